@@ -1,0 +1,57 @@
+"""Errors that a person can act on: what was wrong, where, and what to do."""
+
+from __future__ import annotations
+
+
+class TomoskinError(Exception):
+    """Base of every error that tomoskin raises on purpose.
+
+    Parameters
+    ----------
+    message
+        What was expected and what was found.
+    where
+        The place: file, section and key, row, cell, electrode or port.
+    hint
+        What to do about it.
+    """
+
+    def __init__(self, message: str, *, where: str = "", hint: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.where = where
+        self.hint = hint
+
+    def __str__(self) -> str:
+        """One line: ``where: message (hint)``."""
+        place = f"{self.where}: " if self.where else ""
+        advice = f" ({self.hint})" if self.hint else ""
+        return f"{place}{self.message}{advice}"
+
+
+class SkinError(TomoskinError):
+    """A skin file that cannot be meant: unknown key, wrong unit, impossible value."""
+
+
+class GeometryError(TomoskinError):
+    """An outline, electrode placement or mesh that does not describe a sheet."""
+
+
+class PatternError(TomoskinError):
+    """A drive or measurement table that is inconsistent, or rows that cannot be matched."""
+
+
+class ModelError(TomoskinError):
+    """A forward or inverse problem that has no answer as it was put."""
+
+
+class DataError(TomoskinError):
+    """A recording that is empty, damaged, or of another skin."""
+
+
+class WireError(TomoskinError):
+    """A message that cannot be encoded, or a device that speaks another protocol."""
+
+
+class SourceError(TomoskinError):
+    """A source of frames that cannot be opened, or that went away."""

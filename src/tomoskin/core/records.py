@@ -1,0 +1,124 @@
+"""The frozen records that travel from bytes to touches.
+
+SI units throughout; electrodes, measurements and cells are counted from 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One scan as the device sent it.
+
+    Attributes
+    ----------
+    sequence
+        The device's frame counter, modulo 2³².
+    ticks
+        Device clock at the start of the scan, in ticks (rate in the device's INFO).
+    host_time
+        Host monotonic seconds at which the frame's last byte was read.
+    configuration
+        Identity of the scan configuration that produced the samples.
+    flags
+        Bit field, see the protocol's schema.
+    drops
+        Frames that the device itself has dropped since START.
+    samples
+        (n_samples,) raw counts in scan order, each the sum over the oversampling.
+    """
+
+    sequence: int
+    ticks: int
+    host_time: float
+    configuration: int
+    flags: int
+    drops: int
+    samples: NDArray[np.uint16]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Voltages:
+    """One frame in volts, in the order of the pattern's rows.
+
+    ``values`` is (n_meas,) V; ``railed`` is (n_meas,) bool, True where a sample that the row
+    is made of stood at a rail of the converter.
+    """
+
+    values: FloatArray
+    railed: NDArray[np.bool_]
+    sequence: int
+    ticks: int
+    host_time: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Image:
+    """A change of conductivity per cell.
+
+    ``values`` is (n_cells,) in ``unit``: "S" (sheet), "S/m" (volume) or "relative" (Δσ/σ₀).
+    ``mesh_id`` names the mesh that the values live on (``Mesh.identity``).
+    """
+
+    values: FloatArray
+    unit: str
+    mesh_id: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading:
+    """One region of an image, before it is tracked.
+
+    Attributes
+    ----------
+    x, y
+        Weighted centroid, m.
+    sd_x, sd_y
+        Standard deviation of the centroid that the measurement noise alone causes, m;
+        NaN where the noise is not known.
+    area
+        Area of the region, m².
+    peak
+        Extreme value of the image in the region, signed, in the image's unit.
+    cells
+        (n,) indices of the region's cells.
+    """
+
+    x: float
+    y: float
+    sd_x: float
+    sd_y: float
+    area: float
+    peak: float
+    cells: IntArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Touch:
+    """A tracked region: a reading with an identity that lasts from onset to release."""
+
+    id: int
+    kind: str
+    since: float
+    reading: Reading = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something a person should know: a gap, a refused frame, a lost source.
+
+    ``kind`` is a short stable word, ``text`` a sentence.
+    """
+
+    host_time: float
+    kind: str
+    text: str

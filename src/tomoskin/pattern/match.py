@@ -1,0 +1,85 @@
+"""Foreign measurement rows brought into a pattern's order and sign."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tomoskin.core import FloatArray, IntArray, PatternError
+from tomoskin.pattern.pattern import Pattern
+
+_LISTED = 5
+
+
+@dataclass(frozen=True, eq=False)
+class RowMatch:
+    """Where each row of a pattern is found in a foreign table.
+
+    ``rows`` (n_meas,) index into the foreign table; ``signs`` (n_meas,) ±1;
+    ``unused`` foreign rows that the pattern does not ask for.
+    """
+
+    rows: IntArray
+    signs: FloatArray
+    unused: IntArray
+
+    def apply(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
+        """(…, n_foreign) → (…, n_meas) in the pattern's order and sign."""
+        return np.asarray(values[..., self.rows] * self.signs)
+
+
+def match_rows(pattern: Pattern, drive: ArrayLike, measure: ArrayLike) -> RowMatch:
+    """Match foreign rows to ``pattern`` by their electrodes.
+
+    A row is found as it stands, with a pair reversed (sign changes), or as its reciprocal,
+    drive and measuring pair exchanged (Geselowitz 1971). A row that stands as itself wins over
+    its reciprocal.
+
+    Raises
+    ------
+    PatternError
+        When rows of the pattern are missing in the table; the message lists them.
+    """
+    foreign = Pattern.from_tables(drive, measure)
+    table: dict[tuple[int, ...], tuple[int, float]] = {}
+    for row, (d, m) in enumerate(
+        zip(foreign.drive.tolist(), foreign.measure.tolist(), strict=True)
+    ):
+        key, sign = _canonical(d, m)
+        table[key] = (row, sign)
+    found = [
+        _find(table, d, m)
+        for d, m in zip(pattern.drive.tolist(), pattern.measure.tolist(), strict=True)
+    ]
+    missing = [row for row, hit in enumerate(found) if hit is None]
+    if missing:
+        raise PatternError(_describe(pattern, missing), hint="is it the right skin and pattern?")
+    hits = [hit for hit in found if hit is not None]
+    rows = np.array([row for row, _ in hits], dtype=np.int64)
+    unused = np.setdiff1d(np.arange(foreign.n_meas), rows)
+    return RowMatch(rows, np.array([sign for _, sign in hits]), unused)
+
+
+def _canonical(d: list[int], m: list[int]) -> tuple[tuple[int, ...], float]:
+    sign = (1.0 if d[0] < d[1] else -1.0) * (1.0 if m[0] < m[1] else -1.0)
+    return (min(d), max(d), min(m), max(m)), sign
+
+
+def _find(
+    table: dict[tuple[int, ...], tuple[int, float]], d: list[int], m: list[int]
+) -> tuple[int, float] | None:
+    key, sign = _canonical(d, m)
+    hit = table.get(key) or table.get(key[2:] + key[:2])
+    return None if hit is None else (hit[0], hit[1] * sign)
+
+
+def _describe(pattern: Pattern, missing: list[int]) -> str:
+    listed = "; ".join(
+        f"row {r}: source {pattern.drive[r, 0]}, sink {pattern.drive[r, 1]}, "
+        f"plus {pattern.measure[r, 0]}, minus {pattern.measure[r, 1]}"
+        for r in missing[:_LISTED]
+    )
+    more = f"; and {len(missing) - _LISTED} more" if len(missing) > _LISTED else ""
+    return f"{len(missing)} of {pattern.n_meas} rows are not in the recording: {listed}{more}"

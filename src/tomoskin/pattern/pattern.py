@@ -1,0 +1,232 @@
+"""The pattern: which pair is driven, and which pair is read, row by row."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tomoskin.core import IntArray, PatternError
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """A table of drives and measurements on ``n_electrodes`` electrodes, counted from 0.
+
+    Current +I enters at the source and leaves at the sink; a row's voltage is
+    φ[plus] − φ[minus]. Build one with a named constructor or :meth:`from_tables`.
+
+    Attributes
+    ----------
+    n_electrodes
+        Number of electrodes.
+    drives
+        (n_drive, 2) source, sink of each drive, in scan order.
+    drive_index
+        (n_meas,) the drive that each row belongs to.
+    measure
+        (n_meas, 2) plus, minus of each row.
+
+    Raises
+    ------
+    PatternError
+        When an electrode does not exist, source = sink, plus = minus, a row stands twice
+        (reversed rows included), or there is no row at all.
+    """
+
+    n_electrodes: int
+    drives: IntArray
+    drive_index: IntArray
+    measure: IntArray
+
+    def __post_init__(self) -> None:
+        """Freeze the tables and check every row."""
+        for name in ("drives", "drive_index", "measure"):
+            table = np.array(getattr(self, name), dtype=np.int64)
+            table.flags.writeable = False
+            object.__setattr__(self, name, table)
+        _check_pairs(self.drives, self.n_electrodes, "drive", ("source", "sink"))
+        _check_pairs(self.measure, self.n_electrodes, "measurement", ("plus", "minus"))
+        if len(self.drive_index) != len(self.measure):
+            raise PatternError(
+                f"expected one drive for each of {len(self.measure)} rows, "
+                f"got {len(self.drive_index)}"
+            )
+        outside = (self.drive_index < 0) | (self.drive_index >= len(self.drives))
+        if outside.any():
+            row = int(np.argmax(outside))
+            raise PatternError(
+                f"expected a drive from 0 to {len(self.drives) - 1}, got {self.drive_index[row]}",
+                where=f"measurement row {row}",
+            )
+        _check_unique(self)
+
+    @classmethod
+    def from_tables(
+        cls, drive: ArrayLike, measure: ArrayLike, n_electrodes: int | None = None
+    ) -> Self:
+        """Pattern from two tables, row by row.
+
+        Parameters
+        ----------
+        drive
+            (n_meas, 2) source, sink of each row.
+        measure
+            (n_meas, 2) plus, minus of each row.
+        n_electrodes
+            Number of electrodes; without it, one more than the largest index used.
+
+        The rows keep their order; drives are numbered as they first appear.
+        """
+        drive_rows, measure_rows = _table(drive, "drive"), _table(measure, "measure")
+        if len(drive_rows) != len(measure_rows):
+            raise PatternError(
+                f"expected as many drive rows as measurement rows, "
+                f"got {len(drive_rows)} and {len(measure_rows)}"
+            )
+        unique, first, inverse = np.unique(
+            drive_rows, axis=0, return_index=True, return_inverse=True
+        )
+        order = np.argsort(first, kind="stable")
+        rank = np.argsort(order, kind="stable")
+        count = n_electrodes or 1 + int(max(drive_rows.max(), measure_rows.max()))
+        return cls(count, unique[order], rank[inverse.reshape(-1)], measure_rows)
+
+    @classmethod
+    def from_pairs(
+        cls,
+        n_electrodes: int,
+        drives: ArrayLike,
+        pairs: ArrayLike,
+        *,
+        include_driven: bool = False,
+    ) -> Self:
+        """Every measuring pair under every drive, drive by drive.
+
+        Rows whose pair touches a driven electrode are left out unless ``include_driven``.
+        """
+        drive_table, pair_table = _table(drives, "drive"), _table(pairs, "measure")
+        index = np.repeat(np.arange(len(drive_table)), len(pair_table))
+        measure = np.tile(pair_table, (len(drive_table), 1))
+        if not include_driven:
+            touched = (measure[:, :, None] == drive_table[index][:, None, :]).any(axis=(1, 2))
+            index, measure = index[~touched], measure[~touched]
+        return cls(n_electrodes, drive_table, index, measure)
+
+    @classmethod
+    def adjacent(cls, n: int, *, include_driven: bool = False) -> Self:
+        """Neighbouring electrodes driven and read: n(n−3) rows, in EIDORS' order and signs."""
+        return cls.skip(n, 0, include_driven=include_driven)
+
+    @classmethod
+    def skip(cls, n: int, k: int, *, include_driven: bool = False) -> Self:
+        """Drive i has sink i and source i+k+1; pair j has plus j and minus j+1 (mod n)."""
+        _check_count(n)
+        if not 0 <= k <= n - 2:
+            raise PatternError(f"expected k from 0 to {n - 2} for {n} electrodes, got {k}")
+        e = np.arange(n)
+        drives = np.column_stack([(e + k + 1) % n, e])
+        return cls.from_pairs(n, drives, _neighbours(n), include_driven=include_driven)
+
+    @classmethod
+    def opposite(cls, n: int, *, include_driven: bool = False) -> Self:
+        """Drive i has sink i and source i+n/2, for i < n/2; neighbouring pairs are read."""
+        _check_count(n)
+        if n % 2:
+            raise PatternError(f"expected an even number of electrodes, got {n}")
+        e = np.arange(n // 2)
+        drives = np.column_stack([e + n // 2, e])
+        return cls.from_pairs(n, drives, _neighbours(n), include_driven=include_driven)
+
+    @classmethod
+    def all_pairs(cls, n: int, *, include_driven: bool = False) -> Self:
+        """Each pair a < b driven once (sink a, source b); neighbouring pairs are read."""
+        _check_count(n)
+        sink, source = np.triu_indices(n, 1)
+        drives = np.column_stack([source, sink])
+        return cls.from_pairs(n, drives, _neighbours(n), include_driven=include_driven)
+
+    def joined(self, other: Self) -> Self:
+        """Mixed pattern: the rows of this one, then those of ``other`` that are new."""
+        drive = np.vstack([self.drive, other.drive])
+        measure = np.vstack([self.measure, other.measure])
+        _, first = np.unique(np.hstack([drive, measure]), axis=0, return_index=True)
+        keep = np.sort(first)
+        count = max(self.n_electrodes, other.n_electrodes)
+        return type(self).from_tables(drive[keep], measure[keep], count)
+
+    @property
+    def n_meas(self) -> int:
+        """Number of rows."""
+        return len(self.measure)
+
+    @property
+    def n_drive(self) -> int:
+        """Number of drives."""
+        return len(self.drives)
+
+    @property
+    def drive(self) -> IntArray:
+        """(n_meas, 2) source, sink of each row."""
+        return self.drives[self.drive_index]
+
+    @cached_property
+    def identity(self) -> str:
+        """Short hash of the tables: operators and recordings are matched by it."""
+        digest = hashlib.sha256(str(self.n_electrodes).encode())
+        digest.update(self.drive.astype("<i4").tobytes())
+        digest.update(self.measure.astype("<i4").tobytes())
+        return digest.hexdigest()[:16]
+
+
+def _neighbours(n: int) -> IntArray:
+    e = np.arange(n)
+    return np.column_stack([e, (e + 1) % n])
+
+
+def _check_count(n: int) -> None:
+    if n < 4:
+        raise PatternError(f"expected at least 4 electrodes, got {n}")
+
+
+def _table(value: ArrayLike, name: str) -> IntArray:
+    raw = np.asarray(value)
+    if raw.ndim != 2 or raw.shape[1] != 2 or not len(raw):
+        raise PatternError(f"expected a {name} table of shape (rows, 2), got {raw.shape}")
+    if raw.dtype.kind not in "iu" and not np.array_equal(raw, np.round(raw)):
+        raise PatternError(f"expected whole electrode numbers in the {name} table")
+    return raw.astype(np.int64)
+
+
+def _check_pairs(pairs: IntArray, n: int, kind: str, ends: tuple[str, str]) -> None:
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or not len(pairs):
+        raise PatternError(f"expected a {kind} table of shape (rows, 2), got {pairs.shape}")
+    outside = ((pairs < 0) | (pairs >= n)).any(axis=1)
+    if outside.any():
+        row = int(np.argmax(outside))
+        raise PatternError(
+            f"expected electrodes from 0 to {n - 1}, got {pairs[row].tolist()}",
+            where=f"{kind} row {row}",
+        )
+    same = pairs[:, 0] == pairs[:, 1]
+    if same.any():
+        row = int(np.argmax(same))
+        raise PatternError(
+            f"{ends[0]} and {ends[1]} are both electrode {pairs[row, 0]}",
+            where=f"{kind} row {row}",
+        )
+
+
+def _check_unique(pattern: Pattern) -> None:
+    rows = np.hstack([np.sort(pattern.drive, axis=1), np.sort(pattern.measure, axis=1)])
+    _, inverse, counts = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
+    if counts.max() > 1:
+        twice = np.flatnonzero(inverse.reshape(-1) == np.argmax(counts))[:2].tolist()
+        raise PatternError(
+            f"rows {twice[0]} and {twice[1]} measure the same pair under the same drive",
+            hint="leave one of them out",
+        )
