@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tomoskin.core import FloatArray, IntArray, PatternError
 from tomoskin.pattern.pattern import Pattern
@@ -25,7 +26,7 @@ class RowMatch:
     signs: FloatArray
     unused: IntArray
 
-    def apply(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
+    def apply(self, values: FloatArray) -> FloatArray:
         """(…, n_foreign) → (…, n_meas) in the pattern's order and sign."""
         return np.asarray(values[..., self.rows] * self.signs)
 
@@ -60,6 +61,10 @@ def match_rows(pattern: Pattern, drive: ArrayLike, measure: ArrayLike) -> RowMat
     rows = np.array([row for row, _ in hits], dtype=np.int64)
     unused = np.setdiff1d(np.arange(foreign.n_meas), rows)
     return RowMatch(rows, np.array([sign for _, sign in hits]), unused)
+
+
+def _rows(pattern: Pattern) -> Iterator[tuple[list[int], list[int]]]:
+    return zip(pattern.drive.tolist(), pattern.measure.tolist(), strict=True)
 
 
 def _canonical(d: list[int], m: list[int]) -> tuple[tuple[int, ...], float]:

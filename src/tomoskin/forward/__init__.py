@@ -1,0 +1,7 @@
+"""The complete electrode model: from conductivity to voltages and their derivatives."""
+
+from tomoskin.forward.model import ForwardModel
+from tomoskin.forward.solution import Solution
+from tomoskin.forward.state import State
+
+__all__ = ["ForwardModel", "Solution", "State"]
