@@ -1,0 +1,86 @@
+# Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help live test test-all bench lint lock wheel clean page dev
+
+VENV := .venv
+PY := $(VENV)/bin/python
+PIP := $(PY) -m pip --disable-pip-version-check --quiet
+PINNED := $(PIP) install --require-hashes --only-binary :all:
+NEEDS_NETWORK := { echo "set-up: the packages could not be installed (see above); the first run needs the network." >&2; exit 1; }
+SOURCES := src tests benchmarks examples scripts hatch_build.py
+
+help:  ## this list
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1	/p' Makefile
+
+live: $(VENV)/.installed page  ## the live page of a simulated skin
+	@$(VENV)/bin/tomoskin live $(ARGS)
+
+test: lint  ## lint, page tests and the test suite, without what is slow
+	@$(PY) scripts/page.py run test
+	@sh scripts/chromium.sh
+	@$(PY) -m pytest $(ARGS)
+
+test-all: lint  ## the same, with what is slow
+	@$(PY) scripts/page.py run test
+	@sh scripts/chromium.sh
+	@$(PY) -m pytest -m "" $(ARGS)
+
+bench: $(VENV)/.installed  ## time from bytes to touches
+	@$(VENV)/bin/tomoskin bench frame $(ARGS)
+
+lint: dev page  ## ruff, mypy and the page's types
+	@$(PY) -m ruff check $(SOURCES)
+	@$(PY) -m ruff format --check $(SOURCES)
+	@$(PY) -m mypy
+	@$(PY) scripts/page.py run check
+
+wheel: dev page  ## a wheel with the built page, in dist/
+	@$(PY) -m hatchling build -t wheel
+
+lock: dev  ## pin the newest packages, with hashes, in requirements/*.txt
+	@for out in $(LOCKS); do $(MAKE) --no-print-directory lock-$$out || exit 1; done
+
+clean:  ## remove everything that make made
+	rm -rf $(VENV) build dist src/tomoskin/live/static src/tomoskin/live/web/node_modules
+	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
+# Set-up. A stamp's time says when its step was last done.
+
+$(VENV)/.made: scripts/venv.sh
+	@sh scripts/venv.sh $(VENV)
+	@touch $@
+
+$(VENV)/.runtime: requirements/runtime.txt $(VENV)/.made
+	@echo "set-up: Python packages"
+	@$(PINNED) -r $< || $(NEEDS_NETWORK)
+	@touch $@
+
+$(VENV)/.dev: requirements/dev.txt $(VENV)/.runtime
+	@echo "set-up: Python packages for tests"
+	@$(PINNED) -r $< || $(NEEDS_NETWORK)
+	@touch $@
+
+# Without build isolation: the backend is among the pinned packages, and nothing is downloaded.
+$(VENV)/.installed: pyproject.toml hatch_build.py $(VENV)/.runtime | page
+	@$(PIP) install --no-build-isolation --no-deps --no-index --editable .
+	@touch $@
+
+dev: $(VENV)/.dev $(VENV)/.installed
+	@$(PY) scripts/page.py has-node || $(PINNED) -r requirements/node.txt || $(NEEDS_NETWORK)
+
+page: $(VENV)/.runtime
+	@$(PY) scripts/page.py fresh || { echo "set-up: the page"; \
+		{ $(PY) scripts/page.py has-node || $(PINNED) -r requirements/node.txt || $(NEEDS_NETWORK); } \
+		&& $(PY) scripts/page.py build; }
+
+COMPILE := $(PY) -m uv --quiet pip compile --upgrade --universal --python-version 3.11 \
+	--generate-hashes --no-emit-index-url --custom-compile-command "make lock"
+LOCKS := runtime dev node
+.PHONY: $(LOCKS:%=lock-%)
+lock-runtime:
+	@$(COMPILE) pyproject.toml requirements/build.in -o requirements/runtime.txt
+lock-dev:
+	@$(COMPILE) pyproject.toml --all-extras requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
+lock-node:
+	@$(COMPILE) requirements/node.in -o requirements/node.txt
