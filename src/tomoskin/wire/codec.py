@@ -1,0 +1,154 @@
+"""Payload ↔ message, driven by the schema."""
+
+from __future__ import annotations
+
+import dataclasses
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tomoskin.core import Frame, WireError
+from tomoskin.wire.framing import enclose
+from tomoskin.wire.messages import ENUMS, RECORDS, STRUCTS, Message
+from tomoskin.wire.schema import SCALARS, SCHEMA, FieldSpec, MessageSpec, Schema, StructSpec
+
+_HOST_FIELD = "host_time"
+"""The one field of a record that is not on the wire: the host's own time of reading."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How one message lies in its payload, worked out once from the schema.
+
+    ``head`` packs the type byte and every field but the tail; ``tail`` is the
+    :mod:`struct` layout of one item of the field that fills the rest, if there is one.
+    """
+
+    spec: MessageSpec
+    record: type[Message]
+    head: struct.Struct
+    names: tuple[str, ...]
+    enums: tuple[tuple[int, Callable[[int], Any]], ...]
+    tail: struct.Struct | None
+    tail_record: type[Any] | None
+
+
+def _layout(spec: MessageSpec, structs: dict[str, StructSpec]) -> Layout:
+    record = RECORDS[spec.name]
+    names = tuple(field.name for field in spec.fields)
+    own = tuple(f.name for f in dataclasses.fields(record) if f.name != _HOST_FIELD)
+    if own != names:
+        raise WireError(f"expected the schema's fields {names}, got {own}", where=record.__name__)
+    fixed = [field for field in spec.fields if not field.is_tail]
+    tail = next((field for field in spec.fields if field.is_tail), None)
+    enums = tuple(
+        (number, ENUMS[field.enum])
+        for number, field in enumerate(fixed, start=1)
+        if field.enum and field.enum != "flag"
+    )
+    return Layout(
+        spec, record, struct.Struct("<B" + "".join(map(_code, fixed))), names, enums,
+        struct.Struct("<" + _item(tail, structs)) if tail else None,
+        STRUCTS.get(tail.item) if tail else None,
+    )  # fmt: skip
+
+
+def _code(field: FieldSpec) -> str:
+    return SCALARS[field.item] if field.length == 1 else f"{field.length}s"
+
+
+def _item(field: FieldSpec, structs: dict[str, StructSpec]) -> str:
+    if field.item in SCALARS:
+        return SCALARS[field.item]
+    return "".join(_code(part) for part in structs[field.item].fields)
+
+
+def _layouts(schema: Schema) -> tuple[dict[int, Layout], dict[type[Message], Layout]]:
+    layouts = [_layout(spec, schema.structs) for spec in schema.messages]
+    return {x.spec.type: x for x in layouts}, {x.record: x for x in layouts}
+
+
+_BY_TYPE, _BY_RECORD = _layouts(SCHEMA)
+
+
+def type_byte(record: type[Message]) -> int:
+    """The type byte of a message."""
+    return _BY_RECORD[record].spec.type
+
+
+def encode(message: Message) -> bytes:
+    """The bytes on the line for ``message``; WireError when a value does not fit its field."""
+    payload = encode_payload(message)
+    to_device = _BY_RECORD[type(message)].spec.to_device
+    limit = SCHEMA.to_device_bytes if to_device else SCHEMA.from_device_bytes
+    if len(payload) + 2 > limit:
+        raise WireError(
+            f"expected at most {limit} bytes with the checksum, got {len(payload) + 2}",
+            where=_BY_RECORD[type(message)].spec.name,
+        )
+    return enclose(payload)
+
+
+def encode_payload(message: Message) -> bytes:
+    """Type byte and fields, without checksum."""
+    layout = _BY_RECORD[type(message)]
+    values = [getattr(message, name) for name in layout.names]
+    try:
+        if layout.tail is None:
+            return layout.head.pack(layout.spec.type, *values)
+        return layout.head.pack(layout.spec.type, *values[:-1]) + _pack_tail(layout, values[-1])
+    except struct.error as error:
+        raise WireError(f"{error} in {message!r}", where=layout.spec.name) from error
+
+
+def _pack_tail(layout: Layout, items: Any) -> bytes:
+    if layout.tail_record is None:
+        samples = np.asarray(items)
+        if samples.dtype != np.uint16 or samples.ndim != 1:
+            raise WireError(
+                f"expected samples (n,) of uint16, got {samples.shape} of {samples.dtype}",
+                where=layout.spec.name,
+            )
+        return samples.astype("<u2", copy=False).tobytes()
+    assert layout.tail is not None
+    return b"".join(layout.tail.pack(*dataclasses.astuple(item)) for item in items)
+
+
+def decode_payload(payload: bytes, host_time: float) -> Message | None:
+    """The message in a payload whose checksum was right; None when it is not of this schema."""
+    layout = _BY_TYPE.get(payload[0]) if payload else None
+    if layout is None or not _fits(layout, len(payload)):
+        return None
+    values: list[Any] = list(layout.head.unpack_from(payload))
+    try:
+        for number, enum in layout.enums:
+            values[number] = enum(values[number])
+    except ValueError:
+        return None
+    if layout.tail is None:
+        return layout.record(*values[1:])
+    if layout.record is Frame:
+        return _frame(values, payload, layout.head.size, host_time)
+    record = layout.tail_record
+    assert record is not None
+    items = tuple(record(*item) for item in layout.tail.iter_unpack(payload[layout.head.size :]))
+    return layout.record(*values[1:], items)  # type: ignore[call-arg]
+
+
+def _fits(layout: Layout, length: int) -> bool:
+    rest = length - layout.head.size
+    return rest >= 0 and (rest % layout.tail.size == 0 if layout.tail else rest == 0)
+
+
+def _frame(values: list[Any], payload: bytes, size: int, host_time: float) -> Frame:
+    sequence, ticks, configuration, flags, drops = values[1:]
+    samples = np.frombuffer(payload, dtype="<u2", offset=size)
+    return Frame(sequence, ticks, host_time, configuration, flags, drops, samples)
+
+
+def is_command(message: Message) -> bool:
+    """Whether ``message`` goes to the device."""
+    return _BY_RECORD[type(message)].spec.to_device

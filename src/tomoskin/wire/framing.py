@@ -1,0 +1,63 @@
+"""Payload ↔ bytes on the line: COBS(payload ‖ CRC-16/CCITT-FALSE, big-endian) ‖ 0x00."""
+
+from __future__ import annotations
+
+from binascii import crc_hqx
+
+_FULL = 254
+"""Longest run of data bytes behind one COBS code byte."""
+
+
+def crc16(data: bytes | bytearray) -> int:
+    """CRC-16/CCITT-FALSE (polynomial 0x1021, start 0xFFFF); of ``b"123456789"``: 0x29B1."""
+    return crc_hqx(data, 0xFFFF)
+
+
+def cobs_encode(data: bytes) -> bytes:
+    """Bytes without 0x00 that stand for ``data`` (Cheshire and Baker 1999)."""
+    out = bytearray()
+    for run in data.split(b"\0"):
+        start = 0
+        while len(run) - start >= _FULL:
+            out.append(_FULL + 1)
+            out += run[start : start + _FULL]
+            start += _FULL
+        out.append(len(run) - start + 1)
+        out += run[start:]
+    if run and len(run) % _FULL == 0:
+        out.pop()  # a full run at the very end needs no code byte behind it
+    return bytes(out)
+
+
+def cobs_decode(block: bytes) -> bytes | None:
+    """What ``block`` stands for, or None when it holds a 0x00 or its code bytes do not add up.
+
+    Works in place: a code byte becomes the zero that it stands for, so the loop visits code
+    bytes only.
+    """
+    if not block or 0 in block:
+        return None
+    data = bytearray(block)
+    length, place = len(data), 0
+    overhead = [0]
+    while place < length:
+        code = data[place]
+        data[place] = 0
+        place += code
+        if code > _FULL:
+            overhead.append(place)
+    if place != length:
+        return None
+    for byte in reversed(overhead):
+        del data[byte : byte + 1]
+    return bytes(data)
+
+
+def enclose(payload: bytes) -> bytes:
+    """The bytes on the line for one payload."""
+    return cobs_encode(payload + crc16(payload).to_bytes(2, "big")) + b"\0"
+
+
+def enclosed_size(size: int) -> int:
+    """Most bytes before the 0x00 for ``size`` bytes of payload and checksum."""
+    return size + 1 + size // _FULL

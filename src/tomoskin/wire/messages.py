@@ -1,0 +1,226 @@
+"""The messages as frozen records; their names, fields and order are the schema's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+
+from tomoskin.core import Frame
+
+
+class Result(IntEnum):
+    """Outcome of a command."""
+
+    OK = 0
+    UNKNOWN_COMMAND = 1
+    BAD_LENGTH = 2
+    BAD_VALUE = 3
+    SAME_ELECTRODE = 4
+    NO_SUCH_CHANNEL = 5
+    TOO_MANY_DRIVES = 6
+    TOO_MANY_SAMPLES = 7
+    WRONG_CONFIGURATION = 8
+    INCOMPLETE = 9
+    BUSY = 10
+    CURRENT_TOO_HIGH = 11
+
+
+class FaultCode(IntEnum):
+    """Why the board went to its safe state by itself."""
+
+    HOST_SILENT = 1
+    WATCHDOG = 2
+    BROWN_OUT = 3
+    CURRENT_TOO_LONG = 4
+    SWITCH_REFUSED = 5
+    CONVERTER = 6
+    INTERNAL = 7
+
+
+class Reset(IntEnum):
+    """Why the board started."""
+
+    UNKNOWN = 0
+    POWER = 1
+    EXTERNAL = 2
+    BROWN_OUT = 3
+    WATCHDOG = 4
+
+
+class FrameFlag(IntFlag):
+    """Bits of ``Frame.flags``."""
+
+    FIRST = 1
+    DROPPED = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """One drive: source and sink channel, and bit e of ``mask`` set where e is sampled."""
+
+    source: int
+    sink: int
+    mask: int
+
+
+@dataclass(frozen=True, slots=True)
+class Hello:
+    """The board is here and idle; versions and schema hash for the first check."""
+
+    major: int
+    minor: int
+    schema_hash: int
+
+
+@dataclass(frozen=True, slots=True)
+class Info:
+    """What the board is and can do: ``tick_rate`` Hz, ``current`` µA, ``max_baud`` Bd."""
+
+    request: int
+    major: int
+    minor: int
+    schema_hash: int
+    firmware: bytes
+    reset: Reset
+    channels: int
+    adc_bits: int
+    max_oversampling: int
+    max_drives: int
+    max_samples: int
+    tick_rate: int
+    current: int
+    max_baud: int
+    unique_id: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Ack:
+    """Outcome of a command; ``command`` is its type byte."""
+
+    request: int
+    command: int
+    result: Result
+    detail: int
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """The board went to its safe state by itself."""
+
+    ticks: int
+    code: FaultCode
+    detail: int
+
+
+@dataclass(frozen=True, slots=True)
+class GetInfo:
+    """Ask for :class:`Info`."""
+
+    request: int
+
+
+@dataclass(frozen=True, slots=True)
+class Ping:
+    """The host is alive."""
+
+    request: int
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Stop scanning, all channels high-impedance."""
+
+    request: int
+
+
+@dataclass(frozen=True, slots=True)
+class SafeOff:
+    """As :class:`Stop`, and forget the configuration."""
+
+    request: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetScan:
+    """Begin a configuration: ``settling`` and ``dead_time`` µs, ``current_limit`` µA."""
+
+    request: int
+    configuration: int
+    n_drives: int
+    settling: int
+    dead_time: int
+    oversampling: int
+    prescaler: int
+    current_limit: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetPattern:
+    """Set drives ``first``, ``first`` + 1, … of the configuration."""
+
+    request: int
+    configuration: int
+    first: int
+    drives: tuple[Drive, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Scan and send frames."""
+
+    request: int
+    configuration: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetBaud:
+    """Change the serial rate to ``baud`` Bd."""
+
+    request: int
+    baud: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetHeartbeat:
+    """Host silence tolerated while scanning, ``interval`` ms."""
+
+    request: int
+    interval: int
+
+
+Command = GetInfo | Ping | Stop | SafeOff | SetScan | SetPattern | Start | SetBaud | SetHeartbeat
+"""Messages to the device."""
+
+Report = Hello | Info | Ack | Fault | Frame
+"""Messages from the device."""
+
+Message = Command | Report
+
+RECORDS: dict[str, type[Message]] = {
+    "HELLO": Hello,
+    "INFO": Info,
+    "ACK": Ack,
+    "FAULT": Fault,
+    "FRAME": Frame,
+    "GET_INFO": GetInfo,
+    "PING": Ping,
+    "STOP": Stop,
+    "SAFE_OFF": SafeOff,
+    "SET_SCAN": SetScan,
+    "SET_PATTERN": SetPattern,
+    "START": Start,
+    "SET_BAUD": SetBaud,
+    "SET_HEARTBEAT": SetHeartbeat,
+}
+"""Record of each message of the schema."""
+
+STRUCTS: dict[str, type[Drive]] = {"drive": Drive}
+"""Record of each repeated group."""
+
+ENUMS: dict[str, type[IntEnum] | type[IntFlag]] = {
+    "result": Result,
+    "fault": FaultCode,
+    "reset": Reset,
+    "flag": FrameFlag,
+}
+"""Python side of each enumeration."""
