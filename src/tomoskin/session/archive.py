@@ -1,0 +1,55 @@
+"""Opening .npz archives that may be damaged, hostile or of another kind."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import DataError
+
+MAX_BYTES = 4 << 30
+"""An archive that unpacks to more than this is refused."""
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def load_arrays(path: Path) -> Arrays:
+    """All arrays of a .npz file; never unpickles.
+
+    Raises
+    ------
+    DataError
+        When the file is missing, no archive, torn, too large when unpacked, or holds objects.
+    """
+    where = str(path)
+    try:
+        _check_size(path)
+        with np.load(path, allow_pickle=False) as archive:
+            if not isinstance(archive, np.lib.npyio.NpzFile):
+                raise DataError("expected an .npz archive, got a single array", where=where)
+            return {key: np.asarray(archive[key]) for key in archive.files}
+    except FileNotFoundError as error:
+        raise DataError("there is no such file", where=where) from error
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror or error}", where=where) from error
+    except (zipfile.BadZipFile, EOFError, zipfile.LargeZipFile) as error:
+        raise DataError(
+            f"is not a whole .npz archive: {error}", where=where, hint="copy it again"
+        ) from error
+    except (ValueError, KeyError, NotImplementedError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+        raise DataError(f"holds an array that cannot be read: {error}", where=where) from error
+
+
+def _check_size(path: Path) -> None:
+    with zipfile.ZipFile(path) as archive:
+        size = sum(member.file_size for member in archive.infolist())
+    if size > MAX_BYTES:
+        raise DataError(
+            f"unpacks to {size / 2**30:.1f} GiB, more than {MAX_BYTES / 2**30:.0f}",
+            where=str(path),
+            hint="split it",
+        )

@@ -1,0 +1,88 @@
+"""The interchange file: a plain .npz that any tool can write.
+
+Keys: ``voltages`` (n_frames, n_meas) V, or ``dv``; ``drive`` (n_meas, 2) source, sink;
+``measure`` (n_meas, 2) plus, minus; optional ``time_s`` (n_frames,), ``reference`` (n_meas,),
+``xy_m`` (n_frames, 2).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import DataError, IntArray
+from tomoskin.session.archive import Arrays
+from tomoskin.session.recording import Recording, frame_times
+
+REQUIRED = frozenset({"drive", "measure"})
+
+
+def detects(arrays: Arrays) -> bool:
+    """Whether the keys are those of an interchange file."""
+    return set(arrays) >= REQUIRED and len({"voltages", "dv"} & set(arrays)) > 0
+
+
+def parse(arrays: Arrays, source: str) -> Recording:
+    """Return the recording in the arrays of an interchange file.
+
+    Raises
+    ------
+    DataError
+        When both or neither of voltages and dv are there, a key has the wrong type or shape.
+    """
+    if "voltages" in arrays and "dv" in arrays:
+        raise DataError("holds both voltages and dv", where=source, hint="keep one of them")
+    key = "voltages" if "voltages" in arrays else "dv"
+    voltages = np.atleast_2d(numbers(arrays, key, source))
+    n = len(voltages)
+    return Recording(
+        voltages=voltages,
+        drive=electrode_table(arrays, "drive", source),
+        measure=electrode_table(arrays, "measure", source),
+        time=numbers(arrays, "time_s", source) if "time_s" in arrays else frame_times(n),
+        reference=numbers(arrays, "reference", source) if "reference" in arrays else None,
+        labels=numbers(arrays, "xy_m", source) if "xy_m" in arrays else None,
+        is_change=key == "dv",
+        source=source,
+    )
+
+
+def write_interchange(path: Path, recording: Recording) -> None:
+    """Write ``recording`` as an interchange file."""
+    arrays: dict[str, NDArray[Any]] = {
+        "dv" if recording.is_change else "voltages": recording.voltages,
+        "drive": recording.drive,
+        "measure": recording.measure,
+        "time_s": recording.time,
+    }
+    if recording.reference is not None:
+        arrays["reference"] = recording.reference
+    if recording.labels is not None:
+        arrays["xy_m"] = recording.labels
+    try:
+        with path.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+    except OSError as error:
+        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+
+
+def numbers(arrays: Arrays, key: str, source: str) -> NDArray[Any]:
+    """Array ``key`` as float64, or complex128 where it is complex."""
+    array = arrays[key]
+    if array.dtype.kind not in "biufc":
+        raise DataError(f"expected numbers in {key}, got {array.dtype}", where=source)
+    return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64)
+
+
+def electrode_table(arrays: Arrays, key: str, source: str) -> IntArray:
+    """Array ``key`` as an (n, 2) table of electrodes from 0."""
+    table = numbers(arrays, key, source).real
+    if table.ndim != 2 or table.shape[1] != 2 or not np.array_equal(table, np.round(table)):
+        raise DataError(
+            f"expected {key} as (rows, 2) electrode numbers, got shape {table.shape}",
+            where=source,
+        )
+    return table.astype(np.int64)

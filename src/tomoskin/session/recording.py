@@ -1,0 +1,105 @@
+"""A recording that is whole in memory: frames of voltages with their own table of rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.pattern import Pattern, match_rows
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Frames with the drive and measurement of each row, in the file's own order.
+
+    Attributes
+    ----------
+    voltages
+        (n_frames, n_rows) V or instrument units, real or complex; differences when ``is_change``.
+    drive, measure
+        (n_rows, 2) source, sink; plus, minus.
+    time
+        (n_frames,) s.
+    reference
+        (n_rows,) the file's own reference, or None.
+    labels
+        (n_frames, 2) m, known places of a single touch, or None.
+    is_change
+        True when the file holds differences (``dv``) rather than voltages.
+    source
+        Where it came from, for messages.
+    """
+
+    voltages: NDArray[Any]
+    drive: IntArray
+    measure: IntArray
+    time: FloatArray
+    reference: NDArray[Any] | None
+    labels: FloatArray | None
+    is_change: bool
+    source: str
+
+    def __post_init__(self) -> None:
+        """Check that the shapes belong together and that there is a frame."""
+        if self.voltages.ndim != 2 or not self.voltages.size:
+            raise DataError(
+                f"expected voltages (n_frames, n_rows), got shape {self.voltages.shape}: "
+                "the recording is empty",
+                where=self.source,
+            )
+        n_frames, n_rows = self.voltages.shape
+        _check(self.drive.shape, (n_rows, 2), "drive", self.source)
+        _check(self.measure.shape, (n_rows, 2), "measure", self.source)
+        _check(self.time.shape, (n_frames,), "time_s", self.source)
+        if self.reference is not None:
+            _check(self.reference.shape, (n_rows,), "reference", self.source)
+        if self.labels is not None:
+            _check(self.labels.shape, (n_frames, 2), "xy_m", self.source)
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.voltages)
+
+    def in_order_of(self, pattern: Pattern) -> Recording:
+        """Return the recording with exactly the pattern's rows, in its order and signs.
+
+        Raises
+        ------
+        DataError
+            When the recording has another number of electrodes.
+        PatternError
+            When rows are missing; the message lists them.
+        """
+        electrodes = 1 + int(max(self.drive.max(), self.measure.max()))
+        if electrodes > pattern.n_electrodes:
+            raise DataError(
+                f"the recording uses electrodes E1 to E{electrodes}, "
+                f"the skin has {pattern.n_electrodes}",
+                where=self.source,
+                hint="choose the skin that it was recorded with: --skin",
+            )
+        match = match_rows(pattern, self.drive, self.measure)
+        return Recording(
+            voltages=match.apply(self.voltages),
+            drive=pattern.drive,
+            measure=pattern.measure,
+            time=self.time,
+            reference=None if self.reference is None else match.apply(self.reference),
+            labels=self.labels,
+            is_change=self.is_change,
+            source=self.source,
+        )
+
+
+def _check(got: tuple[int, ...], expected: tuple[int, ...], key: str, source: str) -> None:
+    if got != expected:
+        raise DataError(f"expected {key} of shape {expected}, got {got}", where=source)
+
+
+def frame_times(n_frames: int, rate: float = 1.0) -> FloatArray:
+    """(n_frames,) s: frames at a constant rate, for files that hold no times."""
+    return np.arange(n_frames) / rate

@@ -1,0 +1,66 @@
+"""Raw counts of a frame → volts in the pattern's order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import DataError, Frame, Voltages
+from tomoskin.pattern import Scan
+from tomoskin.skin import ReadoutSettings
+
+
+@dataclass(frozen=True, eq=False)
+class Readout:
+    """The converter and amplifier chain, inverted.
+
+    Attributes
+    ----------
+    scan
+        Which sample is which electrode under which drive.
+    volts_per_count
+        Skin voltage per count of the summed readings, V.
+    low, high
+        A sample at or beyond these summed counts stood at a rail.
+    """
+
+    scan: Scan
+    volts_per_count: float
+    low: int
+    high: int
+
+    @classmethod
+    def of(cls, scan: Scan, settings: ReadoutSettings) -> Self:
+        """Read-out of a skin; one count of each summed reading is left as margin at the rails."""
+        full = (1 << settings.adc_bits) - 1
+        n = settings.oversampling
+        volts = settings.reference_voltage / (full * settings.gain * n)
+        return cls(scan, volts, low=n, high=(full - 1) * n)
+
+    def __call__(self, frame: Frame) -> Voltages:
+        """Voltages of one frame.
+
+        The amplifier's offset is common to both samples of a row and leaves with the difference.
+
+        Raises
+        ------
+        DataError
+            When the frame has another number of samples than the scan.
+        """
+        samples = frame.samples.astype(np.int64)
+        if len(samples) != self.scan.n_samples:
+            raise DataError(
+                f"expected {self.scan.n_samples} samples, got {len(samples)}",
+                where=f"frame {frame.sequence}",
+            )
+        plus, minus = self.scan.plus, self.scan.minus
+        at_rail = (samples <= self.low) | (samples >= self.high)
+        return Voltages(
+            values=(samples[plus] - samples[minus]) * self.volts_per_count,
+            railed=at_rail[plus] | at_rail[minus],
+            sequence=frame.sequence,
+            ticks=frame.ticks,
+            host_time=frame.host_time,
+        )

@@ -1,0 +1,38 @@
+"""What measurement noise alone does to an image: the floor under every touch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseFloor:
+    """Measurement noise carried through a linear operator.
+
+    ``spread`` (n_cells, n_meas): the operator times each row's standard deviation, so that
+    spread · spreadᵀ is the image's covariance for independent noise; ``sd`` (n_cells,) the
+    square root of its diagonal.
+    """
+
+    spread: FloatArray
+    sd: FloatArray
+
+    @classmethod
+    def of(cls, operator: FloatArray, noise: FloatArray) -> Self:
+        """Floor of ``operator`` (n_cells, n_meas) under ``noise`` (n_meas,) of its input."""
+        spread = operator * noise
+        return cls(spread, np.sqrt(np.einsum("cm,cm->c", spread, spread)))
+
+    def centroid_sd(self, cells: IntArray, weights: FloatArray, offset: FloatArray) -> FloatArray:
+        """Standard deviation of a weighted centroid, (2,) m, to first order.
+
+        ``weights`` (n,) image values of the ``cells`` and ``offset`` (n, 2) their positions
+        relative to the centroid: a change δw moves it by Σ offset δw / Σ w.
+        """
+        lever = offset.T / weights.sum()
+        return np.asarray(np.linalg.norm(lever @ self.spread[cells], axis=1))
