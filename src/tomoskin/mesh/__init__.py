@@ -1,6 +1,23 @@
 """Outlines, electrodes and the triangles or tetrahedra between them."""
 
+from tomoskin.mesh.arcs import ElectrodeArc
 from tomoskin.mesh.mesh import Mesh
+from tomoskin.mesh.outline import Disc, Ellipse, Outline
+from tomoskin.mesh.polygon import Polygon, Rectangle
+from tomoskin.mesh.quality import Quality, quality
 from tomoskin.mesh.topology import simplex_measure
+from tomoskin.mesh.triangulate import triangulate
 
-__all__ = ["Mesh", "simplex_measure"]
+__all__ = [
+    "Disc",
+    "ElectrodeArc",
+    "Ellipse",
+    "Mesh",
+    "Outline",
+    "Polygon",
+    "Quality",
+    "Rectangle",
+    "quality",
+    "simplex_measure",
+    "triangulate",
+]

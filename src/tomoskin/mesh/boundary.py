@@ -1,0 +1,163 @@
+"""The rim as a closed chain of nodes: electrode ends and corners exactly, graded between."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tomoskin.core import FloatArray, GeometryError, IntArray
+from tomoskin.mesh.arcs import ElectrodeArc
+from tomoskin.mesh.outline import Outline
+from tomoskin.mesh.sizing import SizeField
+
+AT_ELECTRODE = 0.4
+"""Edge length at an electrode, as a fraction of that far from all electrodes."""
+
+MIN_FACETS = 2
+"""An electrode is cut into at least this many facets."""
+
+_SAME = 1e-9
+"""Nodes nearer than this fraction of the outline's length are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """A closed chain of rim nodes, counter-clockwise; edge i runs from node i to i + 1.
+
+    Attributes
+    ----------
+    s
+        (n,) arclengths, ascending, the first one below ``length``; m.
+    points
+        (n, 2) m.
+    owner
+        (n,) electrode that edge i belongs to, −1 for none.
+    """
+
+    s: FloatArray
+    points: FloatArray
+    owner: IntArray
+
+    @property
+    def midpoints(self) -> FloatArray:
+        """(n, 2) middle of each edge, m."""
+        return np.asarray((self.points + np.roll(self.points, -1, axis=0)) / 2)
+
+    @property
+    def lengths(self) -> FloatArray:
+        """(n,) length of each edge, m."""
+        return np.asarray(np.linalg.norm(np.roll(self.points, -1, axis=0) - self.points, axis=1))
+
+
+def breakpoints(outline: Outline, arcs: Sequence[ElectrodeArc]) -> tuple[FloatArray, IntArray]:
+    """Arclengths that must be nodes, ascending, and the electrode that follows each (or −1)."""
+    length = outline.length
+    ends = [(a.start % length, (a.start + a.width(outline)) % length) for a in arcs]
+    exact = np.array(ends).ravel()
+    corners = outline.corners % length
+    if len(corners):  # an electrode that ends at a corner ends exactly there
+        gap = np.abs(corners[:, None] - exact[None])
+        corners = corners[np.minimum(gap, length - gap).min(axis=1) > _SAME * length]
+    nodes = np.unique(np.concatenate([exact, corners]))
+    middle = (nodes + (np.append(nodes[1:], nodes[0] + length) - nodes) / 2) % length
+    owner = np.full(len(nodes), -1)
+    for number, (arc, (start, _)) in enumerate(zip(arcs, ends, strict=True)):
+        owner[(middle - start) % length < arc.width(outline)] = number
+    return nodes, owner
+
+
+def discretise(outline: Outline, arcs: Sequence[ElectrodeArc], coarse: float) -> Boundary:
+    """Rim nodes for cells of edge length ``coarse`` far from the electrodes, m.
+
+    Every edge's diametral circle is free of other nodes, so that each edge is in every
+    Delaunay triangulation whose inner points keep out of those circles too.
+    """
+    nodes, owner = breakpoints(outline, arcs)
+    spans = np.diff(nodes, append=nodes[0] + outline.length)
+    field = _rim_sizes(outline, nodes, owner, spans, coarse)
+    pieces, owners = [], []
+    for start, span, electrode in zip(nodes, spans, owner, strict=True):
+        least = MIN_FACETS if electrode >= 0 else 1
+        piece = _graded(outline, start, span, field, least)
+        pieces.append(piece)
+        owners.append(np.full(len(piece), electrode))
+    s, who = np.concatenate(pieces), np.concatenate(owners)
+    return _split_encroached(outline, s, who)
+
+
+def _rim_sizes(
+    outline: Outline, nodes: FloatArray, owner: IntArray, spans: FloatArray, coarse: float
+) -> SizeField:
+    """Sources along electrodes and short stretches; nothing asks for more than its own span."""
+    points, sizes = [], []
+    for start, span, electrode in zip(nodes, spans, owner, strict=True):
+        size = min(AT_ELECTRODE * coarse, span / MIN_FACETS) if electrode >= 0 else span
+        if size < coarse:
+            count = 1 + math.ceil(2 * span / size)
+            points.append(outline.point(np.linspace(start, start + span, count)))
+            sizes.append(np.full(count, size))
+    return SizeField(coarse, np.concatenate(points), np.concatenate(sizes))
+
+
+def _graded(
+    outline: Outline, start: float, span: float, field: SizeField, least: int
+) -> FloatArray:
+    """Arclengths from ``start`` (included) to its end (left out), spaced as the field asks."""
+    samples = 1 + max(16, math.ceil(8 * span / field.sizes.min()))
+    s = np.linspace(0.0, span, min(samples, 20_001))
+    density = 1.0 / field(outline.point(start + s))
+    steps = np.diff(s) * (density[1:] + density[:-1]) / 2
+    count = np.concatenate([[0.0], np.cumsum(steps)])
+    parts = max(least, round(float(count[-1])))
+    wanted = np.arange(parts) * (count[-1] / parts)
+    return np.asarray(start + np.interp(wanted, count, s))
+
+
+def _split_encroached(outline: Outline, s: FloatArray, owner: IntArray) -> Boundary:
+    """Halve edges until no node lies in another edge's diametral circle.
+
+    Next to a corner the cut is made at a power-of-two distance from it, so that the two
+    sides of a sharp corner are cut alike and the splitting ends.
+    """
+    corners = outline.corners
+    for _ in range(60):
+        rim = Boundary(s, outline.point(s), owner)
+        tree = cKDTree(rim.points)
+        gap, _near = tree.query(rim.midpoints)
+        bad = gap < rim.lengths / 2 * (1 - 1e-7)
+        if not bad.any():
+            return rim
+        ahead = np.append(s[1:], s[0] + outline.length)
+        cut = _cut(s[bad], ahead[bad], corners, outline.length)
+        s = np.concatenate([s, cut])
+        owner = np.concatenate([owner, owner[bad]])
+        order = np.argsort(s, kind="stable")
+        s, owner = s[order], owner[order]
+    worst = rim.points[int(np.argmax(rim.lengths * bad))] * 1e3
+    raise GeometryError(
+        "the outline comes too near to itself to be meshed",
+        where=f"near ({worst[0]:.4g}, {worst[1]:.4g}) mm",
+    )
+
+
+def _cut(start: FloatArray, end: FloatArray, corners: FloatArray, length: float) -> FloatArray:
+    """Where to cut each edge: its middle, or a power of two from the corner it begins at."""
+    span = end - start
+    shell = 2.0 ** np.round(np.log2(span / 2))
+    at_start = _among(start, corners, length)
+    at_end = _among(end, corners, length)
+    cut = start + span / 2
+    cut = np.where(at_start & ~at_end, start + shell, cut)
+    return np.where(at_end & ~at_start, end - shell, cut)
+
+
+def _among(s: FloatArray, corners: FloatArray, length: float) -> NDArray[np.bool_]:
+    if not len(corners):
+        return np.zeros(len(s), dtype=bool)
+    gap = np.abs((s[:, None] - corners[None] + length / 2) % length - length / 2)
+    return np.asarray(gap.min(axis=1) <= _SAME * length)

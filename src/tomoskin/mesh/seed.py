@@ -1,0 +1,68 @@
+"""First places for the inner points: hexagonal lattices, finer where cells must be smaller."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.mesh.boundary import Boundary
+from tomoskin.mesh.polygon import inside
+from tomoskin.mesh.rim import rim_distance
+from tomoskin.mesh.sizing import SizeField
+
+_RIM = 0.6
+"""Inner points keep this many wanted edge lengths away from the rim."""
+
+_AROUND = np.array([(1, 0), (0, 1), (-1, 1), (-1, 0), (0, -1), (1, -1)])
+"""The six nearest lattice points, in steps of the lattice's two vectors."""
+
+
+def hexagonal(rim: Boundary, field: SizeField, random: np.random.Generator) -> FloatArray:
+    """(n, 2) inner points with the field's density, m.
+
+    Level 0 is a lattice of the coarse spacing, turned and shifted at random; each further
+    level adds the centres of the triangles (spacing / √3) where cells must be smaller. A
+    point of a level is kept with the probability that makes up the density still missing.
+    """
+    spacing, angle = field.coarse, random.uniform(0, math.pi / 3)
+    low, high = rim.points.min(axis=0), rim.points.max(axis=0)
+    origin = (low + high) / 2 + spacing * random.uniform(-0.5, 0.5, 2)
+    reach = math.ceil(np.linalg.norm(high - low) / spacing / math.sqrt(3)) + 3
+    steps = np.mgrid[-reach : reach + 1, -reach : reach + 1].reshape(2, -1).T
+    xy = origin + steps @ _basis(spacing, angle)
+    near = ((xy > low - 2 * spacing) & (xy < high + 2 * spacing)).all(axis=1)
+    steps, xy = steps[near], xy[near]
+    chosen = [_clear_of_rim(xy, rim, field)]
+    while len(steps := steps[field(xy) < 1.3 * spacing]):
+        steps, new = _finer(steps)
+        spacing, angle = spacing / math.sqrt(3), angle + math.pi / 6
+        xy = origin + steps @ _basis(spacing, angle)
+        candidates = _clear_of_rim(xy[new], rim, field)
+        wanted = (spacing / field(candidates)) ** 2  # of this level's density
+        kept = random.uniform(size=len(candidates)) < (3 * wanted - 1) / 2
+        chosen.append(candidates[kept])
+        if spacing <= field.sizes.min():
+            break
+    return np.concatenate(chosen)
+
+
+def _basis(spacing: float, angle: float) -> FloatArray:
+    turns = np.array([angle, angle + math.pi / 3])
+    return spacing * np.column_stack([np.cos(turns), np.sin(turns)])
+
+
+def _finer(steps: IntArray) -> tuple[IntArray, NDArray[np.bool_]]:
+    """The √3 times finer lattice around points, and which of its points are new."""
+    old = np.column_stack([2 * steps[:, 0] + steps[:, 1], steps[:, 1] - steps[:, 0]])
+    around = (old[:, None] + _AROUND).reshape(-1, 2)
+    finer = np.unique(np.concatenate([old, around]), axis=0)
+    return finer, (finer[:, 0] - finer[:, 1]) % 3 != 0
+
+
+def _clear_of_rim(xy: FloatArray, rim: Boundary, field: SizeField) -> FloatArray:
+    """Those of ``xy`` that lie inside, ``_RIM`` wanted edge lengths from every rim edge."""
+    xy = xy[inside(rim.points, xy)]
+    return xy[rim_distance(rim, xy) > _RIM * field(xy)]

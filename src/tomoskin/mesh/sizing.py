@@ -1,0 +1,48 @@
+"""How large a cell should be where: small at sources, growing with distance, capped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tomoskin.core import FloatArray
+
+GROWTH = 0.3
+"""Cell size gained per unit of distance from a source."""
+
+
+@dataclass(frozen=True, eq=False)
+class SizeField:
+    """Edge length wanted at a point: min(coarse, minᵢ(sizesᵢ + GROWTH·|x − pointsᵢ|)).
+
+    Attributes
+    ----------
+    coarse
+        Edge length far from every source, m.
+    points
+        (n, 2) sources, m.
+    sizes
+        (n,) edge length wanted at each, m.
+    """
+
+    coarse: float
+    points: FloatArray
+    sizes: FloatArray
+
+    def __call__(self, xy: FloatArray) -> FloatArray:
+        """(n,) edge length wanted at ``xy`` (n, 2), m; the nearest few sources decide."""
+        reach = (self.coarse - self.sizes.min()) / GROWTH
+        if reach <= 0:
+            return np.full(len(xy), self.coarse)
+        k = min(8, len(self.sizes))
+        gap, index = self._tree.query(xy, k=k, distance_upper_bound=reach)
+        padded = np.append(self.sizes, np.inf)  # the tree says n for "no neighbour"
+        found = (padded[index] + GROWTH * gap).reshape(len(xy), k).min(axis=1)
+        return np.asarray(np.minimum(found, self.coarse))
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.points)

@@ -1,0 +1,64 @@
+"""Delaunay triangles inside a rim, and the smoothing that makes them regular."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.spatial import Delaunay
+
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.mesh.boundary import Boundary
+from tomoskin.mesh.polygon import inside
+from tomoskin.mesh.rim import keeps_clear
+from tomoskin.mesh.sizing import SizeField
+
+ROUNDS = 30
+"""Rounds of smoothing."""
+
+
+def triangles(rim: Boundary, inner: FloatArray) -> IntArray:
+    """(n, 3) Delaunay triangles, counter-clockwise, of the rim's nodes and then ``inner``."""
+    points = np.concatenate([rim.points, inner])
+    middle = (points.max(axis=0) + points.min(axis=0)) / 2
+    scaled = (points - middle) / np.ptp(points, axis=0).max()
+    cells = Delaunay(scaled).simplices.astype(np.int64)
+    a, b, c = (scaled[cells[:, i]] for i in range(3))
+    twice = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    cells[twice < 0] = cells[twice < 0][:, [0, 2, 1]]
+    count = len(rim.points)
+    keep = np.abs(twice) > 1e-13
+    doubtful = np.flatnonzero(keep & (cells < count).all(axis=1))
+    keep[doubtful] = inside(rim.points, points[cells[doubtful]].mean(axis=1))
+    return np.asarray(cells[keep])
+
+
+def smoothed(rim: Boundary, inner: FloatArray, field: SizeField) -> FloatArray:
+    """Move ``inner`` (n, 2) to the weighted mean of the circumcentres around each point.
+
+    The weights are area/size², after L. Chen and M. Holst, "Efficient mesh optimization
+    schemes based on optimal Delaunay triangulations", CMAME 200 (2011) 967-984.
+    """
+    for _ in range(ROUNDS):
+        cells = triangles(rim, inner)
+        moved = _means(np.concatenate([rim.points, inner]), cells, field)[len(rim.points) :]
+        inner = np.where(keeps_clear(rim, moved)[:, None], moved, inner)
+    return inner
+
+
+def _means(points: FloatArray, cells: IntArray, field: SizeField) -> FloatArray:
+    """(n_points, 2) weighted mean of the circumcentres of the triangles around each point."""
+    a, b, c = (points[cells[:, i]] for i in range(3))
+    u, v = b - a, c - a
+    twice = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    uu, vv = (u**2).sum(axis=1), (v**2).sum(axis=1)
+    offset = np.column_stack([v[:, 1] * uu - u[:, 1] * vv, u[:, 0] * vv - v[:, 0] * uu])
+    centroid = (a + b + c) / 3
+    centre = (a + offset / (2 * twice[:, None]) + centroid) / 2
+    weight = twice / field(centroid) ** 2
+    moment = np.column_stack([weight[:, None] * centre, weight])
+    around = coo_array(
+        (np.ones(cells.size), (cells.ravel(), np.repeat(np.arange(len(cells)), 3))),
+        shape=(len(points), len(cells)),
+    ).tocsr()
+    total = np.asarray(around @ moment)
+    return np.asarray(total[:, :2] / total[:, 2:])
