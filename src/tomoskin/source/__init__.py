@@ -1,0 +1,25 @@
+"""Where bytes come from, and the conversation with the board behind them."""
+
+from tomoskin.source.configuration import Configuration
+from tomoskin.source.conversation import Conversation, Stage
+from tomoskin.source.gate import FrameCounters, FrameGate
+from tomoskin.source.link import Link
+from tomoskin.source.registry import GROUP, open_source, read_options, source_names
+from tomoskin.source.settings import ScanSettings, Timing
+from tomoskin.source.transport import Transport
+
+__all__ = [
+    "GROUP",
+    "Configuration",
+    "Conversation",
+    "FrameCounters",
+    "FrameGate",
+    "Link",
+    "ScanSettings",
+    "Stage",
+    "Timing",
+    "Transport",
+    "open_source",
+    "read_options",
+    "source_names",
+]

@@ -1,0 +1,64 @@
+"""Whether this host and a board can work together, and who is to change if not."""
+
+from __future__ import annotations
+
+from tomoskin.core import SourceError, WireError
+from tomoskin.pattern import Scan
+from tomoskin.source.settings import ScanSettings
+from tomoskin.wire import SCHEMA, Hello, Info
+
+_UPDATE_BOARD = "flash the firmware that belongs to this tomoskin"
+_UPDATE_HOST = "update tomoskin on this computer, or flash an older firmware"
+
+
+def check_version(board: Hello | Info, where: str) -> None:
+    """Raise WireError unless the board was made from this host's schema.
+
+    The message says which side is older.
+    """
+    if (board.major, board.minor, board.schema_hash) == (SCHEMA.major, SCHEMA.minor, SCHEMA.hash):
+        return
+    theirs, ours = (board.major, board.minor), (SCHEMA.major, SCHEMA.minor)
+    spoken = f"expected protocol {ours[0]}.{ours[1]}, the board speaks {theirs[0]}.{theirs[1]}: "
+    if theirs < ours:
+        raise WireError(spoken + "its firmware is older", where=where, hint=_UPDATE_BOARD)
+    if theirs > ours:
+        raise WireError(spoken + "this host is older", where=where, hint=_UPDATE_HOST)
+    raise WireError(
+        f"board and host both call their protocol {ours[0]}.{ours[1]} but were made from "
+        f"different schemas (board {board.schema_hash:08x}, host {SCHEMA.hash:08x})",
+        where=where,
+        hint=f"one is a development build: {_UPDATE_BOARD}",
+    )
+
+
+def check_board(info: Info, scan: Scan, settings: ScanSettings, where: str) -> None:
+    """Raise SourceError that says what the board lacks for this scan."""
+    channels = 1 + int(max(scan.drives.max(), scan.sample_electrode.max()))
+    needs = (
+        (channels, info.channels, "electrodes", "use a skin with fewer electrodes"),
+        (len(scan.drives), info.max_drives, "drives", "use a shorter pattern"),
+        (scan.n_samples, info.max_samples, "samples in a frame", "use a shorter pattern"),
+        (settings.oversampling, info.max_oversampling, "conversions summed", "sum fewer"),
+    )
+    for needed, offered, what, hint in needs:
+        if needed > offered:
+            raise SourceError(
+                f"the skin needs {needed} {what}, the board offers {offered}",
+                where=where,
+                hint=hint,
+            )
+    if info.adc_bits != settings.adc_bits:
+        raise SourceError(
+            f"the skin file says that the converter has {settings.adc_bits} bits, "
+            f"the board has {info.adc_bits}",
+            where=where,
+            hint="correct the skin file: every voltage would be wrong",
+        )
+    if info.current > round(settings.current_limit * 1e6):
+        raise SourceError(
+            f"the board's current limiter is set to {info.current / 1e3:g} mA, the skin may carry "
+            f"{settings.current_limit * 1e3:g} mA",
+            where=where,
+            hint="turn the limiter down before you connect the skin",
+        )

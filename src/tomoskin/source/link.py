@@ -1,0 +1,138 @@
+"""A board behind a transport: the conversation with it, and the frames that come of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from tomoskin.core import Event, Frame, SourceError
+from tomoskin.pattern import Scan
+from tomoskin.source.conversation import Conversation, Stage
+from tomoskin.source.gate import FrameCounters
+from tomoskin.source.settings import ScanSettings, Timing
+from tomoskin.source.transport import Transport
+from tomoskin.wire import Ack, Counters, Decoder, Info
+
+
+class Link:
+    """Sets a board up for a scan and passes its frames on.
+
+    Everything happens in :meth:`poll`; leaving the ``with`` block, or :meth:`close`, stops the
+    board.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        scan: Scan,
+        settings: ScanSettings,
+        *,
+        timing: Timing | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """A link that has not spoken yet; ``clock`` gives monotonic seconds."""
+        self.transport = transport
+        self._clock = clock
+        self._timing = timing or Timing()
+        self._decoder = Decoder()
+        self._talk = Conversation(scan, settings, self._timing, clock(), transport.name)
+        self._closed = False
+
+    @property
+    def running(self) -> bool:
+        """Whether the board scans for this link."""
+        return self._talk.stage is Stage.RUNNING
+
+    @property
+    def info(self) -> Info | None:
+        """What the board said of itself, once it has."""
+        return self._talk.info
+
+    @property
+    def configuration(self) -> int:
+        """Identity of this scan's configuration."""
+        return self._talk.configuration.identity
+
+    @property
+    def counters(self) -> Counters:
+        """What the stream has held: messages and dropped bytes."""
+        return self._decoder.counters
+
+    @property
+    def frames(self) -> FrameCounters:
+        """Frames passed, lost, foreign and stale."""
+        return self._talk.gate.counters
+
+    def poll(self, timeout: float) -> list[Frame | Event]:
+        """Frames and events, waiting at most ``timeout`` s for bytes.
+
+        Raises
+        ------
+        SourceError
+            The device has gone away, does not answer, or cannot do this scan.
+        WireError
+            The device speaks another protocol.
+        """
+        now = self._clock()
+        found = self._talk.tick(now)
+        self._flush()
+        patience = min(timeout, self._talk.deadline() - now)
+        found += self._listen(max(patience, 0.0))
+        return found
+
+    def connect(self) -> Info:
+        """Poll until the board scans; what it said of itself. Raises as :meth:`poll` does."""
+        while not self.running:
+            self.poll(self._timing.answer)
+        assert self.info is not None
+        return self.info
+
+    def close(self) -> None:
+        """Stop the board, as far as it can still be reached, and give the transport back."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self._say_goodbye()
+        except SourceError:
+            pass  # gone already: its heartbeat stops it
+        finally:
+            self.transport.close()
+
+    def __enter__(self) -> Self:
+        """The link itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close."""
+        self.close()
+
+    def _listen(self, timeout: float) -> list[Frame | Event]:
+        data = self.transport.read(timeout)
+        now = self._clock()
+        found = []
+        for message in self._decoder.feed(data, now):
+            found += self._talk.receive(message, now)
+        self._flush()
+        return found
+
+    def _say_goodbye(self) -> None:
+        request = self._talk.stop(self._clock())
+        self._flush()
+        end = self._clock() + self._timing.goodbye
+        while (now := self._clock()) < end:
+            for message in self._decoder.feed(self.transport.read(end - now), now):
+                if isinstance(message, Ack) and message.request == request:
+                    return
+
+    def _flush(self) -> None:
+        data = self._talk.take()
+        if data:
+            self.transport.write(data)

@@ -1,0 +1,105 @@
+"""What a link asks of a board, and how long it waits for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+from tomoskin.core import SourceError
+
+if TYPE_CHECKING:
+    from tomoskin.skin import Skin
+
+PRESCALERS = (16, 32, 64, 128)
+"""Clock dividers of the ATmega2560's converter that leave it accurate enough."""
+
+_CYCLES = 13
+"""Converter clocks for one conversion (ATmega2560 datasheet, table 26-1)."""
+
+
+@dataclass(frozen=True)
+class ScanSettings:
+    """Timing and limits of a scan.
+
+    Attributes
+    ----------
+    oversampling
+        Conversions summed per sample.
+    settling
+        From connecting a drive to its first conversion, s.
+    current_limit
+        What the skin may carry, A; a board set higher refuses.
+    adc_bits
+        Converter resolution that the voltages are worked out with.
+    dead_time
+        All channels high-impedance between two drives, s. Short: an unloaded LM317 charges the
+        bus meanwhile and spikes into the skin.
+    prescaler
+        Converter clock divider; 64 is 250 kHz at 16 MHz.
+    """
+
+    oversampling: int
+    settling: float
+    current_limit: float
+    adc_bits: int
+    dead_time: float = 2e-6
+    prescaler: int = 64
+
+    def __post_init__(self) -> None:
+        """Check what every board would refuse."""
+        if not 1 <= self.oversampling <= 64:
+            raise SourceError(f"expected oversampling from 1 to 64, got {self.oversampling}")
+        if self.oversampling * (2**self.adc_bits - 1) > 0xFFFF:
+            raise SourceError(
+                f"{self.oversampling} conversions of {self.adc_bits} bits do not fit a sample of "
+                "16 bits",
+                hint="sum fewer",
+            )
+        if not 0 <= self.settling <= 0.1:
+            raise SourceError(f"expected a settling time from 0 to 0.1 s, got {self.settling} s")
+        if self.prescaler not in PRESCALERS:
+            raise SourceError(f"expected a prescaler of {PRESCALERS}, got {self.prescaler}")
+
+    @classmethod
+    def of(cls, skin: Skin) -> Self:
+        """The settings that a skin file asks for."""
+        return cls(
+            oversampling=skin.readout.oversampling,
+            settling=skin.readout.settling,
+            current_limit=skin.current,
+            adc_bits=skin.readout.adc_bits,
+        )
+
+    def scan_time(self, n_drives: int, n_samples: int, clock: float = 16e6) -> float:
+        """Seconds for one scan on a board with that converter clock (before division), Hz."""
+        conversion = _CYCLES * self.prescaler / clock
+        return n_drives * (self.settling + self.dead_time) + (
+            n_samples * self.oversampling * conversion
+        )
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Waiting times of a link, s.
+
+    Attributes
+    ----------
+    hello
+        How long to wait for HELLO before asking unbidden: opening a port resets a board, whose
+        bootloader must not be spoken to.
+    answer, tries
+        How long to wait for an answer, and how often to ask.
+    ping
+        Between two heartbeats; a board stops after 2 s without.
+    silence
+        Without a frame for that long, or for four scans if that is longer, the board is silent.
+    goodbye
+        How long to wait for the answer to STOP on closing.
+    """
+
+    hello: float = 3.0
+    answer: float = 0.3
+    tries: int = 5
+    ping: float = 0.5
+    silence: float = 1.0
+    goodbye: float = 0.3

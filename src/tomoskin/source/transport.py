@@ -1,0 +1,32 @@
+"""What a link needs of a source: bytes in, bytes out."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+
+@runtime_checkable
+class Transport(Protocol):
+    """A two-way stream of bytes to a board, real or not.
+
+    One thread reads and writes; ``close`` may come from another.
+    """
+
+    @property
+    def name(self) -> str:
+        """How a person would call it: ``serial:/dev/ttyACM0``."""
+
+    def read(self, timeout: float) -> bytes:
+        """Bytes that have come, waiting at most ``timeout`` s for the first; ``b""`` if none.
+
+        Raises
+        ------
+        SourceError
+            When the device has gone away.
+        """
+
+    def write(self, data: bytes) -> None:
+        """Send ``data``; SourceError when the device has gone away."""
+
+    def close(self) -> None:
+        """Give the device back; a second call does nothing."""
