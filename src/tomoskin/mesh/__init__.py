@@ -1,6 +1,6 @@
 """Outlines, electrodes and the triangles or tetrahedra between them."""
 
-from tomoskin.mesh.arcs import ElectrodeArc
+from tomoskin.mesh.arcs import ElectrodeArc, check_arcs
 from tomoskin.mesh.mesh import Mesh
 from tomoskin.mesh.outline import Disc, Ellipse, Outline
 from tomoskin.mesh.polygon import Polygon, Rectangle
@@ -17,6 +17,7 @@ __all__ = [
     "Polygon",
     "Quality",
     "Rectangle",
+    "check_arcs",
     "quality",
     "simplex_measure",
     "triangulate",

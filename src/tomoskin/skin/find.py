@@ -1,0 +1,67 @@
+"""Where a skin's text comes from: the built-in skins, or a file."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from importlib.resources import files
+from os import PathLike, fspath
+from pathlib import Path
+
+from tomoskin.core import SkinError
+
+BUILT_IN = "built-in"
+"""Source of the skins that come with tomoskin."""
+
+_LARGEST = 1_000_000
+"""A skin file has at most so many bytes."""
+
+
+def built_in_names() -> tuple[str, ...]:
+    """Names of the built-in skins, sorted."""
+    folder = files("tomoskin.skin") / "builtin"
+    found = [entry.name.removesuffix(".toml") for entry in folder.iterdir()]
+    return tuple(sorted(name for name in found if not name.startswith("_")))
+
+
+def skin_text(skin: str | PathLike[str]) -> tuple[str, str]:
+    """Text and source of the built-in skin or file.
+
+    Raises SkinError when there is neither, or the file cannot be read as text.
+    """
+    if isinstance(skin, str) and skin in built_in_names():
+        entry = files("tomoskin.skin") / "builtin" / f"{skin}.toml"
+        return entry.read_text(encoding="utf-8"), BUILT_IN
+    path = Path(fspath(skin))
+    if isinstance(skin, str) and path.name == skin and not path.suffix and not path.exists():
+        raise _unknown(skin)
+    return _read(path), str(path)
+
+
+def _unknown(name: str) -> SkinError:
+    known = built_in_names()
+    close = get_close_matches(name, known, n=1)
+    guess = f'did you mean "{close[0]}"? ' if close else ""
+    return SkinError(
+        f'no built-in skin "{name}" and no such file',
+        hint=f"{guess}built-in skins: {', '.join(known)}",
+    )
+
+
+def _read(path: Path) -> str:
+    where = str(path)
+    try:
+        if path.exists() and not path.is_file():
+            raise SkinError("is a folder or device, not a skin file", where=where)
+        if path.stat().st_size > _LARGEST:
+            raise SkinError("is too large for a skin file (over 1 MB)", where=where)
+        return path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        hint = f"built-in skins: {', '.join(built_in_names())}"
+        raise SkinError("no such file", where=where, hint=hint) from None
+    except UnicodeDecodeError as error:
+        raise SkinError(
+            f"is not a text file (byte {error.start} is not UTF-8)", where=where
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise SkinError(f"cannot be read: {reason}", where=where) from None

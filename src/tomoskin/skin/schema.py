@@ -1,0 +1,301 @@
+"""The skin file, declared once: reading, errors, writing and its documentation follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tomoskin.skin.kinds import Choice, Kind, Number, OneOrEach, Quantity, Rows, Text, Whole
+
+FORMAT = 1
+"""Version of the file that this code reads, the top-level key ``format``."""
+
+Raw = str | int | float
+"""A default as it would stand in the file."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of a section.
+
+    Attributes
+    ----------
+    kind
+        What its value may be.
+    meaning
+        A sentence for the documentation.
+    default
+        Value when the key is absent; None where there is none.
+    required
+        The key must be there (where ``when`` and ``unless`` let it stand at all).
+    when
+        Another key of the section and the values of it for which this one may stand.
+    unless
+        Another key of the section that takes this one's place.
+    needs
+        Another key of the section that must stand beside this one.
+    """
+
+    name: str
+    kind: Kind
+    meaning: str
+    default: Raw | None = None
+    required: bool = False
+    when: tuple[str, tuple[str, ...]] | None = None
+    unless: str = ""
+    needs: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A table of the file."""
+
+    name: str
+    meaning: str
+    keys: tuple[Key, ...]
+
+
+_SIZE = Quantity("length", "mm", 1, 5000)
+_PLACE = Quantity("length", "mm", -5000, 5000)
+_ELECTRODE = Whole(0, 31)
+_SIDES = ("ellipse", "rectangle")
+
+SECTIONS: tuple[Section, ...] = (
+    Section(
+        "skin",
+        "What this skin is.",
+        (
+            Key("name", Text(), "Short name, shown on the page.", required=True),
+            Key("description", Text(), "One sentence for people.", default=""),
+        ),
+    ),
+    Section(
+        "outline",
+        "The rim of the sheet, seen from the front. x points right, y up; discs, ellipses and "
+        "rectangles are centred on the origin.",
+        (
+            Key(
+                "shape",
+                Choice(("disc", "ellipse", "rectangle", "polygon")),
+                "Which outline.",
+                required=True,
+            ),
+            Key(
+                "diameter",
+                _SIZE,
+                "Diameter of the disc.",
+                required=True,
+                when=("shape", ("disc",)),
+            ),
+            Key(
+                "width",
+                _SIZE,
+                "Full extent along x.",
+                required=True,
+                when=("shape", _SIDES),
+            ),
+            Key(
+                "height",
+                _SIZE,
+                "Full extent along y.",
+                required=True,
+                when=("shape", _SIDES),
+            ),
+            Key(
+                "vertices",
+                Rows(_PLACE, ("x", "y"), 3),
+                "Corners in order, either way round; the last is joined to the first.",
+                required=True,
+                when=("shape", ("polygon",)),
+            ),
+        ),
+    ),
+    Section(
+        "electrodes",
+        "Electrodes on the rim: either evenly spaced (count, first, order) or one by one "
+        "(positions).",
+        (
+            Key(
+                "count",
+                Whole(4, 32),
+                "Number of electrodes, evenly spaced along the rim.",
+                required=True,
+                unless="positions",
+            ),
+            Key(
+                "first",
+                Quantity("angle", "deg", -360, 360),
+                "Direction of the middle of E1 seen from the sheet's centroid, counter-clockwise "
+                "from +x.",
+                default="90 deg",
+                unless="positions",
+            ),
+            Key(
+                "order",
+                Choice(("clockwise", "counter-clockwise")),
+                "Way in which E1, E2, … follow each other, seen from the front.",
+                default="clockwise",
+                unless="positions",
+            ),
+            Key(
+                "positions",
+                Rows(_PLACE, ("x", "y"), 4),
+                "Middle of each electrode, E1 first; each must lie on the rim.",
+            ),
+            Key(
+                "width",
+                Quantity("length", "mm", 0.1, 1000),
+                "Width of an electrode along the rim.",
+                required=True,
+            ),
+            Key(
+                "contact_impedance",
+                OneOrEach(Quantity("resistivity", "ohm*m", 1e-9, 1e6)),
+                "Contact resistance times electrode width; one value or one per electrode.",
+                required=True,
+            ),
+        ),
+    ),
+    Section(
+        "material",
+        "The sheet.",
+        (
+            Key(
+                "sheet_resistance",
+                Quantity("sheet resistance", "ohm/sq", 1e-4, 1e8),
+                "Resistance of a square of the unloaded sheet.",
+                required=True,
+            ),
+        ),
+    ),
+    Section(
+        "drive",
+        "Where current flows and what is read: a named pattern, or two tables of your own.",
+        (
+            Key(
+                "pattern",
+                Text(),
+                "adjacent, opposite, all_pairs, skip:K, or several joined by +.",
+                default="adjacent",
+                unless="drive",
+            ),
+            Key(
+                "drive",
+                Rows(_ELECTRODE, ("source", "sink"), 1),
+                "Driven electrodes of each measurement, counted from 0.",
+                needs="measure",
+            ),
+            Key(
+                "measure",
+                Rows(_ELECTRODE, ("plus", "minus"), 1),
+                "Read electrodes of each measurement, counted from 0.",
+                needs="drive",
+            ),
+            Key(
+                "current",
+                Quantity("current", "mA", 0.001, 1000),
+                "Driven current.",
+                required=True,
+            ),
+        ),
+    ),
+    Section(
+        "readout",
+        "The amplifier and converter: counts = (gain · potential + offset) / reference · 2^bits.",
+        (
+            Key("adc_bits", Whole(8, 16), "Resolution of the converter.", default=10),
+            Key(
+                "reference_voltage",
+                Quantity("voltage", "V", 0.5, 10),
+                "Full scale of the converter.",
+                default="5 V",
+            ),
+            Key("gain", Number(0.01, 10_000), "Gain in front of the converter.", default=40),
+            Key(
+                "offset",
+                Quantity("voltage", "V", -10, 10),
+                "Voltage at the converter for a potential of 0 V.",
+                default="0 V",
+            ),
+            Key(
+                "oversampling",
+                Whole(1, 64),
+                "Readings summed for one sample; the sum must fit in 16 bits.",
+                default=16,
+            ),
+            Key(
+                "settling",
+                Quantity("time", "ms", 0, 1000),
+                "Wait after each switch of the drive.",
+                default="2 ms",
+            ),
+            Key(
+                "tick_rate",
+                Quantity("frequency", "kHz", 0.1, 100_000),
+                "Rate of the device's clock.",
+                default="250 kHz",
+            ),
+        ),
+    ),
+    Section(
+        "mesh",
+        "The triangles that the picture is made of.",
+        (Key("cells", Whole(50, 100_000), "Wanted number, met within 10 %.", default=1500),),
+    ),
+    Section(
+        "inverse",
+        "How voltages become a picture.",
+        (
+            Key(
+                "prior",
+                Choice(("identity", "laplace", "gaussian", "noser")),
+                "What is held to be likely.",
+                default="noser",
+            ),
+            Key("alpha", Number(1e-9, 1e9), "Weight of the prior; it enters squared.", default=0.1),
+            Key(
+                "difference",
+                Choice(("plain", "normalised")),
+                "v − v_ref, or (v − v_ref)/|v_ref|.",
+                default="plain",
+            ),
+        ),
+    ),
+    Section(
+        "touch",
+        "How a picture becomes touches.",
+        (
+            Key(
+                "gamma1",
+                Number(0.1, 0.99),
+                "First threshold, as a part of the extreme value; 0.6 to 0.7 is usual.",
+                default=0.65,
+            ),
+            Key(
+                "gamma2",
+                Number(0.1, 1),
+                "Second threshold, after smoothing, as a part of the first.",
+                default=0.9,
+            ),
+            Key(
+                "smoothing",
+                Quantity("length", "mm", 0, 1000),
+                "Standard deviation of the Gaussian between the two thresholds.",
+                default="5 mm",
+            ),
+            Key(
+                "sign",
+                Choice(("decrease", "increase", "both")),
+                "Change of conductivity that counts as a touch.",
+                default="decrease",
+            ),
+            Key(
+                "snr",
+                Number(0, 1000),
+                "Extreme value that a touch needs, in standard deviations of the noise.",
+                default=5,
+            ),
+            Key("max_touches", Whole(1, 50), "Most touches reported at once.", default=8),
+        ),
+    ),
+)
+"""Every section and key, in the order in which they are written."""

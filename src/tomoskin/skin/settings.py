@@ -1,0 +1,39 @@
+"""The parts of a skin that other rooms take as their settings; SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class ReadoutSettings:
+    """Amplifier and converter: counts = (gain · potential + offset)/reference · 2^bits."""
+
+    adc_bits: int
+    reference_voltage: float
+    gain: float
+    offset: float
+    oversampling: int
+    settling: float
+    tick_rate: float
+
+
+@dataclass(frozen=True, slots=True)
+class InverseSettings:
+    """Prior ("identity", "laplace", "gaussian", "noser"), its weight, and the difference."""
+
+    prior: str
+    alpha: float
+    difference: str
+
+
+@dataclass(frozen=True, slots=True)
+class TouchSettings:
+    """Thresholds and filters that turn a picture into touches; ``smoothing`` in m."""
+
+    gamma1: float
+    gamma2: float
+    smoothing: float
+    sign: str
+    snr: float
+    max_touches: int

@@ -1,0 +1,171 @@
+"""The skin: one sensor sheet with its electrodes, drive, readout and settings."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from typing import Any, Self
+
+import numpy as np
+
+from tomoskin.core import FloatArray
+from tomoskin.mesh import ElectrodeArc, Mesh, Outline, triangulate
+from tomoskin.pattern import Pattern
+from tomoskin.skin.build import impedances, located, pattern_of, placed, readout_of
+from tomoskin.skin.find import built_in_names, skin_text
+from tomoskin.skin.read import Document, complete, parse, values
+from tomoskin.skin.settings import InverseSettings, ReadoutSettings, TouchSettings
+from tomoskin.skin.write import toml
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """A sensor sheet as its file describes it, in SI units.
+
+    Attributes
+    ----------
+    source
+        Path of the file, or "built-in".
+    document
+        Sections and keys as written, defaults filled in.
+    name, description
+        For people.
+    outline, arcs
+        Rim of the sheet, and the stretch of it that each electrode covers.
+    conductivity
+        Sheet conductance of the unloaded sheet, S.
+    contact_impedance
+        (n,) per electrode, Ω·m.
+    current
+        Driven current, A.
+    mesh_cells
+        Wanted number of triangles.
+    readout, inverse, touch
+        Settings of the rooms of that name.
+    """
+
+    source: str
+    document: Document = field(repr=False)
+    name: str
+    description: str
+    outline: Outline
+    arcs: tuple[ElectrodeArc, ...]
+    conductivity: float
+    contact_impedance: FloatArray
+    current: float
+    mesh_cells: int
+    readout: ReadoutSettings
+    inverse: InverseSettings
+    touch: TouchSettings
+    _pattern: Pattern = field(repr=False)
+
+    @classmethod
+    def load(cls, skin: str | PathLike[str]) -> Self:
+        """Built-in skin of that name, or the skin file at that path.
+
+        Raises
+        ------
+        SkinError
+            For an unknown name, a file that cannot be read, or a value that cannot be meant;
+            the message names file, section, key and the allowed range.
+        """
+        text, source = skin_text(skin)
+        return cls.from_toml(text, source=source)
+
+    @classmethod
+    def from_toml(cls, text: str, *, source: str = "skin") -> Self:
+        """Skin from the text of a skin file; ``source`` names it in errors."""
+        return cls._of(parse(text, source), source)
+
+    @staticmethod
+    def names() -> tuple[str, ...]:
+        """Names of the built-in skins."""
+        return built_in_names()
+
+    def altered(self, changes: Mapping[str, Mapping[str, Any]]) -> Self:
+        """This skin with other values, as a file would write them: ``{"mesh": {"cells": 300}}``.
+
+        A value of None takes the key out.
+        """
+        raw: dict[str, dict[str, Any]] = {s: dict(keys) for s, keys in self.document.items()}
+        for section, keys in changes.items():
+            merged = raw.get(section, {}) | dict(keys)
+            raw[section] = {key: value for key, value in merged.items() if value is not None}
+        return self._of(complete(raw, self.source), self.source)
+
+    @property
+    def n_electrodes(self) -> int:
+        """Number of electrodes."""
+        return len(self.arcs)
+
+    @cached_property
+    def electrode_centres(self) -> FloatArray:
+        """(n, 2) middle of each electrode on the rim, m."""
+        middle = [arc.start + arc.width(self.outline) / 2 for arc in self.arcs]
+        return self.outline.point(np.array(middle))
+
+    @cached_property
+    def identity(self) -> str:
+        """Short hash of everything but name, description and source."""
+        content = {k: v for k, v in values(self.document, self.source).items() if k != "skin"}
+        return hashlib.sha256(_canonical(content).encode()).hexdigest()[:16]
+
+    def pattern(self) -> Pattern:
+        """Drive and measurement table."""
+        return self._pattern
+
+    def mesh(self) -> Mesh:
+        """Mesh of the sheet; made once.
+
+        Raises SkinError when the electrodes cannot be resolved with so few cells.
+        """
+        return self._mesh
+
+    def to_toml(self) -> str:
+        """Text of a skin file that gives this skin again, defaults written out."""
+        return toml(self.document)
+
+    @cached_property
+    def _mesh(self) -> Mesh:
+        with located(f"{self.source}: [mesh] cells"):
+            return triangulate(self.outline, self.arcs, self.mesh_cells)
+
+    @classmethod
+    def _of(cls, document: Document, source: str) -> Self:
+        value = values(document, source)
+        outline, arcs = placed(value, source)
+        return cls(
+            source=source,
+            document=document,
+            name=value["skin"]["name"],
+            description=value["skin"]["description"],
+            outline=outline,
+            arcs=arcs,
+            conductivity=1.0 / value["material"]["sheet_resistance"],
+            contact_impedance=impedances(value, len(arcs), source),
+            current=value["drive"]["current"],
+            mesh_cells=value["mesh"]["cells"],
+            readout=readout_of(value, source),
+            inverse=InverseSettings(**value["inverse"]),
+            touch=TouchSettings(**value["touch"]),
+            _pattern=pattern_of(value, len(arcs), source),
+        )
+
+
+def _canonical(content: Document) -> str:
+    """Text that is the same for the same values, however their units were written."""
+
+    def plain(value: object) -> object:
+        if isinstance(value, float):
+            return f"{value:.12g}"
+        if isinstance(value, tuple):
+            return [plain(item) for item in value]
+        return value
+
+    return json.dumps(
+        {s: {k: plain(v) for k, v in keys.items()} for s, keys in content.items()}, sort_keys=True
+    )
