@@ -1,0 +1,118 @@
+"""What every test may rely on: the public recordings, Chromium, a repeatable seed, no network."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import shutil
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+DEFAULT_DATA = ROOT.parent / "shared" / "data"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+missing_things = pytest.StashKey[set[str]]()
+
+
+class BlockedConnectionError(RuntimeError):
+    """A test tried to leave this machine."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--data",
+        type=Path,
+        default=DEFAULT_DATA,
+        help="folder of the public recordings (default: ../shared/data beside the repository)",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[missing_things] = set()
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("data"):
+        require_data(item.config)
+    if item.get_closest_marker("page"):
+        require_chromium(item.config)
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    seed = config.getoption("randomly_seed", None)
+    if seed is not None:
+        terminalreporter.write_line(f"to repeat this order: --randomly-seed={seed}")
+    for thing in sorted(config.stash[missing_things]):
+        terminalreporter.write_line(f"NOT TESTED: {thing}", yellow=True, bold=True)
+
+
+@pytest.fixture(scope="session")
+def data_dir(pytestconfig: pytest.Config) -> Path:
+    """Return the folder of the public recordings; skip without it (under CI=true: fail)."""
+    return require_data(pytestconfig)
+
+
+@pytest.fixture(scope="session")
+def chromium(pytestconfig: pytest.Config) -> Path:
+    """Return the system's Chromium; skip without it (under CI=true: fail)."""
+    return require_chromium(pytestconfig)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_network() -> Iterator[None]:
+    """Let sockets reach this machine only."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("connect", "connect_ex", "sendto"):
+            patch.setattr(socket.socket, name, guarded(name))
+        yield
+
+
+def guarded(name: str) -> Any:
+    """Return socket method `name`, which first refuses an address beyond loopback."""
+    original = getattr(socket.socket, name)
+
+    def method(self: socket.socket, *args: Any) -> Any:
+        if self.family in (socket.AF_INET, socket.AF_INET6) and not is_loopback(args[-1]):
+            raise BlockedConnectionError(f"a test may reach loopback only, got {args[-1]!r}")
+        return original(self, *args)
+
+    return method
+
+
+def is_loopback(address: Any) -> bool:
+    """Whether the (host, port, ...) `address` is this machine's own."""
+    host = address[0]
+    if host in ("", "localhost"):
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def require_data(config: pytest.Config) -> Path:
+    folder: Path = config.getoption("--data")
+    if not folder.is_dir():
+        missing(config, f"the public recordings: no folder {folder} (see --data)")
+    return folder
+
+
+def require_chromium(config: pytest.Config) -> Path:
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        missing(
+            config, "the page in Chromium: none is installed (Debian: apt-get install chromium)"
+        )
+    return Path(str(found))
+
+
+def missing(config: pytest.Config, thing: str) -> None:
+    """Skip the test and say so at the end; where everything must be there, fail it."""
+    if os.environ.get("CI") == "true":
+        pytest.fail(f"CI must test {thing}", pytrace=False)
+    config.stash[missing_things].add(thing)
+    pytest.skip(thing)

@@ -1,0 +1,239 @@
+"""The rooms' order, read from the imports themselves."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+ROOMS = [
+    *("core", "mesh", "pattern", "skin", "forward", "inverse", "signal"),
+    *("touch", "wire", "source", "twin", "session", "live", "cli"),
+]
+Sources = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Import:
+    """One imported name: the module it comes from ("" when the module itself is imported)."""
+
+    line: int
+    module: str
+    name: str
+    runs_at_import: bool
+
+
+# What is checked: module name → source text, a package under its own name.
+
+
+def library() -> dict[str, str]:
+    source = ROOT / "src"
+    return {
+        ".".join(file.relative_to(source).with_suffix("").parts).removesuffix(".__init__"): (
+            file.read_text(encoding="utf-8")
+        )
+        for file in sorted(source.glob("tomoskin/**/*.py"))
+        if "node_modules" not in file.parts
+    }
+
+
+def imports_of(module: str, sources: Sources) -> Iterator[Import]:
+    """Every import in `module`, wherever it stands; relative ones resolved."""
+    is_package = any(name.startswith(f"{module}.") for name in sources)
+    package = module if is_package else module.rpartition(".")[0]
+    tree = ast.parse(sources[module])
+    deferred = set(_deferred(tree))
+    for node in ast.walk(tree):
+        runs = node not in deferred
+        match node:
+            case ast.Import(names=names):
+                for alias in names:
+                    yield Import(node.lineno, alias.name, "", runs)
+            case ast.ImportFrom(module=origin, names=names, level=level):
+                parts = package.split(".")
+                base = parts[: len(parts) - level + 1] if level else []
+                for alias in names:
+                    full = ".".join([*base, *([origin] if origin else [])])
+                    yield Import(node.lineno, full, alias.name, runs)
+            case ast.Call(func=ast.Attribute(attr="import_module"), args=[ast.Constant(value), *_]):
+                yield Import(node.lineno, str(value), "", runs_at_import=False)
+
+
+def _deferred(tree: ast.Module) -> Iterator[ast.AST]:
+    """Everything inside a function or behind TYPE_CHECKING: it does not run at import."""
+    for node in ast.walk(tree):
+        typing_only = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        if typing_only or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            yield from (child for child in ast.walk(node) if child is not node)
+
+
+def room_of(module: str) -> str | None:
+    parts = module.split(".")
+    return parts[1] if parts[0] == "tomoskin" and len(parts) > 1 else None
+
+
+def violations(sources: Sources) -> list[str]:
+    """Every import that breaks the order or reaches into another room, in words."""
+    return [
+        f"{module}:{found.line}: {why}"
+        for module in sources
+        for found in imports_of(module, sources)
+        if (why := _wrong(module, found, sources))
+    ]
+
+
+def _wrong(module: str, found: Import, sources: Sources) -> str | None:
+    here = room_of(module)
+    if found.module == "tomoskin" and found.name in ROOMS:
+        found = Import(found.line, f"tomoskin.{found.name}", "", found.runs_at_import)
+    there = room_of(found.module)
+    if here is None or found.module.split(".")[0] != "tomoskin":
+        return None
+    if there is None:
+        own = found.name == "__version__"
+        return None if own else "a room imports rooms, not the package above them"
+    if there == here:
+        return _wrong_inside(module, found, sources)
+    return _wrong_across(here, there, found, sources)
+
+
+def _wrong_across(here: str, there: str, found: Import, sources: Sources) -> str | None:
+    unknown = {here, there} - set(ROOMS)
+    if unknown:
+        return f"no such room: {', '.join(sorted(unknown))}"
+    if ROOMS.index(there) > ROOMS.index(here):
+        return f"{here} stands above {there} and must not import it"
+    if _is_inner(found, sources):
+        return f"import from tomoskin.{there}, not from its inner modules"
+    return None
+
+
+def _wrong_inside(module: str, found: Import, sources: Sources) -> str | None:
+    room = f"tomoskin.{room_of(module)}"
+    if found.module == room and module != room and f"{room}.{found.name}" not in sources:
+        return f"inside {room_of(module)}, import from its modules"
+    return None
+
+
+def _is_inner(found: Import, sources: Sources) -> bool:
+    if found.module.count(".") > 1:
+        return True
+    is_module = f"{found.module}.{found.name}" in sources
+    return is_module and found.name not in _offered(sources.get(found.module, ""))
+
+
+def _offered(source: str) -> set[str]:
+    """The names in ``__all__``."""
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+            return set(ast.literal_eval(node.value))
+    return set()
+
+
+def cycle(sources: Sources) -> list[str]:
+    """The modules of an import cycle, in order; empty when there is none."""
+    graph: dict[str, set[str]] = {}
+    for module in sources:
+        targets = {
+            target
+            for found in imports_of(module, sources)
+            if found.runs_at_import
+            for target in (f"{found.module}.{found.name}", found.module)
+            if target in sources
+        }
+        # A package's __init__ may import its modules; they do not wait for it in return.
+        graph[module] = {t for t in targets if not module.startswith(f"{t}.")} - {module}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def table_rooms(text: str) -> list[str]:
+    """The first column of the rooms' table in docs/architecture.md."""
+    return re.findall(r"^\| `(\w+)` \|", text, flags=re.MULTILINE)
+
+
+# The library.
+
+
+def test_rooms_import_only_from_rooms_above() -> None:
+    assert violations(library()) == []
+
+
+def test_no_import_cycle() -> None:
+    assert cycle(library()) == []
+
+
+def test_every_module_stands_in_a_room() -> None:
+    found = {room_of(module) for module in library()} - {None}
+    assert found <= set(ROOMS)
+
+
+def test_the_documented_order_is_the_order() -> None:
+    assert table_rooms((ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")) == ROOMS
+
+
+# The checkers, on planted mistakes.
+
+ROOM = {"tomoskin": "", "tomoskin.core": "__all__ = ['errors']", "tomoskin.core.errors": ""}
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "from tomoskin.live import serve",
+        "import tomoskin.live",
+        "import tomoskin.live as page",
+        "from tomoskin import live",
+        "from ..live import serve",
+        "def later():\n    from tomoskin.live import serve",
+        "if TYPE_CHECKING:\n    from tomoskin.live import serve",
+        "import importlib\nimportlib.import_module('tomoskin.live')",
+        "from tomoskin.mesh.mesh import Mesh",
+        "from tomoskin.mesh import mesh",
+        "from tomoskin.nowhere import thing",
+        "from tomoskin import Skin",
+        "from tomoskin.skin import Skin",
+    ],
+)
+def test_a_planted_import_is_found(source: str) -> None:
+    mesh = {"tomoskin.mesh": "__all__ = ['Mesh']", "tomoskin.mesh.mesh": ""}
+    planted = {**ROOM, **mesh, "tomoskin.skin": "", "tomoskin.skin.load": source}
+    assert len(violations(planted)) == 1
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "from tomoskin.core import DataError, errors",
+        "from tomoskin.skin.outline import Disc",
+        "from tomoskin.skin import outline",
+        "from .outline import Disc",
+        "from tomoskin import __version__",
+        "import numpy.linalg",
+        "'from tomoskin.live import serve'",
+    ],
+)
+def test_what_is_allowed_passes(source: str) -> None:
+    planted = {**ROOM, "tomoskin.skin": "", "tomoskin.skin.load": source}
+    assert violations({**planted, "tomoskin.skin.outline": ""}) == []
+
+
+def test_a_planted_cycle_is_found() -> None:
+    planted = {"tomoskin.core.a": "from tomoskin.core.b import x", "tomoskin.core": ""}
+    first = {**planted, "tomoskin.core.b": "from tomoskin.core import a"}
+    assert set(cycle(first)) == {"tomoskin.core.a", "tomoskin.core.b"}
+    deferred = {**planted, "tomoskin.core.b": "def f():\n    from tomoskin.core.a import y"}
+    assert cycle(deferred) == []
+
+
+def test_a_changed_table_is_seen() -> None:
+    assert table_rooms("| room |\n|---|\n| `core` | x |\n| `mesh` | y |\n") == ["core", "mesh"]
