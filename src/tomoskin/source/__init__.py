@@ -5,11 +5,12 @@ from tomoskin.source.conversation import Conversation, Stage
 from tomoskin.source.gate import FrameCounters, FrameGate
 from tomoskin.source.link import Link
 from tomoskin.source.registry import GROUP, open_source, read_options, source_names
-from tomoskin.source.settings import ScanSettings, Timing
+from tomoskin.source.settings import PRESCALERS, ScanSettings, Timing, scan_time
 from tomoskin.source.transport import Transport
 
 __all__ = [
     "GROUP",
+    "PRESCALERS",
     "Configuration",
     "Conversation",
     "FrameCounters",
@@ -21,5 +22,6 @@ __all__ = [
     "Transport",
     "open_source",
     "read_options",
+    "scan_time",
     "source_names",
 ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from tomoskin.pattern import Scan
-from tomoskin.source.settings import ScanSettings
+from tomoskin.source.settings import ScanSettings, scan_time
 from tomoskin.wire import SCHEMA, Command, Drive, SetPattern, SetScan, Start, crc16, encode_payload
 
 
@@ -47,7 +47,12 @@ class Configuration:
                 Start(0, identity),
             ),
             scan.n_samples,
-            settings.scan_time(len(scan.drives), scan.n_samples),
+            scan_time(
+                len(scan.drives),
+                scan.n_samples * settings.oversampling,
+                settings.settling + settings.dead_time,
+                settings.prescaler,
+            ),
         )
 
 

@@ -17,6 +17,15 @@ _CYCLES = 13
 """Converter clocks for one conversion (ATmega2560 datasheet, table 26-1)."""
 
 
+_CLOCK = 16e6
+"""Clock of the board, Hz."""
+
+
+def scan_time(n_drives: int, n_conversions: int, per_drive: float, prescaler: int) -> float:
+    """Seconds for one scan: settling and dead time ``per_drive`` s, then the conversions."""
+    return n_drives * per_drive + n_conversions * _CYCLES * prescaler / _CLOCK
+
+
 @dataclass(frozen=True)
 class ScanSettings:
     """Timing and limits of a scan.
@@ -68,13 +77,6 @@ class ScanSettings:
             settling=skin.readout.settling,
             current_limit=skin.current,
             adc_bits=skin.readout.adc_bits,
-        )
-
-    def scan_time(self, n_drives: int, n_samples: int, clock: float = 16e6) -> float:
-        """Seconds for one scan on a board with that converter clock (before division), Hz."""
-        conversion = _CYCLES * self.prescaler / clock
-        return n_drives * (self.settling + self.dead_time) + (
-            n_samples * self.oversampling * conversion
         )
 
 

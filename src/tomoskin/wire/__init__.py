@@ -1,6 +1,6 @@
 """Bytes ↔ messages, from one schema that the firmware shares. Sans-IO."""
 
-from tomoskin.wire.codec import decode_payload, encode, encode_payload, type_byte
+from tomoskin.wire.codec import decode_payload, encode, encode_payload, is_command, type_byte
 from tomoskin.wire.decoder import Counters, Decoder, Deframer
 from tomoskin.wire.framing import cobs_decode, cobs_encode, crc16, enclose
 from tomoskin.wire.messages import (
@@ -68,6 +68,7 @@ __all__ = [
     "enclose",
     "encode",
     "encode_payload",
+    "is_command",
     "schema_tables",
     "type_byte",
 ]

@@ -6,13 +6,13 @@ import dataclasses
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
 from tomoskin.core import Frame, WireError
 from tomoskin.wire.framing import enclose
-from tomoskin.wire.messages import ENUMS, RECORDS, STRUCTS, Message
+from tomoskin.wire.messages import ENUMS, RECORDS, STRUCTS, Command, Message
 from tomoskin.wire.schema import SCALARS, SCHEMA, FieldSpec, MessageSpec, Schema, StructSpec
 
 _HOST_FIELD = "host_time"
@@ -149,6 +149,6 @@ def _frame(values: list[Any], payload: bytes, size: int, host_time: float) -> Fr
     return Frame(sequence, ticks, host_time, configuration, flags, drops, samples)
 
 
-def is_command(message: Message) -> bool:
+def is_command(message: Message) -> TypeGuard[Command]:
     """Whether ``message`` goes to the device."""
     return _BY_RECORD[type(message)].spec.to_device

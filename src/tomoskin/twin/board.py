@@ -1,0 +1,107 @@
+"""The twin's board: its limits, and what it refuses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tomoskin.source import PRESCALERS
+from tomoskin.twin.readout import SampleTable
+from tomoskin.wire import SCHEMA, Drive, Info, Reset, Result, SetPattern, SetScan
+
+Verdict = tuple[Result, int]
+"""Result and detail of an ACK."""
+
+OK: Verdict = (Result.OK, 0)
+_MAX_SETTLING = 100_000
+_CONVERSIONS = (1, 64)
+
+
+@dataclass(frozen=True)
+class Board:
+    """What the board is: ``current`` A, ``tick_rate`` Hz."""
+
+    channels: int
+    adc_bits: int
+    current: float
+    tick_rate: float
+    max_drives: int = 128
+    max_samples: int = 2000
+    firmware: tuple[int, int, int] = (1, 0, 0)
+    unique_id: bytes = b"twin\0\0\0\0"
+
+    def info(self, request: int) -> Info:
+        """The answer to GET_INFO."""
+        return Info(
+            request=request,
+            major=SCHEMA.major,
+            minor=SCHEMA.minor,
+            schema_hash=SCHEMA.hash,
+            firmware=bytes(self.firmware),
+            reset=Reset.POWER,
+            channels=self.channels,
+            adc_bits=self.adc_bits,
+            max_oversampling=_CONVERSIONS[1],
+            max_drives=self.max_drives,
+            max_samples=self.max_samples,
+            tick_rate=round(self.tick_rate),
+            current=round(self.current * 1e6),
+            max_baud=1_000_000,
+            unique_id=self.unique_id,
+        )
+
+    def check_scan(self, command: SetScan) -> Verdict:
+        """Whether a SET_SCAN is acceptable."""
+        if command.n_drives > self.max_drives:
+            return Result.TOO_MANY_DRIVES, self.max_drives
+        if round(self.current * 1e6) > command.current_limit:
+            return Result.CURRENT_TOO_HIGH, 0
+        low, high = _CONVERSIONS
+        good = {
+            "configuration": command.configuration > 0,
+            "n_drives": command.n_drives > 0,
+            "settling": command.settling <= _MAX_SETTLING,
+            "oversampling": low <= command.oversampling <= high,
+            "prescaler": command.prescaler in PRESCALERS,
+        }
+        names = [field.name for field in SCHEMA.by_name["SET_SCAN"].fields]
+        wrong = next((name for name, fine in good.items() if not fine), None)
+        return OK if wrong is None else (Result.BAD_VALUE, names.index(wrong))
+
+    def check_drives(self, command: SetPattern, scan: SetScan | None) -> Verdict:
+        """Whether a SET_PATTERN fits the announced scan and this board."""
+        if scan is None or command.configuration != scan.configuration:
+            return Result.WRONG_CONFIGURATION, 0
+        if not command.drives or command.first + len(command.drives) > scan.n_drives:
+            return Result.BAD_VALUE, 2
+        for number, drive in enumerate(command.drives, start=command.first):
+            if drive.source == drive.sink:
+                return Result.SAME_ELECTRODE, number
+            if max(drive.source, drive.sink) >= self.channels or drive.mask >> self.channels:
+                return Result.NO_SUCH_CHANNEL, number
+        return OK
+
+    def check_start(
+        self, configuration: int, scan: SetScan | None, drives: Sequence[Drive | None]
+    ) -> Verdict:
+        """Whether the scan that START names is complete."""
+        if scan is None or configuration != scan.configuration:
+            return Result.WRONG_CONFIGURATION, 0
+        if None in drives:
+            return Result.INCOMPLETE, list(drives).index(None)
+        samples = sum(drive.mask.bit_count() for drive in drives if drive)
+        return OK if samples <= self.max_samples else (Result.TOO_MANY_SAMPLES, self.max_samples)
+
+
+def sample_table(drives: Sequence[Drive], oversampling: int) -> SampleTable:
+    """The samples of a scan: drive by drive, channels ascending."""
+    rows = [
+        (drive.source, drive.sink, channel)
+        for drive in drives
+        for channel in range(drive.mask.bit_length())
+        if drive.mask >> channel & 1
+    ]
+    source, sink, channel = np.array(rows, dtype=np.int64).reshape(-1, 3).T
+    return SampleTable(source, sink, channel, oversampling)

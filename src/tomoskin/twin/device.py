@@ -1,0 +1,210 @@
+"""The twin's firmware: bytes and the time in, bytes out. No I/O, no waiting."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tomoskin.core import Frame
+from tomoskin.source import scan_time
+from tomoskin.twin.board import OK, Board, Verdict, sample_table
+from tomoskin.twin.readout import Analogue, SampleTable
+from tomoskin.wire import (
+    SCHEMA,
+    Ack,
+    Command,
+    Deframer,
+    Drive,
+    Fault,
+    FaultCode,
+    FrameFlag,
+    GetInfo,
+    Hello,
+    Message,
+    Ping,
+    Result,
+    SafeOff,
+    SetBaud,
+    SetHeartbeat,
+    SetPattern,
+    SetScan,
+    Start,
+    Stop,
+    crc16,
+    decode_payload,
+    encode,
+    is_command,
+)
+
+_HELLO_INTERVAL = 0.5
+_HEARTBEAT = 2.0
+_HEARTBEAT_MS = (100, 10_000)
+
+
+@dataclass
+class _Scanning:
+    """A scan under way: ``due`` is when the next frame is whole, ``device_time`` its start."""
+
+    table: SampleTable
+    configuration: int
+    period: float
+    due: float
+    device_time: float
+    sequence: int = 0
+
+
+class TwinDevice:
+    """Behaves on the wire as the board does.
+
+    Says HELLO until spoken to, answers, scans when told to, and switches its current off on STOP
+    and on host silence.
+    """
+
+    def __init__(self, analogue: Analogue, board: Board, now: float, pace: float = 1.0) -> None:
+        """Power on at ``now`` s. ``pace``: seconds per second of device time; 0: no waiting."""
+        self._analogue, self._board, self._pace = analogue, board, pace
+        self._deframer = Deframer(SCHEMA.to_device_bytes)
+        self._power_on = self._heard = now
+        self._next_hello: float | None = now
+        self._heartbeat = _HEARTBEAT
+        self._scan: SetScan | None = None
+        self._drives: list[Drive | None] = []
+        self._scanning: _Scanning | None = None
+        self._last: tuple[int, int] | None = None
+        self._last_reply = b""
+        self._out = bytearray()
+
+    @property
+    def driving(self) -> bool:
+        """Whether current flows; otherwise every channel is high-impedance."""
+        return self._scanning is not None
+
+    @property
+    def due(self) -> float:
+        """When something will be sent next, unless a command comes first."""
+        times = [self._heard + self._heartbeat if self._next_hello is None else self._next_hello]
+        if self._scanning:
+            times.append(self._scanning.due)
+        return times[0] if len(times) == 1 else min(times)
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Act on bytes from the host; answers come with the next :meth:`emit`."""
+        for payload in self._deframer.feed(data):
+            if len(payload) < 2:
+                continue
+            message = decode_payload(payload, now)
+            if message is None or not is_command(message):
+                self._refuse(payload)
+            else:
+                self._obey(message, payload, now)
+
+    def emit(self, now: float) -> bytes:
+        """What is to be sent by ``now``: answers, HELLO, at most one frame."""
+        if now - self._heard >= self._heartbeat and self._next_hello is None:
+            self._fall_silent(now)
+        if self._next_hello is not None and now >= self._next_hello:
+            self._say(Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash))
+            self._next_hello = max(self._next_hello + _HELLO_INTERVAL, now)
+        if self._scanning and now >= self._scanning.due:
+            self._say(self._frame(self._scanning, now))
+        data = bytes(self._out)
+        self._out.clear()
+        return data
+
+    def _frame(self, scanning: _Scanning, now: float) -> Frame:
+        samples = self._analogue.sample(scanning.table)
+        frame = Frame(
+            sequence=scanning.sequence,
+            ticks=round(scanning.device_time * self._board.tick_rate),
+            host_time=now,
+            configuration=scanning.configuration,
+            flags=int(FrameFlag.FIRST) if scanning.sequence == 0 else 0,
+            drops=0,
+            samples=samples,
+        )
+        # A computer that is too slow for the scan makes the twin scan later, never skip.
+        next_due = scanning.due + scanning.period * self._pace
+        slip = max(0.0, now - next_due)
+        scanning.due = next_due + slip
+        scanning.device_time += scanning.period + slip * self._pace
+        scanning.sequence = (scanning.sequence + 1) % 2**32
+        return frame
+
+    def _fall_silent(self, now: float) -> None:
+        if self._scanning:
+            ticks = round((now - self._power_on) * self._board.tick_rate)
+            self._say(Fault(ticks, FaultCode.HOST_SILENT, 0))
+        self._scanning = None
+        self._last = None
+        self._next_hello = now
+
+    def _refuse(self, payload: bytes) -> None:
+        known = {message.type for message in SCHEMA.messages if message.to_device}
+        result = Result.BAD_LENGTH if payload[0] in known else Result.UNKNOWN_COMMAND
+        self._say(Ack(payload[1], payload[0], result, 0))
+
+    def _obey(self, command: Command, payload: bytes, now: float) -> None:
+        self._heard, self._next_hello = now, None
+        identity = (command.request, crc16(payload))
+        if isinstance(command, GetInfo):
+            self._last_reply = encode(self._board.info(command.request))
+        elif identity != self._last:
+            result, detail = self._run(command, now)
+            self._last_reply = encode(Ack(command.request, payload[0], result, detail))
+        self._last = identity
+        self._out += self._last_reply
+
+    def _run(self, command: Command, now: float) -> Verdict:
+        match command:
+            case Stop():
+                self._scanning = None
+            case SafeOff():
+                self._scanning, self._scan, self._drives = None, None, []
+            case SetHeartbeat():
+                low, high = _HEARTBEAT_MS
+                if not low <= command.interval <= high:
+                    return Result.BAD_VALUE, 1
+                self._heartbeat = command.interval / 1e3
+            case SetScan() | SetPattern() | Start() | SetBaud() if self._scanning:
+                return Result.BUSY, 0
+            case SetScan():
+                return self._set_scan(command)
+            case SetPattern():
+                return self._set_pattern(command)
+            case Start():
+                return self._start(command, now)
+            case SetBaud() | Ping() | GetInfo():
+                pass
+        return OK
+
+    def _set_scan(self, command: SetScan) -> Verdict:
+        verdict = self._board.check_scan(command)
+        if verdict == OK:
+            self._scan = command
+            self._drives = [None] * command.n_drives
+        return verdict
+
+    def _set_pattern(self, command: SetPattern) -> Verdict:
+        verdict = self._board.check_drives(command, self._scan)
+        if verdict == OK:
+            self._drives[command.first : command.first + len(command.drives)] = command.drives
+        return verdict
+
+    def _start(self, command: Start, now: float) -> Verdict:
+        verdict = self._board.check_start(command.configuration, self._scan, self._drives)
+        if verdict != OK or self._scan is None:
+            return verdict
+        scan, drives = self._scan, [drive for drive in self._drives if drive]
+        table = sample_table(drives, scan.oversampling)
+        period = scan_time(
+            len(drives),
+            len(table.channel) * scan.oversampling,
+            (scan.settling + scan.dead_time) * 1e-6,
+            scan.prescaler,
+        )
+        self._scanning = _Scanning(
+            table, scan.configuration, period, now + period * self._pace, now - self._power_on
+        )
+        return OK
+
+    def _say(self, message: Message) -> None:
+        self._out += encode(message)
