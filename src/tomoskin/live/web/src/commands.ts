@@ -1,0 +1,128 @@
+/** What a person can ask for, each with its key and its words: buttons and keyboard share them. */
+
+import { computed } from "@preact/signals";
+import { niceAbove } from "./format";
+import { adjustForce, liftAll } from "./presses";
+import * as state from "./state";
+
+export interface Command {
+  readonly id: string;
+  readonly label: string;
+  /** As on the keycap; `code` is what the keyboard sends. */
+  readonly key: string;
+  readonly code: string;
+  readonly title: string;
+  run(): void;
+}
+
+/** The limit that shows all of the present picture: a round number above its largest change. */
+function autoLimit(): number | null {
+  const image = state.newest.frame?.image;
+  if (!image) return null;
+  let largest = 0;
+  for (const value of image) largest = Math.max(largest, Math.abs(value));
+  return largest > 0 ? niceAbove(largest) : null;
+}
+
+export const takeReference: Command = {
+  id: "reference",
+  label: "Reference",
+  key: "R",
+  code: "r",
+  title: "Take the sheet as it is now for untouched",
+  run: () => state.send({ type: "reference" }),
+};
+
+export const pause: Command = {
+  id: "pause",
+  label: "Pause",
+  key: "Space",
+  code: " ",
+  title: "Hold the picture; again to go on",
+  run: () => state.send({ type: "pause", on: !(state.status.value?.paused ?? false) }),
+};
+
+export const lift: Command = {
+  id: "lift",
+  label: "Lift all",
+  key: "Esc",
+  code: "Escape",
+  title: "Lift every press",
+  run: () => (state.hand.value = liftAll(state.hand.value)),
+};
+
+export const keep: Command = {
+  id: "keep",
+  label: "Keep presses",
+  key: "Shift",
+  code: "k",
+  title: "Presses stay when let go (or hold Shift, or key K)",
+  run: () => (state.keepPresses.value = !state.keepPresses.value),
+};
+
+export const softer: Command = {
+  id: "softer",
+  label: "−",
+  key: "−",
+  code: "-",
+  title: "Less force (wheel down)",
+  run: () => (state.hand.value = adjustForce(state.hand.value, -1)),
+};
+
+export const harder: Command = {
+  id: "harder",
+  label: "+",
+  key: "+",
+  code: "+",
+  title: "More force (wheel up)",
+  run: () => (state.hand.value = adjustForce(state.hand.value, 1)),
+};
+
+export const flat: Command = {
+  id: "flat",
+  label: "Cells",
+  key: "F",
+  code: "f",
+  title: "Show the triangles as they are, unsmoothed",
+  run: () => (state.smoothed.value = !state.smoothed.value),
+};
+
+export const truth: Command = {
+  id: "truth",
+  label: "Truth",
+  key: "T",
+  code: "t",
+  title: "Show where the twin is really pressed, as dashed rings",
+  run: () => (state.showTruth.value = !state.showTruth.value),
+};
+
+export const autoOnce: Command = {
+  id: "auto",
+  label: "Auto once",
+  key: "A",
+  code: "a",
+  title: "Fit the colour limits to the picture as it is now, once",
+  run: () => (state.ownLimit.value = autoLimit() ?? state.ownLimit.value),
+};
+
+/** The ones that a press needs are there only where the source can be pressed. */
+export const available = computed<readonly Command[]>(() => [
+  takeReference,
+  pause,
+  ...(state.scene.value?.pressable ? [lift, keep, softer, harder, truth] : []),
+  flat,
+  autoOnce,
+]);
+
+/** Run the command of a key; typing and pressing buttons keep their own meaning. */
+export function onKey(event: KeyboardEvent): void {
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  const target = event.target instanceof HTMLElement ? event.target : null;
+  if (target?.matches("input, select, textarea")) return;
+  if (event.key === " " && target?.matches("button, summary")) return;
+  const key = event.key === "=" ? "+" : event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  const command = available.value.find(({ code }) => code === key);
+  if (!command || (event.repeat && command !== softer && command !== harder)) return;
+  event.preventDefault();
+  command.run();
+}

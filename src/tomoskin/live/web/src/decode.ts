@@ -1,0 +1,99 @@
+/** One binary frame of the server, as typed views on the bytes that arrived. */
+
+const MAGIC = 0x314b5354; // "TSK1"
+const HEADER = 40;
+const TOUCH = 40;
+const TRUTH = 16;
+
+export interface Touch {
+  readonly id: number;
+  readonly kind: "decrease" | "increase";
+  readonly x: number;
+  readonly y: number;
+  /** One standard deviation, m; NaN where unknown. */
+  readonly sdX: number;
+  readonly sdY: number;
+  /** m². */
+  readonly area: number;
+  /** Signed change of conductivity at the peak, in the scene's unit. */
+  readonly peak: number;
+  /** Seconds since the touch began. */
+  readonly since: number;
+}
+
+export interface Truth {
+  readonly x: number;
+  readonly y: number;
+  readonly force: number;
+  readonly radius: number;
+}
+
+export interface Frame {
+  readonly sequence: number;
+  readonly hostTime: number;
+  readonly referenceReady: boolean;
+  /** Bytes-in to touches-out, s. */
+  readonly latency: number;
+  readonly image: Float32Array;
+  readonly voltages: Float32Array;
+  readonly reference: Float32Array;
+  readonly touches: readonly Touch[];
+  readonly truths: readonly Truth[];
+  /** 0 none, k: the cell belongs to the k-th touch. */
+  readonly labels: Uint8Array;
+}
+
+function touchAt(data: DataView, at: number): Touch {
+  return {
+    id: data.getUint32(at, true),
+    kind: data.getUint8(at + 4) === 1 ? "increase" : "decrease",
+    x: data.getFloat32(at + 8, true),
+    y: data.getFloat32(at + 12, true),
+    sdX: data.getFloat32(at + 16, true),
+    sdY: data.getFloat32(at + 20, true),
+    area: data.getFloat32(at + 24, true),
+    peak: data.getFloat32(at + 28, true),
+    since: data.getFloat32(at + 32, true),
+  };
+}
+
+function truthAt(data: DataView, at: number): Truth {
+  return {
+    x: data.getFloat32(at, true),
+    y: data.getFloat32(at + 4, true),
+    force: data.getFloat32(at + 8, true),
+    radius: data.getFloat32(at + 12, true),
+  };
+}
+
+/** Decode one frame. Throws RangeError for bytes that are not one. */
+export function decodeFrame(buffer: ArrayBuffer): Frame {
+  const data = new DataView(buffer);
+  if (buffer.byteLength < HEADER || data.getUint32(0, true) !== MAGIC) {
+    throw new RangeError("expected a frame beginning with TSK1");
+  }
+  const nCells = data.getUint32(16, true);
+  const nMeas = data.getUint32(20, true);
+  const nTouches = data.getUint16(24, true);
+  const nTruth = data.getUint16(26, true);
+  const touchesAt = HEADER + 4 * (nCells + 2 * nMeas);
+  const truthsAt = touchesAt + TOUCH * nTouches;
+  const labelsAt = truthsAt + TRUTH * nTruth;
+  if (buffer.byteLength < labelsAt + nCells) {
+    throw new RangeError(
+      `expected ${labelsAt + nCells} bytes for ${nCells} cells, got ${buffer.byteLength}`,
+    );
+  }
+  return {
+    sequence: data.getUint32(4, true),
+    hostTime: data.getFloat64(8, true),
+    referenceReady: (data.getUint32(28, true) & 1) === 1,
+    latency: data.getUint32(32, true) * 1e-6,
+    image: new Float32Array(buffer, HEADER, nCells),
+    voltages: new Float32Array(buffer, HEADER + 4 * nCells, nMeas),
+    reference: new Float32Array(buffer, HEADER + 4 * (nCells + nMeas), nMeas),
+    touches: Array.from({ length: nTouches }, (_, k) => touchAt(data, touchesAt + TOUCH * k)),
+    truths: Array.from({ length: nTruth }, (_, k) => truthAt(data, truthsAt + TRUTH * k)),
+    labels: new Uint8Array(buffer, labelsAt, nCells),
+  };
+}

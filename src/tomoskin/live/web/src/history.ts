@@ -1,0 +1,60 @@
+/** The strength of each touch over the last seconds: a few fixed slots, one touch in each. */
+
+import type { Touch } from "./decode";
+
+export const SPAN = 10;
+export const SLOTS = 8;
+
+interface Slot {
+  id: number | null;
+  seen: number;
+}
+
+export class History {
+  readonly times: number[] = [];
+  readonly columns: (number | null)[][] = Array.from({ length: SLOTS }, () => []);
+  private readonly slots: Slot[] = Array.from({ length: SLOTS }, () => ({ id: null, seen: 0 }));
+
+  /** Add one frame's touches at a time in seconds; time running backwards starts afresh. */
+  add(time: number, touches: readonly Touch[]): void {
+    const last = this.times[this.times.length - 1];
+    if (last !== undefined && time < last) this.clear();
+    this.times.push(time);
+    for (const column of this.columns) column.push(null);
+    for (const touch of touches) {
+      const slot = this.slotOf(touch.id, time);
+      if (slot < 0) continue;
+      this.slots[slot].seen = time;
+      this.columns[slot][this.times.length - 1] = Math.abs(touch.peak);
+    }
+  }
+
+  /** The touch last drawn in a slot. */
+  idOf(slot: number): number | null {
+    return this.slots[slot].id;
+  }
+
+  /** Drop what is older than the span; call now and then, not per frame. */
+  trim(): void {
+    const now = this.times[this.times.length - 1] ?? 0;
+    let old = 0;
+    while (old < this.times.length && this.times[old] < now - SPAN) old++;
+    if (old === 0) return;
+    this.times.splice(0, old);
+    for (const column of this.columns) column.splice(0, old);
+  }
+
+  clear(): void {
+    this.times.length = 0;
+    for (const column of this.columns) column.length = 0;
+    for (const slot of this.slots) slot.id = null;
+  }
+
+  private slotOf(id: number, time: number): number {
+    const mine = this.slots.findIndex((slot) => slot.id === id);
+    if (mine >= 0) return mine;
+    const free = this.slots.findIndex((slot) => slot.id === null || slot.seen < time - SPAN);
+    if (free >= 0) this.slots[free].id = id;
+    return free;
+  }
+}

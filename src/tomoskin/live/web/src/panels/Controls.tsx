@@ -1,0 +1,64 @@
+/** Every command as a button with its words and its key. */
+
+import * as commands from "../commands";
+import type { Command } from "../commands";
+import { fixed } from "../format";
+import { hand, keepPresses, link, scene, showTruth, smoothed, status } from "../state";
+
+function Button({ command, pressed, label }: { command: Command; pressed?: boolean; label?: string }) {
+  return (
+    <button
+      type="button"
+      title={command.title}
+      data-testid={`do-${command.id}`}
+      onClick={command.run}
+      disabled={link.value.phase !== "open"}
+      {...(pressed === undefined ? {} : { "aria-pressed": pressed })}
+    >
+      {label ?? command.label} <kbd>{command.key}</kbd>
+    </button>
+  );
+}
+
+/** The force of what is held now, else of the next press. */
+function Force() {
+  const { held, probe } = hand.value;
+  const force = held.find((press) => press.pointer !== null)?.force ?? probe.force;
+  const step = (command: Command, name: string) => (
+    <button type="button" title={command.title} aria-label={name} onClick={command.run}>
+      {command.label}
+    </button>
+  );
+  return (
+    <div class="force" role="group" aria-label="Force">
+      <span>Force</span>
+      {step(commands.softer, "Less force")}
+      <output>{fixed(force, 1)} N</output>
+      {step(commands.harder, "More force")}
+    </div>
+  );
+}
+
+export function Controls() {
+  const pressable = scene.value?.pressable ?? false;
+  const paused = status.value?.paused ?? false;
+  return (
+    <footer class="controls">
+      <div role="group" aria-label="Measurement">
+        <Button command={commands.takeReference} />
+        <Button command={commands.pause} pressed={paused} label={paused ? "Go on" : "Pause"} />
+      </div>
+      {pressable && (
+        <div role="group" aria-label="Pressing">
+          <Force />
+          <Button command={commands.keep} pressed={keepPresses.value} />
+          <Button command={commands.lift} />
+        </div>
+      )}
+      <div role="group" aria-label="View" class="views">
+        <Button command={commands.flat} label={smoothed.value ? "Show cells" : "Smooth"} />
+        {pressable && <Button command={commands.truth} pressed={showTruth.value} />}
+      </div>
+    </footer>
+  );
+}

@@ -1,0 +1,58 @@
+/** The colour scale of the sheet, its numbers and unit, and "auto once". */
+
+import { useEffect, useRef } from "preact/hooks";
+import { MAP_SIZE } from "../colours";
+import { autoOnce } from "../commands";
+import { inScale, scaleFor } from "../format";
+import { limit, ownLimit, scene } from "../state";
+import { theme } from "../theme";
+
+/** The map as an upright strip, largest increase on top. */
+function Strip() {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const { map } = theme.value;
+  useEffect(() => {
+    const pen = canvas.current?.getContext("2d");
+    if (!pen) return;
+    const strip = pen.createImageData(1, MAP_SIZE);
+    for (let k = 0; k < MAP_SIZE; k++) {
+      const from = 4 * (MAP_SIZE - 1 - k);
+      strip.data.set(map.subarray(from, from + 4), 4 * k);
+    }
+    pen.putImageData(strip, 0, 0);
+  }, [map]);
+  return <canvas ref={canvas} width={1} height={MAP_SIZE} class="strip" />;
+}
+
+export function Legend() {
+  if (!scene.value) return null;
+  const scale = scaleFor(limit.value, scene.value.unit);
+  const fixedScale = scaleFor(scene.value.limit, scene.value.unit);
+  const marks = [1, 0.5, 0, -0.5, -1].map((part) => {
+    const value = part * limit.value;
+    return (value > 0 ? "+" : "") + (part === 0 ? "0" : inScale(value, scale));
+  });
+  return (
+    <aside class="legend" aria-label={`Colour scale: change of conductivity, ${scale.unit}`}>
+      <p class="unit">
+        change, {scale.unit}
+      </p>
+      <div class="scale">
+        <Strip />
+        <ol>
+          {marks.map((mark) => (
+            <li key={mark}>{mark}</li>
+          ))}
+        </ol>
+      </div>
+      <button type="button" title={autoOnce.title} onClick={autoOnce.run}>
+        Auto once <kbd>{autoOnce.key}</kbd>
+      </button>
+      {ownLimit.value !== null && (
+        <button type="button" title="Back to the skin's own limits" onClick={() => (ownLimit.value = null)}>
+          Back to ±{inScale(scene.value.limit, fixedScale)} {fixedScale.unit}
+        </button>
+      )}
+    </aside>
+  );
+}

@@ -1,0 +1,87 @@
+/** The strength of each touch over the last ten seconds, each line named at its end. */
+
+import { computed } from "@preact/signals";
+import type uPlot from "uplot";
+import { inScale, scaleFor } from "../format";
+import { SLOTS, SPAN } from "../history";
+import { history, limit, link, newest, scene, shown } from "../state";
+import { theme } from "../theme";
+import { axis, Plot, type Plan } from "./Plot";
+
+const scale = computed(() => scaleFor(limit.value, scene.value?.unit ?? "S"));
+
+/** The touch's number where its line ends. */
+function nameLines(plot: uPlot): void {
+  const { ctx } = plot;
+  const colours = theme.peek();
+  const density = window.devicePixelRatio;
+  ctx.save();
+  ctx.font = `600 ${13 * density}px ${colours.font}`;
+  ctx.fillStyle = colours.accent;
+  ctx.textAlign = "left";
+  ctx.textBaseline = "middle";
+  const last = history.times.length - 1;
+  const x = plot.bbox.left + plot.bbox.width + 7 * density;
+  const ends = history.columns.flatMap((column, slot) => {
+    const value = column[last] ?? null;
+    if (value === null) return [];
+    return { text: String(history.idOf(slot)), y: plot.valToPos(Math.min(value, limit.peek()), "y", true) };
+  });
+  let lowest = Infinity;
+  for (const { text, y } of ends.sort((a, b) => b.y - a.y)) {
+    lowest = Math.min(y, lowest - 14 * density);
+    ctx.fillText(text, x, lowest);
+  }
+  ctx.restore();
+}
+
+function plan(): Plan | null {
+  const colours = theme.value;
+  const top = limit.value;
+  const shownScale = scale.value;
+  return {
+    legend: { show: false },
+    cursor: { show: false },
+    padding: [6, 26, 0, 0],
+    scales: { x: { time: false, range: [-SPAN, 0] }, y: { range: [0, top] } },
+    axes: [
+      axis(colours, {
+        size: 22,
+        splits: () => [-10, -8, -6, -4, -2, 0],
+        values: (_, splits) => splits.map((v) => (v === 0 ? "now" : `−${-v} s`)),
+      }),
+      axis(colours, {
+        size: 52,
+        splits: () => [0, top / 2, top],
+        values: (_, splits) => splits.map((v) => inScale(v, shownScale)),
+      }),
+    ],
+    series: [
+      {},
+      ...Array.from({ length: SLOTS }, () => ({
+        stroke: colours.accent,
+        width: 2,
+        points: { show: false },
+      })),
+    ],
+    hooks: { draw: [nameLines] },
+  };
+}
+
+function data(): uPlot.AlignedData {
+  void shown.value;
+  const end = newest.frame?.hostTime ?? 0;
+  return [history.times.map((time) => time - end), ...history.columns] as uPlot.AlignedData;
+}
+
+export function Strength() {
+  return (
+    <section
+      class={`panel${link.value.phase === "lost" ? " stale" : ""}`}
+      aria-labelledby="strength-title"
+    >
+      <h2 id="strength-title">Strength, {scale.value.unit}</h2>
+      <Plot label="Strength of each touch over the last ten seconds" plan={plan} data={data} />
+    </section>
+  );
+}

@@ -1,0 +1,37 @@
+/** One line of state in words: what is shown, how it goes, and what someone must do. */
+
+import { connection, link, newest, notice, now, scene, status } from "../state";
+import { facts, sentence } from "../words";
+
+function age(): number | null {
+  return newest.count ? now.value - newest.arrived : null;
+}
+
+export function TopLine() {
+  const said = sentence(link.value, scene.value, status.value, now.value, age());
+  const lost = link.value.phase === "lost";
+  return (
+    <header class={`top${said.act ? " act" : ""}`}>
+      <p class="state" data-testid="state" role="status">
+        <span class="lamp" aria-hidden="true" />
+        <strong>{said.text}</strong>
+        {scene.value && !lost && <span class="source">{scene.value.source}</span>}
+        {notice.value && !said.act && <span class="notice">{notice.value}</span>}
+        {lost && (
+          <button type="button" onClick={() => connection.open()}>
+            Try now
+          </button>
+        )}
+      </p>
+      <dl class="facts">
+        {!lost &&
+          facts(status.value).map((fact) => (
+            <div key={fact.id} title={fact.title}>
+              <dd data-testid={fact.id}>{fact.value}</dd>
+              <dt>{fact.name}</dt>
+            </div>
+          ))}
+      </dl>
+    </header>
+  );
+}

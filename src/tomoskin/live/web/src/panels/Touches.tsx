@@ -1,0 +1,118 @@
+/** The touches as a short list in large figures, and, quietly, as words for a screen reader. */
+
+import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
+import type { Touch } from "../decode";
+import { inScale, millimetres, scaleFor, type Scale } from "../format";
+import { limit, link, scene, shown, status } from "../state";
+
+const ROWS = 4;
+
+/** The larger of the two standard deviations, in mm; nothing where it is unknown. */
+function uncertainty(touch: Touch): string {
+  const sd = Math.max(touch.sdX, touch.sdY);
+  return Number.isFinite(sd) ? `±${millimetres(sd)}` : "";
+}
+
+function Row({ touch, scale }: { touch: Touch; scale: Scale }) {
+  return (
+    <tr data-testid="touch-row" data-id={touch.id}>
+      <th scope="row">
+        <span class="chip">{touch.id}</span>
+      </th>
+      <td class="large">{millimetres(touch.x)}</td>
+      <td class="large">{millimetres(touch.y)}</td>
+      <td class="small">{uncertainty(touch)}</td>
+      <td class="large">
+        <span class="arrow" title={touch.kind}>
+          {touch.kind === "decrease" ? "↓" : "↑"}
+        </span>
+        {inScale(Math.abs(touch.peak), scale)}
+      </td>
+    </tr>
+  );
+}
+
+function Teaching() {
+  const reference = status.value?.reference;
+  if (!scene.value || !status.value) return <p class="lead">Waiting for the sheet</p>;
+  if (reference && !reference.ready) {
+    return (
+      <>
+        <p class="lead">Taking the reference: keep hands off</p>
+        <progress max={reference.needed} value={reference.frames} aria-label="Reference" />
+      </>
+    );
+  }
+  if (!scene.value.pressable) return <p class="lead">Press the sheet</p>;
+  return (
+    <>
+      <p class="lead">Press the sheet</p>
+      <p class="hint">
+        Hold for more force, or set it with the wheel. Drag to slide. With Shift a press stays.
+      </p>
+    </>
+  );
+}
+
+/** Says which touches there are when that changes, not where they move. */
+function Announcer() {
+  const ids = useComputed(() => (shown.value?.touches ?? []).map((touch) => touch.id).join(" "));
+  const words = useSignal("");
+  useSignalEffect(() => {
+    void ids.value;
+    const timer = window.setTimeout(() => {
+      const touches = shown.peek()?.touches ?? [];
+      const places = touches.map(
+        ({ id, x, y }) => `touch ${id} at ${millimetres(x, 0)}, ${millimetres(y, 0)} millimetres`,
+      );
+      words.value = places.length ? places.join("; ") : "No touch";
+    }, 700);
+    return () => window.clearTimeout(timer);
+  });
+  return (
+    <p class="unseen" role="log" aria-live="polite">
+      {words}
+    </p>
+  );
+}
+
+export function Touches() {
+  const touches = shown.value?.touches ?? [];
+  const scale = scaleFor(limit.value, scene.value?.unit ?? "S");
+  const stale = link.value.phase === "lost";
+  return (
+    <section class={`panel touches${stale ? " stale" : ""}`} aria-labelledby="touches-title">
+      <h2 id="touches-title">Touches</h2>
+      <div class="list" data-testid="touch-list">
+        {touches.length === 0 ? (
+          <div class="teaching">
+            <Teaching />
+          </div>
+        ) : (
+          <table>
+            <thead>
+              <tr>
+                <th scope="col">
+                  <span class="unseen">Number</span>
+                </th>
+                <th scope="col">x, mm</th>
+                <th scope="col">y, mm</th>
+                <th scope="col" title="One standard deviation, the larger of x and y">
+                  mm
+                </th>
+                <th scope="col">change, {scale.unit}</th>
+              </tr>
+            </thead>
+            <tbody>
+              {touches.slice(0, ROWS).map((touch) => (
+                <Row key={touch.id} touch={touch} scale={scale} />
+              ))}
+            </tbody>
+          </table>
+        )}
+        {touches.length > ROWS && <p class="hint">and {touches.length - ROWS} more on the sheet</p>}
+      </div>
+      <Announcer />
+    </section>
+  );
+}

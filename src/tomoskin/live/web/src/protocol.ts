@@ -1,0 +1,92 @@
+/** The messages between server and page, as JSON. Lengths in metres, times in seconds. */
+
+export interface Electrode {
+  readonly x: number;
+  readonly y: number;
+  readonly label: string;
+  /** Mesh points along the electrode's arc. */
+  readonly points: readonly number[];
+}
+
+export interface PatternTable {
+  readonly name: string;
+  readonly n_meas: number;
+  readonly n_drive: number;
+  /** Source, sink of each row, flat. */
+  readonly drive: readonly number[];
+  /** Plus, minus of each row, flat. */
+  readonly measure: readonly number[];
+}
+
+export interface Scene {
+  readonly type: "scene";
+  readonly skin: { readonly name: string; readonly description: string; readonly source: string };
+  readonly unit: "S" | "relative";
+  /** The fixed symmetric colour limit, in `unit`. */
+  readonly limit: number;
+  /** x, y of each mesh point, flat. */
+  readonly points: readonly number[];
+  /** Three mesh points of each cell, flat. */
+  readonly cells: readonly number[];
+  /** x, y along the closed outline, flat. */
+  readonly outline: readonly number[];
+  readonly electrodes: readonly Electrode[];
+  readonly pattern: PatternTable;
+  readonly source: string;
+  readonly pressable: boolean;
+  readonly probe: {
+    readonly radius_m: number;
+    readonly force_n: number;
+    readonly max_force_n: number;
+  };
+  readonly version: string;
+}
+
+export interface Status {
+  readonly type: "state";
+  readonly running: boolean;
+  readonly paused: boolean;
+  readonly fps: number;
+  readonly dropped: number;
+  readonly corrupt: number;
+  readonly gaps: number;
+  readonly p50_ms: number | null;
+  readonly p99_ms: number | null;
+  readonly reference: {
+    readonly frames: number;
+    readonly needed: number;
+    readonly age_s: number | null;
+    readonly ready: boolean;
+  };
+  readonly noise_v: number | null;
+  /** What someone must act on, in words. */
+  readonly problem: string | null;
+  readonly text: string;
+}
+
+export interface EventNote {
+  readonly type: "event";
+  readonly time_s: number;
+  readonly kind: string;
+  readonly text: string;
+}
+
+export interface Refusal {
+  readonly type: "error";
+  readonly message: string;
+}
+
+export type ServerMessage = Scene | Status | EventNote | Refusal;
+
+export interface Press {
+  readonly x: number;
+  readonly y: number;
+  /** Newtons. */
+  readonly force: number;
+  readonly radius: number;
+}
+
+export type PageMessage =
+  | { readonly type: "presses"; readonly presses: readonly Press[] }
+  | { readonly type: "reference" }
+  | { readonly type: "pause"; readonly on: boolean };

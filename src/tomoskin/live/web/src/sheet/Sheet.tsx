@@ -1,0 +1,81 @@
+/** The sheet: image, marks and furniture, in one view; the place where one presses. */
+
+import { effect, signal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { hand, limit, link, newest, onRepaint, scene, showTruth, smoothed, topology } from "../state";
+import { theme } from "../theme";
+import { Furniture } from "./Furniture";
+import { Painter } from "./painter";
+import { cursor, listen } from "./pointer";
+import { boxOf, fit, type View } from "./view";
+
+/** Room for the electrodes' labels all round and for the legend at the left. */
+const MARGIN = { left: 96, right: 52, top: 52, bottom: 52 };
+const NOWHERE: View = { scale: 1, originX: 0, originY: 0, width: 0, height: 0 };
+
+export const view = signal<View>(NOWHERE);
+const size = signal<readonly [number, number]>([0, 0]);
+const accelerated = signal(true);
+const element: { sheet: HTMLElement | null } = { sheet: null };
+
+/** Where the sheet is on the page, for tests that press at a place in metres. */
+export const sheetElement = (): HTMLElement | null => element.sheet;
+
+export function Sheet() {
+  const sheet = useRef<HTMLDivElement>(null);
+  const image = useRef<HTMLCanvasElement>(null);
+  const marks = useRef<HTMLCanvasElement>(null);
+
+  useEffect(() => {
+    if (!sheet.current || !image.current || !marks.current) return;
+    element.sheet = sheet.current;
+    const painter = new Painter(image.current, marks.current, () => view.peek());
+    accelerated.value = painter.accelerated;
+    onRepaint(painter.request);
+    const undo = [
+      listen(sheet.current, () => view.peek()),
+      effect(() => {
+        const [width, height] = size.value;
+        if (scene.value && width > 0) view.value = fit(boxOf(scene.value.outline), width, height, MARGIN);
+        painter.resize(width, height);
+      }),
+      effect(() => {
+        void [theme.value, topology.value, limit.value, smoothed.value, showTruth.value, hand.value, cursor.value];
+        painter.request();
+      }),
+      () => painter.stop(),
+    ];
+    const observer = new ResizeObserver(([entry]) => {
+      size.value = [entry.contentRect.width, entry.contentRect.height];
+    });
+    observer.observe(sheet.current);
+    return () => {
+      observer.disconnect();
+      for (const step of undo) step();
+    };
+  }, []);
+
+  const stale = link.value.phase === "lost" && newest.count > 0;
+  const pressable = scene.value?.pressable ?? false;
+  return (
+    <div
+      ref={sheet}
+      class={`sheet${stale ? " stale" : ""}${pressable ? " pressable" : ""}`}
+      data-testid="sheet"
+      tabIndex={0}
+      role="application"
+      aria-label={
+        pressable
+          ? "The sheet. Arrow keys move the probe, Enter presses or lifts, plus and minus set the force."
+          : "The sheet"
+      }
+    >
+      <canvas ref={image} />
+      <canvas ref={marks} />
+      {scene.value && view.value.width > 0 && <Furniture scene={scene.value} view={view.value} />}
+      {!accelerated.value && (
+        <p class="remark">WebGL 2 is missing in this browser: the sheet is drawn flat and more slowly.</p>
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,163 @@
+/** The sheet's image in WebGL2: one static buffer of corners, one texture of values per frame. */
+
+import { MAP_SIZE } from "../colours";
+import type { Look, Picture } from "./picture";
+import { toNodes, type Topology } from "./topology";
+
+const VERTEX = `#version 300 es
+layout(location = 0) in vec2 place;
+layout(location = 1) in float node;
+uniform vec4 view;
+uniform highp sampler2D values;
+uniform int row;
+uniform bool smoothed;
+out float value;
+out vec3 corner;
+void main() {
+  int index = smoothed ? int(node) : gl_VertexID / 3;
+  value = texelFetch(values, ivec2(index % row, index / row), 0).r;
+  int k = gl_VertexID % 3;
+  corner = vec3(k == 0, k == 1, k == 2);
+  gl_Position = vec4(place * view.xy + view.zw, 0.0, 1.0);
+}`;
+
+const FRAGMENT = `#version 300 es
+precision highp float;
+uniform sampler2D map;
+uniform float limit;
+uniform float size;
+uniform vec4 mesh;
+in float value;
+in vec3 corner;
+out vec4 colour;
+void main() {
+  float t = clamp(value / limit, -1.0, 1.0) * 0.5 + 0.5;
+  vec3 shade = texture(map, vec2((t * (size - 1.0) + 0.5) / size, 0.5)).rgb;
+  vec3 near = smoothstep(vec3(0.0), fwidth(corner) * 1.2, corner);
+  float edge = 1.0 - min(min(near.x, near.y), near.z);
+  colour = vec4(mix(shade, mesh.rgb, edge * mesh.a), 1.0);
+}`;
+
+const ROW = 1024;
+
+function compile(gl: WebGL2RenderingContext): WebGLProgram {
+  const program = gl.createProgram();
+  for (const [kind, text] of [
+    [gl.VERTEX_SHADER, VERTEX],
+    [gl.FRAGMENT_SHADER, FRAGMENT],
+  ] as const) {
+    const shader = gl.createShader(kind);
+    if (!shader) throw new Error("no shader");
+    gl.shaderSource(shader, text);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
+    throw new Error(gl.getProgramInfoLog(program) ?? "the sheet's program does not link");
+  }
+  return program;
+}
+
+function makeTexture(gl: WebGL2RenderingContext, unit: number, filter: number): WebGLTexture {
+  const texture = gl.createTexture();
+  gl.activeTexture(gl.TEXTURE0 + unit);
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
+    gl.texParameteri(gl.TEXTURE_2D, side, filter);
+  }
+  for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) {
+    gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);
+  }
+  return texture;
+}
+
+/** Three corners a cell: x, y, node. */
+function cornerData(topology: Topology): Float32Array {
+  const { cells, points } = topology;
+  const corners = new Float32Array(3 * cells.length);
+  cells.forEach((node, k) => corners.set([points[2 * node], points[2 * node + 1], node], 3 * k));
+  return corners;
+}
+
+/** The WebGL2 context of a canvas, or null where WebGL2 is missing. */
+export function openGl(canvas: HTMLCanvasElement): WebGL2RenderingContext | null {
+  return canvas.getContext("webgl2", { antialias: true, premultipliedAlpha: true });
+}
+
+/** Paints pictures in a fresh (or restored) context. */
+export class GlPicture implements Picture {
+  private readonly uniforms: Record<string, WebGLUniformLocation | null>;
+  private topology: Topology | null = null;
+  private values = new Float32Array(ROW);
+  private map: Uint8Array | null = null;
+
+  constructor(private readonly gl: WebGL2RenderingContext) {
+    const program = compile(gl);
+    const at = (name: string) => gl.getUniformLocation(program, name);
+    gl.useProgram(program);
+    makeTexture(gl, 0, gl.NEAREST);
+    makeTexture(gl, 1, gl.LINEAR);
+    gl.uniform1i(at("values"), 0);
+    gl.uniform1i(at("map"), 1);
+    gl.uniform1i(at("row"), ROW);
+    gl.uniform1f(at("size"), MAP_SIZE);
+    this.uniforms = Object.fromEntries(
+      ["view", "limit", "mesh", "smoothed"].map((name) => [name, at(name)]),
+    );
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 2, gl.FLOAT, false, 12, 0);
+    gl.enableVertexAttribArray(1);
+    gl.vertexAttribPointer(1, 1, gl.FLOAT, false, 12, 8);
+  }
+
+  setTopology(topology: Topology): void {
+    const { gl } = this;
+    const rows = Math.ceil(Math.max(topology.nCells, topology.nPoints) / ROW);
+    this.topology = topology;
+    this.values = new Float32Array(rows * ROW);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, ROW, rows, 0, gl.RED, gl.FLOAT, this.values);
+    gl.bufferData(gl.ARRAY_BUFFER, cornerData(topology), gl.STATIC_DRAW);
+  }
+
+  paint(image: Float32Array, look: Look): void {
+    const { gl, topology, uniforms } = this;
+    if (!topology) return;
+    const { scale, originX, originY, width, height } = look.view;
+    gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
+    gl.uniform4f(
+      uniforms.view,
+      (2 * scale) / width,
+      (2 * scale) / height,
+      (2 * originX) / width - 1,
+      1 - (2 * originY) / height,
+    );
+    gl.uniform1f(uniforms.limit, look.limit);
+    gl.uniform1i(uniforms.smoothed, look.smoothed ? 1 : 0);
+    const [red, green, blue, strength] = look.mesh;
+    gl.uniform4f(uniforms.mesh, red, green, blue, look.smoothed ? 0 : strength);
+    this.uploadMap(look.map);
+    this.uploadValues(topology, image, look.smoothed);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.drawArrays(gl.TRIANGLES, 0, 3 * topology.nCells);
+  }
+
+  private uploadMap(map: Uint8Array): void {
+    if (this.map === map) return;
+    const { gl } = this;
+    this.map = map;
+    gl.activeTexture(gl.TEXTURE1);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, MAP_SIZE, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, map);
+  }
+
+  private uploadValues(topology: Topology, image: Float32Array, smoothed: boolean): void {
+    const { gl, values } = this;
+    if (smoothed) toNodes(topology, image, values);
+    else values.set(image);
+    gl.activeTexture(gl.TEXTURE0);
+    const rows = values.length / ROW;
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ROW, rows, gl.RED, gl.FLOAT, values);
+  }
+}

@@ -1,0 +1,168 @@
+/** What is drawn over the image each frame: contours, touches, the twin's truth, own presses. */
+
+import type { Touch, Truth } from "../decode";
+import type { Held } from "../presses";
+import type { Theme } from "../theme";
+import { contours, type Topology } from "./topology";
+import { toPixels, type View } from "./view";
+
+export interface Marks {
+  readonly touches: readonly Touch[];
+  readonly labels: Uint8Array;
+  /** Null: the truth is not asked for. */
+  readonly truths: readonly Truth[] | null;
+  readonly held: readonly Held[];
+  /** The keyboard's place on the sheet, m. */
+  readonly cursor: readonly [number, number] | null;
+  readonly smoothed: boolean;
+}
+
+type Pen = CanvasRenderingContext2D;
+type Place = readonly [number, number];
+
+/** A line that reads on any colour: a wide halo under it. */
+function haloed(pen: Pen, theme: Theme, path: Path2D, colour: string, width: number): void {
+  pen.setLineDash([]);
+  pen.strokeStyle = theme.halo;
+  pen.lineWidth = width + 2.5;
+  pen.stroke(path);
+  pen.strokeStyle = colour;
+  pen.lineWidth = width;
+  pen.stroke(path);
+}
+
+const ROUNDS = 4;
+
+/** A corner drawn towards its neighbours along a closed loop. */
+function evened(corner: Place, k: number, loop: readonly Place[]): Place {
+  const before = loop[(k + loop.length - 1) % loop.length];
+  const after = loop[(k + 1) % loop.length];
+  return [
+    corner[0] / 2 + (before[0] + after[0]) / 4,
+    corner[1] / 2 + (before[1] + after[1]) / 4,
+  ];
+}
+
+/** A loop of nodes as a path: its edges, or a smooth curve through the middles of its edges. */
+function loopPath(loop: number[], topology: Topology, view: View, smoothed: boolean): Path2D {
+  const path = new Path2D();
+  let corners = loop.map((node) =>
+    toPixels(view, topology.points[2 * node], topology.points[2 * node + 1]),
+  );
+  for (let round = 0; smoothed && round < ROUNDS; round++) corners = corners.map(evened);
+  corners.forEach(([x, y], k) => {
+    const [nextX, nextY] = corners[(k + 1) % corners.length];
+    if (!smoothed) return path.lineTo(x, y);
+    const [lastX, lastY] = corners[(k + corners.length - 1) % corners.length];
+    if (k === 0) path.moveTo((lastX + x) / 2, (lastY + y) / 2);
+    path.quadraticCurveTo(x, y, (x + nextX) / 2, (y + nextY) / 2);
+  });
+  path.closePath();
+  return path;
+}
+
+function drawTouch(pen: Pen, theme: Theme, view: View, touch: Touch): void {
+  const [x, y] = toPixels(view, touch.x, touch.y);
+  const path = new Path2D();
+  const arm = 9;
+  path.moveTo(x - arm, y);
+  path.lineTo(x + arm, y);
+  path.moveTo(x, y - arm);
+  path.lineTo(x, y + arm);
+  if (Number.isFinite(touch.sdX) && Number.isFinite(touch.sdY)) {
+    // Two standard deviations: where the touch is with 86 % of certainty.
+    const [rx, ry] = [2 * touch.sdX * view.scale, 2 * touch.sdY * view.scale];
+    path.moveTo(x + rx, y);
+    path.ellipse(x, y, Math.max(1, rx), Math.max(1, ry), 0, 0, 2 * Math.PI);
+  }
+  haloed(pen, theme, path, theme.accent, 2);
+}
+
+/** The touch's number on a disc beside its cross. */
+function drawNumber(pen: Pen, theme: Theme, view: View, touch: Touch): void {
+  const [x, y] = toPixels(view, touch.x, touch.y);
+  const text = String(touch.id);
+  pen.font = `600 15px ${theme.font}`;
+  pen.textAlign = "center";
+  pen.textBaseline = "middle";
+  const half = Math.max(11, pen.measureText(text).width / 2 + 6);
+  const [cx, cy] = [x + 14 + half, y - 20];
+  pen.beginPath();
+  pen.roundRect(cx - half, cy - 11, 2 * half, 22, 11);
+  pen.fillStyle = theme.accent;
+  pen.fill();
+  pen.fillStyle = theme.halo;
+  pen.fillText(text, cx, cy + 1);
+}
+
+function drawTruth(pen: Pen, theme: Theme, view: View, truth: Truth): void {
+  const [x, y] = toPixels(view, truth.x, truth.y);
+  pen.beginPath();
+  pen.ellipse(x, y, truth.radius * view.scale, truth.radius * view.scale, 0, 0, 2 * Math.PI);
+  pen.setLineDash([]);
+  pen.strokeStyle = theme.halo;
+  pen.lineWidth = 3;
+  pen.stroke();
+  pen.setLineDash([5, 4]);
+  pen.strokeStyle = theme.ink;
+  pen.lineWidth = 1.25;
+  pen.stroke();
+  pen.setLineDash([]);
+}
+
+/** The hand's own press: its probe, an arc as long as its force, the force in words. */
+function drawHeld(pen: Pen, theme: Theme, view: View, held: Held, maxForce: number): void {
+  const [x, y] = toPixels(view, held.x, held.y);
+  const radius = Math.max(10, held.radius * view.scale);
+  const ring = new Path2D();
+  ring.arc(x, y, radius, 0, 2 * Math.PI);
+  haloed(pen, theme, ring, theme.muted, 1);
+  const arc = new Path2D();
+  arc.arc(x, y, radius, -Math.PI / 2, -Math.PI / 2 + (2 * Math.PI * held.force) / maxForce);
+  haloed(pen, theme, arc, theme.ink, 3);
+  pen.font = `500 13px ${theme.font}`;
+  pen.textAlign = "center";
+  pen.textBaseline = "top";
+  pen.strokeStyle = theme.halo;
+  pen.lineWidth = 4;
+  pen.lineJoin = "round";
+  const text = `${held.force.toFixed(1)} N`;
+  pen.strokeText(text, x, y + radius + 6);
+  pen.fillStyle = theme.ink;
+  pen.fillText(text, x, y + radius + 6);
+}
+
+function drawCursor(pen: Pen, theme: Theme, view: View, place: readonly [number, number]): void {
+  const [x, y] = toPixels(view, ...place);
+  const path = new Path2D();
+  path.arc(x, y, 12, 0, 2 * Math.PI);
+  path.moveTo(x + 2, y);
+  path.arc(x, y, 2, 0, 2 * Math.PI);
+  haloed(pen, theme, path, theme.ink, 1.5);
+}
+
+/** Draw all marks on a cleared canvas. */
+export function drawMarks(
+  pen: Pen,
+  theme: Theme,
+  view: View,
+  topology: Topology,
+  marks: Marks,
+  maxForce: number,
+): void {
+  const density = pen.canvas.width / view.width;
+  pen.setTransform(density, 0, 0, density, 0, 0);
+  pen.clearRect(0, 0, view.width, view.height);
+  if (marks.touches.length > 0) {
+    for (const region of contours(topology, marks.labels, marks.touches.length)) {
+      for (const loop of region) {
+        haloed(pen, theme, loopPath(loop, topology, view, marks.smoothed), theme.accent, 1.5);
+      }
+    }
+  }
+  for (const truth of marks.truths ?? []) drawTruth(pen, theme, view, truth);
+  for (const held of marks.held) drawHeld(pen, theme, view, held, maxForce);
+  for (const touch of marks.touches) drawTouch(pen, theme, view, touch);
+  for (const touch of marks.touches) drawNumber(pen, theme, view, touch);
+  if (marks.cursor) drawCursor(pen, theme, view, marks.cursor);
+}

@@ -1,0 +1,123 @@
+/** Pointer, wheel and arrow keys on the sheet, turned into presses. */
+
+import { signal } from "@preact/signals";
+import { adjustForce, liftAll, press, release, slide } from "../presses";
+import { hand, keepPresses, requestRepaint, scene } from "../state";
+import { contains, toSheet, type View } from "./view";
+
+/** Where the keyboard would press, m; null while the keyboard is elsewhere. */
+export const cursor = signal<readonly [number, number] | null>(null);
+
+/** No pointer has this number. */
+const KEYBOARD = -1;
+const STEP = 5e-3;
+const FINE_STEP = 1e-3;
+const WHEEL_STEP = 40;
+
+const ARROWS: Readonly<Record<string, readonly [number, number]>> = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, 1],
+  ArrowDown: [0, -1],
+};
+
+function onSheet(x: number, y: number): boolean {
+  return contains(scene.value?.outline ?? [], x, y);
+}
+
+/** Press with the probe's force and leave the press there; lift the one that is there. */
+function keyPress([x, y]: readonly [number, number]): void {
+  hand.value = release(press(hand.value, KEYBOARD, x, y, true), KEYBOARD);
+}
+
+function onArrow(event: KeyboardEvent): void {
+  const arrow = ARROWS[event.key];
+  const place = cursor.value ?? [0, 0];
+  if (arrow) {
+    const step = event.shiftKey ? FINE_STEP : STEP;
+    const next = [place[0] + arrow[0] * step, place[1] + arrow[1] * step] as const;
+    if (onSheet(...next)) cursor.value = next;
+  } else if (event.key === "Enter") keyPress(place);
+  else return;
+  event.preventDefault();
+  event.stopPropagation();
+  requestRepaint();
+}
+
+/** Listen on an element that shows the sheet in the view of the moment. Returns the undoing. */
+export function listen(element: HTMLElement, view: () => View): () => void {
+  const quit = new AbortController();
+  const { signal } = quit;
+  let turned = 0;
+
+  const placeOf = (event: PointerEvent): readonly [number, number] => {
+    const box = element.getBoundingClientRect();
+    return toSheet(view(), event.clientX - box.left, event.clientY - box.top);
+  };
+  const pressable = () => scene.value?.pressable ?? false;
+
+  element.addEventListener(
+    "pointerdown",
+    (event) => {
+      const [x, y] = placeOf(event);
+      if (event.button !== 0 || !pressable() || !onSheet(x, y)) return;
+      element.setPointerCapture(event.pointerId);
+      const keeping = event.shiftKey || keepPresses.value;
+      hand.value = press(hand.value, event.pointerId, x, y, keeping);
+    },
+    { signal },
+  );
+  element.addEventListener(
+    "pointermove",
+    (event) => {
+      if (!element.hasPointerCapture(event.pointerId)) return;
+      const [x, y] = placeOf(event);
+      if (onSheet(x, y)) hand.value = slide(hand.value, event.pointerId, x, y);
+    },
+    { signal },
+  );
+  for (const kind of ["pointerup", "pointercancel", "lostpointercapture"] as const) {
+    element.addEventListener(
+      kind,
+      (event) => (hand.value = release(hand.value, event.pointerId)),
+      { signal },
+    );
+  }
+  element.addEventListener(
+    "wheel",
+    (event) => {
+      if (!pressable()) return;
+      event.preventDefault();
+      turned -= event.deltaMode === WheelEvent.DOM_DELTA_LINE ? event.deltaY * 16 : event.deltaY;
+      const steps = Math.trunc(turned / WHEEL_STEP);
+      turned -= steps * WHEEL_STEP;
+      if (steps) hand.value = adjustForce(hand.value, steps);
+    },
+    { signal, passive: false },
+  );
+  element.addEventListener("keydown", (event) => pressable() && onArrow(event), { signal });
+  element.addEventListener(
+    "focus",
+    () => {
+      if (pressable() && element.matches(":focus-visible")) cursor.value ??= [0, 0];
+      requestRepaint();
+    },
+    { signal },
+  );
+  element.addEventListener(
+    "blur",
+    () => {
+      cursor.value = null;
+      requestRepaint();
+    },
+    { signal },
+  );
+  // The window going away must not leave a press on the skin.
+  window.addEventListener("blur", () => (hand.value = letGo()), { signal });
+  return () => quit.abort();
+}
+
+function letGo() {
+  const held = hand.value.held.filter((other) => other.pointer === null);
+  return held.length ? { ...hand.value, held } : liftAll(hand.value);
+}

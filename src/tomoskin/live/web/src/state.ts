@@ -1,0 +1,133 @@
+/** Everything that the page knows, as signals; the newest frame beside them, outside rendering. */
+
+import { batch, computed, signal } from "@preact/signals";
+import { decodeFrame, type Frame } from "./decode";
+import { History } from "./history";
+import { emptyHand, type Hand } from "./presses";
+import type { PageMessage, Scene, ServerMessage, Status } from "./protocol";
+import { prepareTopology } from "./sheet/topology";
+import { Connection, type LinkState, socketAddress } from "./socket";
+
+export const scene = signal<Scene | null>(null);
+export const status = signal<Status | null>(null);
+export const link = signal<LinkState>({ phase: "connecting" });
+/** A sentence that the server just said, cleared after some seconds. */
+export const notice = signal<string | null>(null);
+
+/** How the page shows things; nothing of it leaves the page. */
+export const smoothed = signal(true);
+export const showTruth = signal(false);
+export const showDifference = signal(false);
+/** Set by "auto once"; null: the scene's own fixed limit. */
+export const ownLimit = signal<number | null>(null);
+export const keepPresses = signal(false);
+
+export const limit = computed(() => ownLimit.value ?? scene.value?.limit ?? 1);
+export const topology = computed(() =>
+  scene.value ? prepareTopology(scene.value.points, scene.value.cells) : null,
+);
+
+export const hand = signal<Hand>(emptyHand({ radius: 0.01, force: 1, maxForce: 10 }));
+
+/** The newest frame as shown in numbers: ten times a second. */
+export const shown = signal<Frame | null>(null);
+/** Page time, s, at the same rhythm; for ages. */
+export const now = signal(0);
+
+/** The newest frame and when it came, written at the wire's pace, read at the display's. */
+export const newest = { frame: null as Frame | null, arrived: 0, count: 0, broken: 0 };
+export const history = new History();
+
+/** Called when a new frame (or nothing but its setting) wants painting. */
+let repaint = (): void => undefined;
+export function onRepaint(callback: () => void): void {
+  repaint = callback;
+}
+export const requestRepaint = (): void => repaint();
+
+const NOTICE_SECONDS = 6;
+let noticeTimer = 0;
+
+function say(text: string): void {
+  notice.value = text;
+  window.clearTimeout(noticeTimer);
+  noticeTimer = window.setTimeout(() => (notice.value = null), NOTICE_SECONDS * 1e3);
+}
+
+function setScene(next: Scene): void {
+  const changed = next.skin.name !== scene.value?.skin.name;
+  const { radius_m: radius, force_n: force, max_force_n: maxForce } = next.probe;
+  batch(() => {
+    scene.value = next;
+    if (changed) {
+      hand.value = emptyHand({ radius, force, maxForce });
+      ownLimit.value = null;
+      newest.frame = null;
+      shown.value = null;
+      history.clear();
+    }
+  });
+}
+
+function receive(message: ServerMessage): void {
+  if (message.type === "scene") setScene(message);
+  else if (message.type === "state") status.value = message;
+  else if (message.type === "event") say(message.text);
+  else if (message.type === "error") say(message.message);
+}
+
+/** A frame that does not fit the scene (it crossed a change of skin) is not shown. */
+function receiveFrame(bytes: ArrayBuffer): void {
+  let frame: Frame;
+  try {
+    frame = decodeFrame(bytes);
+  } catch {
+    newest.broken++;
+    return;
+  }
+  if (frame.image.length !== topology.peek()?.nCells) return;
+  newest.frame = frame;
+  newest.arrived = performance.now() / 1e3;
+  newest.count++;
+  history.add(frame.hostTime, frame.touches);
+  repaint();
+}
+
+/** Scripting time spent on frames, for the bench: arrival, painting, numbers. */
+export const cost = { seconds: 0 };
+
+/** Run and add the time to the cost. */
+export function timed<A extends unknown[]>(work: (...args: A) => void): (...args: A) => void {
+  return (...args) => {
+    const start = performance.now();
+    work(...args);
+    cost.seconds += (performance.now() - start) / 1e3;
+  };
+}
+
+export const connection = new Connection(socketAddress(window.location), {
+  message: receive,
+  frame: timed(receiveFrame),
+  link(state) {
+    // The server lifts our presses when it loses us; so does the page.
+    if (state.phase === "lost") hand.value = { ...hand.peek(), held: [] };
+    link.value = state;
+  },
+});
+
+export const send = (message: PageMessage): void => connection.send(message);
+
+const TICK_MS = 100;
+
+/** Open the connection and start the ten-a-second rhythm of the numbers. */
+export function start(): void {
+  connection.open();
+  const tick = timed(() => {
+    history.trim();
+    batch(() => {
+      now.value = performance.now() / 1e3;
+      shown.value = newest.frame;
+    });
+  });
+  window.setInterval(tick, TICK_MS);
+}

@@ -1,0 +1,33 @@
+/** The colours that canvases need, read from tokens.css, following the system's light or dark. */
+
+import { signal } from "@preact/signals";
+import { DARK_MAP, LIGHT_MAP, mapTable } from "./colours";
+
+const NAMES = ["ground", "ink", "muted", "line", "accent", "halo", "mesh"] as const;
+
+export type Theme = Readonly<Record<(typeof NAMES)[number], string>> & {
+  readonly dark: boolean;
+  readonly map: Uint8Array;
+  readonly font: string;
+};
+
+const darkQuery = window.matchMedia("(prefers-color-scheme: dark)");
+
+function read(): Theme {
+  const style = getComputedStyle(document.documentElement);
+  const colours = Object.fromEntries(
+    NAMES.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]),
+  ) as Record<(typeof NAMES)[number], string>;
+  return {
+    ...colours,
+    dark: darkQuery.matches,
+    map: mapTable(darkQuery.matches ? DARK_MAP : LIGHT_MAP),
+    font: style.getPropertyValue("--font").trim(),
+  };
+}
+
+export const theme = signal<Theme>(read());
+
+darkQuery.addEventListener("change", () => {
+  theme.value = read();
+});

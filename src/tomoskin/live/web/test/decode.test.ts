@@ -1,0 +1,50 @@
+import { describe, expect, it } from "vitest";
+import { decodeFrame } from "../src/decode";
+
+/** Five cells, three rows, one touch, one press: built as the server builds it. */
+function sample(): ArrayBuffer {
+  const bytes = new ArrayBuffer(40 + 4 * (5 + 6) + 40 + 16 + 8);
+  const data = new DataView(bytes);
+  new Uint8Array(bytes).set([0x54, 0x53, 0x4b, 0x31]); // "TSK1"
+  data.setUint32(4, 77, true);
+  data.setFloat64(8, 12.5, true);
+  data.setUint32(16, 5, true);
+  data.setUint32(20, 3, true);
+  data.setUint16(24, 1, true);
+  data.setUint16(26, 1, true);
+  data.setUint32(28, 1, true);
+  data.setUint32(32, 250, true);
+  for (let k = 0; k < 11; k++) data.setFloat32(40 + 4 * k, k / 4, true);
+  const touch = 84;
+  data.setUint32(touch, 9, true);
+  data.setUint8(touch + 4, 1);
+  [0.01, -0.02, Number.NaN, Number.NaN, 3e-4, 0.5, 1.5].forEach((v, k) =>
+    data.setFloat32(touch + 8 + 4 * k, v, true),
+  );
+  [0.01, -0.02, 4, 0.008].forEach((v, k) => data.setFloat32(124 + 4 * k, v, true));
+  new Uint8Array(bytes, 140).set([0, 1, 1, 0, 0]);
+  return bytes;
+}
+
+describe("decodeFrame", () => {
+  it("reads every section", () => {
+    const frame = decodeFrame(sample());
+    expect(frame).toMatchObject({ sequence: 77, hostTime: 12.5, referenceReady: true });
+    expect(frame.latency).toBeCloseTo(250e-6);
+    expect([...frame.image]).toEqual([0, 0.25, 0.5, 0.75, 1]);
+    expect([...frame.voltages]).toEqual([1.25, 1.5, 1.75]);
+    expect([...frame.reference]).toEqual([2, 2.25, 2.5]);
+    expect([...frame.labels]).toEqual([0, 1, 1, 0, 0]);
+    expect(frame.touches[0]).toMatchObject({ id: 9, kind: "increase", peak: 0.5, since: 1.5 });
+    expect(frame.touches[0].x).toBeCloseTo(0.01);
+    expect(frame.touches[0].sdX).toBeNaN();
+    expect(frame.truths[0].radius).toBeCloseTo(0.008);
+  });
+
+  it("refuses foreign, short and empty bytes", () => {
+    expect(() => decodeFrame(new ArrayBuffer(0))).toThrow(RangeError);
+    expect(() => decodeFrame(new ArrayBuffer(64))).toThrow("TSK1");
+    expect(() => decodeFrame(sample().slice(0, 100))).toThrow(RangeError);
+    expect(() => decodeFrame(sample().slice(0, 60))).toThrow("expected");
+  });
+});
