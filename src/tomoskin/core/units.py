@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-_PREFIX = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
+_PREFIX = {"u": 1e-6, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
 
 
 def _scaled(symbol: str, prefixes: str) -> dict[str, float]:
@@ -13,10 +13,10 @@ def _scaled(symbol: str, prefixes: str) -> dict[str, float]:
 
 
 DIMENSIONS: dict[str, dict[str, float]] = {
-    "length": _scaled("m", "mu") | {"cm": 1e-2},
-    "current": _scaled("A", "mu"),
-    "voltage": _scaled("V", "mu"),
-    "time": _scaled("s", "mu"),
+    "length": _scaled("m", "muµ") | {"cm": 1e-2},
+    "current": _scaled("A", "muµ"),
+    "voltage": _scaled("V", "muµ"),
+    "time": _scaled("s", "muµ"),
     "angle": {"deg": math.pi / 180, "rad": 1.0},
     "sheet resistance": {"ohm/sq": 1.0, "Ω/sq": 1.0, "kohm/sq": 1e3, "kΩ/sq": 1e3, "mohm/sq": 1e-3},
     "resistivity": {"ohm*m": 1.0, "Ω·m": 1.0, "ohm*cm": 1e-2, "Ω·cm": 1e-2, "mohm*m": 1e-3},
@@ -36,7 +36,7 @@ def parse_quantity(text: str, dimension: str) -> float:
     Raises
     ------
     ValueError
-        When there is no number, or the unit is not one of ``DIMENSIONS[dimension]``;
+        When there is no finite number, or the unit is not one of ``DIMENSIONS[dimension]``;
         the message names the units that would do.
     """
     units = DIMENSIONS[dimension]
@@ -45,7 +45,10 @@ def parse_quantity(text: str, dimension: str) -> float:
     if not found:
         raise ValueError(f'expected a number with a unit of {dimension} ({known}), got "{text}"')
     number, unit = found.groups()
+    unit = unit.replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
     if unit not in units:
         got = f'unit "{unit}"' if unit else "no unit"
         raise ValueError(f"expected a unit of {dimension} ({known}), got {got}")
+    if not math.isfinite(float(number)):
+        raise ValueError(f'expected a finite number, got "{text}"')
     return float(number) * units[unit]

@@ -45,15 +45,10 @@ def match_rows(pattern: Pattern, drive: ArrayLike, measure: ArrayLike) -> RowMat
     """
     foreign = Pattern.from_tables(drive, measure)
     table: dict[tuple[int, ...], tuple[int, float]] = {}
-    for row, (d, m) in enumerate(
-        zip(foreign.drive.tolist(), foreign.measure.tolist(), strict=True)
-    ):
+    for row, (d, m) in enumerate(_rows(foreign)):
         key, sign = _canonical(d, m)
         table[key] = (row, sign)
-    found = [
-        _find(table, d, m)
-        for d, m in zip(pattern.drive.tolist(), pattern.measure.tolist(), strict=True)
-    ]
+    found = [_find(table, d, m) for d, m in _rows(pattern)]
     missing = [row for row, hit in enumerate(found) if hit is None]
     if missing:
         raise PatternError(_describe(pattern, missing), hint="is it the right skin and pattern?")

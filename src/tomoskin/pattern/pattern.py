@@ -88,12 +88,13 @@ class Pattern:
                 f"expected as many drive rows as measurement rows, "
                 f"got {len(drive_rows)} and {len(measure_rows)}"
             )
+        count = n_electrodes or 1 + int(max(drive_rows.max(), measure_rows.max()))
+        _check_pairs(drive_rows, count, "drive", ("source", "sink"))
         unique, first, inverse = np.unique(
             drive_rows, axis=0, return_index=True, return_inverse=True
         )
         order = np.argsort(first, kind="stable")
         rank = np.argsort(order, kind="stable")
-        count = n_electrodes or 1 + int(max(drive_rows.max(), measure_rows.max()))
         return cls(count, unique[order], rank[inverse.reshape(-1)], measure_rows)
 
     @classmethod
@@ -128,6 +129,11 @@ class Pattern:
         _check_count(n)
         if not 0 <= k <= n - 2:
             raise PatternError(f"expected k from 0 to {n - 2} for {n} electrodes, got {k}")
+        if 2 * (k + 1) == n:
+            raise PatternError(
+                f"skipping {k} of {n} electrodes drives every pair twice",
+                hint='"opposite" drives each of them once',
+            )
         e = np.arange(n)
         drives = np.column_stack([(e + k + 1) % n, e])
         return cls.from_pairs(n, drives, _neighbours(n), include_driven=include_driven)
@@ -151,10 +157,13 @@ class Pattern:
         return cls.from_pairs(n, drives, _neighbours(n), include_driven=include_driven)
 
     def joined(self, other: Self) -> Self:
-        """Mixed pattern: the rows of this one, then those of ``other`` that are new."""
+        """Mixed pattern: the rows of this one, then those of ``other`` that are new.
+
+        A row with a pair reversed is not new: it would measure the same voltage again.
+        """
         drive = np.vstack([self.drive, other.drive])
         measure = np.vstack([self.measure, other.measure])
-        _, first = np.unique(np.hstack([drive, measure]), axis=0, return_index=True)
+        _, first = np.unique(_undirected(drive, measure), axis=0, return_index=True)
         keep = np.sort(first)
         count = max(self.n_electrodes, other.n_electrodes)
         return type(self).from_tables(drive[keep], measure[keep], count)
@@ -221,8 +230,12 @@ def _check_pairs(pairs: IntArray, n: int, kind: str, ends: tuple[str, str]) -> N
         )
 
 
+def _undirected(drive: IntArray, measure: IntArray) -> IntArray:
+    return np.hstack([np.sort(drive, axis=1), np.sort(measure, axis=1)])
+
+
 def _check_unique(pattern: Pattern) -> None:
-    rows = np.hstack([np.sort(pattern.drive, axis=1), np.sort(pattern.measure, axis=1)])
+    rows = _undirected(pattern.drive, pattern.measure)
     _, inverse, counts = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
     if counts.max() > 1:
         twice = np.flatnonzero(inverse.reshape(-1) == np.argmax(counts))[:2].tolist()

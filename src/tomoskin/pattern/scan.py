@@ -8,8 +8,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import IntArray
+from tomoskin.core import IntArray, PatternError
 from tomoskin.pattern.pattern import Pattern
+
+_MOST = 32
+"""Electrodes that a mask has bits for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +42,13 @@ class Scan:
 
     @classmethod
     def of(cls, pattern: Pattern) -> Self:
-        """Smallest scan that holds every row of ``pattern``."""
+        """Smallest scan that holds every row of ``pattern``.
+
+        Raises PatternError when there are more electrodes than a mask has bits.
+        """
         n = pattern.n_electrodes
+        if n > _MOST:
+            raise PatternError(f"expected at most {_MOST} electrodes to scan, got {n}")
         read = np.zeros((pattern.n_drive, n), dtype=bool)
         read[pattern.drive_index[:, None], pattern.measure] = True
         sample_drive, sample_electrode = np.nonzero(read)
