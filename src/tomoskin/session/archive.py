@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tokenize
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,18 @@ from tomoskin.core import DataError
 
 MAX_BYTES = 4 << 30
 """An archive that unpacks to more than this is refused."""
+
+_UNREADABLE = (
+    ValueError,
+    KeyError,
+    OverflowError,
+    MemoryError,  # a header may claim any size
+    RuntimeError,  # encrypted, or compressed in a way that is not known
+    SyntaxError,
+    tokenize.TokenError,
+    zlib.error,
+)
+"""What numpy and zipfile raise for an array that is torn, foreign or hostile."""
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -29,8 +43,6 @@ def load_arrays(path: Path) -> Arrays:
     try:
         _check_size(path)
         with np.load(path, allow_pickle=False) as archive:
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise DataError("expected an .npz archive, got a single array", where=where)
             return {key: np.asarray(archive[key]) for key in archive.files}
     except FileNotFoundError as error:
         raise DataError("there is no such file", where=where) from error
@@ -40,7 +52,7 @@ def load_arrays(path: Path) -> Arrays:
         raise DataError(
             f"is not a whole .npz archive: {error}", where=where, hint="copy it again"
         ) from error
-    except (ValueError, KeyError, NotImplementedError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+    except _UNREADABLE as error:
         raise DataError(f"holds an array that cannot be read: {error}", where=where) from error
 
 

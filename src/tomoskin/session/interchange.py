@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, IntArray
+from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.session.archive import Arrays
 from tomoskin.session.recording import Recording, frame_times
+
+_MOST_ELECTRODES = 1024
 
 REQUIRED = frozenset({"drive", "measure"})
 
@@ -42,9 +44,9 @@ def parse(arrays: Arrays, source: str) -> Recording:
         voltages=voltages,
         drive=electrode_table(arrays, "drive", source),
         measure=electrode_table(arrays, "measure", source),
-        time=numbers(arrays, "time_s", source) if "time_s" in arrays else frame_times(n),
+        time=real_numbers(arrays, "time_s", source) if "time_s" in arrays else frame_times(n),
         reference=numbers(arrays, "reference", source) if "reference" in arrays else None,
-        labels=numbers(arrays, "xy_m", source) if "xy_m" in arrays else None,
+        labels=real_numbers(arrays, "xy_m", source) if "xy_m" in arrays else None,
         is_change=key == "dv",
         source=source,
     )
@@ -77,12 +79,24 @@ def numbers(arrays: Arrays, key: str, source: str) -> NDArray[Any]:
     return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64)
 
 
+def real_numbers(arrays: Arrays, key: str, source: str) -> FloatArray:
+    """Array ``key`` as float64."""
+    array = numbers(arrays, key, source)
+    if array.dtype.kind == "c":
+        raise DataError(f"expected real numbers in {key}, got complex ones", where=source)
+    return array
+
+
 def electrode_table(arrays: Arrays, key: str, source: str) -> IntArray:
     """Array ``key`` as an (n, 2) table of electrodes from 0."""
-    table = numbers(arrays, key, source).real
-    if table.ndim != 2 or table.shape[1] != 2 or not np.array_equal(table, np.round(table)):
+    table = real_numbers(arrays, key, source)
+    if table.ndim != 2 or table.shape[1] != 2:
+        raise DataError(f"expected {key} of shape (n_meas, 2), got {table.shape}", where=source)
+    good = (table >= 0) & (table < _MOST_ELECTRODES) & (table == np.round(table))
+    if not good.all():
+        row = int(np.argmin(good.all(axis=1)))
         raise DataError(
-            f"expected {key} as (rows, 2) electrode numbers, got shape {table.shape}",
-            where=source,
+            f"expected whole electrode numbers from 0, got {table[row].tolist()}",
+            where=f"{source}, {key} row {row}",
         )
     return table.astype(np.int64)
