@@ -43,7 +43,8 @@ class OneStep:
     Raises
     ------
     ModelError
-        For an unknown prior or difference, alpha ≤ 0, or weights that are not positive.
+        For an unknown prior or difference, alpha ≤ 0, weights that are not positive, or a
+        complex conductivity or contact impedance.
     """
 
     def __init__(
@@ -59,6 +60,8 @@ class OneStep:
         if not (np.isfinite(alpha) and alpha > 0):
             raise ModelError(f"expected alpha above 0, got {alpha}")
         state = model.at(conductivity)
+        if np.iscomplexobj(state.conductivity) or np.iscomplexobj(model.contact_impedance):
+            raise ModelError("expected a real conductivity and contact impedance, got complex ones")
         self.model = model
         self.alpha = alpha
         self.difference = difference

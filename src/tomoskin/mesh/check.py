@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.mesh.topology import boundary_facets, neighbour_pairs, simplex_measure
+from tomoskin.mesh.topology import boundary_facets, facets, neighbour_pairs, simplex_measure
 
 _FLAT = 1e-12
 """A cell is degenerate below this fraction of (its longest edge)^dimension."""
@@ -18,8 +18,10 @@ def check_mesh(points: FloatArray, cells: IntArray, electrodes: tuple[IntArray, 
     _check_shapes(points, cells)
     _check_indices(points, cells, electrodes)
     _check_volumes(points, cells)
-    _check_connected(cells)
-    _check_electrodes(cells, electrodes)
+    pairs, boundary = neighbour_pairs(cells), boundary_facets(cells)
+    _check_facets(cells, pairs, boundary)
+    _check_connected(len(cells), pairs)
+    _check_electrodes(cells.shape[1] - 1, boundary, electrodes)
 
 
 def _check_shapes(points: FloatArray, cells: IntArray) -> None:
@@ -69,8 +71,21 @@ def _check_volumes(points: FloatArray, cells: IntArray) -> None:
         )
 
 
-def _check_connected(cells: IntArray) -> None:
-    n, pairs = len(cells), neighbour_pairs(cells)
+def _check_facets(cells: IntArray, pairs: IntArray, boundary: IntArray) -> None:
+    if len(boundary) + 2 * len(pairs) == cells.size:
+        return
+    facet, owner = facets(cells)
+    unique, place, counts = np.unique(facet, axis=0, return_inverse=True, return_counts=True)
+    worst = int(np.argmax(counts))
+    shared = owner[place.reshape(-1) == worst].tolist()
+    raise GeometryError(
+        f"expected a facet in one or two cells, got {unique[worst].tolist()} in {len(shared)}",
+        where=f"cells {', '.join(map(str, shared))}",
+        hint="cells overlap, or one stands twice",
+    )
+
+
+def _check_connected(n: int, pairs: IntArray) -> None:
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     pieces, label = connected_components(graph, directed=False)
     if pieces > 1:
@@ -80,11 +95,12 @@ def _check_connected(cells: IntArray) -> None:
         )
 
 
-def _check_electrodes(cells: IntArray, electrodes: tuple[IntArray, ...]) -> None:
+def _check_electrodes(
+    width: int, boundary_table: IntArray, electrodes: tuple[IntArray, ...]
+) -> None:
     if not electrodes:
         raise GeometryError("expected at least one electrode, got none")
-    width = cells.shape[1] - 1
-    boundary = {tuple(f) for f in boundary_facets(cells).tolist()}
+    boundary = {tuple(f) for f in boundary_table.tolist()}
     owner: dict[tuple[int, ...], int] = {}
     for number, table in enumerate(electrodes):
         where = f"electrode {number}"

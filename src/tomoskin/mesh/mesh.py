@@ -31,8 +31,9 @@ class Mesh:
     Raises
     ------
     GeometryError
-        For indices that do not exist, a degenerate cell, an electrode without a facet, a facet
-        that is not on the boundary or belongs to two electrodes, or a mesh in pieces.
+        For tables that are no numbers, indices that do not exist, a degenerate cell, a facet in
+        more than two cells, an electrode without a facet, an electrode's facet that is not on
+        the boundary or belongs to another one too, or a mesh in pieces.
     """
 
     points: FloatArray
@@ -85,8 +86,17 @@ class Mesh:
 
 
 def _frozen(value: object, dtype: DTypeLike, where: str) -> NDArray[Any]:
-    array = np.array(value, dtype=dtype)
-    if array.ndim != 2:
-        raise GeometryError(f"expected a table with two axes, got shape {array.shape}", where=where)
+    try:
+        raw = np.array(value)
+    except ValueError as error:
+        raise GeometryError("expected rows of equal length", where=where) from error
+    if raw.ndim != 2:
+        raise GeometryError(f"expected a table with two axes, got shape {raw.shape}", where=where)
+    if raw.dtype.kind not in "iuf":
+        raise GeometryError(f"expected real numbers, got {raw.dtype}", where=where)
+    with np.errstate(invalid="ignore"):
+        array = raw.astype(dtype)
+    if array.dtype.kind == "i" and not np.array_equal(array, raw):
+        raise GeometryError("expected whole numbers", where=where)
     array.flags.writeable = False
     return array
