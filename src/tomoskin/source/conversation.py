@@ -70,6 +70,7 @@ class Conversation:
         self._silence = max(timing.silence, 4 * self.configuration.scan_time)
         self._since = self._last_frame = self._last_sent = now
         self._silent = False
+        self._resets = 0
         self._queue: deque[Command] = deque()
         self._pending: _Pending | None = None
         self._request = 0
@@ -189,6 +190,13 @@ class Conversation:
         if self.stage is Stage.SETTING_UP and self.info is None:
             return []
         was_running = self.stage is Stage.RUNNING
+        self._resets = 0 if was_running else self._resets + 1
+        if self._resets > self._timing.tries:
+            raise SourceError(
+                "the board resets again and again while it is set up",
+                where=self._where,
+                hint="is its supply strong enough?",
+            )
         self._set_up(now)
         text = "the board has been reset or has missed the heartbeat: it is set up anew"
         return [Event(now, "reset", text)] if was_running else []

@@ -99,7 +99,7 @@ class TwinDevice:
 
     def emit(self, now: float) -> bytes:
         """What is to be sent by ``now``: answers, HELLO, at most one frame."""
-        if now - self._heard >= self._heartbeat and self._next_hello is None:
+        if self._next_hello is None and now >= self._heard + self._heartbeat:
             self._fall_silent(now)
         if self._next_hello is not None and now >= self._next_hello:
             self._say(Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash))

@@ -1,0 +1,48 @@
+"""Any message of the schema, drawn field by field from the schema itself."""
+
+import numpy as np
+from hypothesis import strategies as st
+
+from tomoskin.core import Frame
+from tomoskin.wire import ENUMS, RECORDS, SCHEMA, Drive
+
+BITS = {"u8": 8, "u16": 16, "u32": 32, "u64": 64}
+
+
+def _field(field):
+    if field.enum and field.enum != "flag":
+        return st.sampled_from(list(ENUMS[field.enum]))
+    if field.item == "drive":
+        drive = st.builds(
+            Drive, st.integers(0, 255), st.integers(0, 255), st.integers(0, 2**32 - 1)
+        )
+        return st.lists(drive, max_size=9).map(tuple)
+    if field.is_tail:
+        counts = st.integers(0, 65535) | st.sampled_from([0, 1, 255, 256])
+        return st.lists(counts, max_size=300).map(lambda c: np.array(c, dtype=np.uint16))
+    if field.length > 1:
+        return st.binary(min_size=field.length, max_size=field.length)
+    return st.integers(0, 2 ** BITS[field.item] - 1)
+
+
+def _message(spec):
+    fields = {field.name: _field(field) for field in spec.fields}
+    if spec.name == "FRAME":
+        fields["host_time"] = st.just(0.0)
+    return st.builds(RECORDS[spec.name], **fields)
+
+
+def messages(to_device=None):
+    """Strategy for messages, of one direction if asked."""
+    chosen = [m for m in SCHEMA.messages if to_device is None or m.to_device == to_device]
+    return st.one_of([_message(spec) for spec in chosen])
+
+
+def same(one, other):
+    """Equality that looks into the samples of a frame."""
+    if isinstance(one, Frame) and isinstance(other, Frame):
+        names = ("sequence", "ticks", "configuration", "flags", "drops", "host_time")
+        return all(getattr(one, n) == getattr(other, n) for n in names) and np.array_equal(
+            one.samples, other.samples
+        )
+    return type(one) is type(other) and one == other
