@@ -1,0 +1,65 @@
+"""The commands, and what becomes of an error: one sentence and an exit code.
+
+To add a command: a module with a function (or a Typer of sub-commands) that imports heavy rooms
+inside, and one line in the list below.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated, NoReturn
+
+import typer
+
+from tomoskin import __version__
+from tomoskin.cli import doctor, image, live, skin
+from tomoskin.core import TomoskinError
+
+DEBUG = "TOMOSKIN_DEBUG"
+"""Environment variable: set it to see the traceback of an error."""
+
+app = typer.Typer(
+    help="Touch for soft robots by electrical impedance tomography.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("live")(live.live)
+app.command("image")(image.image)
+app.add_typer(skin.app, name="skin")
+app.command("doctor")(doctor.doctor)
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    if version:
+        typer.echo(f"tomoskin {__version__}")
+        raise typer.Exit
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run a command and exit: 0 done, 1 failed, 2 wrong usage."""
+    try:
+        app(args=None if arguments is None else list(arguments), prog_name="tomoskin")
+    except TomoskinError as error:
+        _fail(str(error))
+    except Exception as error:
+        _fail(
+            f"internal error, {type(error).__name__}: {error} "
+            f"(set {DEBUG}=1 to see where, and please report it)"
+        )
+    sys.exit(0)
+
+
+def _fail(message: str) -> NoReturn:
+    if os.environ.get(DEBUG):
+        raise  # noqa: PLE0704 - called while the error is handled
+    typer.echo(f"tomoskin: {message}", err=True)
+    sys.exit(1)

@@ -1,0 +1,94 @@
+"""``tomoskin doctor``: what works here, what does not, and what to do about it."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import TypeVar
+
+import typer
+
+from tomoskin import __version__
+from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.core import TomoskinError
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing looked at: whether it is as needed, and a sentence."""
+
+    name: str
+    ok: bool
+    text: str
+
+
+def doctor(json: JsonFlag = False) -> None:
+    """Look at this installation: versions, page, sources, skins, ports."""
+    findings = [found for look in _LOOKS for found in look()]
+    healthy = all(found.ok for found in findings)
+    if json:
+        emit({"ok": healthy, "version": __version__, "findings": [asdict(f) for f in findings]})
+    else:
+        for found in findings:
+            typer.echo(f"{'ok  ' if found.ok else 'FAIL'}  {found.name:<10} {found.text}")
+    raise typer.Exit(0 if healthy else 1)
+
+
+def _python() -> Iterator[Finding]:
+    import numpy as np
+    import scipy
+
+    recent = sys.version_info >= (3, 11)
+    yield Finding("python", recent, f"{platform.python_version()} on {platform.platform()}")
+    yield Finding("numpy", True, np.__version__)
+    yield Finding("scipy", True, f"{scipy.__version__}, does the linear algebra")
+
+
+def _page() -> Iterator[Finding]:
+    from tomoskin.live.server import check_page
+
+    yield _tried("page", check_page, lambda _: "built")
+
+
+def _sources() -> Iterator[Finding]:
+    from serial.tools.list_ports import comports  # type: ignore[import-untyped]
+
+    from tomoskin.source import source_names
+
+    known = ", ".join(source_names())
+    yield Finding("sources", bool(known), known or "none; install tomoskin again (make live)")
+    ports = ", ".join(port.device for port in comports())
+    yield Finding("serial", True, ports or "no serial port is connected")
+
+
+def _skins() -> Iterator[Finding]:
+    from tomoskin.skin import Skin
+
+    for name in Skin.names():
+        yield _tried("skin", partial(Skin.load, name), lambda skin: skin.name)
+
+
+def _port() -> Iterator[Finding]:
+    from tomoskin.live.server import DEFAULT_PORT, listen
+
+    try:
+        listen("127.0.0.1", DEFAULT_PORT).close()
+    except TomoskinError as error:
+        yield Finding("port", True, str(error))
+    else:
+        yield Finding("port", True, f"{DEFAULT_PORT} is free")
+
+
+def _tried(name: str, look: Callable[[], _T], say: Callable[[_T], str]) -> Finding:
+    try:
+        return Finding(name, True, say(look()))
+    except TomoskinError as error:
+        return Finding(name, False, str(error))
+
+
+_LOOKS = (_python, _page, _sources, _skins, _port)

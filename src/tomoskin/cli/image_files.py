@@ -1,0 +1,53 @@
+"""Files that images are written to, by the ending of their name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from tomoskin.core import DataError
+from tomoskin.live import Prepared, Reconstruction
+from tomoskin.session import MOST_PANELS, Panel, write_picture, write_vtu
+
+_MOST_FIELDS = 200
+
+
+def png(path: Path, prepared: Prepared, found: Reconstruction) -> None:
+    """Draw all frames, or as many as fit, evenly spread over the recording."""
+    n = len(found.frames)
+    chosen = np.unique(np.linspace(0, n - 1, min(n, MOST_PANELS)).round().astype(int))
+    panels = [Panel(f"frame {found.frames[i]}", found.images[i], found.touches[i]) for i in chosen]
+    write_picture(path, prepared.mesh, panels, found.unit)
+
+
+def npz(path: Path, prepared: Prepared, found: Reconstruction) -> None:
+    """Write images (n_frames, n_cells) with their mesh."""
+    try:
+        with path.open("wb") as file:
+            np.savez_compressed(
+                file,
+                allow_pickle=False,
+                images=found.images,
+                frames=found.frames,
+                unit=np.array(found.unit),
+                points=prepared.mesh.points,
+                cells=prepared.mesh.cells,
+            )
+    except OSError as error:
+        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+
+
+def vtu(path: Path, prepared: Prepared, found: Reconstruction) -> None:
+    """Write one cell field a frame."""
+    if len(found.frames) > _MOST_FIELDS:
+        raise DataError(
+            f"a .vtu file takes {_MOST_FIELDS} frames, got {len(found.frames)}",
+            where=str(path),
+            hint="choose some with --frames A:B",
+        )
+    names = [f"frame_{frame:06d}" for frame in found.frames.tolist()]
+    write_vtu(path, prepared.mesh, dict(zip(names, found.images, strict=True)))
+
+
+WRITERS = {".png": png, ".npz": npz, ".vtu": vtu}

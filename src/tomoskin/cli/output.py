@@ -1,0 +1,16 @@
+"""Output for programs: JSON, one document a line."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import msgspec
+import typer
+
+JsonFlag = Annotated[bool, typer.Option("--json", help="Machine-readable output.")]
+"""The --json option of a command."""
+
+
+def emit(document: Any) -> None:
+    """Write ``document`` as one line of JSON on stdout, at once."""
+    typer.echo(msgspec.json.encode(document).decode())

@@ -1,0 +1,40 @@
+"""The running pipeline, and the server of its page."""
+
+from tomoskin.live.hub import Hub
+from tomoskin.live.offline import DOUBTED, Reconstruction, reconstruct
+from tomoskin.live.pipeline import Pipeline
+from tomoskin.live.prepare import Prepared, prepare
+from tomoskin.live.result import Result
+from tomoskin.live.runner import Runner, Snapshot
+from tomoskin.live.scale import colour_limit
+from tomoskin.live.security import Door, is_loopback
+from tomoskin.live.server import (
+    DEFAULT_PORT,
+    Server,
+    ServerError,
+    application,
+    check_page,
+    listen,
+)
+
+__all__ = [
+    "DEFAULT_PORT",
+    "DOUBTED",
+    "Door",
+    "Hub",
+    "Pipeline",
+    "Prepared",
+    "Reconstruction",
+    "Result",
+    "Runner",
+    "Server",
+    "ServerError",
+    "Snapshot",
+    "application",
+    "check_page",
+    "colour_limit",
+    "is_loopback",
+    "listen",
+    "prepare",
+    "reconstruct",
+]

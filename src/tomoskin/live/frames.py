@@ -1,0 +1,126 @@
+"""The binary message: one result for one page, little-endian, every section 4-byte aligned.
+
+====================  ======================================================================
+header, 40 bytes      ``TSK1``, sequence u32, host_time f64, n_cells u32, n_meas u32,
+                      n_touches u16, n_truth u16, flags u32, latency_us u32, reserved u32
+image                 f32 [n_cells], change of conductivity in the scene's unit
+voltages, reference   f32 [n_meas] each, V
+touches, 40 bytes     id u32, kind u8 (0 decrease, 1 increase), 3 pad, x, y, sd_x, sd_y
+each                  (NaN unknown), area, peak, since (s ago) f32, reserved u32
+truth, 16 bytes each  x, y (m), force (N), radius (m) f32: the presses on the twin
+labels                u8 [n_cells], 0 none, k = cells of the k-th touch; padded to 4 bytes
+====================  ======================================================================
+
+Flags: bit 0 the reference stands; bit 1 too many rows are unusable, there is no picture;
+bit 2 some rows are left out of the picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tomoskin.core import Touch
+from tomoskin.live.result import Result
+from tomoskin.twin import Press
+
+READY, NO_PICTURE, ROWS_LEFT_OUT = 1, 2, 4
+"""Bits of the header's flags."""
+
+_HEADER = np.dtype(
+    [
+        ("magic", "S4"),
+        ("sequence", "<u4"),
+        ("host_time", "<f8"),
+        ("n_cells", "<u4"),
+        ("n_meas", "<u4"),
+        ("n_touches", "<u2"),
+        ("n_truth", "<u2"),
+        ("flags", "<u4"),
+        ("latency_us", "<u4"),
+        ("reserved", "<u4"),
+    ]
+)
+_TOUCH = np.dtype(
+    [
+        ("id", "<u4"),
+        ("kind", "u1"),
+        ("pad", "u1", 3),
+        *((name, "<f4") for name in ("x", "y", "sd_x", "sd_y", "area", "peak", "since")),
+        ("reserved", "<u4"),
+    ]
+)
+_MOST = 255
+"""Labels are bytes: more touches than that are not sent."""
+
+
+def encode_result(result: Result, truth: Sequence[Press], latency: float) -> bytes:
+    """Message of one result.
+
+    Parameters
+    ----------
+    result
+        What the pipeline made of the frame.
+    truth
+        The twin's own presses when the frame was read; empty for a real skin.
+    latency
+        Seconds from the frame's last byte to its touches.
+    """
+    touches = result.touches[:_MOST]
+    return b"".join(
+        [
+            _header(result, len(touches), len(truth), latency),
+            result.image.values.astype("<f4").tobytes(),
+            result.voltages.astype("<f4").tobytes(),
+            result.reference.astype("<f4").tobytes(),
+            _touches(touches, result.host_time),
+            np.array([(p.x, p.y, p.force, p.radius) for p in truth], "<f4").tobytes(),
+            _labels(touches, len(result.image.values)),
+        ]
+    )
+
+
+def _header(result: Result, n_touches: int, n_truth: int, latency: float) -> bytes:
+    flags = READY * result.ready | NO_PICTURE * (not result.pictured)
+    flags |= ROWS_LEFT_OUT * (result.left_out > 0)
+    values = (
+        b"TSK1",
+        result.sequence % 2**32,
+        result.host_time,
+        len(result.image.values),
+        len(result.voltages),
+        n_touches,
+        n_truth,
+        flags,
+        min(max(round(latency * 1e6), 0), 2**32 - 1),
+        0,
+    )
+    return np.array(values, _HEADER).tobytes()
+
+
+def _touches(touches: Sequence[Touch], now: float) -> bytes:
+    rows = [
+        (
+            t.id % 2**32,
+            t.kind == "increase",
+            (0, 0, 0),
+            t.reading.x,
+            t.reading.y,
+            t.reading.sd_x,
+            t.reading.sd_y,
+            t.reading.area,
+            t.reading.peak,
+            now - t.since,
+            0,
+        )
+        for t in touches
+    ]
+    return np.array(rows, _TOUCH).tobytes()
+
+
+def _labels(touches: Sequence[Touch], n_cells: int) -> bytes:
+    labels = np.zeros(n_cells + -n_cells % 4, np.uint8)
+    for number, touch in enumerate(touches, 1):
+        labels[touch.reading.cells] = number
+    return labels.tobytes()

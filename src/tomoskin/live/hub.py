@@ -1,0 +1,140 @@
+"""Between the runner's thread and the pages: each message made once, each page woken once."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import deque
+from collections.abc import AsyncIterator
+from typing import Protocol
+
+import numpy as np
+
+from tomoskin.live import messages
+from tomoskin.live.frames import encode_result
+from tomoskin.live.requests import Request, SetPause, SetPresses
+from tomoskin.live.runner import Runner, Snapshot
+from tomoskin.twin import Press
+
+MAX_PAGES = 16
+"""Pages that are served at once."""
+
+_STATE_PERIOD = 0.25
+_FIRST_EVENTS = 20
+"""Events of the past that a new page is told."""
+
+
+class Listener(Protocol):
+    """What the hub needs of a page's connection."""
+
+    def wake(self) -> None:
+        """Say that there is a new frame."""
+
+    def post(self, text: str) -> None:
+        """Send ``text`` soon."""
+
+
+class Hub:
+    """The pages of one runner; lives in the event loop.
+
+    Parameters
+    ----------
+    runner
+        Where results come from.
+    limit
+        End of the colour scale, in the image's unit.
+    """
+
+    def __init__(self, runner: Runner, *, limit: float) -> None:
+        self.runner = runner
+        self._pages: set[Listener] = set()
+        self._wake_is_due = False
+        self._encoded: tuple[Snapshot, bytes] | None = None
+        self._told = 0
+        self._past: deque[str] = deque(maxlen=_FIRST_EVENTS)
+        self._scene = messages.scene(
+            runner.prepared, runner.source, limit=limit, pressable=runner.pressable
+        )
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[None]:
+        """Listen to the runner while the block lasts."""
+        loop = asyncio.get_running_loop()
+
+        def announce() -> None:
+            if not self._wake_is_due:
+                self._wake_is_due = True
+                loop.call_soon_threadsafe(self._wake)
+
+        ticker = asyncio.create_task(self._tick())
+        with self.runner.watched_by(announce):
+            yield
+        ticker.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await ticker
+
+    @property
+    def full(self) -> bool:
+        """Whether no further page can be served."""
+        return len(self._pages) >= MAX_PAGES
+
+    def join(self, page: Listener) -> None:
+        """Serve ``page`` from now on."""
+        self._pages.add(page)
+        for text in (self._scene, messages.state(self.runner.status()), *self._past):
+            page.post(text)
+
+    def leave(self, page: Listener, why: str = "") -> None:
+        """Serve ``page`` no longer, and lift what it pressed."""
+        self._pages.discard(page)
+        self.runner.set_presses(page, ())
+        if why:
+            self.runner.say("page-dropped", why)
+
+    def frame(self) -> bytes | None:
+        """The newest binary message; None before the first frame."""
+        newest = self.runner.newest
+        if newest is None:
+            return None
+        if self._encoded is None or self._encoded[0] is not newest:
+            data = encode_result(newest.result, newest.truth, newest.latency)
+            self._encoded = (newest, data)
+        return self._encoded[1]
+
+    def obey(self, page: Listener, request: Request) -> None:
+        """Do what a page asks."""
+        if isinstance(request, SetPresses):
+            self.runner.set_presses(page, self._on_skin(request))
+        elif isinstance(request, SetPause):
+            self.runner.pause(request.on)
+        else:
+            self.runner.take_reference()
+
+    def _on_skin(self, request: SetPresses) -> tuple[Press, ...]:
+        """A finger that has slid off the sheet presses nothing."""
+        asked = request.presses
+        if not asked:
+            return ()
+        outline = self.runner.prepared.skin.outline
+        inside = outline.contains(np.array([(p.x, p.y) for p in asked]))
+        return tuple(
+            Press(p.x, p.y, p.force, p.radius) for p, on in zip(asked, inside, strict=True) if on
+        )
+
+    def _wake(self) -> None:
+        self._wake_is_due = False
+        for page in self._pages:
+            page.wake()
+
+    async def _tick(self) -> None:
+        while True:
+            self._told, happened = self.runner.events.since(self._told)
+            news = [messages.event(e) for e in happened]
+            self._past.extend(news)
+            self._post([*news, messages.state(self.runner.status())])
+            await asyncio.sleep(_STATE_PERIOD)
+
+    def _post(self, texts: list[str]) -> None:
+        for page in self._pages:
+            for text in texts:
+                page.post(text)

@@ -1,0 +1,135 @@
+"""The text messages to a page: scene, state, event and error. Requests: ``live/requests.py``,
+frames: ``live/frames.py``."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from tomoskin import __version__
+from tomoskin.core import Event, FloatArray, IntArray
+from tomoskin.live.prepare import Prepared
+from tomoskin.live.requests import MAX_FORCE
+from tomoskin.live.status import Status
+
+PROBE_RADIUS = 0.015
+"""Radius of a press from the page unless it says otherwise, m: the source's usual probe."""
+
+PROBE_FORCE = 3.0
+"""Its force, N."""
+
+_OUTLINE_POINTS = 240
+
+
+def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> str:
+    """Everything about the skin that does not change from frame to frame.
+
+    ``limit`` is the end of the fixed symmetric colour scale, in the image's unit; lengths are m,
+    coordinates lie flat as x0, y0, x1, y1, …; electrodes and points are counted from 0, labels
+    from E1.
+    """
+    skin, mesh, pattern = prepared.skin, prepared.mesh, prepared.pattern
+    return _text(
+        type="scene",
+        skin={"name": skin.name, "description": skin.description, "source": str(skin.source)},
+        unit=prepared.operator.unit,
+        limit=limit,
+        points=_flat(mesh.points),
+        cells=_flat(mesh.cells),
+        outline=_flat(skin.outline.polyline(skin.outline.length / _OUTLINE_POINTS)),
+        electrodes=_electrodes(prepared),
+        pattern={
+            "name": pattern.identity,
+            "n_meas": pattern.n_meas,
+            "n_drive": pattern.n_drive,
+            "drive": _flat(pattern.drive),
+            "measure": _flat(pattern.measure),
+        },
+        source=source,
+        pressable=pressable,
+        probe={"radius_m": PROBE_RADIUS, "force_n": PROBE_FORCE, "max_force_n": MAX_FORCE},
+        version=__version__,
+    )
+
+
+def state(status: Status) -> str:
+    """One look at the runner; numbers that are not known yet are null."""
+    reference = status.reference
+    return _text(
+        type="state",
+        running=status.running,
+        paused=status.paused,
+        fps=status.fps,
+        frames=status.frames,
+        dropped=status.dropped,
+        corrupt=status.corrupt,
+        gaps=status.gaps,
+        p50_ms=_known(1e3 * status.p50),
+        p99_ms=_known(1e3 * status.p99),
+        reference={
+            "frames": reference.frames,
+            "needed": reference.needed,
+            "age_s": status.reference_age,
+            "ready": reference.ready,
+        },
+        noise_v=_known(reference.noise),
+        left_out=status.left_out,
+        problem=status.problem,
+        text=status.text,
+    )
+
+
+def event(happened: Event) -> str:
+    """Something that a person should know."""
+    return _text(type="event", time_s=happened.host_time, kind=happened.kind, text=happened.text)
+
+
+def error(message: str) -> str:
+    """Answer to a request that was not understood."""
+    return _text(type="error", message=message)
+
+
+def _electrodes(prepared: Prepared) -> list[dict[str, Any]]:
+    centres = prepared.skin.electrode_centres.tolist()
+    return [
+        {"x": x, "y": y, "label": f"E{number}", "points": chain(facets)}
+        for number, ((x, y), facets) in enumerate(
+            zip(centres, prepared.mesh.electrodes, strict=True), 1
+        )
+    ]
+
+
+def chain(facets: IntArray) -> list[int]:
+    """Points along an open chain of edges, from one end to the other.
+
+    ``facets`` is (n, 2); where the edges do not form a single open chain, their points in
+    ascending order.
+    """
+    beside: dict[int, list[int]] = {}
+    for a, b in facets.tolist():
+        beside.setdefault(a, []).append(b)
+        beside.setdefault(b, []).append(a)
+    ends = [point for point, others in beside.items() if len(others) == 1]
+    if len(ends) != 2 or max(map(len, beside.values())) > 2:
+        return sorted(beside)
+    walk, before = [ends[0]], -1
+    while len(onward := [p for p in beside[walk[-1]] if p != before]) == 1:
+        before = walk[-1]
+        walk.append(onward[0])
+    return walk
+
+
+def _known(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else value
+
+
+def _flat(table: FloatArray | IntArray) -> list[float]:
+    flat: list[float] = np.asarray(table).reshape(-1).tolist()
+    return flat
+
+
+def _text(**fields: Any) -> str:
+    return msgspec.json.encode(fields).decode()

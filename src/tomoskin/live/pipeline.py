@@ -1,0 +1,130 @@
+"""From one frame to touches: voltages, reference, difference, picture, touches."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray, Frame, Image, Touch, Voltages
+from tomoskin.live.collector import Collector
+from tomoskin.live.missing import fill
+from tomoskin.live.prepare import Prepared
+from tomoskin.live.result import ReferenceState, Result
+from tomoskin.signal import Reference, difference
+from tomoskin.touch import NoiseFloor, Tracker
+
+REFERENCE_FRAMES = 20
+"""Frames of the untouched skin that make a reference."""
+
+_MOST_LEFT_OUT = 0.25
+"""Above this fraction of unusable rows there is no picture: it would be mostly prior."""
+
+
+class Pipeline:
+    """The frame flow of one skin: no I/O, no clock, memory of fixed size.
+
+    Parameters
+    ----------
+    prepared
+        What was made once for the skin.
+    reference_frames
+        Frames that make a reference; the first ones do, and again after
+        :meth:`take_reference`.
+    """
+
+    def __init__(self, prepared: Prepared, *, reference_frames: int = REFERENCE_FRAMES) -> None:
+        self._prepared = prepared
+        self._needed = reference_frames
+        self._tracker = Tracker()
+        self._image = _none(prepared)
+        self._reference: Reference | None = None
+        self._floor: NoiseFloor | None = None
+        self._since = 0.0
+        self.paused = False
+        self.refused = 0
+        """Frames that were not of this skin's scan."""
+        self.take_reference()
+
+    def take_reference(self) -> None:
+        """Forget the reference; the next frames make a new one."""
+        self._reference = None
+        self._tracker.reset()
+        self._collector = Collector(self._needed, self._prepared.operator.reference)
+
+    @property
+    def reference_state(self) -> ReferenceState:
+        """How far the reference is."""
+        if self._reference is None:
+            return ReferenceState(self._collector.taken, self._needed)
+        noise = float(np.sqrt(np.mean(self._reference.noise**2)))
+        return ReferenceState(self._needed, self._needed, self._since, noise)
+
+    def push(self, frame: Frame) -> Result | None:
+        """Take one frame; None while paused, or where the frame is not of this scan."""
+        if self.paused:
+            return None
+        if len(frame.samples) != self._prepared.scan.n_samples:
+            self.refused += 1
+            return None
+        voltages = self._prepared.readout(frame)
+        unusable = voltages.railed | ~np.isfinite(voltages.values)
+        if self._reference is None:
+            return self._collect(voltages, unusable)
+        return self._picture(voltages, unusable | self._collector.unusable, self._reference)
+
+    def _collect(self, voltages: Voltages, unusable: NDArray[np.bool_]) -> Result:
+        self._collector.add(voltages.values, unusable)
+        if self._collector.done:
+            self._settle(self._collector.reference(), voltages.host_time)
+        return self._result(voltages, self._image, (), unusable, pictured=True)
+
+    def _settle(self, reference: Reference, host_time: float) -> None:
+        p = self._prepared
+        normalised = p.skin.inverse.difference == "normalised"
+        noise = reference.noise / np.abs(reference.mean) if normalised else reference.noise
+        known = reference.noise_is_known
+        self._floor = NoiseFloor.of(p.operator.matrix, noise) if known else None
+        self._reference = reference
+        self._since = host_time
+
+    def _picture(
+        self, voltages: Voltages, unusable: NDArray[np.bool_], reference: Reference
+    ) -> Result:
+        p = self._prepared
+        if np.count_nonzero(unusable) > _MOST_LEFT_OUT * len(unusable):
+            touches = self._tracker.update([], voltages.host_time)
+            return self._result(voltages, self._image, touches, unusable, pictured=False)
+        values = np.where(unusable, reference.mean, voltages.values)
+        dv = difference(values, reference.mean, p.skin.inverse.difference)
+        image = p.operator(fill(dv, unusable, p.predictor))
+        readings = p.segmenter(image.values, self._floor)
+        touches = self._tracker.update(readings, voltages.host_time)
+        return self._result(voltages, image, touches, unusable, pictured=True)
+
+    def _result(
+        self,
+        voltages: Voltages,
+        image: Image,
+        touches: tuple[Touch, ...],
+        unusable: NDArray[np.bool_],
+        *,
+        pictured: bool,
+    ) -> Result:
+        return Result(
+            sequence=voltages.sequence,
+            host_time=voltages.host_time,
+            ready=self._reference is not None,
+            pictured=pictured,
+            image=image,
+            voltages=voltages.values,
+            reference=self._expected(),
+            touches=touches,
+            left_out=int(np.count_nonzero(unusable)),
+        )
+
+    def _expected(self) -> FloatArray:
+        return self._reference.mean if self._reference else self._prepared.operator.reference
+
+
+def _none(prepared: Prepared) -> Image:
+    return prepared.operator(np.zeros(prepared.pattern.n_meas))

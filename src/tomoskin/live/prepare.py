@@ -1,0 +1,79 @@
+"""The model flow: from a skin to everything that a frame needs, made once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tomoskin.core import FloatArray
+from tomoskin.forward import ForwardModel
+from tomoskin.inverse import OneStep
+from tomoskin.mesh import Mesh
+from tomoskin.pattern import Pattern, Scan
+from tomoskin.signal import Readout
+from tomoskin.skin import Skin
+from tomoskin.touch import Segmenter
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What was made once for a skin.
+
+    Attributes
+    ----------
+    skin, mesh, pattern, scan, model, operator, segmenter, readout
+        The stages, in the order of the flow.
+    predictor
+        (n_meas, n_meas) the operator's picture put through the linear model again: what the
+        kept rows say about those that are left out.
+    """
+
+    skin: Skin
+    mesh: Mesh
+    pattern: Pattern
+    scan: Scan
+    model: ForwardModel
+    operator: OneStep
+    segmenter: Segmenter
+    readout: Readout
+    predictor: FloatArray
+
+
+def prepare(skin: Skin) -> Prepared:
+    """Mesh, model, operator and stages of ``skin``.
+
+    Raises
+    ------
+    TomoskinError
+        When the skin cannot be meshed, modelled or inverted; the message says which.
+    """
+    mesh, pattern = skin.mesh(), skin.pattern()
+    scan = Scan.of(pattern)
+    model = ForwardModel(mesh, pattern, skin.contact_impedance, skin.current)
+    settings = skin.inverse
+    operator = OneStep(
+        model,
+        settings.prior,
+        alpha=settings.alpha,
+        conductivity=skin.conductivity,
+        difference=settings.difference,
+    )
+    return Prepared(
+        skin=skin,
+        mesh=mesh,
+        pattern=pattern,
+        scan=scan,
+        model=model,
+        operator=operator,
+        segmenter=Segmenter(mesh, skin.touch),
+        readout=Readout.of(scan, skin.readout),
+        predictor=_predictor(model, operator, skin),
+    )
+
+
+def _predictor(model: ForwardModel, operator: OneStep, skin: Skin) -> FloatArray:
+    predicted = model.jacobian(skin.conductivity) @ operator.matrix
+    if skin.inverse.difference == "normalised":
+        predicted /= np.abs(operator.reference)[:, None]
+    return np.asarray(predicted)

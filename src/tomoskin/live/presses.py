@@ -1,0 +1,38 @@
+"""Who presses the twin: the pages' presses together, each page's own set replaced as a whole."""
+
+from __future__ import annotations
+
+import threading
+from typing import Protocol, runtime_checkable
+
+from tomoskin.twin import Press
+
+
+@runtime_checkable
+class Pressable(Protocol):
+    """A source that can be pressed, as the twin can."""
+
+    def set_presses(self, presses: tuple[Press, ...]) -> None:
+        """All presses from now on."""
+
+
+class PressBoard:
+    """Presses by owner; written by the pages, taken by the runner's thread."""
+
+    def __init__(self) -> None:
+        self._held: dict[object, tuple[Press, ...]] = {}
+        self._lock = threading.Lock()
+        self._changes = 0
+
+    def put(self, owner: object, presses: tuple[Press, ...]) -> None:
+        """All presses that ``owner`` holds now; an empty tuple lifts them."""
+        with self._lock:
+            self._held.pop(owner, None)
+            if presses:
+                self._held[owner] = presses
+            self._changes += 1
+
+    def all(self) -> tuple[int, tuple[Press, ...]]:
+        """(number that grows with each change, every press)."""
+        with self._lock:
+            return self._changes, tuple(p for held in self._held.values() for p in held)

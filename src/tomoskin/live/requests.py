@@ -1,0 +1,67 @@
+"""What a page may ask for, decoded strictly: unknown fields and impossible numbers are errors."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from tomoskin.core import WireError
+
+MAX_REQUEST = 4096
+"""Longest request, bytes."""
+
+MAX_PRESSES = 8
+"""Most presses that one page may hold."""
+
+MAX_FORCE = 10.0
+"""Hardest press from a page, N."""
+
+_Place = Annotated[float, Meta(ge=-10, le=10)]
+
+
+class PressRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One press: place m, force N, radius m."""
+
+    x: _Place
+    y: _Place
+    force: Annotated[float, Meta(ge=0, le=MAX_FORCE)]
+    radius: Annotated[float, Meta(gt=0, le=1)]
+
+
+class SetPresses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="presses"):
+    """All presses that this page holds now."""
+
+    presses: Annotated[tuple[PressRequest, ...], Meta(max_length=MAX_PRESSES)]
+
+
+class TakeReference(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="reference"):
+    """The next frames become the reference."""
+
+
+class SetPause(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="pause"):
+    """Hold the picture, or let it go on."""
+
+    on: bool
+
+
+Request = SetPresses | TakeReference | SetPause
+
+_DECODER: msgspec.json.Decoder[Request] = msgspec.json.Decoder(Request)
+
+
+def decode_request(data: str | bytes) -> Request:
+    """One request from a page's message.
+
+    Raises
+    ------
+    WireError
+        When it is too long, not JSON, of unknown type or with an impossible value.
+    """
+    if len(data) > MAX_REQUEST:
+        raise WireError(f"expected a message of at most {MAX_REQUEST} bytes, got {len(data)}")
+    try:
+        return _DECODER.decode(data)
+    except (msgspec.DecodeError, UnicodeError) as error:
+        raise WireError(f"a message that is not understood: {error}") from None

@@ -1,0 +1,71 @@
+"""What the pipeline hands to its readers: one frame, all the way to touches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tomoskin.core import FloatArray, Image, Touch
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Result:
+    """One frame from voltages to touches.
+
+    Attributes
+    ----------
+    sequence, host_time
+        As in the frame that it was made from.
+    ready
+        Whether a reference stands; until then the image is zero and there are no touches.
+    pictured
+        Whether enough rows were usable; where not, the image is zero and there are no touches.
+    image
+        Change of conductivity against the reference.
+    voltages, reference
+        (n_meas,) V; where no reference stands yet, that of the model.
+    touches
+        Tracked touches.
+    left_out
+        Number of rows that were at a rail or not finite and were left out of the picture.
+    """
+
+    sequence: int
+    host_time: float
+    ready: bool
+    pictured: bool
+    image: Image
+    voltages: FloatArray
+    reference: FloatArray
+    touches: tuple[Touch, ...]
+    left_out: int
+
+    @property
+    def problem(self) -> str | None:
+        """What is wrong with the picture, in a sentence, or None."""
+        if not self.left_out:
+            return None
+        rows = f"{self.left_out} of {len(self.voltages)} rows"
+        if not self.pictured:
+            return (
+                f"{rows} are at a rail of the converter or without a reference: no picture is "
+                "shown; look at the electrodes and the gain"
+            )
+        return (
+            f"{rows} are at a rail of the converter or without a reference, and the picture is "
+            "made without them"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceState:
+    """How far the reference is: frames taken of those needed, when it was done, its noise in V."""
+
+    frames: int
+    needed: int
+    since: float | None = None
+    noise: float | None = None
+
+    @property
+    def ready(self) -> bool:
+        """Whether it stands."""
+        return self.since is not None

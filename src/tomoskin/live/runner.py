@@ -1,0 +1,260 @@
+"""The running pipeline: a thread that owns the source and keeps only the newest result."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from tomoskin.core import DataError, Event, Frame, TomoskinError
+from tomoskin.live.events import EventLog
+from tomoskin.live.meter import Meter
+from tomoskin.live.pipeline import Pipeline
+from tomoskin.live.prepare import Prepared
+from tomoskin.live.presses import Pressable, PressBoard
+from tomoskin.live.result import Result
+from tomoskin.live.status import Status
+from tomoskin.live.tally import Tally
+from tomoskin.source import Link, ScanSettings, Transport
+from tomoskin.twin import Press
+
+MOST_AT_ONCE = 16
+"""Where more frames than this wait, the oldest are skipped: a late picture helps nobody."""
+
+_POLL = 0.05
+_STANDSTILL = frozenset({"silent", "fault", "reset"})
+"""Events after which no frame comes until the board is well again."""
+
+_WAITING = "waiting for the board to answer"
+_FIRST_DELAY, _LONGEST_DELAY = 0.25, 5.0
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """A result, the presses on the twin when it was read, and its latency in s."""
+
+    result: Result
+    truth: tuple[Press, ...]
+    latency: float
+
+
+class Runner:
+    """Feeds a pipeline from a source until it is stopped.
+
+    A source that is lost is opened again, after a pause that doubles up to 5 s; the reference
+    stands meanwhile. Readers take :attr:`newest` whenever they like; a slow one delays nobody.
+
+    Parameters
+    ----------
+    prepared
+        What was made once for the skin.
+    open_transport
+        Opens the source; called again after a loss.
+    clock
+        Host monotonic seconds, the same as in ``Frame.host_time``.
+
+    Attributes
+    ----------
+    newest
+        The newest result, or None before the first.
+    events
+        What happened, the newest kept.
+    source
+        Source and skin in words, once it has been opened.
+    pressable
+        Whether the source can be pressed from a page, as the twin can.
+    """
+
+    def __init__(
+        self,
+        prepared: Prepared,
+        open_transport: Callable[[], Transport],
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.prepared = prepared
+        self.newest: Snapshot | None = None
+        self.events = EventLog()
+        self.source = ""
+        self.pressable = False
+        self._open = open_transport
+        self._clock = clock
+        self._settings = ScanSettings.of(prepared.skin)
+        self._pipeline = Pipeline(prepared)
+        self._meter = Meter()
+        self._presses = PressBoard()
+        self._truth: tuple[Press, ...] = ()
+        self._pressed = 0
+        self._reference_is_wanted = False
+        self._tally, self._earlier, self._skipped = Tally(), Tally(), 0
+        self._trouble: str | None = "not started"
+        self._standstill: str | None = None
+        self._watchers: list[Callable[[], None]] = []
+        self._watching = threading.Lock()
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Open the source and begin.
+
+        Raises
+        ------
+        SourceError
+            When the source cannot be opened the first time: better said at once than retried.
+        """
+        transport = self._open()
+        self.pressable = isinstance(transport, Pressable)
+        skin = self.prepared.skin.name
+        name = transport.name
+        self.source = f"{name} of {skin}" if self.pressable else f"{skin} on {name}"
+        self._thread = threading.Thread(
+            target=self._run, args=(transport,), name="tomoskin-runner", daemon=True
+        )
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop the device and end; returns when it is done. A second call does nothing."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def take_reference(self) -> None:
+        """The next frames become the reference."""
+        self._reference_is_wanted = True
+
+    def pause(self, on: bool) -> None:
+        """Hold the picture, or let it go on; frames are read and left out meanwhile."""
+        self._pipeline.paused = on
+
+    def set_presses(self, owner: object, presses: tuple[Press, ...]) -> None:
+        """All presses that ``owner`` holds now; an empty tuple lifts them."""
+        self._presses.put(owner, presses)
+
+    def say(self, kind: str, text: str) -> None:
+        """Publish an event of this moment."""
+        self.events.add(Event(self._clock(), kind, text))
+
+    @contextlib.contextmanager
+    def watched_by(self, announce: Callable[[], None]) -> Iterator[None]:
+        """While the block lasts, call ``announce`` from the runner's thread at each result.
+
+        It must return at once. After the block it is not called again.
+        """
+        with self._watching:
+            self._watchers.append(announce)
+        try:
+            yield
+        finally:
+            with self._watching:
+                self._watchers.remove(announce)
+
+    def status(self) -> Status:
+        """How it is doing now."""
+        now = self._clock()
+        p50, p99 = self._meter.latency()
+        reference = self._pipeline.reference_state
+        newest = self.newest
+        total = self._earlier + self._tally
+        return Status(
+            source=self.source,
+            running=self._trouble is None and self._standstill is None,
+            paused=self._pipeline.paused,
+            frames=self._meter.frames,
+            fps=self._meter.rate(now),
+            dropped=total.dropped + self._skipped + self._pipeline.refused,
+            corrupt=total.corrupt,
+            gaps=total.gaps,
+            p50=p50,
+            p99=p99,
+            reference=reference,
+            reference_age=None if reference.since is None else now - reference.since,
+            left_out=newest.result.left_out if newest else 0,
+            problem=self._trouble
+            or self._standstill
+            or (newest.result.problem if newest else None),
+        )
+
+    def _run(self, transport: Transport | None) -> None:
+        try:
+            while transport is not None:
+                self._follow(transport)
+                transport = self._reopened()
+        except Exception as error:
+            _log.exception("the live thread ended")
+            self._trouble = f"internal error, {type(error).__name__}: {error}; start again"
+            self.say("internal", self._trouble)
+
+    def _follow(self, transport: Transport) -> None:
+        """Take frames until the source is lost or the runner is stopped."""
+        self._trouble, self._standstill = _WAITING, None
+        self._pressed = -1
+        drops = 0
+        try:
+            with Link(transport, self.prepared.scan, self._settings, clock=self._clock) as link:
+                while not self._stopping.is_set():
+                    self._press(transport)
+                    found = link.poll(_POLL)
+                    self._trouble = None if link.running else _WAITING
+                    frames = [item for item in found if isinstance(item, Frame)]
+                    drops = frames[-1].drops if frames else drops
+                    self._tally = Tally.of(link, drops)
+                    self._note([item for item in found if isinstance(item, Event)])
+                    self._take(frames)
+        except TomoskinError as error:
+            self._trouble = str(error)
+            self.say("source-lost", str(error))
+        finally:
+            self._earlier, self._tally = self._earlier + self._tally, Tally()
+
+    def _reopened(self) -> Transport | None:
+        delay = _FIRST_DELAY
+        while not self._stopping.wait(delay):
+            try:
+                return self._open()
+            except TomoskinError as error:
+                self._trouble = str(error)
+                delay = min(2 * delay, _LONGEST_DELAY)
+        return None
+
+    def _press(self, transport: Transport) -> None:
+        changes, presses = self._presses.all()
+        if changes != self._pressed and isinstance(transport, Pressable):
+            transport.set_presses(presses)
+            self._pressed, self._truth = changes, presses
+
+    def _note(self, happened: list[Event]) -> None:
+        for event in happened:
+            self.events.add(event)
+            if event.kind in _STANDSTILL:
+                self._standstill = event.text
+
+    def _take(self, frames: list[Frame]) -> None:
+        self._skipped += max(len(frames) - MOST_AT_ONCE, 0)
+        for frame in frames[-MOST_AT_ONCE:]:
+            self._process(frame)
+
+    def _process(self, frame: Frame) -> None:
+        self._standstill = None
+        self._meter.arrived(frame.host_time)
+        if self._reference_is_wanted:
+            self._reference_is_wanted = False
+            self._pipeline.take_reference()
+        try:
+            result = self._pipeline.push(frame)
+        except DataError as error:
+            self._skipped += 1
+            self.say("refused", f"a frame was left out: {error}")
+            return
+        if result is None:
+            return
+        latency = self._clock() - frame.host_time
+        self._meter.took(latency)
+        self.newest = Snapshot(result, self._truth, latency)
+        with self._watching:
+            for announce in self._watchers:
+                announce()

@@ -1,0 +1,136 @@
+"""Who may talk to the page's server: token, Host and Origin, and the headers of every answer."""
+
+from __future__ import annotations
+
+import ipaddress
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs
+
+LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
+"""Names under which the server is always reached from this machine."""
+
+_WILDCARDS = frozenset({"", "0.0.0.0", "::"})
+_HTTP_PORT = 80
+
+
+@dataclass(frozen=True, slots=True)
+class Door:
+    """The rules for one server on one port.
+
+    Attributes
+    ----------
+    port
+        Port that the server listens on.
+    host
+        Name or address that it was bound to.
+    token
+        Secret that the printed address carries; without it there is no entry.
+    """
+
+    port: int
+    host: str = "127.0.0.1"
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(24), repr=False)
+
+    @property
+    def address(self) -> str:
+        """Address for the person at the keyboard, with the token."""
+        name = "127.0.0.1" if self.host in _WILDCARDS else _bracketed(self.host)
+        return f"http://{name}:{self.port}/?token={self.token}"
+
+    @property
+    def cookie(self) -> str:
+        """Name of the cookie: cookies ignore ports, so the port is part of the name."""
+        return f"tomoskin-{self.port}"
+
+    def knows_host(self, host: str) -> bool:
+        """Whether a Host header names this server.
+
+        A page of another site can point its own name at this machine (DNS rebinding), but not
+        an address: so where the server listens on every address, any literal address will do.
+        """
+        name, port = _split(host)
+        if port != self.port:
+            return False
+        if name in LOOPBACK_NAMES or name == _bracketed(self.host).lower():
+            return True
+        return self.host in _WILDCARDS and _is_address(name)
+
+    def knows_origin(self, origin: str | None, host: str) -> bool:
+        """Whether a request with this Origin header may open a WebSocket on ``host``.
+
+        Browsers always send an Origin with a WebSocket; programs that send none still need the
+        token.
+        """
+        return origin is None or origin.lower() == f"http://{host.lower()}"
+
+    def has_token(self, query: str) -> bool:
+        """Whether a query string carries the right token."""
+        given = parse_qs(query).get("token", [])
+        return len(given) == 1 and self._same(given[0])
+
+    def has_cookie(self, header: str) -> bool:
+        """Whether a Cookie header carries the right token."""
+        try:
+            morsel = SimpleCookie(header).get(self.cookie)
+        except CookieError:
+            return False
+        return morsel is not None and self._same(morsel.value)
+
+    def set_cookie(self) -> str:
+        """Set-Cookie header: out of reach of scripts, and never sent from another site."""
+        return f"{self.cookie}={self.token}; Path=/; HttpOnly; SameSite=Strict"
+
+    def _same(self, given: str) -> bool:
+        return secrets.compare_digest(given.encode(), self.token.encode())
+
+
+def answer_headers(host: str) -> Mapping[str, str]:
+    """Headers of every answer: nothing from elsewhere, no inline script, no frame, no leak."""
+    policy = (
+        "default-src 'self'; img-src 'self' data:; "
+        f"connect-src 'self' ws://{host}; "
+        "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+    return {
+        "content-security-policy": policy,
+        "x-content-type-options": "nosniff",
+        "x-frame-options": "DENY",
+        "referrer-policy": "no-referrer",
+        "cross-origin-opener-policy": "same-origin",
+        "cross-origin-resource-policy": "same-origin",
+        "cache-control": "no-store",
+    }
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach a server bound to ``host``."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _split(host: str) -> tuple[str, int]:
+    """Name and port of a Host header; port −1 where it is none."""
+    name, colon, port = host.lower().rpartition(":")
+    if not colon or "]" in port:
+        return host.lower(), _HTTP_PORT
+    digits = port.isascii() and port.isdigit() and len(port) <= 5
+    return name, int(port) if digits else -1
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host and not host.startswith("[") else host
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name.removeprefix("[").removesuffix("]"))
+    except ValueError:
+        return False
+    return "%" not in name

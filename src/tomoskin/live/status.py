@@ -1,0 +1,72 @@
+"""How the running pipeline is doing, for a person and for a program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tomoskin.live.result import ReferenceState
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """One look at the runner.
+
+    Attributes
+    ----------
+    source
+        Name of the source.
+    running
+        Whether frames come in.
+    paused
+        Whether the picture is held.
+    frames
+        Frames that were read since the start.
+    fps
+        Frames per second over the last second.
+    dropped
+        Frames that the device or this host left out.
+    corrupt
+        Messages that were damaged on the way.
+    gaps
+        Frames that are missing in the sequence.
+    p50, p99
+        Latency from a frame's last byte to its touches over the last frames, s; NaN at first.
+    reference
+        How far the reference is.
+    reference_age
+        Seconds since it stood, or None.
+    left_out
+        Rows that the newest picture does without.
+    problem
+        What someone should see to, in one sentence, or None.
+    """
+
+    source: str
+    running: bool
+    paused: bool
+    frames: int
+    fps: float
+    dropped: int
+    corrupt: int
+    gaps: int
+    p50: float
+    p99: float
+    reference: ReferenceState
+    reference_age: float | None
+    left_out: int
+    problem: str | None
+
+    @property
+    def text(self) -> str:
+        """One line in words."""
+        if self.problem:
+            return f"{self.source}: {self.problem}"
+        if self.paused:
+            return f"{self.source}: paused"
+        if not self.reference.ready:
+            taken, needed = self.reference.frames, self.reference.needed
+            return f"{self.source}: taking the reference, {taken} of {needed} frames; do not touch"
+        return (
+            f"{self.source}: {self.fps:.0f} frames/s, {self.dropped} dropped, "
+            f"p99 {1e3 * self.p99:.1f} ms"
+        )

@@ -1,0 +1,54 @@
+"""What a page may ask for."""
+
+import json
+
+import pytest
+
+from tomoskin.core import WireError
+from tomoskin.live.requests import (
+    PressRequest,
+    SetPause,
+    SetPresses,
+    TakeReference,
+    decode_request,
+)
+
+PRESS = {"x": 0.01, "y": -0.02, "force": 3.0, "radius": 0.015}
+
+
+def test_requests():
+    assert decode_request('{"type":"reference"}') == TakeReference()
+    assert decode_request('{"type":"pause","on":true}') == SetPause(True)
+    asked = decode_request(json.dumps({"type": "presses", "presses": [PRESS]}))
+    assert asked == SetPresses((PressRequest(**PRESS),))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[]",
+        "null",
+        "reference",
+        "{}",
+        '{"type":"format"}',
+        '{"type":1}',
+        '{"type":"reference","path":"/etc/passwd"}',
+        '{"type":"pause"}',
+        '{"type":"pause","on":"yes"}',
+        '{"type":"presses","presses":[{}]}',
+        '{"type":"presses","presses":[' + ",".join([json.dumps(PRESS)] * 9) + "]}",
+        json.dumps({"type": "presses", "presses": [PRESS | {"force": -1}]}),
+        json.dumps({"type": "presses", "presses": [PRESS | {"force": 1e9}]}),
+        json.dumps({"type": "presses", "presses": [PRESS | {"radius": 0}]}),
+        json.dumps({"type": "presses", "presses": [PRESS | {"x": float("nan")}]}),
+        '{"type":"presses","presses":[{"x":1e999,"y":0,"force":1,"radius":0.01}]}',
+        "[" * 3000,
+        "\ud800",
+        '{"type":"reference"' + " " * 5000 + "}",
+    ],
+)
+def test_malformed(text):
+    with pytest.raises(WireError):
+        decode_request(text)
