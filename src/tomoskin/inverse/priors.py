@@ -87,7 +87,8 @@ def prior_matrix(prior: Any, mesh: Mesh, jacobian: FloatArray) -> NDArray[Any]:
         if prior not in PRIORS:
             raise ModelError(f'expected a prior among {", ".join(PRIORS)}, got "{prior}"')
         prior = PRIORS[prior](mesh, jacobian)
-    matrix = prior.toarray() if issparse(prior) else np.asarray(prior, dtype=np.float64)
+    value: Any = prior
+    matrix = np.asarray(value.toarray() if issparse(prior) else value, dtype=np.float64)
     if matrix.shape not in ((n,), (n, n)):
         raise ModelError(f"expected a prior of shape ({n}, {n}), got {matrix.shape}")
-    return np.asarray(matrix)
+    return matrix

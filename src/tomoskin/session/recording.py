@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -64,6 +64,12 @@ class Recording:
         """Number of frames."""
         return len(self.voltages)
 
+    def part(self, start: int, stop: int) -> Recording:
+        """Frames ``start`` to ``stop`` − 1."""
+        chosen = slice(start, stop)
+        labels = None if self.labels is None else self.labels[chosen]
+        return replace(self, voltages=self.voltages[chosen], time=self.time[chosen], labels=labels)
+
     def in_order_of(self, pattern: Pattern) -> Recording:
         """Return the recording with exactly the pattern's rows, in its order and signs.
 
@@ -83,15 +89,12 @@ class Recording:
                 hint="choose the skin that it was recorded with: --skin",
             )
         match = match_rows(pattern, self.drive, self.measure)
-        return Recording(
+        return replace(
+            self,
             voltages=match.apply(self.voltages),
             drive=pattern.drive,
             measure=pattern.measure,
-            time=self.time,
             reference=None if self.reference is None else match.apply(self.reference),
-            labels=self.labels,
-            is_change=self.is_change,
-            source=self.source,
         )
 
 

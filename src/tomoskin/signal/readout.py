@@ -34,10 +34,10 @@ class Readout:
     @classmethod
     def of(cls, scan: Scan, settings: ReadoutSettings) -> Self:
         """Read-out of a skin; one count of each summed reading is left as margin at the rails."""
-        full = (1 << settings.adc_bits) - 1
+        levels = 1 << settings.adc_bits
         n = settings.oversampling
-        volts = settings.reference_voltage / (full * settings.gain * n)
-        return cls(scan, volts, low=n, high=(full - 1) * n)
+        volts = settings.reference_voltage / (levels * settings.gain * n)
+        return cls(scan, volts, low=n, high=(levels - 2) * n)
 
     def __call__(self, frame: Frame) -> Voltages:
         """Voltages of one frame.
@@ -49,7 +49,7 @@ class Readout:
         DataError
             When the frame has another number of samples than the scan.
         """
-        samples = frame.samples.astype(np.int64)
+        samples = frame.samples.astype(np.float64)
         if len(samples) != self.scan.n_samples:
             raise DataError(
                 f"expected {self.scan.n_samples} samples, got {len(samples)}",

@@ -1,0 +1,84 @@
+"""A sheet of images with their touches, drawn by matplotlib (extra ``plot``)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tomoskin.core import DataError, FloatArray, Touch
+from tomoskin.mesh import Mesh
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MOST_PANELS = 16
+_COLOURS = "RdBu"
+_MM = 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One image: ``values`` (n_cells,), its touches, and what to write above it."""
+
+    title: str
+    values: FloatArray
+    touches: tuple[Touch, ...]
+
+
+def write_picture(path: Path, mesh: Mesh, panels: Sequence[Panel], unit: str) -> None:
+    """Draw at most ``MOST_PANELS`` panels on one symmetric colour scale, and save them.
+
+    Raises
+    ------
+    DataError
+        When matplotlib is not installed or the file cannot be written.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise DataError(
+            "pictures need matplotlib", where=str(path), hint="pip install 'tomoskin[plot]'"
+        ) from error
+    columns = min(len(panels), 4)
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(3.2 * columns + 1.1, 3.3 * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    limit = max(float(np.abs(p.values).max()) for p in panels) or 1.0
+    axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+    for ax, panel in zip(axes, panels, strict=False):
+        drawn = _draw(ax, mesh, panel, limit)
+    for ax in axes[len(panels) :]:
+        ax.set_visible(False)
+    figure.colorbar(drawn, ax=list(axes), label=f"change of conductivity ({unit})", shrink=0.8)
+    try:
+        figure.savefig(path, dpi=120)
+    except OSError as error:
+        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+
+
+def _draw(ax: Axes, mesh: Mesh, panel: Panel, limit: float) -> Any:
+    x, y = _MM * mesh.points[:, :2].T
+    drawn = ax.tripcolor(
+        x, y, mesh.cells, facecolors=panel.values, cmap=_COLOURS, vmin=-limit, vmax=limit
+    )
+    for number, facets in enumerate(mesh.electrodes, start=1):
+        middle = _MM * mesh.points[np.unique(facets)][:, :2].mean(axis=0)
+        ax.plot(*middle, "s", color="0.25", markersize=2.5)
+        x_label, y_label = 1.09 * middle
+        ax.text(x_label, y_label, f"E{number}", fontsize=6, color="0.3", ha="center", va="center")
+    for touch in panel.touches:
+        place = (_MM * touch.reading.x, _MM * touch.reading.y)
+        ax.plot(*place, "+", color="black", markersize=9, markeredgewidth=1.2)
+        label = f"{place[0]:.0f}, {place[1]:.0f}"
+        ax.annotate(label, place, xytext=(5, 5), textcoords="offset points", fontsize=7)
+    ax.set_title(panel.title, fontsize=9)
+    ax.set_aspect("equal")
+    ax.set_xlabel("mm", fontsize=7)
+    ax.tick_params(labelsize=6)
+    ax.margins(0.09)
+    return drawn
