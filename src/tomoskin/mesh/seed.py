@@ -1,4 +1,4 @@
-"""First places for the inner points: hexagonal lattices, finer where cells must be smaller."""
+"""First places for the inner points: a row along the rim, then hexagonal lattices."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.mesh.boundary import Boundary
@@ -16,11 +17,38 @@ from tomoskin.mesh.sizing import SizeField
 _RIM = 0.6
 """Inner points keep this many wanted edge lengths away from the rim."""
 
+_APART = 0.7
+"""Points of the row along the rim, and from it, keep this many wanted edge lengths apart."""
+
 _AROUND = np.array([(1, 0), (0, 1), (-1, 1), (-1, 0), (0, -1), (1, -1)])
 """The six nearest lattice points, in steps of the lattice's two vectors."""
 
 
-def hexagonal(rim: Boundary, field: SizeField, random: np.random.Generator) -> FloatArray:
+def inner_points(rim: Boundary, field: SizeField, random: np.random.Generator) -> FloatArray:
+    """(n, 2) inner points with the field's density, m: a row along the rim, then a lattice."""
+    row, lattice = _row(rim, field), _hexagonal(rim, field, random)
+    if not len(row):
+        return lattice
+    gap, _ = cKDTree(row).query(lattice)
+    return np.concatenate([row, lattice[gap > _APART * field(lattice)]])
+
+
+def _row(rim: Boundary, field: SizeField) -> FloatArray:
+    """Tips of equilateral triangles that stand on the rim's edges; of a close pair, one."""
+    step = np.roll(rim.points, -1, axis=0) - rim.points
+    tips = rim.midpoints + np.column_stack([-step[:, 1], step[:, 0]]) * (math.sqrt(3) / 2)
+    tips = _clear_of_rim(tips, rim, field)
+    if len(tips) < 2:
+        return tips
+    pairs = cKDTree(tips).query_pairs(_APART * field.coarse, output_type="ndarray")
+    one, other = tips[pairs[:, 0]], tips[pairs[:, 1]]
+    close = np.linalg.norm(one - other, axis=1) < _APART * field((one + other) / 2)
+    keep = np.ones(len(tips), dtype=bool)
+    keep[np.maximum(pairs[close, 0], pairs[close, 1])] = False
+    return tips[keep]
+
+
+def _hexagonal(rim: Boundary, field: SizeField, random: np.random.Generator) -> FloatArray:
     """(n, 2) inner points with the field's density, m.
 
     Level 0 is a lattice of the coarse spacing, turned and shifted at random; each further

@@ -11,9 +11,13 @@ from tomoskin.mesh.boundary import Boundary
 from tomoskin.mesh.polygon import inside
 from tomoskin.mesh.rim import keeps_clear
 from tomoskin.mesh.sizing import SizeField
+from tomoskin.mesh.topology import simplex_measure
 
-ROUNDS = 30
+ROUNDS = 14
 """Rounds of smoothing."""
+
+MENDS = (3, 6, 9)
+"""Rounds before which points with too few or too many neighbours are mended."""
 
 
 def triangles(rim: Boundary, inner: FloatArray) -> IntArray:
@@ -38,11 +42,32 @@ def smoothed(rim: Boundary, inner: FloatArray, field: SizeField) -> FloatArray:
     The weights are area/size², after L. Chen and M. Holst, "Efficient mesh optimization
     schemes based on optimal Delaunay triangulations", CMAME 200 (2011) 967-984.
     """
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS):
         cells = triangles(rim, inner)
+        if number in MENDS:
+            inner = _mended(rim, inner, cells, field)
+            cells = triangles(rim, inner)
         moved = _means(np.concatenate([rim.points, inner]), cells, field)[len(rim.points) :]
         inner = np.where(keeps_clear(rim, moved)[:, None], moved, inner)
     return inner
+
+
+def _mended(rim: Boundary, inner: FloatArray, cells: IntArray, field: SizeField) -> FloatArray:
+    """Without points of four neighbours or fewer; with one more beside those of eight or more."""
+    points, first = np.concatenate([rim.points, inner]), len(rim.points)
+    degree = np.bincount(cells.ravel(), minlength=len(points))
+    few, many = degree <= 4, degree >= 8
+    few[:first] = many[:first] = False
+    sides = np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])
+    both = few[sides].all(axis=1)
+    few[sides[both].max(axis=1)] = False  # of two neighbours only one goes
+    middle = points[cells].mean(axis=1)
+    size = simplex_measure(points, cells) / field(middle) ** 2
+    corner, owner = cells.ravel(), np.repeat(np.arange(len(cells)), 3)
+    order = np.lexsort((size[owner], corner))
+    last = np.flatnonzero(np.append(np.diff(corner[order]) != 0, True))
+    largest = owner[order[last]]  # for each point, the triangle that is largest for its place
+    return np.concatenate([inner[~few[first:]], middle[np.unique(largest[many])]])
 
 
 def _means(points: FloatArray, cells: IntArray, field: SizeField) -> FloatArray:

@@ -12,12 +12,15 @@ from tomoskin.mesh.arcs import ElectrodeArc, check_arcs
 from tomoskin.mesh.boundary import Boundary, discretise
 from tomoskin.mesh.mesh import Mesh
 from tomoskin.mesh.outline import Outline
-from tomoskin.mesh.seed import hexagonal
+from tomoskin.mesh.seed import inner_points
 from tomoskin.mesh.sizing import SizeField
 from tomoskin.mesh.smooth import smoothed, triangles
 
 _TOLERANCE = 0.10
 """Accepted relative miss of the wanted number of cells."""
+
+_ADDED = 0.02
+"""Part of the cells that smoothing adds, on average, where it mends points."""
 
 
 def triangulate(
@@ -58,12 +61,12 @@ def _sized(
     for _ in range(12):
         rim = discretise(outline, arcs, coarse)
         field = SizeField(coarse, rim.midpoints, np.minimum(rim.lengths, coarse))
-        inner = hexagonal(rim, field, np.random.default_rng(seed))
-        count = 2 * len(inner) + len(rim.points) - 2
+        inner = inner_points(rim, field, np.random.default_rng(seed))
+        count = (2 * len(inner) + len(rim.points) - 2) * (1 + _ADDED)
         miss = abs(count / cells - 1)
         if best is None or miss < best[0]:
             best = miss, rim, inner, field
-        if miss < _TOLERANCE / 10:
+        if miss < _TOLERANCE / 5:
             break
         coarse *= min(max(math.sqrt(count / cells), 0.5), 2.0)
     assert best is not None
