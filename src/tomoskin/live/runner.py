@@ -158,7 +158,7 @@ class Runner:
         now = self._clock()
         p50, p99 = self._meter.latency()
         reference = self._pipeline.reference_state
-        newest = self.newest
+        result = self.newest.result if self.newest else None
         total = self._earlier + self._tally
         return Status(
             source=self.source,
@@ -173,10 +173,10 @@ class Runner:
             p99=p99,
             reference=reference,
             reference_age=None if reference.since is None else now - reference.since,
-            left_out=newest.result.left_out if newest else 0,
+            left_out=result.left_out if result else 0,
             problem=self._trouble
             or self._standstill
-            or (newest.result.problem if newest else None),
+            or (result.problem if result else None),
         )
 
     def _run(self, transport: Transport | None) -> None:
