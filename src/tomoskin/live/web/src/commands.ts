@@ -114,6 +114,12 @@ export const available = computed<readonly Command[]>(() => [
   autoOnce,
 ]);
 
+/** After a click a button does not keep the focus, so that Space still means pause. */
+export function onClick(event: MouseEvent): void {
+  const button = event.target instanceof Element ? event.target.closest("button") : null;
+  if (event.detail > 0) button?.blur();
+}
+
 /** Run the command of a key; typing and pressing buttons keep their own meaning. */
 export function onKey(event: KeyboardEvent): void {
   if (event.ctrlKey || event.metaKey || event.altKey) return;

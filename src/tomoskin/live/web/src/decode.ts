@@ -4,6 +4,8 @@ const MAGIC = 0x314b5354; // "TSK1"
 const HEADER = 40;
 const TOUCH = 40;
 const TRUTH = 16;
+const READY = 1;
+const NO_PICTURE = 2;
 
 export interface Touch {
   readonly id: number;
@@ -32,6 +34,8 @@ export interface Frame {
   readonly sequence: number;
   readonly hostTime: number;
   readonly referenceReady: boolean;
+  /** False: too many rows are unusable, the image is not one. */
+  readonly pictured: boolean;
   /** Bytes-in to touches-out, s. */
   readonly latency: number;
   readonly image: Float32Array;
@@ -75,6 +79,7 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
   const nCells = data.getUint32(16, true);
   const nMeas = data.getUint32(20, true);
   const nTouches = data.getUint16(24, true);
+  const flags = data.getUint32(28, true);
   const nTruth = data.getUint16(26, true);
   const touchesAt = HEADER + 4 * (nCells + 2 * nMeas);
   const truthsAt = touchesAt + TOUCH * nTouches;
@@ -87,7 +92,8 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
   return {
     sequence: data.getUint32(4, true),
     hostTime: data.getFloat64(8, true),
-    referenceReady: (data.getUint32(28, true) & 1) === 1,
+    referenceReady: (flags & READY) !== 0,
+    pictured: (flags & NO_PICTURE) === 0,
     latency: data.getUint32(32, true) * 1e-6,
     image: new Float32Array(buffer, HEADER, nCells),
     voltages: new Float32Array(buffer, HEADER + 4 * nCells, nMeas),

@@ -2,16 +2,21 @@
 
 import "./tokens.css";
 import "./page.css";
+import { effect } from "@preact/signals";
 import { render } from "preact";
 import { App } from "./App";
-import { onKey } from "./commands";
+import { onClick, onKey } from "./commands";
 import { startHolding } from "./hold";
 import { installHook } from "./hook";
-import { start } from "./state";
+import { scene, start } from "./state";
 
 const page = document.getElementById("page");
 if (page) render(<App />, page);
 window.addEventListener("keydown", onKey);
+window.addEventListener("click", onClick);
+effect(() => {
+  document.title = scene.value ? `${scene.value.skin.name} · tomoskin` : "tomoskin";
+});
 installHook();
 startHolding();
 start();

@@ -59,6 +59,8 @@ export interface Status {
     readonly ready: boolean;
   };
   readonly noise_v: number | null;
+  /** Rows that the newest picture does without. */
+  readonly left_out: number;
   /** What someone must act on, in words. */
   readonly problem: string | null;
   readonly text: string;

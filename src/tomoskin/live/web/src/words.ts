@@ -6,6 +6,8 @@ import type { LinkState } from "./socket";
 
 export interface Sentence {
   readonly text: string;
+  /** The same without what counts up or down, for a screen reader. */
+  readonly brief: string;
   /** Amber: someone must act. */
   readonly act: boolean;
 }
@@ -13,8 +15,8 @@ export interface Sentence {
 /** A picture older than this, while it should be moving, is said to be old. */
 const OLD = 1.5;
 
-const calm = (text: string): Sentence => ({ text, act: false });
-const act = (text: string): Sentence => ({ text, act: true });
+const calm = (text: string, brief = text): Sentence => ({ text, brief, act: false });
+const act = (text: string, brief = text): Sentence => ({ text, brief, act: true });
 
 function lostSentence(link: LinkState & { phase: "lost" }, now: number, age: number | null): Sentence {
   if (link.refused) {
@@ -23,7 +25,7 @@ function lostSentence(link: LinkState & { phase: "lost" }, now: number, age: num
   const wait = Math.max(0, link.retryAt / 1e3 - now);
   const retry = wait < 0.5 ? "trying again" : `trying again in ${duration(Math.ceil(wait))}`;
   const picture = age === null ? "" : `, the picture is ${duration(age)} old`;
-  return act(`Connection lost${picture}: ${retry}`);
+  return act(`Connection lost${picture}: ${retry}`, "Connection lost");
 }
 
 /** What the top line says. `age`: seconds since the last frame, null before the first. */
@@ -40,10 +42,13 @@ export function sentence(
   if (status?.paused) return calm("Paused");
   if (status && !status.reference.ready) {
     const { frames, needed } = status.reference;
-    return calm(`Taking the reference, ${frames} of ${needed}: keep hands off`);
+    return calm(
+      `Taking the reference, ${frames} of ${needed}: keep hands off`,
+      "Taking the reference: keep hands off",
+    );
   }
   if (status && !status.running) return act("Stopped: no frames come from the source");
-  if (age !== null && age > OLD) return act(`No new picture for ${duration(age)}`);
+  if (age !== null && age > OLD) return act(`No new picture for ${duration(age)}`, "No new picture");
   return calm("Live");
 }
 
@@ -60,7 +65,14 @@ export function facts(status: Status | null): Fact[] {
   if (!status) return [];
   const lost = status.dropped + status.corrupt + status.gaps;
   const { age_s: age } = status.reference;
+  const leftOut = {
+    id: "left-out",
+    name: "rows left out",
+    value: String(status.left_out),
+    title: "Measurements that the picture does without",
+  };
   return [
+    ...(status.left_out > 0 ? [leftOut] : []),
     { id: "fps", name: "frames/s", value: fixed(status.fps, 0), title: "Frames decoded per second" },
     {
       id: "dropped",

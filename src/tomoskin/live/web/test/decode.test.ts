@@ -29,7 +29,7 @@ function sample(): ArrayBuffer {
 describe("decodeFrame", () => {
   it("reads every section", () => {
     const frame = decodeFrame(sample());
-    expect(frame).toMatchObject({ sequence: 77, hostTime: 12.5, referenceReady: true });
+    expect(frame).toMatchObject({ sequence: 77, hostTime: 12.5, referenceReady: true, pictured: true });
     expect(frame.latency).toBeCloseTo(250e-6);
     expect([...frame.image]).toEqual([0, 0.25, 0.5, 0.75, 1]);
     expect([...frame.voltages]).toEqual([1.25, 1.5, 1.75]);

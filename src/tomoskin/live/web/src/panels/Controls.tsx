@@ -5,14 +5,22 @@ import type { Command } from "../commands";
 import { fixed } from "../format";
 import { hand, keepPresses, link, scene, showTruth, smoothed, status } from "../state";
 
-function Button({ command, pressed, label }: { command: Command; pressed?: boolean; label?: string }) {
+interface ButtonProps {
+  readonly command: Command;
+  readonly pressed?: boolean;
+  readonly label?: string;
+  /** The server must be there to do it. */
+  readonly remote?: boolean;
+}
+
+function Button({ command, pressed, label, remote = false }: ButtonProps) {
   return (
     <button
       type="button"
       title={command.title}
       data-testid={`do-${command.id}`}
       onClick={command.run}
-      disabled={link.value.phase !== "open"}
+      disabled={remote && link.value.phase !== "open"}
       {...(pressed === undefined ? {} : { "aria-pressed": pressed })}
     >
       {label ?? command.label} <kbd>{command.key}</kbd>
@@ -45,14 +53,19 @@ export function Controls() {
   return (
     <footer class="controls">
       <div role="group" aria-label="Measurement">
-        <Button command={commands.takeReference} />
-        <Button command={commands.pause} pressed={paused} label={paused ? "Go on" : "Pause"} />
+        <Button remote command={commands.takeReference} />
+        <Button
+          remote
+          command={commands.pause}
+          pressed={paused}
+          label={paused ? "Go on" : "Pause"}
+        />
       </div>
       {pressable && (
         <div role="group" aria-label="Pressing">
           <Force />
-          <Button command={commands.keep} pressed={keepPresses.value} />
-          <Button command={commands.lift} />
+          <Button remote command={commands.keep} pressed={keepPresses.value} />
+          <Button remote command={commands.lift} />
         </div>
       )}
       <div role="group" aria-label="View" class="views">

@@ -28,15 +28,15 @@ export function Legend() {
   if (!scene.value) return null;
   const scale = scaleFor(limit.value, scene.value.unit);
   const fixedScale = scaleFor(scene.value.limit, scene.value.unit);
+  const fixedLimit = inScale(scene.value.limit, fixedScale);
+  const resetTitle = `Back to the skin's own limits, ±${fixedLimit} ${fixedScale.unit}`;
   const marks = [1, 0.5, 0, -0.5, -1].map((part) => {
     const value = part * limit.value;
     return (value > 0 ? "+" : "") + (part === 0 ? "0" : inScale(value, scale));
   });
   return (
     <aside class="legend" aria-label={`Colour scale: change of conductivity, ${scale.unit}`}>
-      <p class="unit">
-        change, {scale.unit}
-      </p>
+      <p class="unit">change, {scale.unit}</p>
       <div class="scale">
         <Strip />
         <ol>
@@ -49,8 +49,8 @@ export function Legend() {
         Auto once <kbd>{autoOnce.key}</kbd>
       </button>
       {ownLimit.value !== null && (
-        <button type="button" title="Back to the skin's own limits" onClick={() => (ownLimit.value = null)}>
-          Back to ±{inScale(scene.value.limit, fixedScale)} {fixedScale.unit}
+        <button type="button" title={resetTitle} onClick={() => (ownLimit.value = null)}>
+          Reset
         </button>
       )}
     </aside>

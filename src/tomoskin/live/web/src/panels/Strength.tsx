@@ -27,10 +27,10 @@ function nameLines(plot: uPlot): void {
     if (value === null) return [];
     return { text: String(history.idOf(slot)), y: plot.valToPos(Math.min(value, limit.peek()), "y", true) };
   });
-  let lowest = Infinity;
-  for (const { text, y } of ends.sort((a, b) => b.y - a.y)) {
-    lowest = Math.min(y, lowest - 14 * density);
-    ctx.fillText(text, x, lowest);
+  let above = -Infinity;
+  for (const { text, y } of ends.sort((a, b) => a.y - b.y)) {
+    above = Math.max(y, above + 14 * density);
+    ctx.fillText(text, x, above);
   }
   ctx.restore();
 }
@@ -46,14 +46,15 @@ function plan(): Plan | null {
     scales: { x: { time: false, range: [-SPAN, 0] }, y: { range: [0, top] } },
     axes: [
       axis(colours, {
-        size: 22,
+        size: 26,
+        gap: 8,
         splits: () => [-10, -8, -6, -4, -2, 0],
         values: (_, splits) => splits.map((v) => (v === 0 ? "now" : `−${-v} s`)),
       }),
       axis(colours, {
         size: 52,
         splits: () => [0, top / 2, top],
-        values: (_, splits) => splits.map((v) => inScale(v, shownScale)),
+        values: (_, splits) => splits.map((v) => (v === 0 ? "0" : inScale(v, shownScale))),
       }),
     ],
     series: [
@@ -71,7 +72,12 @@ function plan(): Plan | null {
 function data(): uPlot.AlignedData {
   void shown.value;
   const end = newest.frame?.hostTime ?? 0;
-  return [history.times.map((time) => time - end), ...history.columns] as uPlot.AlignedData;
+  const top = limit.value;
+  // What exceeds the limit runs along the upper edge rather than out of sight.
+  const columns = history.columns.map((column) =>
+    column.map((value) => (value === null ? null : Math.min(value, top))),
+  );
+  return [history.times.map((time) => time - end), ...columns];
 }
 
 export function Strength() {

@@ -12,10 +12,14 @@ export function TopLine() {
   const lost = link.value.phase === "lost";
   return (
     <header class={`top${said.act ? " act" : ""}`}>
-      <p class="state" data-testid="state" role="status">
+      <h1 class="unseen">tomoskin, {scene.value?.skin.name}</h1>
+      <p class="unseen" role="status">
+        {said.brief}
+      </p>
+      <p class="state" data-testid="state">
         <span class="lamp" aria-hidden="true" />
         <strong>{said.text}</strong>
-        {scene.value && !lost && <span class="source">{scene.value.source}</span>}
+        {scene.value && !said.act && <span class="source">{scene.value.source}</span>}
         {notice.value && !said.act && <span class="notice">{notice.value}</span>}
         {lost && (
           <button type="button" onClick={() => connection.open()}>

@@ -10,7 +10,7 @@ const ROWS = 4;
 /** The larger of the two standard deviations, in mm; nothing where it is unknown. */
 function uncertainty(touch: Touch): string {
   const sd = Math.max(touch.sdX, touch.sdY);
-  return Number.isFinite(sd) ? `±${millimetres(sd)}` : "";
+  return Number.isFinite(sd) ? millimetres(sd) : "";
 }
 
 function Row({ touch, scale }: { touch: Touch; scale: Scale }) {
@@ -38,7 +38,8 @@ function Teaching() {
   if (reference && !reference.ready) {
     return (
       <>
-        <p class="lead">Taking the reference: keep hands off</p>
+        <p class="lead">Keep hands off</p>
+        <p class="hint">Taking the reference: the sheet as it is now counts as untouched.</p>
         <progress max={reference.needed} value={reference.frames} aria-label="Reference" />
       </>
     );
@@ -98,7 +99,7 @@ export function Touches() {
                 <th scope="col">x, mm</th>
                 <th scope="col">y, mm</th>
                 <th scope="col" title="One standard deviation, the larger of x and y">
-                  mm
+                  ± mm
                 </th>
                 <th scope="col">change, {scale.unit}</th>
               </tr>

@@ -12,6 +12,9 @@ const grouping = computed<Grouping | null>(() =>
   scene.value ? groupByDrive(scene.value.pattern) : null,
 );
 
+/** A strong press may raise a voltage by so much without leaving the plot. */
+const HEADROOM = 1.3;
+
 /** Bounds of the reference's own pattern, V; they move only when the reference does. */
 const bounds = computed<readonly [number, number]>(() => {
   const frame = shown.value;
@@ -21,7 +24,7 @@ const bounds = computed<readonly [number, number]>(() => {
     if (v < low) low = v;
     if (v > high) high = v;
   }
-  return [low && -niceAbove(-low * 1.1), high && niceAbove(high * 1.1)];
+  return [low && -niceAbove(-low * HEADROOM), high && niceAbove(high * HEADROOM)];
 });
 const lowest = computed(() => bounds.value[0]);
 const highest = computed(() => bounds.value[1]);
@@ -58,6 +61,12 @@ function separators(groups: Grouping): (plot: uPlot) => void {
   };
 }
 
+/** With more rows than this the dots would run into one another. */
+const MOST_DOTS = 100;
+
+/** A drive's label takes as many of the canvas's pixels. */
+const LABEL_ROOM = 38 * window.devicePixelRatio;
+
 function plan(): Plan | null {
   const groups = grouping.value;
   if (!groups || highest.value === lowest.value) return null;
@@ -66,8 +75,7 @@ function plan(): Plan | null {
   const [low, high] = difference ? [-span.value, span.value] : [lowest.value, highest.value];
   const scale = scaleFor(high, "V");
   const middles = groups.drives.map(({ from, to }) => (from + to) / 2);
-  const every = groups.drives.length > 10 ? 2 : 1;
-  const point = { show: true, size: 4, fill: colours.ink, stroke: colours.ink };
+  const point = { show: groups.rows.length < MOST_DOTS, size: 4, fill: colours.ink, stroke: colours.ink };
   return {
     legend: { show: false },
     cursor: { show: false },
@@ -75,16 +83,20 @@ function plan(): Plan | null {
     scales: { x: { time: false, range: [-1, groups.places.length] }, y: { range: [low, high] } },
     axes: [
       axis(colours, {
-        size: 22,
+        size: 24,
+        gap: 6,
         grid: { show: false },
         splits: () => middles,
         filter: (_, splits) => splits,
-        values: () => groups.drives.map(({ label }, k) => (k % every ? "" : label)),
+        values: (plot) => {
+          const every = Math.ceil((groups.drives.length * LABEL_ROOM) / plot.bbox.width);
+          return groups.drives.map(({ label }, k) => (k % every ? "" : label));
+        },
       }),
       axis(colours, {
         size: 52,
         space: 28,
-        values: (_, splits) => splits.map((v) => inScale(v, scale)),
+        values: (_, splits) => splits.map((v) => (v === 0 ? "0" : inScale(v, scale))),
       }),
     ],
     series: [
@@ -117,7 +129,12 @@ export function Voltages() {
       aria-labelledby="voltages-title"
     >
       <h2 id="voltages-title">
-        Voltages, {unit} <span class="key">— now <i>— reference</i></span>
+        Voltages, {unit}
+        {!showDifference.value && (
+          <span class="key">
+            — now <i>— reference</i>
+          </span>
+        )}
         <span class="choice" role="group" aria-label="What is plotted">
           <button type="button" aria-pressed={!showDifference.value} onClick={choose(false)}>
             Pattern

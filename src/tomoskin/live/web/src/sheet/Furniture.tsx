@@ -4,7 +4,20 @@ import type { Scene } from "../protocol";
 import { barLength, boxOf, outward, toPixels, type View } from "./view";
 
 const DOT = 15;
+/** From the rim to a label's middle above and below the sheet, to its near end beside it. */
 const LABEL = 36;
+const SIDE_LABEL = 28;
+
+function Label({ text, x, y, dx, dy }: Record<"x" | "y" | "dx" | "dy", number> & { text: string }) {
+  const beside = Math.abs(dx) > 0.5;
+  const away = beside ? SIDE_LABEL : LABEL;
+  const anchor = beside ? (dx > 0 ? "start" : "end") : "middle";
+  return (
+    <text class={anchor} x={x + away * dx} y={y - away * dy}>
+      {text}
+    </text>
+  );
+}
 
 function pathOf(view: View, flat: readonly number[]): string {
   const pairs: string[] = [];
@@ -40,9 +53,7 @@ export function Furniture({ scene, view }: { scene: Scene; view: View }) {
           <g key={electrode.label} class="electrode">
             {arc.length > 2 && <path d={pathOf(view, arc)} />}
             <circle cx={x + DOT * dx} cy={y - DOT * dy} r={5} />
-            <text x={x + LABEL * dx} y={y - LABEL * dy}>
-              {electrode.label}
-            </text>
+            <Label text={electrode.label} x={x} y={y} dx={dx} dy={dy} />
           </g>
         );
       })}

@@ -2,7 +2,7 @@
 
 import { effect, signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { hand, limit, link, newest, onRepaint, scene, showTruth, smoothed, topology } from "../state";
+import { hand, limit, link, newest, onRepaint, scene, shown, showTruth, smoothed, topology } from "../state";
 import { theme } from "../theme";
 import { Furniture } from "./Furniture";
 import { Painter } from "./painter";
@@ -10,7 +10,7 @@ import { cursor, listen } from "./pointer";
 import { boxOf, fit, type View } from "./view";
 
 /** Room for the electrodes' labels all round and for the legend at the left. */
-const MARGIN = { left: 96, right: 52, top: 52, bottom: 52 };
+const MARGIN = { left: 140, right: 64, top: 52, bottom: 52 };
 const NOWHERE: View = { scale: 1, originX: 0, originY: 0, width: 0, height: 0 };
 
 export const view = signal<View>(NOWHERE);
@@ -55,12 +55,13 @@ export function Sheet() {
     };
   }, []);
 
-  const stale = link.value.phase === "lost" && newest.count > 0;
+  const stale =
+    (link.value.phase === "lost" && newest.count > 0) || shown.value?.pictured === false;
   const pressable = scene.value?.pressable ?? false;
   return (
     <div
       ref={sheet}
-      class={`sheet${stale ? " stale" : ""}${pressable ? " pressable" : ""}`}
+      class={`sheet${stale ? " stale" : ""}${pressable ? " pressable" : ""}${cursor.value ? " keyed" : ""}`}
       data-testid="sheet"
       tabIndex={0}
       role="application"

@@ -77,7 +77,7 @@ export class Painter {
       limit: limit.peek(),
       smoothed: smoothed.peek(),
       map: colours.map,
-      mesh: channels(colours.mesh, 0.35),
+      mesh: channels(colours.mesh, 0.22),
     });
     if (!this.pen) return;
     const marks = {
