@@ -14,7 +14,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from tomoskin import __version__
-from tomoskin.cli import doctor, image, live, skin
+from tomoskin.cli import bench, doctor, image, live, skin
 from tomoskin.core import TomoskinError
 
 DEBUG = "TOMOSKIN_DEBUG"
@@ -29,19 +29,27 @@ app = typer.Typer(
 )
 app.command("live")(live.live)
 app.command("image")(image.image)
+app.command("bench")(bench.bench)
 app.add_typer(skin.app, name="skin")
 app.command("doctor")(doctor.doctor)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"tomoskin {__version__}")
+        raise typer.Exit
 
 
 @app.callback()
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", is_eager=True, help="Show the version and exit.")
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
+        ),
     ] = False,
 ) -> None:
-    if version:
-        typer.echo(f"tomoskin {__version__}")
-        raise typer.Exit
+    """Say what the command as a whole takes."""
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

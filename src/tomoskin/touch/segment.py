@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, IntArray, Reading
 from tomoskin.mesh import Mesh
 from tomoskin.skin import TouchSettings
+from tomoskin.touch.connect import connected, neighbour_table
 from tomoskin.touch.floor import NoiseFloor
 
 _REACH = 3.0
@@ -36,8 +35,8 @@ class Segmenter:
     def __init__(self, mesh: Mesh, settings: TouchSettings) -> None:
         self.mesh = mesh
         self.settings = settings
-        self._filter = _gaussian_filter(mesh, settings.smoothing)
-        self._neighbours = mesh.neighbours.T.copy()
+        self._near, self._weights = _gaussian_table(mesh, settings.smoothing)
+        self._neighbours = neighbour_table(mesh)
 
     def __call__(self, values: FloatArray, floor: NoiseFloor | None = None) -> list[Reading]:
         """Regions of an image ``values`` (n_cells,), strongest first.
@@ -49,32 +48,22 @@ class Segmenter:
         limit = self.settings.gamma1 * strength.max()
         if not limit > 0:
             return []
-        filtered = self._filter @ np.where(strength >= limit, image, 0.0)
+        filtered = self._filtered(np.flatnonzero(strength >= limit), image)
         kept = np.flatnonzero(np.abs(filtered) >= self.settings.gamma2 * limit)
-        if floor is not None:
-            significant = strength >= self.settings.snr * floor.sd
-            if not significant[kept].any():
-                return []
-        regions = self._connected(kept, filtered > 0)
-        if floor is not None:
-            regions = [cells for cells in regions if significant[cells].any()]
+        significant = _significant(kept, strength, floor, self.settings.snr)
+        if not significant.any():
+            return []
+        label = connected(kept, filtered > 0, self._neighbours)
+        regions = [kept[label == number] for number in np.unique(label[significant])]
         found = [self._reading(cells, image, floor) for cells in regions]
         found.sort(key=lambda reading: -abs(reading.peak))
         return found[: self.settings.max_touches]
 
-    def _connected(self, kept: IntArray, positive: NDArray[np.bool_]) -> list[IntArray]:
-        """Connected sets of the ``kept`` cells, joined over shared edges of the same sign."""
-        if not len(kept):
-            return []
-        place = np.full(len(positive), -1)
-        place[kept] = np.arange(len(kept))
-        first, second = self._neighbours
-        joined = (place[first] >= 0) & (place[second] >= 0) & (positive[first] == positive[second])
-        ends = (place[first[joined]], place[second[joined]])
-        graph = coo_array((np.ones(len(ends[0])), ends), shape=(len(kept), len(kept)))
-        n, label = connected_components(graph, directed=False)
-        order = np.argsort(label, kind="stable")
-        return np.split(kept[order], np.searchsorted(label[order], np.arange(1, n)))
+    def _filtered(self, active: IntArray, image: FloatArray) -> FloatArray:
+        """(n_cells,) Gaussian average of the image where it is ``active``, zero elsewhere."""
+        spread = self._weights[active] * image[active, None]
+        near = self._near[active]
+        return np.asarray(np.bincount(near.ravel(), spread.ravel(), minlength=len(image)), float)
 
     def _reading(self, cells: IntArray, image: FloatArray, floor: NoiseFloor | None) -> Reading:
         volumes, weights = self.mesh.volumes[cells], image[cells]
@@ -103,11 +92,30 @@ def _of_sign(values: FloatArray, sign: str) -> FloatArray:
     return values
 
 
-def _gaussian_filter(mesh: Mesh, width: float) -> csr_array:
-    """(n_cells, n_cells) area-weighted Gaussian average; rows sum to one."""
+def _significant(
+    kept: IntArray, strength: FloatArray, floor: NoiseFloor | None, snr: float
+) -> NDArray[np.bool_]:
+    if floor is None:
+        return np.ones(len(kept), dtype=bool)
+    return np.asarray(strength[kept] >= snr * floor.sd[kept])
+
+
+def _gaussian_table(mesh: Mesh, width: float) -> tuple[IntArray, FloatArray]:
+    """Area-weighted Gaussian average as two (n_cells, n_near) tables.
+
+    Row c lists the cells whose average cell c enters, and with what weight; short rows are
+    padded with weight zero. The weights that enter one average sum to one.
+    """
     tree = cKDTree(mesh.centroids)
     near = tree.sparse_distance_matrix(tree, _REACH * width, output_type="coo_matrix")
-    weights = np.exp(-0.5 * (near.data / width) ** 2) * mesh.volumes[near.col]
-    matrix = csr_array(coo_array((weights, (near.row, near.col)), shape=near.shape))
-    scale = 1.0 / matrix.sum(axis=1)
-    return csr_array(matrix.multiply(scale[:, None]))
+    n = len(mesh.centroids)
+    weights = np.exp(-0.5 * (near.data / width) ** 2) * mesh.volumes[near.row]
+    weights /= np.bincount(near.col, weights, minlength=n)[near.col]
+    order = np.argsort(near.row, kind="stable")
+    count = np.bincount(near.row, minlength=n)
+    place = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
+    cells, table = np.zeros((2, n, count.max()))
+    rows = near.row[order]
+    cells[rows, place] = near.col[order]
+    table[rows, place] = weights[order]
+    return cells.astype(np.int64), table

@@ -1,0 +1,134 @@
+"""Bytes in to touches out, per frame: p50 and p99 on one core."""
+
+from __future__ import annotations
+
+import gc
+import time
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+
+from report import Report
+from tomoskin.core import Frame
+from tomoskin.live import Pipeline, Prepared, prepare
+from tomoskin.skin import Skin
+from tomoskin.source import Link, ScanSettings
+from tomoskin.twin import Press, open_twin
+from tomoskin.wire import Decoder, encode
+
+CASES = (
+    ("textile-disc-8", 660),
+    ("textile-disc-8", 3000),
+    ("textile-disc-16", 660),
+    ("textile-disc-16", 3000),
+)
+IDLE, PRESSED, REPEATS = 30, 60, 40
+SEED = 1
+
+
+def run(data: Path | None) -> Report:
+    """Time every case; ``data`` is not needed."""
+    del data
+    rows = []
+    for name, cells in CASES:
+        prepared = prepare(Skin.load(name).altered({"mesh": {"cells": cells}}))
+        rows.append(_row(prepared))
+    return Report(
+        "bytes in → touches out",
+        (
+            "electrodes",
+            "triangles",
+            "rows",
+            "bytes",
+            "p50 ms",
+            "p99 ms",
+            "max ms",
+            "touches",
+            "growth B/frame",
+        ),
+        tuple(rows),
+        (
+            f"{PRESSED * REPEATS} frames with two moving presses of a twin, seed {SEED}",
+            "decode, voltages, difference, one-step image, segmentation, tracking",
+            "growth: allocated memory that stays, per frame",
+        ),
+    )
+
+
+def _row(prepared: Prepared) -> tuple[object, ...]:
+    idle, pressed = _chunks(prepared)
+    decoder, pipeline = Decoder(), Pipeline(prepared)
+    for chunk in idle:
+        _one(decoder, pipeline, chunk)
+    for chunk in pressed:
+        _one(decoder, pipeline, chunk)
+    gc.collect()
+    taken, touches = [], 0
+    for _ in range(REPEATS):
+        for chunk in pressed:
+            start = time.perf_counter()
+            touches += _one(decoder, pipeline, chunk)
+            taken.append(time.perf_counter() - start)
+    p50, p99 = 1e3 * np.percentile(taken, (50, 99))
+    n = len(taken)
+    return (
+        prepared.pattern.n_electrodes,
+        len(prepared.mesh.cells),
+        prepared.pattern.n_meas,
+        len(pressed[0]),
+        round(p50, 3),
+        round(p99, 3),
+        round(1e3 * max(taken), 3),
+        round(touches / n, 2),
+        round(_growth(decoder, pipeline, pressed), 1),
+    )
+
+
+def _one(decoder: Decoder, pipeline: Pipeline, chunk: bytes) -> int:
+    count = 0
+    for message in decoder.feed(chunk, time.monotonic()):
+        assert isinstance(message, Frame)
+        result = pipeline.push(message)
+        count = len(result.touches) if result else 0
+    return count
+
+
+def _growth(decoder: Decoder, pipeline: Pipeline, chunks: list[bytes]) -> float:
+    tracemalloc.start()
+    for chunk in chunks:
+        _one(decoder, pipeline, chunk)
+    before, _ = tracemalloc.get_traced_memory()
+    for _ in range(5):
+        for chunk in chunks:
+            _one(decoder, pipeline, chunk)
+    after, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return (after - before) / (5 * len(chunks))
+
+
+def _chunks(prepared: Prepared) -> tuple[list[bytes], list[bytes]]:
+    """Encoded frames of an idle twin, then of one with two presses that circle."""
+    transport = open_twin(f"fast,seed={SEED}", prepared.skin)
+    settings = ScanSettings.of(prepared.skin)
+    with Link(transport, prepared.scan, settings) as link:
+        idle = _take(link, IDLE)
+        pressed = []
+        for step in range(PRESSED):
+            angle = 2 * np.pi * step / PRESSED
+            place = 0.05 * np.array([np.cos(angle), np.sin(angle)])
+            transport.set_presses(
+                tuple(
+                    Press(x=float(s * place[0]), y=float(s * place[1]), force=4.0, radius=0.012)
+                    for s in (1, -1)
+                )
+            )
+            pressed += _take(link, 2)[1:]
+    return idle, pressed
+
+
+def _take(link: Link, count: int) -> list[bytes]:
+    frames: list[Frame] = []
+    while len(frames) < count:
+        frames += [found for found in link.poll(1.0) if isinstance(found, Frame)]
+    return [encode(frame) for frame in frames[:count]]

@@ -1,0 +1,87 @@
+"""``tomoskin bench``: the benchmarks of the source tree."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.core import DataError
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+_FOLDER = Path(__file__).parents[3] / "benchmarks"
+
+
+def bench(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="Which one; without it they are listed.")
+    ] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of public recordings, for those that need it.")
+    ] = None,
+    cores: Annotated[int, typer.Option(min=1, help="Processor cores that may be used.")] = 1,
+    json: JsonFlag = False,
+) -> None:
+    """Measure speed on this machine."""
+    known = _benchmarks()
+    if name is None:
+        for key, summary in known.items():
+            typer.echo(f"{key:<10} {summary}")
+        return
+    if name not in known:
+        raise typer.BadParameter(f'expected {", ".join(known)}, got "{name}"', param_hint="NAME")
+    # before numpy is loaded, which starts a thread for each core that it may use
+    os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:cores])
+    report = _load(name).run(data)
+    if json:
+        emit(report)
+    else:
+        _show(report)
+
+
+def _benchmarks() -> dict[str, str]:
+    """Name → first line of the docstring of every module with a ``run`` function."""
+    if not _FOLDER.is_dir():
+        raise DataError(
+            "the benchmarks are not part of the installed package",
+            where="tomoskin bench",
+            hint="run it from a checkout of the source",
+        )
+    found = {}
+    for path in sorted(_FOLDER.glob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        if any(isinstance(node, ast.FunctionDef) and node.name == "run" for node in tree.body):
+            found[path.stem] = (ast.get_docstring(tree) or "").partition("\n")[0]
+    return found
+
+
+def _load(name: str) -> ModuleType:
+    sys.path.insert(0, str(_FOLDER))
+    try:
+        return importlib.import_module(name)
+    finally:
+        sys.path.remove(str(_FOLDER))
+
+
+def _show(report: Any) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=report.title)
+    for column in report.columns:
+        table.add_column(column, justify="right")
+    for row in report.rows:
+        table.add_row(*map(str, row))
+    console = Console()
+    console.print(table)
+    for note in report.notes:
+        console.print(f"  {note}", highlight=False)
+    console.print("  " + ", ".join(f"{k} {v}" for k, v in report.machine.items()), highlight=False)
