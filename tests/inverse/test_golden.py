@@ -70,4 +70,4 @@ def test_gaussian_prior_resembles_the_rastered_one(golden: Golden) -> None:
     picture = images(OneStep(golden.model(), "gaussian", alpha=alpha), golden)[:, 0]
     expected = golden.fields["x_gaussian_HPF"][:, 0]
     assert np.corrcoef(picture, expected)[0, 1] > 0.95
-    assert np.std(picture) == pytest.approx(np.std(expected), rel=0.1)
+    assert np.std(picture) == pytest.approx(np.std(expected), rel=0.2)
