@@ -294,6 +294,12 @@ SECTIONS: tuple[Section, ...] = (
                 "Extreme value that a touch needs, in standard deviations of the noise.",
                 default=5,
             ),
+            Key(
+                "position",
+                Choice(("centroid", "peak")),
+                "One touch a region, at its weighted centroid; or one at each local extreme.",
+                default="centroid",
+            ),
             Key("max_touches", Whole(1, 50), "Most touches reported at once.", default=8),
         ),
     ),

@@ -36,4 +36,5 @@ class TouchSettings:
     smoothing: float
     sign: str
     snr: float
+    position: str
     max_touches: int

@@ -19,6 +19,9 @@ from tomoskin.touch.floor import NoiseFloor
 _REACH = 3.0
 """The Gaussian filter is cut off at this many standard deviations."""
 
+_NO_WIDTH = 1e-9
+"""A filter of width zero, m: reaches no other cell."""
+
 
 class Segmenter:
     """Prepared once per mesh; finds the regions of one image at a time.
@@ -55,7 +58,10 @@ class Segmenter:
             return []
         label = connected(kept, filtered > 0, self._neighbours)
         regions = [kept[label == number] for number in np.unique(label[significant])]
-        found = [self._reading(cells, image, floor) for cells in regions]
+        if self.settings.position == "peak":
+            found = [r for cells in regions for r in self._extremes(cells, image, filtered)]
+        else:
+            found = [self._centroid(cells, image, floor) for cells in regions]
         found.sort(key=lambda reading: -abs(reading.peak))
         return found[: self.settings.max_touches]
 
@@ -65,7 +71,7 @@ class Segmenter:
         near = self._near[active]
         return np.asarray(np.bincount(near.ravel(), spread.ravel(), minlength=len(image)), float)
 
-    def _reading(self, cells: IntArray, image: FloatArray, floor: NoiseFloor | None) -> Reading:
+    def _centroid(self, cells: IntArray, image: FloatArray, floor: NoiseFloor | None) -> Reading:
         volumes, weights = self.mesh.volumes[cells], image[cells]
         mass = np.abs(weights) * volumes
         centre = mass @ self.mesh.centroids[cells] / mass.sum()
@@ -82,6 +88,24 @@ class Segmenter:
             peak=float(weights[np.argmax(np.abs(weights))]),
             cells=cells,
         )
+
+    def _extremes(self, cells: IntArray, image: FloatArray, filtered: FloatArray) -> list[Reading]:
+        """One reading at each cell where the filtered image exceeds all its neighbours'."""
+        height = np.append(np.abs(filtered), -1.0)  # the last stands for "no neighbour"
+        above = height[cells] > height[self._neighbours[cells]].max(axis=1)
+        area = float(self.mesh.volumes[cells].sum())
+        return [
+            Reading(
+                x=float(self.mesh.centroids[top, 0]),
+                y=float(self.mesh.centroids[top, 1]),
+                sd_x=float("nan"),
+                sd_y=float("nan"),
+                area=area,
+                peak=float(image[top]),
+                cells=cells,
+            )
+            for top in cells[above]
+        ]
 
 
 def _of_sign(values: FloatArray, sign: str) -> FloatArray:
@@ -106,6 +130,7 @@ def _gaussian_table(mesh: Mesh, width: float) -> tuple[IntArray, FloatArray]:
     Row c lists the cells whose average cell c enters, and with what weight; short rows are
     padded with weight zero. The weights that enter one average sum to one.
     """
+    width = max(width, _NO_WIDTH)
     tree = cKDTree(mesh.centroids)
     near = tree.sparse_distance_matrix(tree, _REACH * width, output_type="coo_matrix")
     n = len(mesh.centroids)
