@@ -1,7 +1,10 @@
 /** Where the page starts. */
 
-import "./tokens.css";
-import "./page.css";
+import "./styles/tokens.css";
+import "./styles/page.css";
+import "./styles/sheet.css";
+import "./styles/panels.css";
+import "./styles/narrow.css";
 import { effect } from "@preact/signals";
 import { render } from "preact";
 import { App } from "./App";

@@ -55,7 +55,8 @@ function say(text: string): void {
 }
 
 function setScene(next: Scene): void {
-  const changed = next.skin.name !== scene.value?.skin.name;
+  const last = scene.value;
+  const changed = next.skin.name !== last?.skin.name || next.cells.length !== last.cells.length;
   const { radius_m: radius, force_n: force, max_force_n: maxForce } = next.probe;
   batch(() => {
     scene.value = next;

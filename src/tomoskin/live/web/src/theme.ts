@@ -1,4 +1,4 @@
-/** The colours that canvases need, read from tokens.css, following the system's light or dark. */
+/** The colours that canvases need, read from styles/tokens.css, following the system's light or dark. */
 
 import { signal } from "@preact/signals";
 import { DARK_MAP, LIGHT_MAP, mapTable } from "./colours";
