@@ -127,6 +127,8 @@ def npm(page: Page, node: Node, words: Sequence[str], *, show: bool = False) -> 
     cache = page.web.parents[3] / "build" / "npm-cache"
     path = os.pathsep.join([str(node.program.parent), os.environ.get("PATH", os.defpath)])
     environ = {"npm_config_cache": str(cache), "npm_config_update_notifier": "false"}
+    if authorities := os.environ.get("SSL_CERT_FILE"):  # Node reads it only under its own name
+        environ["NODE_EXTRA_CA_CERTS"] = authorities
     done = subprocess.run(
         [*node.npm, *words],
         cwd=page.web,
