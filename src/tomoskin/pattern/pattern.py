@@ -116,6 +116,8 @@ class Pattern:
         if not include_driven:
             touched = (measure[:, :, None] == drive_table[index][:, None, :]).any(axis=(1, 2))
             index, measure = index[~touched], measure[~touched]
+        if not len(index):
+            raise PatternError("every measuring pair touches a driven electrode")
         return cls(n_electrodes, drive_table, index, measure)
 
     @classmethod

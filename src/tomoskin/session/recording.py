@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.core import DataError, FloatArray, IntArray, PatternError
 from tomoskin.pattern import Pattern, match_rows
 
 
@@ -46,9 +46,9 @@ class Recording:
     def __post_init__(self) -> None:
         """Check that the shapes belong together and that there is a frame."""
         if self.voltages.ndim != 2 or not self.voltages.size:
+            empty = "" if self.voltages.size else ": the recording is empty"
             raise DataError(
-                f"expected voltages (n_frames, n_rows), got shape {self.voltages.shape}: "
-                "the recording is empty",
+                f"expected voltages (n_frames, n_rows), got shape {self.voltages.shape}{empty}",
                 where=self.source,
             )
         n_frames, n_rows = self.voltages.shape
@@ -78,7 +78,7 @@ class Recording:
         DataError
             When the recording has another number of electrodes.
         PatternError
-            When rows are missing; the message lists them.
+            When rows are missing or impossible; the message lists them.
         """
         electrodes = 1 + int(max(self.drive.max(), self.measure.max()))
         if electrodes > pattern.n_electrodes:
@@ -88,7 +88,11 @@ class Recording:
                 where=self.source,
                 hint="choose the skin that it was recorded with: --skin",
             )
-        match = match_rows(pattern, self.drive, self.measure)
+        try:
+            match = match_rows(pattern, self.drive, self.measure)
+        except PatternError as error:
+            where = f"{self.source}, {error.where}" if error.where else self.source
+            raise PatternError(error.message, where=where, hint=error.hint) from error
         return replace(
             self,
             voltages=match.apply(self.voltages),
