@@ -47,7 +47,8 @@ class _Pending:
 class Conversation:
     """Waits for HELLO, asks for INFO, sets the scan, starts it and keeps the board alive.
 
-    A board that says HELLO again has been reset or has missed the heartbeat: it is set up anew.
+    A board that says HELLO again has been reset or has missed the heartbeat: it is set up anew,
+    as is one that answers but has stopped scanning.
 
     Raises
     ------
@@ -100,15 +101,15 @@ class Conversation:
 
     def tick(self, now: float) -> list[Frame | Event]:
         """Act on the time: ask again, keep alive, notice silence."""
-        if self.stage is Stage.WAITING and now - self._since >= self._timing.hello:
+        if self.stage is Stage.WAITING and now >= self._since + self._timing.hello:
             self._set_up(now)
-        if self._pending and now - self._pending.sent >= self._timing.answer:
+        if self._pending and now >= self._pending.sent + self._timing.answer:
             self._ask_again(self._pending, now)
         if self.stage is not Stage.RUNNING:
             return []
-        if now - self._last_sent >= self._timing.ping:
+        if now >= self._last_sent + self._timing.ping:
             self._send(replace(Ping(0), request=self._next_request()), now)
-        if self._silent or now - self._last_frame < self._silence:
+        if self._silent or now < self._last_frame + self._silence:
             return []
         self._silent = True
         text = f"no frame for {now - self._last_frame:.1f} s: is the board powered and connected?"
@@ -213,6 +214,11 @@ class Conversation:
 
     def _ack(self, ack: Ack, now: float) -> list[Frame | Event]:
         pending = self._pending
+        if self._silent and pending is None:
+            # It hears the heartbeat but does not scan: its HELLO or FAULT was lost.
+            self._silent = False
+            self._set_up(now)
+            return [Event(now, "reset", "the board answers but does not scan: it is set up anew")]
         if pending is None or ack.request != pending.command.request:
             return []
         if ack.command != type_byte(type(pending.command)):

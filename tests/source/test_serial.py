@@ -1,0 +1,127 @@
+"""The serial port, over a pseudo-terminal with the twin's firmware at the far end."""
+
+import errno
+import os
+import select
+import threading
+import time
+
+import pytest
+
+from source.boards import BOARD, SCAN, SETTINGS, Counting, frames, poll_until
+from tomoskin.core import SourceError
+from tomoskin.source import Link
+from tomoskin.source import serial as port
+from tomoskin.twin import TwinDevice
+
+pytest.importorskip("pty")
+
+
+class Bench:
+    """The twin's firmware behind a pseudo-terminal, until unplugged."""
+
+    def __init__(self):
+        import tty
+
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        self.path = os.ttyname(self._slave)
+        self.device = TwinDevice(Counting(), BOARD, time.monotonic())
+        self._wake, self._stop = os.pipe()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self):
+        while True:
+            wait = max(self.device.due - time.monotonic(), 0.0)
+            ready, _, _ = select.select([self._master, self._wake], [], [], wait)
+            if self._wake in ready:
+                return
+            if self._master in ready:
+                self.device.receive(os.read(self._master, 4096), time.monotonic())
+            data = self.device.emit(time.monotonic())
+            if data:
+                os.write(self._master, data)
+
+    def unplug(self):
+        if self._thread.is_alive():
+            os.write(self._stop, b"x")
+            self._thread.join()
+            for end in (self._master, self._slave, self._wake, self._stop):
+                os.close(end)
+
+
+@pytest.fixture
+def bench():
+    bench = Bench()
+    yield bench
+    bench.unplug()
+
+
+def test_frames_through_a_port_and_a_clean_stop(bench):
+    transport = port.open_serial(bench.path, None)
+    assert transport.name == f"serial:{bench.path}"
+    with Link(transport, SCAN, SETTINGS) as link:
+        got = frames(poll_until(link, lambda items: len(frames(items)) >= 20))
+        assert [frame.sequence for frame in got] == list(range(len(got)))
+        assert got[3].samples.tolist() == list(range(3, 51))
+        assert bench.device.driving
+    assert not bench.device.driving
+
+
+def test_a_port_in_use(bench):
+    first = port.SerialTransport(bench.path)
+    with pytest.raises(SourceError, match="another program is using the port"):
+        port.SerialTransport(bench.path)
+    first.close()
+    first.close()
+    port.SerialTransport(bench.path).close()
+
+
+def test_unplugged_while_scanning(bench):
+    link = Link(port.SerialTransport(bench.path), SCAN, SETTINGS)
+    poll_until(link, frames)
+    bench.unplug()
+    with pytest.raises(SourceError, match="gone away"):
+        poll_until(link, lambda _: False)
+    link.close()
+
+
+def test_reading_and_writing_after_close(bench):
+    transport = port.SerialTransport(bench.path)
+    transport.close()
+    for act in (lambda: transport.read(0.01), lambda: transport.write(b"x")):
+        with pytest.raises(SourceError, match="the port is closed"):
+            act()
+
+
+def test_an_absent_port_and_none_named():
+    with pytest.raises(SourceError, match=r"serial:/dev/no-such: there is no such port \(.*port"):
+        port.open_serial("/dev/no-such", None)
+    with pytest.raises(SourceError, match="expected a port"):
+        port.open_serial("", None)
+
+
+@pytest.mark.parametrize("rate", ["fast", "10", "99999999"])
+def test_an_impossible_rate(rate):
+    with pytest.raises(SourceError, match="rate"):
+        port.open_serial(f"/dev/no-such,baud={rate}", None)
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        (errno.EACCES, "no permission .*dialout"),
+        (errno.EBUSY, "another program"),
+        (errno.EIO, "cannot be opened"),
+    ],
+)
+def test_other_refusals(monkeypatch, number, said):
+    import serial
+
+    def refuse(*_args, **_named):
+        raise serial.SerialException(number, "no")
+
+    monkeypatch.setattr(serial, "Serial", refuse)
+    with pytest.raises(SourceError, match=said):
+        port.SerialTransport("/dev/some")
