@@ -8,7 +8,6 @@ PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check --quiet
 # uv installs in a tenth of pip's time; where it cannot (a mirror that only pip knows), pip does.
 PINNED := scripts/install.sh $(PY)
-SOURCES := src tests benchmarks examples scripts hatch_build.py
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1	/p' Makefile
@@ -30,8 +29,8 @@ bench: $(VENV)/.installed  ## time from bytes to touches
 	@$(VENV)/bin/tomoskin bench frame $(ARGS)
 
 lint: dev page  ## ruff, mypy and the page's types
-	@$(PY) -m ruff check $(SOURCES)
-	@$(PY) -m ruff format --check $(SOURCES)
+	@$(PY) -m ruff check .
+	@$(PY) -m ruff format --check .
 	@$(PY) -m mypy
 	@$(PY) scripts/page.py run check
 
