@@ -9,20 +9,19 @@ import numpy as np
 from tomoskin.live.prepare import Prepared
 
 _RADIUS = 0.015
-_LOSS = 0.3
 
 
 def colour_limit(prepared: Prepared) -> float:
     """End of the symmetric scale, in the image's unit, rounded up to 1, 2 or 5.
 
     The largest change that the operator shows for a round touch of 15 mm radius in the middle
-    of the sheet that takes away three tenths of its conductivity, by the linear model.
+    of the sheet that takes away all of its conductivity, by the linear model.
     """
     mesh, skin = prepared.mesh, prepared.skin
     middle = mesh.volumes @ mesh.centroids / mesh.volumes.sum()
     distance = np.linalg.norm(mesh.centroids - middle, axis=1)
     touched = distance <= max(_RADIUS, float(distance.min()))
-    change = np.where(touched, -_LOSS * skin.conductivity, 0.0)
+    change = np.where(touched, -skin.conductivity, 0.0)
     dv = prepared.model.jacobian(skin.conductivity) @ change
     if skin.inverse.difference == "normalised":
         dv = dv / np.abs(prepared.operator.reference)

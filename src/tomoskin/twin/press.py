@@ -68,7 +68,7 @@ class ContactSettings:
     foam_thickness: float = 10e-3
     tension: float = 200.0
     stretch_per_depth: float = 20.0
-    gauge_factor: float = 30.0
+    gauge_factor: float = 15.0
 
     @property
     def foundation(self) -> float:
