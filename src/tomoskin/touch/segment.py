@@ -90,9 +90,13 @@ class Segmenter:
         )
 
     def _extremes(self, cells: IntArray, image: FloatArray, filtered: FloatArray) -> list[Reading]:
-        """One reading at each cell where the filtered image exceeds all its neighbours'."""
+        """One reading at each cell where the filtered image exceeds all its neighbours'.
+
+        A level region has no such cell; its first highest one stands for it.
+        """
         height = np.append(np.abs(filtered), -1.0)  # the last stands for "no neighbour"
         above = height[cells] > height[self._neighbours[cells]].max(axis=1)
+        above[np.argmax(height[cells])] = True
         area = float(self.mesh.volumes[cells].sum())
         return [
             Reading(
