@@ -21,7 +21,7 @@ AT_ELECTRODE = 0.4
 MIN_FACETS = 2
 """An electrode is cut into at least this many facets."""
 
-_SAME = 1e-9
+_SAME = 1e-7
 """Nodes nearer than this fraction of the outline's length are one."""
 
 
@@ -71,15 +71,17 @@ def breakpoints(outline: Outline, arcs: Sequence[ElectrodeArc]) -> tuple[FloatAr
     return nodes, owner
 
 
-def discretise(outline: Outline, arcs: Sequence[ElectrodeArc], coarse: float) -> Boundary:
-    """Rim nodes for cells of edge length ``coarse`` far from the electrodes, m.
+def discretise(
+    outline: Outline, arcs: Sequence[ElectrodeArc], coarse: float, growth: float
+) -> Boundary:
+    """Rim nodes for cells of edge length ``coarse`` m far from the electrodes.
 
     Every edge's diametral circle is free of other nodes, so that each edge is in every
     Delaunay triangulation whose inner points keep out of those circles too.
     """
     nodes, owner = breakpoints(outline, arcs)
     spans = np.diff(nodes, append=nodes[0] + outline.length)
-    field = _rim_sizes(outline, nodes, owner, spans, coarse)
+    field = _rim_sizes(outline, nodes, owner, coarse, growth)
     pieces, owners = [], []
     for start, span, electrode in zip(nodes, spans, owner, strict=True):
         least = MIN_FACETS if electrode >= 0 else 1
@@ -91,9 +93,10 @@ def discretise(outline: Outline, arcs: Sequence[ElectrodeArc], coarse: float) ->
 
 
 def _rim_sizes(
-    outline: Outline, nodes: FloatArray, owner: IntArray, spans: FloatArray, coarse: float
+    outline: Outline, nodes: FloatArray, owner: IntArray, coarse: float, growth: float
 ) -> SizeField:
     """Sources along electrodes and short stretches; nothing asks for more than its own span."""
+    spans = np.diff(nodes, append=nodes[0] + outline.length)
     points, sizes = [], []
     for start, span, electrode in zip(nodes, spans, owner, strict=True):
         size = min(AT_ELECTRODE * coarse, span / MIN_FACETS) if electrode >= 0 else span
@@ -101,14 +104,14 @@ def _rim_sizes(
             count = 1 + math.ceil(2 * span / size)
             points.append(outline.point(np.linspace(start, start + span, count)))
             sizes.append(np.full(count, size))
-    return SizeField(coarse, np.concatenate(points), np.concatenate(sizes))
+    return SizeField(coarse, np.concatenate(points), np.concatenate(sizes), growth)
 
 
 def _graded(
     outline: Outline, start: float, span: float, field: SizeField, least: int
 ) -> FloatArray:
     """Arclengths from ``start`` (included) to its end (left out), spaced as the field asks."""
-    samples = 1 + max(16, math.ceil(8 * span / field.sizes.min()))
+    samples = 1 + max(16, math.ceil(3 * span / field.sizes.min()))
     s = np.linspace(0.0, span, min(samples, 20_001))
     density = 1.0 / field(outline.point(start + s))
     steps = np.diff(s) * (density[1:] + density[:-1]) / 2

@@ -8,6 +8,10 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray
 from tomoskin.mesh.boundary import Boundary
+from tomoskin.mesh.polygon import inside
+
+_MARGIN = 1.02
+"""Circles are taken so much larger than they are."""
 
 
 def rim_distance(rim: Boundary, xy: FloatArray) -> FloatArray:
@@ -25,11 +29,10 @@ def rim_distance(rim: Boundary, xy: FloatArray) -> FloatArray:
 
 
 def keeps_clear(rim: Boundary, xy: FloatArray) -> NDArray[np.bool_]:
-    """(n,) True where a point is outside every rim edge's diametral circle.
-
-    The nearest few circle centres suffice: edges are graded, so a circle that reaches over
-    several nearer ones would hold their nodes too, which :func:`discretise` rules out.
-    """
-    middle, radius = rim.midpoints, rim.lengths / 2
-    gap, edge = cKDTree(middle).query(xy, k=min(6, len(middle)))
-    return np.asarray((gap > radius[edge] * 1.02).all(axis=1))
+    """(n,) True where a point is inside the rim and outside every edge's diametral circle."""
+    if not len(xy):
+        return np.zeros(0, dtype=bool)
+    result = inside(rim.points, xy)
+    held = cKDTree(xy).query_ball_point(rim.midpoints, rim.lengths / 2 * _MARGIN)
+    result[np.concatenate(held).astype(np.int64)] = False
+    return result

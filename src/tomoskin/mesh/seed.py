@@ -10,8 +10,7 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.mesh.boundary import Boundary
-from tomoskin.mesh.polygon import inside
-from tomoskin.mesh.rim import rim_distance
+from tomoskin.mesh.rim import keeps_clear, rim_distance
 from tomoskin.mesh.sizing import SizeField
 
 _RIM = 0.6
@@ -92,5 +91,5 @@ def _finer(steps: IntArray) -> tuple[IntArray, NDArray[np.bool_]]:
 
 def _clear_of_rim(xy: FloatArray, rim: Boundary, field: SizeField) -> FloatArray:
     """Those of ``xy`` that lie inside, ``_RIM`` wanted edge lengths from every rim edge."""
-    xy = xy[inside(rim.points, xy)]
+    xy = xy[keeps_clear(rim, xy)]
     return xy[rim_distance(rim, xy) > _RIM * field(xy)]

@@ -10,13 +10,10 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray
 
-GROWTH = 0.3
-"""Cell size gained per unit of distance from a source."""
-
 
 @dataclass(frozen=True, eq=False)
 class SizeField:
-    """Edge length wanted at a point: min(coarse, minᵢ(sizesᵢ + GROWTH·|x − pointsᵢ|)).
+    """Edge length wanted at a point: min(coarse, minᵢ(sizesᵢ + growth·|x − pointsᵢ|)).
 
     Attributes
     ----------
@@ -26,21 +23,24 @@ class SizeField:
         (n, 2) sources, m.
     sizes
         (n,) edge length wanted at each, m.
+    growth
+        Edge length gained per unit of distance from a source.
     """
 
     coarse: float
     points: FloatArray
     sizes: FloatArray
+    growth: float
 
     def __call__(self, xy: FloatArray) -> FloatArray:
         """(n,) edge length wanted at ``xy`` (n, 2), m; the nearest few sources decide."""
-        reach = (self.coarse - self.sizes.min()) / GROWTH
+        reach = (self.coarse - self.sizes.min()) / self.growth
         if reach <= 0:
             return np.full(len(xy), self.coarse)
         k = min(8, len(self.sizes))
         gap, index = self._tree.query(xy, k=k, distance_upper_bound=reach)
         padded = np.append(self.sizes, np.inf)  # the tree says n for "no neighbour"
-        found = (padded[index] + GROWTH * gap).reshape(len(xy), k).min(axis=1)
+        found = (padded[index] + self.growth * gap).reshape(len(xy), k).min(axis=1)
         return np.asarray(np.minimum(found, self.coarse))
 
     @cached_property

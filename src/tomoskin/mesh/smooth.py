@@ -13,10 +13,10 @@ from tomoskin.mesh.rim import keeps_clear
 from tomoskin.mesh.sizing import SizeField
 from tomoskin.mesh.topology import simplex_measure
 
-ROUNDS = 14
+ROUNDS = 8
 """Rounds of smoothing."""
 
-MENDS = (3, 6, 9)
+MENDS = (2, 4)
 """Rounds before which points with too few or too many neighbours are mended."""
 
 
@@ -67,7 +67,8 @@ def _mended(rim: Boundary, inner: FloatArray, cells: IntArray, field: SizeField)
     order = np.lexsort((size[owner], corner))
     last = np.flatnonzero(np.append(np.diff(corner[order]) != 0, True))
     largest = owner[order[last]]  # for each point, the triangle that is largest for its place
-    return np.concatenate([inner[~few[first:]], middle[np.unique(largest[many])]])
+    added = middle[np.unique(largest[many])]
+    return np.concatenate([inner[~few[first:]], added[keeps_clear(rim, added)]])
 
 
 def _means(points: FloatArray, cells: IntArray, field: SizeField) -> FloatArray:

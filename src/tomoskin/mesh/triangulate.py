@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,8 +17,17 @@ from tomoskin.mesh.seed import inner_points
 from tomoskin.mesh.sizing import SizeField
 from tomoskin.mesh.smooth import smoothed, triangles
 
-_TOLERANCE = 0.10
+TOLERANCE = 0.10
 """Accepted relative miss of the wanted number of cells."""
+
+GROWTHS = (0.3, 0.5, 0.8, 1.2)
+"""Growths of cell size with distance, tried in turn until so few cells will do."""
+
+_SEARCH = 12
+"""Sizes tried for one growth."""
+
+_RETRIES = 3
+"""Corrections of the wanted number by what smoothing made of it."""
 
 _ADDED = 0.02
 """Part of the cells that smoothing adds, on average, where it mends points."""
@@ -41,42 +51,57 @@ def triangulate(
     if cells < 1:
         raise GeometryError(f"expected at least 1 cell, got {cells}")
     check_arcs(outline, arcs)
-    rim, inner, field = _sized(outline, arcs, cells, seed)
-    inner = smoothed(rim, inner, field)
-    table = triangles(rim, inner)
-    points = np.concatenate([rim.points, inner])
-    return Mesh(points, table, _facets(rim, len(arcs)))
+    fewest = math.inf
+    for growth in GROWTHS:
+        wanted = float(cells)
+        for _ in range(_RETRIES):
+            plan = _sized(outline, arcs, wanted, growth, seed)
+            inner = smoothed(plan.rim, plan.inner, plan.field)
+            table = triangles(plan.rim, inner)
+            if abs(len(table) / cells - 1) <= TOLERANCE:
+                points = np.concatenate([plan.rim.points, inner])
+                return Mesh(points, table, _facets(plan.rim, len(arcs)))
+            fewest = min(fewest, len(table))
+            if plan.miss > TOLERANCE:
+                break  # the wanted number is out of reach: let cells grow faster
+            wanted *= cells / len(table)
+    raise GeometryError(
+        f"{cells} cells cannot resolve this outline and its electrodes",
+        hint=f"ask for {max(fewest, 1.2 * cells):.0f} cells or more",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """Rim and inner points before smoothing, and how far they miss the wanted number."""
+
+    rim: Boundary
+    inner: FloatArray
+    field: SizeField
+    miss: float
 
 
 def _sized(
-    outline: Outline, arcs: Sequence[ElectrodeArc], cells: int, seed: int
-) -> tuple[Boundary, FloatArray, SizeField]:
-    """Rim and inner points whose triangulation has the wanted number of cells.
+    outline: Outline, arcs: Sequence[ElectrodeArc], cells: float, growth: float, seed: int
+) -> _Plan:
+    """Points whose triangulation has about the wanted number of cells.
 
     A triangulation of b rim and n inner points has 2n + b − 2 triangles (Euler), so that the
     size is found before anything is triangulated.
     """
     coarse = math.sqrt(outline.area / cells * 4 / math.sqrt(3))
-    best: tuple[float, Boundary, FloatArray, SizeField] | None = None
-    for _ in range(12):
-        rim = discretise(outline, arcs, coarse)
-        field = SizeField(coarse, rim.midpoints, np.minimum(rim.lengths, coarse))
+    plans: list[_Plan] = []
+    for turn in range(_SEARCH):
+        rim = discretise(outline, arcs, coarse, growth)
+        field = SizeField(coarse, rim.midpoints, np.minimum(rim.lengths, coarse), growth)
         inner = inner_points(rim, field, np.random.default_rng(seed))
         count = (2 * len(inner) + len(rim.points) - 2) * (1 + _ADDED)
-        miss = abs(count / cells - 1)
-        if best is None or miss < best[0]:
-            best = miss, rim, inner, field
-        if miss < _TOLERANCE / 5:
+        plans.append(_Plan(rim, inner, field, abs(count / cells - 1)))
+        if plans[-1].miss < TOLERANCE / 5:
             break
-        coarse *= min(max(math.sqrt(count / cells), 0.5), 2.0)
-    assert best is not None
-    if best[0] > _TOLERANCE:
-        least = 2 * len(best[2]) + len(best[1].points) - 2
-        raise GeometryError(
-            f"{cells} cells cannot resolve this outline and its electrodes",
-            hint=f"ask for about {least} cells or more",
-        )
-    return best[1:]
+        step = min(max(math.sqrt(count / cells), 0.5), 2.0)
+        coarse *= step if turn < _SEARCH / 2 else math.sqrt(step)  # damped, lest it swings
+    return min(plans, key=lambda plan: plan.miss)
 
 
 def _facets(rim: Boundary, n_electrodes: int) -> tuple[IntArray, ...]:
