@@ -87,11 +87,11 @@ class OneStep:
         n = self.matrix.shape[1]
         if dv.shape != (n,):
             raise DataError(f"expected difference data of shape ({n},), got {dv.shape}")
-        values = self.matrix @ dv
-        if not np.isfinite(values).all():
-            bad = np.flatnonzero(~np.isfinite(dv)).tolist()
+        finite = np.isfinite(dv)
+        if not finite.all():
+            bad = np.flatnonzero(~finite).tolist()
             raise DataError(f"expected finite difference data; rows {bad} are not")
-        return Image(values, self.unit, self.model.mesh.identity)
+        return Image(self.matrix @ dv, self.unit, self.model.mesh.identity)
 
 
 def _data_model(

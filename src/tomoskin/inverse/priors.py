@@ -80,7 +80,7 @@ def prior_matrix(prior: Any, mesh: Mesh, jacobian: FloatArray) -> NDArray[Any]:
     Raises
     ------
     ModelError
-        When the name is not known or the shape does not fit the mesh.
+        When the name is not known, the shape does not fit the mesh, or a value is not finite.
     """
     n = len(mesh.cells)
     if isinstance(prior, str):
@@ -91,4 +91,8 @@ def prior_matrix(prior: Any, mesh: Mesh, jacobian: FloatArray) -> NDArray[Any]:
     matrix = np.asarray(value.toarray() if issparse(prior) else value, dtype=np.float64)
     if matrix.shape not in ((n,), (n, n)):
         raise ModelError(f"expected a prior of shape ({n}, {n}), got {matrix.shape}")
+    finite = np.isfinite(matrix)
+    if not finite.all():
+        cell = int(np.argwhere(~finite)[0, 0])
+        raise ModelError("expected finite numbers", where=f"prior, cell {cell}")
     return matrix
