@@ -6,12 +6,13 @@ conductivity and the contact impedance:
 
     values = stiffness @ σ + contact @ (1/z)
 
-with the weak form of Somersalo, Cheney & Isaacson 1992, eq. (4.2), for P1 elements.
+with the weak form of Somersalo, Cheney & Isaacson 1992, eq. (4.2).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.mesh import Mesh, simplex_measure
+from tomoskin.forward.element import Element
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,118 +29,135 @@ class Assembly:
 
     Attributes
     ----------
-    n_points, n_electrodes
-        Sizes; the system has n_points + n_electrodes − 1 unknowns.
+    element
+        Shape functions.
     indices, indptr
         Compressed-column structure of the symmetric matrix.
-    stiffness
-        (n_values, n_cells): values per unit of conductivity.
+    place
+        (n_cells, k, k) where each entry of a cell's matrix goes.
     contact
         (n_values, n_electrodes): values per unit of 1/z.
     """
 
-    n_points: int
-    n_electrodes: int
+    element: Element
     indices: NDArray[np.int32]
     indptr: NDArray[np.int32]
-    stiffness: csr_array
+    place: IntArray
     contact: csr_array
 
     @classmethod
-    def of(cls, mesh: Mesh) -> Self:
-        """Structure and maps for ``mesh``."""
-        n = len(mesh.points) + len(mesh.electrodes) - 1
-        cell_rows, cell_cols, cell_values, cell_owner = _stiffness_entries(mesh)
-        rows, cols, values, owner = _contact_entries(mesh)
-        key = np.concatenate([cell_cols * n + cell_rows, cols * n + rows])
-        unique, place = np.unique(key, return_inverse=True)
-        split = len(cell_rows)
-        indptr = np.searchsorted(unique, np.arange(n + 1) * n)
+    def of(cls, element: Element) -> Self:
+        """Structure and maps for the elements of a mesh."""
+        n_electrodes = len(element.facets)
+        n = element.n_nodes + n_electrodes - 1
+        cells = element.cells
+        rows, cols, values, owner = _contact_entries(element)
+        of_cells = (cells[:, None, :] * n + cells[:, :, None]).ravel()
+        keys, place = np.unique(np.concatenate([of_cells, cols * n + rows]), return_inverse=True)
+        split = len(of_cells)
+        maps = coo_array((values, (place[split:], owner)), shape=(len(keys), n_electrodes))
         return cls(
-            n_points=len(mesh.points),
-            n_electrodes=len(mesh.electrodes),
-            indices=(unique % n).astype(np.int32),
-            indptr=indptr.astype(np.int32),
-            stiffness=_map(cell_values, place[:split], cell_owner, len(unique), len(mesh.cells)),
-            contact=_map(values, place[split:], owner, len(unique), len(mesh.electrodes)),
+            element=element,
+            indices=(keys % n).astype(np.int32),
+            indptr=np.searchsorted(keys, np.arange(n + 1) * n).astype(np.int32),
+            place=place[:split].reshape(*cells.shape, cells.shape[1]),
+            contact=csr_array(maps),
         )
+
+    @property
+    def n_points(self) -> int:
+        """Number of nodal unknowns."""
+        return self.element.n_nodes
+
+    @property
+    def n_electrodes(self) -> int:
+        """Number of electrodes."""
+        return len(self.element.facets)
 
     @property
     def n_unknowns(self) -> int:
         """Size of the system."""
         return self.n_points + self.n_electrodes - 1
 
+    @cached_property
+    def stiffness(self) -> csr_array:
+        """(n_values, n_cells): values per unit of a scalar conductivity."""
+        g = self.element.gradients
+        return self._stiffness_map(np.einsum("nqid,nqjd->nij", g, g)[..., None])
+
+    @cached_property
+    def tensor_stiffness(self) -> csr_array:
+        """(n_values, n_cells·d·d): values per unit of each component of a conductivity tensor."""
+        g = self.element.gradients
+        local = np.einsum("nqia,nqjb->nijab", g, g)
+        return self._stiffness_map(local.reshape(*local.shape[:3], -1))
+
     def matrix(self, conductivity: NDArray[Any], contact_impedance: NDArray[Any]) -> csc_array:
-        """System matrix, (n_unknowns, n_unknowns), for σ (n_cells,) and z (n_electrodes,)."""
-        values = self.stiffness @ conductivity + self.contact @ (1.0 / contact_impedance)
+        """System matrix for σ (n_cells,) or (n_cells, d, d) and z (n_electrodes,)."""
+        maps = self.stiffness if conductivity.ndim == 1 else self.tensor_stiffness
+        values = maps @ conductivity.ravel() + self.contact @ (1.0 / contact_impedance)
         shape = (self.n_unknowns, self.n_unknowns)
         return csc_array((values, self.indices, self.indptr), shape=shape)
 
-
-def gradients(mesh: Mesh) -> FloatArray:
-    """(n_cells, k, d) gradient of each corner's hat function, 1/m, in the mesh's own metric."""
-    corner = mesh.points[mesh.cells]
-    edges = corner[:, 1:] - corner[:, :1]
-    gram = edges @ edges.transpose(0, 2, 1)
-    inner = np.linalg.solve(gram, edges)
-    return np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+    def _stiffness_map(self, local: FloatArray) -> csr_array:
+        """``local`` (n_cells, k, k, c) → (n_values, n_cells·c)."""
+        n_cells, _, _, c = local.shape
+        rows = np.broadcast_to(self.place[..., None], local.shape)
+        cols = np.arange(n_cells * c).reshape(n_cells, 1, 1, c)
+        entries = (local.ravel(), (rows.ravel(), np.broadcast_to(cols, local.shape).ravel()))
+        return csr_array(coo_array(entries, shape=(len(self.indices), n_cells * c)))
 
 
 Entries = tuple[IntArray, IntArray, FloatArray, IntArray]
 
 
-def _stiffness_entries(mesh: Mesh) -> Entries:
-    grad = gradients(mesh)
-    k = mesh.cells.shape[1]
-    local = grad @ grad.transpose(0, 2, 1) * mesh.volumes[:, None, None]
-    rows = np.repeat(mesh.cells, k, axis=1).ravel()
-    cols = np.tile(mesh.cells, (1, k)).ravel()
-    return rows, cols, local.ravel(), np.repeat(np.arange(len(mesh.cells)), k * k)
+def electrode_forms(element: Element) -> list[tuple[IntArray, FloatArray]]:
+    """Per electrode: its unknowns (n,), itself last, and the matrix of ∫(u − U)² over it.
 
-
-def _contact_entries(mesh: Mesh) -> Entries:
-    """∫(u − U)² over each electrode; the ground electrode's U is no unknown."""
-    parts = [_electrode_entries(mesh, number) for number in range(len(mesh.electrodes))]
-    rows, cols, values, owner = (np.concatenate(p) for p in zip(*parts, strict=True))
-    unknown = (rows < _end(mesh)) & (cols < _end(mesh))
-    return rows[unknown], cols[unknown], values[unknown], owner[unknown]
-
-
-def _electrode_entries(mesh: Mesh, number: int) -> Entries:
-    facets = mesh.electrodes[number]
-    m = facets.shape[1]
-    size = simplex_measure(mesh.points, facets)
-    unknown = np.column_stack([facets, np.full(len(facets), len(mesh.points) + number)])
-    # exact integrals of products of the facet's hat functions, and of each with the constant U
-    local = np.empty((m + 1, m + 1))
-    local[:m, :m] = (1.0 + np.eye(m)) / (m * (m + 1))
-    local[:m, m] = local[m, :m] = -1.0 / m
-    local[m, m] = 1.0
-    values = size[:, None, None] * local
-    rows = np.repeat(unknown, m + 1, axis=1).ravel()
-    cols = np.tile(unknown, (1, m + 1)).ravel()
-    return rows, cols, values.ravel(), np.full(len(rows), number)
-
-
-def _end(mesh: Mesh) -> int:
-    return len(mesh.points) + len(mesh.electrodes) - 1
-
-
-def _map(
-    values: FloatArray, place: IntArray, owner: IntArray, n_values: int, n_owners: int
-) -> csr_array:
-    return csr_array(coo_array((values, (place, owner)), shape=(n_values, n_owners)))
-
-
-def gradient_operator(mesh: Mesh) -> csr_array:
-    """(d·n_cells, n_points): nodal potentials → gradient times √volume, axis-major.
-
-    The scaling makes a product of two such fields the integral over the cell.
+    The electrode's own unknown is n_nodes + its number, the ground electrode's included.
     """
-    grad = gradients(mesh) * np.sqrt(mesh.volumes)[:, None, None]
-    n, k, d = grad.shape
-    rows = np.arange(d)[:, None, None] * n + np.arange(n)[None, :, None]
-    cols = np.broadcast_to(mesh.cells[None], (d, n, k))
-    rows = np.broadcast_to(rows, (d, n, k))
-    entries = (grad.transpose(2, 0, 1).ravel(), (rows.ravel(), cols.ravel()))
-    return csr_array(coo_array(entries, shape=(d * n, len(mesh.points))))
+    return [_electrode_form(element, number) for number in range(len(element.facets))]
+
+
+def _electrode_form(element: Element, number: int) -> tuple[IntArray, FloatArray]:
+    facets, sizes = element.facets[number], element.facet_sizes[number]
+    nodes, local = np.unique(facets, return_inverse=True)
+    local = local.reshape(facets.shape)
+    n = len(nodes)
+    form = np.zeros((n + 1, n + 1))
+    np.add.at(
+        form, (local[:, :, None], local[:, None, :]), sizes[:, None, None] * element.facet_mass
+    )
+    load = np.bincount(local.ravel(), (sizes[:, None] * element.facet_load).ravel(), minlength=n)
+    form[:n, n] = form[n, :n] = -load
+    form[n, n] = sizes.sum()
+    return np.append(nodes, element.n_nodes + number), form
+
+
+def _contact_entries(element: Element) -> Entries:
+    """Entries of all electrodes' forms; the ground electrode's potential is no unknown."""
+    rows, cols, values, owner = [], [], [], []
+    for number, (unknown, form) in enumerate(electrode_forms(element)):
+        rows.append(np.repeat(unknown, len(unknown)))
+        cols.append(np.tile(unknown, len(unknown)))
+        values.append(form.ravel())
+        owner.append(np.full(form.size, number))
+    entries = [np.concatenate(part) for part in (rows, cols, values, owner)]
+    end = element.n_nodes + len(element.facets) - 1
+    kept = (entries[0] < end) & (entries[1] < end) & (entries[2] != 0)
+    row, col, value, number = (part[kept] for part in entries)
+    return row, col, value, number
+
+
+def gradient_operator(element: Element) -> csr_array:
+    """(d·q·n_cells, n_nodes): nodal potentials → scaled gradients, cells last.
+
+    The product of two such fields, summed over all but the cells, is the integral of ∇u · ∇v
+    over each cell.
+    """
+    n, q, k, d = element.gradients.shape
+    rows = np.arange(d * q * n).reshape(d * q, n, 1)
+    values = element.gradients.transpose(3, 1, 0, 2).reshape(d * q, n, k)
+    cols = np.broadcast_to(element.cells[None], values.shape)
+    entries = (values.ravel(), (np.broadcast_to(rows, values.shape).ravel(), cols.ravel()))
+    return csr_array(coo_array(entries, shape=(d * q * n, element.n_nodes)))

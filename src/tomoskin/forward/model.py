@@ -11,6 +11,8 @@ from scipy.sparse import csr_array
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.forward.assembly import Assembly, gradient_operator
+from tomoskin.forward.conductivity import checked_conductivity, number_type
+from tomoskin.forward.element import Element
 from tomoskin.forward.solution import Solution
 from tomoskin.forward.state import State
 from tomoskin.mesh import Mesh
@@ -18,7 +20,7 @@ from tomoskin.pattern import Pattern
 
 
 class ForwardModel:
-    """Complete electrode model (Somersalo, Cheney & Isaacson 1992) with linear elements.
+    """Complete electrode model (Somersalo, Cheney & Isaacson 1992) by finite elements.
 
     Parameters
     ----------
@@ -30,6 +32,8 @@ class ForwardModel:
         Scalar or (n_electrodes,): Ω·m on a sheet, Ω·m² on a volume; may be complex.
     current
         Scalar or (n_drive,) A.
+    order
+        Order of the elements: 1, linear; 2, quadratic.
 
     Raises
     ------
@@ -43,6 +47,8 @@ class ForwardModel:
         pattern: Pattern,
         contact_impedance: ArrayLike,
         current: ArrayLike = 1.0,
+        *,
+        order: int = 1,
     ) -> None:
         if len(mesh.electrodes) != pattern.n_electrodes:
             raise ModelError(
@@ -53,20 +59,30 @@ class ForwardModel:
         self.pattern = pattern
         self.contact_impedance = _impedance(contact_impedance, pattern.n_electrodes)
         self.current = _current(current, pattern.n_drive)
-        self.assembly = Assembly.of(mesh)
+        self.order = order
+        self.assembly = Assembly.of(Element.of(mesh, order))
 
     @cached_property
     def gradient(self) -> csr_array:
-        """Nodal potentials → √volume-scaled gradients, (d·n_cells, n_points), axis-major."""
-        return gradient_operator(self.mesh)
+        """Nodal potentials → scaled gradients, (d·q·n_cells, n_nodes); see Element."""
+        return gradient_operator(self.assembly.element)
 
     def at(self, conductivity: ArrayLike) -> State:
-        """Return the model at a conductivity, (n_cells,) S or S/m, or one number for all cells.
+        """Return the model at a conductivity, S or S/m.
 
-        Ask the state for ``solution``, ``jacobian`` and ``transfer_resistance``: the
+        One number for all cells, (n_cells,), or a symmetric tensor per cell (n_cells, d, d) in
+        the mesh's coordinates. Ask the state for ``solution``, ``jacobian`` and more: the
         factorisation is shared between them.
         """
-        return State(self, _conductivity(conductivity, len(self.mesh.cells)))
+        return State(self, checked_conductivity(conductivity, self.mesh))
+
+    def voltages(self, transfer_resistance: NDArray[Any]) -> NDArray[Any]:
+        """(n_meas,) V of the pattern, from (n_electrodes, n_electrodes) Ω."""
+        (source, sink), (plus, minus) = self.pattern.drive.T, self.pattern.measure.T
+        r = transfer_resistance
+        driven_plus = r[..., plus, source] - r[..., plus, sink]
+        driven_minus = r[..., minus, source] - r[..., minus, sink]
+        return np.asarray(self.current[self.pattern.drive_index] * (driven_plus - driven_minus))
 
     def solve(self, conductivity: ArrayLike) -> Solution:
         """Voltages and potentials; see :meth:`at`."""
@@ -81,25 +97,11 @@ class ForwardModel:
         return self.at(conductivity).transfer_resistance
 
 
-def _conductivity(value: ArrayLike, n_cells: int) -> NDArray[Any]:
-    raw = np.asarray(value)
-    if raw.shape not in ((), (n_cells,)):
-        raise ModelError(f"expected conductivity of shape ({n_cells},), got {raw.shape}")
-    sigma = np.broadcast_to(raw, (n_cells,)).astype(_dtype(raw))
-    good = np.isfinite(sigma) & (sigma.real > 0)
-    if not good.all():
-        cell = int(np.argmin(good))
-        raise ModelError(
-            f"expected a positive finite conductivity, got {sigma[cell]}", where=f"cell {cell}"
-        )
-    return sigma
-
-
 def _impedance(value: ArrayLike, n: int) -> NDArray[Any]:
     raw = np.asarray(value)
     if raw.shape not in ((), (n,)):
         raise ModelError(f"expected one contact impedance or {n}, got shape {raw.shape}")
-    z = np.broadcast_to(raw, (n,)).astype(_dtype(raw))
+    z = np.broadcast_to(raw, (n,)).astype(number_type(raw))
     good = np.isfinite(z) & (z.real > 0)
     if not good.all():
         electrode = int(np.argmin(good))
@@ -117,7 +119,3 @@ def _current(value: ArrayLike, n_drive: int) -> FloatArray:
     if not (np.isfinite(raw).all() and (raw != 0).all()):
         raise ModelError(f"expected currents other than zero, got {raw.tolist()}")
     return np.array(np.broadcast_to(raw, (n_drive,)))
-
-
-def _dtype(raw: NDArray[Any]) -> type[np.floating[Any] | np.complexfloating[Any, Any]]:
-    return np.complex128 if np.iscomplexobj(raw) else np.float64

@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.forward.factor import factorise, solve_checked
+from tomoskin.forward import derivatives
+from tomoskin.forward.factor import Factor, factorise, solve_checked
+from tomoskin.forward.pairs import centred, pair_differences
 from tomoskin.forward.solution import Solution
+from tomoskin.forward.update import LocalUpdate
 
 if TYPE_CHECKING:
     from tomoskin.forward.model import ForwardModel
@@ -18,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A forward model at a conductivity (n_cells,).
+    """A forward model at a conductivity, (n_cells,) or a tensor per cell (n_cells, d, d).
 
     Everything follows from one basis: the fields of 1 A into each electrode and out at the last.
     """
@@ -27,13 +30,26 @@ class State:
     conductivity: NDArray[Any]
 
     @cached_property
-    def _basis(self) -> tuple[NDArray[Any], float]:
+    def factor(self) -> Factor:
+        """The factorised system."""
+        return factorise(self._matrix)
+
+    @cached_property
+    def _matrix(self) -> Any:
+        return self.model.assembly.matrix(self.conductivity, self.model.contact_impedance)
+
+    @cached_property
+    def _solved(self) -> tuple[NDArray[Any], float]:
         assembly = self.model.assembly
         n_basis = assembly.n_electrodes - 1
-        matrix = assembly.matrix(self.conductivity, self.model.contact_impedance)
-        rhs = np.zeros((assembly.n_unknowns, n_basis), dtype=matrix.dtype)
+        rhs = np.zeros((assembly.n_unknowns, n_basis), dtype=self._matrix.dtype)
         rhs[assembly.n_points + np.arange(n_basis), np.arange(n_basis)] = 1.0
-        return solve_checked(matrix, factorise(matrix), rhs)
+        return solve_checked(self._matrix, self.factor, rhs)
+
+    @property
+    def basis(self) -> NDArray[Any]:
+        """(n_unknowns, n_electrodes − 1) V/A: the last electrode is at zero."""
+        return self._solved[0]
 
     @cached_property
     def transfer_resistance(self) -> NDArray[Any]:
@@ -41,60 +57,67 @@ class State:
 
         Symmetric (reciprocity, Geselowitz 1971); rows and columns sum to zero.
         """
-        n = self.model.assembly.n_electrodes
-        grounded = np.zeros((n, n), dtype=self._basis[0].dtype)
-        grounded[:-1, :-1] = self._basis[0][self.model.assembly.n_points :]
-        rows = grounded - grounded.mean(axis=0)
-        return np.asarray(rows - rows.mean(axis=1, keepdims=True))
+        return centred(self.basis[self.model.assembly.n_points :])
 
     @cached_property
     def solution(self) -> Solution:
         """Voltages and potentials for every drive of the pattern."""
-        model, resistance = self.model, self.transfer_resistance
-        electrode = model.current[:, None] * _difference(resistance, model.pattern.drives)
-        pattern = model.pattern
-        rows, (plus, minus) = pattern.drive_index, pattern.measure.T
+        model, drives = self.model, self.model.pattern.drives
+        electrode = model.current[:, None] * pair_differences(self.transfer_resistance, drives)
+        nodal = model.current[:, None] * pair_differences(self._nodal, drives)
         return Solution(
-            voltages=electrode[rows, plus] - electrode[rows, minus],
+            voltages=model.voltages(self.transfer_resistance),
             electrode_potentials=electrode,
-            potentials=self._nodal(electrode),
-            residual=self._basis[1],
+            potentials=nodal + electrode[:, -1:],
+            residual=self._solved[1],
         )
 
-    def _nodal(self, electrode: NDArray[Any]) -> NDArray[Any]:
-        """(n_drive, n_points): shifted so that it belongs to ``electrode``'s zero."""
-        model = self.model
-        fields = np.zeros((model.assembly.n_electrodes, model.assembly.n_points), electrode.dtype)
-        fields[:-1] = self._basis[0][: model.assembly.n_points].T
-        nodal = model.current[:, None] * _difference(fields.T, model.pattern.drives)
-        return np.asarray(nodal + electrode[:, -1:])
+    @property
+    def _nodal(self) -> NDArray[Any]:
+        """(n_electrodes, n_points): basis fields at the mesh's points."""
+        assembly = self.model.assembly
+        fields = np.zeros((assembly.n_electrodes, len(self.model.mesh.points)), self.basis.dtype)
+        fields[:-1] = self.basis[: fields.shape[1]].T
+        return fields
 
     @cached_property
-    def _gradient(self) -> NDArray[Any]:
-        """(n_electrodes, d, n_cells): √volume-scaled gradient of each basis field."""
+    def gradient(self) -> NDArray[Any]:
+        """(n_electrodes, d·q, n_cells): scaled gradient of each basis field, see Element."""
         n, operator = self.model.assembly.n_electrodes, self.model.gradient
-        fields = self._basis[0][: self.model.assembly.n_points]
+        fields = self.basis[: self.model.assembly.n_points]
         gradient = np.zeros((n, operator.shape[0]), dtype=fields.dtype)
         gradient[:-1] = (operator @ fields).T
         return gradient.reshape(n, -1, len(self.conductivity))
 
     @cached_property
     def jacobian(self) -> NDArray[Any]:
-        """(n_meas, n_cells) V/S: −I ∫ ∇u_drive · ∇u_measure over each cell (Polydorides 2002).
+        """(n_meas, n_cells) V/S; for a tensor (n_meas, n_cells, d, d), by each component.
 
-        u_drive and u_measure are the fields of 1 A through the driven and the measured pair.
+        −I ∫ ∇u_drive · ∇u_measure over each cell (Polydorides & Lionheart 2002): the fields of
+        1 A through the driven and the measured pair.
         """
-        model, pattern, gradient = self.model, self.model.pattern, self._gradient
-        out = np.empty((pattern.n_meas, gradient.shape[-1]), dtype=gradient.dtype)
-        for drive, (source, sink) in enumerate(pattern.drives):
-            rows = np.flatnonzero(pattern.drive_index == drive)
-            driven = model.current[drive] * (gradient[sink] - gradient[source])
-            plus, minus = pattern.measure[rows].T
-            projected = np.einsum("edc,dc->ec", gradient, driven)
-            out[rows] = projected[plus] - projected[minus]
-        return out
+        return derivatives.by_conductivity(self)
 
+    @cached_property
+    def contact_jacobian(self) -> NDArray[Any]:
+        """(n_meas, n_electrodes): derivative by each contact impedance, V per Ω·m (or Ω·m²)."""
+        return derivatives.by_contact_impedance(self)
 
-def _difference(columns: NDArray[Any], pairs: NDArray[np.int64]) -> NDArray[Any]:
-    """(n, n_electrodes) fields → (n_pairs, n): first electrode of each pair minus the second."""
-    return np.asarray((columns[:, pairs[:, 0]] - columns[:, pairs[:, 1]]).T)
+    @cached_property
+    def movement_jacobian(self) -> NDArray[Any]:
+        """(n_meas, n_electrodes, n_coordinates) V/m: derivative by the place of each electrode.
+
+        The electrode's points move with it, all others stay (Soleimani, Gómez-Laberge & Adler
+        2006); only for scalar conductivity and elements of order 1.
+        """
+        return derivatives.by_movement(self)
+
+    @cached_property
+    def power(self) -> NDArray[Any]:
+        """(n_drive, n_cells) W: power turned to heat in each cell, its real part."""
+        return derivatives.power(self)
+
+    @cached_property
+    def local(self) -> LocalUpdate:
+        """Exact voltages when few cells change, without a new factorisation."""
+        return LocalUpdate(self)

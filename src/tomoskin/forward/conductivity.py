@@ -1,0 +1,60 @@
+"""What may be given as a conductivity."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tomoskin.core import ModelError
+from tomoskin.mesh import Mesh
+
+_SYMMETRY = 1e-10
+
+
+def checked_conductivity(value: ArrayLike, mesh: Mesh) -> NDArray[Any]:
+    """(n_cells,) or (n_cells, d, d), real or complex, with a positive real part.
+
+    Raises
+    ------
+    ModelError
+        For another shape, or naming the first cell whose conductivity is not positive, not
+        finite or (a tensor) not symmetric.
+    """
+    raw = np.asarray(value)
+    n, d = len(mesh.cells), mesh.points.shape[1]
+    if raw.shape not in ((), (n,), (n, d, d)):
+        raise ModelError(
+            f"expected conductivity of shape ({n},) or ({n}, {d}, {d}), got {raw.shape}"
+        )
+    if raw.dtype.kind not in "biufc":
+        raise ModelError(f"expected numbers as conductivity, got {raw.dtype}")
+    sigma = raw.astype(number_type(raw))
+    if sigma.ndim == 3:
+        return _checked_tensor(sigma)
+    sigma = np.array(np.broadcast_to(sigma, (n,)))
+    _refuse_first(~(np.isfinite(sigma) & (sigma.real > 0)), sigma, "a positive finite conductivity")
+    return sigma
+
+
+def number_type(raw: NDArray[Any]) -> type[np.floating[Any] | np.complexfloating[Any, Any]]:
+    """complex128 for complex input, else float64."""
+    return np.complex128 if np.iscomplexobj(raw) else np.float64
+
+
+def _checked_tensor(sigma: NDArray[Any]) -> NDArray[Any]:
+    _refuse_first(~np.isfinite(sigma).all(axis=(1, 2)), sigma, "a finite conductivity")
+    skew = np.abs(sigma - sigma.swapaxes(1, 2)).max(axis=(1, 2))
+    _refuse_first(
+        skew > _SYMMETRY * np.abs(sigma).max(axis=(1, 2)), sigma, "a symmetric conductivity tensor"
+    )
+    least = np.linalg.eigvalsh(sigma.real)[:, 0]
+    _refuse_first(least <= 0, sigma, "a conductivity tensor that is positive definite")
+    return sigma
+
+
+def _refuse_first(bad: NDArray[np.bool_], sigma: NDArray[Any], expected: str) -> None:
+    if bad.any():
+        cell = int(np.argmax(bad))
+        raise ModelError(f"expected {expected}, got {sigma[cell].tolist()}", where=f"cell {cell}")
