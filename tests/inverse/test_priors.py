@@ -53,6 +53,20 @@ def test_noser_is_the_root_of_the_sensitivity(mesh: Mesh) -> None:
     assert prior_matrix("noser", mesh, 9 * j) == pytest.approx(9 * got)
 
 
+def test_gaussian_is_what_an_area_weighted_average_leaves_over(mesh: Mesh) -> None:
+    """Half the weight at half the width, which is a tenth of the largest extent."""
+    rng = np.random.default_rng(3)
+    points = mesh.points * rng.uniform(0.98, 1.02, mesh.points.shape)
+    uneven = Mesh(points, mesh.cells, mesh.electrodes)
+    width = 0.1 * np.ptp(points, axis=0).max()
+    gap = np.linalg.norm(uneven.centroids[:, None] - uneven.centroids[None], axis=2)
+    weights = uneven.volumes * 0.5 ** ((2 * gap / width) ** 2)
+    x = rng.standard_normal(len(uneven.cells))
+    left_over = x - weights @ x / weights.sum(axis=1)
+    got = x @ prior_matrix("gaussian", uneven, jacobian(uneven)) @ x
+    assert got == pytest.approx(left_over @ left_over, rel=1e-10)
+
+
 def test_gaussian_does_not_depend_on_size(mesh: Mesh) -> None:
     large = Mesh(1e3 * mesh.points, mesh.cells, mesh.electrodes)
     got = prior_matrix("gaussian", large, jacobian(mesh))

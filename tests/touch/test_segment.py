@@ -118,9 +118,12 @@ def test_gamma2_and_smoothing_drop_what_is_narrower_than_the_filter() -> None:
 
 
 def test_the_filter_averages_cells_above_gamma1_only() -> None:
-    """By hand, dense: threshold, area-weighted Gaussian to three widths, second threshold."""
+    """By hand, dense: threshold, area-weighted Gaussian to three widths, second threshold.
+
+    At an electrode, where cells are small, and inside.
+    """
     mesh, width = sheet(), 0.006
-    image = blob(0.02, 0.01) + 0.7 * blob(-0.04, 0.03)
+    image = blob(0.0, 0.08, width=0.02) + 0.8 * blob(-0.04, -0.03)
     limit = 0.65 * np.abs(image).max()
     masked = np.where(np.abs(image) >= limit, image, 0.0)
     gap = np.linalg.norm(mesh.centroids[:, None] - mesh.centroids[None], axis=2)
