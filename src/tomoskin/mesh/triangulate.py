@@ -26,6 +26,9 @@ GROWTHS = (0.3, 0.5, 0.8, 1.2)
 _SEARCH = 12
 """Sizes tried for one growth."""
 
+_STUCK = 0.01
+"""A size that changes the number of cells by less than this, far off it, ends the search."""
+
 _RETRIES = 3
 """Corrections of the wanted number by what smoothing made of it."""
 
@@ -67,7 +70,7 @@ def triangulate(
             wanted *= cells / len(table)
     raise GeometryError(
         f"{cells} cells cannot resolve this outline and its electrodes",
-        hint=f"ask for {max(fewest, 1.2 * cells):.0f} cells or more",
+        hint=f"ask for {1.5 * max(fewest, cells):.0f} cells or more",
     )
 
 
@@ -91,20 +94,29 @@ def _sized(
     """
     coarse = math.sqrt(outline.area / cells * 4 / math.sqrt(3))
     plans: list[_Plan] = []
+    last = math.inf
     for turn in range(_SEARCH):
         rim = discretise(outline, arcs, coarse, growth)
         field = SizeField(coarse, rim.midpoints, np.minimum(rim.lengths, coarse), growth)
         inner = inner_points(rim, field, np.random.default_rng(seed))
         count = (2 * len(inner) + len(rim.points) - 2) * (1 + _ADDED)
         plans.append(_Plan(rim, inner, field, abs(count / cells - 1)))
-        if plans[-1].miss < TOLERANCE / 5:
+        stuck = abs(count / last - 1) < _STUCK and plans[-1].miss > TOLERANCE
+        if plans[-1].miss < TOLERANCE / 5 or stuck:
             break
+        last = count
         step = min(max(math.sqrt(count / cells), 0.5), 2.0)
         coarse *= step if turn < _SEARCH / 2 else math.sqrt(step)  # damped, lest it swings
     return min(plans, key=lambda plan: plan.miss)
 
 
 def _facets(rim: Boundary, n_electrodes: int) -> tuple[IntArray, ...]:
+    """Rim edges of each electrode, counter-clockwise from its start."""
     nodes = np.arange(len(rim.points))
     edges = np.column_stack([nodes, np.roll(nodes, -1)])
-    return tuple(edges[rim.owner == number] for number in range(n_electrodes))
+    result = []
+    for number in range(n_electrodes):
+        own = np.flatnonzero(rim.owner == number)
+        jump = np.flatnonzero(np.diff(own) > 1)  # where the arc runs through the first node
+        result.append(edges[np.roll(own, -1 - jump[0]) if len(jump) else own])
+    return tuple(result)
