@@ -15,9 +15,9 @@ def check_simple(vertices: FloatArray) -> None:
     _check_table(vertices)
     size = float(np.ptp(vertices, axis=0).max())
     _check_repeats(vertices, size)
-    area = vertices - vertices[0]
-    steps = np.roll(area, -1, axis=0)
-    if abs((area[:, 0] * steps[:, 1] - area[:, 1] * steps[:, 0]).sum()) <= _TOUCH * size**2:
+    offset = vertices - vertices[0]
+    far = offset[np.argmax(np.linalg.norm(offset, axis=1))]
+    if np.abs(offset[:, 0] * far[1] - offset[:, 1] * far[0]).max() <= _TOUCH * size**2:
         raise GeometryError("the polygon has no area", hint="its vertices lie on a line")
     _check_crossings(vertices, size)
 

@@ -32,17 +32,16 @@ def skin_text(skin: str | PathLike[str]) -> tuple[str, str]:
         entry = files("tomoskin.skin") / "builtin" / f"{skin}.toml"
         return entry.read_text(encoding="utf-8"), BUILT_IN
     path = Path(fspath(skin))
-    if isinstance(skin, str) and path.name == skin and not path.suffix and not path.exists():
-        raise _unknown(skin)
     return _read(path), str(path)
 
 
-def _unknown(name: str) -> SkinError:
+def _missing(path: Path) -> SkinError:
     known = built_in_names()
-    close = get_close_matches(name, known, n=1)
+    close = get_close_matches(str(path), known, n=1)
     guess = f'did you mean "{close[0]}"? ' if close else ""
     return SkinError(
-        f'no built-in skin "{name}" and no such file',
+        "no such file, and no built-in skin of that name",
+        where=str(path),
         hint=f"{guess}built-in skins: {', '.join(known)}",
     )
 
@@ -56,12 +55,11 @@ def _read(path: Path) -> str:
             raise SkinError("is too large for a skin file (over 1 MB)", where=where)
         return path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
-        hint = f"built-in skins: {', '.join(built_in_names())}"
-        raise SkinError("no such file", where=where, hint=hint) from None
+        raise _missing(path) from None
     except UnicodeDecodeError as error:
         raise SkinError(
             f"is not a text file (byte {error.start} is not UTF-8)", where=where
         ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise SkinError(f"cannot be read: {reason}", where=where) from None
+        raise SkinError(f"cannot be read: {reason}", where=where[:80]) from None

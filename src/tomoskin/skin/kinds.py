@@ -116,14 +116,15 @@ class Quantity(Kind):
     def read(self, value: object) -> float:
         """The quantity in SI units."""
         if isinstance(value, int | float) and not isinstance(value, bool):
-            example = f'"{value:g} {self.unit}"'
-            raise ValueError(f"expected {self.expected}, got {value:g} without a unit; {example}?")
+            number = show(value)
+            example = f'"{number} {self.unit}"'
+            raise ValueError(f"expected {self.expected}, got {number} without a unit; {example}?")
         if not isinstance(value, str):
             raise _unexpected(self, value)
         result = parse_quantity(value, self.dimension)
         size = DIMENSIONS[self.dimension][self.unit]
-        slack = 1e-12 * max(abs(self.low), abs(self.high))
-        if not self.low - slack <= result / size <= self.high + slack:
+        low, high = (end * size for end in (self.low, self.high))
+        if not low - 1e-12 * abs(low) <= result <= high + 1e-12 * abs(high):  # NaN fails too
             raise _unexpected(self, value)
         return result
 

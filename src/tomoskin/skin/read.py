@@ -22,7 +22,7 @@ def parse(text: str, source: str) -> Document:
     """
     try:
         raw = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also numbers or nesting beyond all bounds
         raise SkinError(f"is not valid TOML: {error}", where=source) from None
     _check_format(raw, source)
     return complete({name: raw[name] for name in raw if name != "format"}, source)
