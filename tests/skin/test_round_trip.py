@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from tomoskin.core import SkinError
 from tomoskin.skin import Skin, skin_file_page
+from tomoskin.skin.page import EXAMPLE
 from tomoskin.skin.schema import SECTIONS
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "skin-file.md"
@@ -78,6 +79,10 @@ def test_page_lists_every_key_with_its_range() -> None:
         assert f"## [{section.name}]" in page
         for key in section.keys:
             assert f"| `{key.name}` | {key.kind.expected} |" in page
+
+
+def test_example_of_the_page_is_a_skin() -> None:
+    assert Skin.from_toml(EXAMPLE).n_electrodes == 8
 
 
 def test_defaults_are_allowed_values() -> None:

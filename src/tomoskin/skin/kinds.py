@@ -111,7 +111,8 @@ class Quantity(Kind):
     @property
     def expected(self) -> str:
         """The phrase."""
-        return f"a {self.dimension} from {self.low:g} to {self.high:g} {self.unit}"
+        article = "an" if self.dimension[0] in "aeiou" else "a"
+        return f"{article} {self.dimension} from {self.low:g} to {self.high:g} {self.unit}"
 
     def read(self, value: object) -> float:
         """The quantity in SI units."""

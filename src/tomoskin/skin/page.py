@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from tomoskin.skin.find import skin_text
 from tomoskin.skin.kinds import literal
 from tomoskin.skin.schema import SECTIONS, Key, Section
 
@@ -17,10 +16,33 @@ NAME` prints one with all defaults written out.
 The first line is `format = 1`. Directions and order are as seen from the front of the sheet, x to
 the right, y up. Electrodes are E1, E2, … for people and 0, 1, … in tables.
 
-A complete example, the built-in `textile-disc-8`:
+A file with all that is required:
 
 ```toml
 """
+
+EXAMPLE = """\
+format = 1
+
+[skin]
+name = "my-sheet"
+
+[outline]
+shape = "disc"
+diameter = "200 mm"
+
+[electrodes]
+count = 8
+width = "10 mm"
+contact_impedance = "0.2 mohm*m"
+
+[material]
+sheet_resistance = "0.8 ohm/sq"
+
+[drive]
+current = "100 mA"
+"""
+"""The page's example of a skin file."""
 
 _TABLE = """\
 | key | value | default | meaning |
@@ -30,9 +52,8 @@ _TABLE = """\
 
 def skin_file_page() -> str:
     """Text of docs/skin-file.md."""
-    example, _ = skin_text("textile-disc-8")
     sections = "\n".join(_section(section) for section in SECTIONS)
-    return f"{_HEAD}{example}```\n\n{sections}"
+    return f"{_HEAD}{EXAMPLE}```\n\n{sections}"
 
 
 def _section(section: Section) -> str:
