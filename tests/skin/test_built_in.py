@@ -68,7 +68,7 @@ def test_textile_disc_of_the_source() -> None:
     assert skin.inverse.difference == "plain"
     assert skin.touch.sign == "decrease"
     readout = skin.readout
-    assert (readout.adc_bits, readout.gain, readout.oversampling) == (10, 40, 16)
+    assert (readout.adc_bits, readout.oversampling) == (10, 16)
     assert (readout.reference_voltage, readout.offset) == (5.0, 0.0)
     assert readout.settling == pytest.approx(2e-3)
     assert readout.tick_rate == pytest.approx(250e3)
