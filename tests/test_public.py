@@ -1,0 +1,39 @@
+"""The names that others rely on: ``from tomoskin import …``."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+import tomoskin
+
+
+@pytest.mark.parametrize("name", tomoskin.__all__)
+def test_every_public_name_is_there(name: str) -> None:
+    assert getattr(tomoskin, name) is not None
+    assert name in dir(tomoskin)
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="Nonsense"):
+        _ = tomoskin.Nonsense
+
+
+def test_the_package_alone_imports_nothing_heavy() -> None:
+    code = "import sys, tomoskin; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_the_flow_in_a_few_lines() -> None:
+    """The example of the design page, end to end."""
+    skin = tomoskin.Skin.load("textile-disc-8")
+    model = tomoskin.ForwardModel(
+        skin.mesh(), skin.pattern(), contact_impedance=skin.contact_impedance, current=skin.current
+    )
+    sigma = skin.conductivity
+    operator = tomoskin.OneStep(model, prior="noser", alpha=0.05, conductivity=sigma)
+    image = operator(0.01 * model.solve(sigma).voltages)
+    assert image.values.shape == (len(skin.mesh().cells),)
+    assert image.values.mean() < 0  # higher voltages, lower conductivity
