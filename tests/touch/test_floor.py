@@ -10,7 +10,7 @@ import pytest
 from numpy.random import Generator
 
 from shapes import disc
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import OneStep
 from tomoskin.pattern import Pattern
@@ -20,15 +20,15 @@ from tomoskin.touch import NoiseFloor, Segmenter
 
 @dataclass(frozen=True)
 class Chain:
-    """Operator, floor and Jacobian of a disc with eight electrodes at 100 mA, 10 µV of noise."""
+    """Operator, floor and Jacobian of a disc at 100 mA, 5 to 20 µV of noise."""
 
     operator: OneStep
     jacobian: FloatArray
     noise: FloatArray
     floor: NoiseFloor
 
-    def segmenter(self, snr: float) -> Segmenter:
-        settings = TouchSettings(0.65, 0.9, 0.008, "decrease", snr, "centroid", 8)
+    def segmenter(self, snr: float, sign: str = "decrease") -> Segmenter:
+        settings = TouchSettings(0.65, 0.9, 0.005, sign, snr, "centroid", 8)
         return Segmenter(self.operator.model.mesh, settings)
 
     def image(self, dv: FloatArray, rng: Generator) -> FloatArray:
@@ -43,9 +43,19 @@ class Chain:
 
 @cache
 def chain() -> Chain:
-    model = ForwardModel(disc(8, 500), Pattern.adjacent(8), 0.01, current=0.1)
+    return chain_of(8, 500)
+
+
+@cache
+def fine() -> Chain:
+    return chain_of(16, 1500)
+
+
+def chain_of(n: int, cells: int) -> Chain:
+    pattern = Pattern.adjacent(n)
+    model = ForwardModel(disc(n, cells), pattern, 0.01, current=0.1)
     operator = OneStep(model, "noser", alpha=0.003)
-    noise = 1e-5 * np.random.default_rng(0).uniform(0.5, 2.0, 40)
+    noise = 1e-5 * np.random.default_rng(0).uniform(0.5, 2.0, pattern.n_meas)
     return Chain(operator, model.jacobian(1.0), noise, NoiseFloor.of(operator.matrix, noise))
 
 
@@ -101,22 +111,50 @@ def test_without_a_floor_no_deviation_is_claimed() -> None:
     assert np.isnan([reading.sd_x, reading.sd_y]).all()
 
 
-def centroid(cells: IntArray, image: FloatArray) -> FloatArray:
-    mesh = chain().operator.model.mesh
-    mass = np.abs(image[cells]) * mesh.volumes[cells]
-    return np.asarray(mass @ mesh.centroids[cells] / mass.sum())
+@pytest.mark.parametrize("sign", ["decrease", "increase", "both"])
+@pytest.mark.parametrize(("place", "ratio"), [((0.0, 0.0), 12.0), ((0.04, 0.02), 25.0)])
+def test_deviation_of_a_centroid_is_what_noise_makes_of_it(
+    sign: str, place: tuple[float, float], ratio: float
+) -> None:
+    """Cells that cross the threshold move a centroid most; on cells the edge comes in steps."""
+    rng, n = np.random.default_rng(6), 200
+    segmenter = fine().segmenter(5.0, sign=sign)
+    press = fine().press(*place, ratio) * (-1 if sign == "increase" else 1)
+    readings = [segmenter(fine().image(press, rng), fine().floor)[0] for _ in range(n)]
+    got = np.std([(r.x, r.y) for r in readings], axis=0, ddof=1)
+    reported = np.sqrt(np.mean([(r.sd_x**2, r.sd_y**2) for r in readings], axis=0))
+    assert ((reported > 0.65 * got) & (reported < 1.5 * got)).all(), reported / got
 
 
-@pytest.mark.parametrize("place", [(0.0, 0.0), (0.04, 0.02)])
-def test_deviation_of_a_centroid_over_given_cells(place: tuple[float, float]) -> None:
-    rng, n = np.random.default_rng(6), 3000
-    dv = chain().press(*place, ratio=40.0)
-    (reading,) = chain().segmenter(snr=5.0)(chain().operator(dv).values, chain().floor)
-    cloud = [centroid(reading.cells, chain().image(dv, rng)) for _ in range(n)]
-    got = np.std(cloud, axis=0, ddof=1)
-    # 4.5 standard errors of a deviation, and 1 % for the second order in 1/ratio
-    tolerance = 4.5 / np.sqrt(2 * (n - 1)) + 0.01
-    assert (reading.sd_x, reading.sd_y) == pytest.approx(tuple(got), rel=tolerance)
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_deviation_of_a_region_that_noise_shifts_is_the_shift(axis: int, sign: float) -> None:
+    """One source of noise, and its image is the derivative of the blob: all of it moves."""
+    mesh, width, shift = fine().operator.model.mesh, 0.025, 1e-3
+    offset = mesh.centroids - [0.01, -0.02]
+    blob = sign * np.exp(-0.5 * (offset**2).sum(axis=1) / width**2)
+    column = (blob * offset[:, axis] / width**2)[:, None]
+    floor = NoiseFloor.of(column, np.array([shift]))
+    (reading,) = fine().segmenter(0.0, sign="both")(blob, floor)
+    expected = np.where(np.arange(2) == axis, shift, 0.0)
+    assert (reading.sd_x, reading.sd_y) == pytest.approx(tuple(expected), abs=0.15 * shift)
+
+
+def test_a_change_of_strength_does_not_move_a_region() -> None:
+    mesh = fine().operator.model.mesh
+    # lopsided, so that edge and inside pull to one side unless the threshold follows the peak
+    x, y = (mesh.centroids / 0.03).T
+    blob = np.exp(-(x**2) - y**2) * np.exp(0.8 * x)
+    floor = NoiseFloor.of(blob[:, None], np.array([0.1]))
+    (reading,) = fine().segmenter(0.0, sign="both")(blob, floor)
+    assert np.hypot(reading.sd_x, reading.sd_y) < 3e-4
+
+
+def test_deviation_scales_with_the_noise() -> None:
+    image = fine().operator(fine().press(0.04, 0.02, ratio=20.0)).values
+    twice = NoiseFloor.of(fine().operator.matrix, 2 * fine().noise)
+    (one,), (two,) = (fine().segmenter(1.0)(image, f) for f in (fine().floor, twice))
+    assert (two.sd_x, two.sd_y) == pytest.approx((2 * one.sd_x, 2 * one.sd_y))
 
 
 def test_noise_of_no_channel_is_no_deviation() -> None:

@@ -28,11 +28,6 @@ class NoiseFloor:
         spread = operator * noise
         return cls(spread, np.sqrt(np.einsum("cm,cm->c", spread, spread)))
 
-    def centroid_sd(self, cells: IntArray, weights: FloatArray, offset: FloatArray) -> FloatArray:
-        """Standard deviation of a weighted centroid, (2,) m, to first order.
-
-        ``weights`` (n,) image values of the ``cells`` and ``offset`` (n, 2) their positions
-        relative to the centroid: a change δw moves it by Σ offset δw / Σ w.
-        """
-        lever = offset.T / weights.sum()
-        return np.asarray(np.linalg.norm(lever @ self.spread[cells], axis=1))
+    def sd_of(self, cells: IntArray, lever: FloatArray) -> FloatArray:
+        """Standard deviation, (k,), of Σ lever · image over ``cells`` (n,), ``lever`` (n, k)."""
+        return np.asarray(np.linalg.norm(lever.T @ self.spread[cells], axis=1))

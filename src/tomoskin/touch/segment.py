@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from tomoskin.core import FloatArray, IntArray, Reading
 from tomoskin.mesh import Mesh
 from tomoskin.skin import TouchSettings
+from tomoskin.touch.centroid import centroid, centroid_sd
 from tomoskin.touch.connect import connected, neighbour_table
 from tomoskin.touch.floor import NoiseFloor
 
@@ -72,19 +73,18 @@ class Segmenter:
         return np.asarray(np.bincount(near.ravel(), spread.ravel(), minlength=len(image)), float)
 
     def _centroid(self, cells: IntArray, image: FloatArray, floor: NoiseFloor | None) -> Reading:
-        volumes, weights = self.mesh.volumes[cells], image[cells]
-        mass = np.abs(weights) * volumes
-        centre = mass @ self.mesh.centroids[cells] / mass.sum()
-        offset = self.mesh.centroids[cells] - centre
+        weights = image[cells]
+        centre = centroid(self.mesh, cells, np.abs(image))
         sd = np.full(2, np.nan)
         if floor is not None:
-            sd = floor.centroid_sd(cells, mass, offset * volumes[:, None])
+            margin = _REACH * self.settings.smoothing
+            sd = centroid_sd(self.mesh, cells, image, margin, floor)
         return Reading(
             x=float(centre[0]),
             y=float(centre[1]),
             sd_x=float(sd[0]),
             sd_y=float(sd[1]),
-            area=float(volumes.sum()),
+            area=float(self.mesh.volumes[cells].sum()),
             peak=float(weights[np.argmax(np.abs(weights))]),
             cells=cells,
         )

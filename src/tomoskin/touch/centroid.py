@@ -1,0 +1,51 @@
+"""The weighted centroid of a region, and how far measurement noise alone moves it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.mesh import Mesh
+from tomoskin.touch.floor import NoiseFloor
+
+_BAND = 0.2
+"""Cells within this fraction of a region's lowest value stand for its edge."""
+
+
+def centroid(mesh: Mesh, cells: IntArray, strength: FloatArray) -> FloatArray:
+    """(2,) m, weighted by ``strength`` (n_cells of the mesh,) times area."""
+    mass = strength[cells] * mesh.volumes[cells]
+    return np.asarray(mass @ mesh.centroids[cells] / mass.sum())
+
+
+def centroid_sd(
+    mesh: Mesh, cells: IntArray, image: FloatArray, margin: float, floor: NoiseFloor
+) -> FloatArray:
+    """(2,) m, to first order in the noise, for a region above a fraction of the extreme.
+
+    A change of the image moves the centroid in two ways: by the weight of each cell, and by
+    cells that cross the threshold as they or the extreme change. The second is an integral over
+    the edge, taken here over a band of values around the region's lowest (coarea formula); it
+    counts for most of the deviation. ``margin`` m: how far beyond the region the edge may lie.
+    """
+    top = int(np.argmax(np.abs(image)))
+    limit = float(image[cells[np.argmin(np.abs(image[cells]))]])
+    mass = image[cells] * mesh.volumes[cells]
+    centre = centroid(mesh, cells, np.abs(image))
+    offset = mesh.centroids[cells] - centre
+    edge, edge_offset = _edge(mesh, image, limit, centre, np.hypot(*offset.T).max() + margin)
+    share = mesh.volumes[edge] * image[edge] / (2 * _BAND * limit)
+    at_edge = edge_offset * share[:, None]
+    of_top = -at_edge.sum(axis=0) * limit / image[top]
+    lever = np.vstack([offset * mesh.volumes[cells, None], at_edge, of_top])
+    return floor.sd_of(np.concatenate([cells, edge, [top]]), lever / mass.sum())
+
+
+def _edge(
+    mesh: Mesh, image: FloatArray, limit: float, centre: FloatArray, reach: float
+) -> tuple[IntArray, FloatArray]:
+    """Cells whose value is about ``limit`` within ``reach`` of the centre; their offsets."""
+    cells = np.flatnonzero(np.abs(image - limit) < _BAND * abs(limit))
+    offset = mesh.centroids[cells] - centre
+    near = np.hypot(*offset.T) < reach
+    return cells[near], offset[near]
