@@ -14,6 +14,7 @@ from shapes import box, disc
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import PRIORS, OneStep, prior_matrix
+from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern
 from tomoskin.signal import difference
 
@@ -178,3 +179,20 @@ def test_data_that_are_not_finite_are_named(value: float) -> None:
     dv[[4, 17]] = value
     with pytest.raises(DataError, match=r"rows \[4, 17\] are not"):
         OneStep(model(), alpha=ALPHA)(dv)
+
+
+def test_a_voltage_that_is_zero_by_symmetry_cannot_be_normalised_by() -> None:
+    """A pair read between two patches that a layered bar holds at the same potential."""
+    axis = np.linspace(0.0, 1.0, 3)
+    bar = box(np.linspace(-1.0, 1.0, 9), axis, axis)
+    facet = bar.boundary
+    middle = bar.points[facet].mean(axis=1)
+    ring = (np.abs(middle[:, 0] - 0.125) < 0.125) & (np.abs(middle[:, 0]) > 0)
+    patches = [facet[ring & (middle[:, 2] == z)] for z in (0.0, 1.0)]
+    mesh = Mesh(bar.points, bar.cells, (*bar.electrodes, *patches))
+    pattern = Pattern.from_tables([[0, 1], [0, 1]], [[2, 3], [0, 1]])
+    # patches that conduct badly into the bar do not disturb its even current
+    model = ForwardModel(mesh, pattern, [0.01, 0.01, 1e11, 1e11])
+    with pytest.raises(ModelError, match=r"row 0: .*cannot be normalised"):
+        OneStep(model, alpha=0.1, difference="normalised")
+    assert OneStep(model, alpha=0.1).matrix.shape == (len(mesh.cells), 2)

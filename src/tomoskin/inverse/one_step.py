@@ -12,6 +12,9 @@ from tomoskin.core import DataError, FloatArray, Image, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse.priors import prior_matrix
 
+_ZERO = 1e-9
+"""A voltage below this part of the largest is zero by symmetry, and its value is rounding."""
+
 
 class OneStep:
     """Linear difference imaging: x = (JᵀWJ + α²Q)⁻¹JᵀW dv, the source's (3.54) and (3.55).
@@ -101,8 +104,19 @@ def _data_model(
     if difference == "plain":
         return jacobian, np.ones(len(reference))
     if difference == "normalised":
+        _refuse_zeros(reference)
         return jacobian / np.abs(reference)[:, None], reference**2
     raise ModelError(f'expected difference "plain" or "normalised", got "{difference}"')
+
+
+def _refuse_zeros(reference: FloatArray) -> None:
+    size = np.abs(reference)
+    if size.min() < _ZERO * size.max():
+        raise ModelError(
+            f"the model expects {reference[size.argmin()]:.1e} V, which cannot be normalised by",
+            where=f"row {int(size.argmin())}",
+            hint='choose difference "plain", or a pattern without such rows',
+        )
 
 
 def _weights(value: ArrayLike, n_meas: int) -> FloatArray:
