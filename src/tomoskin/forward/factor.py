@@ -11,7 +11,7 @@ from scipy.sparse.linalg import splu
 
 from tomoskin.core import ModelError
 
-_RESIDUAL = 1e-6
+MOST_RESIDUAL = 1e-6
 """A relative residual above this means that the matrix was singular to working precision."""
 
 
@@ -42,7 +42,7 @@ def factorise(matrix: csc_array) -> Factor:
             options={"SymmetricMode": True},
         )
     except RuntimeError as error:
-        raise _singular() from error
+        raise singular() from error
     return factor
 
 
@@ -58,12 +58,13 @@ def solve_checked(
     """
     solution = factor.solve(rhs)
     residual = float(np.abs(rhs - matrix @ solution).max() / np.abs(rhs).max())
-    if not residual < _RESIDUAL:
-        raise _singular()
+    if not residual < MOST_RESIDUAL:
+        raise singular()
     return solution, residual
 
 
-def _singular() -> ModelError:
+def singular() -> ModelError:
+    """Return the error for a system that no factorisation solves."""
     return ModelError(
         "the system is singular to working precision",
         hint="conductivities or contact impedances span too many orders of magnitude",

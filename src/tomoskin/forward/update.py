@@ -6,7 +6,8 @@ sheet follow exactly from a small dense system (Woodbury 1950):
     R' = R − Uᵀ (I + A C)⁻¹ A U,
 
 where A is the change of the system on the touched nodes, C = (K⁻¹) between them and U the basis
-fields on them.
+fields on them. A constant changes nothing, so all three are taken against the first touched node:
+what the nodes have in common would cost digits, and does not enter.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import IntArray, ModelError
+from tomoskin.forward.factor import MOST_RESIDUAL, singular
 from tomoskin.forward.pairs import centred
 
 if TYPE_CHECKING:
@@ -54,15 +56,14 @@ class LocalUpdate:
         Raises
         ------
         ModelError
-            For cells that do not exist or stand twice, or a conductivity that is not positive.
+            For cells that do not exist or stand twice, a conductivity that is not positive, or
+            a change that leaves the system singular to working precision.
         """
         index, change = self._change(cells, conductivity)
         nodes, block = self._block(index, change)
-        inverse = self._between(nodes)
-        fields = self._state.basis[nodes]
-        system = block @ inverse
-        system[np.diag_indices_from(system)] += 1.0
-        lost = fields.T @ np.linalg.solve(system, block @ fields)
+        between, fields = self._between(nodes), self._state.basis[nodes]
+        between = between[1:] - between[:1]
+        lost = _lost(block[1:, 1:], between[:, 1:] - between[:, :1], fields[1:] - fields[:1])
         base = self._state.basis[self._state.model.assembly.n_points :]
         return centred(base - lost)
 
@@ -127,3 +128,21 @@ class LocalUpdate:
         solved = state.factor.solve(rhs)[:n].T
         self._slot[missing] = len(self._columns) + np.arange(len(missing))
         self._columns = np.vstack([self._columns, solved])
+
+
+def _lost(change: NDArray[Any], between: NDArray[Any], fields: NDArray[Any]) -> NDArray[Any]:
+    """Uᵀ (I + A C)⁻¹ A U, the fall of the transfer resistance.
+
+    The residual is that of the whole changed system: what A drives in the changed fields must be
+    the currents that were found, in parts of the 1 A of each field.
+    """
+    system = change @ between
+    system[np.diag_indices_from(system)] += 1.0
+    try:
+        current = np.linalg.solve(system, change @ fields)
+    except np.linalg.LinAlgError as error:
+        raise singular() from error
+    residual = np.abs(change @ (fields - between @ current) - current).max(initial=0.0)
+    if not residual < MOST_RESIDUAL:
+        raise singular()
+    return np.asarray(fields.T @ current)
