@@ -1,0 +1,212 @@
+//! Jacobian rows: products of the fields of driven and measured pairs, cell by cell.
+
+use std::ops::Range;
+
+use pulp::{Arch, Simd, WithSimd};
+
+use crate::scalar::Scalar;
+use crate::threads::{Shared, split};
+
+/// Most cells of a block: one row's part and the fields of two pairs stay in the first cache.
+const CELLS: usize = 512;
+/// Bytes of all pairs' fields that stay in the second cache while the rows are written.
+const CACHE: usize = 512 * 1024;
+/// Fewer cells than this are not worth a thread.
+const GRAIN: usize = 4096;
+
+/// Scaled gradients of the fields of 1 A into each electrode.
+#[derive(Clone, Copy)]
+pub struct Fields<'a, T> {
+    /// The values, row-major.
+    pub values: &'a [T],
+    /// Electrodes, components, cells.
+    pub shape: [usize; 3],
+}
+
+impl<'a, T> Fields<'a, T> {
+    #[inline(always)]
+    fn component(&self, electrode: usize, component: usize, cells: &Range<usize>) -> &'a [T] {
+        let first = (electrode * self.shape[1] + component) * self.shape[2];
+        &self.values[first + cells.start..first + cells.end]
+    }
+}
+
+/// The rows of a pattern, by the pairs of electrodes that they use.
+#[derive(Debug)]
+pub struct Table {
+    /// Distinct pairs: first minus second.
+    pairs: Vec<[usize; 2]>,
+    drives: Vec<Drive>,
+    n_rows: usize,
+}
+
+#[derive(Debug)]
+struct Drive {
+    /// Number of its pair, sink minus source: ∂V = −∫ ∇u · ∇w.
+    pair: usize,
+    current: f64,
+    /// Row and the number of its pair.
+    rows: Vec<(usize, usize)>,
+}
+
+impl Table {
+    /// Sorts the rows by drive.
+    ///
+    /// # Errors
+    /// When a row names a drive that is not there.
+    pub fn new(
+        drives: &[[usize; 2]],
+        current: impl Fn(usize) -> f64,
+        drive_index: &[usize],
+        measure: &[[usize; 2]],
+    ) -> Result<Self, String> {
+        let driven = drives.iter().map(|&[source, sink]| [sink, source]);
+        let mut pairs: Vec<[usize; 2]> = driven.clone().chain(measure.iter().copied()).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let number = |pair: &[usize; 2]| pairs.partition_point(|other| other < pair);
+        let drive = |(at, pair)| Drive {
+            pair: number(&pair),
+            current: current(at),
+            rows: Vec::new(),
+        };
+        let mut drives: Vec<Drive> = driven.enumerate().map(drive).collect();
+        for (row, (&drive, pair)) in drive_index.iter().zip(measure).enumerate() {
+            let drive = drives.get_mut(drive);
+            let drive = drive.ok_or_else(|| format!("drive_index: row {row} names no drive"))?;
+            drive.rows.push((row, number(pair)));
+        }
+        Ok(Self {
+            pairs,
+            drives,
+            n_rows: measure.len(),
+        })
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn n_rows(&self) -> usize {
+        self.n_rows
+    }
+
+    /// Least number of electrodes that the fields must have.
+    #[must_use]
+    pub fn n_electrodes(&self) -> usize {
+        let last = self.pairs.as_flattened().iter().max();
+        last.map_or(0, |&last| last.saturating_add(1))
+    }
+}
+
+/// Writes all rows of the table, row-major (rows, cells).
+///
+/// # Panics
+/// When a size does not fit.
+pub fn jacobian<T: Scalar>(fields: Fields<'_, T>, table: &Table, out: &mut [T], threads: usize) {
+    assert!(out.len() == table.n_rows * fields.shape[2]);
+    assert!(table.n_electrodes() <= fields.shape[0]);
+    let out = Shared::new(out);
+    split(fields.shape[2], GRAIN, threads, |cells| {
+        Arch::new().dispatch(Blocks {
+            fields,
+            table,
+            cells,
+            out: &out,
+        });
+    });
+}
+
+struct Blocks<'a, T> {
+    fields: Fields<'a, T>,
+    table: &'a Table,
+    cells: Range<usize>,
+    out: &'a Shared<T>,
+}
+
+impl<T: Scalar> WithSimd for Blocks<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let per_cell = self.fields.shape[1] * self.table.pairs.len();
+        let size = (CACHE / (size_of::<T>() * per_cell.max(1))).clamp(64, CELLS);
+        let mut pairs = vec![T::ZERO; per_cell * size];
+        let mut driven = vec![T::ZERO; self.fields.shape[1] * size];
+        for begin in self.cells.clone().step_by(size) {
+            let cells = begin..self.cells.end.min(begin + size);
+            self.pair_fields(&cells, size, &mut pairs);
+            for drive in &self.table.drives {
+                self.rows(drive, &cells, size, &pairs, &mut driven);
+            }
+        }
+    }
+}
+
+impl<T: Scalar> Blocks<'_, T> {
+    /// Fills (pair, component, cell) with the fields of a block of cells.
+    #[inline(always)]
+    fn pair_fields(&self, cells: &Range<usize>, size: usize, out: &mut [T]) {
+        let n_components = self.fields.shape[1];
+        for (target, at) in out.chunks_exact_mut(size).zip(0..) {
+            let [first, second] = self.table.pairs[at / n_components];
+            let first = self.fields.component(first, at % n_components, cells);
+            let second = self.fields.component(second, at % n_components, cells);
+            for (value, (&a, &b)) in target.iter_mut().zip(first.iter().zip(second)) {
+                *value = a - b;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn rows(
+        &self,
+        drive: &Drive,
+        cells: &Range<usize>,
+        size: usize,
+        pairs: &[T],
+        driven: &mut [T],
+    ) {
+        let driven_len = driven.len();
+        let field = |pair: usize| &pairs[pair * driven_len..][..driven_len];
+        for (value, &unit) in driven.iter_mut().zip(field(drive.pair)) {
+            *value = unit * drive.current;
+        }
+        for &(row, measured) in &drive.rows {
+            let at = row * self.fields.shape[2];
+            // SAFETY: each thread has cells of its own.
+            let target = unsafe { self.out.part(at + cells.start..at + cells.end) };
+            scalar_product(target, driven, field(measured), size);
+        }
+    }
+}
+
+/// Sum over the components of products, cell by cell; each component has `size` cells.
+#[inline(always)]
+fn scalar_product<T: Scalar>(target: &mut [T], a: &[T], b: &[T], size: usize) {
+    let n = target.len();
+    let (mut a, mut b) = (a.chunks_exact(2 * size), b.chunks_exact(2 * size));
+    let mut is_first = true;
+    for (a, b) in a.by_ref().zip(b.by_ref()) {
+        let ((a0, a1), (b0, b1)) = (a.split_at(size), b.split_at(size));
+        let (a0, a1, b0, b1) = (&a0[..n], &a1[..n], &b0[..n], &b1[..n]);
+        accumulate(target, is_first, |i| a0[i] * b0[i] + a1[i] * b1[i]);
+        is_first = false;
+    }
+    let (a, b) = (a.remainder(), b.remainder());
+    if !a.is_empty() {
+        let (a, b) = (&a[..n], &b[..n]);
+        accumulate(target, is_first, |i| a[i] * b[i]);
+    }
+}
+
+#[inline(always)]
+fn accumulate<T: Scalar>(target: &mut [T], is_first: bool, term: impl Fn(usize) -> T) {
+    if is_first {
+        for (i, value) in target.iter_mut().enumerate() {
+            *value = term(i);
+        }
+    } else {
+        for (i, value) in target.iter_mut().enumerate() {
+            *value += term(i);
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! Sparse Cholesky factors and Jacobian rows for tomoskin.
+
+pub mod factor;
+pub mod jacobian;
+mod kernel;
+pub mod product;
+mod python;
+pub mod scalar;
+pub mod solve;
+pub mod symbolic;
+pub mod threads;

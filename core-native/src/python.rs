@@ -1,0 +1,259 @@
+//! What Python sees: arrays checked, the interpreter free while the work runs.
+
+use std::sync::Arc;
+
+use faer::c64;
+use numpy::ndarray::Dimension;
+use numpy::{
+    Element, Ix1, Ix2, Ix3, PyArray2, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2,
+    PyReadwriteArray2, PyUntypedArrayMethods, dtype,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::jacobian::{Fields, Table};
+use crate::product::Rows;
+use crate::scalar::Scalar;
+use crate::{factor, jacobian, product, solve, symbolic, threads};
+
+type Any<'py> = Bound<'py, PyAny>;
+
+fn invalid(message: impl Into<String>) -> PyErr {
+    PyValueError::new_err(message.into())
+}
+
+/// An argument as an array of this type and number of axes.
+fn array<'py, T: Element, D: Dimension>(
+    name: &str,
+    value: &Any<'py>,
+) -> PyResult<PyReadonlyArray<'py, T, D>> {
+    value.extract().map_err(|_| {
+        let axes = D::NDIM.unwrap_or(0);
+        let kind = dtype::<T>(value.py());
+        invalid(format!(
+            "{name}: expected an array of {kind} with {axes} axes"
+        ))
+    })
+}
+
+fn contiguous<'a, T: Element, D: Dimension>(
+    name: &str,
+    value: &'a PyReadonlyArray<'_, T, D>,
+) -> PyResult<&'a [T]> {
+    value
+        .as_slice()
+        .map_err(|_| invalid(format!("{name}: expected a C-contiguous array")))
+}
+
+fn same(what: &str, expected: usize, got: usize) -> PyResult<()> {
+    if expected == got {
+        return Ok(());
+    }
+    Err(invalid(format!("{what}: expected {expected}, got {got}")))
+}
+
+fn unsigned(name: &str, value: &Any<'_>) -> PyResult<Vec<u32>> {
+    array::<i32, Ix1>(name, value)?
+        .as_array()
+        .iter()
+        .map(|&entry| u32::try_from(entry))
+        .collect::<Result<_, _>>()
+        .map_err(|_| invalid(format!("{name}: a negative entry")))
+}
+
+fn is_complex(value: &Any<'_>) -> bool {
+    let name = value.getattr("dtype").and_then(|kind| kind.getattr("kind"));
+    name.is_ok_and(|kind| kind.eq("c").unwrap_or(false))
+}
+
+#[pyclass(frozen, module = "tomoskin_core")]
+struct Symbolic(Arc<symbolic::Symbolic>);
+
+#[pymethods]
+impl Symbolic {
+    #[new]
+    fn new(py: Python<'_>, n: usize, indptr: &Any<'_>, indices: &Any<'_>) -> PyResult<Self> {
+        let (starts, rows) = (unsigned("indptr", indptr)?, unsigned("indices", indices)?);
+        py.detach(|| symbolic::Symbolic::new(n, &starts, &rows))
+            .map(|symbolic| Self(Arc::new(symbolic)))
+            .map_err(invalid)
+    }
+
+    /// Number of values in a factor.
+    #[getter]
+    fn factor_len(&self) -> usize {
+        self.0.factor_len()
+    }
+
+    fn factor(&self, py: Python<'_>, values: &Any<'_>) -> PyResult<Factor> {
+        if is_complex(values) {
+            return numeric(py, &self.0, values).map(|factor| Factor(Number::Complex(factor)));
+        }
+        numeric(py, &self.0, values).map(|factor| Factor(Number::Real(factor)))
+    }
+}
+
+fn numeric<T: Scalar + Element>(
+    py: Python<'_>,
+    symbolic: &Arc<symbolic::Symbolic>,
+    values: &Any<'_>,
+) -> PyResult<factor::Factor<T>> {
+    let values = array::<T, Ix1>("values", values)?;
+    let values = contiguous("values", &values)?;
+    py.detach(|| factor::Factor::new(Arc::clone(symbolic), values))
+        .map_err(invalid)
+}
+
+#[pyclass(frozen, module = "tomoskin_core")]
+struct Factor(Number);
+
+enum Number {
+    Real(factor::Factor<f64>),
+    Complex(factor::Factor<c64>),
+}
+
+#[pymethods]
+impl Factor {
+    fn solve<'py>(&self, rhs: &Any<'py>) -> PyResult<Any<'py>> {
+        Ok(match &self.0 {
+            Number::Real(factor) => solution(factor, &array("rhs", rhs)?)?.into_any(),
+            Number::Complex(factor) => solution(factor, &array("rhs", rhs)?)?.into_any(),
+        })
+    }
+}
+
+fn solution<'py, T: Scalar + Element>(
+    factor: &factor::Factor<T>,
+    rhs: &PyReadonlyArray2<'py, T>,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let py = rhs.py();
+    same("rows of rhs", factor.symbolic().size(), rhs.shape()[0])?;
+    let out = PyArray2::<T>::zeros(py, [rhs.shape()[0], rhs.shape()[1]], false);
+    {
+        let mut writable = out.readwrite();
+        let (rhs, x) = (rhs.as_array(), writable.as_slice_mut()?);
+        py.detach(|| solve::solve(factor, rhs, x));
+    }
+    Ok(out)
+}
+
+#[pyfunction]
+#[pyo3(signature = (indptr, indices, data, vectors, out, threads=None))]
+fn transposed_product(
+    indptr: &Any<'_>,
+    indices: &Any<'_>,
+    data: &Any<'_>,
+    vectors: &Any<'_>,
+    out: &Any<'_>,
+    threads: Option<usize>,
+) -> PyResult<()> {
+    let starts = array::<i32, Ix1>("indptr", indptr)?;
+    let columns = array::<i32, Ix1>("indices", indices)?;
+    let values = array::<f64, Ix1>("data", data)?;
+    let matrix = Rows::new(
+        contiguous("indptr", &starts)?,
+        contiguous("indices", &columns)?,
+        contiguous("data", &values)?,
+    )
+    .map_err(invalid)?;
+    let threads = threads::count(threads);
+    if is_complex(vectors) {
+        return product_into::<c64>(matrix, vectors, out, threads);
+    }
+    product_into::<f64>(matrix, vectors, out, threads)
+}
+
+fn product_into<T: Scalar + Element>(
+    matrix: Rows<'_>,
+    vectors: &Any<'_>,
+    out: &Any<'_>,
+    threads: usize,
+) -> PyResult<()> {
+    let vectors = array::<T, Ix2>("vectors", vectors)?;
+    let mut out: PyReadwriteArray2<'_, T> = out
+        .extract()
+        .map_err(|_| invalid("out: expected a writable array of the type of vectors"))?;
+    if matrix.n_columns() > vectors.shape()[0] {
+        return Err(invalid("indices: a column beyond the rows of vectors"));
+    }
+    same("rows of out", vectors.shape()[1], out.shape()[0])?;
+    same("columns of out", matrix.n_rows(), out.shape()[1])?;
+    let (py, vectors) = (vectors.py(), vectors.as_array());
+    let out = out
+        .as_slice_mut()
+        .map_err(|_| invalid("out: expected a C-contiguous array"))?;
+    py.detach(|| product::transposed_product(matrix, vectors, out, threads));
+    Ok(())
+}
+
+#[pyfunction]
+#[pyo3(name = "jacobian", signature = (gradient, drives, current, drive_index, measure, threads=None))]
+fn jacobian_rows<'py>(
+    gradient: &Any<'py>,
+    drives: &Any<'_>,
+    current: &Any<'_>,
+    drive_index: &Any<'_>,
+    measure: &Any<'_>,
+    threads: Option<usize>,
+) -> PyResult<Any<'py>> {
+    let drives = pairs("drives", drives)?;
+    let measure = pairs("measure", measure)?;
+    let current = array::<f64, Ix1>("current", current)?;
+    let drive_index = array::<i64, Ix1>("drive_index", drive_index)?;
+    same("length of current", drives.len(), current.len())?;
+    same("length of drive_index", measure.len(), drive_index.len())?;
+    let current = current.as_array();
+    let index: Vec<usize> = drive_index.as_array().iter().map(|&i| i as usize).collect();
+    let table = Table::new(&drives, |drive| current[drive], &index, &measure).map_err(invalid)?;
+    let threads = threads::count(threads);
+    if is_complex(gradient) {
+        return Ok(rows::<c64>(gradient, &table, threads)?.into_any());
+    }
+    Ok(rows::<f64>(gradient, &table, threads)?.into_any())
+}
+
+/// Pairs of electrodes; a negative number becomes one that is too large.
+fn pairs(name: &str, value: &Any<'_>) -> PyResult<Vec<[usize; 2]>> {
+    let table = array::<i64, Ix2>(name, value)?;
+    same(&format!("columns of {name}"), 2, table.shape()[1])?;
+    let table = table.as_array();
+    let rows = table.outer_iter();
+    Ok(rows.map(|row| [row[0] as usize, row[1] as usize]).collect())
+}
+
+fn rows<'py, T: Scalar + Element>(
+    gradient: &Any<'py>,
+    table: &Table,
+    threads: usize,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let gradient = array::<T, Ix3>("gradient", gradient)?;
+    let (py, shape) = (gradient.py(), gradient.shape());
+    let values = contiguous("gradient", &gradient)?;
+    let fields = Fields {
+        values,
+        shape: [shape[0], shape[1], shape[2]],
+    };
+    if table.n_electrodes() > shape[0] {
+        return Err(invalid(format!(
+            "an electrode beyond the {} of gradient",
+            shape[0]
+        )));
+    }
+    // SAFETY: `jacobian` writes all rows before anything reads them.
+    let out = unsafe { PyArray2::<T>::new(py, [table.n_rows(), shape[2]], false) };
+    {
+        let mut writable = out.readwrite();
+        let values = writable.as_slice_mut()?;
+        py.detach(|| jacobian::jacobian(fields, table, values, threads));
+    }
+    Ok(out)
+}
+
+#[pymodule]
+fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<Symbolic>()?;
+    module.add_class::<Factor>()?;
+    module.add_function(wrap_pyfunction!(jacobian_rows, module)?)?;
+    module.add_function(wrap_pyfunction!(transposed_product, module)?)
+}

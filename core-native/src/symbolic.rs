@@ -1,0 +1,300 @@
+//! Ordering and symbolic analysis: once per mesh.
+
+use faer::Side;
+use faer::sparse::SymbolicSparseColMatRef;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
+    supernodal::SymbolicSupernodalCholesky,
+};
+use faer::sparse::linalg::{SupernodalThreshold, SymbolicSupernodalParams};
+
+/// Adjacent panels are merged up to this many columns with up to this part of zeros.
+const MERGE: &[(usize, f64)] = &[(2, 1.0), (8, 0.5), (32, 0.1), (usize::MAX, 0.02)];
+
+/// What the structure of a symmetric matrix fixes for each of its factors.
+#[derive(Debug)]
+pub struct Symbolic {
+    n_values: usize,
+    order: Vec<u32>,
+    /// First column of each panel, then the size.
+    starts: Vec<u32>,
+    /// Where each panel's `below` begins.
+    below_starts: Vec<usize>,
+    below: Vec<u32>,
+    /// For each entry of `below`, the row of the parent's front.
+    in_parent: Vec<u32>,
+    /// Where each panel's values begin.
+    value_starts: Vec<usize>,
+    /// For each panel, its children: `children[child_starts[p]..child_starts[p + 1]]`.
+    child_starts: Vec<u32>,
+    children: Vec<u32>,
+    /// (position in the factor, position in the matrix) of each value of the lower triangle.
+    scatter: Vec<(u32, u32)>,
+}
+
+/// Adjacent columns of the factor that share one pattern below their diagonal block.
+#[derive(Clone, Copy, Debug)]
+pub struct Panel<'a> {
+    /// First column.
+    pub start: usize,
+    /// Number of columns.
+    pub width: usize,
+    /// Rows below the diagonal block.
+    pub below: &'a [u32],
+    /// For each row below, the row of the parent's front that it adds to.
+    pub in_parent: &'a [u32],
+    /// Panels whose rows below begin in these columns.
+    pub children: &'a [u32],
+    /// First value: column-major, `height()` rows.
+    pub first_value: usize,
+}
+
+impl Panel<'_> {
+    /// Number of rows.
+    #[inline(always)]
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.width + self.below.len()
+    }
+
+    /// Its values among those of the factor.
+    #[inline(always)]
+    #[must_use]
+    pub fn values(&self) -> std::ops::Range<usize> {
+        self.first_value..self.first_value + self.width * self.height()
+    }
+}
+
+impl Symbolic {
+    /// Analyses the structure of a symmetric matrix given in full, by columns.
+    ///
+    /// # Errors
+    /// When the arrays are no such structure, or the factor is too large to index.
+    pub fn new(size: usize, column_starts: &[u32], rows: &[u32]) -> Result<Self, String> {
+        check(size, column_starts, rows)?;
+        let matrix =
+            SymbolicSparseColMatRef::new_unsorted_checked(size, size, column_starts, None, rows);
+        let params = CholeskySymbolicParams {
+            // below zero: a diagonal matrix, too, gets panels
+            supernodal_flop_ratio_threshold: SupernodalThreshold(-1.0),
+            supernodal_params: SymbolicSupernodalParams { relax: Some(MERGE) },
+            ..Default::default()
+        };
+        let analysis =
+            factorize_symbolic_cholesky(matrix, Side::Lower, SymmetricOrdering::Amd, params)
+                .map_err(|error| format!("the symbolic analysis failed: {error:?}"))?;
+        let (Some(permutation), SymbolicCholeskyRaw::Supernodal(panels)) =
+            (analysis.perm(), analysis.raw())
+        else {
+            return Err("the symbolic analysis made no panels".into());
+        };
+        let (order, place) = permutation.arrays();
+        let mut symbolic = Self::of_panels(order.to_vec(), rows.len(), panels);
+        symbolic.link_panels();
+        symbolic.scatter = symbolic.scatter_of(column_starts, rows, place)?;
+        Ok(symbolic)
+    }
+
+    fn of_panels(
+        order: Vec<u32>,
+        n_values: usize,
+        panels: &SymbolicSupernodalCholesky<u32>,
+    ) -> Self {
+        let mut starts = panels.supernode_begin().to_vec();
+        starts.push(order.len() as u32);
+        let (mut below, mut below_starts) = (Vec::new(), vec![0]);
+        let mut value_starts = vec![0];
+        for (number, columns) in starts.windows(2).enumerate() {
+            let (width, rows) = (
+                (columns[1] - columns[0]) as usize,
+                panels.supernode(number).pattern(),
+            );
+            value_starts.push(value_starts[number] + width * (width + rows.len()));
+            below.extend_from_slice(rows);
+            below_starts.push(below.len());
+        }
+        Self {
+            n_values,
+            order,
+            starts,
+            below_starts,
+            below,
+            in_parent: Vec::new(),
+            value_starts,
+            child_starts: Vec::new(),
+            children: Vec::new(),
+            scatter: Vec::new(),
+        }
+    }
+
+    /// Finds each panel's parent, the panel of its first row below, and where its rows lie there.
+    fn link_panels(&mut self) {
+        let n_panels = self.n_panels();
+        let mut panel_of = vec![0_u32; self.size()];
+        for (number, columns) in self.starts.windows(2).enumerate() {
+            panel_of[columns[0] as usize..columns[1] as usize].fill(number as u32);
+        }
+        let parent: Vec<Option<u32>> = self
+            .below_starts
+            .windows(2)
+            .map(|ends| {
+                self.below[ends[0]..ends[1]]
+                    .first()
+                    .map(|&row| panel_of[row as usize])
+            })
+            .collect();
+        self.child_starts = vec![0; n_panels + 1];
+        for &number in parent.iter().flatten() {
+            self.child_starts[number as usize + 1] += 1;
+        }
+        for number in 0..n_panels {
+            self.child_starts[number + 1] += self.child_starts[number];
+        }
+        let mut next = self.child_starts.clone();
+        self.children = vec![0; self.child_starts[n_panels] as usize];
+        self.in_parent = vec![0; self.below.len()];
+        for (number, &parent) in parent.iter().enumerate() {
+            let Some(parent) = parent.map(|number| number as usize) else {
+                continue;
+            };
+            self.children[next[parent] as usize] = number as u32;
+            next[parent] += 1;
+            let (start, end) = (self.starts[parent], self.starts[parent + 1]);
+            let theirs = &self.below[self.below_starts[parent]..self.below_starts[parent + 1]];
+            let mut at = 0;
+            for entry in self.below_starts[number]..self.below_starts[number + 1] {
+                let row = self.below[entry];
+                self.in_parent[entry] = if row < end {
+                    row - start
+                } else {
+                    at += theirs[at..].partition_point(|&other| other < row);
+                    end - start + at as u32
+                };
+            }
+        }
+    }
+
+    fn scatter_of(
+        &self,
+        column_starts: &[u32],
+        rows: &[u32],
+        place: &[u32],
+    ) -> Result<Vec<(u32, u32)>, String> {
+        if u32::try_from(self.factor_len()).is_err() {
+            return Err("the factor has too many values to index".into());
+        }
+        let mut row_in_front = vec![0_u32; self.size()];
+        let mut scatter = Vec::with_capacity((rows.len() + self.size()) / 2);
+        for number in 0..self.n_panels() {
+            let panel = self.panel(number);
+            for (i, &row) in panel.below.iter().enumerate() {
+                row_in_front[row as usize] = (panel.width + i) as u32;
+            }
+            for j in 0..panel.width {
+                row_in_front[panel.start + j] = j as u32;
+            }
+            for j in 0..panel.width {
+                let column = self.order[panel.start + j] as usize;
+                let first = panel.first_value + j * panel.height();
+                for from in column_starts[column]..column_starts[column + 1] {
+                    let row = place[rows[from as usize] as usize] as usize;
+                    if row >= panel.start + j {
+                        scatter.push((first as u32 + row_in_front[row], from));
+                    }
+                }
+            }
+        }
+        scatter.sort_unstable();
+        Ok(scatter)
+    }
+
+    /// Number of rows and columns.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Number of values that a matrix of this structure has.
+    #[must_use]
+    pub fn n_values(&self) -> usize {
+        self.n_values
+    }
+
+    /// Number of values in a factor.
+    #[must_use]
+    pub fn factor_len(&self) -> usize {
+        self.value_starts[self.n_panels()]
+    }
+
+    /// For each row of the factor, the row of the matrix.
+    #[must_use]
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// (position in the factor, position in the matrix) of each value of the lower triangle.
+    pub(crate) fn scatter(&self) -> &[(u32, u32)] {
+        &self.scatter
+    }
+
+    /// Number of panels.
+    #[must_use]
+    pub fn n_panels(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// Panel `number`; its children have lower numbers.
+    #[inline(always)]
+    #[must_use]
+    pub fn panel(&self, number: usize) -> Panel<'_> {
+        let start = self.starts[number] as usize;
+        let below = self.below_starts[number]..self.below_starts[number + 1];
+        let children = self.child_starts[number] as usize..self.child_starts[number + 1] as usize;
+        Panel {
+            start,
+            width: self.starts[number + 1] as usize - start,
+            below: &self.below[below.clone()],
+            in_parent: &self.in_parent[below],
+            children: &self.children[children],
+            first_value: self.value_starts[number],
+        }
+    }
+}
+
+fn check(size: usize, column_starts: &[u32], rows: &[u32]) -> Result<(), String> {
+    if size == 0 || column_starts.len() != size + 1 {
+        return Err(format!(
+            "expected indptr of length n + 1 with n > 0, got n = {size} and length {}",
+            column_starts.len()
+        ));
+    }
+    if column_starts[0] != 0 || column_starts[size] as usize != rows.len() {
+        return Err(format!(
+            "expected indptr from 0 to {}, got {} to {}",
+            rows.len(),
+            column_starts[0],
+            column_starts[size]
+        ));
+    }
+    if let Some(column) = column_starts.windows(2).position(|ends| ends[0] > ends[1]) {
+        return Err(format!("indptr decreases at column {column}"));
+    }
+    for (column, ends) in column_starts.windows(2).enumerate() {
+        let within = &rows[ends[0] as usize..ends[1] as usize];
+        if !within.windows(2).all(|pair| pair[0] < pair[1]) {
+            return Err(format!(
+                "row indices of column {column} are not in ascending order"
+            ));
+        }
+        if within.last().is_some_and(|&row| row as usize >= size) {
+            return Err(format!(
+                "a row index beyond {} in column {column}",
+                size - 1
+            ));
+        }
+        if within.binary_search(&(column as u32)).is_err() {
+            return Err(format!("column {column} has no diagonal entry"));
+        }
+    }
+    Ok(())
+}

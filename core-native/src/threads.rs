@@ -1,0 +1,60 @@
+//! How many threads, and who does which part.
+
+use std::num::NonZero;
+use std::ops::Range;
+use std::sync::OnceLock;
+use std::thread;
+
+/// The number asked for, else `RAYON_NUM_THREADS`, else that of the machine.
+#[must_use]
+pub fn count(asked: Option<usize>) -> usize {
+    static MACHINE: OnceLock<usize> = OnceLock::new();
+    asked
+        .or_else(|| std::env::var("RAYON_NUM_THREADS").ok()?.parse().ok())
+        .filter(|&n| n > 0)
+        .unwrap_or_else(|| {
+            *MACHINE.get_or_init(|| thread::available_parallelism().map_or(1, NonZero::get))
+        })
+}
+
+/// Runs `work` on even parts of `0..n`, each a multiple of `grain` but the last, one per thread.
+pub fn split(n: usize, grain: usize, threads: usize, work: impl Fn(Range<usize>) + Sync) {
+    let size = n.div_ceil(threads.max(1)).next_multiple_of(grain.max(1));
+    if size >= n {
+        return work(0..n);
+    }
+    thread::scope(|scope| {
+        for first in (size..n).step_by(size) {
+            let work = &work;
+            scope.spawn(move || work(first..n.min(first + size)));
+        }
+        work(0..size);
+    });
+}
+
+/// A slice whose parts several threads write.
+#[derive(Clone, Copy)]
+pub struct Shared<T>(*mut T, usize);
+
+// SAFETY: `part` demands that no element is in two parts.
+unsafe impl<T: Send> Send for Shared<T> {}
+// SAFETY: as above.
+unsafe impl<T: Send> Sync for Shared<T> {}
+
+impl<T> Shared<T> {
+    /// Shares `slice`.
+    pub fn new(slice: &mut [T]) -> Self {
+        Self(slice.as_mut_ptr(), slice.len())
+    }
+
+    /// A part of the slice.
+    ///
+    /// # Safety
+    /// The slice must outlive the part, and no element may be in two live parts.
+    #[allow(clippy::mut_from_ref)]
+    pub unsafe fn part(&self, range: Range<usize>) -> &mut [T] {
+        assert!(range.start <= range.end && range.end <= self.1);
+        // SAFETY: inside the slice; the caller keeps parts apart.
+        unsafe { std::slice::from_raw_parts_mut(self.0.add(range.start), range.len()) }
+    }
+}
