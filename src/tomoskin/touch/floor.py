@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 
@@ -16,18 +17,20 @@ class NoiseFloor:
 
     ``spread`` (n_cells, n_meas): the operator times each row's standard deviation, so that
     spread · spreadᵀ is the image's covariance for independent noise; ``sd`` (n_cells,) the
-    square root of its diagonal.
+    square root of its diagonal. Single precision is plenty for a deviation, and half to read.
     """
 
-    spread: FloatArray
+    spread: NDArray[np.float32]
     sd: FloatArray
 
     @classmethod
     def of(cls, operator: FloatArray, noise: FloatArray) -> Self:
         """Floor of ``operator`` (n_cells, n_meas) under ``noise`` (n_meas,) of its input."""
         spread = operator * noise
-        return cls(spread, np.sqrt(np.einsum("cm,cm->c", spread, spread)))
+        sd = np.sqrt(np.einsum("cm,cm->c", spread, spread))
+        return cls(spread.astype(np.float32), sd)
 
     def sd_of(self, cells: IntArray, lever: FloatArray) -> FloatArray:
         """Standard deviation, (k,), of Σ lever · image over ``cells`` (n,), ``lever`` (n, k)."""
-        return np.asarray(np.linalg.norm(lever.T @ self.spread[cells], axis=1))
+        moved = lever.T.astype(np.float32) @ self.spread[cells]
+        return np.asarray(np.linalg.norm(moved, axis=1), dtype=np.float64)
