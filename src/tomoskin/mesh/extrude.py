@@ -1,0 +1,166 @@
+"""Flat meshes raised to bodies of tetrahedra, with electrodes of the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray, GeometryError, IntArray
+from tomoskin.mesh.footprint import footprint
+from tomoskin.mesh.layers import check_height, grid_lines
+from tomoskin.mesh.mesh import Mesh
+from tomoskin.mesh.outline import Outline
+from tomoskin.mesh.patch import FacePatch, Patch, WallPatch, check_patches
+from tomoskin.mesh.topology import boundary_facets
+from tomoskin.mesh.triangulate import triangulate
+
+
+def extrude(
+    outline: Outline,
+    height: float,
+    patches: Sequence[Patch],
+    *,
+    cells: int,
+    layers: int,
+    planes: Sequence[float] = (),
+    seed: int = 0,
+) -> Mesh:
+    """Body over ``outline`` from z = 0 to ``height`` m; one electrode per patch.
+
+    The flat mesh has about ``cells`` triangles, finer towards the wall patches, and there are
+    about ``layers`` layers, finer beside the patches' bottoms and tops; every triangle and
+    layer is cut into three tetrahedra. ``planes`` are further heights, m, that cells must not
+    cross. Wall patches are resolved exactly on the mesh's own wall, which is a polygon where
+    the outline is curved.
+
+    Raises
+    ------
+    GeometryError
+        When an electrode does not fit, overlaps another one or has no facet, or when the
+        outline cannot be met with so few cells.
+    """
+    check_height(height)
+    check_patches(outline, height, patches)
+    _check_planes(planes, height)
+    marked, arcs = footprint(outline, patches)
+    flat = triangulate(marked, arcs, cells, seed=seed)
+    walls = [p for p in patches if isinstance(p, WallPatch)]
+    marks = [*planes, *(z for p in walls for z in (p.bottom, p.top))]
+    body = Body(flat.points, flat.cells, grid_lines(0.0, height, marks, layers))
+    return body.mesh(_facets(body, outline, patches))
+
+
+def extrude_mesh(flat: Mesh, planes: Sequence[float]) -> Mesh:
+    """Raise ``flat`` through the heights ``planes`` m, ascending.
+
+    Its electrodes go from the bottom to the top of the wall. Cells come layer by layer, three
+    for each triangle in turn; point i of plane k has the number k·n + i.
+
+    Raises
+    ------
+    GeometryError
+        When the mesh is not flat, or ``planes`` are not at least two ascending heights.
+    """
+    z = np.array(planes, dtype=np.float64)
+    if flat.cells.shape[1] != 3 or flat.points.shape[1] != 2:
+        raise GeometryError("expected triangles in the plane", hint="points of 2 coordinates")
+    if z.ndim != 1 or len(z) < 2 or not (np.isfinite(z).all() and (np.diff(z) > 0).all()):
+        raise GeometryError(f"expected at least 2 ascending heights, got {z.tolist()}")
+    body = Body(flat.points, flat.cells, z)
+    return body.mesh([body.wall(edges, z[0], z[-1]) for edges in flat.electrodes])
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """Prisms over flat triangles, cut into tetrahedra.
+
+    Attributes
+    ----------
+    flat
+        (n, 2) points, m.
+    triangles
+        (n_triangles, 3).
+    planes
+        (n_layers + 1,) ascending heights, m.
+    """
+
+    flat: FloatArray
+    triangles: IntArray
+    planes: FloatArray
+
+    def mesh(self, electrodes: Sequence[IntArray]) -> Mesh:
+        """Return the tetrahedra with those facets as electrodes."""
+        for number, facets in enumerate(electrodes):
+            if not len(facets):
+                raise GeometryError(
+                    "no facet lies inside it",
+                    where=f"electrode {number}",
+                    hint="make it larger, or ask for more cells",
+                )
+        n = len(self.flat)
+        points = np.column_stack(
+            [np.tile(self.flat, (len(self.planes), 1)), np.repeat(self.planes, n)]
+        )
+        return Mesh(points, self._tetrahedra(), tuple(electrodes))
+
+    def wall(self, edges: IntArray, bottom: float, top: float) -> IntArray:
+        """(n, 3) facets over the rim ``edges`` (k, 2) between two planes.
+
+        Two for each edge and layer, along the diagonal that the prisms behind them have.
+        """
+        a, b = np.sort(edges, axis=1).T
+        up = len(self.flat)
+        quads = [np.column_stack([a, b, b + up]), np.column_stack([a, a + up, b + up])]
+        one_layer = np.concatenate(quads)
+        middle = (self.planes[1:] + self.planes[:-1]) / 2
+        levels = np.flatnonzero((middle > bottom) & (middle < top))
+        return np.asarray((one_layer + up * levels[:, None, None]).reshape(-1, 3))
+
+    def face(self, chosen: NDArray[np.bool_], plane: int) -> IntArray:
+        """(n, 3) facets: the chosen triangles (n_triangles,) in the plane of that number."""
+        level = plane % len(self.planes)
+        return np.asarray(self.triangles[chosen] + level * len(self.flat))
+
+    def _tetrahedra(self) -> IntArray:
+        """Three to a prism: with corners a < b < c, the paths a → b → c that go up once.
+
+        A side between two prisms is cut from the lower number's bottom to the higher one's top
+        whichever prism is asked, so that neighbours fit.
+        """
+        a, b, c = np.sort(self.triangles, axis=1).T
+        up = len(self.flat)
+        cut = [(a, b, c, c + up), (a, b, c + up, b + up), (a, a + up, b + up, c + up)]
+        prism = np.stack([np.column_stack(t) for t in cut], axis=1)
+        u, v = self.flat[b] - self.flat[a], self.flat[c] - self.flat[a]
+        clockwise = u[:, 0] * v[:, 1] < u[:, 1] * v[:, 0]
+        prism[clockwise] = prism[clockwise][:, :, [0, 1, 3, 2]]  # all turn the same way
+        levels = np.arange(len(self.planes) - 1)
+        return np.asarray((prism + up * levels[:, None, None, None]).reshape(-1, 4))
+
+
+def _facets(body: Body, outline: Outline, patches: Sequence[Patch]) -> list[IntArray]:
+    """Facets of each patch."""
+    edges = boundary_facets(body.triangles)
+    s = outline.nearest(body.flat[edges].mean(axis=1))
+    centroids = body.flat[body.triangles].mean(axis=1)
+    facets = []
+    for patch in patches:
+        if isinstance(patch, FacePatch):
+            plane = -1 if patch.face == "top" else 0
+            facets.append(body.face(patch.holds(centroids), plane))
+        else:
+            own = edges[patch.holds(outline, s)]
+            facets.append(body.wall(own, patch.bottom, patch.top))
+    return facets
+
+
+def _check_planes(planes: Sequence[float], height: float) -> None:
+    for number, z in enumerate(planes):
+        if not 0 <= z <= height:
+            raise GeometryError(
+                f"expected a height from 0 to {height * 1e3:.4g} mm, got {z * 1e3:.4g} mm",
+                where=f"plane {number}",
+            )
