@@ -32,13 +32,15 @@ def connected(kept: IntArray, positive: NDArray[np.bool_], neighbours: IntArray)
     n = len(kept)
     place = np.full(len(neighbours) + 1, n)
     place[kept] = np.arange(n)
-    around = neighbours[kept]
+    around = neighbours[kept].T
     around_place = place[around]
-    around_place[positive[around] != positive[kept][:, None]] = n
+    around_place[positive[around] != positive[kept]] = n
     label = np.arange(n + 1)
     while True:
-        least = np.minimum(label[:n], label[around_place].min(axis=1))
+        least = label[:n].copy()
+        for column in around_place:
+            np.minimum(least, label[column], out=least)
         least = least[least]
-        if np.array_equal(least, label[:n]):
-            return np.asarray(least)
+        if (least == label[:n]).all():
+            return least
         label[:n] = least

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
 from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, IntArray, Reading
@@ -17,7 +18,7 @@ from tomoskin.touch.centroid import centroid, centroid_sd
 from tomoskin.touch.connect import connected, neighbour_table
 from tomoskin.touch.floor import NoiseFloor
 
-_REACH = 3.0
+_REACH = 2.0
 """The Gaussian filter is cut off at this many standard deviations."""
 
 _NO_WIDTH = 1e-9
@@ -39,7 +40,7 @@ class Segmenter:
     def __init__(self, mesh: Mesh, settings: TouchSettings) -> None:
         self.mesh = mesh
         self.settings = settings
-        self._near, self._weights = _gaussian_table(mesh, settings.smoothing)
+        self._filter = _gaussian_filter(mesh, settings.smoothing)
         self._neighbours = neighbour_table(mesh)
 
     def __call__(self, values: FloatArray, floor: NoiseFloor | None = None) -> list[Reading]:
@@ -52,7 +53,7 @@ class Segmenter:
         limit = self.settings.gamma1 * strength.max()
         if not limit > 0:
             return []
-        filtered = self._filtered(np.flatnonzero(strength >= limit), image)
+        filtered = self._filter @ np.where(strength >= limit, image, 0.0).astype(np.float32)
         kept = np.flatnonzero(np.abs(filtered) >= self.settings.gamma2 * limit)
         significant = _significant(kept, strength, floor, self.settings.snr)
         if not significant.any():
@@ -65,12 +66,6 @@ class Segmenter:
             found = [self._centroid(cells, image, floor) for cells in regions]
         found.sort(key=lambda reading: -abs(reading.peak))
         return found[: self.settings.max_touches]
-
-    def _filtered(self, active: IntArray, image: FloatArray) -> FloatArray:
-        """(n_cells,) Gaussian average of the image where it is ``active``, zero elsewhere."""
-        spread = self._weights[active] * image[active, None]
-        near = self._near[active]
-        return np.asarray(np.bincount(near.ravel(), spread.ravel(), minlength=len(image)), float)
 
     def _centroid(self, cells: IntArray, image: FloatArray, floor: NoiseFloor | None) -> Reading:
         weights = image[cells]
@@ -128,23 +123,15 @@ def _significant(
     return np.asarray(strength[kept] >= snr * floor.sd[kept])
 
 
-def _gaussian_table(mesh: Mesh, width: float) -> tuple[IntArray, FloatArray]:
-    """Area-weighted Gaussian average as two (n_cells, n_near) tables.
+def _gaussian_filter(mesh: Mesh, width: float) -> csr_array:
+    """(n_cells, n_cells) area-weighted Gaussian average; rows sum to one.
 
-    Row c lists the cells whose average cell c enters, and with what weight; short rows are
-    padded with weight zero. The weights that enter one average sum to one.
+    In single precision: it is read whole for each frame, and only thresholded.
     """
     width = max(width, _NO_WIDTH)
     tree = cKDTree(mesh.centroids)
     near = tree.sparse_distance_matrix(tree, _REACH * width, output_type="coo_matrix")
-    n = len(mesh.centroids)
-    weights = np.exp(-0.5 * (near.data / width) ** 2) * mesh.volumes[near.row]
-    weights /= np.bincount(near.col, weights, minlength=n)[near.col]
-    order = np.argsort(near.row, kind="stable")
-    count = np.bincount(near.row, minlength=n)
-    place = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
-    cells, table = np.zeros((2, n, count.max()))
-    rows = near.row[order]
-    cells[rows, place] = near.col[order]
-    table[rows, place] = weights[order]
-    return cells.astype(np.int64), table
+    weights = np.exp(-0.5 * (near.data / width) ** 2) * mesh.volumes[near.col]
+    weights /= np.bincount(near.row, weights)[near.row]
+    matrix = csr_array(coo_array((weights, (near.row, near.col)), shape=near.shape))
+    return matrix.astype(np.float32)
