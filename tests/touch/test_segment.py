@@ -118,7 +118,7 @@ def test_gamma2_and_smoothing_drop_what_is_narrower_than_the_filter() -> None:
 
 
 def test_the_filter_averages_cells_above_gamma1_only() -> None:
-    """By hand, dense: threshold, area-weighted Gaussian to three widths, second threshold.
+    """By hand, dense: threshold, area-weighted Gaussian to two widths, second threshold.
 
     At an electrode, where cells are small, and inside.
     """
@@ -127,7 +127,7 @@ def test_the_filter_averages_cells_above_gamma1_only() -> None:
     limit = 0.65 * np.abs(image).max()
     masked = np.where(np.abs(image) >= limit, image, 0.0)
     gap = np.linalg.norm(mesh.centroids[:, None] - mesh.centroids[None], axis=2)
-    weights = np.where(gap <= 3 * width, np.exp(-0.5 * (gap / width) ** 2), 0.0) * mesh.volumes
+    weights = np.where(gap <= 2 * width, np.exp(-0.5 * (gap / width) ** 2), 0.0) * mesh.volumes
     filtered = weights @ masked / weights.sum(axis=1)
     expected = np.flatnonzero(np.abs(filtered) >= 0.9 * limit)
     readings = segment(image, smoothing=width)

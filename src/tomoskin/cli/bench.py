@@ -31,6 +31,8 @@ def bench(
     json: JsonFlag = False,
 ) -> None:
     """Measure speed on this machine."""
+    from threadpoolctl import threadpool_limits
+
     known = _benchmarks()
     if name is None:
         for key, summary in known.items():
@@ -38,9 +40,9 @@ def bench(
         return
     if name not in known:
         raise typer.BadParameter(f'expected {", ".join(known)}, got "{name}"', param_hint="NAME")
-    # before numpy is loaded, which starts a thread for each core that it may use
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:cores])
-    report = _load(name).run(data)
+    with threadpool_limits(cores):
+        report = _load(name).run(data)
     if json:
         emit(report)
     else:

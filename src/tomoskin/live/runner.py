@@ -9,6 +9,8 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from threadpoolctl import threadpool_limits
+
 from tomoskin.core import DataError, Event, Frame, TomoskinError
 from tomoskin.live.events import EventLog
 from tomoskin.live.meter import Meter
@@ -181,9 +183,11 @@ class Runner:
 
     def _run(self, transport: Transport | None) -> None:
         try:
-            while transport is not None:
-                self._follow(transport)
-                transport = self._reopened()
+            # a frame's products are small: more threads would only wait for each other
+            with threadpool_limits(1):
+                while transport is not None:
+                    self._follow(transport)
+                    transport = self._reopened()
         except Exception as error:
             _log.exception("the live thread ended")
             self._trouble = f"internal error, {type(error).__name__}: {error}; start again"
