@@ -9,7 +9,7 @@ from tomoskin.core import SourceError
 from tomoskin.source.registry import read_options
 
 if TYPE_CHECKING:
-    from serial import Serial  # type: ignore[import-untyped]
+    from serial import Serial
 
     from tomoskin.skin import Skin
 
@@ -99,7 +99,7 @@ def _refusal(port: str, error: Exception) -> SourceError:
 
 
 def _ports() -> str:
-    from serial.tools.list_ports import comports  # type: ignore[import-untyped]  # noqa: PLC0415
+    from serial.tools.list_ports import comports
 
     found = ", ".join(sorted(port.device for port in comports()))
     return f"ports here: {found}" if found else "no serial port is connected"
