@@ -99,7 +99,7 @@ def _refusal(port: str, error: Exception) -> SourceError:
 
 
 def _ports() -> str:
-    from serial.tools.list_ports import comports
+    from serial.tools.list_ports import comports  # noqa: PLC0415
 
     found = ", ".join(sorted(port.device for port in comports()))
     return f"ports here: {found}" if found else "no serial port is connected"
