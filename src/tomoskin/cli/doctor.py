@@ -56,7 +56,7 @@ def _page() -> Iterator[Finding]:
 
 
 def _sources() -> Iterator[Finding]:
-    from serial.tools.list_ports import comports  # type: ignore[import-untyped]
+    from serial.tools.list_ports import comports
 
     from tomoskin.source import source_names
 

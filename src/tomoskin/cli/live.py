@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import signal
 import sys
 import webbrowser
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -30,30 +33,41 @@ def live(
     json: JsonFlag = False,
 ) -> None:
     """Show a skin live on a page; without options, the twin of a textile disc."""
-    from tomoskin import live as room
-    from tomoskin.skin import Skin
-    from tomoskin.source import open_source
+    with _ended_by_signals():
+        from tomoskin import live as room
+        from tomoskin.skin import Skin
+        from tomoskin.source import open_source
 
-    room.check_page()
-    chosen = Skin.load(skin)
-    listener = room.listen(host, port)
-    with listener:
-        door = room.Door(listener.getsockname()[1], host)
-        prepared = room.prepare(chosen)
-        runner = room.Runner(prepared, lambda: open_source(source, chosen))
-        runner.start()
-        try:
-            hub = room.Hub(runner, limit=room.colour_limit(prepared))
-            server = room.Server.of(room.application(hub, door))
+        room.check_page()
+        chosen = Skin.load(skin)
+        with room.listen(host, port) as listener:
             if not room.is_loopback(host):
                 _warn(host)
-            _announce(door, runner, json=json)
-            if open_browser:
-                webbrowser.open(door.address)
-            server.run_on(listener)
-        finally:
-            runner.stop()
+            door = room.Door(listener.getsockname()[1], host)
+            runner = room.Runner(room.prepare(chosen), lambda: open_source(source, chosen))
+            runner.start()
+            try:
+                hub = room.Hub(runner, limit=room.colour_limit(runner.prepared))
+                server = room.Server.of(room.application(hub, door))
+                with _ended_by_signals():
+                    _announce(door, runner, json=json)
+                    if open_browser:
+                        webbrowser.open(door.address)
+                    server.run_on(listener)
+            finally:
+                runner.stop()
         _farewell(runner, json=json)
+
+
+@contextlib.contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """Ctrl-C and SIGTERM end the block, at whatever moment they come: that is no failure."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _warn(host: str) -> None:

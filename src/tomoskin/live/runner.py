@@ -176,9 +176,7 @@ class Runner:
             reference=reference,
             reference_age=None if reference.since is None else now - reference.since,
             left_out=result.left_out if result else 0,
-            problem=self._trouble
-            or self._standstill
-            or (result.problem if result else None),
+            problem=self._trouble or self._standstill or (result.problem if result else None),
         )
 
     def _run(self, transport: Transport | None) -> None:

@@ -1,0 +1,92 @@
+"""``tomoskin doctor``, and what is common to all commands."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from tomoskin import __version__
+from tomoskin.cli import app as commands
+from tomoskin.cli import main
+from tomoskin.live import check_page
+
+
+@pytest.fixture
+def tomoskin(capsys):
+    """Run a command: (exit code, stdout, stderr)."""
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as end:
+            main(arguments)
+        out, errors = capsys.readouterr()
+        return end.value.code, out, errors
+
+    return run
+
+
+def test_doctor(tomoskin):
+    code, out, _ = tomoskin("doctor", "--json")
+    report = json.loads(out)
+    assert report["ok"] is (code == 0)
+    assert report["version"] == __version__
+    found = {}
+    for finding in report["findings"]:
+        found.setdefault(finding["name"], []).append(finding)
+    assert found["python"][0]["ok"]
+    assert "twin" in found["sources"][0]["text"]
+    assert len(found["skin"]) == 4
+    assert all(skin["ok"] for skin in found["skin"])
+    assert "8765" in found["port"][0]["text"]
+
+
+def test_doctor_for_people(tomoskin):
+    _, out, _ = tomoskin("doctor")
+    assert "numpy" in out
+    assert "scipy" in out
+
+
+def test_doctor_says_what_fails(tomoskin, monkeypatch, tmp_path):
+    monkeypatch.setattr("tomoskin.live.server.check_page", lambda: check_page(tmp_path))
+    code, out, _ = tomoskin("doctor")
+    assert code == 1
+    assert "FAIL  page" in out
+    assert "make live" in out
+
+
+def test_version(tomoskin):
+    assert tomoskin("--version") == (0, f"tomoskin {__version__}\n", "")
+
+
+def test_an_unknown_command_is_wrong_usage(tomoskin):
+    assert tomoskin("levitate")[0] == 2
+
+
+def test_an_error_of_our_own_is_a_sentence(tomoskin, monkeypatch):
+    def broken(*_, **__):
+        raise ZeroDivisionError("oh dear")
+
+    monkeypatch.delenv("TOMOSKIN_DEBUG", raising=False)
+    monkeypatch.setattr(commands, "app", broken)
+    code, _, errors = tomoskin("doctor")
+    assert code == 1
+    assert errors.startswith("tomoskin: internal error, ZeroDivisionError: oh dear")
+    assert "TOMOSKIN_DEBUG=1" in errors
+    assert len(errors.splitlines()) == 1
+
+
+def test_the_traceback_is_there_for_who_wants_it(monkeypatch):
+    def broken(*_, **__):
+        raise ZeroDivisionError("oh dear")
+
+    monkeypatch.setenv("TOMOSKIN_DEBUG", "1")
+    monkeypatch.setattr(commands, "app", broken)
+    with pytest.raises(ZeroDivisionError):
+        main(["doctor"])
+
+
+def test_heavy_rooms_are_not_imported_at_the_start():
+    heavy = ("scipy", "starlette", "uvicorn", "serial", "matplotlib")
+    code = f"import sys, tomoskin.cli; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"

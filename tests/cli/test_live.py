@@ -1,0 +1,144 @@
+"""``tomoskin live`` as a program: its address, its end, and what it says when it cannot start."""
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from contextlib import ExitStack
+
+import httpx
+import pytest
+
+from tomoskin.cli import main
+from tomoskin.live.server import STATIC
+
+COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]
+PATIENCE = 60
+
+
+@pytest.fixture(autouse=True)
+def built_page():
+    if not (STATIC / "index.html").is_file():
+        if os.environ.get("CI") == "true":
+            pytest.fail("the page must be built: make page", pytrace=False)
+        pytest.skip("the page has not been built: make page")
+
+
+@pytest.fixture
+def start():
+    """Start the command as a program of its own; whatever still runs is ended after the test."""
+    with ExitStack() as stack:
+
+        def start(*arguments):
+            process = subprocess.Popen(
+                [*COMMAND, "live", *arguments],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+            stack.enter_context(process)
+            stack.callback(process.kill)
+            return process
+
+        yield start
+
+
+@pytest.fixture
+def refused(capsys):
+    """Run the command in this process, for it ends before it serves: (exit code, out, errors)."""
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as end:
+            main(["live", *arguments])
+        return (end.value.code, *capsys.readouterr())
+
+    return run
+
+
+def end(process, number):
+    process.send_signal(number)
+    out, errors = process.communicate(timeout=PATIENCE)
+    return process.returncode, out, errors
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_serves_at_the_printed_address_and_ends_cleanly(start, number):
+    process = start("--port", "0", "--source", "twin:fast")
+    line = process.stdout.readline()
+    address = re.fullmatch(
+        r"twin of textile-disc-8 is live at (http://127\.0\.0\.1:(\d+)/)(\?token=\S+)\n", line
+    )
+    assert address, line
+    with httpx.Client(trust_env=False, follow_redirects=True) as client:
+        assert client.get(address[1]).status_code == 403
+        page = client.get(address[1] + address[3])
+        assert page.status_code == 200
+        assert "<script" in page.text
+    assert end(process, number) == (0, "", "")
+    with socket.socket() as probe:
+        assert probe.connect_ex(("127.0.0.1", int(address[2]))) != 0
+
+
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_a_signal_before_it_is_ready_is_a_clean_end_too(number):
+    code = (
+        "import os, signal; from tomoskin import live; from tomoskin.cli import main\n"
+        f"live.prepare = lambda skin: os.kill(os.getpid(), signal.{number})\n"
+        "main(['live', '--port', '0'])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+
+
+def test_json(start):
+    process = start("--port", "0", "--source", "twin:fast", "--json")
+    started = json.loads(process.stdout.readline())
+    code, out, errors = end(process, signal.SIGTERM)
+    assert (code, errors) == (0, "")
+    assert started["type"] == "listening"
+    assert str(started["port"]) in started["address"]
+    assert json.loads(out)["type"] == "stopped"
+
+
+def test_a_port_in_use_is_one_sentence(refused):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        code, out, errors = refused("--port", str(port))
+    assert (code, out) == (1, "")
+    assert errors == (
+        f"tomoskin: port {port}: the port is in use, perhaps by another tomoskin "
+        "(choose another with --port, or any free one with --port 0)\n"
+    )
+
+
+def test_other_hosts_are_warned_about(start):
+    process = start("--port", "0", "--host", "0.0.0.0", "--source", "twin:fast")
+    process.stdout.readline()
+    code, _, errors = end(process, signal.SIGTERM)
+    assert code == 0
+    assert "warning: --host 0.0.0.0" in errors
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--skin", "none"], "none"),
+        (["--source", "telepathy"], "telepathy"),
+        (["--source", "twin:backwards"], "backwards"),
+        (["--host", "192.0.2.1", "--port", "0"], "192.0.2.1"),
+    ],
+)
+def test_what_cannot_start_is_one_sentence(refused, arguments, said):
+    code, _, errors = refused("--port", "0", *arguments)
+    assert code == 1
+    assert said in errors
+    assert len(errors.splitlines()) == 1
+    assert errors.startswith("tomoskin: ")
+
+
+@pytest.mark.parametrize("arguments", [["--port", "many"], ["--port", "70000"], ["--nonsense"]])
+def test_wrong_usage(refused, arguments):
+    assert refused(*arguments)[0] == 2

@@ -1,0 +1,71 @@
+"""``tomoskin skin``."""
+
+import json
+
+import pytest
+
+from tomoskin.cli import main
+from tomoskin.skin import Skin
+
+
+@pytest.fixture
+def tomoskin(capsys):
+    """Run a command: (exit code, stdout, stderr)."""
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as end:
+            main(arguments)
+        out, errors = capsys.readouterr()
+        return end.value.code, out, errors
+
+    return run
+
+
+def test_list(tomoskin):
+    code, out, _ = tomoskin("skin", "list")
+    assert code == 0
+    for name in ("textile-disc-8", "textile-disc-16", "textile-square-16", "tank-16"):
+        assert name in out
+
+
+def test_list_for_programs(tomoskin):
+    code, out, _ = tomoskin("skin", "list", "--json")
+    assert code == 0
+    found = {skin["name"]: skin for skin in json.loads(out)}
+    assert set(found) == set(Skin.names())
+    assert found["textile-disc-8"]["n_measurements"] == 40
+
+
+def test_what_show_prints_is_a_skin_file_of_that_skin(tomoskin, tmp_path):
+    code, out, _ = tomoskin("skin", "show", "textile-square-16")
+    assert code == 0
+    (tmp_path / "again.toml").write_text(out)
+    again = Skin.load(tmp_path / "again.toml")
+    assert again.identity == Skin.load("textile-square-16").identity
+    _, out, _ = tomoskin("skin", "show", str(tmp_path / "again.toml"), "--json")
+    assert json.loads(out)["identity"] == again.identity
+
+
+def test_check(tomoskin):
+    code, out, _ = tomoskin("skin", "check", "textile-disc-8")
+    assert code == 0
+    assert "ok" in out
+    _, out, _ = tomoskin("skin", "check", "textile-disc-8", "--json")
+    assert json.loads(out)["mesh"]["quality_minimum"] > 0.3
+
+
+def test_a_wrong_file_is_one_sentence(tomoskin, tmp_path):
+    text = Skin.load("textile-disc-8").to_toml().replace("[mesh]\ncells", "[mesh]\nceils")
+    file = tmp_path / "wrong.toml"
+    file.write_text(text)
+    code, out, errors = tomoskin("skin", "check", str(file))
+    assert code == 1
+    assert out == ""
+    assert len(errors.splitlines()) == 1
+    for part in ("wrong.toml", "mesh", "ceils"):
+        assert part in errors
+
+
+def test_usage(tomoskin):
+    assert tomoskin("skin", "paint")[0] == 2
+    assert tomoskin("skin", "check")[0] == 2
