@@ -2,8 +2,10 @@
 
 from tomoskin.mesh.arcs import ElectrodeArc, check_arcs
 from tomoskin.mesh.box import BoxPatch, box
+from tomoskin.mesh.choose import Places
 from tomoskin.mesh.cylinder import cylinder
 from tomoskin.mesh.extrude import extrude, extrude_mesh
+from tomoskin.mesh.files import MeshFile, read_mesh
 from tomoskin.mesh.mesh import Mesh
 from tomoskin.mesh.outline import Disc, Ellipse, Outline
 from tomoskin.mesh.patch import FacePatch, Patch, WallPatch, ring
@@ -19,8 +21,10 @@ __all__ = [
     "Ellipse",
     "FacePatch",
     "Mesh",
+    "MeshFile",
     "Outline",
     "Patch",
+    "Places",
     "Polygon",
     "Quality",
     "Rectangle",
@@ -31,6 +35,7 @@ __all__ = [
     "extrude",
     "extrude_mesh",
     "quality",
+    "read_mesh",
     "ring",
     "simplex_measure",
     "triangulate",

@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -13,6 +14,9 @@ from numpy.typing import DTypeLike, NDArray
 from tomoskin.core import FloatArray, GeometryError, IntArray
 from tomoskin.mesh.check import check_mesh
 from tomoskin.mesh.topology import boundary_facets, neighbour_pairs, simplex_measure
+
+if TYPE_CHECKING:
+    from tomoskin.mesh.choose import Electrodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +53,13 @@ class Mesh:
         )
         object.__setattr__(self, "electrodes", facets)
         check_mesh(self.points, self.cells, self.electrodes)
+
+    @classmethod
+    def read(cls, path: str | Path, electrodes: Electrodes = None, *, scale: float = 1.0) -> Mesh:
+        """Read a .msh, .vtu, .stl or .obj file; see :func:`read_mesh`. Raises GeometryError."""
+        from tomoskin.mesh.files import read_mesh  # noqa: PLC0415 - it makes meshes itself
+
+        return read_mesh(path, electrodes, scale=scale)
 
     @property
     def dimension(self) -> int:

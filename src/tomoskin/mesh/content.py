@@ -1,0 +1,106 @@
+"""Cells, points and groups of facets out of what meshio read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from tomoskin.core import FloatArray, GeometryError, IntArray
+
+TOO_LARGE = 10.0
+"""A body that extends further than this, m, is taken for one in millimetres."""
+
+MARKER = "electrode"
+"""Cell data of this name number facets: n > 0 belongs to the group En."""
+
+_CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "tetra": 4}
+
+
+def cells_of(raw: Any) -> IntArray:
+    """(n, k) cells of the highest dimension, which must be all triangles or all tetrahedra."""
+    kinds = {block.type for block in raw.cells if len(block.data)}
+    strange = sorted(kinds - set(_CORNERS))
+    if strange:
+        raise GeometryError(
+            f"expected triangles or tetrahedra of straight edges, got {', '.join(strange)}",
+            hint="cut them into triangles or tetrahedra of first order before saving",
+        )
+    most = max((_CORNERS[kind] for kind in kinds), default=0)
+    if most < 3:
+        raise GeometryError("expected triangles or tetrahedra, got no cells")
+    tables = [block.data for block in raw.cells if _CORNERS.get(block.type) == most]
+    return np.concatenate(tables).astype(np.int64)
+
+
+def points_of(raw: Any, cells: IntArray, scale: float) -> FloatArray:
+    """(n, d) points in m; those of a flat mesh with two coordinates."""
+    if not (math.isfinite(scale) and scale > 0):
+        raise GeometryError(f"expected a scale above 0, got {scale:g}")
+    points = np.asarray(raw.points, dtype=np.float64) * scale
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise GeometryError(f"expected points of 2 or 3 coordinates, got shape {points.shape}")
+    if cells.min() < 0 or cells.max() >= len(points):
+        raise GeometryError(
+            f"cells refer to points {cells.min()} to {cells.max()}, the file has {len(points)}"
+        )
+    extent = np.ptp(points[np.unique(cells)], axis=0)
+    if extent.max() > TOO_LARGE:
+        raise GeometryError(
+            f"extends over {extent.max():.4g} m",
+            hint="if the file is in millimetres, pass scale=1e-3",
+        )
+    flat = cells.shape[1] == 3 and points.shape[1] == 3 and extent[2] == 0
+    return points[:, :2] if flat else points
+
+
+def groups_of(raw: Any, corners: int) -> dict[str, IntArray]:
+    """Name → (n, corners) facets, for all groups that hold any."""
+    parts: dict[str, list[IntArray]] = {}
+    for source in (_sets, _physical, _marked):
+        found: dict[str, list[IntArray]] = {}
+        for name, facets in source(raw, corners):
+            found.setdefault(name, []).append(facets)
+        parts = {**found, **parts}  # what is a set already is not read twice
+    joined = {name: np.concatenate(tables).astype(np.int64) for name, tables in parts.items()}
+    return {name: facets for name, facets in joined.items() if len(facets)}
+
+
+def _sets(raw: Any, corners: int) -> Iterator[tuple[str, IntArray]]:
+    """Cell sets; gmsh 4.1 has its named physical groups here."""
+    for name, members in raw.cell_sets.items():
+        for block, chosen in zip(raw.cells, members, strict=True):
+            if not name.startswith("gmsh:") and chosen is not None and _fits(block, corners):
+                yield name, block.data[np.asarray(chosen, dtype=np.int64)]
+
+
+def _physical(raw: Any, corners: int) -> Iterator[tuple[str, IntArray]]:
+    """gmsh's physical groups, by name, or by number where they have none."""
+    names = {
+        int(number): name
+        for name, (number, dimension) in raw.field_data.items()
+        if dimension == corners - 1
+    }
+    for number, facets in _by_number(raw, "gmsh:physical", corners):
+        yield names.get(number, str(number)), facets
+
+
+def _marked(raw: Any, corners: int) -> Iterator[tuple[str, IntArray]]:
+    for number, facets in _by_number(raw, MARKER, corners):
+        yield f"E{number}", facets
+
+
+def _by_number(raw: Any, key: str, corners: int) -> Iterator[tuple[int, IntArray]]:
+    if key not in raw.cell_data:
+        return
+    for block, values in zip(raw.cells, raw.cell_data[key], strict=True):
+        if _fits(block, corners):
+            numbers = np.asarray(values).reshape(-1)
+            for number in np.unique(numbers[numbers > 0]).tolist():
+                yield int(number), block.data[numbers == number]
+
+
+def _fits(block: Any, corners: int) -> bool:
+    return len(block.data) > 0 and block.data.shape[1] == corners
