@@ -156,8 +156,7 @@ def gradient_operator(element: Element) -> csr_array:
     over each cell.
     """
     n, q, k, d = element.gradients.shape
-    rows = np.arange(d * q * n).reshape(d * q, n, 1)
-    values = element.gradients.transpose(3, 1, 0, 2).reshape(d * q, n, k)
-    cols = np.broadcast_to(element.cells[None], values.shape)
-    entries = (values.ravel(), (np.broadcast_to(rows, values.shape).ravel(), cols.ravel()))
-    return csr_array(coo_array(entries, shape=(d * q * n, element.n_nodes)))
+    values = element.gradients.transpose(3, 1, 0, 2).ravel()
+    cols = np.tile(element.cells.astype(np.int32).ravel(), d * q)
+    starts = np.arange(d * q * n + 1, dtype=np.int32) * np.int32(k)
+    return csr_array((values, cols, starts), shape=(d * q * n, element.n_nodes))

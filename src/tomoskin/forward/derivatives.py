@@ -19,15 +19,8 @@ def by_conductivity(state: State) -> NDArray[Any]:
     """See :attr:`State.jacobian`."""
     if state.conductivity.ndim > 1:
         return _by_tensor(state)
-    model, pattern, gradient = state.model, state.model.pattern, state.gradient
-    out = np.empty((pattern.n_meas, gradient.shape[-1]), dtype=gradient.dtype)
-    for drive, (source, sink) in enumerate(pattern.drives):
-        rows = np.flatnonzero(pattern.drive_index == drive)
-        driven = model.current[drive] * (gradient[sink] - gradient[source])
-        plus, minus = pattern.measure[rows].T
-        projected = np.einsum("edc,dc->ec", gradient, driven)
-        out[rows] = projected[plus] - projected[minus]
-    return out
+    model = state.model
+    return model.engine.jacobian(state.gradient, model.pattern, model.current)
 
 
 def _by_tensor(state: State) -> NDArray[Any]:

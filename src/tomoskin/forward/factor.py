@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -21,6 +22,9 @@ class Factor(Protocol):
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
         """Solution of shape (n_unknowns, n_rhs)."""
         ...
+
+
+Factorise = Callable[[csc_array], Factor]
 
 
 def factorise(matrix: csc_array) -> Factor:

@@ -13,6 +13,8 @@ from tomoskin.core import FloatArray, ModelError
 from tomoskin.forward.assembly import Assembly, gradient_operator
 from tomoskin.forward.conductivity import checked_conductivity, number_type
 from tomoskin.forward.element import Element
+from tomoskin.forward.engine import choose_engine
+from tomoskin.forward.factor import Factorise
 from tomoskin.forward.solution import Solution
 from tomoskin.forward.state import State
 from tomoskin.mesh import Mesh
@@ -60,12 +62,18 @@ class ForwardModel:
         self.contact_impedance = _impedance(contact_impedance, pattern.n_electrodes)
         self.current = _current(current, pattern.n_drive)
         self.order = order
+        self.engine = choose_engine()
         self.assembly = Assembly.of(Element.of(mesh, order))
 
     @cached_property
     def gradient(self) -> csr_array:
         """Nodal potentials → scaled gradients, (d·q·n_cells, n_nodes); see Element."""
         return gradient_operator(self.assembly.element)
+
+    @cached_property
+    def factorise(self) -> Factorise:
+        """Factorises system matrices; their structure is analysed once."""
+        return self.engine.analyse(self.assembly.indptr, self.assembly.indices)
 
     def at(self, conductivity: ArrayLike) -> State:
         """Return the model at a conductivity, S or S/m.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.forward import derivatives
-from tomoskin.forward.factor import Factor, factorise, solve_checked
+from tomoskin.forward.factor import Factor, solve_checked
 from tomoskin.forward.pairs import centred, pair_differences
 from tomoskin.forward.solution import Solution
 from tomoskin.forward.update import LocalUpdate
@@ -32,7 +32,7 @@ class State:
     @cached_property
     def factor(self) -> Factor:
         """The factorised system."""
-        return factorise(self._matrix)
+        return self.model.factorise(self._matrix)
 
     @cached_property
     def _matrix(self) -> Any:
@@ -86,7 +86,7 @@ class State:
         n, operator = self.model.assembly.n_electrodes, self.model.gradient
         fields = self.basis[: self.model.assembly.n_points]
         gradient = np.zeros((n, operator.shape[0]), dtype=fields.dtype)
-        gradient[:-1] = (operator @ fields).T
+        self.model.engine.fields(operator, fields, gradient[:-1])
         return gradient.reshape(n, -1, len(self.conductivity))
 
     @cached_property

@@ -1,0 +1,72 @@
+"""The native engine: what tomoskin_core does, and a trial of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array, csr_array
+
+from tomoskin.core import FloatArray, ModelError
+from tomoskin.forward.factor import Factor, Factorise, singular
+from tomoskin.pattern import Pattern
+
+
+@dataclass(frozen=True)
+class Native:
+    """Cholesky, products and rows of ``core``, the module tomoskin_core."""
+
+    core: Any
+    reason: str
+    name: str = "native"
+
+    def analyse(self, indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> Factorise:
+        """Order the unknowns and lay out the factor, once for all matrices of this structure."""
+        symbolic = self.core.Symbolic(len(indptr) - 1, indptr, indices)
+
+        def factorise_natively(matrix: csc_array) -> Factor:
+            try:
+                factor: Factor = symbolic.factor(matrix.data)
+            except ValueError as error:
+                raise singular() from error
+            return factor
+
+        return factorise_natively
+
+    def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
+        """See :class:`Engine`."""
+        indptr, indices = (
+            part.astype(np.int32, copy=False) for part in (operator.indptr, operator.indices)
+        )
+        self.core.transposed_product(indptr, indices, operator.data, vectors, out)
+
+    def jacobian(
+        self, gradient: NDArray[Any], pattern: Pattern, current: FloatArray
+    ) -> NDArray[Any]:
+        """See :class:`Engine`."""
+        rows: NDArray[Any] = self.core.jacobian(
+            gradient, pattern.drives, current, pattern.drive_index, pattern.measure
+        )
+        return rows
+
+    def check(self) -> None:
+        """Let it do a sum of each kind.
+
+        Raises
+        ------
+        Exception
+            Of any kind, when a part is missing or a result wrong.
+        """
+        starts, rows = (np.array(part, dtype=np.int32) for part in ([0, 2, 4], [0, 1, 0, 1]))
+        matrix = csc_array((np.array([2.0, 1.0, 1.0, 3.0]), rows, starts), shape=(2, 2))
+        solved = self.analyse(starts, rows)(matrix).solve(np.array([[3.0], [4.0]]))
+        fields = np.empty((1, 2))
+        self.fields(matrix.tocsr(), solved, fields)
+        pattern = Pattern.adjacent(4)
+        jacobian = self.jacobian(np.ones((4, 2, 3)), pattern, np.ones(pattern.n_drive))
+        if not (
+            np.allclose(solved, 1.0) and np.allclose(fields, [[3.0, 4.0]]) and not jacobian.any()
+        ):
+            raise ModelError("its results are wrong")

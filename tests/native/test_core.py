@@ -1,0 +1,241 @@
+"""The extension by itself, against scipy and numpy; hostile input ends in ValueError."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.sparse import csc_array, csr_array, random_array
+from scipy.sparse.linalg import spsolve
+
+import shapes
+from tomoskin.forward import ForwardModel
+from tomoskin.pattern import Pattern
+
+core = pytest.importorskip("tomoskin_core")
+
+TYPES = [np.float64, np.complex128]
+
+
+def system(kind: Any, cells: int = 800) -> tuple[csc_array, NDArray[Any]]:
+    """Return a system matrix and right-hand sides."""
+    model = ForwardModel(shapes.disc(16, cells), Pattern.adjacent(16), contact_impedance=0.02)
+    generator = np.random.default_rng(3)
+    sigma = generator.uniform(0.5, 2.0, len(model.mesh.cells)).astype(kind)
+    if kind is np.complex128:
+        sigma += 1j * generator.uniform(-1.0, 1.0, len(sigma))
+    matrix = model.assembly.matrix(sigma, model.contact_impedance)
+    return matrix, generator.normal(size=(matrix.shape[0], 16)).astype(kind)
+
+
+def symbolic(matrix: csc_array) -> Any:
+    return core.Symbolic(matrix.shape[0], matrix.indptr, matrix.indices)
+
+
+def jacobian_arguments(n_cells: int = 50) -> list[Any]:
+    pattern = Pattern.adjacent(8)
+    gradient = np.random.default_rng(0).normal(size=(8, 2, n_cells))
+    current = np.ones(pattern.n_drive)
+    return [gradient, pattern.drives, current, pattern.drive_index, pattern.measure]
+
+
+def product_arguments() -> list[Any]:
+    matrix = csr_array(np.arange(1.0, 13.0).reshape(4, 3))
+    parts = [matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32), matrix.data]
+    return [*parts, np.ones((3, 5)), np.zeros((5, 4))]
+
+
+@pytest.mark.parametrize("kind", TYPES)
+@pytest.mark.parametrize("k", [0, 1, 2, 5, 8, 15, 16, 17, 33])
+def test_solutions_are_those_of_scipy(kind: Any, k: int) -> None:
+    matrix, _ = system(kind)
+    rhs = np.random.default_rng(k).normal(size=(matrix.shape[0], k)).astype(kind)
+    solved = symbolic(matrix).factor(matrix.data).solve(rhs)
+    assert solved.shape == rhs.shape
+    assert solved.dtype == kind
+    if k:
+        expected = spsolve(matrix, rhs).reshape(rhs.shape)
+        np.testing.assert_allclose(solved, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("kind", TYPES)
+def test_right_hand_sides_may_lie_in_any_order(kind: Any) -> None:
+    matrix, rhs = system(kind)
+    factor = symbolic(matrix).factor(matrix.data)
+    expected = factor.solve(rhs)
+    strided = np.zeros((2 * len(rhs), 20), kind)[::2, ::-1][:, :16]
+    strided[...] = rhs
+    np.testing.assert_array_equal(factor.solve(np.asfortranarray(rhs)), expected)
+    np.testing.assert_array_equal(factor.solve(strided), expected)
+
+
+def test_one_structure_serves_many_factors_in_many_threads() -> None:
+    matrix, rhs = system(np.float64)
+    analysis = symbolic(matrix)
+    solved: dict[int, NDArray[Any]] = {}
+
+    def work(scale: int) -> None:
+        solved[scale] = analysis.factor(matrix.data * scale).solve(rhs) * scale
+
+    workers = [threading.Thread(target=work, args=(scale,)) for scale in (1, 2, 4, 8)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    for values in solved.values():
+        np.testing.assert_allclose(values, solved[1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("n", [1, 2, 60])
+def test_small_and_diagonal_matrices(n: int) -> None:
+    matrix = csc_array((np.arange(1.0, n + 1), np.arange(n), np.arange(n + 1)), shape=(n, n))
+    matrix.indices, matrix.indptr = matrix.indices.astype(np.int32), matrix.indptr.astype(np.int32)
+    solved = symbolic(matrix).factor(matrix.data).solve(np.ones((n, 1)))
+    np.testing.assert_allclose(solved[:, 0], 1.0 / np.arange(1.0, n + 1))
+
+
+@pytest.mark.parametrize("kind", TYPES)
+@pytest.mark.parametrize("value", [np.nan, np.inf, 0.0, -1.0])
+def test_what_is_not_positive_definite_is_refused(kind: Any, value: float) -> None:
+    matrix, _ = system(kind)
+    with pytest.raises(ValueError, match="not positive definite"):
+        symbolic(matrix).factor(np.full_like(matrix.data, value))
+
+
+def test_an_indefinite_matrix_is_refused() -> None:
+    matrix, _ = system(np.float64)
+    matrix.setdiag(matrix.diagonal() - matrix.diagonal().mean())
+    with pytest.raises(ValueError, match="not positive definite"):
+        symbolic(matrix).factor(matrix.data)
+
+
+@pytest.mark.parametrize(
+    ("n", "indptr", "indices"),
+    [
+        (2, [0, 1], [0]),
+        (2, [0, 1, 3], [0, 1]),
+        (2, [0, 3, 2], [0, 1]),
+        (2, [1, 1, 2], [0, 1]),
+        (2, [0, 1, 2], [0, 2]),
+        (2, [0, 1, 2], [0, -1]),
+        (2, [0, 2, 4], [1, 0, 0, 1]),
+        (2, [0, 1, 2], [1, 0]),
+        (0, [0], []),
+        (2**60, [0, 1, 2], [0, 1]),
+    ],
+)
+def test_what_is_no_structure_is_refused(n: int, indptr: list[int], indices: list[int]) -> None:
+    with pytest.raises(ValueError, match=r"ind|row|column"):
+        core.Symbolic(n, np.array(indptr, np.int32), np.array(indices, np.int32))
+
+
+def test_wrong_arrays_are_refused() -> None:
+    matrix, rhs = system(np.float64)
+    analysis = symbolic(matrix)
+    factor = analysis.factor(matrix.data)
+    bad_values = [matrix.data[1:], matrix.data[None], matrix.data.astype(np.float32), "text", None]
+    for values in [*bad_values, np.repeat(matrix.data, 2)[::2]]:
+        with pytest.raises(ValueError, match="values"):
+            analysis.factor(values)
+    for bad in (rhs[1:], rhs[:, 0], rhs.astype(complex), rhs.astype(np.float32), None):
+        with pytest.raises(ValueError, match="rhs"):
+            factor.solve(bad)
+    with pytest.raises(ValueError, match="indptr"):
+        core.Symbolic(matrix.shape[0], matrix.indptr.astype(np.int64), matrix.indices)
+
+
+@pytest.mark.parametrize("kind", TYPES)
+@pytest.mark.parametrize("threads", [None, 1, 2, 3])
+@pytest.mark.parametrize("k", [1, 15, 16, 40])
+def test_products_are_those_of_scipy(kind: Any, threads: int | None, k: int) -> None:
+    generator = np.random.default_rng(k)
+    matrix = csr_array(random_array((40_000, 30), density=0.1, rng=generator))
+    vectors = generator.normal(size=(30, k)).astype(kind)
+    out = np.full((k, 40_000), np.nan, kind)
+    parts = (part.astype(np.int32) for part in (matrix.indptr, matrix.indices))
+    core.transposed_product(*parts, matrix.data, vectors, out, threads)
+    np.testing.assert_allclose(out, (matrix @ vectors).T, rtol=1e-13, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("at", "value"),
+    [
+        (0, np.array([0, 3, 6, 9], np.int32)),
+        (0, np.array([1, 3, 6, 9, 12], np.int32)),
+        (0, np.array([0, 6, 3, 9, 12], np.int32)),
+        (0, np.zeros(0, np.int32)),
+        (1, np.full(11, 2, np.int32)),
+        (1, np.full(11, -1, np.int32)),
+        (2, np.ones(3)),
+        (3, np.ones((2, 5))),
+        (3, np.ones(5)),
+        (4, np.ones((4, 5))),
+        (4, np.ones((5, 4), complex)),
+        (4, np.ones((5, 8))[:, ::2]),
+    ],
+)
+def test_products_of_wrong_shape_are_refused(at: int, value: Any) -> None:
+    arguments = product_arguments()
+    arguments[at] = value
+    with pytest.raises(ValueError, match=r"\w"):
+        core.transposed_product(*arguments)
+
+
+def test_a_result_that_may_not_be_written_is_refused() -> None:
+    arguments = product_arguments()
+    arguments[4].flags.writeable = False
+    with pytest.raises(ValueError, match="out"):
+        core.transposed_product(*arguments)
+
+
+@pytest.mark.parametrize("kind", TYPES)
+@pytest.mark.parametrize("components", [1, 2, 3, 6])
+@pytest.mark.parametrize("threads", [None, 1, 2, 5])
+def test_jacobian_rows(kind: Any, components: int, threads: int | None) -> None:
+    generator = np.random.default_rng(components)
+    n_el, n_cells, n_meas = 7, 9001, 30
+    gradient = generator.normal(size=(n_el, components, n_cells)).astype(kind)
+    drives, measure = (
+        generator.integers(n_el, size=(5, 2)),
+        generator.integers(n_el, size=(n_meas, 2)),
+    )
+    index, current = generator.integers(5, size=n_meas), generator.normal(size=5)
+    rows = core.jacobian(gradient, drives, current, index, measure, threads)
+    driven = gradient[drives[index, 1]] - gradient[drives[index, 0]]
+    read = gradient[measure[:, 0]] - gradient[measure[:, 1]]
+    expected = np.einsum("m,mdc,mdc->mc", current[index], driven, read)
+    np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(
+    ("at", "value"),
+    [
+        (0, np.zeros((3, 2, 50))),
+        (0, np.zeros((8, 100))),
+        (0, np.zeros((8, 50, 2)).transpose(0, 2, 1)),
+        (1, np.zeros((8, 3), np.int64)),
+        (1, np.full((8, 2), -1)),
+        (1, np.zeros((8, 2))),
+        (2, np.ones(7)),
+        (3, np.full(40, 8)),
+        (3, np.full(40, -1)),
+        (3, np.zeros(39, np.int64)),
+        (4, np.full((40, 2), 8)),
+        (4, np.full((40, 2), np.iinfo(np.int64).max)),
+        (4, np.zeros((40, 1), np.int64)),
+    ],
+)
+def test_jacobians_of_wrong_shape_are_refused(at: int, value: Any) -> None:
+    arguments = jacobian_arguments()
+    arguments[at] = value
+    with pytest.raises(ValueError, match=r"\w"):
+        core.jacobian(*arguments)
+
+
+def test_empty_jacobians() -> None:
+    gradient, drives, current, index, measure = jacobian_arguments(0)
+    assert core.jacobian(gradient, drives, current, index, measure).shape == (40, 0)
+    assert core.jacobian(gradient, drives, current, index[:0], measure[:0]).shape == (0, 0)

@@ -1,0 +1,144 @@
+"""Both engines give the same numbers, and which one runs is said and can be chosen."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+import pytest
+
+import shapes
+from tomoskin.core import ModelError
+from tomoskin.forward import ForwardModel, choose_engine
+from tomoskin.forward import engine as engines
+from tomoskin.mesh import Mesh
+from tomoskin.pattern import Pattern
+
+TOLERANCE = 1e-12
+
+
+@pytest.fixture(autouse=True)
+def _fresh_choice(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.delenv(engines.VARIABLE, raising=False)
+    engines._native.cache_clear()
+    yield
+    engines._native.cache_clear()
+
+
+def body() -> tuple[Mesh, Pattern]:
+    """Tetrahedra with two electrodes on each of two opposite faces."""
+    line = np.linspace(0.0, 0.1, 7)
+    block = shapes.box(line, line, line)
+    x, y, _ = block.points[block.boundary].mean(axis=1).T
+    electrodes = tuple(
+        block.boundary[(np.abs(x - face) < 1e-9) & (np.abs(y - centre) < 0.02)]
+        for face in (0.0, 0.1)
+        for centre in (0.02, 0.08)
+    )
+    return Mesh(block.points, block.cells, electrodes), Pattern.adjacent(4)
+
+
+def sheet() -> tuple[Mesh, Pattern]:
+    return shapes.disc(16, 1500), Pattern.adjacent(16)
+
+
+def models(
+    monkeypatch: pytest.MonkeyPatch, mesh: Mesh, pattern: Pattern, **settings: Any
+) -> list[ForwardModel]:
+    """Return the same model on the native engine and on scipy's."""
+    pytest.importorskip("tomoskin_core")
+    both = []
+    for name in ("native", "scipy"):
+        monkeypatch.setenv(engines.VARIABLE, name)
+        both.append(ForwardModel(mesh, pattern, **settings))
+        assert both[-1].engine.name == name
+    return both
+
+
+def assert_same(native: Any, scipy: Any) -> None:
+    assert native.dtype == scipy.dtype
+    np.testing.assert_allclose(native, scipy, rtol=0, atol=TOLERANCE * np.abs(scipy).max())
+
+
+@pytest.mark.parametrize("domain", [sheet, body])
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("is_complex", [False, True])
+def test_the_engines_agree(
+    monkeypatch: pytest.MonkeyPatch, domain: Any, order: int, is_complex: bool
+) -> None:
+    mesh, pattern = domain()
+    both = models(monkeypatch, mesh, pattern, contact_impedance=0.01, current=0.3, order=order)
+    sigma = np.random.default_rng(1).uniform(0.3, 3.0, len(mesh.cells))
+    states = [model.at(sigma * (1.0 + 0.4j) if is_complex else sigma) for model in both]
+    for name in ("voltages", "electrode_potentials", "potentials"):
+        assert_same(*(getattr(state.solution, name) for state in states))
+    for name in ("basis", "gradient", "jacobian"):
+        assert_same(*(getattr(state, name) for state in states))
+    # the drop of potential across a contact is a difference of nearly equal numbers
+    native, scipy = (state.contact_jacobian for state in states)
+    np.testing.assert_allclose(native, scipy, rtol=0, atol=1e-10 * np.abs(scipy).max())
+    for state in states:
+        assert state.solution.residual < 1e-12
+
+
+def test_the_engines_agree_on_tensors_and_local_updates(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, pattern = sheet()
+    both = models(monkeypatch, mesh, pattern, contact_impedance=0.01)
+    tensor = np.broadcast_to([[2.0, 0.5], [0.5, 1.0]], (len(mesh.cells), 2, 2))
+    assert_same(*(model.at(tensor).jacobian for model in both))
+    cells = np.arange(40)
+    changed = [model.at(1.0).local.voltages(cells, np.full(40, 3.0)) for model in both]
+    assert_same(*changed)
+
+
+def test_a_system_that_is_singular_to_rounding_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, pattern = sheet()
+    sigma = np.where(np.arange(len(mesh.cells)) % 2, 1e-180, 1e180)
+    for model in models(monkeypatch, mesh, pattern, contact_impedance=1e-300):
+        with pytest.raises(ModelError, match="singular"):
+            model.solve(sigma)
+
+
+def test_the_structure_is_analysed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, pattern = sheet()
+    model, _ = models(monkeypatch, mesh, pattern, contact_impedance=0.01)
+    assert model.at(1.0).factor is not model.at(1.0).factor
+    assert model.factorise is model.factorise
+
+
+def test_scipy_runs_where_the_extension_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> Any:
+        raise ModuleNotFoundError(name=name)
+
+    monkeypatch.setattr(importlib, "import_module", missing)
+    engine = choose_engine()
+    assert (engine.name, engine.reason) == ("scipy", "tomoskin_core is not installed")
+    monkeypatch.setenv(engines.VARIABLE, "native")
+    with pytest.raises(ModelError, match="not installed"):
+        choose_engine()
+
+
+def test_scipy_runs_where_the_extension_does_not_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Broken:
+        __version__ = "9"
+
+    monkeypatch.setattr(importlib, "import_module", lambda _: Broken)
+    engine = choose_engine()
+    assert engine.name == "scipy"
+    assert "does not work" in engine.reason
+
+
+def test_the_variable_chooses(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(engines.VARIABLE, "scipy")
+    assert choose_engine().name == "scipy"
+    monkeypatch.setenv(engines.VARIABLE, "fast")
+    with pytest.raises(ModelError, match="fast"):
+        choose_engine()
+
+
+def test_the_extension_runs_where_it_is_installed() -> None:
+    pytest.importorskip("tomoskin_core")
+    engine = choose_engine()
+    assert engine.name == "native"
+    assert "tomoskin_core" in engine.reason
