@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import ModelError
 from tomoskin.forward.assembly import electrode_forms
-from tomoskin.forward.element import barycentric_gradients
 
 if TYPE_CHECKING:
     from tomoskin.forward.state import State
@@ -41,42 +39,19 @@ def by_contact_impedance(state: State) -> NDArray[Any]:
 
     ∂R/∂z_l = z_l⁻² ∫_l (u_i − U_i)(u_j − U_j), with the basis fields i and j.
     """
-    assembly, z = state.model.assembly, state.model.contact_impedance
-    fields = np.zeros((assembly.n_unknowns + 1, assembly.n_electrodes), state.basis.dtype)
-    fields[:-1, :-1] = state.basis  # the ground electrode's row and column are zero
-    columns = []
-    for number, (unknown, form) in enumerate(electrode_forms(assembly.element)):
+    z, fields, columns = state.model.contact_impedance, grounded(state), []
+    for number, (unknown, form) in enumerate(electrode_forms(state.model.assembly.element)):
         resistance = fields[unknown].T @ form @ fields[unknown] / z[number] ** 2
         columns.append(state.model.voltages(resistance))
     return np.stack(columns, axis=1)
 
 
-def by_movement(state: State) -> NDArray[Any]:
-    """See :attr:`State.movement_jacobian`.
-
-    When the mesh moves with velocity v, linear in each cell, the integral of σ∇u·∇w changes by
-    that of σ(div v ∇u·∇w − ∇uᵀ(∇v + ∇vᵀ)∇w); an electrode that moves as a whole keeps its form.
-    """
-    model, mesh = state.model, state.model.mesh
-    if model.order != 1 or state.conductivity.ndim > 1:
-        raise ModelError("movement needs elements of order 1 and a scalar conductivity")
-    linear = barycentric_gradients(mesh)
-    d = mesh.points.shape[1]
-    out = np.empty((model.pattern.n_meas, len(mesh.electrodes), d), state.gradient.dtype)
-    for number, facets in enumerate(mesh.electrodes):
-        moved = np.isin(mesh.cells, facets)
-        cells = np.flatnonzero(moved.any(axis=1))
-        # (cells, d): gradient of the function that is one on the electrode and zero elsewhere
-        weight = np.einsum("ck,ckd->cd", moved[cells].astype(float), linear[cells])
-        field = state.gradient[:, :, cells]
-        along = np.einsum("cd,edc->ec", weight, field)
-        sigma = state.conductivity[cells]
-        square = np.einsum("eac,fac,c->efc", field, field, sigma)
-        for axis in range(d):
-            cross = np.einsum("ec,fc,c->ef", along, field[:, axis], sigma)
-            spread = square @ weight[:, axis]
-            out[:, number, axis] = model.voltages(cross + cross.T - spread)
-    return out
+def grounded(state: State) -> NDArray[Any]:
+    """(n_unknowns + 1, n_electrodes) V/A: the basis with the ground electrode, which is zero."""
+    assembly = state.model.assembly
+    fields = np.zeros((assembly.n_unknowns + 1, assembly.n_electrodes), state.basis.dtype)
+    fields[:-1, :-1] = state.basis
+    return fields
 
 
 def power(state: State) -> NDArray[Any]:

@@ -94,12 +94,12 @@ class _Edges:
         return np.hstack(numbers)
 
 
-def barycentric_gradients(mesh: Mesh) -> FloatArray:
-    """(n_cells, d + 1, n_coordinates) gradient of each corner's linear function, 1/m.
+def barycentric_gradients(points: FloatArray, simplices: IntArray) -> FloatArray:
+    """(n, k, n_coordinates) gradient of each corner's linear function, 1/m.
 
-    On a curved sheet they lie in the plane of the triangle.
+    On a curved sheet, or on facets, they lie in the plane of the simplex.
     """
-    corner = mesh.points[mesh.cells]
+    corner = points[simplices]
     edges = corner[:, 1:] - corner[:, :1]
     gram = edges @ edges.transpose(0, 2, 1)
     inner = np.linalg.solve(gram, edges)
@@ -107,7 +107,7 @@ def barycentric_gradients(mesh: Mesh) -> FloatArray:
 
 
 def _gradients(mesh: Mesh, order: int) -> FloatArray:
-    linear = barycentric_gradients(mesh)
+    linear = barycentric_gradients(mesh.points, mesh.cells)
     if order == 1:
         return (linear * np.sqrt(mesh.volumes)[:, None, None])[:, None]
     points = _quadrature(mesh.dimension)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tomoskin.forward import derivatives
 from tomoskin.forward.factor import Factor, solve_checked
+from tomoskin.forward.movement import by_movement
 from tomoskin.forward.pairs import centred, pair_differences
 from tomoskin.forward.solution import Solution
 from tomoskin.forward.update import LocalUpdate
@@ -107,10 +108,11 @@ class State:
     def movement_jacobian(self) -> NDArray[Any]:
         """(n_meas, n_electrodes, n_coordinates) V/m: derivative by the place of each electrode.
 
-        The electrode's points move with it, all others stay (Soleimani, Gómez-Laberge & Adler
-        2006); only for scalar conductivity and elements of order 1.
+        The electrode's points move with it, also those that it shares with another electrode,
+        and all others stay (Soleimani, Gómez-Laberge & Adler 2006); only for scalar
+        conductivity and elements of order 1.
         """
-        return derivatives.by_movement(self)
+        return by_movement(self)
 
     @cached_property
     def power(self) -> NDArray[Any]:
