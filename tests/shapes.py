@@ -1,4 +1,4 @@
-"""Meshes of a known shape, built without the mesher: boxes, strips, refined and folded sheets."""
+"""Meshes of a known shape, built without the mesher: boxes, strips, rings, tubes, bent sheets."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable
 from itertools import permutations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.mesh import Disc, ElectrodeArc, Mesh, triangulate
@@ -102,3 +103,48 @@ def _halved(facets: IntArray, side: dict[tuple[int, ...], int], offset: int) -> 
     middle = np.array([offset + side[tuple(sorted(f))] for f in facets.tolist()])
     first = np.column_stack([facets[:, 0], middle])
     return np.concatenate([first, np.column_stack([middle, facets[:, 1]])])
+
+
+def patched(mesh: Mesh, *patches: Callable[[FloatArray], NDArray[np.bool_]]) -> Mesh:
+    """Return the mesh with one electrode per patch: boundary facets whose middle lies in it."""
+    middle = mesh.points[mesh.boundary].mean(axis=1).round(12)
+    return Mesh(mesh.points, mesh.cells, tuple(mesh.boundary[inside(middle)] for inside in patches))
+
+
+def mapped(mesh: Mesh, place: Callable[[FloatArray], FloatArray]) -> Mesh:
+    """Return the mesh with its points (n, d) moved to ``place(points)``."""
+    return Mesh(place(mesh.points), mesh.cells, mesh.electrodes)
+
+
+def rings(radii: FloatArray, n: int) -> Mesh:
+    """Disc of rings at ``radii`` with ``n`` points each, one side of the rim as an electrode.
+
+    Every ring is a polygon of the mesh, so that cells lie on one side of it.
+    """
+    turn = 2 * np.pi * np.arange(n) / n
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    points = np.vstack([[0.0, 0.0], *(r * circle for r in radii)])
+    following = np.roll(np.arange(n), -1)
+    fan = np.column_stack([np.zeros(n, dtype=int), 1 + np.arange(n), 1 + following])
+    cells = [fan]
+    for ring in range(len(radii) - 1):
+        a, b = 1 + ring * n + np.arange(n), 1 + ring * n + following
+        cells += [np.column_stack([a, a + n, b + n]), np.column_stack([a, b + n, b])]
+    rim = 1 + (len(radii) - 1) * n + np.arange(2)
+    return Mesh(points, np.concatenate(cells), (rim[None],))
+
+
+def tube(n: int, rows: int, radius: float, height: float, *, stagger: float = 0.0) -> Mesh:
+    """Closed tube around z, ``n`` points a row; one side of the rim z = 0 as an electrode.
+
+    With ``stagger`` every second row (the rims apart) is turned by that part of a side, so that
+    the triangles no longer lie in the faces of a prism.
+    """
+    row, step = np.divmod(np.arange(n * (rows + 1)), n)
+    turned = stagger * ((row % 2 == 1) & (row < rows))
+    turn = 2 * np.pi * (step + turned) / n
+    points = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height * row / rows])
+    a = np.arange(n * rows)
+    b = a - step[: n * rows] + (step[: n * rows] + 1) % n
+    cells = np.concatenate([np.column_stack([a, b, b + n]), np.column_stack([a, b + n, a + n])])
+    return Mesh(points, cells, (np.array([[0, 1]]),))
