@@ -11,6 +11,8 @@ from tomoskin.core import ModelError
 from tomoskin.mesh import Mesh
 
 _SYMMETRY = 1e-10
+_DEFINITE = 1e-14
+"""A tensor whose least eigenvalue is this far below its largest is singular but for rounding."""
 
 
 def checked_conductivity(value: ArrayLike, mesh: Mesh) -> NDArray[Any]:
@@ -20,7 +22,8 @@ def checked_conductivity(value: ArrayLike, mesh: Mesh) -> NDArray[Any]:
     ------
     ModelError
         For another shape, or naming the first cell whose conductivity is not positive, not
-        finite or (a tensor) not symmetric.
+        finite or (a tensor) not symmetric. On a curved sheet a tensor acts in the sheet only, and
+        must be positive there.
     """
     raw = np.asarray(value)
     n, d = len(mesh.cells), mesh.points.shape[1]
@@ -32,7 +35,7 @@ def checked_conductivity(value: ArrayLike, mesh: Mesh) -> NDArray[Any]:
         raise ModelError(f"expected numbers as conductivity, got {raw.dtype}")
     sigma = raw.astype(number_type(raw))
     if sigma.ndim == 3:
-        return _checked_tensor(sigma)
+        return _checked_tensor(sigma, mesh)
     sigma = np.array(np.broadcast_to(sigma, (n,)))
     _refuse_first(~(np.isfinite(sigma) & (sigma.real > 0)), sigma, "a positive finite conductivity")
     return sigma
@@ -43,15 +46,26 @@ def number_type(raw: NDArray[Any]) -> type[np.floating[Any] | np.complexfloating
     return np.complex128 if np.iscomplexobj(raw) else np.float64
 
 
-def _checked_tensor(sigma: NDArray[Any]) -> NDArray[Any]:
+def _checked_tensor(sigma: NDArray[Any], mesh: Mesh) -> NDArray[Any]:
     _refuse_first(~np.isfinite(sigma).all(axis=(1, 2)), sigma, "a finite conductivity")
     skew = np.abs(sigma - sigma.swapaxes(1, 2)).max(axis=(1, 2))
     _refuse_first(
         skew > _SYMMETRY * np.abs(sigma).max(axis=(1, 2)), sigma, "a symmetric conductivity tensor"
     )
-    least = np.linalg.eigvalsh(sigma.real)[:, 0]
-    _refuse_first(least <= 0, sigma, "a conductivity tensor that is positive definite")
+    principal = np.linalg.eigvalsh(_in_sheet(sigma.real, mesh))
+    _refuse_first(
+        principal[:, 0] <= _DEFINITE * np.abs(principal[:, -1]),
+        sigma,
+        "a conductivity tensor that is positive definite",
+    )
     return sigma
+
+
+def _in_sheet(sigma: NDArray[Any], mesh: Mesh) -> NDArray[Any]:
+    """Each tensor in an orthonormal basis of its cell."""
+    corner = mesh.points[mesh.cells]
+    basis, _ = np.linalg.qr((corner[:, 1:] - corner[:, :1]).swapaxes(1, 2))
+    return np.asarray(basis.swapaxes(1, 2) @ sigma @ basis)
 
 
 def _refuse_first(bad: NDArray[np.bool_], sigma: NDArray[Any], expected: str) -> None:
