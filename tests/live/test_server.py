@@ -3,69 +3,15 @@
 import json
 import socket
 import threading
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 
-import httpx
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import connect
 
 from live.board import Board, pressed, samples_of
+from live.serving import PATIENCE, Site
 from live.test_frames import decode
-from tomoskin.live import (
-    Door,
-    Hub,
-    Runner,
-    Server,
-    ServerError,
-    application,
-    check_page,
-    listen,
-    page,
-)
-
-PATIENCE = 20
-
-
-class Site:
-    """A running server with a board behind it."""
-
-    def __init__(self, runner, board, static):
-        self.runner, self.board = runner, board
-        self._listener = listen("127.0.0.1", 0)
-        self.port = self._listener.getsockname()[1]
-        self.door = Door(self.port)
-        self.origin = f"http://127.0.0.1:{self.port}"
-        self._server = Server.of(application(Hub(runner, limit=0.1), self.door, static))
-        self._thread = threading.Thread(target=self._server.run_on, args=(self._listener,))
-        self._thread.start()
-
-    def stop(self):
-        self._server.stop()
-        self._thread.join(PATIENCE)
-        assert not self._thread.is_alive()
-
-    @contextmanager
-    def client(self, *, entered=True):
-        with httpx.Client(base_url=self.origin, trust_env=False) as client:
-            if entered:
-                client.get("/", params={"token": self.door.token})
-            yield client
-
-    @contextmanager
-    def connect(self, *, token=None, host="127.0.0.1", cookie=None, origin="own"):
-        """WebSocket as a browser would open it, from that origin and to that name."""
-        query = self.door.token if token is None else token
-        with (
-            socket.create_connection(("127.0.0.1", self.port)) as plain,
-            connect(
-                f"ws://{host}:{self.port}/ws?token={query}",
-                origin=self.origin if origin == "own" else origin,
-                additional_headers={"Cookie": cookie} if cookie else {},
-                sock=plain,
-            ) as page,
-        ):
-            yield page
+from tomoskin.live import Runner, ServerError, check_page, listen, page
 
 
 @pytest.fixture
@@ -77,9 +23,9 @@ def static(tmp_path):
 
 
 @pytest.fixture
-def site(runner, board, static):
+def site(runner, static):
     runner.start()
-    site = Site(runner, board, static)
+    site = Site(runner, static)
     yield site
     site.stop()
 
@@ -226,10 +172,10 @@ def test_a_page_gets_scene_state_and_frames(site):
         assert first(page, "state")["running"]
 
 
-def test_a_touch_is_seen_on_the_page(site, prepared):
+def test_a_touch_is_seen_on_the_page(site, board, prepared):
     with site.connect() as page:
         first(page, ready)
-        site.board.free = samples_of(prepared, pressed(prepared, -0.02, 0.03))
+        board.free = samples_of(prepared, pressed(prepared, -0.02, 0.03))
         frame = first(page, lambda frame: frame["n_touches"])
         _, kind, x, y = frame["touches"][0][:4]
         assert kind == 0
@@ -280,7 +226,7 @@ def test_reference_and_pause(site):
             pass
 
 
-def test_presses_reach_the_twin_and_are_lifted_when_the_page_leaves(site):
+def test_presses_reach_the_twin_and_are_lifted_when_the_page_leaves(site, board):
     held = {"x": 0.01, "y": 0.02, "force": 3.0, "radius": 0.015}
     with site.connect() as watcher:
         with site.connect() as page:
@@ -288,7 +234,7 @@ def test_presses_reach_the_twin_and_are_lifted_when_the_page_leaves(site):
             truth = first(watcher, lambda frame: frame["n_truth"])["truth"]
             assert truth == [pytest.approx((0.01, 0.02, 3.0, 0.015))]
         first(watcher, lambda frame: not frame["n_truth"])
-        assert site.board.presses == ()
+        assert board.presses == ()
 
 
 def test_a_press_beside_the_sheet_presses_nothing(site):
@@ -298,7 +244,7 @@ def test_a_press_beside_the_sheet_presses_nothing(site):
         assert first(page, lambda frame: frame["n_truth"])["n_truth"] == 1
 
 
-def test_a_lost_source_is_said_on_the_page(site, monkeypatch):
+def test_a_lost_source_is_said_on_the_page(site, board, monkeypatch):
     away = threading.Event()
 
     def refuse():
@@ -308,7 +254,7 @@ def test_a_lost_source_is_said_on_the_page(site, monkeypatch):
     monkeypatch.setattr(site.runner, "_open", refuse)
     with site.connect() as page:
         first(page, ready)
-        site.board.lose()
+        board.lose()
         assert first(page, "event")
         assert away.wait(PATIENCE)
         while not (problem := first(page, "state")["problem"]):
@@ -369,9 +315,9 @@ def test_a_page_that_does_not_read_delays_nobody_and_is_let_go(site, monkeypatch
         assert status.fps > 50
 
 
-def test_stopping_with_a_page_open_is_quick(runner, board, static):
+def test_stopping_with_a_page_open_is_quick(runner, static):
     runner.start()
-    site = Site(runner, board, static)
+    site = Site(runner, static)
     with site.connect() as opened:
         first(opened, "scene")
         site.stop()
@@ -409,7 +355,7 @@ def test_a_runner_without_touchable_source_is_not_pressable(prepared, idle, stat
     board = Deaf(free=idle)
     runner = Runner(prepared, lambda: board)
     runner.start()
-    site = Site(runner, board, static)
+    site = Site(runner, static)
     with site.connect() as page:
         scene = first(page, "scene")
         held = {"x": 0.01, "y": 0.02, "force": 3.0, "radius": 0.015}

@@ -10,6 +10,7 @@ from tomoskin.live.scale import colour_limit
 from tomoskin.live.security import Door, is_loopback
 from tomoskin.live.server import (
     DEFAULT_PORT,
+    STATIC,
     Server,
     ServerError,
     application,
@@ -20,6 +21,7 @@ from tomoskin.live.server import (
 __all__ = [
     "DEFAULT_PORT",
     "DOUBTED",
+    "STATIC",
     "Door",
     "Hub",
     "Pipeline",

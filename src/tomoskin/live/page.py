@@ -79,13 +79,15 @@ class Page:
             self.post(messages.error(str(error)))
 
     async def _write(self) -> None:
+        loop = asyncio.get_running_loop()
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             while True:
                 await self._due.wait()
                 self._due.clear()
+                following = loop.time() + FRAME_PERIOD
                 async with asyncio.timeout(PATIENCE):
                     await self._send()
-                await asyncio.sleep(FRAME_PERIOD)
+                await asyncio.sleep(following - loop.time())
 
     async def _send(self) -> None:
         while self._outbox:

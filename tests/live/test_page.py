@@ -1,0 +1,236 @@
+"""The built page in real Chromium, on the real server and the twin."""
+
+import os
+
+import numpy as np
+import pytest
+from playwright.sync_api import sync_playwright
+
+from live.serving import Site
+from tomoskin.live import STATIC, Runner
+from tomoskin.source import open_source
+
+pytestmark = pytest.mark.page
+
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+NEAR = 0.015
+PATIENCE = 60_000
+READ = """() => {
+    const { image, touches, truths, referenceReady, sequence } = window.tomoskin.last;
+    return { image: [...image], touches, truths, referenceReady, sequence };
+}"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def built_page():
+    if not (STATIC / "index.html").is_file():
+        if os.environ.get("CI") == "true":
+            pytest.fail("the page must be built: make page", pytrace=False)
+        pytest.skip("the page has not been built: make page")
+
+
+@pytest.fixture(scope="module")
+def browser(chromium):
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def site(prepared):
+    runner = Runner(prepared, lambda: open_source("twin", prepared.skin))
+    runner.start()
+    site = Site(runner)
+    yield site
+    site.stop()
+    runner.stop()
+
+
+class Watched:
+    """A page of which everything that goes wrong is noted."""
+
+    def __init__(self, browser, site, mesh):
+        self.site, self._mesh = site, mesh
+        self.wrong = []
+        self.context = browser.new_context(viewport={"width": 1280, "height": 720})
+        self.page = self.context.new_page()
+        self.page.set_default_timeout(PATIENCE)
+        self.page.on("console", self._console)
+        self.page.on("pageerror", lambda error: self.wrong.append(str(error)))
+        self.page.on("requestfailed", lambda request: self.wrong.append(request.url))
+        self.page.on("response", self._response)
+
+    def open(self):
+        self.page.goto(self.site.door.address)
+        self.until("last?.referenceReady")
+
+    def until(self, condition):
+        """Wait until ``condition`` of ``window.tomoskin`` holds."""
+        self.page.wait_for_function(f"() => window.tomoskin && window.tomoskin.{condition}")
+
+    def test_id(self, name):
+        return self.page.get_by_test_id(name)
+
+    def move(self, x, y):
+        """Pointer over a place on the sheet, m."""
+        place = self.page.evaluate("([x, y]) => window.tomoskin.sheetToClient(x, y)", [x, y])
+        self.page.mouse.move(place["x"], place["y"])
+
+    def press(self, x, y):
+        """Pointer down there, until the twin feels it and a touch is shown."""
+        self.move(x, y)
+        self.page.mouse.down()
+        self.until("last.truths.length > 0")
+        self.until("last.touches.length > 0")
+
+    def lifted(self):
+        self.until("last.truths.length === 0")
+        self.until("last.touches.length === 0")
+
+    def read(self):
+        return self.page.evaluate(READ)
+
+    def extreme(self):
+        """Centroid of the half-maximum region of the picture, m."""
+        image = np.array(self.read()["image"])
+        weight = np.where(image < 0.5 * image.min(), -image, 0.0) * self._mesh.volumes
+        return weight @ self._mesh.centroids / weight.sum()
+
+    def rows(self):
+        """(n, 2) m: the places in the list, as a person reads them."""
+        cells = self.test_id("touch-row").evaluate_all(
+            "rows => rows.map(row => [...row.querySelectorAll('td')].map(td => td.innerText))"
+        )
+        return np.array([[number(row[0]), number(row[1])] for row in cells]).reshape(-1, 2) / 1e3
+
+    def _console(self, message):
+        if message.type == "error":
+            self.wrong.append(message.text)
+
+    def _response(self, response):
+        if response.status >= 400:
+            self.wrong.append(f"{response.status} {response.url}")
+
+
+@pytest.fixture
+def opened(browser, site, prepared):
+    watched = Watched(browser, site, prepared.mesh)
+    watched.open()
+    yield watched
+    watched.context.close()
+
+
+def number(text):
+    return float(text.replace("−", "-").strip())
+
+
+def distance(one, two):
+    return float(np.hypot(*(np.asarray(one) - two)))
+
+
+def test_it_loads_and_says_that_it_is_live(opened, prepared):
+    state = opened.test_id("state")
+    state.filter(has_text="Live").wait_for()
+    assert "twin of textile-disc-8" in state.inner_text()
+    assert opened.test_id("touch-row").count() == 0
+    assert opened.page.evaluate("window.tomoskin.scene.points.length") == prepared.mesh.points.size
+    assert "token" not in opened.page.url
+    sizes = "[document.scrollingElement.scrollHeight, innerHeight]"
+    height, room = opened.page.evaluate(sizes)
+    assert height <= room
+    assert opened.wrong == []
+
+
+@pytest.mark.parametrize(
+    "place", [(0.0, 0.0), (0.05, 0.02), (-0.04, 0.05), (0.02, -0.06), (-0.07, -0.03)]
+)
+def test_a_press_appears_where_it_was_pressed(opened, place):
+    opened.press(*place)
+    opened.until("last.touches.length === 1 && window.tomoskin.last.truths[0].force >= 5")
+    read = opened.read()
+    assert distance([read["truths"][0]["x"], read["truths"][0]["y"]], place) < 0.001
+    assert distance([read["touches"][0]["x"], read["touches"][0]["y"]], place) < NEAR
+    assert read["touches"][0]["kind"] == "decrease"
+    assert distance(opened.extreme(), place) < NEAR
+    opened.test_id("touch-row").first.wait_for()
+    rows = opened.rows()
+    assert len(rows) == 1
+    assert distance(rows[0], place) < NEAR
+    opened.page.mouse.up()
+    opened.lifted()
+    opened.test_id("touch-row").first.wait_for(state="detached")
+    assert opened.wrong == []
+
+
+def test_a_press_slides_and_keeps_its_number(opened):
+    opened.press(0.04, 0.0)
+    first = opened.read()["touches"][0]["id"]
+    for step in range(1, 9):
+        opened.move(0.04 - 0.01 * step, 0.005 * step)
+        opened.until(f"last.truths[0].x < {0.041 - 0.01 * step}")
+    opened.until("last.touches[0]?.x < -0.025")
+    read = opened.read()
+    assert [touch["id"] for touch in read["touches"]] == [first]
+    assert distance([read["touches"][0]["x"], read["touches"][0]["y"]], (-0.04, 0.04)) < NEAR
+    opened.page.mouse.up()
+    opened.lifted()
+
+
+def test_several_presses_stay_with_shift_and_escape_lifts_them(opened):
+    places = [(-0.05, 0.0), (0.05, 0.0)]
+    opened.page.keyboard.down("Shift")
+    for count, place in enumerate(places, 1):
+        opened.move(*place)
+        opened.page.mouse.down()
+        opened.until(f"last.truths.length === {count}")
+        opened.until(f"last.truths[{count - 1}].force >= 6")
+        opened.page.mouse.up()
+    opened.page.keyboard.up("Shift")
+    opened.until("last.touches.length === 2")
+    opened.test_id("touch-row").nth(1).wait_for()
+    rows = opened.rows()
+    for place in places:
+        assert min(distance(row, place) for row in rows) < NEAR
+    opened.page.keyboard.press("Escape")
+    opened.lifted()
+    assert opened.wrong == []
+
+
+def test_the_reference_and_pause_by_key(opened):
+    opened.page.keyboard.press("r")
+    opened.until("last.referenceReady === false")
+    opened.until("last.referenceReady")
+    opened.page.keyboard.press(" ")
+    opened.test_id("state").filter(has_text="Paused").wait_for()
+    opened.page.keyboard.press(" ")
+    opened.test_id("state").filter(has_text="Live").wait_for()
+    assert opened.wrong == []
+
+
+def test_a_lost_server_is_said(opened):
+    opened.test_id("state").filter(has_text="Live").wait_for()
+    assert opened.wrong == []
+    opened.site.stop()
+    opened.test_id("state").filter(has_text="Connection lost").wait_for()
+
+
+def test_presses_are_lifted_when_the_page_goes(opened):
+    opened.press(0.03, 0.03)
+    before = opened.site.runner.newest
+    assert before.truth
+    with opened.site.connect() as watcher:
+        opened.page.close()
+        for message in watcher:
+            if isinstance(message, bytes) and not opened.site.runner.newest.truth:
+                break
