@@ -43,14 +43,17 @@ def _python() -> Iterator[Finding]:
     import numpy as np
     import scipy
 
+    from tomoskin.forward import choose_engine
+
     recent = sys.version_info >= (3, 11)
     yield Finding("python", recent, f"{platform.python_version()} on {platform.platform()}")
     yield Finding("numpy", True, np.__version__)
-    yield Finding("scipy", True, f"{scipy.__version__}, does the linear algebra")
+    yield Finding("scipy", True, scipy.__version__)
+    yield _tried("engine", choose_engine, lambda engine: f"{engine.name}: {engine.reason}")
 
 
 def _page() -> Iterator[Finding]:
-    from tomoskin.live.server import check_page
+    from tomoskin.live import check_page
 
     yield _tried("page", check_page, lambda _: "built")
 
@@ -74,7 +77,7 @@ def _skins() -> Iterator[Finding]:
 
 
 def _port() -> Iterator[Finding]:
-    from tomoskin.live.server import DEFAULT_PORT, listen
+    from tomoskin.live import DEFAULT_PORT, listen
 
     try:
         listen("127.0.0.1", DEFAULT_PORT).close()
