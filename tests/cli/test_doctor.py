@@ -47,7 +47,7 @@ def test_doctor_for_people(tomoskin):
 
 
 def test_doctor_says_what_fails(tomoskin, monkeypatch, tmp_path):
-    monkeypatch.setattr("tomoskin.live.server.check_page", lambda: check_page(tmp_path))
+    monkeypatch.setattr("tomoskin.live.check_page", lambda: check_page(tmp_path))
     code, out, _ = tomoskin("doctor")
     assert code == 1
     assert "FAIL  page" in out
