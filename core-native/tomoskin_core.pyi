@@ -17,7 +17,7 @@ class Symbolic:
         Raises
         ------
         ValueError
-            When the arrays are no such structure with ascending rows and a diagonal.
+            When the arrays are no such structure, with ascending rows and a diagonal.
         """
 
     @property
@@ -27,7 +27,7 @@ class Symbolic:
     def factor(self, values: NDArray[Any]) -> Factor:
         """Factorise the matrix with these values, float64 or complex128, in the structure's order.
 
-        A complex matrix is symmetric, not Hermitian. Only the lower triangle is read.
+        A complex matrix is symmetric, not Hermitian. One of each pair of equal values is read.
 
         Raises
         ------

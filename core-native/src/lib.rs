@@ -3,6 +3,7 @@
 pub mod factor;
 pub mod jacobian;
 mod kernel;
+mod ordering;
 pub mod product;
 mod python;
 pub mod scalar;

@@ -1,15 +1,9 @@
-//! Ordering and symbolic analysis: once per mesh.
+//! Layout of a factor: which panels it has, and how each adds to its parent.
 
-use faer::Side;
-use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
-    supernodal::SymbolicSupernodalCholesky,
-};
-use faer::sparse::linalg::{SupernodalThreshold, SymbolicSupernodalParams};
+use faer::sparse::linalg::cholesky::SymbolicCholeskyRaw;
+use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 
-/// Adjacent panels are merged up to this many columns with up to this part of zeros.
-const MERGE: &[(usize, f64)] = &[(2, 1.0), (8, 0.5), (32, 0.1), (usize::MAX, 0.02)];
+use crate::ordering::analyse;
 
 /// What the structure of a symmetric matrix fixes for each of its factors.
 #[derive(Debug)]
@@ -71,18 +65,7 @@ impl Symbolic {
     /// # Errors
     /// When the arrays are no such structure, or the factor is too large to index.
     pub fn new(size: usize, column_starts: &[u32], rows: &[u32]) -> Result<Self, String> {
-        check(size, column_starts, rows)?;
-        let matrix =
-            SymbolicSparseColMatRef::new_unsorted_checked(size, size, column_starts, None, rows);
-        let params = CholeskySymbolicParams {
-            // below zero: a diagonal matrix, too, gets panels
-            supernodal_flop_ratio_threshold: SupernodalThreshold(-1.0),
-            supernodal_params: SymbolicSupernodalParams { relax: Some(MERGE) },
-            ..Default::default()
-        };
-        let analysis =
-            factorize_symbolic_cholesky(matrix, Side::Lower, SymmetricOrdering::Amd, params)
-                .map_err(|error| format!("the symbolic analysis failed: {error:?}"))?;
+        let analysis = analyse(size, column_starts, rows)?;
         let (Some(permutation), SymbolicCholeskyRaw::Supernodal(panels)) =
             (analysis.perm(), analysis.raw())
         else {
@@ -259,42 +242,4 @@ impl Symbolic {
             first_value: self.value_starts[number],
         }
     }
-}
-
-fn check(size: usize, column_starts: &[u32], rows: &[u32]) -> Result<(), String> {
-    if size == 0 || column_starts.len() != size + 1 {
-        return Err(format!(
-            "expected indptr of length n + 1 with n > 0, got n = {size} and length {}",
-            column_starts.len()
-        ));
-    }
-    if column_starts[0] != 0 || column_starts[size] as usize != rows.len() {
-        return Err(format!(
-            "expected indptr from 0 to {}, got {} to {}",
-            rows.len(),
-            column_starts[0],
-            column_starts[size]
-        ));
-    }
-    if let Some(column) = column_starts.windows(2).position(|ends| ends[0] > ends[1]) {
-        return Err(format!("indptr decreases at column {column}"));
-    }
-    for (column, ends) in column_starts.windows(2).enumerate() {
-        let within = &rows[ends[0] as usize..ends[1] as usize];
-        if !within.windows(2).all(|pair| pair[0] < pair[1]) {
-            return Err(format!(
-                "row indices of column {column} are not in ascending order"
-            ));
-        }
-        if within.last().is_some_and(|&row| row as usize >= size) {
-            return Err(format!(
-                "a row index beyond {} in column {column}",
-                size - 1
-            ));
-        }
-        if within.binary_search(&(column as u32)).is_err() {
-            return Err(format!("column {column} has no diagonal entry"));
-        }
-    }
-    Ok(())
 }

@@ -57,7 +57,7 @@ fn largest_residual<T: Scalar>(side: usize, k: usize, scale: T, magnitude: fn(T)
 
 #[test]
 fn solves_to_rounding() {
-    for side in [1, 2, 5, 40, 90] {
+    for side in [1, 2, 5, 40] {
         for k in [0, 1, 3, 8, 15, 16, 17, 40] {
             assert!(largest_residual(side, k, 1.0, f64::abs) < 1e-10);
             assert!(largest_residual(side, k, c64::new(1.0, 0.7), c64::norm) < 1e-10);
@@ -83,6 +83,8 @@ fn refuses_what_is_no_structure() {
     assert!(Symbolic::new(0, &[0], &[]).is_err());
     assert!(Symbolic::new(2, &[0, 1, 2], &[0, 2]).is_err());
     assert!(Symbolic::new(2, &[0, 2, 3], &[1, 0, 1]).is_err());
+    assert!(Symbolic::new(2, &[0, 2, 3], &[0, 1, 1]).is_err());
+    assert!(Symbolic::new(2, &[0, 1, 3], &[0, 0, 1]).is_err());
     assert!(Symbolic::new(2, &[0, 1, 2], &[0, 0]).is_err());
     assert!(Symbolic::new(2, &[0, 3, 2], &[0, 1]).is_err());
 }

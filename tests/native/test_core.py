@@ -97,6 +97,19 @@ def test_small_and_diagonal_matrices(n: int) -> None:
     np.testing.assert_allclose(solved[:, 0], 1.0 / np.arange(1.0, n + 1))
 
 
+@pytest.mark.parametrize("density", [1.0, 0.05, 0.01])
+def test_matrices_that_fill_in(density: float) -> None:
+    n = 800
+    half = random_array((n, n), density=density, rng=np.random.default_rng(0), format="coo")
+    matrix = csc_array(half + half.T)
+    matrix.setdiag(2.0 * n)
+    matrix.sort_indices()
+    matrix.indices, matrix.indptr = matrix.indices.astype(np.int32), matrix.indptr.astype(np.int32)
+    rhs = np.random.default_rng(1).normal(size=(n, 5))
+    solved = symbolic(matrix).factor(matrix.data).solve(rhs)
+    np.testing.assert_allclose(matrix @ solved, rhs, rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize("kind", TYPES)
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.0, -1.0])
 def test_what_is_not_positive_definite_is_refused(kind: Any, value: float) -> None:
@@ -123,6 +136,8 @@ def test_an_indefinite_matrix_is_refused() -> None:
         (2, [0, 1, 2], [0, -1]),
         (2, [0, 2, 4], [1, 0, 0, 1]),
         (2, [0, 1, 2], [1, 0]),
+        (2, [0, 2, 3], [0, 1, 1]),
+        (2, [0, 1, 3], [0, 0, 1]),
         (0, [0], []),
         (2**60, [0, 1, 2], [0, 1]),
     ],
