@@ -1,6 +1,8 @@
 """The server as a page, a slow page, several pages and an attacker meet it."""
 
 import json
+import os
+import signal
 import socket
 import threading
 from contextlib import ExitStack
@@ -11,7 +13,17 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from live.board import Board, pressed, samples_of
 from live.serving import PATIENCE, Site
 from live.test_frames import decode
-from tomoskin.live import Runner, ServerError, check_page, listen, page
+from tomoskin.live import (
+    Door,
+    Hub,
+    Runner,
+    Server,
+    ServerError,
+    application,
+    check_page,
+    listen,
+    page,
+)
 
 
 @pytest.fixture
@@ -323,6 +335,18 @@ def test_stopping_with_a_page_open_is_quick(runner, static):
         site.stop()
         with pytest.raises(ConnectionClosed):
             first(opened, "never")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_before_it_begins_ends_it_at_once(runner, static, number):
+    listener = listen("127.0.0.1", 0)
+    door = Door(listener.getsockname()[1])
+    server = Server.of(application(Hub(runner, limit=1.0), door, static))
+    before = signal.getsignal(number)
+    with server.stopped_by_signals():
+        os.kill(os.getpid(), number)
+        server.run_on(listener)
+    assert signal.getsignal(number) is before
 
 
 # the socket

@@ -49,7 +49,7 @@ def live(
             try:
                 hub = room.Hub(runner, limit=room.colour_limit(runner.prepared))
                 server = room.Server.of(room.application(hub, door))
-                with _ended_by_signals():
+                with server.stopped_by_signals():
                     _announce(door, runner, json=json)
                     if open_browser:
                         webbrowser.open(door.address)
@@ -61,7 +61,7 @@ def live(
 
 @contextlib.contextmanager
 def _ended_by_signals() -> Iterator[None]:
-    """Ctrl-C and SIGTERM end the block, at whatever moment they come: that is no failure."""
+    """Ctrl-C and SIGTERM end the block, wherever it stands: that is no failure."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with contextlib.suppress(KeyboardInterrupt):

@@ -99,7 +99,7 @@ def application(hub: Hub, door: Door, static: Path = STATIC) -> ASGIApp:
 
 
 class Server(uvicorn.Server):
-    """Serves until :meth:`stop`, or SIGINT or SIGTERM, and then returns instead of dying."""
+    """Serves until :meth:`stop`; leaves signals to :meth:`stopped_by_signals`."""
 
     @classmethod
     def of(cls, app: ASGIApp) -> Server:
@@ -123,22 +123,23 @@ class Server(uvicorn.Server):
         asyncio.run(self.serve([listener]))
 
     def stop(self) -> None:
-        """End :meth:`run_on`; callable from any thread and from a signal handler."""
+        """End :meth:`run_on`, or let it end at once when it begins; callable from any thread."""
         self.should_exit = True
 
     @contextlib.contextmanager
-    def capture_signals(self) -> Iterator[None]:
-        """Stop on a signal; unlike the base class, do not raise it again afterwards."""
-        try:
-            before = {s: signal.signal(s, lambda *_: self.stop()) for s in _SIGNALS}
-        except ValueError:  # not in the main thread
-            yield
-            return
+    def stopped_by_signals(self) -> Iterator[None]:
+        """While the block lasts, SIGINT and SIGTERM stop the server, and do nothing else."""
+        before = {s: signal.signal(s, lambda *_: self.stop()) for s in _SIGNALS}
         try:
             yield
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Nothing: the base class would raise the signal again after a clean end."""
+        yield
 
 
 def _limit_stalled(listener: socket.socket) -> None:
