@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.mesh.topology import boundary_facets, facets, neighbour_pairs, simplex_measure
+from tomoskin.mesh.topology import facets, paired_facets, simplex_measure
 
 _FLAT = 1e-12
 """A cell is degenerate below this fraction of (its longest edge)^dimension."""
@@ -18,7 +18,7 @@ def check_mesh(points: FloatArray, cells: IntArray, electrodes: tuple[IntArray, 
     _check_shapes(points, cells)
     _check_indices(points, cells, electrodes)
     _check_volumes(points, cells)
-    pairs, boundary = neighbour_pairs(cells), boundary_facets(cells)
+    pairs, boundary = paired_facets(cells)
     _check_facets(cells, pairs, boundary)
     _check_connected(len(cells), pairs)
     _check_electrodes(cells.shape[1] - 1, boundary, electrodes)

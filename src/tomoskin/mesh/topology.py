@@ -28,15 +28,19 @@ def facets(cells: IntArray) -> tuple[IntArray, IntArray]:
 
 def neighbour_pairs(cells: IntArray) -> IntArray:
     """(n_pairs, 2) cells that share a facet, each pair once."""
-    facet, owner = facets(cells)
-    order = np.lexsort(facet.T[::-1])
-    facet, owner = facet[order], owner[order]
-    same = (facet[1:] == facet[:-1]).all(axis=1)
-    return np.column_stack([owner[:-1][same], owner[1:][same]])
+    return paired_facets(cells)[0]
 
 
 def boundary_facets(cells: IntArray) -> IntArray:
     """(n_facets, k − 1) facets that belong to one cell only, corners sorted."""
-    facet, _ = facets(cells)
-    unique, counts = np.unique(facet, axis=0, return_counts=True)
-    return np.asarray(unique[counts == 1])
+    return paired_facets(cells)[1]
+
+
+def paired_facets(cells: IntArray) -> tuple[IntArray, IntArray]:
+    """:func:`neighbour_pairs` and :func:`boundary_facets`, from one sort."""
+    facet, owner = facets(cells)
+    order = np.lexsort(facet.T[::-1])
+    facet, owner = facet[order], owner[order]
+    same = (facet[1:] == facet[:-1]).all(axis=1)
+    single = ~(np.append(same, False) | np.append(False, same))
+    return np.column_stack([owner[:-1][same], owner[1:][same]]), np.asarray(facet[single])
