@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg.blas import dtrsm
 
 from tomoskin.core import DataError, FloatArray, Image, ModelError
 from tomoskin.forward import ForwardModel
@@ -68,7 +69,7 @@ class OneStep:
         self.model = model
         self.alpha = alpha
         self.difference = difference
-        self.reference: FloatArray = state.solution.voltages
+        self.reference: FloatArray = model.voltages(state.transfer_resistance)
         jacobian, default = _data_model(state.jacobian, self.reference, difference)
         weight = _weights(default if weights is None else weights, len(jacobian))
         q = prior_matrix(prior, model.mesh, jacobian)
@@ -133,10 +134,15 @@ def _diagonal(jacobian: FloatArray, weights: FloatArray, alpha: float, q: FloatA
     """Q⁻¹Jᵀ(JQ⁻¹Jᵀ + α²W⁻¹)⁻¹: the same matrix, solved in the small measurement space."""
     if not (q > 0).all():
         raise ModelError("expected a positive diagonal", where=f"prior, cell {int(np.argmin(q))}")
-    scaled = jacobian / q
-    system = scaled @ jacobian.T
+    root = np.sqrt(q)
+    scaled = jacobian / root
+    system = scaled @ scaled.T
     system[np.diag_indices_from(system)] += alpha**2 / weights
-    return np.asarray(_cholesky_solve(system, scaled).T)
+    scaled /= root
+    factor, _ = _cholesky(system)
+    # from the right and in place: the rows of measurements are the columns that BLAS wants
+    half = dtrsm(1.0, factor, scaled.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+    return np.asarray(dtrsm(1.0, factor, half, side=1, lower=1, overwrite_b=1))
 
 
 def _full(jacobian: FloatArray, weights: FloatArray, alpha: float, q: FloatArray) -> FloatArray:
@@ -145,10 +151,14 @@ def _full(jacobian: FloatArray, weights: FloatArray, alpha: float, q: FloatArray
 
 
 def _cholesky_solve(system: NDArray[Any], rhs: NDArray[Any]) -> FloatArray:
+    return np.asarray(cho_solve(_cholesky(system), rhs, check_finite=False))
+
+
+def _cholesky(system: NDArray[Any]) -> tuple[FloatArray, bool]:
     try:
-        factor = cho_factor(system, lower=True, overwrite_a=True, check_finite=False)
+        factor, lower = cho_factor(system, lower=True, overwrite_a=True, check_finite=False)
     except LinAlgError as error:
         raise ModelError(
             "the regularised system is not positive definite", hint="raise alpha"
         ) from error
-    return np.asarray(cho_solve(factor, rhs, check_finite=False))
+    return factor, lower
