@@ -11,11 +11,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parent.parent
 DEFAULT_DATA = ROOT.parent / "shared" / "data"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 missing_things = pytest.StashKey[set[str]]()
+
+# How long an example takes says more of the machine's other load than of the code.
+settings.register_profile("tomoskin", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("tomoskin")
 
 
 class BlockedConnectionError(RuntimeError):
