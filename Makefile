@@ -1,7 +1,7 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help live test test-all bench lint lock wheel clean page dev
+.PHONY: help live test test-all bench lint lock native wheel clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -15,17 +15,17 @@ help:  ## this list
 live: $(VENV)/.installed page  ## the live page of a simulated skin
 	@$(VENV)/bin/tomoskin live $(ARGS)
 
-test: lint  ## lint, page tests and the test suite, without what is slow
+test: lint native  ## lint, page tests and the test suite, without what is slow
 	@$(PY) scripts/page.py run test
 	@sh scripts/chromium.sh
 	@$(PY) -m pytest $(ARGS)
 
-test-all: lint  ## the same, with what is slow
+test-all: lint native  ## the same, with what is slow
 	@$(PY) scripts/page.py run test
 	@sh scripts/chromium.sh
 	@$(PY) -m pytest -m "" $(ARGS)
 
-bench: $(VENV)/.installed  ## time from bytes to touches
+bench: native  ## time from bytes to touches
 	@$(VENV)/bin/tomoskin bench frame $(ARGS)
 
 lint: dev page  ## ruff, mypy and the page's types
@@ -33,6 +33,9 @@ lint: dev page  ## ruff, mypy and the page's types
 	@$(PY) -m ruff format --check .
 	@$(PY) -m mypy
 	@$(PY) scripts/page.py run check
+
+native: dev  ## the native engine, where Rust is installed; live runs without
+	@$(PY) scripts/native.py
 
 wheel: dev page  ## a wheel with the built page, in dist/
 	@$(PY) -m hatchling build -t wheel

@@ -1,0 +1,89 @@
+"""The native engine's build: the wheel of core-native, where a cargo that works is on the PATH.
+
+Without one nothing is built and nothing fails: scipy does the same job more slowly. Standard
+library only; run by the virtual environment's Python, which has maturin and pip.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+CORE = ROOT / "core-native"
+STAMP = Path(sys.prefix) / ".native.sha256"
+
+
+def why_not() -> str:
+    """Return why the engine cannot be built here; empty where it can."""
+    cargo = shutil.which("cargo")
+    if cargo is None:
+        return "there is no cargo"
+    tried = subprocess.run([cargo, "--version"], capture_output=True, text=True, check=False)
+    if tried.returncode:
+        said = (tried.stderr or tried.stdout).strip().splitlines()
+        return f"cargo does not work: {said[0] if said else 'it says nothing'}"
+    return ""
+
+
+def sources() -> str:
+    """Return the hash of all that the wheel is built from."""
+    digest = hashlib.sha256()
+    for file in sorted([*CORE.glob("*.toml"), *CORE.glob("*.pyi"), *CORE.glob("src/**/*.rs")]):
+        digest.update(file.relative_to(CORE).as_posix().encode())
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def is_fresh() -> bool:
+    """Whether the installed engine is that of the sources."""
+    if importlib.util.find_spec("tomoskin_core") is None or not STAMP.is_file():
+        return False
+    return STAMP.read_text(encoding="ascii").strip() == sources()
+
+
+def build() -> None:
+    """Build the wheel and install it beside tomoskin.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        When cargo or pip fails; both have said why.
+    """
+    python = sys.executable
+    with tempfile.TemporaryDirectory() as folder:
+        manifest = str(CORE / "Cargo.toml")
+        maturin = (python, "-m", "maturin", "build", "--release", "--quiet")
+        subprocess.run([*maturin, "--manifest-path", manifest, "--out", folder], check=True)
+        (wheel,) = Path(folder).glob("*.whl")
+        pip = (python, "-m", "pip", "--disable-pip-version-check", "--quiet", "install")
+        subprocess.run(
+            [*pip, "--no-deps", "--no-index", "--force-reinstall", str(wheel)], check=True
+        )
+    STAMP.write_text(sources(), encoding="ascii")
+
+
+def main() -> int:
+    """Build unless fresh or impossible; a build that fails is said, and scipy goes on."""
+    if is_fresh():
+        return 0
+    reason = why_not()
+    if reason:
+        print(f"set-up: no native engine, scipy does its job: {reason}")
+        return 0
+    print("set-up: the native engine (some minutes the first time)", flush=True)
+    try:
+        build()
+    except subprocess.CalledProcessError as error:
+        print(f"set-up: the native engine was not built: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
