@@ -47,7 +47,8 @@ def image(
     prepared = prepare(Skin.load(skin))
     whole = read_recording(recording).in_order_of(prepared.pattern)
     idle = _idle(whole, reference, prepared.pattern)
-    found = reconstruct(prepared, _chosen(whole, frames), idle)
+    start, stop = _range(whole, frames)
+    found = reconstruct(prepared, whole.part(start, stop), idle).numbered_from(start)
     if touches is not None:
         _write_touches(touches, whole, found)
     if out is not None:
@@ -72,7 +73,10 @@ def _idle(recording: Recording, spec: str | None, pattern: Pattern) -> Any:
     kind, _, number = (spec or "first:1").partition(":")
     if kind in ("first", "frame") and number.isdigit():
         return _frames_of(recording, kind, int(number))
-    other = read_recording(Path(spec or ""))
+    path = Path(spec or "")
+    if not path.exists():
+        raise DataError(f'expected first:N, frame:K or a file, got "{spec}"', where="--reference")
+    other = read_recording(path)
     if other.is_change:
         raise DataError("holds differences, not an untouched skin", where=other.source)
     return other.in_order_of(pattern).voltages
@@ -91,17 +95,15 @@ def _frames_of(recording: Recording, kind: str, number: int) -> Any:
     return recording.voltages[:number]
 
 
-def _chosen(recording: Recording, spec: str | None) -> Recording:
-    if spec is None:
-        return recording
-    first, colon, last = spec.partition(":")
+def _range(recording: Recording, spec: str | None) -> tuple[int, int]:
     n = len(recording)
+    first, colon, last = (spec or ":").partition(":")
     if not (colon and (first or "0").isdigit() and (last or "0").isdigit()):
         raise typer.BadParameter(f'expected A:B, got "{spec}"', param_hint="--frames")
     start, stop = int(first or 0), int(last or n)
     if not 0 <= start < stop <= n:
         raise DataError(f"expected frames within 0:{n}, got {spec}", where="--frames")
-    return recording.part(start, stop)
+    return start, stop
 
 
 def _writer(out: Path | None) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,9 @@ REFUSED = 0.3
 DOUBTED = 0.8
 """Agreement of a recording's reference with the model's voltages (cosine, 1 = proportional):
 below the first the recording is refused as another skin's, below the second it is doubted."""
+
+_MOST_SCALE = 30.0
+"""Plain differences are refused where voltages and model differ in size by more than this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +47,10 @@ class Reconstruction:
     unit: str
     touches: tuple[tuple[Touch, ...], ...]
     agreement: float
+
+    def numbered_from(self, first: int) -> Reconstruction:
+        """Frames counted from ``first``, for a part of a longer recording."""
+        return replace(self, frames=self.frames + first, left_out=self.left_out + first)
 
 
 def reconstruct(
@@ -90,6 +97,8 @@ def _changes(
     real_values, _ = in_phase(values, mean, model)
     reference = Reference.of(in_phase(idle, mean, model)[0])
     agreement = _agreement(reference.mean, model, source)
+    if operator.difference == "plain":
+        _check_scale(reference.mean, model, source)
     dv = difference(real_values, reference.mean, operator.difference)
     if not reference.noise_is_known:
         return dv, None, agreement
@@ -128,6 +137,17 @@ def _agreement(reference: FloatArray, model: FloatArray, source: str) -> float:
             hint="check --skin, the order of the electrodes and --reference",
         )
     return cosine
+
+
+def _check_scale(reference: FloatArray, model: FloatArray, source: str) -> None:
+    scale = float(np.linalg.norm(reference) / np.linalg.norm(model))
+    if not 1 / _MOST_SCALE < scale < _MOST_SCALE:
+        raise DataError(
+            f"its voltages are {scale:.3g} times those of the skin's model",
+            where=source,
+            hint="give volts, correct the skin's current and sheet resistance, "
+            'or set difference = "normalised" in its [inverse]',
+        )
 
 
 def _touches(

@@ -1,0 +1,185 @@
+"""``tomoskin image`` on files that a model wrote: references, outputs, refusals."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from tomoskin.cli import main
+from tomoskin.core import FloatArray
+from tomoskin.forward import ForwardModel
+from tomoskin.mesh import triangulate
+from tomoskin.skin import Skin
+
+PLACE = (0.03, 0.04)
+SKIN = Skin.load("textile-disc-8")
+
+
+@pytest.fixture(scope="module")
+def frames() -> FloatArray:
+    """Three idle frames with noise, then one pressed at PLACE; on a mesh of its own."""
+    mesh = triangulate(SKIN.outline, SKIN.arcs, 1100, seed=11)
+    model = ForwardModel(mesh, SKIN.pattern(), SKIN.contact_impedance, SKIN.current)
+    near = np.hypot(*(mesh.centroids - PLACE).T) < 0.015
+    sigma = np.where(near, 0.7, 1.0) * SKIN.conductivity
+    idle = model.solve(SKIN.conductivity).voltages
+    noise = np.random.default_rng(3).normal(0.0, 5e-6, (4, len(idle)))
+    return np.vstack([idle, idle, idle, model.solve(sigma).voltages]) + noise
+
+
+@pytest.fixture
+def save(tmp_path: Path, frames: FloatArray) -> Callable[..., str]:
+    def write(name: str = "recording.npz", **changes: Any) -> str:
+        pattern = SKIN.pattern()
+        arrays = {"voltages": frames, "drive": pattern.drive, "measure": pattern.measure}
+        arrays |= changes
+        path = tmp_path / name
+        np.savez(path, **{k: v for k, v in arrays.items() if v is not None})
+        return str(path)
+
+    return write
+
+
+@pytest.fixture
+def image(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    def run(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as end:
+            main(["image", *map(str, arguments)])
+        return int(end.value.code or 0), *capfd.readouterr()
+
+    return run
+
+
+def places(path: Path) -> dict[int, tuple[float, float]]:
+    with path.open() as file:
+        return {int(r["frame"]): (float(r["x_m"]), float(r["y_m"])) for r in csv.DictReader(file)}
+
+
+@pytest.mark.parametrize("reference", ["first:3", "frame:1", None])
+def test_a_press_is_found_where_it_was(save, image, tmp_path, reference) -> None:
+    table = tmp_path / "touches.csv"
+    chosen = () if reference is None else ("--reference", reference)
+    code, _, err = image(save(), "--touches", table, "--frames", "3:4", *chosen)
+    assert (code, err) == (0, "")
+    assert np.hypot(*np.subtract(places(table)[3], PLACE)) < 0.012
+
+
+def test_idle_frames_with_known_noise_give_no_touch(save, image, tmp_path) -> None:
+    table = tmp_path / "touches.csv"
+    assert image(save(), "--reference", "first:3", "--touches", table)[0] == 0
+    assert set(places(table)) == {3}
+    header = table.read_text().splitlines()[0]
+    assert header == "frame,time_s,id,x_m,y_m,sd_x_m,sd_y_m,area_m2,peak,kind"
+
+
+def test_reference_from_a_file_or_in_the_file(save, image, tmp_path, frames) -> None:
+    idle = save("idle.npz", voltages=frames[:3])
+    one, two = tmp_path / "one.csv", tmp_path / "two.csv"
+    assert image(save("a.npz", voltages=frames[3:]), "--reference", idle, "--touches", one)[0] == 0
+    inside = save("b.npz", voltages=frames[3:], reference=frames[:3].mean(axis=0))
+    assert image(inside, "--touches", two)[0] == 0
+    np.testing.assert_allclose(places(one)[0], places(two)[0], atol=1e-9)
+
+
+def test_differences_need_no_reference(save, image, tmp_path, frames) -> None:
+    path = save("dv.npz", voltages=None, dv=frames[3:] - frames[:3].mean(axis=0))
+    table = tmp_path / "touches.csv"
+    assert image(path, "--touches", table)[0] == 0
+    assert np.hypot(*np.subtract(places(table)[0], PLACE)) < 0.012
+    code, _, err = image(path, "--reference", "first:1")
+    assert code == 1
+    assert "holds differences" in err
+
+
+def test_rows_in_any_order_and_sign(save, image, tmp_path, frames) -> None:
+    rng = np.random.default_rng(1)
+    order = rng.permutation(frames.shape[1])
+    pattern, flip = SKIN.pattern(), rng.choice([False, True], frames.shape[1])
+    measure = np.where(flip[:, None], pattern.measure[:, ::-1], pattern.measure)[order]
+    mixed = (frames * np.where(flip, -1.0, 1.0))[:, order]
+    one, two = tmp_path / "one.csv", tmp_path / "two.csv"
+    image(save("a.npz"), "--touches", one)
+    image(save("b.npz", voltages=mixed, drive=pattern.drive[order], measure=measure),
+          "--touches", two)  # fmt: skip
+    np.testing.assert_allclose(places(one)[3], places(two)[3], atol=1e-9)
+
+
+def test_every_kind_of_output(save, image, tmp_path) -> None:
+    recording = save()
+    for name in ("maps.png", "maps.npz", "maps.vtu"):
+        assert image(recording, "--out", tmp_path / name)[0] == 0
+    assert (tmp_path / "maps.png").read_bytes()[:4] == b"\x89PNG"
+    with np.load(tmp_path / "maps.npz") as found:
+        assert found["images"].shape == (4, len(found["cells"]))
+        assert str(found["unit"]) == "S"
+    grid = ElementTree.parse(tmp_path / "maps.vtu").getroot()
+    assert len(grid.findall(".//CellData/DataArray")) == 4
+
+
+def test_json_says_the_same(save, image) -> None:
+    code, out, _ = image(save(), "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert found["frames"] == 4
+    assert [t["frame"] for t in found["touches"]][-1] == 3
+    assert found["agreement"] > 0.99
+
+
+def test_a_frame_that_is_not_finite_is_left_out_and_named(save, image, tmp_path, frames) -> None:
+    broken = frames.copy()
+    broken[1, 5] = np.nan
+    table = tmp_path / "touches.csv"
+    code, _, err = image(save(voltages=broken), "--touches", table)
+    assert code == 0
+    assert "left out: 1" in err
+    assert 3 in places(table)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--reference", "first:9"), "first:1 to first:4"),
+        (("--reference", "frame:4"), "0 to 3"),
+        (("--reference", "banana"), "expected first:N, frame:K or a file"),
+        (("--frames", "3:9"), "within 0:4"),
+        (("--skin", "tank-16"), "rows are not in the recording"),
+        (("--skin", "nothing"), "built-in skins"),
+        (("--out", "/nowhere/maps.png"), "cannot be written"),
+        (("--touches", "/nowhere/touches.csv"), "cannot be written"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(save, image, arguments, said) -> None:
+    code, _, err = image(save(), *arguments)
+    assert code == 1
+    assert said in err
+    assert "Traceback" not in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda v: -v, "sign reversed"),
+        (lambda v: v * (-1.0) ** np.arange(v.shape[1]), "does not look like this skin"),
+        (lambda v: 1e3 * v, "times those of the skin's model"),
+        (lambda v: np.full_like(v, np.nan), "no frame has finite values"),
+        (lambda v: v[:0], "the recording is empty"),
+    ],
+)
+def test_voltages_of_something_else(save, image, frames, change, said) -> None:
+    code, _, err = image(save(voltages=change(frames)))
+    assert code == 1
+    assert said in err
+
+
+def test_wrong_usage(save, image) -> None:
+    assert image(save(), "--out", "maps.gif")[0] == 2
+    assert image(save(), "--frames", "3")[0] == 2
+    assert image()[0] == 2
