@@ -78,13 +78,15 @@ page: $(VENV)/.runtime
 
 COMPILE := $(PY) -m uv --quiet pip compile --upgrade --universal --python-version 3.11 \
 	--generate-hashes --no-emit-index-url --custom-compile-command "make lock"
-LOCKS := uv runtime dev node
+LOCKS := uv runtime dev bench node
 .PHONY: $(LOCKS:%=lock-%)
 lock-uv:
 	@$(COMPILE) requirements/uv.in -o requirements/uv.txt
 lock-runtime:
 	@$(COMPILE) pyproject.toml requirements/build.in -o requirements/runtime.txt
 lock-dev:
-	@$(COMPILE) pyproject.toml --all-extras requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
+	@$(COMPILE) pyproject.toml --extra mesh --extra plot requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
+lock-bench:
+	@$(COMPILE) pyproject.toml --extra bench -c requirements/dev.txt -o requirements/bench.txt
 lock-node:
 	@$(COMPILE) requirements/node.in -o requirements/node.txt

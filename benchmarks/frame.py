@@ -27,14 +27,14 @@ IDLE, PRESSED, REPEATS = 30, 60, 40
 SEED = 1
 
 
-def run(data: Path | None) -> Report:
+def run(data: Path | None) -> tuple[Report, ...]:
     """Time every case; ``data`` is not needed."""
     del data
     rows = []
     for name, cells in CASES:
         prepared = prepare(Skin.load(name).altered({"mesh": {"cells": cells}}))
         rows.append(_row(prepared))
-    return Report(
+    table = Report(
         "bytes in → touches out",
         (
             "electrodes",
@@ -54,6 +54,7 @@ def run(data: Path | None) -> Report:
             "growth: allocated memory that stays, per frame",
         ),
     )
+    return (table,)
 
 
 def _row(prepared: Prepared) -> tuple[object, ...]:

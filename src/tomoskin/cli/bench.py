@@ -15,7 +15,10 @@ from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import ModuleType
+
+    from rich.table import Table
 
 _FOLDER = Path(__file__).parents[3] / "benchmarks"
 
@@ -36,17 +39,18 @@ def bench(
     known = _benchmarks()
     if name is None:
         for key, summary in known.items():
-            typer.echo(f"{key:<10} {summary}")
+            typer.echo(f"{key:<14} {summary}")
         return
     if name not in known:
         raise typer.BadParameter(f'expected {", ".join(known)}, got "{name}"', param_hint="NAME")
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:cores])
+    os.environ["RAYON_NUM_THREADS"] = str(cores)  # the native engine reads it at each call
     with threadpool_limits(cores):
-        report = _load(name).run(data)
+        reports = _load(name).run(data)
     if json:
-        emit(report)
+        emit(reports)
     else:
-        _show(report)
+        _show(reports)
 
 
 def _benchmarks() -> dict[str, str]:
@@ -73,8 +77,19 @@ def _load(name: str) -> ModuleType:
         sys.path.remove(str(_FOLDER))
 
 
-def _show(report: Any) -> None:
+def _show(reports: Sequence[Any]) -> None:
     from rich.console import Console
+
+    console = Console()
+    for report in reports:
+        console.print(_table(report))
+        for note in report.notes:
+            console.print(f"  {note}", highlight=False)
+    known = ", ".join(f"{k} {v}" for k, v in reports[-1].machine.items())
+    console.print(f"  {known}", highlight=False)
+
+
+def _table(report: Any) -> Table:
     from rich.table import Table
 
     table = Table(title=report.title)
@@ -82,8 +97,4 @@ def _show(report: Any) -> None:
         table.add_column(column, justify="right")
     for row in report.rows:
         table.add_row(*map(str, row))
-    console = Console()
-    console.print(table)
-    for note in report.notes:
-        console.print(f"  {note}", highlight=False)
-    console.print("  " + ", ".join(f"{k} {v}" for k, v in report.machine.items()), highlight=False)
+    return table

@@ -1,0 +1,147 @@
+"""One case of the forward benchmarks, measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+import forward_peer
+from forward_cases import PATTERN, Case, medians
+from forward_peak import peaks
+from forward_script import Script
+from tomoskin.core import FloatArray
+from tomoskin.forward import ForwardModel, State
+from tomoskin.inverse import OneStep
+from tomoskin.mesh import Mesh
+
+ALPHA = 1e-3
+AGREE = 1e-9
+SECONDS = 4.0
+TOUCH = 150
+MOST_SET_UP = 300_000
+"""Cells; the operator of more would not fit the memory of many a machine."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Times in s and peaks in MB by name; what was not measured is missing."""
+
+    case: Case
+    unknowns: int
+    times: dict[str, float]
+    peak: dict[str, float] = field(default_factory=dict)
+
+    def ratio(self, name: str, own: str) -> float | None:
+        """Time of ``name`` in parts of that of ``own``."""
+        found, base = self.times.get(name), self.times.get(own)
+        return None if found is None or base is None else found / base
+
+
+def measure(case: Case, *, script: bool = True, peer: str = "") -> Measured:
+    """Time everything of ``case``; ``peer``: which letters of f(orward), j(acobian), s(et-up)."""
+    model = ForwardModel(case.mesh, PATTERN, case.contact_impedance)
+    sigma = 1.0 + 0.1 * np.random.default_rng(1).random(len(case.mesh.cells))
+    state = model.at(sigma)
+    assert state.solution.residual < AGREE
+    times = _against_library(model, sigma)
+    if script:
+        times |= _against_script(model, sigma)
+    if len(case.mesh.cells) <= MOST_SET_UP:
+        times |= medians({"set-up": lambda: _set_up(case)}, SECONDS / 2)
+    if forward_peer.INSTALLED:
+        times |= _against_peer(model, sigma, peer)
+    return Measured(case, model.assembly.n_unknowns, times, peaks(case))
+
+
+def _against_library(model: ForwardModel, sigma: FloatArray) -> dict[str, float]:
+    """Own calls; the factor and solve inside them alone; and copies of the Jacobian's size."""
+    state = model.at(sigma)
+    result = state.jacobian
+    target = np.empty_like(result)
+    calls = {
+        "forward": lambda: model.solve(sigma),
+        "bare": _bare(state),
+        "jacobian": lambda: model.jacobian(sigma),
+        "rows": lambda: _rows(state),
+        "copy": lambda: np.copyto(target, result),
+        "new copy": lambda: np.array(result),
+    }
+    return medians(calls, SECONDS)
+
+
+def _bare(state: State) -> Callable[[], object]:
+    """Return a call that factorises and solves on ready arrays, and does nothing else."""
+    model, matrix = state.model, state.model.assembly.matrix
+    ready = matrix(state.conductivity, model.contact_impedance)
+    n, n_basis = model.assembly.n_points, model.assembly.n_electrodes - 1
+    rhs = np.zeros((model.assembly.n_unknowns, n_basis))
+    rhs[n + np.arange(n_basis), np.arange(n_basis)] = 1.0
+    return lambda: model.factorise(ready).solve(rhs)
+
+
+def _rows(state: State) -> FloatArray:
+    """Return the Jacobian of a state whose fields are solved already."""
+    for name in ("gradient", "jacobian"):
+        state.__dict__.pop(name, None)
+    return state.jacobian
+
+
+def _against_script(model: ForwardModel, sigma: FloatArray) -> dict[str, float]:
+    script = Script(model.mesh, model.pattern, float(model.contact_impedance[0]))
+    _agree(script.voltages(sigma), model.solve(sigma).voltages)
+    _agree(script.jacobian(sigma), model.jacobian(sigma))
+    return medians(
+        {
+            "forward, script run": lambda: model.solve(sigma),
+            "jacobian, script run": lambda: model.jacobian(sigma),
+            "script forward": lambda: script.voltages(sigma),
+            "script jacobian": lambda: script.jacobian(sigma),
+        },
+        SECONDS,
+    )
+
+
+def _agree(other: FloatArray, own: FloatArray) -> None:
+    off = np.abs(other - own).max() / np.abs(own).max()
+    if not off < AGREE:
+        raise AssertionError(f"the script is off by {off:.1e}")
+
+
+def _against_peer(model: ForwardModel, sigma: FloatArray, which: str) -> dict[str, float]:
+    peer = forward_peer.Peer(model.mesh, model.pattern)
+    peer.prepare()
+    calls = {
+        "peer forward": lambda: peer.forward(sigma),
+        "peer jacobian": lambda: peer.jacobian(sigma),
+        "peer set-up": lambda: peer.set_up(ALPHA),
+    }
+    chosen = {name: call for name, call in calls.items() if name.split()[1][0] in which}
+    return medians(chosen, SECONDS) if chosen else {}
+
+
+def _set_up(case: Case) -> OneStep:
+    """From points and cells to the one-step operator."""
+    mesh = Mesh(case.mesh.points, case.mesh.cells, case.mesh.electrodes)
+    return OneStep(ForwardModel(mesh, PATTERN, case.contact_impedance), alpha=ALPHA)
+
+
+def measure_touch(case: Case) -> Measured:
+    """Time the local update of a touch, its columns in hand, and what it saves."""
+    model = ForwardModel(case.mesh, PATTERN, case.contact_impedance)
+    base = np.ones(len(case.mesh.cells))
+    gap = np.linalg.norm(case.mesh.centroids - [0.03, 0.02], axis=1)
+    cells = np.argsort(gap)[:TOUCH]
+    changed, own = np.full(TOUCH, 0.8), base.copy()
+    own[cells] = changed
+    state = model.at(base)
+    _agree(state.local.voltages(cells, changed), model.solve(own).voltages)
+    script = Script(case.mesh, PATTERN, case.contact_impedance)
+    calls = {
+        "update": lambda: state.local.voltages(cells, changed),
+        "bare": _bare(model.at(own)),
+        "forward": lambda: model.solve(own),
+        "script forward": lambda: script.voltages(own),
+    }
+    return Measured(case, model.assembly.n_unknowns, medians(calls, SECONDS))

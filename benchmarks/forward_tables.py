@@ -1,0 +1,165 @@
+"""Tables of the forward benchmarks, and what was promised beside what was reached."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+import forward_peer
+from forward_cases import ELECTRODES, clock
+from forward_measure import TOUCH, Measured
+from report import Report
+
+Value = float | None
+
+
+def cell(value: Value) -> str:
+    """Three figures, or a dash for what was not measured."""
+    return "–" if value is None else f"{value:,.{max(0, 2 - int(np.floor(np.log10(value))))}f}"
+
+
+def _ms(measured: Measured, name: str) -> str:
+    found = measured.times.get(name)
+    return cell(None if found is None else 1e3 * found)
+
+
+def _size(measured: Measured) -> tuple[str, str]:
+    kind = "triangles" if measured.case.mesh.dimension == 2 else "tetrahedra"
+    return f"{len(measured.case.mesh.cells):,} {kind}", f"{measured.unknowns:,}"
+
+
+def forward_table(measured: Sequence[Measured]) -> Report:
+    """Forward solves, and the factor and solve in them."""
+    rows = [
+        (
+            *_size(m),
+            _ms(m, "forward"),
+            _ms(m, "bare"),
+            cell(m.ratio("forward", "bare")),
+            _ms(m, "script forward"),
+            cell(m.ratio("script forward", "forward, script run")),
+            _ms(m, "peer forward"),
+            cell(m.ratio("peer forward", "forward")),
+            cell(m.peak.get("forward")),
+        )
+        for m in measured
+    ]
+    columns = ("cells", "unknowns", "ms", "bare ms", "ms/bare", "script ms", "script ×")
+    return Report(
+        f"forward: {ELECTRODES} electrodes, adjacent, all drives",
+        (*columns, "pyEIT ms", "pyEIT ×", "peak MB"),
+        tuple(rows),
+        (
+            f"medians of {clock()[1]}; × is how many times longer the other takes",
+            "bare: factor and solve of the same matrix by the engine, on ready arrays",
+            "script: COO assembly, splu as it comes; its voltages agree to 1e-9",
+            f"{forward_peer.name()}: point electrodes; larger meshes are left out",
+            "peak: resident memory above that of the process with its mesh, in its own process",
+        ),
+    )
+
+
+def jacobian_table(measured: Sequence[Measured]) -> Report:
+    """Jacobians with their solves, and the writing of the result."""
+    rows = [
+        (
+            _size(m)[0],
+            _ms(m, "jacobian"),
+            _ms(m, "script jacobian"),
+            cell(m.ratio("script jacobian", "jacobian, script run")),
+            _ms(m, "peer jacobian"),
+            cell(m.ratio("peer jacobian", "jacobian")),
+            _ms(m, "rows"),
+            _ms(m, "copy"),
+            cell(m.ratio("rows", "copy")),
+            cell(m.ratio("rows", "new copy")),
+            cell(m.peak.get("jacobian")),
+        )
+        for m in measured
+    ]
+    columns = ("cells", "ms", "script ms", "script ×", "pyEIT ms", "pyEIT ×", "after solves ms")
+    return Report(
+        "Jacobian with its solves",
+        (*columns, "copy ms", "ms/copy", "ms/new copy", "peak MB"),
+        tuple(rows),
+        (
+            "after solves: gradients and rows, written to new memory",
+            "copy: an array of the result's size into one in use; new copy: into new memory too",
+        ),
+    )
+
+
+def set_up_table(measured: Sequence[Measured]) -> Report:
+    """From a mesh to the one-step operator."""
+    rows = [
+        (
+            _size(m)[0],
+            _ms(m, "set-up"),
+            _ms(m, "peer set-up"),
+            cell(m.ratio("peer set-up", "set-up")),
+        )
+        for m in measured
+    ]
+    return Report(
+        "set-up: points and cells → one-step operator (NOSER)",
+        ("cells", "ms", "pyEIT ms", "pyEIT ×"),
+        tuple(rows),
+        ("check of the mesh included; pyEIT: JAC with p = 0.5",),
+    )
+
+
+def touch_table(m: Measured) -> Report:
+    """Local update."""
+    row = (_size(m)[0], _ms(m, "update"), *(cell(m.ratio(n, "update")) for n in _FRESH))
+    return Report(
+        f"local update: a touch of {TOUCH} cells, columns in hand",
+        ("cells", "ms", "factor and solve ×", "forward ×", "script ×"),
+        (row,),
+        ("× is how many times longer a fresh one takes",),
+    )
+
+
+_FRESH = ("bare", "forward", "script forward")
+
+
+def growth(measured: Sequence[Measured]) -> Value:
+    """Largest exponent of the forward time between two sizes, each four times the last or so."""
+    sheets = [m for m in measured if m.case.mesh.dimension == 2 and m.unknowns > 1000]
+    steps = [
+        np.log(b.times["forward"] / a.times["forward"])
+        / np.log(len(b.case.mesh.cells) / len(a.case.mesh.cells))
+        for a, b in pairwise(sheets)
+    ]
+    return float(max(steps)) if steps else None
+
+
+Promise = tuple[str, Value, float, bool]
+"""What, reached, promised, and whether more is better."""
+
+
+def promises(rows: Sequence[Promise]) -> Report:
+    """Say which are met."""
+    table = []
+    for what, reached, promised, more in rows:
+        met = "not measured"
+        if reached is not None:
+            met = "yes" if (reached >= promised if more else reached <= promised) else "no"
+        table.append((what, f"{'≥' if more else '≤'} {promised:g}", cell(reached), met))
+    return Report("promised and reached", ("what", "promised", "reached", "met"), tuple(table))
+
+
+def worst(measured: Sequence[Measured], name: str, own: str) -> Value:
+    """Largest ratio over all cases."""
+    found = [r for m in measured if (r := m.ratio(name, own)) is not None]
+    return max(found, default=None)
+
+
+Ratio = Callable[[str, str, str], Value]
+
+
+def ratios(measured: Sequence[Measured]) -> Ratio:
+    """Return a look-up of ratios by the case's name."""
+    known = {m.case.name: m for m in measured}
+    return lambda case, name, own: known[case].ratio(name, own) if case in known else None
