@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
+import importlib.util
 import ipaddress
 import os
 import shutil
 import socket
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -108,11 +111,23 @@ def require_data(config: pytest.Config) -> Path:
 
 def require_chromium(config: pytest.Config) -> Path:
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if found is None:
-        missing(
-            config, "the page in Chromium: none is installed (Debian: apt-get install chromium)"
-        )
+    if found is None or not driver_runs():
+        advice = "Debian: apt-get install chromium libatomic1"
+        missing(config, f"the page in Chromium: none that Playwright can drive ({advice})")
     return Path(str(found))
+
+
+@functools.cache
+def driver_runs() -> bool:
+    """Whether Playwright's own program starts: it needs a library that Chromium does not."""
+    spec = importlib.util.find_spec("playwright")
+    if spec is None or not spec.submodule_search_locations:
+        return False
+    node = Path(spec.submodule_search_locations[0]) / "driver" / "node"
+    try:
+        return subprocess.run([node, "--version"], capture_output=True, check=False).returncode == 0
+    except OSError:
+        return False
 
 
 def missing(config: pytest.Config, thing: str) -> None:
