@@ -10,12 +10,23 @@ from tomoskin.core import FloatArray, IntArray
 
 
 def simplex_measure(points: FloatArray, simplices: IntArray) -> FloatArray:
-    """Length (m), area (m²) or volume (m³) of each simplex, (n,), from its Gram determinant."""
+    """Length (m), area (m²) or volume (m³) of each simplex, (n,), in the plane or in space."""
     corner = points[simplices]
-    edges = corner[:, 1:] - corner[:, :1]
-    gram = np.einsum("nid,njd->nij", edges, edges)
-    k = edges.shape[1]
-    return np.asarray(np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / math.factorial(k))
+    edges = (corner[:, 1:] - corner[:, :1]).transpose(1, 2, 0)
+    return np.abs(_content(edges)) / math.factorial(len(edges))
+
+
+def _content(edges: FloatArray) -> FloatArray:
+    """(n,) of what ``edges`` (k, d, n) span: a Gram determinant would lose half the digits."""
+    if len(edges) == 1:
+        return np.asarray(np.linalg.norm(edges[0], axis=0))
+    u, v = edges[:2]
+    if edges.shape[1] == 2:
+        return np.asarray(u[0] * v[1] - u[1] * v[0])
+    normal = np.cross(u, v, axis=0)
+    if len(edges) == 2:
+        return np.asarray(np.linalg.norm(normal, axis=0))
+    return np.asarray((normal * edges[2]).sum(axis=0))
 
 
 def facets(cells: IntArray) -> tuple[IntArray, IntArray]:
