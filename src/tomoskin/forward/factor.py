@@ -52,8 +52,8 @@ def factorise(matrix: csc_array) -> Factor:
 
 def solve_checked(
     matrix: csc_array, factor: Factor, rhs: NDArray[Any]
-) -> tuple[NDArray[Any], float]:
-    """Solution (n_unknowns, n_rhs) and its relative residual.
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Solution and residual, each (n_unknowns, n_rhs).
 
     Raises
     ------
@@ -61,8 +61,8 @@ def solve_checked(
         When the residual shows that the matrix is singular to working precision.
     """
     solution = factor.solve(rhs)
-    residual = float(np.abs(rhs - matrix @ solution).max() / np.abs(rhs).max())
-    if not residual < MOST_RESIDUAL:
+    residual = rhs - matrix @ solution
+    if not np.abs(residual).max() < MOST_RESIDUAL * np.abs(rhs).max():
         raise singular()
     return solution, residual
 

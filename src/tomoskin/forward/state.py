@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.forward import derivatives
-from tomoskin.forward.factor import Factor, solve_checked
+from tomoskin.forward.accuracy import believable, error_of_drives, error_of_residual
+from tomoskin.forward.factor import Factor, singular, solve_checked
 from tomoskin.forward.movement import by_movement
-from tomoskin.forward.pairs import centred, pair_differences
+from tomoskin.forward.pairs import centred, padded, pair_differences
 from tomoskin.forward.solution import Solution
 from tomoskin.forward.update import LocalUpdate
 
@@ -45,7 +46,15 @@ class State:
         n_basis = assembly.n_electrodes - 1
         rhs = np.zeros((assembly.n_unknowns, n_basis), dtype=self._matrix.dtype)
         rhs[assembly.n_points + np.arange(n_basis), np.arange(n_basis)] = 1.0
-        return solve_checked(self._matrix, self.factor, rhs)
+        basis, residual = solve_checked(self._matrix, self.factor, rhs)
+        resistance = padded(basis[assembly.n_points :])
+        if not believable(
+            self.model, resistance, error_of_residual(self.model, basis, residual)
+        ) and not believable(
+            self.model, resistance, error_of_drives(self.model, self._matrix, basis)
+        ):
+            raise singular()
+        return basis, float(np.abs(residual).max())
 
     @property
     def basis(self) -> NDArray[Any]:
@@ -61,13 +70,18 @@ class State:
         return centred(self.basis[self.model.assembly.n_points :])
 
     @cached_property
+    def voltages(self) -> NDArray[Any]:
+        """(n_meas,) V of the pattern."""
+        return self.model.voltages(padded(self.basis[self.model.assembly.n_points :]))
+
+    @cached_property
     def solution(self) -> Solution:
         """Voltages and potentials for every drive of the pattern."""
         model, drives = self.model, self.model.pattern.drives
         electrode = model.current[:, None] * pair_differences(self.transfer_resistance, drives)
         nodal = model.current[:, None] * pair_differences(self._nodal, drives)
         return Solution(
-            voltages=model.voltages(self.transfer_resistance),
+            voltages=self.voltages,
             electrode_potentials=electrode,
             potentials=nodal + electrode[:, -1:],
             residual=self._solved[1],

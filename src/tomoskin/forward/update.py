@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import IntArray, ModelError
-from tomoskin.forward.factor import MOST_RESIDUAL, singular
-from tomoskin.forward.pairs import centred
+from tomoskin.forward.accuracy import believable, error_of_residual
+from tomoskin.forward.factor import singular
+from tomoskin.forward.pairs import centred, padded
 
 if TYPE_CHECKING:
     from tomoskin.forward.state import State
@@ -59,17 +60,32 @@ class LocalUpdate:
             For cells that do not exist or stand twice, a conductivity that is not positive, or
             a change that leaves the system singular to working precision.
         """
-        index, change = self._change(cells, conductivity)
-        nodes, block = self._block(index, change)
-        between, fields = self._between(nodes), self._state.basis[nodes]
-        between = between[1:] - between[:1]
-        lost = _lost(block[1:, 1:], between[:, 1:] - between[:, :1], fields[1:] - fields[:1])
-        base = self._state.basis[self._state.model.assembly.n_points :]
-        return centred(base - lost)
+        return centred(self._grounded(cells, conductivity)[:-1, :-1])
 
     def voltages(self, cells: ArrayLike, conductivity: ArrayLike) -> NDArray[Any]:
         """(n_meas,) V with ``cells`` changed; see :meth:`transfer_resistance`."""
-        return self._state.model.voltages(self.transfer_resistance(cells, conductivity))
+        return self._state.model.voltages(self._grounded(cells, conductivity))
+
+    def _grounded(self, cells: ArrayLike, conductivity: ArrayLike) -> NDArray[Any]:
+        """Transfer resistance against the ground electrode.
+
+        The residual is that of the whole changed system: what A drives in the changed fields must
+        be the currents that were found.
+        """
+        index, change = self._change(cells, conductivity)
+        nodes, block = self._block(index, change)
+        block, between, base = block[1:, 1:], self._between(nodes), self._state.basis
+        between = between[1:] - between[:1]
+        between = between[:, 1:] - between[:, :1]
+        fields = base[nodes[1:]] - base[nodes[:1]]
+        current = _currents(block, between, fields)
+        changed = fields - between @ current
+        residual = block @ changed - current
+        model = self._state.model
+        resistance = padded(base[model.assembly.n_points :] - fields.T @ current)
+        if not believable(model, resistance, error_of_residual(model, changed, residual)):
+            raise singular()
+        return resistance
 
     def _change(self, cells: ArrayLike, conductivity: ArrayLike) -> tuple[IntArray, NDArray[Any]]:
         state = self._state
@@ -130,19 +146,11 @@ class LocalUpdate:
         self._columns = np.vstack([self._columns, solved])
 
 
-def _lost(change: NDArray[Any], between: NDArray[Any], fields: NDArray[Any]) -> NDArray[Any]:
-    """Uᵀ (I + A C)⁻¹ A U, the fall of the transfer resistance.
-
-    The residual is that of the whole changed system: what A drives in the changed fields must be
-    the currents that were found, in parts of the 1 A of each field.
-    """
+def _currents(change: NDArray[Any], between: NDArray[Any], fields: NDArray[Any]) -> NDArray[Any]:
+    """(I + A C)⁻¹ A U, what the change drives out of each node."""
     system = change @ between
     system[np.diag_indices_from(system)] += 1.0
     try:
-        current = np.linalg.solve(system, change @ fields)
+        return np.linalg.solve(system, change @ fields)
     except np.linalg.LinAlgError as error:
         raise singular() from error
-    residual = np.abs(change @ (fields - between @ current) - current).max(initial=0.0)
-    if not residual < MOST_RESIDUAL:
-        raise singular()
-    return np.asarray(fields.T @ current)

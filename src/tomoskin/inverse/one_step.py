@@ -69,7 +69,7 @@ class OneStep:
         self.model = model
         self.alpha = alpha
         self.difference = difference
-        self.reference: FloatArray = model.voltages(state.transfer_resistance)
+        self.reference: FloatArray = state.voltages
         jacobian, default = _data_model(state.jacobian, self.reference, difference)
         weight = _weights(default if weights is None else weights, len(jacobian))
         q = prior_matrix(prior, model.mesh, jacobian)

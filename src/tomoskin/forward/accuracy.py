@@ -1,0 +1,75 @@
+"""Whether the voltages of a solve can be believed.
+
+A current that is left over at a node shifts a voltage by the field of the measured pair there (the
+adjoint), however small the current is: where an electrode is all but cut off, that is many volts.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.forward.factor import MOST_RESIDUAL
+from tomoskin.forward.pairs import padded
+
+if TYPE_CHECKING:
+    from tomoskin.forward.model import ForwardModel
+
+_FLOOR = 1e-12
+"""Voltages that are zero by symmetry are right to this part of √(R_drive · R_measure)."""
+
+
+def believable(model: ForwardModel, resistance: NDArray[Any], error: NDArray[Any]) -> bool:
+    """Whether errors (n_meas,) V leave six digits of the largest voltage of their drive.
+
+    ``resistance`` (n_electrodes, n_electrodes) Ω, in any convention.
+    """
+    pattern, size = model.pattern, np.abs(error)
+    largest = np.zeros(pattern.n_drive)
+    np.maximum.at(largest, pattern.drive_index, np.abs(model.voltages(resistance)))
+    allowed = MOST_RESIDUAL * largest[pattern.drive_index]
+    if (size <= allowed).all():
+        return True
+    inner = _inner(model, resistance, pattern.drive) * _inner(model, resistance, pattern.measure)
+    floor = _FLOOR * np.abs(model.current[pattern.drive_index]) * np.sqrt(inner)
+    return bool((size <= np.maximum(allowed, floor)).all())
+
+
+def _inner(model: ForwardModel, resistance: NDArray[Any], pairs: IntArray) -> FloatArray:
+    """(n_pairs,) Ω between the electrodes of each pair, without what the contacts have at least."""
+    (a, b), r = pairs.T, resistance
+    sizes = np.array([size.sum() for size in model.assembly.element.facet_sizes])
+    contact = np.abs(model.contact_impedance) / sizes
+    between = np.abs(r[a, a] - r[a, b] - r[b, a] + r[b, b])
+    return np.asarray(np.maximum(between - contact[a] - contact[b], 0.0))
+
+
+def error_of_residual(
+    model: ForwardModel, fields: NDArray[Any], residual: NDArray[Any]
+) -> NDArray[Any]:
+    """(n_meas,) V from the fields (n, n_electrodes − 1) of the basis and their residual, A."""
+    return model.voltages(padded(fields.T @ residual))
+
+
+def error_of_drives(model: ForwardModel, matrix: Any, basis: NDArray[Any]) -> NDArray[Any]:
+    """(n_meas,) V from the residual of each drive's own field.
+
+    Sharper, and dearer, where all fields of the basis share the large potential of a bad ground
+    electrode: that of a drive between others has none of it, and loses no digits to it.
+    """
+    pattern, n_points = model.pattern, model.assembly.n_points
+    fields = np.zeros((len(basis), basis.shape[1] + 1), basis.dtype)
+    fields[:, :-1] = basis
+    error = np.empty(pattern.n_meas, basis.dtype)
+    for drive, (source, sink) in enumerate(pattern.drives):
+        residual = -(matrix @ (fields[:, source] - fields[:, sink]))
+        for electrode, current in ((source, 1.0), (sink, -1.0)):
+            if electrode < basis.shape[1]:
+                residual[n_points + electrode] += current
+        rows = np.flatnonzero(pattern.drive_index == drive)
+        plus, minus = pattern.measure[rows].T
+        error[rows] = (fields[:, plus] - fields[:, minus]).T @ residual * model.current[drive]
+    return error
