@@ -6,13 +6,14 @@ adjoint), however small the current is: where an electrode is all but cut off, t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.forward.factor import MOST_RESIDUAL
+from tomoskin.forward.factor import MOST_RESIDUAL, singular
 from tomoskin.forward.pairs import padded
 
 if TYPE_CHECKING:
@@ -22,20 +23,45 @@ _FLOOR = 1e-12
 """Voltages that are zero by symmetry are right to this part of √(R_drive · R_measure)."""
 
 
-def believable(model: ForwardModel, resistance: NDArray[Any], error: NDArray[Any]) -> bool:
-    """Whether errors (n_meas,) V leave six digits of the largest voltage of their drive.
+def checked_voltages(
+    model: ForwardModel,
+    grounded: NDArray[Any],
+    lost: NDArray[Any],
+    sharper: Callable[[], NDArray[Any]] | None = None,
+) -> NDArray[Any]:
+    """(n_meas,) V, of which the residual leaves six digits of the largest of each drive.
 
-    ``resistance`` (n_electrodes, n_electrodes) Ω, in any convention.
+    Parameters
+    ----------
+    grounded
+        (k, k) Ω transfer resistance against the ground electrode.
+    lost
+        (k, k) Ω, fields of 1 A into each electrode times their residuals, Σ over nodes: how far
+        ``grounded`` may be off.
+    sharper
+        A dearer estimate of the voltages' errors (n_meas,) V, asked for where that is too large.
+
+    Raises
+    ------
+    ModelError
+        When more than that is lost.
     """
-    pattern, size = model.pattern, np.abs(error)
+    pattern, resistance = model.pattern, padded(grounded)
+    voltages = model.voltages(resistance)
     largest = np.zeros(pattern.n_drive)
-    np.maximum.at(largest, pattern.drive_index, np.abs(model.voltages(resistance)))
-    allowed = MOST_RESIDUAL * largest[pattern.drive_index]
-    if (size <= allowed).all():
-        return True
+    np.maximum.at(largest, pattern.drive_index, np.abs(voltages))
+    largest = largest[pattern.drive_index]
+    most = 4.0 * np.abs(model.current).max() * np.abs(lost).max(initial=0.0)
+    if most <= MOST_RESIDUAL * largest.min():
+        return voltages
     inner = _inner(model, resistance, pattern.drive) * _inner(model, resistance, pattern.measure)
     floor = _FLOOR * np.abs(model.current[pattern.drive_index]) * np.sqrt(inner)
-    return bool((size <= np.maximum(allowed, floor)).all())
+    allowed = np.maximum(MOST_RESIDUAL * largest, floor)
+    if (np.abs(model.voltages(padded(lost))) <= allowed).all():
+        return voltages
+    if sharper is not None and (np.abs(sharper()) <= allowed).all():
+        return voltages
+    raise singular()
 
 
 def _inner(model: ForwardModel, resistance: NDArray[Any], pairs: IntArray) -> FloatArray:
@@ -47,15 +73,8 @@ def _inner(model: ForwardModel, resistance: NDArray[Any], pairs: IntArray) -> Fl
     return np.asarray(np.maximum(between - contact[a] - contact[b], 0.0))
 
 
-def error_of_residual(
-    model: ForwardModel, fields: NDArray[Any], residual: NDArray[Any]
-) -> NDArray[Any]:
-    """(n_meas,) V from the fields (n, n_electrodes − 1) of the basis and their residual, A."""
-    return model.voltages(padded(fields.T @ residual))
-
-
 def error_of_drives(model: ForwardModel, matrix: Any, basis: NDArray[Any]) -> NDArray[Any]:
-    """(n_meas,) V from the residual of each drive's own field.
+    """(n_meas,) V that the residual of each drive's own field may cost.
 
     Sharper, and dearer, where all fields of the basis share the large potential of a bad ground
     electrode: that of a drive between others has none of it, and loses no digits to it.

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.forward import derivatives
-from tomoskin.forward.accuracy import believable, error_of_drives, error_of_residual
-from tomoskin.forward.factor import Factor, singular, solve_checked
+from tomoskin.forward.accuracy import checked_voltages, error_of_drives
+from tomoskin.forward.factor import Factor, solve_checked
 from tomoskin.forward.movement import by_movement
-from tomoskin.forward.pairs import centred, padded, pair_differences
+from tomoskin.forward.pairs import centred, pair_differences
 from tomoskin.forward.solution import Solution
 from tomoskin.forward.update import LocalUpdate
 
@@ -41,20 +41,19 @@ class State:
         return self.model.assembly.matrix(self.conductivity, self.model.contact_impedance)
 
     @cached_property
-    def _solved(self) -> tuple[NDArray[Any], float]:
+    def _solved(self) -> tuple[NDArray[Any], NDArray[Any], float]:
         assembly = self.model.assembly
         n_basis = assembly.n_electrodes - 1
         rhs = np.zeros((assembly.n_unknowns, n_basis), dtype=self._matrix.dtype)
         rhs[assembly.n_points + np.arange(n_basis), np.arange(n_basis)] = 1.0
         basis, residual = solve_checked(self._matrix, self.factor, rhs)
-        resistance = padded(basis[assembly.n_points :])
-        if not believable(
-            self.model, resistance, error_of_residual(self.model, basis, residual)
-        ) and not believable(
-            self.model, resistance, error_of_drives(self.model, self._matrix, basis)
-        ):
-            raise singular()
-        return basis, float(np.abs(residual).max())
+        voltages = checked_voltages(
+            self.model,
+            basis[assembly.n_points :],
+            basis.T @ residual,
+            sharper=lambda: error_of_drives(self.model, self._matrix, basis),
+        )
+        return basis, voltages, float(np.abs(residual).max())
 
     @property
     def basis(self) -> NDArray[Any]:
@@ -69,10 +68,10 @@ class State:
         """
         return centred(self.basis[self.model.assembly.n_points :])
 
-    @cached_property
+    @property
     def voltages(self) -> NDArray[Any]:
         """(n_meas,) V of the pattern."""
-        return self.model.voltages(padded(self.basis[self.model.assembly.n_points :]))
+        return self._solved[1]
 
     @cached_property
     def solution(self) -> Solution:
@@ -84,7 +83,7 @@ class State:
             voltages=self.voltages,
             electrode_potentials=electrode,
             potentials=nodal + electrode[:, -1:],
-            residual=self._solved[1],
+            residual=self._solved[2],
         )
 
     @property

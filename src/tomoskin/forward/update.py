@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import IntArray, ModelError
-from tomoskin.forward.accuracy import believable, error_of_residual
+from tomoskin.forward.accuracy import checked_voltages
 from tomoskin.forward.factor import singular
-from tomoskin.forward.pairs import centred, padded
+from tomoskin.forward.pairs import centred
 
 if TYPE_CHECKING:
     from tomoskin.forward.state import State
@@ -60,14 +60,16 @@ class LocalUpdate:
             For cells that do not exist or stand twice, a conductivity that is not positive, or
             a change that leaves the system singular to working precision.
         """
-        return centred(self._grounded(cells, conductivity)[:-1, :-1])
+        return centred(self._changed(cells, conductivity)[0])
 
     def voltages(self, cells: ArrayLike, conductivity: ArrayLike) -> NDArray[Any]:
         """(n_meas,) V with ``cells`` changed; see :meth:`transfer_resistance`."""
-        return self._state.model.voltages(self._grounded(cells, conductivity))
+        return self._changed(cells, conductivity)[1]
 
-    def _grounded(self, cells: ArrayLike, conductivity: ArrayLike) -> NDArray[Any]:
-        """Transfer resistance against the ground electrode.
+    def _changed(
+        self, cells: ArrayLike, conductivity: ArrayLike
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Transfer resistance against the ground electrode, and voltages.
 
         The residual is that of the whole changed system: what A drives in the changed fields must
         be the currents that were found.
@@ -82,10 +84,8 @@ class LocalUpdate:
         changed = fields - between @ current
         residual = block @ changed - current
         model = self._state.model
-        resistance = padded(base[model.assembly.n_points :] - fields.T @ current)
-        if not believable(model, resistance, error_of_residual(model, changed, residual)):
-            raise singular()
-        return resistance
+        grounded = base[model.assembly.n_points :] - fields.T @ current
+        return grounded, checked_voltages(model, grounded, changed.T @ residual)
 
     def _change(self, cells: ArrayLike, conductivity: ArrayLike) -> tuple[IntArray, NDArray[Any]]:
         state = self._state
