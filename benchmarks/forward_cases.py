@@ -94,18 +94,21 @@ def clock() -> tuple[Clock, str]:
     return time.perf_counter, "wall time"
 
 
-def medians(calls: Mapping[str, Callable[[], object]], seconds: float) -> dict[str, float]:
-    """Median time of each call, s: turn about for about ``seconds``, each at least once.
+def medians(
+    calls: Mapping[str, Callable[[], object]], seconds: float, *, least: int = 1
+) -> dict[str, float]:
+    """Median time of each call, s: turn about for ``seconds``, and ``least`` turns.
 
-    A call runs a few times in a row in its turn, so that all find caches of their own making; what
-    takes longer than ``seconds`` runs once.
+    A call runs a few times in a row in its turn, so that all find caches of their own making.
     """
     now, _ = clock()
     taken: dict[str, list[float]] = {name: [] for name in calls}
     gc.collect()
     gc.disable()
     began = now()
-    while True:
+    turns = 0
+    while turns < least or now() - began < seconds:
+        turns += 1
         for name, call in calls.items():
             turn, most = 0.0, min(0.05, seconds / 10)
             while turn <= most and len(taken[name]) < MOST_REPEATS:
@@ -113,7 +116,7 @@ def medians(calls: Mapping[str, Callable[[], object]], seconds: float) -> dict[s
                 call()
                 taken[name].append(now() - start)
                 turn += taken[name][-1]
-        if now() - began > seconds or all(len(t) >= MOST_REPEATS for t in taken.values()):
+        if all(len(times) >= MOST_REPEATS for times in taken.values()):
             break
     gc.enable()
     return {name: float(np.median(times)) for name, times in taken.items()}
