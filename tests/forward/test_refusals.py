@@ -63,6 +63,31 @@ def test_another_count_of_currents() -> None:
         ForwardModel(MESH, PATTERN, 0.01, [1, 2, 3])
 
 
+@pytest.mark.parametrize("value", ["x", None, [1.0, [2.0]], ["0.01"] * 8, object()])
+def test_what_is_no_number_is_refused(value: Any) -> None:
+    local = ForwardModel(MESH, PATTERN, 0.01).at(1.0).local
+    for give in (
+        lambda: ForwardModel(MESH, PATTERN, value),
+        lambda: ForwardModel(MESH, PATTERN, 0.01, value),
+        lambda: ForwardModel(MESH, PATTERN, 0.01).solve(value),
+        lambda: local.voltages([1], value),
+        lambda: local.voltages(value, [1.0]),
+    ):
+        with pytest.raises(ModelError, match="expected"):
+            give()
+
+
+def test_a_complex_current_is_refused() -> None:
+    with pytest.raises(ModelError, match="real currents"):
+        ForwardModel(MESH, PATTERN, 0.01, 1j)
+
+
+@pytest.mark.parametrize("order", [0, 3, "2", None])
+def test_another_order(order: Any) -> None:
+    with pytest.raises(ModelError, match="order 1 or 2"):
+        ForwardModel(MESH, PATTERN, 0.01, order=order)
+
+
 def test_pattern_of_another_electrode_count() -> None:
     with pytest.raises(ModelError, match="the mesh has 8 electrodes and the pattern 16"):
         ForwardModel(MESH, Pattern.adjacent(16), 0.01)

@@ -25,20 +25,35 @@ def checked_conductivity(value: ArrayLike, mesh: Mesh) -> NDArray[Any]:
         finite or (a tensor) not symmetric. On a curved sheet a tensor acts in the sheet only, and
         must be positive there.
     """
-    raw = np.asarray(value)
+    raw = numbers(value, "conductivity")
     n, d = len(mesh.cells), mesh.points.shape[1]
     if raw.shape not in ((), (n,), (n, d, d)):
         raise ModelError(
             f"expected conductivity of shape ({n},) or ({n}, {d}, {d}), got {raw.shape}"
         )
-    if raw.dtype.kind not in "biufc":
-        raise ModelError(f"expected numbers as conductivity, got {raw.dtype}")
     sigma = raw.astype(number_type(raw))
     if sigma.ndim == 3:
         return _checked_tensor(sigma, mesh)
     sigma = np.array(np.broadcast_to(sigma, (n,)))
     _refuse_first(~(np.isfinite(sigma) & (sigma.real > 0)), sigma, "a positive finite conductivity")
     return sigma
+
+
+def numbers(value: ArrayLike, name: str) -> NDArray[Any]:
+    """``value`` as an array of numbers.
+
+    Raises
+    ------
+    ModelError
+        For anything else: text, nothing, rows of unequal length.
+    """
+    try:
+        raw = np.asarray(value)
+    except ValueError as error:
+        raise ModelError(f"expected rows of equal length as {name}") from error
+    if raw.dtype.kind not in "biufc":
+        raise ModelError(f"expected numbers as {name}, got {raw.dtype}")
+    return raw
 
 
 def number_type(raw: NDArray[Any]) -> type[np.floating[Any] | np.complexfloating[Any, Any]]:

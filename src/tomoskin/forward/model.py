@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.forward.assembly import Assembly, gradient_operator
-from tomoskin.forward.conductivity import checked_conductivity, number_type
+from tomoskin.forward.conductivity import checked_conductivity, number_type, numbers
 from tomoskin.forward.element import Element
 from tomoskin.forward.engine import choose_engine
 from tomoskin.forward.factor import Factorise
@@ -106,7 +106,7 @@ class ForwardModel:
 
 
 def _impedance(value: ArrayLike, n: int) -> NDArray[Any]:
-    raw = np.asarray(value)
+    raw = numbers(value, "contact impedance")
     if raw.shape not in ((), (n,)):
         raise ModelError(f"expected one contact impedance or {n}, got shape {raw.shape}")
     z = np.broadcast_to(raw, (n,)).astype(number_type(raw))
@@ -121,9 +121,11 @@ def _impedance(value: ArrayLike, n: int) -> NDArray[Any]:
 
 
 def _current(value: ArrayLike, n_drive: int) -> FloatArray:
-    raw = np.asarray(value, dtype=np.float64)
+    raw = numbers(value, "current")
     if raw.shape not in ((), (n_drive,)):
         raise ModelError(f"expected one current or {n_drive}, got shape {raw.shape}")
+    if raw.dtype.kind == "c":
+        raise ModelError("expected real currents, got complex ones")
     if not (np.isfinite(raw).all() and (raw != 0).all()):
         raise ModelError(f"expected currents other than zero, got {raw.tolist()}")
-    return np.array(np.broadcast_to(raw, (n_drive,)))
+    return np.array(np.broadcast_to(raw, (n_drive,)), dtype=np.float64)

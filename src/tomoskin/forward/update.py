@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import IntArray, ModelError
 from tomoskin.forward.accuracy import checked_voltages
+from tomoskin.forward.conductivity import numbers
 from tomoskin.forward.factor import singular
 from tomoskin.forward.pairs import centred
 
@@ -91,7 +92,9 @@ class LocalUpdate:
         state = self._state
         if state.conductivity.ndim > 1:
             raise ModelError("a local update needs a scalar conductivity")
-        index, sigma = np.asarray(cells), np.asarray(conductivity)
+        index, sigma = numbers(cells, "cells"), numbers(conductivity, "conductivity")
+        if not index.size:
+            index = index.astype(np.int64)
         n = len(self._cells)
         if index.dtype.kind not in "iu" or index.ndim != 1 or sigma.shape != index.shape:
             raise ModelError(
