@@ -131,11 +131,12 @@ impl<T: Scalar> WithSimd for Blocks<'_, T> {
         let size = (CACHE / (size_of::<T>() * per_cell.max(1))).clamp(64, CELLS);
         let mut pairs = vec![T::ZERO; per_cell * size];
         let mut driven = vec![T::ZERO; self.fields.shape[1] * size];
+        let mut line = vec![T::ZERO; size];
         for begin in self.cells.clone().step_by(size) {
             let cells = begin..self.cells.end.min(begin + size);
             self.pair_fields(&cells, size, &mut pairs);
             for drive in &self.table.drives {
-                self.rows(drive, &cells, size, &pairs, &mut driven);
+                self.rows(drive, &cells, &pairs, &mut driven, &mut line);
             }
         }
     }
@@ -161,9 +162,9 @@ impl<T: Scalar> Blocks<'_, T> {
         &self,
         drive: &Drive,
         cells: &Range<usize>,
-        size: usize,
         pairs: &[T],
         driven: &mut [T],
+        line: &mut [T],
     ) {
         let driven_len = driven.len();
         let field = |pair: usize| &pairs[pair * driven_len..][..driven_len];
@@ -174,39 +175,21 @@ impl<T: Scalar> Blocks<'_, T> {
             let at = row * self.fields.shape[2];
             // SAFETY: each thread has cells of its own.
             let target = unsafe { self.out.part(at + cells.start..at + cells.end) };
-            scalar_product(target, driven, field(measured), size);
+            // summed in the first cache, then written once
+            scalar_product(line, driven, field(measured));
+            target.copy_from_slice(&line[..target.len()]);
         }
     }
 }
 
-/// Sum over the components of products, cell by cell; each component has `size` cells.
+/// Sum over the components of products, cell by cell; each component is as long as the target.
 #[inline(always)]
-fn scalar_product<T: Scalar>(target: &mut [T], a: &[T], b: &[T], size: usize) {
+fn scalar_product<T: Scalar>(target: &mut [T], a: &[T], b: &[T]) {
     let n = target.len();
-    let (mut a, mut b) = (a.chunks_exact(2 * size), b.chunks_exact(2 * size));
-    let mut is_first = true;
-    for (a, b) in a.by_ref().zip(b.by_ref()) {
-        let ((a0, a1), (b0, b1)) = (a.split_at(size), b.split_at(size));
-        let (a0, a1, b0, b1) = (&a0[..n], &a1[..n], &b0[..n], &b1[..n]);
-        accumulate(target, is_first, |i| a0[i] * b0[i] + a1[i] * b1[i]);
-        is_first = false;
-    }
-    let (a, b) = (a.remainder(), b.remainder());
-    if !a.is_empty() {
-        let (a, b) = (&a[..n], &b[..n]);
-        accumulate(target, is_first, |i| a[i] * b[i]);
-    }
-}
-
-#[inline(always)]
-fn accumulate<T: Scalar>(target: &mut [T], is_first: bool, term: impl Fn(usize) -> T) {
-    if is_first {
-        for (i, value) in target.iter_mut().enumerate() {
-            *value = term(i);
-        }
-    } else {
-        for (i, value) in target.iter_mut().enumerate() {
-            *value += term(i);
+    target.fill(T::ZERO);
+    for (a, b) in a.chunks_exact(n).zip(b.chunks_exact(n)) {
+        for (value, (&a, &b)) in target.iter_mut().zip(a.iter().zip(b)) {
+            *value += a * b;
         }
     }
 }

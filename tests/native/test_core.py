@@ -80,13 +80,13 @@ def test_one_structure_serves_many_factors_in_many_threads() -> None:
     def work(scale: int) -> None:
         solved[scale] = analysis.factor(matrix.data * scale).solve(rhs) * scale
 
-    workers = [threading.Thread(target=work, args=(scale,)) for scale in (1, 2, 4, 8)]
+    workers = [threading.Thread(target=work, args=(scale,)) for scale in (1, 4, 16, 64)]
     for worker in workers:
         worker.start()
     for worker in workers:
         worker.join()
     for values in solved.values():
-        np.testing.assert_allclose(values, solved[1], rtol=1e-12)
+        np.testing.assert_array_equal(values, solved[1])  # powers of four are exact
 
 
 @pytest.mark.parametrize("n", [1, 2, 60])
@@ -254,3 +254,4 @@ def test_empty_jacobians() -> None:
     gradient, drives, current, index, measure = jacobian_arguments(0)
     assert core.jacobian(gradient, drives, current, index, measure).shape == (40, 0)
     assert core.jacobian(gradient, drives, current, index[:0], measure[:0]).shape == (0, 0)
+    assert not core.jacobian(np.ones((8, 0, 900)), drives, current, index, measure).any()
