@@ -249,8 +249,19 @@ fn rows<'py, T: Scalar + Element>(
     Ok(out)
 }
 
+/// Lets the process keep the memory of arrays up to 32 MB when they are freed.
+///
+/// glibc gives back the end of its heap beyond twice the largest block that was ever freed to the
+/// system, 128 kB at first; arrays that come and go are then mapped anew, page by page, which took
+/// half of a forward solve. One large block, never touched, raises that bound.
+fn keep_freed_memory() {
+    const LARGEST: usize = 31 << 20;
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGEST)));
+}
+
 #[pymodule]
 fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    keep_freed_memory();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<Symbolic>()?;
     module.add_class::<Factor>()?;
