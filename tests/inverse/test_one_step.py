@@ -104,6 +104,16 @@ def test_normalised_image_is_blind_to_the_read_outs_gain() -> None:
     assert images[0].values == pytest.approx(images[1].values, rel=1e-9)
 
 
+def test_the_quick_image_is_the_image_to_single_precision() -> None:
+    operator = OneStep(ForwardModel(disc(), Pattern.adjacent(8), 0.01), alpha=0.1)
+    dv = np.random.default_rng(2).normal(0.0, 1e-4, operator.matrix.shape[1])
+    exact, quick = operator(dv), operator.quick(dv)
+    assert mismatch(quick.values, exact.values) < 1e-5
+    assert (quick.unit, quick.mesh_id) == (exact.unit, exact.mesh_id)
+    with pytest.raises(DataError, match="not"):
+        operator.quick(np.full_like(dv, np.nan))
+
+
 def test_image_names_its_mesh_and_unit() -> None:
     image = OneStep(model(), alpha=ALPHA)(np.zeros(40))
     assert (image.unit, image.mesh_id) == ("S", model().mesh.identity)

@@ -43,7 +43,7 @@ def bench(
         return
     if name not in known:
         raise typer.BadParameter(f'expected {", ".join(known)}, got "{name}"', param_hint="NAME")
-    os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:cores])
+    os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-cores:])
     os.environ["RAYON_NUM_THREADS"] = str(cores)  # the native engine reads it at each call
     with threadpool_limits(cores):
         reports = _load(name).run(data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -88,6 +89,23 @@ class OneStep:
         DataError
             When there are more or fewer values than rows, or one is not finite.
         """
+        self._check(dv)
+        return Image(self.matrix @ dv, self.unit, self.model.mesh.identity)
+
+    def quick(self, dv: FloatArray) -> Image:
+        """As a call, from the matrix in single precision: half the bytes, for the frame flow.
+
+        The product reads the whole matrix once, so its time is that of the memory.
+        """
+        self._check(dv)
+        values = (self._single @ dv.astype(np.float32)).astype(np.float64)
+        return Image(values, self.unit, self.model.mesh.identity)
+
+    @cached_property
+    def _single(self) -> NDArray[np.float32]:
+        return self.matrix.astype(np.float32)
+
+    def _check(self, dv: FloatArray) -> None:
         n = self.matrix.shape[1]
         if dv.shape != (n,):
             raise DataError(f"expected difference data of shape ({n},), got {dv.shape}")
@@ -95,7 +113,6 @@ class OneStep:
         if not finite.all():
             bad = np.flatnonzero(~finite).tolist()
             raise DataError(f"expected finite difference data; rows {bad} are not")
-        return Image(self.matrix @ dv, self.unit, self.model.mesh.identity)
 
 
 def _data_model(

@@ -78,7 +78,7 @@ def reconstruct(
     else:
         changes, floor, agreement = _changes(prepared, recording.source, values, idle)
     frames = np.flatnonzero(finite)
-    images = np.stack([prepared.operator(dv).values for dv in changes])
+    images = np.stack([prepared.operator.quick(dv).values for dv in changes])
     return Reconstruction(
         frames=frames,
         left_out=np.flatnonzero(~finite),

@@ -96,7 +96,7 @@ class Pipeline:
             return self._result(voltages, self._image, touches, unusable, pictured=False)
         values = np.where(unusable, reference.mean, voltages.values)
         dv = difference(values, reference.mean, p.skin.inverse.difference)
-        image = p.operator(fill(dv, unusable, p.predictor))
+        image = p.operator.quick(fill(dv, unusable, p.predictor))
         readings = p.segmenter(image.values, self._floor)
         touches = self._tracker.update(readings, voltages.host_time)
         return self._result(voltages, image, touches, unusable, pictured=True)
