@@ -12,19 +12,6 @@ from tomoskin.cli import main
 from tomoskin.live import check_page
 
 
-@pytest.fixture
-def tomoskin(capsys):
-    """Run a command: (exit code, stdout, stderr)."""
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as end:
-            main(arguments)
-        out, errors = capsys.readouterr()
-        return end.value.code, out, errors
-
-    return run
-
-
 def test_doctor(tomoskin):
     code, out, _ = tomoskin("doctor", "--json")
     report = json.loads(out)

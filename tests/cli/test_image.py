@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -12,7 +13,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from tomoskin.cli import main
 from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel
 from tomoskin.mesh import triangulate
@@ -48,13 +48,8 @@ def save(tmp_path: Path, frames: FloatArray) -> Callable[..., str]:
 
 
 @pytest.fixture
-def image(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as end:
-            main(["image", *map(str, arguments)])
-        return int(end.value.code or 0), *capfd.readouterr()
-
-    return run
+def image(tomoskin: Callable[..., tuple[int, str, str]]) -> Callable[..., tuple[int, str, str]]:
+    return partial(tomoskin, "image")
 
 
 def places(path: Path) -> dict[int, tuple[float, float]]:

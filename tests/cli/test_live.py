@@ -8,11 +8,11 @@ import socket
 import subprocess
 import sys
 from contextlib import ExitStack
+from functools import partial
 
 import httpx
 import pytest
 
-from tomoskin.cli import main
 from tomoskin.live.server import STATIC
 
 COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]
@@ -47,15 +47,9 @@ def start():
 
 
 @pytest.fixture
-def refused(capsys):
+def refused(tomoskin):
     """Run the command in this process, for it ends before it serves: (exit code, out, errors)."""
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as end:
-            main(["live", *arguments])
-        return (end.value.code, *capsys.readouterr())
-
-    return run
+    return partial(tomoskin, "live")
 
 
 def end(process, number):

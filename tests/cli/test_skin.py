@@ -2,23 +2,7 @@
 
 import json
 
-import pytest
-
-from tomoskin.cli import main
 from tomoskin.skin import Skin
-
-
-@pytest.fixture
-def tomoskin(capsys):
-    """Run a command: (exit code, stdout, stderr)."""
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as end:
-            main(arguments)
-        out, errors = capsys.readouterr()
-        return end.value.code, out, errors
-
-    return run
 
 
 def test_list(tomoskin):
