@@ -104,6 +104,9 @@ impl Table {
 pub fn jacobian<T: Scalar>(fields: Fields<'_, T>, table: &Table, out: &mut [T], threads: usize) {
     assert!(out.len() == table.n_rows * fields.shape[2]);
     assert!(table.n_electrodes() <= fields.shape[0]);
+    if fields.shape[1] == 0 {
+        return out.fill(T::ZERO);
+    }
     let out = Shared::new(out);
     split(fields.shape[2], GRAIN, threads, |cells| {
         Arch::new().dispatch(Blocks {
@@ -131,12 +134,11 @@ impl<T: Scalar> WithSimd for Blocks<'_, T> {
         let size = (CACHE / (size_of::<T>() * per_cell.max(1))).clamp(64, CELLS);
         let mut pairs = vec![T::ZERO; per_cell * size];
         let mut driven = vec![T::ZERO; self.fields.shape[1] * size];
-        let mut line = vec![T::ZERO; size];
         for begin in self.cells.clone().step_by(size) {
             let cells = begin..self.cells.end.min(begin + size);
             self.pair_fields(&cells, size, &mut pairs);
             for drive in &self.table.drives {
-                self.rows(drive, &cells, &pairs, &mut driven, &mut line);
+                self.rows(drive, &cells, &pairs, &mut driven);
             }
         }
     }
@@ -158,15 +160,9 @@ impl<T: Scalar> Blocks<'_, T> {
     }
 
     #[inline(always)]
-    fn rows(
-        &self,
-        drive: &Drive,
-        cells: &Range<usize>,
-        pairs: &[T],
-        driven: &mut [T],
-        line: &mut [T],
-    ) {
+    fn rows(&self, drive: &Drive, cells: &Range<usize>, pairs: &[T], driven: &mut [T]) {
         let driven_len = driven.len();
+        let size = driven_len / self.fields.shape[1];
         let field = |pair: usize| &pairs[pair * driven_len..][..driven_len];
         for (value, &unit) in driven.iter_mut().zip(field(drive.pair)) {
             *value = unit * drive.current;
@@ -175,21 +171,42 @@ impl<T: Scalar> Blocks<'_, T> {
             let at = row * self.fields.shape[2];
             // SAFETY: each thread has cells of its own.
             let target = unsafe { self.out.part(at + cells.start..at + cells.end) };
-            // summed in the first cache, then written once
-            scalar_product(line, driven, field(measured));
-            target.copy_from_slice(&line[..target.len()]);
+            scalar_product(target, driven, field(measured), size);
         }
     }
 }
 
-/// Sum over the components of products, cell by cell; each component is as long as the target.
+/// Sum over the components of products, cell by cell; each component has `size` cells.
 #[inline(always)]
-fn scalar_product<T: Scalar>(target: &mut [T], a: &[T], b: &[T]) {
+fn scalar_product<T: Scalar>(target: &mut [T], a: &[T], b: &[T], size: usize) {
     let n = target.len();
-    target.fill(T::ZERO);
-    for (a, b) in a.chunks_exact(n).zip(b.chunks_exact(n)) {
-        for (value, (&a, &b)) in target.iter_mut().zip(a.iter().zip(b)) {
-            *value += a * b;
+    let (mut a, mut b) = (a.chunks_exact(2 * size), b.chunks_exact(2 * size));
+    match (a.next(), b.next()) {
+        (Some(a), Some(b)) => {
+            let ((a0, a1), (b0, b1)) = (halves(a, n), halves(b, n));
+            for i in 0..n {
+                target[i] = a0[i] * b0[i] + a1[i] * b1[i];
+            }
+        }
+        _ => target.fill(T::ZERO),
+    }
+    for (a, b) in a.by_ref().zip(b.by_ref()) {
+        let ((a0, a1), (b0, b1)) = (halves(a, n), halves(b, n));
+        for i in 0..n {
+            target[i] += a0[i] * b0[i] + a1[i] * b1[i];
         }
     }
+    for (value, (&a, &b)) in target
+        .iter_mut()
+        .zip(a.remainder().iter().zip(b.remainder()))
+    {
+        *value += a * b;
+    }
+}
+
+/// The first `n` cells of two components.
+#[inline(always)]
+fn halves<T>(both: &[T], n: usize) -> (&[T], &[T]) {
+    let (first, second) = both.split_at(both.len() / 2);
+    (&first[..n], &second[..n])
 }
