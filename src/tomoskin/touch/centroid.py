@@ -28,24 +28,29 @@ def centroid_sd(
     the edge, taken here over a band of values around the region's lowest (coarea formula); it
     counts for most of the deviation. ``margin`` m: how far beyond the region the edge may lie.
     """
-    top = int(np.argmax(np.abs(image)))
-    limit = float(image[cells[np.argmin(np.abs(image[cells]))]])
+    strength = np.abs(image)
+    top = int(strength.argmax())
+    limit = float(image[cells[strength[cells].argmin()]])
     mass = image[cells] * mesh.volumes[cells]
-    centre = centroid(mesh, cells, np.abs(image))
-    offset = mesh.centroids[cells] - centre
-    edge, edge_offset = _edge(mesh, image, limit, centre, np.hypot(*offset.T).max() + margin)
+    total = mass.sum()
+    offset = mesh.centroids[cells]
+    centre = mass @ offset / total
+    offset -= centre
+    reach = float(np.sqrt((offset**2).sum(axis=1).max())) + margin
+    edge, edge_offset = _edge(mesh, image, limit, centre, reach)
     share = mesh.volumes[edge] * image[edge] / (2 * _BAND * limit)
     at_edge = edge_offset * share[:, None]
     of_top = -at_edge.sum(axis=0) * limit / image[top]
-    lever = np.vstack([offset * mesh.volumes[cells, None], at_edge, of_top])
-    return floor.sd_of(np.concatenate([cells, edge, [top]]), lever / mass.sum())
+    lever = np.concatenate([offset * mesh.volumes[cells, None], at_edge, of_top[None]])
+    return floor.sd_of(np.concatenate([cells, edge, [top]]), lever / total)
 
 
 def _edge(
     mesh: Mesh, image: FloatArray, limit: float, centre: FloatArray, reach: float
 ) -> tuple[IntArray, FloatArray]:
     """Cells whose value is about ``limit`` within ``reach`` of the centre; their offsets."""
-    cells = np.flatnonzero(np.abs(image - limit) < _BAND * abs(limit))
+    ends = sorted((limit * (1 - _BAND), limit * (1 + _BAND)))
+    cells = np.flatnonzero((image > ends[0]) & (image < ends[1]))
     offset = mesh.centroids[cells] - centre
-    near = np.hypot(*offset.T) < reach
+    near = (offset**2).sum(axis=1) < reach**2
     return cells[near], offset[near]

@@ -28,9 +28,9 @@ class NoiseFloor:
         """Floor of ``operator`` (n_cells, n_meas) under ``noise`` (n_meas,) of its input."""
         spread = operator * noise
         sd = np.sqrt(np.einsum("cm,cm->c", spread, spread))
-        return cls(spread.astype(np.float32), sd)
+        return cls(spread.astype(np.float32, order="C"), sd)  # rows are taken one by one
 
     def sd_of(self, cells: IntArray, lever: FloatArray) -> FloatArray:
         """Standard deviation, (k,), of Σ lever · image over ``cells`` (n,), ``lever`` (n, k)."""
-        moved = lever.T.astype(np.float32) @ self.spread[cells]
-        return np.asarray(np.linalg.norm(moved, axis=1), dtype=np.float64)
+        moved = lever.T.astype(np.float32) @ self.spread.take(cells, axis=0)
+        return np.asarray(np.sqrt(np.einsum("km,km->k", moved, moved)), dtype=np.float64)
