@@ -100,11 +100,7 @@ def _changes(
     if operator.difference == "plain":
         _check_scale(reference.mean, model, source)
     dv = difference(real_values, reference.mean, operator.difference)
-    if not reference.noise_is_known:
-        return dv, None, agreement
-    normalised = operator.difference == "normalised"
-    noise = reference.noise / np.abs(reference.mean) if normalised else reference.noise
-    return dv, NoiseFloor.of(operator.matrix, noise), agreement
+    return dv, prepared.noise_floor(reference), agreement
 
 
 def _given_changes(prepared: Prepared, recording: Recording, dv: NDArray[Any]) -> FloatArray:

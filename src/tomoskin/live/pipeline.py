@@ -79,11 +79,7 @@ class Pipeline:
         return self._result(voltages, self._image, (), unusable, pictured=True)
 
     def _settle(self, reference: Reference, host_time: float) -> None:
-        p = self._prepared
-        normalised = p.skin.inverse.difference == "normalised"
-        noise = reference.noise / np.abs(reference.mean) if normalised else reference.noise
-        known = reference.noise_is_known
-        self._floor = NoiseFloor.of(p.operator.matrix, noise) if known else None
+        self._floor = self._prepared.noise_floor(reference)
         self._reference = reference
         self._since = host_time
 

@@ -11,9 +11,9 @@ from tomoskin.forward import ForwardModel
 from tomoskin.inverse import OneStep
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern, Scan
-from tomoskin.signal import Readout
+from tomoskin.signal import Readout, Reference
 from tomoskin.skin import Skin
-from tomoskin.touch import Segmenter
+from tomoskin.touch import NoiseFloor, Segmenter
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +38,14 @@ class Prepared:
     segmenter: Segmenter
     readout: Readout
     predictor: FloatArray
+
+    def noise_floor(self, reference: Reference) -> NoiseFloor | None:
+        """What the noise of a reference does to the picture; None where it is not known."""
+        if not reference.noise_is_known:
+            return None
+        normalised = self.operator.difference == "normalised"
+        noise = reference.noise / np.abs(reference.mean) if normalised else reference.noise
+        return NoiseFloor.of(self.operator.matrix, noise)
 
 
 def prepare(skin: Skin) -> Prepared:
