@@ -1,7 +1,32 @@
-"""The skin file: outline, electrodes, material, drive, readout, mesh and settings; strict."""
+"""The skin file: outline, electrodes, material, drive, readout, mesh and settings; strict.
 
-from tomoskin.skin.page import skin_file_page
+What reads it (:class:`Section`, :class:`Key`, kinds of values) also reads other TOML files.
+"""
+
+from tomoskin.skin.kinds import Choice, Kind, Number, Quantity, Text, Whole, show
+from tomoskin.skin.page import section_text, skin_file_page
+from tomoskin.skin.read import check_names, read_section, toml_tables
+from tomoskin.skin.schema import Key, Section
 from tomoskin.skin.settings import InverseSettings, ReadoutSettings, TouchSettings
 from tomoskin.skin.skin import Skin
 
-__all__ = ["InverseSettings", "ReadoutSettings", "Skin", "TouchSettings", "skin_file_page"]
+__all__ = [
+    "Choice",
+    "InverseSettings",
+    "Key",
+    "Kind",
+    "Number",
+    "Quantity",
+    "ReadoutSettings",
+    "Section",
+    "Skin",
+    "Text",
+    "TouchSettings",
+    "Whole",
+    "check_names",
+    "read_section",
+    "section_text",
+    "show",
+    "skin_file_page",
+    "toml_tables",
+]

@@ -52,13 +52,14 @@ _TABLE = """\
 
 def skin_file_page() -> str:
     """Text of docs/skin-file.md."""
-    sections = "\n".join(_section(section) for section in SECTIONS)
+    sections = "\n".join(section_text(section) for section in SECTIONS)
     return f"{_HEAD}{EXAMPLE}```\n\n{sections}"
 
 
-def _section(section: Section) -> str:
+def section_text(section: Section) -> str:
+    """A section's heading, meaning and table of keys, in Markdown."""
     rows = "".join(_row(key) for key in section.keys)
-    return f"## [{section.name}]\n\n{section.meaning}\n\n{_TABLE}{rows}"
+    return f"## {section.heading}\n\n{section.meaning}\n\n{_TABLE}{rows}"
 
 
 def _row(key: Key) -> str:

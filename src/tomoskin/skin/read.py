@@ -20,51 +20,68 @@ def parse(text: str, source: str) -> Document:
 
     Raises SkinError that names ``source``, section and key.
     """
+    return complete(toml_tables(text, source, FORMAT), source)
+
+
+def toml_tables(text: str, source: str, version: int) -> dict[str, Any]:
+    """Tables of a TOML file whose first key is ``format = version``, as written.
+
+    Raises SkinError that names ``source``.
+    """
     try:
         raw = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also numbers or nesting beyond all bounds
         raise SkinError(f"is not valid TOML: {error}", where=source) from None
-    _check_format(raw, source)
-    return complete({name: raw[name] for name in raw if name != "format"}, source)
+    _check_format(raw, source, version)
+    return {name: raw[name] for name in raw if name != "format"}
 
 
 def complete(raw: Mapping[str, object], source: str) -> Document:
     """``raw`` with every known section, defaults filled in; unknown names are errors."""
-    _check_names(raw, [section.name for section in SECTIONS], "section", source)
-    return {section.name: _complete(section, raw, source) for section in SECTIONS}
+    check_names(raw, [section.name for section in SECTIONS], "section", source)
+    return {
+        section.name: complete_section(
+            section, raw.get(section.name, {}), f"{source}: {section.heading}"
+        )
+        for section in SECTIONS
+    }
 
 
 def values(document: Document, source: str) -> Document:
     """The document's values in SI units."""
     return {
-        section.name: {
-            key.name: _read(section, key, document[section.name][key.name], source)
-            for key in section.keys
-            if key.name in document[section.name]
-        }
+        section.name: section_values(
+            section, document[section.name], f"{source}: {section.heading}"
+        )
         for section in SECTIONS
     }
 
 
-def _check_format(raw: Mapping[str, object], source: str) -> None:
+def read_section(section: Section, given: object, where: str) -> dict[str, Any]:
+    """Values of one section in SI units, defaults filled in; ``where`` names it in errors.
+
+    Raises SkinError that names the key.
+    """
+    return section_values(section, complete_section(section, given, where), where)
+
+
+def _check_format(raw: Mapping[str, object], source: str, version: int) -> None:
+    where = f"{source}: format"
     if "format" not in raw:
-        raise SkinError(
-            "is missing", where=f"{source}: format", hint=f"begin the file with format = {FORMAT}"
-        )
-    if raw["format"] != FORMAT or isinstance(raw["format"], bool):
-        raise SkinError(f"expected {FORMAT}, got {show(raw['format'])}", where=f"{source}: format")
+        raise SkinError("is missing", where=where, hint=f"begin the file with format = {version}")
+    if raw["format"] != version or isinstance(raw["format"], bool):
+        raise SkinError(f"expected {version}, got {show(raw['format'])}", where=where)
 
 
-def _complete(section: Section, raw: Mapping[str, object], source: str) -> dict[str, Any]:
-    where = f"{source}: [{section.name}]"
-    given = raw.get(section.name, {})
+def complete_section(section: Section, given: object, where: str) -> dict[str, Any]:
+    """``given`` keys as written, defaults filled in; SkinError for a key that may not stand."""
     if not isinstance(given, Mapping):
         raise SkinError(
             f"expected a section, got {show(given)}",
             where=where,
-            hint=f"write [{section.name}] on a line of its own",
+            hint=f"write {section.heading} on a line of its own",
         )
-    _check_names(given, [key.name for key in section.keys], "key", where)
+    check_names(given, [key.name for key in section.keys], "key", where)
     filled: dict[str, Any] = {}
     for key in section.keys:
         barred = _barred(key, given, filled)
@@ -95,7 +112,8 @@ def _barred(key: Key, given: Mapping[str, object], filled: Mapping[str, object])
     return ""
 
 
-def _check_names(given: Iterable[str], known: list[str], what: str, where: str) -> None:
+def check_names(given: Iterable[str], known: list[str], what: str, where: str) -> None:
+    """Raise SkinError for a name that is not known, with the one that may have been meant."""
     for name in given:
         if name not in known:
             close = get_close_matches(name, known, n=1)
@@ -103,9 +121,17 @@ def _check_names(given: Iterable[str], known: list[str], what: str, where: str) 
             raise SkinError(f'unknown {what} "{name}"', where=where, hint=guess)
 
 
-def _read(section: Section, key: Key, value: object, source: str) -> Any:
+def section_values(section: Section, filled: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """The section's values in SI units."""
+    return {
+        key.name: _read(key, filled[key.name], f"{where} {key.name}")
+        for key in section.keys
+        if key.name in filled
+    }
+
+
+def _read(key: Key, value: object, place: str) -> Any:
     try:
         return key.kind.read(value)
     except ValueError as error:
-        place = f"{source}: [{section.name}] {key.name}"
         raise SkinError(str(error), where=place) from None

@@ -47,11 +47,17 @@ class Key:
 
 @dataclass(frozen=True)
 class Section:
-    """A table of the file."""
+    """A table of the file; with ``many``, a list of tables."""
 
     name: str
     meaning: str
     keys: tuple[Key, ...]
+    many: bool = False
+
+    @property
+    def heading(self) -> str:
+        """The line that begins it."""
+        return f"[[{self.name}]]" if self.many else f"[{self.name}]"
 
 
 _SIZE = Quantity("length", "mm", 1, 5000)
