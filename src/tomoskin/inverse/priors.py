@@ -1,98 +1,155 @@
-"""Prior matrices Q of the one-step operator.
+"""Priors: what is held to be likely before there are data.
 
-A prior is a function of the mesh and the Jacobian that returns Q: a vector is a diagonal
-matrix; otherwise a sparse or dense symmetric one, (n_cells, n_cells).
+A prior is a small frozen object; on a mesh, with the Jacobian of the difference data, it becomes a
+penalty xᵀQx. The names in a skin file stand for the priors in ``PRIORS``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, issparse
 
 from tomoskin.core import FloatArray, ModelError
+from tomoskin.inverse.penalty import Diagonal, Penalty, dense_penalty, sparse_penalty
 from tomoskin.mesh import Mesh
 
-Prior = Callable[[Mesh, FloatArray], Any]
 
-NOSER_EXPONENT = 0.5
-GAUSSIAN_DIAMETER = 0.1
-"""Width of the Gaussian high-pass prior, as a fraction of the mesh's largest extent."""
+class Prior(Protocol):
+    """Anything that becomes a penalty on a mesh."""
+
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+        """Return Q on ``mesh``; ``jacobian`` (n_meas, n_cells) is that of the difference data."""
+        ...
 
 
-def identity(mesh: Mesh, jacobian: FloatArray) -> FloatArray:
+@dataclass(frozen=True)
+class Identity:
     """Q = I (Tikhonov)."""
-    del jacobian
-    return np.ones(len(mesh.cells))
+
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+        """Return Q on ``mesh``."""
+        del jacobian
+        return Diagonal(np.ones(len(mesh.cells)))
 
 
-def noser(mesh: Mesh, jacobian: FloatArray) -> FloatArray:
-    """Q = diag(Σ_rows J²)^0.5 (Cheney et al. 1990; the exponent as in EIDORS)."""
-    del mesh
-    return np.asarray(np.einsum("mc,mc->c", jacobian, jacobian) ** NOSER_EXPONENT)
+@dataclass(frozen=True)
+class Noser:
+    """Q = diag(Σ_rows |J|²)^exponent (Cheney et al. 1990); 0.5 as in EIDORS.
+
+    An exponent of 0 is the identity; 1 raises the inner cells to the sensitivity of the rim.
+    """
+
+    exponent: float = 0.5
+
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+        """Return Q on ``mesh``."""
+        del mesh
+        power = np.einsum("mc,mc->c", jacobian, jacobian.conj()).real
+        return Diagonal(np.asarray(power**self.exponent))
 
 
-def laplace(mesh: Mesh, jacobian: FloatArray) -> csr_array:
+@dataclass(frozen=True)
+class Laplace:
     """Q = twice the graph Laplacian of cells that share a facet, as in EIDORS."""
-    del jacobian
-    first, second = mesh.neighbours.T
-    n = len(mesh.cells)
-    degree = np.bincount(np.concatenate([first, second]), minlength=n)
-    rows = np.concatenate([first, second, np.arange(n)])
-    cols = np.concatenate([second, first, np.arange(n)])
-    values = np.concatenate([np.full(2 * len(first), -2.0), 2.0 * degree])
-    return csr_array(coo_array((values, (rows, cols)), shape=(n, n)))
+
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+        """Return Q on ``mesh``."""
+        del jacobian
+        return sparse_penalty(_graph_laplacian(mesh, np.full(len(mesh.neighbours), 2.0)))
 
 
-def gaussian(mesh: Mesh, jacobian: FloatArray) -> FloatArray:
+@dataclass(frozen=True)
+class GaussianHighPass:
     """Q = FᵀF with F = I − G, a Gaussian high-pass filter (Adler & Guardo 1996).
 
-    G averages with weights area · exp(−4 ln 2 · (distance / width)²), rows summing to one.
+    G averages with weights area · exp(−4 ln 2 · (distance / width)²), rows summing to one;
+    ``width`` is a fraction of the mesh's largest extent.
     """
-    del jacobian
-    extent = float(np.ptp(mesh.points, axis=0).max())
-    offset = mesh.centroids[:, None, :] - mesh.centroids[None, :, :]
-    square = np.einsum("ijd,ijd->ij", offset, offset) / (GAUSSIAN_DIAMETER * extent) ** 2
-    weights = mesh.volumes * np.exp(-4.0 * np.log(2.0) * square)
-    high_pass = np.eye(len(weights)) - weights / weights.sum(axis=1, keepdims=True)
-    return np.asarray(high_pass.T @ high_pass)
 
+    width: float = 0.1
+
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+        """Return Q on ``mesh``."""
+        del jacobian
+        extent = float(np.ptp(mesh.points, axis=0).max())
+        offset = mesh.centroids[:, None, :] - mesh.centroids[None, :, :]
+        square = np.einsum("ijd,ijd->ij", offset, offset) / (self.width * extent) ** 2
+        weights = mesh.volumes * np.exp(-4.0 * np.log(2.0) * square)
+        high_pass = np.eye(len(weights)) - weights / weights.sum(axis=1, keepdims=True)
+        return dense_penalty(high_pass.T @ high_pass)
+
+
+PriorLike = str | Prior | Any
+"""A name, a prior, or a matrix Q of the caller's own: dense, sparse or a diagonal."""
 
 PRIORS: dict[str, Prior] = {
-    "identity": identity,
-    "laplace": laplace,
-    "gaussian": gaussian,
-    "noser": noser,
+    "identity": Identity(),
+    "laplace": Laplace(),
+    "gaussian": GaussianHighPass(),
+    "noser": Noser(),
 }
 """Priors by the name that a skin file uses."""
 
 
-def prior_matrix(prior: Any, mesh: Mesh, jacobian: FloatArray) -> NDArray[Any]:
-    """Q by name, or a matrix of the caller's own (dense, sparse or a diagonal), checked.
-
-    Returns
-    -------
-    (n_cells,) for a diagonal Q, else dense (n_cells, n_cells).
+def penalty_of(prior: PriorLike, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+    """Penalty of a prior by name, of a prior, or of a matrix of the caller's own, checked.
 
     Raises
     ------
     ModelError
-        When the name is not known, the shape does not fit the mesh, or a value is not finite.
+        When the name is not known, the shape does not fit the mesh, a value is not finite, or
+        Q is not positive semi-definite.
     """
-    n = len(mesh.cells)
     if isinstance(prior, str):
         if prior not in PRIORS:
             raise ModelError(f'expected a prior among {", ".join(PRIORS)}, got "{prior}"')
-        prior = PRIORS[prior](mesh, jacobian)
-    value: Any = prior
-    matrix = np.asarray(value.toarray() if issparse(prior) else value, dtype=np.float64)
-    if matrix.shape not in ((n,), (n, n)):
-        raise ModelError(f"expected a prior of shape ({n}, {n}), got {matrix.shape}")
-    finite = np.isfinite(matrix)
+        prior = PRIORS[prior]
+    if hasattr(prior, "penalty"):
+        penalty: Penalty = prior.penalty(mesh, jacobian)
+        return penalty
+    return _of_matrix(prior, len(mesh.cells))
+
+
+def prior_matrix(prior: PriorLike, mesh: Mesh, jacobian: NDArray[Any]) -> FloatArray:
+    """Q: (n_cells,) where it is diagonal, else dense (n_cells, n_cells); see `penalty_of`."""
+    return penalty_of(prior, mesh, jacobian).matrix
+
+
+def _of_matrix(given: Any, n: int) -> Penalty:
+    if issparse(given):
+        _check_shape(given.shape, n)
+        table = given.tocoo()
+        _check_finite(table.data, table.row)
+        return sparse_penalty(csr_array(table).astype(np.float64))
+    matrix = np.asarray(given, dtype=np.float64)
+    _check_shape(matrix.shape, n)
+    _check_finite(matrix, np.arange(n))
+    return Diagonal(matrix) if matrix.ndim == 1 else dense_penalty(matrix)
+
+
+def _check_shape(shape: tuple[int, ...], n: int) -> None:
+    if shape not in ((n,), (n, n)):
+        raise ModelError(f"expected a prior of shape ({n}, {n}), got {shape}")
+
+
+def _check_finite(values: FloatArray, cells: NDArray[Any]) -> None:
+    finite = np.isfinite(values)
     if not finite.all():
-        cell = int(np.argwhere(~finite)[0, 0])
+        cell = int(cells[np.argwhere(~finite)[0, 0]])
         raise ModelError("expected finite numbers", where=f"prior, cell {cell}")
-    return matrix
+
+
+def _graph_laplacian(mesh: Mesh, coupling: FloatArray) -> csr_array:
+    """(n_cells, n_cells) with −``coupling`` (n_pairs,) for neighbours; rows sum to zero."""
+    first, second = mesh.neighbours.T
+    n = len(mesh.cells)
+    ends = np.concatenate([first, second])
+    degree = np.bincount(ends, np.tile(coupling, 2), n)
+    rows = np.concatenate([ends, np.arange(n)])
+    cols = np.concatenate([second, first, np.arange(n)])
+    values = np.concatenate([np.tile(-coupling, 2), degree])
+    return csr_array(coo_array((values, (rows, cols)), shape=(n, n)))

@@ -1,0 +1,168 @@
+"""A prior on one mesh, in the forms that it comes in: what Q is, and what Q⁻¹ does to J.
+
+A one-step image minimises ‖Jx − dv‖²_W + α²xᵀQx. All that an operator needs of Q is Q⁻¹Jᴴ and
+JQ⁻¹Jᴴ, n_meas columns at most, so Q is never inverted. Where Q is singular, as a smoothness
+prior is, Q⁻¹ is any generalised inverse, and the images that Q does not weigh, ``free``, are
+fitted to the data beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
+from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from tomoskin.core import FloatArray, ModelError
+
+_ZERO = 1e-12
+"""An eigenvalue, pivot or row sum below this part of the largest one is zero."""
+
+Carried = tuple[NDArray[Any], NDArray[Any]]
+"""Q⁻¹Jᴴ (n_cells, n_meas) and JQ⁻¹Jᴴ (n_meas, n_meas)."""
+
+
+class Penalty(Protocol):
+    """xᵀQx on the cells of one mesh; Q is real."""
+
+    @property
+    def free(self) -> FloatArray:
+        """(n_cells, k) a basis of the images that cost nothing; k is 0 where Q is regular."""
+        ...
+
+    @property
+    def matrix(self) -> FloatArray:
+        """Q: (n_cells,) where it is diagonal, else dense (n_cells, n_cells)."""
+        ...
+
+    def carry(self, jacobian: NDArray[Any]) -> Carried:
+        """Q⁻¹Jᴴ, in new memory, and JQ⁻¹Jᴴ."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Diagonal:
+    """Q = diag(``matrix``), (n_cells,) above 0. Raises ModelError where it is not."""
+
+    matrix: FloatArray
+
+    def __post_init__(self) -> None:
+        """Refuse an entry that is not positive."""
+        if not (self.matrix > 0).all():
+            cell = int(np.argmin(self.matrix > 0))
+            raise ModelError("expected a positive diagonal", where=f"prior, cell {cell}")
+
+    @property
+    def free(self) -> FloatArray:
+        """No image is free."""
+        return np.empty((len(self.matrix), 0))
+
+    def carry(self, jacobian: NDArray[Any]) -> Carried:
+        """By a symmetric product, which is half the work of a general one."""
+        root = np.sqrt(self.matrix)
+        scaled = jacobian / root
+        gram = scaled @ scaled.conj().T
+        scaled /= root
+        return scaled.conj().T, gram
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """Q dense or sparse, (n_cells, n_cells), and what solves with it.
+
+    ``solve`` maps real columns (n_cells, m) by a generalised inverse of Q.
+    """
+
+    given: FloatArray | csr_array
+    free: FloatArray
+    solve: Callable[[FloatArray], FloatArray]
+
+    @property
+    def matrix(self) -> FloatArray:
+        """Q, dense."""
+        given: Any = self.given
+        return np.asarray(given.toarray() if isinstance(given, csr_array) else given)
+
+    def carry(self, jacobian: NDArray[Any]) -> Carried:
+        """By one solution for each row of the Jacobian."""
+        columns = jacobian.conj().T
+        if np.iscomplexobj(columns):
+            spread = self.solve(columns.real) + 1j * self.solve(columns.imag)
+        else:
+            spread = self.solve(columns)
+        return spread, jacobian @ spread
+
+
+def sparse_penalty(q: csr_array) -> Penalty:
+    """Penalty of a sparse Q, positive semi-definite.
+
+    A part of the mesh whose rows sum to zero is a difference prior: its constant is free. More
+    weight on one cell of such a part makes a regular matrix, whose inverse is a generalised
+    inverse of Q. Where that does not do, Q is taken as dense.
+    """
+    count, part = connected_components(q, directed=False)
+    diagonal = q.diagonal()
+    sums = np.bincount(part, np.abs(q.sum(axis=1)), count)
+    floating = np.flatnonzero(sums <= _ZERO * np.bincount(part, np.abs(diagonal), count))
+    free = (part[:, None] == floating).astype(np.float64)
+    grounded = csc_array(q + diags_array(_ground(free, diagonal)))
+    try:
+        factor = splu(
+            grounded,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError:
+        return dense_penalty(q.toarray())
+    pivots = factor.U.diagonal()
+    if pivots.min() <= _ZERO * pivots.max():
+        return dense_penalty(q.toarray())
+    return Factored(q, free, factor.solve)
+
+
+def dense_penalty(q: FloatArray) -> Penalty:
+    """Penalty of a dense Q, positive semi-definite.
+
+    Raises
+    ------
+    ModelError
+        When Q has a negative eigenvalue.
+    """
+    diagonal = np.diag(q)
+    constant_is_free = np.abs(q.sum(axis=1)).max() <= _ZERO * np.abs(diagonal).max()
+    free = np.ones((len(q), int(constant_is_free)))
+    grounded = q.copy()
+    grounded[np.diag_indices_from(grounded)] += _ground(free, diagonal)
+    try:
+        factor = cho_factor(grounded, lower=True, overwrite_a=True, check_finite=False)
+    except LinAlgError:
+        return _by_eigenvalues(q)
+    pivots = np.diag(factor[0]) ** 2
+    if pivots.min() <= _ZERO * pivots.max():
+        return _by_eigenvalues(q)
+    return Factored(q, free, lambda columns: cho_solve(factor, columns, check_finite=False))
+
+
+def _ground(free: FloatArray, diagonal: FloatArray) -> FloatArray:
+    """(n_cells,) weight on one cell of each free image."""
+    ground = np.zeros(len(diagonal))
+    ground[free.argmax(axis=0)] = np.abs(diagonal).max()
+    return ground
+
+
+def _by_eigenvalues(q: FloatArray) -> Penalty:
+    """Penalty of a Q with free images that are not constants: costly, and always right."""
+    values, vectors = eigh(q, check_finite=False)
+    if values[0] < -_ZERO * np.abs(values).max():
+        raise ModelError(f"the prior is not positive definite: it has eigenvalue {values[0]:.3g}")
+    regular = values > _ZERO * np.abs(values).max()
+    kept = vectors[:, regular]
+    inverse = kept.T / values[regular, None]
+    return Factored(q, vectors[:, ~regular], lambda columns: kept @ (inverse @ columns))

@@ -1,0 +1,172 @@
+"""The linear problem that every one-step operator, spectrum and choice of alpha starts from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import LinAlgError, cho_solve, get_blas_funcs
+from scipy.linalg import cholesky as scipy_cholesky
+
+from tomoskin.core import FloatArray, ModelError
+from tomoskin.forward import ForwardModel
+from tomoskin.inverse.operator import Operator
+from tomoskin.inverse.penalty import Carried, Penalty
+from tomoskin.inverse.priors import PriorLike, penalty_of
+
+_ZERO = 1e-9
+"""A voltage below this part of the largest is zero by symmetry, and its value is rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearProblem:
+    """Minimise ‖Jx − dv‖²_W + α²xᵀQx over images x, for any alpha.
+
+    Attributes
+    ----------
+    model
+        The forward model that was linearised.
+    jacobian
+        (n_meas, n_cells) J of the difference data: V per S, or 1 per S when normalised; real
+        or complex.
+    weights
+        (n_meas,) diagonal of W.
+    prior
+        Q on this mesh.
+    difference
+        "plain" or "normalised".
+    reference
+        (n_meas,) V: the model's voltages where it was linearised.
+    """
+
+    model: ForwardModel
+    jacobian: NDArray[Any]
+    weights: FloatArray
+    prior: Penalty
+    difference: str
+    reference: NDArray[Any]
+
+    @classmethod
+    def of(
+        cls,
+        model: ForwardModel,
+        prior: PriorLike = "noser",
+        *,
+        conductivity: ArrayLike = 1.0,
+        difference: str = "plain",
+        weights: ArrayLike | None = None,
+    ) -> Self:
+        """Linearise ``model``; the parameters are those of :class:`OneStep`.
+
+        Raises
+        ------
+        ModelError
+            For an unknown prior or difference, weights that are not positive, or a
+            conductivity that is impossible or a tensor.
+        """
+        state = model.at(conductivity)
+        if state.conductivity.ndim > 1:
+            raise ModelError("expected one conductivity per cell, got tensors")
+        reference = state.voltages
+        jacobian, default = _data_model(state.jacobian, reference, difference)
+        weight = _weights(default if weights is None else weights, len(jacobian))
+        penalty = penalty_of(prior, model.mesh, jacobian)
+        return cls(model, jacobian, weight, penalty, difference, reference)
+
+    @cached_property
+    def carried(self) -> Carried:
+        """Q⁻¹Jᴴ (n_cells, n_meas) and JQ⁻¹Jᴴ (n_meas, n_meas), which hold for every alpha."""
+        return self.prior.carry(self.jacobian)
+
+    def operator(self, alpha: float) -> Operator:
+        """Minimiser of the problem as a matrix, made in the space of the measurements.
+
+        With K = JQ⁻¹Jᴴ + α²W⁻¹ it is Q⁻¹JᴴK⁻¹. Free images N are fitted first, by generalised
+        least squares with B = JN: they get C = (BᴴK⁻¹B)⁻¹BᴴK⁻¹, the rest what is left over
+        (universal kriging; Rasmussen & Williams 2006, equations 2.41 and 2.42).
+
+        Raises
+        ------
+        ModelError
+            When alpha is not above 0, or so small that the system is singular.
+        """
+        if not (np.isfinite(alpha) and alpha > 0):
+            raise ModelError(f"expected alpha above 0, got {alpha}")
+        spread, gram = self.carried
+        system = gram.copy()
+        system[np.diag_indices_from(system)] += alpha**2 / self.weights
+        factor = _cholesky(system)
+        matrix = _divided(spread, factor)
+        precision = cho_solve((factor, True), np.eye(len(gram)), check_finite=False)
+        free = self.prior.free
+        if free.shape[1]:
+            matrix, precision = _with_free(matrix, precision, free, self.jacobian @ free)
+        return Operator(
+            self.model,
+            matrix,
+            precision=precision,
+            reference=self.reference,
+            difference=self.difference,
+        )
+
+
+def _divided(spread: NDArray[Any], factor: NDArray[Any]) -> NDArray[Any]:
+    """``spread`` K⁻¹, from the right: the rows of measurements are the columns that BLAS wants."""
+    (solve,) = get_blas_funcs(("trsm",), (factor, spread))
+    half = solve(1.0, factor, spread, side=1, lower=1, trans_a=2)
+    return np.asarray(solve(1.0, factor, half, side=1, lower=1, overwrite_b=1))
+
+
+def _with_free(
+    matrix: NDArray[Any], precision: NDArray[Any], free: FloatArray, seen: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Matrix and precision with the free images N fitted, ``seen`` = JN (n_meas, k)."""
+    half = precision @ seen
+    factor = _cholesky(seen.conj().T @ half)
+    fitted = cho_solve((factor, True), half.conj().T, check_finite=False)
+    matrix += (free - matrix @ seen) @ fitted
+    return matrix, precision - half @ fitted
+
+
+def _data_model(
+    jacobian: NDArray[Any], reference: NDArray[Any], difference: str
+) -> tuple[NDArray[Any], FloatArray]:
+    """Jacobian of the difference data, and the weights that go with it."""
+    if difference == "plain":
+        return jacobian, np.ones(len(reference))
+    if difference == "normalised":
+        size = np.abs(reference)
+        _refuse_zeros(size)
+        return jacobian / size[:, None], size**2
+    raise ModelError(f'expected difference "plain" or "normalised", got "{difference}"')
+
+
+def _refuse_zeros(size: FloatArray) -> None:
+    if size.min() < _ZERO * size.max():
+        raise ModelError(
+            f"the model expects {size.min():.1e} V, which cannot be normalised by",
+            where=f"row {int(size.argmin())}",
+            hint='choose difference "plain", or a pattern without such rows',
+        )
+
+
+def _weights(value: ArrayLike, n_meas: int) -> FloatArray:
+    weights = np.asarray(value, dtype=np.float64)
+    if weights.shape != (n_meas,):
+        raise ModelError(f"expected weights of shape ({n_meas},), got {weights.shape}")
+    if not (np.isfinite(weights).all() and (weights > 0).all()):
+        row = int(np.argmin(np.isfinite(weights) & (weights > 0)))
+        raise ModelError(f"expected weights above 0, got {weights[row]}", where=f"row {row}")
+    return weights
+
+
+def _cholesky(system: NDArray[Any]) -> NDArray[Any]:
+    try:
+        return np.asarray(scipy_cholesky(system, lower=True, overwrite_a=True, check_finite=False))
+    except LinAlgError as error:
+        raise ModelError(
+            "the regularised system is not positive definite", hint="raise alpha"
+        ) from error
