@@ -33,6 +33,10 @@ class SkinError(TomoskinError):
     """A skin file that cannot be meant: unknown key, wrong unit, impossible value."""
 
 
+class ScriptError(TomoskinError):
+    """A script of the twin that cannot be meant: unknown key, overlapping ids, impossible step."""
+
+
 class GeometryError(TomoskinError):
     """An outline, electrode placement or mesh that does not describe a sheet."""
 

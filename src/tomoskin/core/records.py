@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tomoskin.core.errors import DataError, ModelError
+
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 IntArray = NDArray[np.int64]
@@ -62,6 +64,30 @@ class Voltages:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class PixelMap:
+    """A raster over a mesh; a pixel belongs to the cell that its centre lies in.
+
+    Attributes
+    ----------
+    cells
+        (h, w) cell of each pixel, −1 outside the mesh; row 0 is at the top (greatest y).
+    x, y
+        (w,) and (h,) centres of the columns and of the rows, m.
+    mesh_id
+        ``Mesh.identity`` of the mesh.
+    """
+
+    cells: IntArray
+    x: FloatArray
+    y: FloatArray
+    mesh_id: str
+
+    def spread(self, values: FloatArray) -> FloatArray:
+        """(h, w) of ``values`` (n_cells,), NaN outside."""
+        return np.asarray(np.where(self.cells >= 0, values[self.cells], np.nan))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Image:
     """A change of conductivity per cell.
 
@@ -72,6 +98,35 @@ class Image:
     values: FloatArray
     unit: str
     mesh_id: str
+
+    def relative_to(self, conductivity: float) -> Image:
+        """Share of the sheet's own ``conductivity`` (S or S/m): Δσ/σ₀.
+
+        Raises
+        ------
+        ModelError
+            When the conductivity is not above 0.
+        """
+        if self.unit == "relative":
+            return self
+        if not (np.isfinite(conductivity) and conductivity > 0):
+            raise ModelError(f"expected a conductivity above 0, got {conductivity}")
+        return Image(self.values / conductivity, "relative", self.mesh_id)
+
+    def on_pixels(self, pixels: PixelMap) -> FloatArray:
+        """(h, w) values on a raster of the same mesh, NaN outside.
+
+        Raises
+        ------
+        DataError
+            When the raster was made for another mesh.
+        """
+        if pixels.mesh_id != self.mesh_id:
+            raise DataError(
+                f"the image lives on mesh {self.mesh_id}, the pixels on {pixels.mesh_id}",
+                hint="make the pixels from the mesh that the image was made on",
+            )
+        return pixels.spread(self.values)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from tomoskin.core import FloatArray, GeometryError, IntArray
+from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap
 from tomoskin.mesh.check import check_mesh
+from tomoskin.mesh.pixels import pixel_map, step_for
 from tomoskin.mesh.topology import boundary_facets, neighbour_pairs, simplex_measure
 
 if TYPE_CHECKING:
@@ -94,6 +95,17 @@ class Mesh:
             digest.update(str(array.shape).encode())
             digest.update(np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()[:16]
+
+    def pixels(
+        self, count: int = 64, *, step: float | None = None, z: float | None = None
+    ) -> PixelMap:
+        """Raster of square pixels: ``count`` along the longer side, or of side ``step`` m.
+
+        Of tetrahedra it is the slice at height ``z`` m. Raises GeometryError for a curved sheet,
+        or a size or height that is impossible.
+        """
+        side = step_for(self.points, self.cells, count) if step is None else step
+        return pixel_map(self.points, self.cells, self.identity, step=side, height=z)
 
 
 def _frozen(value: object, dtype: DTypeLike, where: str) -> NDArray[Any]:
