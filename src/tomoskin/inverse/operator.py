@@ -120,14 +120,17 @@ class Operator:
         lost &= ~self.left_out
         if not lost.any():
             return self
-        matrix, precision = downdated(self.matrix, self.precision, lost, self.left_out | lost)
+        left_out = self.left_out | lost
+        if left_out.all():
+            raise DataError("no row is left")
+        matrix, precision = downdated(self.matrix, self.precision, lost, left_out)
         return Operator(
             self.model,
             matrix,
             precision=precision,
             reference=self.reference,
             difference=self.difference,
-            left_out=self.left_out | lost,
+            left_out=left_out,
         )
 
     def filled(self, dv: NDArray[Any], missing: NDArray[np.bool_]) -> NDArray[Any]:

@@ -2,8 +2,8 @@
 
 A one-step image minimises ‖Jx − dv‖²_W + α²xᵀQx. All that an operator needs of Q is Q⁻¹Jᴴ and
 JQ⁻¹Jᴴ, n_meas columns at most, so Q is never inverted. Where Q is singular, as a smoothness
-prior is, Q⁻¹ is any generalised inverse, and the images that Q does not weigh, ``free``, are
-fitted to the data beside it.
+prior is, Q⁻¹ is its pseudo-inverse, and the images that Q does not weigh, ``free``, are fitted
+to the data beside it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Penalty(Protocol):
 
     @property
     def free(self) -> FloatArray:
-        """(n_cells, k) a basis of the images that cost nothing; k is 0 where Q is regular."""
+        """(n_cells, k) orthonormal basis of the images that cost nothing; k is 0 for regular Q."""
         ...
 
     @property
@@ -76,7 +76,7 @@ class Diagonal:
 class Factored:
     """Q dense or sparse, (n_cells, n_cells), and what solves with it.
 
-    ``solve`` maps real columns (n_cells, m) by a generalised inverse of Q.
+    ``solve`` maps real columns (n_cells, m) by any generalised inverse of Q.
     """
 
     given: FloatArray | csr_array
@@ -90,13 +90,23 @@ class Factored:
         return np.asarray(given.toarray() if isinstance(given, csr_array) else given)
 
     def carry(self, jacobian: NDArray[Any]) -> Carried:
-        """By one solution for each row of the Jacobian."""
-        columns = jacobian.conj().T
+        """By one solution for each row of the Jacobian.
+
+        Without its free images before and after, a generalised inverse is the pseudo-inverse.
+        """
+        columns = self._weighed(jacobian.conj().T)
         if np.iscomplexobj(columns):
-            spread = self.solve(columns.real) + 1j * self.solve(columns.imag)
+            solved = self.solve(columns.real) + 1j * self.solve(columns.imag)
         else:
-            spread = self.solve(columns)
+            solved = self.solve(columns)
+        spread = self._weighed(solved)
         return spread, jacobian @ spread
+
+    def _weighed(self, columns: NDArray[Any]) -> NDArray[Any]:
+        """``columns`` without their part in the free images."""
+        if not self.free.shape[1]:
+            return columns
+        return np.asarray(columns - self.free @ (self.free.T @ columns))
 
 
 def sparse_penalty(q: csr_array) -> Penalty:
@@ -110,7 +120,7 @@ def sparse_penalty(q: csr_array) -> Penalty:
     diagonal = q.diagonal()
     sums = np.bincount(part, np.abs(q.sum(axis=1)), count)
     floating = np.flatnonzero(sums <= _ZERO * np.bincount(part, np.abs(diagonal), count))
-    free = (part[:, None] == floating).astype(np.float64)
+    free = (part[:, None] == floating) / np.sqrt(np.bincount(part)[floating])
     grounded = csc_array(q + diags_array(_ground(free, diagonal)))
     try:
         factor = splu(
@@ -137,7 +147,7 @@ def dense_penalty(q: FloatArray) -> Penalty:
     """
     diagonal = np.diag(q)
     constant_is_free = np.abs(q.sum(axis=1)).max() <= _ZERO * np.abs(diagonal).max()
-    free = np.ones((len(q), int(constant_is_free)))
+    free = np.full((len(q), int(constant_is_free)), 1.0 / np.sqrt(len(q)))
     grounded = q.copy()
     grounded[np.diag_indices_from(grounded)] += _ground(free, diagonal)
     try:

@@ -120,12 +120,13 @@ def prior_matrix(prior: PriorLike, mesh: Mesh, jacobian: NDArray[Any]) -> FloatA
 
 
 def _of_matrix(given: Any, n: int) -> Penalty:
+    value: Any = given  # which issparse would narrow to a class without members
     if issparse(given):
-        _check_shape(given.shape, n)
-        table = given.tocoo()
+        table = coo_array(value)
+        _check_shape(table.shape, n)
         _check_finite(table.data, table.row)
         return sparse_penalty(csr_array(table).astype(np.float64))
-    matrix = np.asarray(given, dtype=np.float64)
+    matrix = np.asarray(value, dtype=np.float64)
     _check_shape(matrix.shape, n)
     _check_finite(matrix, np.arange(n))
     return Diagonal(matrix) if matrix.ndim == 1 else dense_penalty(matrix)

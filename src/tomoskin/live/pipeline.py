@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, Frame, Image, Touch, Voltages
 from tomoskin.live.collector import Collector
-from tomoskin.live.missing import fill
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.result import ReferenceState, Result
 from tomoskin.signal import Reference, difference
@@ -92,7 +91,7 @@ class Pipeline:
             return self._result(voltages, self._image, touches, unusable, pictured=False)
         values = np.where(unusable, reference.mean, voltages.values)
         dv = difference(values, reference.mean, p.skin.inverse.difference)
-        image = p.operator.quick(fill(dv, unusable, p.predictor))
+        image = p.operator.quick(p.operator.filled(dv, unusable))
         readings = p.segmenter(image.values, self._floor)
         touches = self._tracker.update(readings, voltages.host_time)
         return self._result(voltages, image, touches, unusable, pictured=True)

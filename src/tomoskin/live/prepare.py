@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import OneStep
 from tomoskin.mesh import Mesh
@@ -24,9 +23,6 @@ class Prepared:
     ----------
     skin, mesh, pattern, scan, model, operator, segmenter, readout
         The stages, in the order of the flow.
-    predictor
-        (n_meas, n_meas) the operator's picture put through the linear model again: what the
-        kept rows say about those that are left out.
     """
 
     skin: Skin
@@ -37,7 +33,6 @@ class Prepared:
     operator: OneStep
     segmenter: Segmenter
     readout: Readout
-    predictor: FloatArray
 
     def noise_floor(self, reference: Reference) -> NoiseFloor | None:
         """What the noise of a reference does to the picture; None where it is not known."""
@@ -76,12 +71,4 @@ def prepare(skin: Skin) -> Prepared:
         operator=operator,
         segmenter=Segmenter(mesh, skin.touch),
         readout=Readout.of(scan, skin.readout),
-        predictor=_predictor(model, operator, skin),
     )
-
-
-def _predictor(model: ForwardModel, operator: OneStep, skin: Skin) -> FloatArray:
-    predicted = model.jacobian(skin.conductivity) @ operator.matrix
-    if skin.inverse.difference == "normalised":
-        predicted /= np.abs(operator.reference)[:, None]
-    return np.asarray(predicted)
