@@ -12,6 +12,7 @@ from tomoskin.inverse.priors import (
     prior_matrix,
 )
 from tomoskin.inverse.problem import LinearProblem
+from tomoskin.inverse.spectrum import Spectrum
 
 __all__ = [
     "PRIORS",
@@ -23,5 +24,6 @@ __all__ = [
     "OneStep",
     "Operator",
     "Prior",
+    "Spectrum",
     "prior_matrix",
 ]
