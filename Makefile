@@ -85,7 +85,7 @@ lock-uv:
 lock-runtime:
 	@$(COMPILE) pyproject.toml requirements/build.in -o requirements/runtime.txt
 lock-dev:
-	@$(COMPILE) pyproject.toml --extra mesh --extra plot requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
+	@$(COMPILE) pyproject.toml --extra mesh --extra plot --extra parquet --extra hdf5 requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
 lock-bench:
 	@$(COMPILE) pyproject.toml --extra bench -c requirements/dev.txt -o requirements/bench.txt
 lock-node:

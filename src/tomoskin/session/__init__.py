@@ -1,17 +1,34 @@
-"""Recordings: read, import, write; pictures and files of their images."""
+"""Recordings: sessions, interchange, import; pictures and files of their images."""
 
 from tomoskin.session.interchange import write_interchange
+from tomoskin.session.layout import Mark, MarkedFrame
 from tomoskin.session.picture import MOST_PANELS, Panel, write_picture
+from tomoskin.session.raster import Raster
 from tomoskin.session.reader import read_recording
 from tomoskin.session.recording import Recording
+from tomoskin.session.session_reader import (
+    RecordedTouches,
+    SessionReader,
+    Truth,
+    read_session,
+)
 from tomoskin.session.touch_csv import write_touches
 from tomoskin.session.vtu import write_vtu
+from tomoskin.session.writer import SessionWriter
 
 __all__ = [
     "MOST_PANELS",
+    "Mark",
+    "MarkedFrame",
     "Panel",
+    "Raster",
+    "RecordedTouches",
     "Recording",
+    "SessionReader",
+    "SessionWriter",
+    "Truth",
     "read_recording",
+    "read_session",
     "write_interchange",
     "write_picture",
     "write_touches",

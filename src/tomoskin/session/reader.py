@@ -8,7 +8,9 @@ from pathlib import Path
 from tomoskin.core import DataError
 from tomoskin.session import interchange, sixteen
 from tomoskin.session.archive import Arrays, load_arrays
+from tomoskin.session.mcap import MAGIC
 from tomoskin.session.recording import Recording
+from tomoskin.session.session_reader import read_session
 
 Detect = Callable[[Arrays], bool]
 Parse = Callable[[Arrays, str], Recording]
@@ -21,13 +23,15 @@ FORMATS: tuple[tuple[Detect, Parse], ...] = (
 
 
 def read_recording(path: Path) -> Recording:
-    """Recording in ``path``: an interchange file or a format that can be imported.
+    """Recording in ``path``: a session, an interchange file or a format that can be imported.
 
     Raises
     ------
     DataError
         When the file cannot be read or is of no known kind; the message lists its keys.
     """
+    if _beginning(path) == MAGIC:
+        return read_session(path)
     arrays = load_arrays(path)
     for detects, parse in FORMATS:
         if detects(arrays):
@@ -37,3 +41,13 @@ def read_recording(path: Path) -> Recording:
         f"{', '.join(sorted(arrays)) or 'of an empty archive'}",
         where=str(path),
     )
+
+
+def _beginning(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(len(MAGIC))
+    except FileNotFoundError as error:
+        raise DataError("there is no such file", where=str(path)) from error
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror or error}", where=str(path)) from error

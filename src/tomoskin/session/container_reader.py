@@ -1,0 +1,382 @@
+"""An MCAP file read with suspicion: every length is checked, every chunk's CRC is compared."""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO, Self
+
+from tomoskin.core import DataError
+from tomoskin.session import mcap
+from tomoskin.session.container import SEEK_ROW, SEEK_TABLE
+
+LARGEST = 64 << 20
+"""A longer record is no record of a session."""
+
+_MEND = "tomoskin session repair recovers what is whole"
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message: its channel's number, log time in ns, data, and the chunk that it was in."""
+
+    channel: int
+    log_time: int
+    data: bytes
+    chunk: int
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """A file inside the file."""
+
+    name: str
+    media_type: str
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Totals:
+    """Messages by channel, and first and last log time in ns."""
+
+    counts: dict[int, int]
+    first: int
+    last: int
+
+
+@dataclass
+class Chunk:
+    """Where a chunk's record is, and what its head says."""
+
+    offset: int
+    length: int
+    first: int
+    last: int
+    crc: int
+    records: bytes = field(repr=False)
+
+
+class Fields:
+    """Takes fields off the body of a record; ``struct.error`` or ValueError when it is short."""
+
+    def __init__(self, body: bytes) -> None:
+        self._body = body
+        self.place = 0
+
+    def numbers(self, layout: str) -> tuple[int, ...]:
+        """Numbers in a layout of :mod:`struct`."""
+        found: tuple[int, ...] = struct.unpack_from("<" + layout, self._body, self.place)
+        self.place += struct.calcsize("<" + layout)
+        return found
+
+    def bytes(self, length: int) -> bytes:
+        """So many bytes."""
+        if length > len(self._body) - self.place:
+            raise ValueError(f"{length} bytes are said to follow, {len(self._body)} in all")
+        self.place += length
+        return self._body[self.place - length : self.place]
+
+    def text(self) -> str:
+        """A string behind its length."""
+        return self.bytes(self.numbers("I")[0]).decode()
+
+    def mapping(self) -> dict[str, str]:
+        """A map of strings."""
+        length = self.numbers("I")[0]
+        end = self.place + length
+        found = {}
+        while self.place < end:
+            key = self.text()
+            found[key] = self.text()
+        return found
+
+
+class ContainerReader:
+    """Reads one MCAP file; a context manager.
+
+    A file without its end, as a killed program leaves it, is read up to where it is torn, and
+    :attr:`torn` says where. Damage inside is an error that names the byte.
+
+    Attributes
+    ----------
+    torn
+        A sentence on what is missing at the end, or "".
+
+    Raises
+    ------
+    DataError
+        When the file cannot be read, is no MCAP file, or is damaged.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.where = str(path)
+        self.torn = ""
+        try:
+            self._file: BinaryIO = path.open("rb", buffering=1 << 18)
+            self.size = self._file.seek(0, io.SEEK_END)
+        except OSError as error:
+            reason = "there is no such file" if isinstance(error, FileNotFoundError) else (
+                f"cannot be read: {error.strerror or error}")  # fmt: skip
+            raise DataError(reason, where=self.where) from error
+        try:
+            self._start()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> Self:
+        """The reader itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close."""
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()
+
+    @property
+    def whole(self) -> bool:
+        """Whether the file was ended properly."""
+        return self._summary_start > 0
+
+    def describes(self) -> dict[str, dict[str, str]]:
+        """The named strings that stand before the first chunk."""
+        found = {}
+        for opcode, offset, body in self._front():
+            if opcode == mcap.METADATA:
+                fields = Fields(body)
+                with self._understood(offset):
+                    name = fields.text()
+                    found[name] = fields.mapping()
+        return found
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Every file inside: by the index, or by going through the whole file."""
+        for offset in self._attachment_offsets():
+            yield self._attachment(offset)
+
+    def totals(self) -> Totals | None:
+        """Totals of a whole file; None where there is no summary."""
+        start, length = self._groups.get(mcap.STATISTICS, (0, 0))
+        if not length:
+            return None
+        fields = Fields(self._body(start))
+        with self._understood(start):
+            fields.numbers("QHIIII")
+            first, last = fields.numbers("QQ")
+            n = fields.numbers("I")[0] // 10
+            pairs = [fields.numbers("HQ") for _ in range(n)]
+        return Totals({pair[0]: pair[1] for pair in pairs}, first, last)
+
+    def chunks(self, since: int = 0) -> Iterator[Chunk]:
+        """Chunks from the first that may hold log times of ``since`` ns or later; CRC checked."""
+        for opcode, offset, length in self._records(self._offset_of(since)):
+            if opcode == mcap.CHUNK:
+                yield self._chunk(offset, length)
+
+    def messages(self, wanted: frozenset[int], since: int = 0) -> Iterator[Message]:
+        """Messages of the channels ``wanted`` logged at ``since`` ns or later, in file order."""
+        for chunk in self.chunks(since):
+            if chunk.last >= since:
+                for message in messages_in(chunk, self.where):
+                    if message.channel in wanted and message.log_time >= since:
+                        yield message
+
+    def _start(self) -> None:
+        if self._read(0, len(mcap.MAGIC)) != mcap.MAGIC:
+            raise DataError("is not an MCAP file", where=self.where)
+        self._groups: dict[int, tuple[int, int]] = {}
+        self._summary_start = 0
+        self._end = self.size
+        tail = self._read(self.size - mcap.FOOTER_SIZE, mcap.FOOTER_SIZE)
+        head = mcap.PREFIX.pack(mcap.FOOTER, mcap.FOOTER_BODY.size)
+        if not (tail.startswith(head) and tail.endswith(mcap.MAGIC)):
+            self.torn = "was not ended: the program or the computer stopped while it was written"
+            return
+        start, offsets, crc = mcap.FOOTER_BODY.unpack_from(tail, len(head))
+        self._end = self.size - mcap.FOOTER_SIZE
+        if start:
+            self._open_summary(start, offsets, crc)
+
+    def _open_summary(self, start: int, offsets: int, crc: int) -> None:
+        where = f"{self.where}, byte {start}"
+        if not len(mcap.MAGIC) <= start <= offsets <= self._end:
+            raise DataError("the index is not in the file", where=where, hint=_MEND)
+        length = self.size - mcap.FOOTER_SIZE + mcap.PREFIX.size + 16 - start
+        if crc and crc != self._crc(start, length):
+            raise DataError("the index is damaged (its CRC differs)", where=where, hint=_MEND)
+        for opcode, offset, _ in self._records(offsets):
+            if opcode == mcap.SUMMARY_OFFSET:
+                with self._understood(offset):
+                    group, *place = Fields(self._body(offset)).numbers("BQQ")
+                    self._groups[group] = (place[0], place[1])
+        self._summary_start = start
+
+    def _crc(self, start: int, length: int) -> int:
+        crc, place = 0, start
+        while place < start + length:
+            part = self._read(place, min(1 << 20, start + length - place))
+            crc, place = zlib.crc32(part, crc), place + len(part)
+        return crc
+
+    def _front(self) -> Iterator[tuple[int, int, bytes]]:
+        """(opcode, offset, body) of the records before the first chunk."""
+        for opcode, offset, _ in self._records(len(mcap.MAGIC)):
+            if opcode == mcap.CHUNK:
+                return
+            yield opcode, offset, self._body(offset)
+
+    def _attachment_offsets(self) -> Iterator[int]:
+        start, length = self._groups.get(mcap.ATTACHMENT_INDEX, (0, 0))
+        if self.whole:
+            for opcode, offset, _ in self._records(start, start + length):
+                if opcode == mcap.ATTACHMENT_INDEX:
+                    with self._understood(offset):
+                        yield Fields(self._body(offset)).numbers("Q")[0]
+            return
+        for opcode, offset, _ in self._records(len(mcap.MAGIC)):
+            if opcode == mcap.ATTACHMENT:
+                yield offset
+
+    def _attachment(self, offset: int) -> Attachment:
+        body = self._body(offset)
+        fields = Fields(body)
+        with self._understood(offset):
+            fields.numbers("QQ")
+            name, media_type = fields.text(), fields.text()
+            data = fields.bytes(fields.numbers("Q")[0])
+            end = fields.place
+            crc = fields.numbers("I")[0]
+        if crc and zlib.crc32(body[:end]) != crc:
+            raise self._damaged(offset, f"the file {name} inside has another CRC")
+        return Attachment(name, media_type, data)
+
+    def _offset_of(self, since: int) -> int:
+        """Where to begin so as to meet everything from ``since`` on."""
+        best = len(mcap.MAGIC)
+        if since <= 0 or not self.whole:
+            return best
+        for found in self.attachments():
+            if found.name == SEEK_TABLE and len(found.data) % SEEK_ROW.size == 0:
+                for first, offset in SEEK_ROW.iter_unpack(found.data):
+                    if first >= since:
+                        break
+                    best = offset
+        return best
+
+    def _records(self, start: int, end: int | None = None) -> Iterator[tuple[int, int, int]]:
+        """(opcode, offset, length of the body) one after another; ends where the file is torn."""
+        place, end = start, self._end if end is None else end
+        while place < end:
+            head = self._read(place, mcap.PREFIX.size)
+            if len(head) < mcap.PREFIX.size:
+                self._stop(place, "a record's head is cut")
+                return
+            opcode, length = mcap.PREFIX.unpack(head)
+            if length > LARGEST or not opcode:
+                raise self._damaged(place, f"a record of kind {opcode} and {length} bytes")
+            after = place + mcap.PREFIX.size + length
+            if after > end:
+                self._stop(place, f"a record of {length} bytes is cut")
+                return
+            yield opcode, place, length
+            if opcode == mcap.DATA_END:
+                return
+            place = after
+
+    def _stop(self, place: int, why: str) -> None:
+        if self._end < self.size:
+            raise self._damaged(place, why)
+        self.torn = f"was not ended: {why} at byte {place} of {self.size}"
+
+    def _chunk(self, offset: int, length: int) -> Chunk:
+        fields = Fields(self._body(offset))
+        with self._understood(offset):
+            first, last = fields.numbers("QQ")
+            size, crc = fields.numbers("QI")
+            compression = fields.text()
+            data = fields.bytes(fields.numbers("Q")[0])
+        if compression:
+            raise DataError(
+                f"its chunks are compressed ({compression}); those of a session are not",
+                where=f"{self.where}, byte {offset}",
+                hint="decompress it first: mcap decompress",
+            )
+        if len(data) != size or zlib.crc32(data) != crc:
+            raise self._damaged(offset, "the CRC of a chunk differs")
+        return Chunk(offset, mcap.PREFIX.size + length, first, last, crc, data)
+
+    def _body(self, offset: int) -> bytes:
+        head = self._read(offset, mcap.PREFIX.size)
+        if len(head) < mcap.PREFIX.size:
+            raise self._damaged(offset, "an index points beyond the end")
+        _, length = mcap.PREFIX.unpack(head)
+        if length > min(LARGEST, self.size - offset - mcap.PREFIX.size):
+            raise self._damaged(offset, f"a record of {length} bytes")
+        return self._read(offset + mcap.PREFIX.size, length)
+
+    def _read(self, place: int, length: int) -> bytes:
+        try:
+            self._file.seek(max(place, 0))
+            return self._file.read(length)
+        except OSError as error:
+            reason = error.strerror or error
+            raise DataError(f"cannot be read: {reason}", where=self.where) from error
+
+    def _damaged(self, place: int, why: str) -> DataError:
+        return DataError(f"is damaged: {why}", where=f"{self.where}, byte {place}", hint=_MEND)
+
+    def _understood(self, offset: int) -> _Understood:
+        return _Understood(lambda why: self._damaged(offset, why))
+
+
+@dataclass
+class _Understood:
+    """Turns what a malformed body raises into the reader's error."""
+
+    error: Callable[[str], DataError]
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, struct.error | ValueError):
+            raise self.error(str(error)) from error
+
+
+def messages_in(chunk: Chunk, where: str) -> Iterator[Message]:
+    """Messages of a chunk whose CRC was right.
+
+    Raises
+    ------
+    DataError
+        When its records do not add up all the same: written wrongly, by another program.
+    """
+    records, place, end = chunk.records, 0, len(chunk.records)
+    prefix, head = mcap.PREFIX, mcap.MESSAGE_HEAD
+    while place < end:
+        if end - place < prefix.size:
+            break
+        opcode, length = prefix.unpack_from(records, place)
+        place += prefix.size
+        if length > end - place:
+            break
+        if opcode == mcap.MESSAGE:
+            if length < head.size:
+                break
+            channel, _, log_time, _ = head.unpack_from(records, place)
+            data = records[place + head.size : place + length]
+            yield Message(channel, log_time, data, chunk.offset)
+        place += length
+    if place != end:
+        raise DataError(
+            "the records of a chunk do not add up",
+            where=f"{where}, byte {chunk.offset}",
+            hint=_MEND,
+        )

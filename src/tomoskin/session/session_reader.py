@@ -1,0 +1,276 @@
+"""Reading a session file: what it holds, message by message, and its frames as a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import msgspec
+import numpy as np
+
+from tomoskin.core import DataError, Event, FloatArray, Reading, SkinError, Touch
+from tomoskin.pattern import Scan
+from tomoskin.session import channels
+from tomoskin.session.container_reader import ContainerReader, Message, Totals
+from tomoskin.session.layout import MarkedFrame, decode_frame, decode_raw
+from tomoskin.session.recording import Recording
+from tomoskin.session.writer import ABOUT, FORMAT, SKIN_FILE
+from tomoskin.signal import Readout
+from tomoskin.skin import Skin
+
+_NO_CELLS = np.empty(0, dtype=np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What pressed on the twin from ``host_time`` on: each press with its fields by name."""
+
+    host_time: float
+    presses: tuple[dict[str, Any], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedTouches:
+    """Touches of the frame ``sequence``; which cells they covered is not in the file."""
+
+    host_time: float
+    sequence: int
+    touches: tuple[Touch, ...]
+
+
+class SessionReader:
+    """A session file, open for reading; a context manager.
+
+    Iterators read as they go: memory does not grow with the file. Times are host monotonic
+    seconds, as they were when it was recorded.
+
+    Attributes
+    ----------
+    path
+        The file.
+    skin
+        The skin that it was recorded with.
+    epoch
+        What is added to a host time to give seconds since 1970; 0 when it was not said.
+
+    Raises
+    ------
+    DataError
+        When the file cannot be read, is no session, or is damaged; from every method.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file = ContainerReader(path)
+        try:
+            about = self._about()
+            self.epoch = _epoch(about, str(path))
+            self.skin = self._skin()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> Self:
+        """The reader itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close."""
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()
+
+    @property
+    def torn(self) -> str:
+        """What is missing at the end, in a sentence, or ""; whole once everything was read."""
+        return self._file.torn
+
+    @cached_property
+    def totals(self) -> Totals | None:
+        """Messages by channel and log times, from the index; None in a file without its end."""
+        return self._file.totals()
+
+    def log_time(self, host_time: float) -> int:
+        """Ns at which something at ``host_time`` is logged."""
+        return max(0, round((host_time + self.epoch) * 1e9))
+
+    def attachments(self) -> dict[str, bytes]:
+        """Files inside by their name."""
+        return {found.name: found.data for found in self._file.attachments()}
+
+    def frames(self, since: float | None = None) -> Iterator[MarkedFrame]:
+        """Frames, from host time ``since`` on."""
+        for message in self._messages(channels.FRAMES, since):
+            yield decode_frame(message.data, self._place(message))
+
+    def raw(self, since: float | None = None) -> Iterator[tuple[float, bytes]]:
+        """(host time, bytes as they were read from the source)."""
+        for message in self._messages(channels.RAW, since):
+            yield decode_raw(message.data, self._place(message))
+
+    def touches(self) -> Iterator[RecordedTouches]:
+        """Touches of every frame that had some, or none after some."""
+        for item in self._documents(channels.TOUCHES):
+            touches = tuple(map(_touch, item["touches"]))
+            yield RecordedTouches(item["host_time"], item["sequence"], touches)
+
+    def truth(self) -> Iterator[Truth]:
+        """The twin's presses, each time that they changed."""
+        for item in self._documents(channels.TRUTH):
+            yield Truth(item["host_time"], tuple(item["presses"]))
+
+    def events(self) -> Iterator[Event]:
+        """What happened."""
+        return (_event(item) for item in self._documents(channels.EVENTS))
+
+    def notes(self) -> Iterator[Event]:
+        """What a person remarked."""
+        return (_event(item) for item in self._documents(channels.NOTES))
+
+    def device(self) -> dict[str, Any]:
+        """What the board last said of itself; empty when it did not."""
+        return self._last(channels.DEVICE)
+
+    def clock(self) -> dict[str, Any]:
+        """The last fit of the device's clock."""
+        return self._last(channels.CLOCK)
+
+    def settings(self) -> dict[str, Any]:
+        """How the run was set."""
+        return self._last(channels.SETTINGS)
+
+    def recording(self) -> Recording:
+        """All frames as voltages in the order of the skin's pattern.
+
+        Frames of another scan are left out. A row at a rail of the converter is NaN. ``labels``
+        are there when the file holds truth: the place of the press where there was exactly one,
+        else NaN.
+
+        Raises
+        ------
+        DataError
+            Also when no frame is in the file, or some that were written are missing.
+        """
+        pattern = self.skin.pattern()
+        readout = Readout.of(Scan.of(pattern), self.skin.readout)
+        found = [item.frame for item in self._counted_frames()]
+        frames = [f for f in found if len(f.samples) == readout.scan.n_samples]
+        if not frames:
+            raise DataError(f"holds no frame of its skin{self._but()}", where=str(self.path))
+        read = [readout(frame) for frame in frames]
+        time = np.array([frame.host_time for frame in frames])
+        return Recording(
+            voltages=np.stack([np.where(v.railed, np.nan, v.values) for v in read]),
+            drive=pattern.drive,
+            measure=pattern.measure,
+            time=time,
+            reference=None,
+            labels=self._labels(time),
+            is_change=False,
+            source=str(self.path),
+        )
+
+    def _counted_frames(self) -> Iterator[MarkedFrame]:
+        count = 0
+        for count, item in enumerate(self.frames(), start=1):  # noqa: B007
+            yield item
+        expected = self.totals.counts.get(channels.FRAMES, 0) if self.totals else count
+        if count != expected:
+            raise DataError(
+                f"is damaged: {expected} frames were written, {count} are there",
+                where=str(self.path),
+            )
+
+    def _labels(self, time: FloatArray) -> FloatArray | None:
+        truth = list(self.truth())
+        if not truth:
+            return None
+        places = np.full((len(truth) + 1, 2), np.nan)
+        for number, item in enumerate(truth, start=1):
+            if len(item.presses) == 1:
+                places[number] = _place_of(item.presses[0])
+        changes = np.array([item.host_time for item in truth])
+        return places[np.searchsorted(changes, time, side="right")]
+
+    def _about(self) -> dict[str, str]:
+        about = self._file.describes().get(ABOUT)
+        if about is None:
+            raise DataError("is an MCAP file, but no session of tomoskin", where=str(self.path))
+        if about.get("format") != str(FORMAT):
+            raise DataError(
+                f"expected a session of format {FORMAT}, got {about.get('format')}",
+                where=str(self.path),
+                hint="it was written by another version of tomoskin",
+            )
+        return about
+
+    def _skin(self) -> Skin:
+        for found in self._file.attachments():
+            if found.name == SKIN_FILE:
+                try:
+                    return Skin.from_toml(found.data.decode(), source=f"{self.path}, {SKIN_FILE}")
+                except (SkinError, UnicodeDecodeError) as error:
+                    raise DataError(f"holds a skin that is none: {error}",
+                                    where=str(self.path)) from error  # fmt: skip
+        raise DataError(f"holds no skin{self._but()}", where=str(self.path))
+
+    def _but(self) -> str:
+        return f"; it {self.torn}" if self.torn else ""
+
+    def _messages(self, channel: int, since: float | None = None) -> Iterator[Message]:
+        start = 0 if since is None else self.log_time(since)
+        return self._file.messages(frozenset({channel}), start)
+
+    def _documents(self, channel: int) -> Iterator[dict[str, Any]]:
+        if self.totals and not self.totals.counts.get(channel):
+            return
+        for message in self._messages(channel):
+            try:
+                yield msgspec.json.decode(message.data, type=dict[str, Any])
+            except (msgspec.DecodeError, UnicodeDecodeError) as error:
+                topic = channels.TOPICS[channel]
+                raise DataError(f"a message of {topic} is not understood: {error}",
+                                where=self._place(message)) from error  # fmt: skip
+
+    def _last(self, channel: int) -> dict[str, Any]:
+        last: dict[str, Any] = {}
+        for item in self._documents(channel):
+            last = item
+        return last
+
+    def _place(self, message: Message) -> str:
+        return f"{self.path}, chunk at byte {message.chunk}"
+
+
+def read_session(path: Path) -> Recording:
+    """All frames of a session file as voltages; see :meth:`SessionReader.recording`."""
+    with SessionReader(path) as session:
+        return session.recording()
+
+
+def _epoch(about: dict[str, str], where: str) -> float:
+    try:
+        return float(about["epoch_s"])
+    except (KeyError, ValueError) as error:
+        raise DataError("does not say when its clock began", where=where) from error
+
+
+def _event(item: dict[str, Any]) -> Event:
+    return Event(item["host_time"], item["name"], item["message"])
+
+
+def _touch(item: dict[str, Any]) -> Touch:
+    sd_x, sd_y = (float("nan") if item[k] is None else item[k] for k in ("sd_x", "sd_y"))
+    reading = Reading(
+        item["x"], item["y"], sd_x, sd_y, item["area"], item["peak"], _NO_CELLS
+    )  # fmt: skip
+    return Touch(item["id"], item["kind"], item["since"], reading)
+
+
+def _place_of(press: dict[str, Any]) -> tuple[float, float]:
+    return float(press["x"]), float(press["y"])
