@@ -1,18 +1,17 @@
 """From a change of voltages to a change of conductivity."""
 
+from tomoskin.inverse.merit import Merit, figures
+from tomoskin.inverse.noise_figure import noise_figure
+from tomoskin.inverse.high_pass import GaussianHighPass
+from tomoskin.inverse.laplace import Laplace, Structural
+from tomoskin.inverse.matern import Matern
 from tomoskin.inverse.one_step import OneStep
 from tomoskin.inverse.operator import Operator
-from tomoskin.inverse.priors import (
-    PRIORS,
-    GaussianHighPass,
-    Identity,
-    Laplace,
-    Noser,
-    Prior,
-    prior_matrix,
-)
+from tomoskin.inverse.priors import PRIORS, Identity, Noser, Prior, prior_matrix
 from tomoskin.inverse.problem import LinearProblem
+from tomoskin.inverse.source_metrics import SourceMetrics
 from tomoskin.inverse.spectrum import Spectrum
+from tomoskin.inverse.targets import Targets, along
 
 __all__ = [
     "PRIORS",
@@ -20,10 +19,18 @@ __all__ = [
     "Identity",
     "Laplace",
     "LinearProblem",
+    "Matern",
+    "Merit",
     "Noser",
     "OneStep",
     "Operator",
     "Prior",
+    "SourceMetrics",
     "Spectrum",
+    "Targets",
+    "along",
+    "figures",
+    "noise_figure",
+    "Structural",
     "prior_matrix",
 ]

@@ -1,0 +1,125 @@
+"""Test targets: small discs of changed conductivity, and the exact voltages that they cause."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tomoskin.core import DataError, FloatArray, ModelError
+from tomoskin.forward import ForwardModel
+from tomoskin.inverse.ball import Balls
+from tomoskin.mesh import Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Discs (in a volume, balls) of one size and contrast, one at a time.
+
+    Attributes
+    ----------
+    places
+        (n, d) m, the centroid of each target.
+    radius
+        m.
+    contrast
+        Change of conductivity inside, as a part of what was there.
+    amount
+        (n,) change of conductivity, integrated over the target: S·m² or S/m·m³.
+    dv
+        (n, n_meas) difference data.
+    difference
+        Their kind, "plain" or "normalised".
+    pattern_id
+        ``Pattern.identity`` of their rows.
+    """
+
+    places: FloatArray
+    radius: float
+    contrast: float
+    amount: FloatArray
+    dv: FloatArray
+    difference: str
+    pattern_id: str
+
+    @classmethod
+    def simulate(
+        cls,
+        model: ForwardModel,
+        places: ArrayLike,
+        *,
+        radius: float,
+        contrast: float = -0.1,
+        conductivity: ArrayLike = 1.0,
+        difference: str = "plain",
+    ) -> Targets:
+        """Targets at ``places`` (n, d), by the exact local update of ``model``.
+
+        Give a finer mesh than that of the operator under test: its own would flatter it. A
+        target over the rim is cut there.
+
+        Raises
+        ------
+        ModelError
+            For a radius that is not above 0, a contrast that is 0 or not above −1, a difference
+            that is not known, or complex voltages.
+        DataError
+            For a place that has no cell within the radius, naming it.
+        """
+        table = _checked(places, model.mesh, radius, contrast, difference)
+        state = model.at(conductivity)
+        if state.conductivity.ndim > 1 or np.iscomplexobj(state.voltages):
+            raise ModelError("expected a real conductivity per cell and a real contact impedance")
+        rows, middles, amounts = [], [], []
+        for number, (cells, share) in enumerate(Balls(model.mesh).each(table, radius)):
+            if not len(cells):
+                raise DataError("lies outside the sheet", where=f"target {number}")
+            sigma = state.conductivity[cells]
+            content = share * model.mesh.volumes[cells]
+            rows.append(state.local.voltages(cells, sigma * (1.0 + contrast * share)))
+            middles.append(content @ model.mesh.centroids[cells] / content.sum())
+            amounts.append(contrast * content @ sigma)
+        dv = np.array(rows) - state.voltages
+        if difference == "normalised":
+            dv /= np.abs(state.voltages)
+        return cls(
+            np.array(middles),
+            radius,
+            contrast,
+            np.array(amounts),
+            dv,
+            difference,
+            model.pattern.identity,
+        )
+
+
+def along(mesh: Mesh, end: ArrayLike, count: int) -> FloatArray:
+    """(count, d) places from the sheet's centroid towards ``end`` (d,) m, both included."""
+    if count < 1:
+        raise DataError(f"expected at least 1 place, got {count}")
+    start = centre_of(mesh)
+    return np.asarray(start + np.linspace(0, 1, count)[:, None] * (np.asarray(end) - start))
+
+
+def centre_of(mesh: Mesh) -> FloatArray:
+    """(d,) m: centroid of the sheet or volume."""
+    return np.asarray(mesh.volumes @ mesh.centroids / mesh.volumes.sum())
+
+
+def _checked(
+    places: ArrayLike, mesh: Mesh, radius: float, contrast: float, difference: str
+) -> FloatArray:
+    table = np.asarray(places, dtype=np.float64)
+    d = mesh.points.shape[1]
+    if table.ndim != 2 or table.shape[1] != d or not len(table):
+        raise DataError(f"expected places (n, {d}), got shape {table.shape}")
+    if not np.isfinite(table).all():
+        raise DataError("expected finite places")
+    if not (np.isfinite(radius) and radius > 0):
+        raise ModelError(f"expected a radius above 0 m, got {radius}")
+    if not (np.isfinite(contrast) and contrast > -1 and contrast != 0):
+        raise ModelError(f"expected a contrast above -1 and not 0, got {contrast}")
+    if difference not in ("plain", "normalised"):
+        raise ModelError(f'expected difference "plain" or "normalised", got "{difference}"')
+    return table
