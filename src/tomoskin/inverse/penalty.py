@@ -27,6 +27,9 @@ _ZERO = 1e-12
 Carried = tuple[NDArray[Any], NDArray[Any]]
 """Q⁻¹Jᴴ (n_cells, n_meas) and JQ⁻¹Jᴴ (n_meas, n_meas)."""
 
+Solve = Callable[[FloatArray], FloatArray]
+"""Columns (n_cells, m) → columns."""
+
 
 class Penalty(Protocol):
     """xᵀQx on the cells of one mesh; Q is real."""
@@ -74,20 +77,20 @@ class Diagonal:
 
 @dataclass(frozen=True, eq=False)
 class Factored:
-    """Q dense or sparse, (n_cells, n_cells), and what solves with it.
+    """Q by what solves with it.
 
-    ``solve`` maps real columns (n_cells, m) by any generalised inverse of Q.
+    ``dense`` makes Q, (n_cells, n_cells); ``solve`` maps real columns (n_cells, m) that are
+    orthogonal to ``free`` by any generalised inverse of Q.
     """
 
-    given: FloatArray | csr_array
+    dense: Callable[[], FloatArray]
     free: FloatArray
-    solve: Callable[[FloatArray], FloatArray]
+    solve: Solve
 
     @property
     def matrix(self) -> FloatArray:
         """Q, dense."""
-        given: Any = self.given
-        return np.asarray(given.toarray() if isinstance(given, csr_array) else given)
+        return self.dense()
 
     def carry(self, jacobian: NDArray[Any]) -> Carried:
         """By one solution for each row of the Jacobian.
@@ -134,7 +137,7 @@ def sparse_penalty(q: csr_array) -> Penalty:
     pivots = factor.U.diagonal()
     if pivots.min() <= _ZERO * pivots.max():
         return dense_penalty(q.toarray())
-    return Factored(q, free, factor.solve)
+    return Factored(q.toarray, free, factor.solve)
 
 
 def dense_penalty(q: FloatArray) -> Penalty:
@@ -145,19 +148,27 @@ def dense_penalty(q: FloatArray) -> Penalty:
     ModelError
         When Q has a negative eigenvalue.
     """
-    diagonal = np.diag(q)
-    constant_is_free = np.abs(q.sum(axis=1)).max() <= _ZERO * np.abs(diagonal).max()
+    constant_is_free = np.abs(q.sum(axis=1)).max() <= _ZERO * np.abs(np.diag(q)).max()
     free = np.full((len(q), int(constant_is_free)), 1.0 / np.sqrt(len(q)))
+    solve = dense_solver(q, free)
+    return _by_eigenvalues(q) if solve is None else Factored(q.copy, free, solve)
+
+
+def dense_solver(q: FloatArray, free: FloatArray) -> Solve | None:
+    """What solves with a symmetric Q, by Cholesky; None where it is not positive definite.
+
+    ``free`` (n_cells, k) are the constants, on parts of the mesh, that Q maps to zero.
+    """
     grounded = q.copy()
-    grounded[np.diag_indices_from(grounded)] += _ground(free, diagonal)
+    grounded[np.diag_indices_from(grounded)] += _ground(free, np.diag(q))
     try:
         factor = cho_factor(grounded, lower=True, overwrite_a=True, check_finite=False)
     except LinAlgError:
-        return _by_eigenvalues(q)
+        return None
     pivots = np.diag(factor[0]) ** 2
     if pivots.min() <= _ZERO * pivots.max():
-        return _by_eigenvalues(q)
-    return Factored(q, free, lambda columns: cho_solve(factor, columns, check_finite=False))
+        return None
+    return lambda columns: cho_solve(factor, columns, check_finite=False)
 
 
 def _ground(free: FloatArray, diagonal: FloatArray) -> FloatArray:
@@ -175,4 +186,4 @@ def _by_eigenvalues(q: FloatArray) -> Penalty:
     regular = values > _ZERO * np.abs(values).max()
     kept = vectors[:, regular]
     inverse = kept.T / values[regular, None]
-    return Factored(q, vectors[:, ~regular], lambda columns: kept @ (inverse @ columns))
+    return Factored(q.copy, vectors[:, ~regular], lambda columns: kept @ (inverse @ columns))

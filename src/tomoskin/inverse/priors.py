@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, issparse
 
 from tomoskin.core import FloatArray, ModelError
+from tomoskin.inverse.high_pass import GaussianHighPass
+from tomoskin.inverse.laplace import Laplace
+from tomoskin.inverse.matern import Matern
 from tomoskin.inverse.penalty import Diagonal, Penalty, dense_penalty, sparse_penalty
 from tomoskin.mesh import Mesh
 
@@ -52,37 +55,6 @@ class Noser:
         return Diagonal(np.asarray(power**self.exponent))
 
 
-@dataclass(frozen=True)
-class Laplace:
-    """Q = twice the graph Laplacian of cells that share a facet, as in EIDORS."""
-
-    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
-        """Return Q on ``mesh``."""
-        del jacobian
-        return sparse_penalty(_graph_laplacian(mesh, np.full(len(mesh.neighbours), 2.0)))
-
-
-@dataclass(frozen=True)
-class GaussianHighPass:
-    """Q = FᵀF with F = I − G, a Gaussian high-pass filter (Adler & Guardo 1996).
-
-    G averages with weights area · exp(−4 ln 2 · (distance / width)²), rows summing to one;
-    ``width`` is a fraction of the mesh's largest extent.
-    """
-
-    width: float = 0.1
-
-    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
-        """Return Q on ``mesh``."""
-        del jacobian
-        extent = float(np.ptp(mesh.points, axis=0).max())
-        offset = mesh.centroids[:, None, :] - mesh.centroids[None, :, :]
-        square = np.einsum("ijd,ijd->ij", offset, offset) / (self.width * extent) ** 2
-        weights = mesh.volumes * np.exp(-4.0 * np.log(2.0) * square)
-        high_pass = np.eye(len(weights)) - weights / weights.sum(axis=1, keepdims=True)
-        return dense_penalty(high_pass.T @ high_pass)
-
-
 PriorLike = str | Prior | Any
 """A name, a prior, or a matrix Q of the caller's own: dense, sparse or a diagonal."""
 
@@ -91,6 +63,8 @@ PRIORS: dict[str, Prior] = {
     "laplace": Laplace(),
     "gaussian": GaussianHighPass(),
     "noser": Noser(),
+    "exponential": Matern(smoothness=0.5),
+    "matern": Matern(smoothness=1.5),
 }
 """Priors by the name that a skin file uses."""
 
@@ -142,15 +116,3 @@ def _check_finite(values: FloatArray, cells: NDArray[Any]) -> None:
     if not finite.all():
         cell = int(cells[np.argwhere(~finite)[0, 0]])
         raise ModelError("expected finite numbers", where=f"prior, cell {cell}")
-
-
-def _graph_laplacian(mesh: Mesh, coupling: FloatArray) -> csr_array:
-    """(n_cells, n_cells) with −``coupling`` (n_pairs,) for neighbours; rows sum to zero."""
-    first, second = mesh.neighbours.T
-    n = len(mesh.cells)
-    ends = np.concatenate([first, second])
-    degree = np.bincount(ends, np.tile(coupling, 2), n)
-    rows = np.concatenate([ends, np.arange(n)])
-    cols = np.concatenate([second, first, np.arange(n)])
-    values = np.concatenate([np.tile(-coupling, 2), degree])
-    return csr_array(coo_array((values, (rows, cols)), shape=(n, n)))

@@ -40,6 +40,8 @@ class LinearProblem:
         "plain" or "normalised".
     reference
         (n_meas,) V: the model's voltages where it was linearised.
+    conductivity
+        (n_cells,) S or S/m: where that was.
     """
 
     model: ForwardModel
@@ -48,6 +50,7 @@ class LinearProblem:
     prior: Penalty
     difference: str
     reference: NDArray[Any]
+    conductivity: NDArray[Any]
 
     @classmethod
     def of(
@@ -74,7 +77,7 @@ class LinearProblem:
         jacobian, default = _data_model(state.jacobian, reference, difference)
         weight = _weights(default if weights is None else weights, len(jacobian))
         penalty = penalty_of(prior, model.mesh, jacobian)
-        return cls(model, jacobian, weight, penalty, difference, reference)
+        return cls(model, jacobian, weight, penalty, difference, reference, state.conductivity)
 
     @cached_property
     def carried(self) -> Carried:
