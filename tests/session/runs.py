@@ -6,7 +6,7 @@ import numpy as np
 
 from tomoskin.core import Event, Frame, Image, Reading, Touch
 from tomoskin.pattern import Scan
-from tomoskin.session import Mark, Raster, SessionWriter
+from tomoskin.session import Mark, SessionWriter
 from tomoskin.skin import Skin
 from tomoskin.wire import Info, Reset, encode
 
@@ -76,7 +76,7 @@ def write_all(path):
         session.touches(0.2, 20, (TOUCH,))
         mesh = SKIN.mesh()
         values = np.linspace(-1, 1, len(mesh.cells))
-        session.image(0.2, Image(values, "S", mesh.identity), Raster.of(mesh), (TOUCH,))
+        session.image(0.2, Image(values, "S", mesh.identity), mesh.pixels(48), (TOUCH,))
         session.clock(0.3, {"tick_rate": 16e6, "offset": 0.0, "residual": 1e-6, "frames": 30})
         session.attach("calibration.json", "application/json", b"{}")
     return path

@@ -3,8 +3,8 @@
 from tomoskin.session.interchange import write_interchange
 from tomoskin.session.layout import Mark, MarkedFrame
 from tomoskin.session.picture import MOST_PANELS, Panel, write_picture
-from tomoskin.session.raster import Raster
 from tomoskin.session.reader import read_recording
+from tomoskin.session.recorder import Recorder
 from tomoskin.session.recording import Recording
 from tomoskin.session.session_reader import (
     RecordedTouches,
@@ -21,8 +21,8 @@ __all__ = [
     "Mark",
     "MarkedFrame",
     "Panel",
-    "Raster",
     "RecordedTouches",
+    "Recorder",
     "Recording",
     "SessionReader",
     "SessionWriter",

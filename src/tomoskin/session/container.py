@@ -75,6 +75,14 @@ class ContainerWriter:
         """Bytes in the file so far, each of them part of a whole record."""
         return self._size
 
+    @property
+    def is_linked(self) -> bool:
+        """Whether the file is still in a folder; False also when its disk does not answer."""
+        try:
+            return not self._file.closed and os.fstat(self._file.fileno()).st_nlink > 0
+        except OSError:
+            return False
+
     def attach(self, name: str, media_type: str, data: bytes, log_time: int = 0) -> None:
         """Put a whole file inside."""
         self.flush()

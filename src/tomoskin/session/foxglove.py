@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Event, Image, Touch
-from tomoskin.session.raster import Raster
+from tomoskin.core import Event, Image, PixelMap, Touch
 
 _INFO, _WARNING = 2, 3
 _QUIET = frozenset({"connected", "resumed", "note", "recording"})
@@ -42,20 +41,24 @@ def log(event: Event, log_time: int) -> Message:
     }
 
 
-def grid(image: Image, raster: Raster, host_time: float, log_time: int) -> Message:
-    """A ``foxglove.Grid`` of one image: one 32-bit float a pixel, NaN outside the sheet."""
-    pixels = raster(image.values).astype("<f4")
-    columns = pixels.shape[1]
+def grid(image: Image, pixels: PixelMap, host_time: float, log_time: int) -> Message:
+    """A ``foxglove.Grid`` of one image: a 32-bit float a pixel, NaN outside the sheet.
+
+    Its rows begin at the lowest y, where the grid's own place is.
+    """
+    values = image.on_pixels(pixels)[::-1].astype("<f4")
+    columns = values.shape[1]
+    size = _size(pixels)
     return {
         "timestamp": _timestamp(log_time),
         "frame_id": _FRAME,
-        "pose": _pose(*raster.corner),
+        "pose": _pose(float(pixels.x[0]) - size / 2, float(pixels.y[-1]) - size / 2),
         "column_count": columns,
-        "cell_size": {"x": raster.size, "y": raster.size},
+        "cell_size": {"x": size, "y": size},
         "row_stride": 4 * columns,
         "cell_stride": 4,
         "fields": [{"name": "change", "offset": 0, "type": _FLOAT32}],
-        "data": base64.b64encode(np.ascontiguousarray(pixels).tobytes()).decode("ascii"),
+        "data": base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii"),
         "host_time": host_time,
         "unit": image.unit,
     }
@@ -68,6 +71,12 @@ def scene(touches: Sequence[Touch], log_time: int) -> Message:
         "deletions": [{"timestamp": now, "type": 1, "id": ""}],
         "entities": [_entity(touch, now) for touch in touches],
     }
+
+
+def _size(pixels: PixelMap) -> float:
+    """Side of a pixel, m; 1 mm where there is only one."""
+    several = next((line for line in (pixels.x, pixels.y) if len(line) > 1), None)
+    return 1e-3 if several is None else abs(float(several[1] - several[0]))
 
 
 def _entity(touch: Touch, now: dict[str, int]) -> Message:

@@ -13,11 +13,10 @@ import msgspec
 import numpy as np
 
 from tomoskin import __version__
-from tomoskin.core import DataError, Event, Frame, Image, Touch
+from tomoskin.core import DataError, Event, Frame, Image, PixelMap, Touch
 from tomoskin.session import channels, foxglove
 from tomoskin.session.container import ContainerWriter
 from tomoskin.session.layout import Mark, encode_frame, encode_raw
-from tomoskin.session.raster import Raster
 
 if TYPE_CHECKING:
     from tomoskin.skin import Skin
@@ -92,11 +91,11 @@ class SessionWriter:
         self._say(channels.TOUCHES, host_time, content)
 
     def image(
-        self, host_time: float, image: Image, raster: Raster, touches: Sequence[Touch] = ()
+        self, host_time: float, image: Image, pixels: PixelMap, touches: Sequence[Touch] = ()
     ) -> None:
         """One image for tools that show it, with its touches; the frames give it exactly."""
         log_time = self._log_time(host_time)
-        self._say(channels.IMAGE, host_time, foxglove.grid(image, raster, host_time, log_time))
+        self._say(channels.IMAGE, host_time, foxglove.grid(image, pixels, host_time, log_time))
         self._say(channels.SCENE, host_time, foxglove.scene(touches, log_time))
 
     def truth(self, host_time: float, presses: Sequence[Any]) -> None:
@@ -128,6 +127,13 @@ class SessionWriter:
         }
         del content["request"]
         self._say(channels.DEVICE, host_time, content)
+
+    def settle(self) -> None:
+        """Write the open chunk, and see that the file is still in its folder."""
+        with self._said():
+            self._file.flush()
+        if not self._file.is_linked:
+            raise DataError("has been removed while it was written", where=str(self.path))
 
     def clock(self, host_time: float, fit: Any) -> None:
         """A fit of the device's clock to the host's: a mapping or record, see the schema."""
