@@ -68,10 +68,10 @@ class Diagonal:
 
     def carry(self, jacobian: NDArray[Any]) -> Carried:
         """By a symmetric product, which is half the work of a general one."""
-        root = np.sqrt(self.matrix)
-        scaled = jacobian / root
+        root = 1.0 / np.sqrt(self.matrix)
+        scaled = jacobian * root
         gram = scaled @ scaled.conj().T
-        scaled /= root
+        scaled *= root
         return scaled.conj().T, gram
 
 
