@@ -1,17 +1,20 @@
 """From a change of voltages to a change of conductivity."""
 
-from tomoskin.inverse.merit import Merit, figures
-from tomoskin.inverse.noise_figure import noise_figure
 from tomoskin.inverse.high_pass import GaussianHighPass
 from tomoskin.inverse.laplace import Laplace, Structural
 from tomoskin.inverse.matern import Matern
+from tomoskin.inverse.merit import Merit, figures
+from tomoskin.inverse.modes import Modes
+from tomoskin.inverse.noise_figure import noise_figure
 from tomoskin.inverse.one_step import OneStep
 from tomoskin.inverse.operator import Operator
 from tomoskin.inverse.priors import PRIORS, Identity, Noser, Prior, prior_matrix
 from tomoskin.inverse.problem import LinearProblem
+from tomoskin.inverse.smoother import Smoothed, Smoother
 from tomoskin.inverse.source_metrics import SourceMetrics
 from tomoskin.inverse.spectrum import Spectrum
 from tomoskin.inverse.targets import Targets, along
+from tomoskin.inverse.temporal import Steady, Temporal
 
 __all__ = [
     "PRIORS",
@@ -21,16 +24,21 @@ __all__ = [
     "LinearProblem",
     "Matern",
     "Merit",
+    "Modes",
     "Noser",
     "OneStep",
     "Operator",
     "Prior",
+    "Smoothed",
+    "Smoother",
     "SourceMetrics",
     "Spectrum",
+    "Steady",
+    "Structural",
     "Targets",
+    "Temporal",
     "along",
     "figures",
     "noise_figure",
-    "Structural",
     "prior_matrix",
 ]
