@@ -1,7 +1,10 @@
 """From a change of voltages to a change of conductivity."""
 
+from tomoskin.inverse.assembly import Assembly
+from tomoskin.inverse.choice import AlphaChoice, Curve, Evidence
 from tomoskin.inverse.high_pass import GaussianHighPass
 from tomoskin.inverse.laplace import Laplace, Structural
+from tomoskin.inverse.light_touch import LightTouch
 from tomoskin.inverse.matern import Matern
 from tomoskin.inverse.merit import Merit, figures
 from tomoskin.inverse.modes import Modes
@@ -10,6 +13,7 @@ from tomoskin.inverse.one_step import OneStep
 from tomoskin.inverse.operator import Operator
 from tomoskin.inverse.priors import PRIORS, Identity, Noser, Prior, prior_matrix
 from tomoskin.inverse.problem import LinearProblem
+from tomoskin.inverse.rules import RULES, choose
 from tomoskin.inverse.smoother import Smoothed, Smoother
 from tomoskin.inverse.source_metrics import SourceMetrics
 from tomoskin.inverse.spectrum import Spectrum
@@ -18,9 +22,15 @@ from tomoskin.inverse.temporal import Steady, Temporal
 
 __all__ = [
     "PRIORS",
+    "RULES",
+    "AlphaChoice",
+    "Assembly",
+    "Curve",
+    "Evidence",
     "GaussianHighPass",
     "Identity",
     "Laplace",
+    "LightTouch",
     "LinearProblem",
     "Matern",
     "Merit",
@@ -38,6 +48,7 @@ __all__ = [
     "Targets",
     "Temporal",
     "along",
+    "choose",
     "figures",
     "noise_figure",
     "prior_matrix",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -15,6 +15,7 @@ from tomoskin.forward import ForwardModel
 from tomoskin.inverse.operator import Operator
 from tomoskin.inverse.penalty import Carried, Penalty
 from tomoskin.inverse.priors import PriorLike, penalty_of
+from tomoskin.inverse.weights import noise_weights
 
 _ZERO = 1e-9
 """A voltage below this part of the largest is zero by symmetry, and its value is rounding."""
@@ -85,6 +86,10 @@ class LinearProblem:
     def carried(self) -> Carried:
         """Q⁻¹Jᴴ (n_cells, n_meas) and JQ⁻¹Jᴴ (n_meas, n_meas), which hold for every alpha."""
         return self.prior.carry(self.jacobian)
+
+    def weighted(self, noise: NDArray[np.floating]) -> Self:
+        """The problem with weights from the noise of each row; see :func:`noise_weights`."""
+        return replace(self, weights=noise_weights(noise, self.weights))
 
     def operator(self, alpha: float) -> Operator:
         """Minimiser of the problem as a matrix, made in the space of the measurements.

@@ -119,13 +119,20 @@ class Spectrum:
 
     def operator(self, alpha: float) -> Operator:
         """The operator of ``alpha``, the same as ``problem.operator(alpha)``, by one product."""
-        filtered = self.gains(alpha)[:, None] * self.analysis
+        return self.operator_of(alpha, np.asarray(self.modes @ self.filtered(alpha)))
+
+    def filtered(self, alpha: float) -> NDArray[Any]:
+        """(n_meas, n_meas) difference data → filtered coefficients; modes times it is R."""
+        return np.asarray(self.gains(alpha)[:, None] * self.analysis)
+
+    def operator_of(self, alpha: float, matrix: NDArray[Any]) -> Operator:
+        """The operator of ``alpha``, whose ``matrix`` is known."""
         weighed = np.isfinite(self.values)
-        precision = self.analysis[weighed].conj().T @ filtered[weighed]
+        precision = self.analysis[weighed].conj().T @ self.filtered(alpha)[weighed]
         p = self.problem
         return Operator(
             p.model,
-            np.asarray(self.modes @ filtered),
+            matrix,
             precision=precision,
             reference=p.reference,
             difference=p.difference,
@@ -158,12 +165,13 @@ class Spectrum:
         ``covariance`` from :meth:`noise_coefficients`.
         """
         area = float(self.problem.model.mesh.volumes.sum())
-        return float(np.sqrt(self.energy(alpha, covariance) / area))
+        return float(np.sqrt(self.energies(np.array([alpha]), covariance)[0] / area))
 
-    def energy(self, alpha: float, covariance: NDArray[Any]) -> float:
-        """Expected ∫x² over the sheet for coefficients of that covariance."""
-        gain = self.gains(alpha)
-        return float(np.real(gain @ (self.overlap * covariance.T) @ gain))
+    def energies(self, alphas: FloatArray, covariance: NDArray[Any]) -> FloatArray:
+        """(k,) expected ∫x² over the sheet, for coefficients of that covariance."""
+        gains = np.array([self.gains(float(a)) for a in alphas])
+        shared = np.real(self.overlap * covariance.T)
+        return np.asarray(np.einsum("am,am->a", gains @ shared, gains))
 
     @cached_property
     def overlap(self) -> NDArray[Any]:

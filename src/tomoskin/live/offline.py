@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray, Touch
+from tomoskin.inverse import AlphaChoice, Evidence
 from tomoskin.live.prepare import Prepared
+from tomoskin.live.tune import tuned, tuned_by_rule
 from tomoskin.session import Recording
 from tomoskin.signal import Reference, difference, in_phase
 from tomoskin.touch import NoiseFloor, Tracker
@@ -39,6 +41,8 @@ class Reconstruction:
         One tuple a frame.
     agreement
         Cosine between the reference and the model's voltages, NaN where there is no reference.
+    choice
+        The alpha of the images, and what chose it.
     """
 
     frames: IntArray
@@ -47,14 +51,57 @@ class Reconstruction:
     unit: str
     touches: tuple[tuple[Touch, ...], ...]
     agreement: float
+    choice: AlphaChoice
 
     def numbered_from(self, first: int) -> Reconstruction:
         """Frames counted from ``first``, for a part of a longer recording."""
         return replace(self, frames=self.frames + first, left_out=self.left_out + first)
 
 
+@dataclass(frozen=True, eq=False)
+class Changes:
+    """Difference data of a recording.
+
+    Attributes
+    ----------
+    frames, left_out
+        Indices in the recording, as in :class:`Reconstruction`.
+    values
+        (n, n_meas) in the operator's kind of difference.
+    places
+        (n, 2) m, where the skin was touched, or None.
+    reference
+        Mean and noise of the idle frames; None where the recording holds differences.
+    agreement
+        As in :class:`Reconstruction`.
+    """
+
+    frames: IntArray
+    left_out: IntArray
+    values: FloatArray
+    places: FloatArray | None
+    reference: Reference | None
+    agreement: float
+
+    def evidence(self, prepared: Prepared) -> Evidence:
+        """What the recording tells a rule that chooses alpha."""
+        noise = None
+        if self.reference is not None and self.reference.noise_is_known:
+            noise = prepared.difference_noise(self.reference)
+        return Evidence(
+            noise=noise,
+            frames=self.values,
+            places=self.places,
+            locate=prepared.places,
+        )
+
+
 def reconstruct(
-    prepared: Prepared, recording: Recording, idle: NDArray[Any] | None
+    prepared: Prepared,
+    recording: Recording,
+    idle: NDArray[Any] | None,
+    *,
+    rule: str | None = None,
 ) -> Reconstruction:
     """Reconstruct every frame of ``recording``, whose rows are in the pattern's order.
 
@@ -63,35 +110,63 @@ def reconstruct(
     idle
         (n_idle, n_meas) frames of the untouched skin; None where the recording holds
         differences.
+    rule
+        Chooses alpha from this recording, by a name of :data:`tomoskin.inverse.RULES`; without
+        it the skin's alpha holds, "auto" at the noise of the idle frames.
 
     Raises
     ------
     DataError
-        When the reference does not look like this skin, or no frame is left.
+        When the reference does not look like this skin, no frame is left, or the recording
+        lacks what the rule needs.
+    ModelError
+        When the rule is not known or finds no alpha.
     """
+    changes = changes_of(prepared, recording, idle)
+    prepared = _tuned(prepared, changes, rule)
+    floor = None if changes.reference is None else prepared.noise_floor(changes.reference)
+    images = np.stack([prepared.operator.quick(dv).values for dv in changes.values])
+    times = recording.time[changes.frames]
+    return Reconstruction(
+        frames=changes.frames,
+        left_out=changes.left_out,
+        images=images,
+        unit=prepared.operator.unit,
+        touches=_touches(prepared, images, times, floor),
+        agreement=changes.agreement,
+        choice=prepared.choice,
+    )
+
+
+def changes_of(prepared: Prepared, recording: Recording, idle: NDArray[Any] | None) -> Changes:
+    """Difference data of every frame of ``recording``; parameters and errors as above."""
     finite = np.isfinite(recording.voltages).all(axis=1)
     if not finite.any():
         raise DataError("no frame has finite values in every row", where=recording.source)
     values = recording.voltages[finite]
     if idle is None:
-        changes, floor, agreement = _given_changes(prepared, recording, values), None, np.nan
+        dv, reference, agreement = _given_changes(prepared, recording, values), None, np.nan
     else:
-        changes, floor, agreement = _changes(prepared, recording.source, values, idle)
-    frames = np.flatnonzero(finite)
-    images = np.stack([prepared.operator.quick(dv).values for dv in changes])
-    return Reconstruction(
-        frames=frames,
+        dv, reference, agreement = _changes(prepared, recording.source, values, idle)
+    return Changes(
+        frames=np.flatnonzero(finite),
         left_out=np.flatnonzero(~finite),
-        images=images,
-        unit=prepared.operator.unit,
-        touches=_touches(prepared, images, recording.time[frames], floor),
+        values=dv,
+        places=None if recording.labels is None else recording.labels[finite],
+        reference=reference,
         agreement=agreement,
     )
 
 
+def _tuned(prepared: Prepared, changes: Changes, rule: str | None) -> Prepared:
+    if rule is not None:
+        return tuned_by_rule(prepared, rule, changes.evidence(prepared))
+    return prepared if changes.reference is None else tuned(prepared, changes.reference)
+
+
 def _changes(
     prepared: Prepared, source: str, values: NDArray[Any], idle: NDArray[Any]
-) -> tuple[FloatArray, NoiseFloor | None, float]:
+) -> tuple[FloatArray, Reference, float]:
     operator, model = prepared.operator, prepared.operator.reference
     mean = idle.mean(axis=0)
     real_values, _ = in_phase(values, mean, model)
@@ -100,7 +175,7 @@ def _changes(
     if operator.difference == "plain":
         _check_scale(reference.mean, model, source)
     dv = difference(real_values, reference.mean, operator.difference)
-    return dv, prepared.noise_floor(reference), agreement
+    return dv, reference, agreement
 
 
 def _given_changes(prepared: Prepared, recording: Recording, dv: NDArray[Any]) -> FloatArray:

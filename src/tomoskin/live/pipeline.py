@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, Frame, Image, Touch, Voltages
+from tomoskin.inverse import AlphaChoice
 from tomoskin.live.collector import Collector
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.result import ReferenceState, Result
+from tomoskin.live.tune import tune
 from tomoskin.signal import Reference, difference
 from tomoskin.touch import NoiseFloor, Tracker
 
@@ -38,6 +42,7 @@ class Pipeline:
         self._image = _none(prepared)
         self._reference: Reference | None = None
         self._floor: NoiseFloor | None = None
+        self._tuning: Generator[None, None, Prepared] | None = None
         self._since = 0.0
         self.paused = False
         self.refused = 0
@@ -47,6 +52,7 @@ class Pipeline:
     def take_reference(self) -> None:
         """Forget the reference; the next frames make a new one."""
         self._reference = None
+        self._tuning = None
         self._tracker.reset()
         self._collector = Collector(self._needed, self._prepared.operator.reference)
 
@@ -57,6 +63,11 @@ class Pipeline:
             return ReferenceState(self._collector.taken, self._needed)
         noise = float(np.sqrt(np.mean(self._reference.noise**2)))
         return ReferenceState(self._needed, self._needed, self._since, noise)
+
+    @property
+    def choice(self) -> AlphaChoice:
+        """The alpha of the pictures, and what chose it."""
+        return self._prepared.choice
 
     def push(self, frame: Frame) -> Result | None:
         """Take one frame; None while paused, or where the frame is not of this scan."""
@@ -69,6 +80,7 @@ class Pipeline:
         unusable = voltages.railed | ~np.isfinite(voltages.values)
         if self._reference is None:
             return self._collect(voltages, unusable)
+        self._tune(self._reference)
         return self._picture(voltages, unusable | self._collector.unusable, self._reference)
 
     def _collect(self, voltages: Voltages, unusable: NDArray[np.bool_]) -> Result:
@@ -79,8 +91,21 @@ class Pipeline:
 
     def _settle(self, reference: Reference, host_time: float) -> None:
         self._floor = self._prepared.noise_floor(reference)
+        self._tuning = tune(self._prepared, reference)
         self._reference = reference
         self._since = host_time
+
+    def _tune(self, reference: Reference) -> None:
+        """One step towards the operator for the reference's noise; the old one serves meanwhile."""
+        if self._tuning is None:
+            return
+        try:
+            next(self._tuning)
+        except StopIteration as end:
+            self._tuning = None
+            if end.value is not self._prepared:
+                self._prepared = end.value
+                self._floor = self._prepared.noise_floor(reference)
 
     def _picture(
         self, voltages: Voltages, unusable: NDArray[np.bool_], reference: Reference

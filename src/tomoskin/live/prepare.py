@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel
-from tomoskin.inverse import OneStep
+from tomoskin.inverse import AlphaChoice, LightTouch, LinearProblem, Operator, Spectrum
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern, Scan
-from tomoskin.signal import Readout, Reference
+from tomoskin.signal import Readout, Reference, difference_noise
 from tomoskin.skin import Skin
 from tomoskin.touch import NoiseFloor, Segmenter
 
@@ -21,8 +22,12 @@ class Prepared:
 
     Attributes
     ----------
-    skin, mesh, pattern, scan, model, operator, segmenter, readout
+    skin, mesh, pattern, scan, model, problem, operator, segmenter, readout
         The stages, in the order of the flow.
+    choice
+        The operator's alpha, and what chose it.
+    light_touch
+        Chooses alpha again when the noise has been measured; None where it was set by hand.
     """
 
     skin: Skin
@@ -30,21 +35,33 @@ class Prepared:
     pattern: Pattern
     scan: Scan
     model: ForwardModel
-    operator: OneStep
+    problem: LinearProblem
+    operator: Operator
     segmenter: Segmenter
     readout: Readout
+    choice: AlphaChoice
+    light_touch: LightTouch | None
 
     def noise_floor(self, reference: Reference) -> NoiseFloor | None:
         """What the noise of a reference does to the picture; None where it is not known."""
         if not reference.noise_is_known:
             return None
-        normalised = self.operator.difference == "normalised"
-        noise = reference.noise / np.abs(reference.mean) if normalised else reference.noise
-        return NoiseFloor.of(self.operator.matrix, noise)
+        return NoiseFloor.of(self.operator.matrix, self.difference_noise(reference))
+
+    def difference_noise(self, reference: Reference) -> FloatArray:
+        """(n_meas,) standard deviation of difference data against that reference."""
+        return difference_noise(reference.noise, reference.mean, self.operator.difference)
+
+    def places(self, image: FloatArray) -> FloatArray:
+        """(k, 2) m, where the touches of an image (n_cells,) are."""
+        found = [(reading.x, reading.y) for reading in self.segmenter(image)]
+        return np.array(found).reshape(-1, 2)
 
 
 def prepare(skin: Skin) -> Prepared:
     """Mesh, model, operator and stages of ``skin``.
+
+    Where the skin's alpha is "auto", it is chosen by the noise that its read-out predicts.
 
     Raises
     ------
@@ -53,22 +70,39 @@ def prepare(skin: Skin) -> Prepared:
     """
     mesh, pattern = skin.mesh(), skin.pattern()
     scan = Scan.of(pattern)
+    readout = Readout.of(scan, skin.readout)
     model = ForwardModel(mesh, pattern, skin.contact_impedance, skin.current)
     settings = skin.inverse
-    operator = OneStep(
+    problem = LinearProblem.of(
         model,
         settings.prior,
-        alpha=settings.alpha,
         conductivity=skin.conductivity,
         difference=settings.difference,
     )
+    light_touch, choice, operator = _chosen(problem, settings.alpha, readout.noise)
     return Prepared(
         skin=skin,
         mesh=mesh,
         pattern=pattern,
         scan=scan,
         model=model,
+        problem=problem,
         operator=operator,
         segmenter=Segmenter(mesh, skin.touch),
-        readout=Readout.of(scan, skin.readout),
+        readout=readout,
+        choice=choice,
+        light_touch=light_touch,
     )
+
+
+def _chosen(
+    problem: LinearProblem, alpha: float | str, noise: float
+) -> tuple[LightTouch | None, AlphaChoice, Operator]:
+    if not isinstance(alpha, str):
+        by_hand = AlphaChoice(alpha, "hand", "set in the skin file")
+        return None, by_hand, problem.operator(alpha)
+    light_touch = LightTouch.of(Spectrum.of(problem))
+    rows = np.full(len(problem.reference), noise)
+    choice = light_touch(difference_noise(rows, problem.reference, problem.difference))
+    choice = replace(choice, reason=f"{choice.reason}, as its read-out predicts it")
+    return light_touch, choice, light_touch.spectrum.operator(choice.alpha)

@@ -1,7 +1,7 @@
 """Counts → voltages → differences, with the noise of an idle skin."""
 
 from tomoskin.signal.consecutive import Consecutive, at_one_time
-from tomoskin.signal.difference import DIFFERENCES, difference
+from tomoskin.signal.difference import DIFFERENCES, difference, difference_noise
 from tomoskin.signal.phase import in_phase
 from tomoskin.signal.readout import Readout
 from tomoskin.signal.reference import Reference
@@ -13,5 +13,6 @@ __all__ = [
     "Reference",
     "at_one_time",
     "difference",
+    "difference_noise",
     "in_phase",
 ]

@@ -40,3 +40,11 @@ def difference(values: FloatArray, reference: FloatArray, kind: str) -> FloatArr
             hint='set difference = "plain" in [inverse], or look at that electrode',
         )
     return np.asarray(change / np.abs(reference))
+
+
+def difference_noise(noise: FloatArray, reference: FloatArray, kind: str) -> FloatArray:
+    """Standard deviation of difference data, (n_meas,), where that of the voltages is ``noise``.
+
+    ``noise`` and ``reference`` are (n_meas,) V; the result is V, or a ratio when normalised.
+    """
+    return noise if kind == "plain" else np.asarray(noise / np.abs(reference))

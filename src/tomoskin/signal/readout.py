@@ -11,6 +11,10 @@ from tomoskin.core import DataError, Frame, Voltages
 from tomoskin.pattern import Scan
 from tomoskin.skin import ReadoutSettings
 
+CONVERSION_NOISE = 0.7
+"""Standard deviation of one conversion before it is rounded, in LSB, of a usual small board;
+rounding adds 1/√12 LSB, and a row is the difference of two samples."""
+
 
 @dataclass(frozen=True, eq=False)
 class Readout:
@@ -24,12 +28,15 @@ class Readout:
         Skin voltage per count of the summed readings, V.
     low, high
         A sample at or beyond these summed counts stood at a rail.
+    noise
+        Standard deviation of a row that the converter alone causes, V.
     """
 
     scan: Scan
     volts_per_count: float
     low: int
     high: int
+    noise: float
 
     @classmethod
     def of(cls, scan: Scan, settings: ReadoutSettings) -> Self:
@@ -37,7 +44,8 @@ class Readout:
         levels = 1 << settings.adc_bits
         n = settings.oversampling
         volts = settings.reference_voltage / (levels * settings.gain * n)
-        return cls(scan, volts, low=n, high=(levels - 2) * n)
+        noise = volts * np.sqrt(2 * n * (CONVERSION_NOISE**2 + 1 / 12))
+        return cls(scan, volts, low=n, high=(levels - 2) * n, noise=float(noise))
 
     def __call__(self, frame: Frame) -> Voltages:
         """Voltages of one frame.

@@ -100,6 +100,28 @@ class Number(Kind):
 
 
 @dataclass(frozen=True)
+class NumberOrWord(Kind):
+    """A number in a range, or one of a few words in its place."""
+
+    number: Number
+    words: Choice
+
+    @property
+    def expected(self) -> str:
+        """The phrase."""
+        return f"{self.number.expected}, or {self.words.expected}"
+
+    def read(self, value: object) -> float | str:
+        """The number or the word."""
+        kind: Kind = self.words if isinstance(value, str) else self.number
+        try:
+            found: float | str = kind.read(value)
+        except ValueError:
+            raise _unexpected(self, value) from None
+        return found
+
+
+@dataclass(frozen=True)
 class Quantity(Kind):
     """A number with a unit; the range is stated in ``unit``, the value comes back in SI."""
 

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tomoskin.skin.kinds import Choice, Kind, Number, OneOrEach, Quantity, Rows, Text, Whole
+from tomoskin.skin.kinds import (
+    Choice,
+    Kind,
+    Number,
+    NumberOrWord,
+    OneOrEach,
+    Quantity,
+    Rows,
+    Text,
+    Whole,
+)
 
 FORMAT = 1
 """Version of the file that this code reads, the top-level key ``format``."""
@@ -257,7 +267,13 @@ SECTIONS: tuple[Section, ...] = (
                 "What is held to be likely.",
                 default="noser",
             ),
-            Key("alpha", Number(1e-9, 1e9), "Weight of the prior; it enters squared.", default=0.1),
+            Key(
+                "alpha",
+                NumberOrWord(Number(1e-9, 1e9), Choice(("auto",))),
+                "Weight of the prior; it enters squared. auto: chosen by the noise, for a light "
+                "touch.",
+                default="auto",
+            ),
             Key(
                 "difference",
                 Choice(("plain", "normalised")),
@@ -307,6 +323,18 @@ SECTIONS: tuple[Section, ...] = (
                 default="centroid",
             ),
             Key("max_touches", Whole(1, 50), "Most touches reported at once.", default=8),
+        ),
+    ),
+    Section(
+        "twin",
+        "The simulated skin that stands in for this one; a real skin does not read it.",
+        (
+            Key(
+                "preset",
+                Choice(("ideal", "textile", "hydrogel", "tank")),
+                "Material and board: without vices and memory, or as measured or assumed.",
+                default="ideal",
+            ),
         ),
     ),
 )

@@ -20,11 +20,21 @@ class ReadoutSettings:
 
 @dataclass(frozen=True, slots=True)
 class InverseSettings:
-    """Prior ("identity", "laplace", "gaussian", "noser"), its weight, and the difference."""
+    """Prior ("identity", "laplace", "gaussian", "noser"), its weight, and the difference.
+
+    ``alpha`` is a number or "auto": chosen by the noise.
+    """
 
     prior: str
-    alpha: float
+    alpha: float | str
     difference: str
+
+
+@dataclass(frozen=True, slots=True)
+class TwinChoice:
+    """Name of the twin's settings for this skin."""
+
+    preset: str
 
 
 @dataclass(frozen=True, slots=True)
