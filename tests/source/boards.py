@@ -99,7 +99,7 @@ class Counting:
     def __init__(self):
         self.scans = 0
 
-    def sample(self, table):
+    def sample(self, table, _time):
         counts = np.arange(len(table.channel)) + self.scans
         self.scans += 1
         return counts.astype(np.uint16)

@@ -44,7 +44,7 @@ class Known:
     def __init__(self):
         self.given = []
 
-    def sample(self, table):
+    def sample(self, table, _time):
         counts = np.random.default_rng(len(self.given)).integers(0, 1024, len(table.channel))
         self.given.append(counts.astype(np.uint16))
         return self.given[-1]

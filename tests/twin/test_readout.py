@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tomoskin.skin import ReadoutSettings
-from tomoskin.twin import TwinElectronics, convert, sample_table
+from tomoskin.twin import ElectronicsSettings, TwinElectronics, convert, sample_table
 from tomoskin.wire import Drive
 
 SETTINGS = ReadoutSettings(10, 5.0, 40.0, 0.5, 16, 2e-3, 250e3)
@@ -13,7 +13,8 @@ LSB = 5.0 / 1024
 
 def conversions(volts, oversampling, noise, n=4000, seed=1):
     random = np.random.default_rng(seed)
-    return convert(np.full(n, volts), SETTINGS, oversampling, noise, random).astype(float)
+    board = ElectronicsSettings(noise=noise)
+    return convert(np.full(n, volts), SETTINGS, oversampling, board, random).astype(float)
 
 
 @pytest.mark.parametrize("oversampling", [1, 4, 64])
@@ -50,8 +51,9 @@ def test_noise_is_fresh_in_each_scan_and_repeats_with_the_seed(sheet, skin):
     table = sample_table([Drive(1, 0, 0b11111100)], 16)
 
     def scans(seed):
-        electronics = TwinElectronics(sheet, skin.readout, skin.current, 0.7, seed)
-        return [electronics.sample(table).tolist() for _ in range(3)]
+        perfect = ElectronicsSettings()
+        electronics = TwinElectronics(sheet, skin.readout, skin.current, perfect, seed)
+        return [electronics.sample(table, float(k)).tolist() for k in range(3)]
 
     assert scans(3) == scans(3)
     assert scans(3) != scans(4)

@@ -74,7 +74,7 @@ def test_pace_is_the_boards(skin):
 
 def test_a_press_shows_in_the_next_frame_and_goes_again(skin):
     clock = ManualClock()
-    transport = make_twin(skin, TwinSettings(noise=0.0), clock)
+    transport = make_twin(skin, TwinSettings().with_noise(0.0), clock)
     (rest,), link = frames_of(transport, skin, 1, clock)
 
     def following():

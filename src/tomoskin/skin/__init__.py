@@ -7,7 +7,7 @@ from tomoskin.skin.kinds import Choice, Kind, Number, Quantity, Text, Whole, sho
 from tomoskin.skin.page import section_text, skin_file_page
 from tomoskin.skin.read import check_names, read_section, toml_tables
 from tomoskin.skin.schema import Key, Section
-from tomoskin.skin.settings import InverseSettings, ReadoutSettings, TouchSettings
+from tomoskin.skin.settings import InverseSettings, ReadoutSettings, TouchSettings, TwinChoice
 from tomoskin.skin.skin import Skin
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "Skin",
     "Text",
     "TouchSettings",
+    "TwinChoice",
     "Whole",
     "check_names",
     "read_section",

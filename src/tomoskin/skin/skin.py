@@ -18,7 +18,7 @@ from tomoskin.pattern import Pattern
 from tomoskin.skin.build import impedances, located, pattern_of, placed, readout_of
 from tomoskin.skin.find import built_in_names, skin_text
 from tomoskin.skin.read import Document, complete, parse, values
-from tomoskin.skin.settings import InverseSettings, ReadoutSettings, TouchSettings
+from tomoskin.skin.settings import InverseSettings, ReadoutSettings, TouchSettings, TwinChoice
 from tomoskin.skin.write import toml
 
 
@@ -44,7 +44,7 @@ class Skin:
         Driven current, A.
     mesh_cells
         Wanted number of triangles.
-    readout, inverse, touch
+    readout, inverse, touch, twin
         Settings of the rooms of that name.
     """
 
@@ -61,6 +61,7 @@ class Skin:
     readout: ReadoutSettings
     inverse: InverseSettings
     touch: TouchSettings
+    twin: TwinChoice
     _pattern: Pattern = field(repr=False)
 
     @classmethod
@@ -110,8 +111,9 @@ class Skin:
 
     @cached_property
     def identity(self) -> str:
-        """Short hash of everything but name, description and source."""
-        content = {k: v for k, v in values(self.document, self.source).items() if k != "skin"}
+        """Short hash of everything but name, description, source and twin."""
+        known = values(self.document, self.source)
+        content = {k: v for k, v in known.items() if k not in ("skin", "twin")}
         return hashlib.sha256(_canonical(content).encode()).hexdigest()[:16]
 
     def pattern(self) -> Pattern:
@@ -152,6 +154,7 @@ class Skin:
             readout=readout_of(value, source),
             inverse=InverseSettings(**value["inverse"]),
             touch=TouchSettings(**value["touch"]),
+            twin=TwinChoice(**value["twin"]),
             _pattern=pattern_of(value, len(arcs), source),
         )
 

@@ -5,7 +5,13 @@ from tomoskin.source.conversation import Conversation, Stage
 from tomoskin.source.gate import FrameCounters, FrameGate
 from tomoskin.source.link import Link
 from tomoskin.source.registry import GROUP, open_source, read_options, source_names
-from tomoskin.source.settings import PRESCALERS, ScanSettings, Timing, scan_time
+from tomoskin.source.settings import (
+    PRESCALERS,
+    ScanSettings,
+    Timing,
+    conversion_time,
+    scan_time,
+)
 from tomoskin.source.transport import Transport
 
 __all__ = [
@@ -20,6 +26,7 @@ __all__ = [
     "Stage",
     "Timing",
     "Transport",
+    "conversion_time",
     "open_source",
     "read_options",
     "scan_time",

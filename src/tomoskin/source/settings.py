@@ -21,9 +21,14 @@ _CLOCK = 16e6
 """Clock of the board, Hz."""
 
 
+def conversion_time(prescaler: int) -> float:
+    """Seconds for one conversion."""
+    return _CYCLES * prescaler / _CLOCK
+
+
 def scan_time(n_drives: int, n_conversions: int, per_drive: float, prescaler: int) -> float:
     """Seconds for one scan: settling and dead time ``per_drive`` s, then the conversions."""
-    return n_drives * per_drive + n_conversions * _CYCLES * prescaler / _CLOCK
+    return n_drives * per_drive + n_conversions * conversion_time(prescaler)
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,11 @@ class ScanSettings:
             raise SourceError(f"expected a settling time from 0 to 0.1 s, got {self.settling} s")
         if self.prescaler not in PRESCALERS:
             raise SourceError(f"expected a prescaler of {PRESCALERS}, got {self.prescaler}")
+
+    @property
+    def conversion(self) -> float:
+        """One conversion, s."""
+        return conversion_time(self.prescaler)
 
     @classmethod
     def of(cls, skin: Skin) -> Self:

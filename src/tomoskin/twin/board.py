@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from tomoskin.source import PRESCALERS
-from tomoskin.twin.readout import SampleTable
 from tomoskin.wire import SCHEMA, Drive, Info, Reset, Result, SetPattern, SetScan
 
 Verdict = tuple[Result, int]
@@ -93,15 +90,3 @@ class Board:
             return Result.INCOMPLETE, list(drives).index(None)
         samples = sum(drive.mask.bit_count() for drive in drives if drive)
         return OK if samples <= self.max_samples else (Result.TOO_MANY_SAMPLES, self.max_samples)
-
-
-def sample_table(drives: Sequence[Drive], oversampling: int) -> SampleTable:
-    """The samples of a scan: drive by drive, channels ascending."""
-    rows = [
-        (drive.source, drive.sink, channel)
-        for drive in drives
-        for channel in range(drive.mask.bit_length())
-        if drive.mask >> channel & 1
-    ]
-    source, sink, channel = np.array(rows, dtype=np.int64).reshape(-1, 3).T
-    return SampleTable(source, sink, channel, oversampling)

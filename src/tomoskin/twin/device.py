@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tomoskin.core import Frame
-from tomoskin.source import scan_time
-from tomoskin.twin.board import OK, Board, Verdict, sample_table
-from tomoskin.twin.readout import Analogue, SampleTable
+from tomoskin.source import conversion_time
+from tomoskin.twin.board import OK, Board, Verdict
+from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, sample_table
 from tomoskin.wire import (
     SCHEMA,
     Ack,
@@ -62,6 +62,12 @@ class TwinDevice:
     def __init__(self, analogue: Analogue, board: Board, now: float, pace: float = 1.0) -> None:
         """Power on at ``now`` s. ``pace``: seconds per second of device time; 0: no waiting."""
         self._analogue, self._board, self._pace = analogue, board, pace
+        self._out = bytearray()
+        self.reboot(now)
+
+    def reboot(self, now: float) -> None:
+        """Power off and on: what was set, scanned or still to be sent is gone."""
+        self._out.clear()
         self._deframer = Deframer(SCHEMA.to_device_bytes)
         self._power_on = self._heard = now
         self._next_hello: float | None = now
@@ -71,7 +77,6 @@ class TwinDevice:
         self._scanning: _Scanning | None = None
         self._last: tuple[int, int] | None = None
         self._last_reply = b""
-        self._out = bytearray()
 
     @property
     def driving(self) -> bool:
@@ -111,7 +116,7 @@ class TwinDevice:
         return data
 
     def _frame(self, scanning: _Scanning, now: float) -> Frame:
-        samples = self._analogue.sample(scanning.table)
+        samples = self._analogue.sample(scanning.table, scanning.device_time)
         frame = Frame(
             sequence=scanning.sequence,
             ticks=round(scanning.device_time * self._board.tick_rate),
@@ -194,13 +199,11 @@ class TwinDevice:
         if verdict != OK or self._scan is None:
             return verdict
         scan, drives = self._scan, [drive for drive in self._drives if drive]
-        table = sample_table(drives, scan.oversampling)
-        period = scan_time(
-            len(drives),
-            len(table.channel) * scan.oversampling,
-            (scan.settling + scan.dead_time) * 1e-6,
-            scan.prescaler,
+        times = ScanClock(
+            scan.dead_time * 1e-6, scan.settling * 1e-6, conversion_time(scan.prescaler)
         )
+        table = sample_table(drives, scan.oversampling, times)
+        period = table.seconds
         self._scanning = _Scanning(
             table, scan.configuration, period, now + period * self._pace, now - self._power_on
         )

@@ -2,63 +2,91 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray
+from tomoskin.twin.circuit import Lines, line_potentials, settled
+from tomoskin.twin.faults import Faults, check_electrodes
+from tomoskin.twin.parameters import check_numbers, parameter
+from tomoskin.twin.scanning import SampleTable
 from tomoskin.twin.sheet import TwinSkin
 
 if TYPE_CHECKING:
     from tomoskin.skin import ReadoutSettings
 
 
-@dataclass(frozen=True, eq=False)
-class SampleTable:
-    """What a scan samples: (n_samples,) channels that are source, sink and read each time."""
+@dataclass(frozen=True, slots=True)
+class ElectronicsSettings:
+    """A board's imperfections; the defaults are a perfect board but for the converter's noise."""
 
-    source: IntArray
-    sink: IntArray
-    channel: IntArray
-    oversampling: int
+    noise: float = parameter(
+        0.7, "LSB", "Standard deviation of one conversion before it is rounded.", "assumed"
+    )
+    compliance: float = parameter(
+        math.inf, "V", "Most that the current source drives its load with.", "ideal"
+    )
+    output_resistance: float = parameter(math.inf, "Ω", "Across the current source.", "ideal")
+    switch_resistance: float = parameter(0.0, "Ω", "Of each switch, when on.", "ideal")
+    contact_sd: float = parameter(
+        0.0, "Ω", "Standard deviation of each contact's resistance over time.", "ideal"
+    )
+    contact_time: float = parameter(10.0, "s", "Correlation time of that.", "assumed")
+    rejection: float = parameter(math.inf, "dB", "Common-mode rejection of the amplifier.", "ideal")
+    gain_sd: float = parameter(0.0, "", "Relative deviation of the channels' gains.", "ideal")
+    offset_sd: float = parameter(
+        0.0, "V", "Deviation of the channels' offsets, at the input.", "ideal"
+    )
+    low_rail: float = parameter(-math.inf, "V", "Least output of the amplifier.", "ideal")
+    high_rail: float = parameter(math.inf, "V", "Largest output of the amplifier.", "ideal")
+    time_constant: float = parameter(
+        0.0, "s", "With which a channel settles after a switch of the drive.", "ideal"
+    )
+    crosstalk: float = parameter(
+        0.0, "", "Part of a neighbouring channel's potential that is read too.", "ideal"
+    )
+    hum: float = parameter(0.0, "V", "Amplitude of the mains at the inputs.", "ideal")
+    hum_frequency: float = parameter(50.0, "Hz", "Of the mains.", "Europe; 60 in America")
+    nonlinearity: float = parameter(
+        0.0, "LSB", "Largest bow of the converter's line, in the middle of its range.", "ideal"
+    )
 
-
-class Analogue(Protocol):
-    """Whatever stands before the converter's output."""
-
-    def sample(self, table: SampleTable) -> NDArray[np.uint16]:
-        """(n_samples,) counts, each the sum of its conversions."""
-
-
-def potentials(resistance: FloatArray, table: SampleTable, current: float) -> FloatArray:
-    """(n_samples,) V of the channel read against the grounded sink, contacts included.
-
-    ``resistance`` (n, n) Ω holds potentials per ampere for currents that sum to zero.
-    """
-    source, sink, channel = table.source, table.sink, table.channel
-    driven = resistance[channel, source] - resistance[channel, sink]
-    ground = resistance[sink, source] - resistance[sink, sink]
-    return np.asarray(current * (driven - ground))
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        check_numbers(
+            self,
+            above="contact_time hum_frequency",
+            least="noise switch_resistance contact_sd gain_sd offset_sd time_constant crosstalk "
+            "hum nonlinearity",
+        )
 
 
 def convert(
     volts: FloatArray,
-    settings: ReadoutSettings,
+    readout: ReadoutSettings,
     oversampling: int,
-    noise: float,
+    electronics: ElectronicsSettings,
     random: np.random.Generator,
 ) -> NDArray[np.uint16]:
-    """(n_samples,) summed codes of the potentials ``volts``.
+    """(n_samples,) summed codes of the potentials ``volts``, (n_samples,) or one per conversion.
 
-    Amplified and shifted; each conversion then has its own Gaussian noise of ``noise`` LSB, is
-    rounded down as the converter does (code = V · 2ⁿ / V_ref) and stops at the rails.
+    Amplified, shifted and held between the amplifier's rails; each conversion then has its own
+    Gaussian noise, is rounded down as the converter does (code = V · 2ⁿ / V_ref) and stops at
+    the converter's rails.
     """
-    levels = 1 << settings.adc_bits
-    exact = (settings.gain * volts + settings.offset) * (levels / settings.reference_voltage)
-    noisy = random.standard_normal((oversampling, len(volts)))
-    noisy *= noise
+    levels = 1 << readout.adc_bits
+    output = readout.gain * volts + readout.offset
+    np.clip(output, electronics.low_rail, electronics.high_rail, out=output)
+    exact = output * (levels / readout.reference_voltage)
+    if electronics.nonlinearity:
+        part = np.clip(exact / levels, 0.0, 1.0)
+        exact = exact + electronics.nonlinearity * 4 * part * (1 - part)
+    noisy = random.standard_normal((oversampling, volts.shape[-1]))
+    noisy *= electronics.noise
     noisy += exact
     np.floor(noisy, out=noisy)
     np.clip(noisy, 0, levels - 1, out=noisy)
@@ -66,29 +94,110 @@ def convert(
 
 
 class TwinElectronics:
-    """Current source, amplifiers and converter on a twin's sheet."""
+    """Current source, switches, amplifiers and converter on a twin's sheet."""
 
     def __init__(
         self,
-        skin: TwinSkin,
-        settings: ReadoutSettings,
+        sheet: TwinSkin,
+        readout: ReadoutSettings,
         current: float,
-        noise: float,
+        electronics: ElectronicsSettings,
         seed: int,
     ) -> None:
-        """``current`` A; ``noise`` LSB of one conversion."""
-        self._skin = skin
-        self._settings = settings
-        self._current = current
-        self._noise = noise
-        self._random = np.random.default_rng(seed)
-        self._volts: tuple[FloatArray, SampleTable, FloatArray] | None = None
+        """``current`` A."""
+        self.sheet, self._readout, self._current = sheet, readout, current
+        self.settings = electronics
+        channels, self._random, self._contacts = (
+            np.random.default_rng(part) for part in np.random.SeedSequence(seed).spawn(3)
+        )
+        n = sheet.n_electrodes
+        self._gain = 1.0 + electronics.gain_sd * channels.standard_normal(n)
+        self._offset = electronics.offset_sd * channels.standard_normal(n)
+        self._hum = electronics.hum * (1 + 0.2 * channels.standard_normal(n))
+        self._phase = channels.uniform(0, 2 * np.pi) + 0.2 * channels.standard_normal(n)
+        self._faults = Faults()
+        self._contact = electronics.contact_sd * self._contacts.standard_normal(n)
+        self._time: float | None = None
+        self._before = np.zeros(n)
+        self._known: tuple[object, ...] = ()
+        self._lines = Lines(np.zeros((0, n)), np.zeros(n))
 
-    def sample(self, table: SampleTable) -> NDArray[np.uint16]:
-        """Counts of one scan of the sheet as it is pressed now."""
-        resistance = self._skin.resistance()
-        known = self._volts
-        if known is None or known[0] is not resistance or known[1] is not table:
-            known = (resistance, table, potentials(resistance, table, self._current))
-            self._volts = known
-        return convert(known[2], self._settings, table.oversampling, self._noise, self._random)
+    @property
+    def faults(self) -> Faults:
+        """What is broken now."""
+        return self._faults
+
+    def set_faults(self, faults: Faults) -> None:
+        """Break and mend, from any thread; ModelError for an electrode that is not there."""
+        check_electrodes(faults, self.sheet.n_electrodes)
+        self._faults = faults
+
+    def renew(self, chance: np.random.SeedSequence) -> None:
+        """Begin anew at no time, with noise and contacts from ``chance``; the channels stay."""
+        noise, contacts = chance.spawn(2)
+        self._random = np.random.default_rng(noise)
+        self._contacts = np.random.default_rng(contacts)
+        n = len(self._contact)
+        self._contact = self.settings.contact_sd * self._contacts.standard_normal(n)
+        self._time, self._before = None, np.zeros(n)
+
+    def sample(self, table: SampleTable, time: float) -> NDArray[np.uint16]:
+        """Counts of a scan begun at ``time`` s of the sheet as it is pressed then.
+
+        The sheet and its contacts go on from the scan before to this time, and then stand still
+        until the scan is over.
+        """
+        dt = 0.0 if self._time is None else max(0.0, time - self._time)
+        self._time = time
+        self.sheet.advance(dt)
+        self._age_contacts(dt)
+        volts = self._volts(table, time)
+        return convert(volts, self._readout, table.oversampling, self.settings, self._random)
+
+    def _volts(self, table: SampleTable, time: float) -> FloatArray:
+        """(n_samples,) or (oversampling, n_samples) V at the amplifiers' inputs."""
+        lines = self._potentials(table)
+        settings, drive, channel = self.settings, table.drive, table.channel
+        volts = lines.read[drive, channel]
+        each = np.arange(table.oversampling)[:, None] * table.conversion
+        if settings.time_constant > 0:
+            start = settled(lines.read, self._before, table.length, settings.time_constant)
+            self._before = start[-1]
+            missing = start[:-1][drive, channel] - volts
+            volts = volts + missing * np.exp(-(table.since + each) / settings.time_constant)
+        if settings.hum > 0:
+            turn = 2 * np.pi * settings.hum_frequency * (time + table.time + each)
+            volts = volts + self._hum[channel] * np.sin(turn + self._phase[channel])
+        volts = self._gain[channel] * (volts + self._offset[channel])
+        stuck = lines.stuck[drive, channel]
+        if stuck.any():
+            volts = np.where(stuck, np.inf, volts)
+        return volts
+
+    def _potentials(self, table: SampleTable) -> Lines:
+        """What the channels stand at under each drive; worked out anew when something changed."""
+        resistance = self.sheet.resistance()
+        faults = self._faults
+        key = (resistance, table, faults, self._contact)
+        if len(self._known) != len(key) or any(
+            a is not b for a, b in zip(self._known, key, strict=True)
+        ):
+            self._lines = line_potentials(
+                resistance,
+                table.drives,
+                self._current,
+                contact=self._contact,
+                faults=faults,
+                settings=self.settings,
+            )
+            self._known = key
+        return self._lines
+
+    def _age_contacts(self, dt: float) -> None:
+        """Ornstein–Uhlenbeck, exact for any step (Gillespie 1996, eq. 2.47)."""
+        sd = self.settings.contact_sd
+        if sd == 0 or dt == 0:
+            return
+        kept = math.exp(-dt / self.settings.contact_time)
+        fresh = self._contacts.standard_normal(len(self._contact))
+        self._contact = kept * self._contact + sd * math.sqrt(1 - kept**2) * fresh

@@ -8,8 +8,10 @@ from tomoskin.core import SourceError
 from tomoskin.source import read_options
 from tomoskin.twin.board import Board
 from tomoskin.twin.device import TwinDevice
+from tomoskin.twin.line import Line
 from tomoskin.twin.readout import TwinElectronics
-from tomoskin.twin.sheet import TwinSettings, TwinSkin
+from tomoskin.twin.settings import PRESETS, TwinSettings
+from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.transport import Clock, TwinTransport, WallClock
 
 if TYPE_CHECKING:
@@ -20,29 +22,57 @@ _BOARDS = (8, 16, 32)
 
 
 def open_twin(argument: str, skin: Skin) -> TwinTransport:
-    """``twin``, or with options: ``twin:seed=3`` (noise), ``twin:fast`` (no waiting).
+    """``twin``, or with options, joined by commas: ``twin:seed=3,noise=2``.
+
+    ``seed=N``: of noise, spread and temperature. ``fast``: no waiting. ``preset=NAME``: another
+    material and board than the skin file's. ``noise=LSB``: of one conversion.
 
     Raises
     ------
     SourceError
-        For an unknown option.
+        For an unknown option or value.
     """
-    options = read_options(argument, ("seed", "fast"), "twin")
+    options = read_options(argument, ("seed", "fast", "preset", "noise"), "twin")
     seed = options.get("seed", "0")
-    if not seed.isdigit():
+    if not (seed.isascii() and seed.isdigit()):
         raise SourceError(f'expected a seed of 0 or more, got "{seed}"', where="twin")
-    pace = 0.0 if "fast" in options else 1.0
-    return make_twin(skin, TwinSettings(seed=int(seed)), WallClock(), pace)
+    preset = options.get("preset", skin.twin.preset)
+    if preset not in PRESETS:
+        known = ", ".join(PRESETS)
+        raise SourceError(f'expected a preset of {known}, got "{preset}"', where="twin")
+    settings = TwinSettings.preset(preset, int(seed))
+    if "noise" in options:
+        settings = settings.with_noise(_noise(options["noise"]))
+    return make_twin(skin, settings, WallClock(), 0.0 if "fast" in options else 1.0)
 
 
 def make_twin(skin: Skin, settings: TwinSettings, clock: Clock, pace: float = 1.0) -> TwinTransport:
     """A twin that takes its time from ``clock``; ``pace`` 0 does not wait between frames."""
-    sheet = TwinSkin.of(skin, settings)
-    electronics = TwinElectronics(sheet, skin.readout, skin.current, settings.noise, settings.seed)
+    electronics = make_electronics(skin, settings)
     board = Board(
         channels=next((n for n in _BOARDS if n >= skin.n_electrodes), skin.n_electrodes),
         adc_bits=skin.readout.adc_bits,
         current=skin.current,
         tick_rate=skin.readout.tick_rate,
     )
-    return TwinTransport(sheet, TwinDevice(electronics, board, clock.now(), pace), clock)
+    device = TwinDevice(electronics, board, clock.now(), pace)
+    return TwinTransport(electronics, device, clock, Line(settings.line, settings.seed))
+
+
+def make_electronics(skin: Skin, settings: TwinSettings) -> TwinElectronics:
+    """Sheet and electronics of a twin, without the board's firmware and the wire.
+
+    For scripts that need the counts only: ``set_presses`` on its ``sheet``, then ``sample``.
+    """
+    sheet = TwinSkin.of(skin, settings)
+    return TwinElectronics(sheet, skin.readout, skin.current, settings.electronics, settings.seed)
+
+
+def _noise(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 <= value <= 1e6:  # NaN fails too
+        raise SourceError(f'expected a noise of 0 LSB or more, got "{text}"', where="twin")
+    return value

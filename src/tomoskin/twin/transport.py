@@ -8,7 +8,10 @@ from typing import Protocol
 
 from tomoskin.core import SourceError
 from tomoskin.twin.device import TwinDevice
-from tomoskin.twin.press import Press
+from tomoskin.twin.faults import Faults
+from tomoskin.twin.line import Line, LineSettings
+from tomoskin.twin.probe import Contact
+from tomoskin.twin.readout import TwinElectronics
 from tomoskin.twin.sheet import TwinSkin
 
 
@@ -37,25 +40,38 @@ class WallClock:
 class TwinTransport:
     """Bytes of a twin, in real time.
 
-    One thread reads; ``write``, ``set_presses`` and ``close`` may come from any.
+    One thread reads; everything else may come from any.
     """
 
-    def __init__(self, skin: TwinSkin, device: TwinDevice, clock: Clock) -> None:
-        """``device`` must have been powered on by the same ``clock``."""
+    def __init__(
+        self,
+        electronics: TwinElectronics,
+        device: TwinDevice,
+        clock: Clock,
+        line: Line | None = None,
+    ) -> None:
+        """``device`` must have been powered on by the same ``clock``, on the ``electronics``."""
+        self._line = line or Line(LineSettings(), 0)
         self.name = "twin"
         self.device = device
-        self._skin = skin
+        self.electronics = electronics
         self._clock = clock
         self._condition = threading.Condition()
         self._inbox = bytearray()
         self._closed = False
+        self._reboot = False
 
     @property
-    def presses(self) -> tuple[Press, ...]:
-        """What presses on the twin now."""
-        return self._skin.presses
+    def sheet(self) -> TwinSkin:
+        """The twin's sheet."""
+        return self.electronics.sheet
 
-    def set_presses(self, presses: tuple[Press, ...]) -> None:
+    @property
+    def presses(self) -> tuple[Contact, ...]:
+        """What presses on the twin now."""
+        return self.sheet.presses
+
+    def set_presses(self, presses: tuple[Contact, ...]) -> None:
         """Replace all presses; they show from the next frame on.
 
         Raises
@@ -63,21 +79,40 @@ class TwinTransport:
         GeometryError
             When the centre of one is off the skin; then nothing is changed.
         """
-        self._skin.set_presses(presses)
+        self.sheet.set_presses(presses)
+
+    def set_faults(self, faults: Faults) -> None:
+        """Break and mend; it shows from the next frame on.
+
+        Raises
+        ------
+        ModelError
+            For an electrode that the skin does not have; then nothing is changed.
+        """
+        self.electronics.set_faults(faults)
+
+    def reboot(self) -> None:
+        """Cut the board's power for a moment: it forgets everything and says HELLO."""
+        with self._condition:
+            self._inbox.clear()
+            self._reboot = True
+            self._condition.notify()
 
     def read(self, timeout: float) -> bytes:
         """What the twin sends next, waiting at most ``timeout`` s; ``b""`` if nothing."""
         end = self._clock.now() + timeout
         while True:
-            received = self._take()
+            received, reboot = self._take()
             now = self._clock.now()
+            if reboot:
+                self.device.reboot(now)
             if received:
                 self.device.receive(received, now)
-            data = self.device.emit(now)
+            data = self._line.carry(self.device.emit(now))
             if data or now >= end:
                 return data
             with self._condition:
-                if not self._inbox and not self._closed:
+                if not (self._inbox or self._closed or self._reboot):
                     self._clock.wait(self._condition, max(min(self.device.due, end) - now, 0.0))
 
     def write(self, data: bytes) -> None:
@@ -93,12 +128,13 @@ class TwinTransport:
             self._closed = True
             self._condition.notify()
 
-    def _take(self) -> bytes:
+    def _take(self) -> tuple[bytes, bool]:
         with self._condition:
             self._check_open()
-            data = bytes(self._inbox)
+            data, reboot = bytes(self._inbox), self._reboot
             self._inbox.clear()
-        return data
+            self._reboot = False
+        return data, reboot
 
     def _check_open(self) -> None:
         if self._closed:

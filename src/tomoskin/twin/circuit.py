@@ -1,0 +1,119 @@
+"""Current source, switches, contacts and shorts around the sheet: what each channel stands at."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.twin.faults import Faults
+
+if TYPE_CHECKING:
+    from tomoskin.twin.readout import ElectronicsSettings
+
+_SHORT = 1e-3
+"""Resistance of two electrodes that touch, Ω; assumed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """The channels under each drive.
+
+    Attributes
+    ----------
+    read
+        (n_drives, n) V between channel and sink line, as the amplifier reads it.
+    stuck
+        (n_drives, n) True where an input floats or a channel is broken: it stands at the rail.
+    """
+
+    read: FloatArray
+    stuck: NDArray[np.bool_]
+
+
+def line_potentials(
+    resistance: FloatArray,
+    drives: IntArray,
+    current: float,
+    *,
+    contact: FloatArray,
+    faults: Faults,
+    settings: ElectronicsSettings,
+) -> Lines:
+    """What the amplifiers see under each of ``drives`` (n_drives, 2).
+
+    Parameters
+    ----------
+    resistance
+        (n, n) Ω transfer resistance of sheet and contacts.
+    contact
+        (n,) Ω that each contact has more than in ``resistance``.
+    """
+    resistance = shorted(resistance, faults.shorts)
+    source, sink = drives.T
+    n, rows = len(resistance), np.arange(len(drives))
+    field = resistance[source] - resistance[sink]  # (n_drives, n) V/A, symmetric
+    extra = settings.switch_resistance + contact
+    load = field[rows, source] - field[rows, sink] + extra[source] + extra[sink]
+    amperes = driven(current, load, settings)
+    broken = np.isin(np.arange(n), sorted(faults.cut))
+    amperes = np.where(broken[source] | broken[sink], 0.0, amperes)
+    potential = amperes[:, None] * (field - field[rows, sink][:, None])
+    potential += (amperes * contact[sink])[:, None]  # against the sink line
+    potential[rows, sink] = 0.0
+    potential[rows, source] += amperes * contact[source]
+    line = (amperes * settings.switch_resistance)[:, None]
+    common = (potential + 2 * line) / 2
+    read = potential + common * 10 ** (-settings.rejection / 20)
+    stuck = np.zeros_like(read, dtype=bool)
+    stuck[:, broken] = True
+    stuck[:, sorted(faults.railed)] = True
+    stuck[broken[sink] & ~broken[source]] = True  # nothing holds the sheet down
+    return Lines(_mixed(read, settings.crosstalk), stuck)
+
+
+def driven(current: float, load: FloatArray, settings: ElectronicsSettings) -> FloatArray:
+    """(n_drives,) A through ``load`` Ω: what the source's own resistance and its supply leave.
+
+    I = I₀/(1 + R_load/R_out), and never more than the compliance over the load.
+    """
+    amperes = current / (1 + load / settings.output_resistance)
+    if math.isinf(settings.compliance):
+        return np.asarray(amperes)
+    return np.minimum(amperes, settings.compliance / np.maximum(load, 1e-12))
+
+
+def shorted(resistance: FloatArray, pairs: frozenset[tuple[int, int]]) -> FloatArray:
+    """Transfer resistance with each pair of electrodes joined: an exact change of rank one."""
+    for a, b in sorted(pairs):
+        column = resistance[:, a] - resistance[:, b]
+        resistance = resistance - np.outer(column, column) / (_SHORT + column[a] - column[b])
+    return resistance
+
+
+def settled(
+    potentials: FloatArray, before: FloatArray, length: FloatArray, time_constant: float
+) -> FloatArray:
+    """(n_drives + 1, n) V that the channels start each drive from; last, what they are left at.
+
+    ``before`` (n,) is where the scan begins, ``length`` (n_drives,) s how long each drive is on.
+    """
+    start = [before]
+    for target, kept in zip(potentials, np.exp(-length / time_constant), strict=True):
+        start.append(target + (start[-1] - target) * kept)
+    return np.array(start)
+
+
+def _mixed(read: FloatArray, part: float) -> FloatArray:
+    """Each channel with ``part`` of the difference to its neighbours on the board."""
+    if part == 0:
+        return read
+    step = part * np.diff(read, axis=1)
+    mixed = read.copy()
+    mixed[:, :-1] += step
+    mixed[:, 1:] -= step
+    return mixed

@@ -1,0 +1,264 @@
+"""Rigid probes on a stretched sheet over an elastic body: dents and pressures on a grid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import irfft2, rfft2
+
+from tomoskin.core import FloatArray, GeometryError, IntArray, ModelError
+from tomoskin.twin.parameters import check_numbers, parameter
+from tomoskin.twin.probe import Probe
+
+_ROUNDS = 2000
+_TOLERANCE = 1e-8
+
+FOUNDATIONS = ("winkler", "half-space")
+"""Bodies under the sheet: springs side by side, or an elastic half-space (Hertz)."""
+
+
+@dataclass(frozen=True, slots=True)
+class ContactSettings:
+    """Sheet, and the soft body under it."""
+
+    foundation: str = parameter("winkler", "", "Model of the body under the sheet.", "")
+    modulus: float = parameter(
+        30e3, "Pa", "Modulus of that body in compression.", "soft polyurethane foam, assumed"
+    )
+    thickness: float = parameter(10e-3, "m", "Its thickness.", "assumed")
+    poisson: float = parameter(0.0, "", "Its Poisson ratio.", "open foam: about 0, assumed")
+    tension: float = parameter(60.0, "N/m", "Tension of the sheet.", "assumed")
+    stiffness: float = parameter(
+        150.0, "N/m", "Young's modulus of the sheet times thickness.", "stretchy knit, assumed"
+    )
+    sheet_poisson: float = parameter(0.3, "", "Poisson ratio of the sheet.", "assumed")
+    bulge: float = parameter(
+        0.2, "", "Strain along the body's face per compression across it.", "assumed"
+    )
+    friction: float = parameter(0.3, "", "Sliding friction of a probe.", "assumed")
+    rolling_friction: float = parameter(0.02, "", "Rolling friction of a probe.", "assumed")
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if self.foundation not in FOUNDATIONS:
+            raise ModelError(f"expected a foundation of {FOUNDATIONS}, got {self.foundation!r}")
+        check_numbers(
+            self,
+            above="modulus thickness",
+            least="poisson tension stiffness sheet_poisson bulge friction rolling_friction",
+        )
+        if self.foundation == "half-space" and self.tension > 0:
+            raise ModelError(
+                f"expected no tension over a half-space, got {self.tension} N/m",
+                where="ContactSettings",
+            )
+
+    @property
+    def spring(self) -> float:
+        """Stiffness per area of a Winkler body, Pa/m: modulus over thickness."""
+        return self.modulus / self.thickness
+
+    @property
+    def shear_spring(self) -> float:
+        """Stiffness per area against shifting the sheet along the body, Pa/m."""
+        return self.modulus / (2 * (1 + self.poisson)) / self.thickness
+
+    @property
+    def reach(self) -> float:
+        """How far a dent reaches beyond a probe, m: √(tension / spring)."""
+        return math.sqrt(self.tension / self.spring)
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Square grid of ``n`` × ``n`` nodes ``step`` m apart around the origin."""
+
+    n: int
+    step: float
+
+    @property
+    def points(self) -> FloatArray:
+        """(n·n, 2) m; x changes slowest."""
+        x = (np.arange(self.n) - self.n // 2) * self.step
+        return np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1).reshape(-1, 2)
+
+    @property
+    def wave_numbers(self) -> tuple[FloatArray, FloatArray]:
+        """(n, 1) and (1, n//2 + 1) rad/m, those of a real transform."""
+        qx = 2 * np.pi * np.fft.fftfreq(self.n, self.step)
+        qy = 2 * np.pi * np.fft.rfftfreq(self.n, self.step)
+        return qx[:, None], qy[None, :]
+
+
+@dataclass(frozen=True, eq=False)
+class Dented:
+    """What probes do to a sheet, on a grid.
+
+    Attributes
+    ----------
+    grid
+        Where.
+    depth
+        (n, n) m.
+    pressure
+        (n, n) Pa under the faces, what all probes press together.
+    travel
+        (n_probes,) m that each probe has moved.
+    """
+
+    grid: Grid
+    depth: FloatArray
+    pressure: FloatArray
+    travel: FloatArray
+
+    @property
+    def stored(self) -> float:
+        """Elastic energy, J: half of pressure times depth."""
+        return float((self.pressure * self.depth).sum() * self.grid.step**2 / 2)
+
+
+def local_points(probe: Probe, points: FloatArray) -> FloatArray:
+    """``points`` (n, 2) in the coordinates of the probe's shape."""
+    c, s = math.cos(probe.angle), math.sin(probe.angle)
+    return (points - (probe.x, probe.y)) @ np.array([[c, -s], [s, c]])
+
+
+def solve_contact(probes: Sequence[Probe], settings: ContactSettings, grid: Grid) -> Dented:
+    """All ``probes`` together on one sheet, each with exactly its force.
+
+    The depth is the pressure p ≥ 0 on the faces times the body's compliance,
+
+        Winkler with a membrane: T∇²w − kw = −p;      half-space: w = ∫ p/(πE*r),
+
+    and each face is w = travel − gap where it presses, w ≥ travel − gap elsewhere. Conjugate
+    gradients on the pressure with the forces kept (Polonsky & Keer 1999, Wear 231, 206). The
+    sheet is taken as endless, the Winkler body as repeating beyond the grid.
+
+    Raises
+    ------
+    GeometryError
+        When a face covers no node of the grid, or two faces overlap.
+    ModelError
+        When the iteration does not converge.
+    """
+    faces = _faces(probes, grid)
+    depth_of = _compliance(settings, grid)
+    shape = (grid.n, grid.n)
+    owner = np.full(shape, -1).ravel()
+    gap = np.zeros(owner.size)
+    for number, (nodes, height) in enumerate(faces):
+        if (owner[nodes] >= 0).any():
+            other = int(owner[nodes].max())
+            raise GeometryError("the faces overlap", where=f"press {other} and press {number}")
+        owner[nodes], gap[nodes] = number, height
+    nodes = np.flatnonzero(owner >= 0)
+    problem = _Problem(
+        owner[nodes],
+        gap[nodes],
+        np.array([probe.force for probe in probes]) / grid.step**2,
+        lambda p: depth_of(_spread(p, nodes, shape)).ravel()[nodes],
+    )
+    pressure = _spread(_balance(problem), nodes, shape)
+    depth = depth_of(pressure)
+    touching = pressure.ravel()[nodes] > 0
+    travel = _means(depth.ravel()[nodes] + gap[nodes], problem.owner, touching, len(probes))
+    return Dented(grid, depth, pressure, travel)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Nodes under the faces: whose they are, their gap, force per node area, and p → w."""
+
+    owner: IntArray
+    gap: FloatArray
+    force: FloatArray
+    depth: Callable[[FloatArray], FloatArray]
+
+
+def _balance(problem: _Problem) -> FloatArray:
+    """(n_nodes,) Pa that keeps every face in balance."""
+    owner, n = problem.owner, len(problem.force)
+    pressure = (problem.force / np.bincount(owner, minlength=n))[owner]
+    if not problem.force.any():
+        return pressure
+    scale = pressure.max()
+    step, last, fresh = np.zeros_like(pressure), 1.0, 0.0
+    for _ in range(_ROUNDS):
+        touching = pressure > 0
+        gap = problem.depth(pressure) + problem.gap
+        gap -= _means(gap, owner, touching, n)[owner]
+        size = float((gap[touching] ** 2).sum())
+        step = np.where(touching, gap + fresh * size / last * step, 0.0)
+        last = size or 1.0
+        bent = problem.depth(step)
+        bent -= _means(bent, owner, touching, n)[owner]
+        slope = float((bent * step)[touching].sum())
+        if slope <= 0:
+            return pressure
+        length = float((gap * step)[touching].sum()) / slope
+        before, pressure = pressure, np.maximum(pressure - length * step, 0.0)
+        newly = (pressure == 0) & (gap < 0)
+        fresh = 0.0 if newly.any() else 1.0
+        pressure[newly] -= length * gap[newly]
+        total = np.bincount(owner, pressure, n)
+        pressure *= np.where(total > 0, problem.force / np.where(total > 0, total, 1.0), 0.0)[owner]
+        if np.abs(pressure - before).sum() <= _TOLERANCE * scale * len(pressure):
+            return pressure
+    raise ModelError(
+        f"the contact did not settle in {_ROUNDS} rounds", hint="use a coarser or a smaller grid"
+    )
+
+
+def _means(values: FloatArray, owner: IntArray, touching: FloatArray, n: int) -> FloatArray:
+    """(n,) mean over the nodes of each face that touch."""
+    count = np.bincount(owner, touching, n)
+    return np.asarray(np.bincount(owner, values * touching, n) / np.maximum(count, 1.0))
+
+
+def _faces(probes: Sequence[Probe], grid: Grid) -> list[tuple[IntArray, FloatArray]]:
+    points = grid.points
+    faces = []
+    for number, probe in enumerate(probes):
+        gap = probe.shape.gap(local_points(probe, points))
+        nodes = np.flatnonzero(np.isfinite(gap))
+        if not len(nodes):
+            raise GeometryError(
+                f"its face covers no node of a grid of {grid.step * 1e3:.3g} mm",
+                where=f"press {number}",
+                hint="use a finer grid",
+            )
+        faces.append((nodes, gap[nodes] - gap[nodes].min()))
+    return faces
+
+
+def _spread(values: FloatArray, nodes: IntArray, shape: tuple[int, int]) -> FloatArray:
+    whole = np.zeros(shape)
+    whole.ravel()[nodes] = values
+    return whole
+
+
+def _compliance(settings: ContactSettings, grid: Grid) -> Callable[[FloatArray], FloatArray]:
+    """Pressure (n, n) Pa → depth (n, n) m."""
+    n = grid.n
+    if settings.foundation == "half-space":
+        kernel = rfft2(_boussinesq(settings, grid))
+        return lambda p: np.asarray(irfft2(rfft2(p, (2 * n, 2 * n)) * kernel)[:n, :n])
+    qx, qy = grid.wave_numbers
+    spring = 1.0 / (settings.spring + settings.tension * (qx**2 + qy**2))
+    return lambda p: np.asarray(irfft2(rfft2(p) * spring, (n, n)))
+
+
+def _boussinesq(settings: ContactSettings, grid: Grid) -> FloatArray:
+    """(2n, 2n) m/Pa: depth around one pressed cell of the grid, wrapped (Love 1929)."""
+    x = np.fft.fftfreq(2 * grid.n, 1 / (2 * grid.n))[:, None] * grid.step
+    y, half = x.T, grid.step / 2
+    total = np.zeros((2 * grid.n, 2 * grid.n))
+    for sx in (1.0, -1.0):
+        for sy in (1.0, -1.0):
+            a, b = x + sx * half, y + sy * half
+            # a·asinh(b/|a|) + b·asinh(a/|b|) is the potential of a quarter plane's corner
+            total += sx * sy * (a * np.arcsinh(b / np.abs(a)) + b * np.arcsinh(a / np.abs(b)))
+    return total * (1 - settings.poisson**2) / (np.pi * settings.modulus)

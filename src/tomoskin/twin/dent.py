@@ -1,0 +1,192 @@
+"""What probes do to a sheet at any points: each probe's own dent, solved once and moved about."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Self
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.twin.contact import ContactSettings, Grid, local_points, solve_contact
+from tomoskin.twin.probe import Probe
+from tomoskin.twin.shape import Shape
+from tomoskin.twin.strain import bulge_strain, drag_strain, slope_strain
+
+_NODES = 128
+_LEAST_FORCE = 1e-3
+_LADDER = math.sqrt(2.0)
+"""Dents of a curved face are solved at forces that differ by this factor, and blended."""
+
+_REACHES = 6.0
+"""A dent is followed this many reaches beyond the face: a part of e⁻⁶ is left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What the sheet feels.
+
+    Attributes
+    ----------
+    strain
+        (n, 3) xx, yy, xy in the plane of the sheet.
+    depth
+        (n,) m.
+    """
+
+    strain: FloatArray
+    depth: FloatArray
+
+    @classmethod
+    def none(cls, n: int) -> Self:
+        """Nothing presses."""
+        return cls(np.zeros((n, 3)), np.zeros(n))
+
+
+@dataclass(frozen=True, eq=False)
+class Dent:
+    """The dent of one probe at one force, on a grid of its own.
+
+    Attributes
+    ----------
+    grid
+        Around the shape's origin, along its axes.
+    force
+        N at which it was solved.
+    table
+        (n·n, 13): depth; strain xx, yy, xy by bulging; by the slope; by a drag of as many
+        newtons as ``force`` along x; and along y.
+    """
+
+    grid: Grid
+    force: float
+    table: FloatArray
+
+
+@lru_cache(maxsize=256)
+def solved_dent(shape: Shape, settings: ContactSettings, force: float, blur: float) -> Dent:
+    """The dent of ``shape`` under ``force`` N, evened out over ``blur`` m (standard deviation).
+
+    Even out by the size of the cells that it will be read at: the read values then hold what lies
+    between them.
+    """
+    reach = max(settings.reach, math.sqrt(settings.stiffness / settings.shear_spring), 2 * blur)
+    grid = Grid(_NODES, 2 * (shape.extent + _REACHES * reach) / _NODES)
+    probe = Probe(shape, 0.0, 0.0, force)
+    dented = solve_contact([probe], settings, grid)
+    pressed, still = dented.pressure, np.zeros_like(dented.pressure)
+    fields = np.concatenate([
+        dented.depth[None],
+        bulge_strain(dented.depth, settings, grid),
+        slope_strain(dented.depth, settings, grid),
+        drag_strain(np.stack([pressed, still]), settings, grid),
+        drag_strain(np.stack([still, pressed]), settings, grid),
+    ])  # fmt: skip
+    even = gaussian_filter(fields, (0, blur / grid.step, blur / grid.step), mode="nearest")
+    even *= _fading(grid)
+    table = np.ascontiguousarray(even.reshape(len(fields), -1).T)
+    table.flags.writeable = False
+    return Dent(grid, force, table)
+
+
+def indent(
+    probes: Sequence[Probe], settings: ContactSettings, points: FloatArray, blur: float = 0.0
+) -> Load:
+    """What ``probes`` do to the sheet at ``points`` (n, 2) m.
+
+    The dents of several probes add up: exact for their pressures, as the body is linear; a rigid
+    face within a few reaches of another would in truth press a little otherwise
+    (:func:`solve_contact` solves them together).
+    """
+    total = Load.none(len(points))
+    for probe in probes:
+        if probe.force == 0:
+            continue
+        c, s = math.cos(probe.angle), math.sin(probe.angle)
+        (dx, dy), turn = probe.drag, probe.angle
+        along = (c * dx + s * dy, c * dy - s * dx)
+        dent = _blended(probe.shape, settings, probe.force, along, blur)
+        values, near = _read(dent, local_points(probe, points))
+        total.depth[near] += values[:, 0]
+        total.strain[near] += turned(values[:, 1:], turn)
+    return total
+
+
+def turned(strain: FloatArray, angle: float) -> FloatArray:
+    """(n, 3) xx, yy, xy of tensors given in axes that are turned by ``angle`` rad."""
+    c, s = math.cos(angle), math.sin(angle)
+    turn = np.array([
+        [c * c, s * s, c * s],
+        [s * s, c * c, -c * s],
+        [-2 * c * s, 2 * c * s, c * c - s * s],
+    ])  # fmt: skip
+    return strain @ turn
+
+
+@dataclass(frozen=True, eq=False)
+class _Blend:
+    """(n·n, 4) depth and strain of a probe as it presses now, on its grid."""
+
+    grid: Grid
+    table: FloatArray
+
+
+@lru_cache(maxsize=64)
+def _blended(
+    shape: Shape,
+    settings: ContactSettings,
+    force: float,
+    drag: tuple[float, float],
+    blur: float,
+) -> _Blend:
+    """Where all is linear from one dent, else between two: either way the force is exact."""
+    total, grid = np.zeros(4), Grid(1, 1.0)
+    for solved_at, weight in _rungs(shape, force):
+        dent = solved_dent(shape, settings, solved_at, blur)
+        scale, table = force / solved_at, dent.table
+        mixed = weight * scale * table[:, :4]
+        mixed[:, 1:] += weight * scale**2 * table[:, 4:7]
+        if drag != (0.0, 0.0):
+            mixed[:, 1:] += weight / solved_at * drag[0] * table[:, 7:10]
+            mixed[:, 1:] += weight / solved_at * drag[1] * table[:, 10:]
+        total, grid = total + mixed, dent.grid
+    total.flags.writeable = False
+    return _Blend(grid, total)
+
+
+def _rungs(shape: Shape, force: float) -> list[tuple[float, float]]:
+    """Forces to solve at and their weights: one where all is linear, else two neighbours."""
+    if shape.flat:
+        return [(1.0, 1.0)]
+    most = max(force, _LEAST_FORCE)
+    low = math.floor(math.log(most / _LEAST_FORCE, _LADDER))
+    below, above = (_LEAST_FORCE * _LADDER**k for k in (low, low + 1))
+    part = (most - below) / (above - below)
+    return [(below, 1 - part), (above, part)]
+
+
+def _read(dent: _Blend, local: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Values (m, 4), linear between the nodes, and the points (m,) that are on the grid."""
+    n = dent.grid.n
+    place = local / dent.grid.step + n // 2
+    near = np.flatnonzero(((place >= 0) & (place < n - 1)).all(axis=1))
+    place = place[near]
+    corner = place.astype(np.int64)
+    fx, fy = (place - corner).T[:, :, None]
+    first = corner[:, 0] * n + corner[:, 1]
+    table = dent.table
+    low = table[first] * (1 - fy) + table[first + 1] * fy
+    high = table[first + n] * (1 - fy) + table[first + n + 1] * fy
+    return low * (1 - fx) + high * fx, near
+
+
+def _fading(grid: Grid) -> FloatArray:
+    """(n, n) from 1 to 0 over the outer eighth, so that nothing ends with a step."""
+    x = np.abs(np.arange(grid.n) - grid.n / 2) / (grid.n / 2)
+    fade = np.clip((1 - x) * 8, 0.0, 1.0)
+    smooth = fade**2 * (3 - 2 * fade)
+    return np.asarray(smooth[:, None] * smooth)

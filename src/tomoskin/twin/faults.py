@@ -1,0 +1,103 @@
+"""What breaks on a skin and its board, and when."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from tomoskin.core import ModelError
+
+KINDS = ("cut", "restore", "short", "unshort", "rail", "unrail")
+"""Events: an electrode's wire breaks or is mended, two electrodes touch or part, a channel
+stands at its rail or works again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Faults:
+    """What is broken now.
+
+    Attributes
+    ----------
+    cut
+        Electrodes whose wire is broken.
+    shorts
+        Pairs of electrodes that touch, the lower one first.
+    railed
+        Channels that stand at their upper rail.
+    """
+
+    cut: frozenset[int] = frozenset()
+    shorts: frozenset[tuple[int, int]] = frozenset()
+    railed: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class FaultEvent:
+    """One of :data:`KINDS` at ``time`` s, of ``electrode`` (with ``other``, for a short).
+
+    Raises
+    ------
+    ModelError
+        For an unknown kind, a time that is not finite, electrodes below 0, or a short of an
+        electrode with itself.
+    """
+
+    time: float
+    kind: str
+    electrode: int
+    other: int = -1
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        where = f"fault at {self.time} s"
+        if self.kind not in KINDS:
+            raise ModelError(f'expected {", ".join(KINDS)}, got "{self.kind}"', where=where)
+        if not math.isfinite(self.time):
+            raise ModelError("expected a finite time", where=where)
+        pair = self.kind in ("short", "unshort")
+        if self.electrode < 0 or (pair and (self.other < 0 or self.other == self.electrode)):
+            raise ModelError(
+                f"expected {'two electrodes' if pair else 'an electrode'}, got "
+                f"{(self.electrode, self.other) if pair else self.electrode}",
+                where=where,
+            )
+
+
+def happen(faults: Faults, event: FaultEvent) -> Faults:
+    """What is broken after ``event``."""
+    one = frozenset({event.electrode})
+    low, high = sorted((event.electrode, event.other))
+    pair = frozenset({(low, high)})
+    match event.kind:
+        case "cut":
+            return replace(faults, cut=faults.cut | one)
+        case "restore":
+            return replace(faults, cut=faults.cut - one)
+        case "short":
+            return replace(faults, shorts=faults.shorts | pair)
+        case "unshort":
+            return replace(faults, shorts=faults.shorts - pair)
+        case "rail":
+            return replace(faults, railed=faults.railed | one)
+        case _:
+            return replace(faults, railed=faults.railed - one)
+
+
+def faults_at(events: Sequence[FaultEvent], time: float) -> Faults:
+    """What is broken at ``time`` s: everything up to and at that time has happened, in order."""
+    faults = Faults()
+    for event in sorted(events, key=lambda event: event.time):
+        if event.time <= time:
+            faults = happen(faults, event)
+    return faults
+
+
+def check_electrodes(faults: Faults, n: int) -> None:
+    """Raise ModelError for an electrode that a skin with ``n`` does not have."""
+    named = faults.cut | faults.railed | {e for pair in faults.shorts for e in pair}
+    wrong = sorted(e for e in named if e >= n)
+    if wrong:
+        raise ModelError(
+            f"expected electrodes from 0 to {n - 1}, got {wrong[0]}", where="twin: fault"
+        )

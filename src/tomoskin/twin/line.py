@@ -1,0 +1,85 @@
+"""A bad line between board and host: bytes lost, altered or late."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tomoskin.core import ModelError
+from tomoskin.source import Transport
+from tomoskin.twin.parameters import parameter
+
+
+@dataclass(frozen=True, slots=True)
+class LineSettings:
+    """What the line does to the bytes of the board; nothing by default."""
+
+    loss: float = parameter(0.0, "", "Probability that a byte is lost.", "ideal")
+    corruption: float = parameter(
+        0.0, "", "Probability that a byte arrives with one bit flipped.", "ideal"
+    )
+    hold: float = parameter(
+        0.0, "", "Probability that what has arrived is held back until the next read.", "ideal"
+    )
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in ("loss", "corruption", "hold"):
+            value = getattr(self, name)
+            if not 0 <= value < 1:
+                raise ModelError(
+                    f"expected {name} from 0 to below 1, got {value}", where="LineSettings"
+                )
+
+    @property
+    def perfect(self) -> bool:
+        """Whether every byte arrives, as it was sent and in time."""
+        return self.loss == self.corruption == self.hold == 0
+
+
+class Line:
+    """The line, read by read; the same seed does the same to the same bytes."""
+
+    def __init__(self, settings: LineSettings, seed: int) -> None:
+        self.settings = settings
+        self._random = np.random.default_rng(seed)
+        self._held = b""
+
+    def carry(self, data: bytes) -> bytes:
+        """What arrives when the board sends ``data``."""
+        if self.settings.perfect or not data:
+            return data
+        arrived = self._held + self._spoiled(data)
+        self._held = b""
+        if self._random.random() < self.settings.hold:
+            self._held, arrived = arrived, b""
+        return arrived
+
+    def _spoiled(self, data: bytes) -> bytes:
+        sent = np.frombuffer(data, dtype=np.uint8)
+        chance = self._random.random((2, len(sent)))
+        bit = self._random.integers(0, 8, len(sent))
+        flipped = np.where(chance[0] < self.settings.corruption, sent ^ (1 << bit), sent)
+        return flipped[chance[1] >= self.settings.loss].astype(np.uint8).tobytes()
+
+
+class FaultyLine:
+    """Any transport on a bad line: bytes to the host suffer, those to the board do not."""
+
+    def __init__(self, transport: Transport, settings: LineSettings, seed: int) -> None:
+        self.name = transport.name
+        self.transport = transport
+        self._line = Line(settings, seed)
+
+    def read(self, timeout: float) -> bytes:
+        """What arrives of the transport's next bytes."""
+        return self._line.carry(self.transport.read(timeout))
+
+    def write(self, data: bytes) -> None:
+        """Send ``data``, unharmed."""
+        self.transport.write(data)
+
+    def close(self) -> None:
+        """Close the transport."""
+        self.transport.close()

@@ -1,0 +1,149 @@
+"""Everything that a twin adds to its skin, and sets of it for known materials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+from tomoskin.core import ModelError
+from tomoskin.twin.contact import ContactSettings
+from tomoskin.twin.line import LineSettings
+from tomoskin.twin.material import MaterialSettings
+from tomoskin.twin.parameters import check_numbers
+from tomoskin.twin.readout import ElectronicsSettings
+
+
+@dataclass(frozen=True)
+class TwinSettings:
+    """What a twin adds to its skin; the defaults are a sheet and a board without vices.
+
+    Attributes
+    ----------
+    seed
+        Of noise, spread and faults of the line: the same seed gives the same bytes.
+    mesh_ratio
+        Cells of the twin's mesh per cell of the reconstruction's. The twin's mesh is finer and
+        from another seed, so that no picture is made with the model that made its data.
+    contact, material, electronics, line
+        The stages.
+    """
+
+    seed: int = 0
+    mesh_ratio: float = 1.6
+    contact: ContactSettings = field(default_factory=ContactSettings)
+    material: MaterialSettings = field(default_factory=MaterialSettings)
+    electronics: ElectronicsSettings = field(default_factory=ElectronicsSettings)
+    line: LineSettings = field(default_factory=LineSettings)
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        check_numbers(self, above="mesh_ratio", least="seed")
+
+    @classmethod
+    def preset(cls, name: str, seed: int = 0) -> Self:
+        """The settings of that name: one of :data:`PRESETS`.
+
+        Raises
+        ------
+        ModelError
+            For another name.
+        """
+        if name not in PRESETS:
+            raise ModelError(f'expected a twin of {", ".join(PRESETS)}, got "{name}"', where="twin")
+        contact, material, electronics = PRESETS[name]
+        return cls(seed=seed, contact=contact, material=material, electronics=electronics)
+
+    def with_noise(self, noise: float) -> Self:
+        """These settings with another noise of one conversion, LSB."""
+        return replace(self, electronics=replace(self.electronics, noise=noise))
+
+
+BOARD = ElectronicsSettings(
+    compliance=7.0,  # 12 V less two drop-outs of the LM317 and the sense resistor
+    output_resistance=20e3,
+    switch_resistance=0.07,
+    contact_sd=2e-3,
+    contact_time=10.0,
+    rejection=90.0,
+    gain_sd=0.002,
+    offset_sd=50e-6,
+    low_rail=0.0,
+    high_rail=5.0,
+    time_constant=30e-6,
+    crosstalk=1e-5,
+    hum=20e-6,
+    hum_frequency=50.0,
+    nonlinearity=0.5,
+)
+"""The source's board: LM317, IRLML6344 and IRLML9301 switches, INA118, an ATmega2560's converter.
+
+Typical values of the parts' datasheets, as far as they state them; contacts, hum and crosstalk
+are assumed."""
+
+PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings]] = {
+    "ideal": (ContactSettings(), MaterialSettings(), ElectronicsSettings()),
+    "textile": (
+        ContactSettings(),
+        MaterialSettings(
+            gauge_across=5.0,
+            compression=0.05,
+            creep=(0.04, 0.03),
+            creep_times=(1.0, 30.0),
+            play=(0.1,),
+            play_widths=(1e-3,),
+            temperature_coefficient=0.0038,
+            temperature_sd=0.2,
+            spread=0.03,
+            wear=2e-4,
+        ),
+        BOARD,
+    ),
+    "hydrogel": (
+        ContactSettings(
+            modulus=20e3,
+            thickness=5e-3,
+            poisson=0.49,
+            tension=0.0,
+            stiffness=100.0,
+            sheet_poisson=0.49,
+            bulge=0.3,
+            friction=0.1,
+        ),
+        MaterialSettings(
+            gauge=1.0,
+            compression=-1.0,
+            thickness=5e-3,
+            creep=(0.1,),
+            creep_times=(3.0,),
+            temperature_coefficient=-0.02,
+            temperature_sd=0.2,
+            spread=0.02,
+        ),
+        replace(BOARD, contact_sd=1.0, time_constant=100e-6),
+    ),
+    "tank": (
+        ContactSettings(
+            modulus=981.0,
+            thickness=0.1,
+            poisson=0.49,
+            tension=0.0,
+            stiffness=0.0,
+            bulge=0.0,
+            friction=0.0,
+            rolling_friction=0.0,
+        ),
+        MaterialSettings(
+            gauge=0.0,
+            compression=-1.0,
+            thickness=0.1,
+            temperature_coefficient=-0.02,
+            temperature_sd=0.1,
+        ),
+        replace(BOARD, contact_sd=0.5, time_constant=100e-6),
+    ),
+}
+"""Contact, material and electronics by name.
+
+ideal: no vices, no memory. textile: silver-plated knit over soft foam. hydrogel: a slab of ionic
+gel on a rigid ground. tank: saline 100 mm deep; a probe is an insulating body that floats, so
+that its force is its weight (a Winkler foundation of ρg)."""

@@ -1,0 +1,204 @@
+"""Faces of probes: where they can touch the sheet, and how far they stand off it."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from tomoskin.core import FloatArray, GeometryError
+from tomoskin.mesh import Polygon
+
+
+class Shape(Protocol):
+    """The face of a rigid probe in coordinates of its own, m."""
+
+    @property
+    @abstractmethod
+    def extent(self) -> float:
+        """Radius around the probe's origin that holds the whole face, m."""
+
+    @property
+    @abstractmethod
+    def area(self) -> float:
+        """Area of the face seen from above, m²."""
+
+    @property
+    @abstractmethod
+    def flat(self) -> bool:
+        """Whether the whole face touches at once: then everything is linear in the force."""
+
+    @abstractmethod
+    def gap(self, points: FloatArray) -> FloatArray:
+        """(n,) m between a flat sheet and the face that just touches it; inf off the face."""
+
+
+@dataclass(frozen=True, slots=True)
+class Circle(Shape):
+    """Round face of ``radius`` m; ``crown`` is its radius of curvature, m (inf: flat).
+
+    A ball is a circle with its crown: a paraboloid near the point of contact.
+    """
+
+    radius: float
+    crown: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        _check("radius", self.radius)
+        _check("crown", self.crown, curved=True)
+
+    @property
+    def extent(self) -> float:
+        """Radius, m."""
+        return self.radius
+
+    @property
+    def area(self) -> float:
+        """Area of the face, m²."""
+        return math.pi * self.radius**2
+
+    @property
+    def flat(self) -> bool:
+        """Without a crown."""
+        return math.isinf(self.crown)
+
+    def gap(self, points: FloatArray) -> FloatArray:
+        """(n,) m; inf off the face."""
+        squared = (points**2).sum(axis=1)
+        return _within(squared < self.radius**2, squared / (2 * self.crown))
+
+
+@dataclass(frozen=True, slots=True)
+class Square(Shape):
+    """Square face with ``side`` m, along the probe's axes, and a ``crown`` as :class:`Circle`."""
+
+    side: float
+    crown: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        _check("side", self.side)
+        _check("crown", self.crown, curved=True)
+
+    @property
+    def extent(self) -> float:
+        """Half a diagonal, m."""
+        return self.side / math.sqrt(2)
+
+    @property
+    def area(self) -> float:
+        """Area of the face, m²."""
+        return self.side**2
+
+    @property
+    def flat(self) -> bool:
+        """Without a crown."""
+        return math.isinf(self.crown)
+
+    def gap(self, points: FloatArray) -> FloatArray:
+        """(n,) m; inf off the face."""
+        inside = np.abs(points).max(axis=1) < self.side / 2
+        return _within(inside, (points**2).sum(axis=1) / (2 * self.crown))
+
+
+@dataclass(frozen=True, slots=True)
+class Finger(Shape):
+    """Fingertip: an elliptic paraboloid.
+
+    Attributes
+    ----------
+    length, width
+        Full axes of the pad along the probe's x and y, m.
+    along, across
+        Radii of curvature in these directions, m. A fingertip of 16 mm has about 8 mm across and
+        12 mm along (assumed).
+    """
+
+    length: float = 22e-3
+    width: float = 16e-3
+    along: float = 12e-3
+    across: float = 8e-3
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in ("length", "width", "along", "across"):
+            _check(name, getattr(self, name))
+
+    @property
+    def extent(self) -> float:
+        """Half the longer axis, m."""
+        return max(self.length, self.width) / 2
+
+    @property
+    def area(self) -> float:
+        """Area of the pad, m²."""
+        return math.pi * self.length * self.width / 4
+
+    @property
+    def flat(self) -> bool:
+        """Never."""
+        return False
+
+    def gap(self, points: FloatArray) -> FloatArray:
+        """(n,) m; inf off the pad."""
+        squared = points**2
+        inside = squared @ np.array([4 / self.length**2, 4 / self.width**2]) < 1
+        return _within(inside, squared @ np.array([0.5 / self.along, 0.5 / self.across]))
+
+
+@dataclass(frozen=True)
+class Face(Shape):
+    """Free polygon with ``vertices`` ((x, y), …) m around the probe's origin, and a ``crown``.
+
+    Raises
+    ------
+    GeometryError
+        For fewer than three vertices, sides that cross or touch, or no area.
+    """
+
+    vertices: tuple[tuple[float, float], ...]
+    crown: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Check the vertices."""
+        _check("crown", self.crown, curved=True)
+        _ = self._polygon
+
+    @cached_property
+    def _polygon(self) -> Polygon:
+        return Polygon(np.array(self.vertices, dtype=float))
+
+    @property
+    def extent(self) -> float:
+        """Distance of the farthest vertex, m."""
+        return float(np.linalg.norm(self._polygon.vertices, axis=1).max())
+
+    @property
+    def area(self) -> float:
+        """Area of the face, m²."""
+        return self._polygon.area
+
+    @property
+    def flat(self) -> bool:
+        """Without a crown."""
+        return math.isinf(self.crown)
+
+    def gap(self, points: FloatArray) -> FloatArray:
+        """(n,) m; inf off the face."""
+        return _within(self._polygon.contains(points), (points**2).sum(axis=1) / (2 * self.crown))
+
+
+def _within(inside: FloatArray, height: FloatArray) -> FloatArray:
+    """Heights above the lowest point of the face, inf where there is none."""
+    lowest = height[inside].min(initial=np.inf) if inside.any() else 0.0
+    return np.where(inside, height - lowest, np.inf)
+
+
+def _check(name: str, value: float, *, curved: bool = False) -> None:
+    if not (0 < value < math.inf or (curved and value == math.inf)):
+        raise GeometryError(f"expected a {name} above 0 m, got {value}", where="probe")

@@ -1,0 +1,72 @@
+"""Probes and presses: what is refused, and by which name."""
+
+import math
+
+import pytest
+
+from tomoskin.core import GeometryError, ModelError
+from tomoskin.mesh import Disc
+from tomoskin.twin import Circle, Face, Finger, Press, Probe, Square
+from tomoskin.twin.probe import check_on_skin
+
+
+@pytest.mark.parametrize(
+    ("values", "error", "said"),
+    [
+        ((math.nan, 0, 1, 0.01), GeometryError, "finite place"),
+        ((0, math.inf, 1, 0.01), GeometryError, "finite place"),
+        ((0, 0, 1, 0.0), GeometryError, "radius above 0"),
+        ((0, 0, 1, math.nan), GeometryError, "radius above 0"),
+        ((0, 0, -0.1, 0.01), ModelError, "push, not pull"),
+        ((0, 0, math.nan, 0.01), ModelError, "force of 0 N or more"),
+    ],
+)
+def test_impossible_presses(values, error, said):
+    with pytest.raises(error, match=said):
+        Press(*values)
+
+
+def test_a_press_off_the_skin_is_named():
+    inside, outside = Press(0, 0, 1, 0.01), Press(0.2, 0, 1, 0.01)
+    check_on_skin((), Disc(0.1))
+    check_on_skin((inside,), Disc(0.1))
+    with pytest.raises(GeometryError, match=r"press 1: its centre \(200.0 mm, 0.0 mm\) is off"):
+        check_on_skin((inside, outside), Disc(0.1))
+
+
+def test_a_press_is_a_flat_round_probe():
+    probe = Press(0.01, 0.02, 3.0, 0.015).probe
+    assert probe == Probe(Circle(0.015), 0.01, 0.02, 3.0)
+    assert probe.radius == pytest.approx(0.015)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Circle(0.0), "radius above 0"),
+        (lambda: Circle(0.01, -1.0), "crown above 0"),
+        (lambda: Square(math.nan), "side above 0"),
+        (lambda: Finger(across=math.inf), "across above 0"),
+        (lambda: Face(((0, 0), (0.01, 0.01), (0.01, 0), (0, 0.01))), "cross"),
+        (lambda: Face(((0, 0), (0.01, 0.0))), "at least 3"),
+        (lambda: Face(((0, 0), (0.01, 0.0), (0.02, 0.0))), "area|touch|cross|side"),
+        (lambda: Probe(Circle(0.01), 0, math.nan, 1), "finite place"),
+        (lambda: Probe(Circle(0.01), 0, 0, 1, math.inf), "finite angle"),
+    ],
+)
+def test_impossible_shapes_and_places(make, said):
+    with pytest.raises(GeometryError, match=said):
+        make()
+
+
+def test_impossible_forces():
+    with pytest.raises(ModelError, match="push, not pull"):
+        Probe(Circle(0.01), 0, 0, -1.0)
+    with pytest.raises(ModelError, match="finite drag"):
+        Probe(Circle(0.01), 0, 0, 1.0, 0.0, (0.0, math.nan))
+
+
+def test_a_moving_probe_drags_with_friction_times_force_the_way_it_goes():
+    probe = Probe(Circle(0.01), 0, 0, 2.0)
+    assert probe.moving(3.0, 4.0, 0.5).drag == pytest.approx((0.6, 0.8))
+    assert probe.moving(0.0, 0.0, 0.5).drag == (0.0, 0.0)
