@@ -204,3 +204,19 @@ def test_a_drive_that_does_not_exist() -> None:
     with pytest.raises(PatternError, match="expected a drive from 0 to 0, got 1") as caught:
         Pattern(5, [[1, 0]], [0, 1], [[2, 3], [3, 4]])  # type: ignore[arg-type]
     assert caught.value.where == "measurement row 1"
+
+
+@pytest.mark.parametrize("electrode", range(8))
+def test_rows_of_an_electrode_are_those_that_drive_or_read_it(electrode: int) -> None:
+    pattern = Pattern.adjacent(8)
+    rows = pattern.rows_of(electrode)
+    assert len(rows) == 2 * 5 + 2 * 5  # two drives with five pairs; two pairs in five drives each
+    used = np.hstack([pattern.drive, pattern.measure])
+    assert (used[rows] == electrode).any(axis=1).all()
+    assert not (np.delete(used, rows, axis=0) == electrode).any()
+
+
+@pytest.mark.parametrize("electrode", [-1, 8])
+def test_rows_of_an_electrode_that_does_not_exist(electrode: int) -> None:
+    with pytest.raises(PatternError, match=f"expected an electrode from 0 to 7, got {electrode}"):
+        Pattern.adjacent(8).rows_of(electrode)

@@ -11,16 +11,27 @@ from tomoskin.inverse.modes import Modes
 from tomoskin.inverse.noise_figure import noise_figure
 from tomoskin.inverse.one_step import OneStep
 from tomoskin.inverse.operator import Operator
+from tomoskin.inverse.pictures import MOST_LEFT_OUT, Pictures, pictures
 from tomoskin.inverse.priors import PRIORS, Identity, Noser, Prior, prior_matrix
 from tomoskin.inverse.problem import LinearProblem
+from tomoskin.inverse.resolution import (
+    averaging,
+    condition_number,
+    point_spread,
+    resolution_matrix,
+    resolved,
+    sensitivity,
+)
 from tomoskin.inverse.rules import RULES, choose
 from tomoskin.inverse.smoother import Smoothed, Smoother
 from tomoskin.inverse.source_metrics import SourceMetrics
 from tomoskin.inverse.spectrum import Spectrum
 from tomoskin.inverse.targets import Targets, along
 from tomoskin.inverse.temporal import Steady, Temporal
+from tomoskin.inverse.weights import noise_weights
 
 __all__ = [
+    "MOST_LEFT_OUT",
     "PRIORS",
     "RULES",
     "AlphaChoice",
@@ -38,6 +49,7 @@ __all__ = [
     "Noser",
     "OneStep",
     "Operator",
+    "Pictures",
     "Prior",
     "Smoothed",
     "Smoother",
@@ -48,8 +60,16 @@ __all__ = [
     "Targets",
     "Temporal",
     "along",
+    "averaging",
     "choose",
+    "condition_number",
     "figures",
     "noise_figure",
+    "noise_weights",
+    "pictures",
+    "point_spread",
     "prior_matrix",
+    "resolution_matrix",
+    "resolved",
+    "sensitivity",
 ]

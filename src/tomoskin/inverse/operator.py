@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tomoskin.core import DataError, Image
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse.missing import downdated, expected
+from tomoskin.pattern import Pattern
 
 
 class Operator:
@@ -100,6 +101,23 @@ class Operator:
             bad = np.flatnonzero(~finite).tolist()
             raise DataError(f"expected finite difference data; rows {bad} are not")
         return counted
+
+    def accept(self, pattern: Pattern) -> None:
+        """Refuse data of another pattern, however many rows it has.
+
+        Raises
+        ------
+        DataError
+            When ``pattern`` is not the one that the operator was made for.
+        """
+        own = self.model.pattern
+        if pattern.identity != own.identity:
+            raise DataError(
+                f"expected data of pattern {own.identity} ({own.n_meas} rows on "
+                f"{own.n_electrodes} electrodes), got {pattern.identity} ({pattern.n_meas} rows "
+                f"on {pattern.n_electrodes})",
+                hint="bring the recording's rows in the order of the operator's pattern",
+            )
 
     def without(self, rows: Sequence[int] | NDArray[Any]) -> Operator:
         """The operator that would have been made without ``rows``, which then do not count.

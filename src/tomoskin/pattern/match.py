@@ -76,10 +76,6 @@ def _find(
 
 
 def _describe(pattern: Pattern, missing: list[int]) -> str:
-    listed = "; ".join(
-        f"row {r}: source {pattern.drive[r, 0]}, sink {pattern.drive[r, 1]}, "
-        f"plus {pattern.measure[r, 0]}, minus {pattern.measure[r, 1]}"
-        for r in missing[:_LISTED]
-    )
+    listed = "; ".join(pattern.row_text(row) for row in missing[:_LISTED])
     more = f"; and {len(missing) - _LISTED} more" if len(missing) > _LISTED else ""
     return f"{len(missing)} of {pattern.n_meas} rows are not in the recording: {listed}{more}"

@@ -185,6 +185,19 @@ class Pattern:
         """(n_meas, 2) source, sink of each row."""
         return self.drives[self.drive_index]
 
+    def rows_of(self, electrode: int) -> IntArray:
+        """(k,) rows that drive or read ``electrode``. Raises PatternError where it is none."""
+        if not 0 <= electrode < self.n_electrodes:
+            raise PatternError(
+                f"expected an electrode from 0 to {self.n_electrodes - 1}, got {electrode}"
+            )
+        return np.flatnonzero((np.hstack([self.drive, self.measure]) == electrode).any(axis=1))
+
+    def row_text(self, row: int) -> str:
+        """The row in words, for messages."""
+        (source, sink), (plus, minus) = self.drive[row], self.measure[row]
+        return f"row {row}: source {source}, sink {sink}, plus {plus}, minus {minus}"
+
     @cached_property
     def identity(self) -> str:
         """Short hash of the tables: operators and recordings are matched by it."""
