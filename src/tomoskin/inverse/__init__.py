@@ -2,6 +2,8 @@
 
 from tomoskin.inverse.assembly import Assembly
 from tomoskin.inverse.choice import AlphaChoice, Curve, Evidence
+from tomoskin.inverse.desired import Desired
+from tomoskin.inverse.greit import Greit
 from tomoskin.inverse.high_pass import GaussianHighPass
 from tomoskin.inverse.laplace import Laplace, Structural
 from tomoskin.inverse.light_touch import LightTouch
@@ -37,8 +39,10 @@ __all__ = [
     "AlphaChoice",
     "Assembly",
     "Curve",
+    "Desired",
     "Evidence",
     "GaussianHighPass",
+    "Greit",
     "Identity",
     "Laplace",
     "LightTouch",

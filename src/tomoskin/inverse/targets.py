@@ -74,7 +74,11 @@ class Targets:
         rows, middles, amounts = [], [], []
         for number, (cells, share) in enumerate(Balls(model.mesh).each(table, radius)):
             if not len(cells):
-                raise DataError("lies outside the sheet", where=f"target {number}")
+                raise DataError(
+                    "lies outside the sheet, or between its cells",
+                    where=f"target {number}",
+                    hint="move it, or choose a radius above the size of a cell",
+                )
             sigma = state.conductivity[cells]
             content = share * model.mesh.volumes[cells]
             rows.append(state.local.voltages(cells, sigma * (1.0 + contrast * share)))
