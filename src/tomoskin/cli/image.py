@@ -7,29 +7,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tomoskin.cli.alpha_option import AlphaOption, said, with_alpha
 from tomoskin.cli.output import JsonFlag, emit
-from tomoskin.core import DataError
+from tomoskin.cli.recording import FramesOption, ReferenceOption, frame_range, idle_frames
 
 if TYPE_CHECKING:
     from tomoskin.core import IntArray
     from tomoskin.live import Reconstruction
-    from tomoskin.pattern import Pattern
     from tomoskin.session import Recording
 
 
 def image(
     recording: Annotated[Path, typer.Argument(metavar="INPUT", help="Recording or .npz file.")],
     skin: Annotated[str, typer.Option(help="Built-in name or path.")] = "textile-disc-8",
-    reference: Annotated[
-        str | None,
-        typer.Option(
-            metavar="first:N|frame:K|FILE",
-            help="Untouched frames; without it the file's own reference, else its first frame.",
-        ),
-    ] = None,
-    frames: Annotated[
-        str | None, typer.Option(metavar="A:B", help="Only frames A to B-1 (from 0).")
-    ] = None,
+    reference: ReferenceOption = None,
+    frames: FramesOption = None,
+    alpha: AlphaOption = None,
     out: Annotated[
         Path | None, typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go.")
     ] = None,
@@ -44,66 +37,18 @@ def image(
     from tomoskin.skin import Skin
 
     write = _writer(out)
-    prepared = prepare(Skin.load(skin))
+    chosen, rule = with_alpha(Skin.load(skin), alpha)
+    prepared = prepare(chosen)
     whole = read_recording(recording).in_order_of(prepared.pattern)
-    idle = _idle(whole, reference, prepared.pattern)
-    start, stop = _range(whole, frames)
-    found = reconstruct(prepared, whole.part(start, stop), idle).numbered_from(start)
+    idle = idle_frames(whole, reference, prepared.pattern)
+    start, stop = frame_range(whole, frames)
+    found = reconstruct(prepared, whole.part(start, stop), idle, rule=rule)
+    found = found.numbered_from(start)
     if touches is not None:
         _write_touches(touches, whole, found)
     if out is not None:
         write(out, prepared, found)
     _report(recording, found, json=json)
-
-
-def _idle(recording: Recording, spec: str | None, pattern: Pattern) -> Any:
-    """(n, n_meas) frames of the untouched skin, None for a file of differences."""
-    from tomoskin.session import read_recording
-
-    if recording.is_change:
-        if spec is not None:
-            raise DataError(
-                "holds differences, which need no reference",
-                where=recording.source,
-                hint="leave --reference out",
-            )
-        return None
-    if spec is None and recording.reference is not None:
-        return recording.reference[None]
-    kind, _, number = (spec or "first:1").partition(":")
-    if kind in ("first", "frame") and number.isdigit():
-        return _frames_of(recording, kind, int(number))
-    path = Path(spec or "")
-    if not path.exists():
-        raise DataError(f'expected first:N, frame:K or a file, got "{spec}"', where="--reference")
-    other = read_recording(path)
-    if other.is_change:
-        raise DataError("holds differences, not an untouched skin", where=other.source)
-    return other.in_order_of(pattern).voltages
-
-
-def _frames_of(recording: Recording, kind: str, number: int) -> Any:
-    n = len(recording)
-    if kind == "frame":
-        if number >= n:
-            raise DataError(
-                f"expected a frame from 0 to {n - 1}, got {number}", where="--reference"
-            )
-        return recording.voltages[number : number + 1]
-    if not 1 <= number <= n:
-        raise DataError(f"expected first:1 to first:{n}, got first:{number}", where="--reference")
-    return recording.voltages[:number]
-
-
-def _range(recording: Recording, spec: str | None) -> tuple[int, int]:
-    n = len(recording)
-    first, colon, last = (spec or ":").partition(":")
-    if not (colon and (first or "0").isdigit() and (last or "0").isdigit()):
-        raise typer.BadParameter(f'expected A:B, got "{spec}"', param_hint="--frames")
-    start, stop = int(first or 0), int(last or n)
-    if not 0 <= start < stop <= n:
-        raise DataError(f"expected frames within 0:{n}, got {spec}", where="--frames")
-    return start, stop
 
 
 def _writer(out: Path | None) -> Any:
@@ -144,6 +89,7 @@ def _report(source: Path, found: Reconstruction, *, json: bool) -> None:
         emit(_document(found))
         return
     typer.echo(f"{len(found.frames)} frames, {sum(map(len, found.touches))} touches")
+    typer.echo(said(found.choice))
     for frame, touches in list(zip(found.frames.tolist(), found.touches, strict=True))[:_SHOWN]:
         for t in touches:
             r = t.reading
@@ -164,6 +110,8 @@ def _document(found: Reconstruction) -> dict[str, Any]:
         "left_out": found.left_out.tolist(),
         "agreement": found.agreement,
         "unit": found.unit,
+        "alpha": found.choice.alpha,
+        "rule": found.choice.rule,
         "touches": [
             {"frame": f, "id": t.id, "x_m": t.reading.x, "y_m": t.reading.y, "peak": t.reading.peak}
             for f, touches in zip(found.frames.tolist(), found.touches, strict=True)

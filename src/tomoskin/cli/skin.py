@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tomoskin.cli.alpha import alpha
 from tomoskin.cli.output import JsonFlag, emit
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from tomoskin.skin import Skin
 
 app = typer.Typer(help="List, show and check skins.", no_args_is_help=True)
+app.command("alpha")(alpha)
 
 _Name = Annotated[str, typer.Argument(metavar="SKIN", help="Built-in name or path.")]
 

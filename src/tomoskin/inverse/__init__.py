@@ -13,6 +13,7 @@ from tomoskin.inverse.modes import Modes
 from tomoskin.inverse.noise_figure import noise_figure
 from tomoskin.inverse.one_step import OneStep
 from tomoskin.inverse.operator import Operator
+from tomoskin.inverse.picard import Picard, picard
 from tomoskin.inverse.pictures import MOST_LEFT_OUT, Pictures, pictures
 from tomoskin.inverse.priors import PRIORS, Identity, Noser, Prior, prior_matrix
 from tomoskin.inverse.problem import LinearProblem
@@ -53,6 +54,7 @@ __all__ = [
     "Noser",
     "OneStep",
     "Operator",
+    "Picard",
     "Pictures",
     "Prior",
     "Smoothed",
@@ -70,6 +72,7 @@ __all__ = [
     "figures",
     "noise_figure",
     "noise_weights",
+    "picard",
     "pictures",
     "point_spread",
     "prior_matrix",

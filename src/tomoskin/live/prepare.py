@@ -52,6 +52,10 @@ class Prepared:
         """(n_meas,) standard deviation of difference data against that reference."""
         return difference_noise(reference.noise, reference.mean, self.operator.difference)
 
+    def predicted_noise(self) -> FloatArray:
+        """(n_meas,) standard deviation of difference data that the read-out predicts."""
+        return _predicted(self.problem, self.readout)
+
     def places(self, image: FloatArray) -> FloatArray:
         """(k, 2) m, where the touches of an image (n_cells,) are."""
         found = [(reading.x, reading.y) for reading in self.segmenter(image)]
@@ -79,7 +83,7 @@ def prepare(skin: Skin) -> Prepared:
         conductivity=skin.conductivity,
         difference=settings.difference,
     )
-    light_touch, choice, operator = _chosen(problem, settings.alpha, readout.noise)
+    light_touch, choice, operator = _chosen(problem, settings.alpha, readout)
     return Prepared(
         skin=skin,
         mesh=mesh,
@@ -96,13 +100,17 @@ def prepare(skin: Skin) -> Prepared:
 
 
 def _chosen(
-    problem: LinearProblem, alpha: float | str, noise: float
+    problem: LinearProblem, alpha: float | str, readout: Readout
 ) -> tuple[LightTouch | None, AlphaChoice, Operator]:
     if not isinstance(alpha, str):
-        by_hand = AlphaChoice(alpha, "hand", "set in the skin file")
+        by_hand = AlphaChoice(alpha, "hand", "set by hand")
         return None, by_hand, problem.operator(alpha)
     light_touch = LightTouch.of(Spectrum.of(problem))
-    rows = np.full(len(problem.reference), noise)
-    choice = light_touch(difference_noise(rows, problem.reference, problem.difference))
+    choice = light_touch(_predicted(problem, readout))
     choice = replace(choice, reason=f"{choice.reason}, as its read-out predicts it")
     return light_touch, choice, light_touch.spectrum.operator(choice.alpha)
+
+
+def _predicted(problem: LinearProblem, readout: Readout) -> FloatArray:
+    rows = np.full(len(problem.reference), readout.noise)
+    return difference_noise(rows, problem.reference, problem.difference)

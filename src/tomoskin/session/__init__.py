@@ -1,5 +1,6 @@
 """Recordings: sessions, interchange, import; pictures and files of their images."""
 
+from tomoskin.session.alpha_picture import write_choices
 from tomoskin.session.interchange import write_interchange
 from tomoskin.session.layout import Mark, MarkedFrame
 from tomoskin.session.picture import MOST_PANELS, Panel, write_picture
@@ -29,6 +30,7 @@ __all__ = [
     "Truth",
     "read_recording",
     "read_session",
+    "write_choices",
     "write_interchange",
     "write_picture",
     "write_touches",

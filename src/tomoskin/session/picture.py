@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tomoskin.core import DataError, FloatArray, Touch
+from tomoskin.core import FloatArray, Touch
 from tomoskin.mesh import Mesh
+from tomoskin.session.figure import new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,17 +38,9 @@ def write_picture(path: Path, mesh: Mesh, panels: Sequence[Panel], unit: str) ->
     DataError
         When matplotlib is not installed or the file cannot be written.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise DataError(
-            "pictures need matplotlib", where=str(path), hint="pip install 'tomoskin[plot]'"
-        ) from error
     columns = min(len(panels), 4)
     rows = -(-len(panels) // columns)
-    figure = Figure(figsize=(3.2 * columns + 1.1, 3.3 * rows), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(path, 3.2 * columns + 1.1, 3.3 * rows)
     limit = max(float(np.abs(p.values).max()) for p in panels) or 1.0
     axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
     for ax, panel in zip(axes, panels, strict=False):
@@ -55,10 +48,7 @@ def write_picture(path: Path, mesh: Mesh, panels: Sequence[Panel], unit: str) ->
     for ax in axes[len(panels) :]:
         ax.set_visible(False)
     figure.colorbar(drawn, ax=list(axes), label=f"change of conductivity ({unit})", shrink=0.8)
-    try:
-        figure.savefig(path, dpi=120)
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+    save_figure(path, figure)
 
 
 def _draw(ax: Axes, mesh: Mesh, panel: Panel, limit: float) -> Any:

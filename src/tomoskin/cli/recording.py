@@ -1,0 +1,76 @@
+"""Options that name parts of a recording: the untouched frames, and a range."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tomoskin.core import DataError
+
+if TYPE_CHECKING:
+    from tomoskin.pattern import Pattern
+    from tomoskin.session import Recording
+
+ReferenceOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="first:N|frame:K|FILE",
+        help="Untouched frames; without it the file's own reference, else its first frame.",
+    ),
+]
+FramesOption = Annotated[
+    str | None, typer.Option(metavar="A:B", help="Only frames A to B-1 (from 0).")
+]
+
+
+def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Any:
+    """(n, n_meas) frames of the untouched skin, None for a file of differences."""
+    from tomoskin.session import read_recording
+
+    if recording.is_change:
+        if spec is not None:
+            raise DataError(
+                "holds differences, which need no reference",
+                where=recording.source,
+                hint="leave --reference out",
+            )
+        return None
+    if spec is None and recording.reference is not None:
+        return recording.reference[None]
+    kind, _, number = (spec or "first:1").partition(":")
+    if kind in ("first", "frame") and number.isdigit():
+        return _frames_of(recording, kind, int(number))
+    path = Path(spec or "")
+    if not path.exists():
+        raise DataError(f'expected first:N, frame:K or a file, got "{spec}"', where="--reference")
+    other = read_recording(path)
+    if other.is_change:
+        raise DataError("holds differences, not an untouched skin", where=other.source)
+    return other.in_order_of(pattern).voltages
+
+
+def _frames_of(recording: Recording, kind: str, number: int) -> Any:
+    n = len(recording)
+    if kind == "frame":
+        if number >= n:
+            raise DataError(
+                f"expected a frame from 0 to {n - 1}, got {number}", where="--reference"
+            )
+        return recording.voltages[number : number + 1]
+    if not 1 <= number <= n:
+        raise DataError(f"expected first:1 to first:{n}, got first:{number}", where="--reference")
+    return recording.voltages[:number]
+
+
+def frame_range(recording: Recording, spec: str | None) -> tuple[int, int]:
+    """First frame, and one past the last; all of them without ``spec``."""
+    n = len(recording)
+    first, colon, last = (spec or ":").partition(":")
+    if not (colon and (first or "0").isdigit() and (last or "0").isdigit()):
+        raise typer.BadParameter(f'expected A:B, got "{spec}"', param_hint="--frames")
+    start, stop = int(first or 0), int(last or n)
+    if not 0 <= start < stop <= n:
+        raise DataError(f"expected frames within 0:{n}, got {spec}", where="--frames")
+    return start, stop
