@@ -1,19 +1,9 @@
 """The running pipeline, and the server of its page."""
 
 from tomoskin.live.hub import Hub
-from tomoskin.live.labelled import (
-    SetMade,
-    Workers,
-    in_processes,
-    in_this_process,
-    make_set,
-    on_cluster,
-    processors,
-)
 from tomoskin.live.offline import DOUBTED, Changes, Reconstruction, changes_of, reconstruct
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.prepare import Prepared, prepare
-from tomoskin.live.replayed import advance, replayed
 from tomoskin.live.result import Result
 from tomoskin.live.runner import Runner, Snapshot
 from tomoskin.live.scale import colour_limit
@@ -27,7 +17,6 @@ from tomoskin.live.server import (
     check_page,
     listen,
 )
-from tomoskin.live.simulate import Simulated, simulate
 
 __all__ = [
     "DEFAULT_PORT",
@@ -43,24 +32,13 @@ __all__ = [
     "Runner",
     "Server",
     "ServerError",
-    "SetMade",
-    "Simulated",
     "Snapshot",
-    "Workers",
-    "advance",
     "application",
     "changes_of",
     "check_page",
     "colour_limit",
-    "in_processes",
-    "in_this_process",
     "is_loopback",
     "listen",
-    "make_set",
-    "on_cluster",
     "prepare",
-    "processors",
     "reconstruct",
-    "replayed",
-    "simulate",
 ]
