@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
@@ -17,9 +18,13 @@ from tomoskin.live.meter import Meter
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.presses import Pressable, PressBoard
+from tomoskin.live.replayed import advance
 from tomoskin.live.result import Result
 from tomoskin.live.status import Status
 from tomoskin.live.tally import Tally
+from tomoskin.live.tape import Tape
+from tomoskin.live.wishes import Wishes
+from tomoskin.session import Mark
 from tomoskin.source import Link, ScanSettings, Transport
 from tomoskin.twin import Press
 
@@ -92,7 +97,8 @@ class Runner:
         self._presses = PressBoard()
         self._truth: tuple[Press, ...] = ()
         self._pressed = 0
-        self._reference_is_wanted = False
+        self._wishes = Wishes()
+        self._tape = Tape(prepared, self.say, clock)
         self._tally, self._earlier, self._skipped = Tally(), Tally(), 0
         self._trouble: str | None = "not started"
         self._standstill: str | None = None
@@ -124,14 +130,29 @@ class Runner:
         self._stopping.set()
         if self._thread is not None:
             self._thread.join()
+        self._tape.stop()
+
+    def record(self, path: Path) -> None:
+        """Record from now on, beside the pipeline: raw bytes, frames, touches and the rest.
+
+        Raises
+        ------
+        DataError
+            When the file exists or cannot be made. What goes wrong later is an event.
+        """
+        self._tape.record(path, self.source)
+
+    def stop_recording(self) -> None:
+        """End the recording, if there is one; returns when the file is whole."""
+        self._tape.stop()
 
     def take_reference(self) -> None:
         """The next frames become the reference."""
-        self._reference_is_wanted = True
+        self._wishes.take_reference()
 
     def pause(self, on: bool) -> None:
         """Hold the picture, or let it go on; frames are read and left out meanwhile."""
-        self._pipeline.paused = on
+        self._wishes.hold(on)
 
     def set_presses(self, owner: object, presses: tuple[Press, ...]) -> None:
         """All presses that ``owner`` holds now; an empty tuple lifts them."""
@@ -139,7 +160,7 @@ class Runner:
 
     def say(self, kind: str, text: str) -> None:
         """Publish an event of this moment."""
-        self.events.add(Event(self._clock(), kind, text))
+        self._publish(Event(self._clock(), kind, text))
 
     @contextlib.contextmanager
     def watched_by(self, announce: Callable[[], None]) -> Iterator[None]:
@@ -165,7 +186,8 @@ class Runner:
         return Status(
             source=self.source,
             running=self._trouble is None and self._standstill is None,
-            paused=self._pipeline.paused,
+            paused=self._wishes.held,
+            recording=self._tape.path,
             frames=self._meter.frames,
             fps=self._meter.rate(now),
             dropped=total.dropped + self._skipped + self._pipeline.refused,
@@ -197,11 +219,12 @@ class Runner:
         self._pressed = -1
         drops = 0
         try:
-            with Link(transport, self.prepared.scan, self._settings, clock=self._clock) as link:
+            with self._link(transport) as link:
                 while not self._stopping.is_set():
                     self._press(transport)
                     found = link.poll(_POLL)
                     self._trouble = None if link.running else _WAITING
+                    self._tape.linked(link)
                     frames = [item for item in found if isinstance(item, Frame)]
                     drops = frames[-1].drops if frames else drops
                     self._tally = Tally.of(link, drops)
@@ -212,6 +235,15 @@ class Runner:
             self.say("source-lost", str(error))
         finally:
             self._earlier, self._tally = self._earlier + self._tally, Tally()
+
+    def _link(self, transport: Transport) -> Link:
+        self._wishes.opened(transport)
+        clock, tap = self._clock, self._tape.read
+        return Link(transport, self.prepared.scan, self._settings, clock=clock, tap=tap)
+
+    def _publish(self, event: Event) -> None:
+        self.events.add(event)
+        self._tape.event(event)
 
     def _reopened(self) -> Transport | None:
         delay = _FIRST_DELAY
@@ -228,26 +260,30 @@ class Runner:
         if changes != self._pressed and isinstance(transport, Pressable):
             transport.set_presses(presses)
             self._pressed, self._truth = changes, presses
+            self._tape.truth(presses)
 
     def _note(self, happened: list[Event]) -> None:
         for event in happened:
-            self.events.add(event)
+            self._publish(event)
             if event.kind in _STANDSTILL:
                 self._standstill = event.text
 
     def _take(self, frames: list[Frame]) -> None:
-        self._skipped += max(len(frames) - MOST_AT_ONCE, 0)
-        for frame in frames[-MOST_AT_ONCE:]:
-            self._process(frame)
+        late = len(frames) - MOST_AT_ONCE
+        for number, frame in enumerate(frames):
+            mark = self._wishes.mark(frame, late=number < late)
+            if mark is not None:
+                self._tape.frame(frame, mark)
+                self._process(frame, mark)
 
-    def _process(self, frame: Frame) -> None:
+    def _process(self, frame: Frame, mark: Mark) -> None:
+        if mark & Mark.SKIPPED:
+            self._skipped += 1
+            return
         self._standstill = None
         self._meter.arrived(frame.host_time)
-        if self._reference_is_wanted:
-            self._reference_is_wanted = False
-            self._pipeline.take_reference()
         try:
-            result = self._pipeline.push(frame)
+            result = advance(self._pipeline, frame, mark)
         except DataError as error:
             self._skipped += 1
             self.say("refused", f"a frame was left out: {error}")
@@ -257,6 +293,7 @@ class Runner:
         latency = self._clock() - frame.host_time
         self._meter.took(latency)
         self.newest = Snapshot(result, self._truth, latency)
+        self._tape.result(result)
         with self._watching:
             for announce in self._watchers:
                 announce()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from tomoskin.live.result import ReferenceState
 
@@ -35,6 +36,8 @@ class Status:
         How far the reference is.
     reference_age
         Seconds since it stood, or None.
+    recording
+        The file that is being recorded to, or None.
     left_out
         Rows that the newest picture does without.
     problem
@@ -55,6 +58,7 @@ class Status:
     reference_age: float | None
     left_out: int
     problem: str | None
+    recording: Path | None = None
 
     @property
     def text(self) -> str:

@@ -24,7 +24,7 @@ uint32 sequence       # scans since START
 uint16 configuration  # identity of the scan
 uint16 drops          # frames that the device dropped since START
 uint8 flags           # the device's
-uint8 mark            # 1 a reference begins, 2 held, 4 skipped, 8 source opened
+uint8 mark            # 1 a reference begins, 2 held, 4 skipped, 8 source opened, 16 from earlier
 uint16[] samples      # counts in scan order, each the sum over the oversampling
 """
 

@@ -31,6 +31,8 @@ class Mark(IntFlag):
     """Left out: too many frames waited."""
     OPENED = 8
     """First frame since the source was opened."""
+    EARLIER = 16
+    """From before the recording began: one of those that its reference was made of."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

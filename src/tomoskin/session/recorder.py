@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import queue
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -111,6 +111,10 @@ class Recorder:
     def device(self, host_time: float, info: Any) -> None:
         """What the board is."""
         self._put(0, self._session.device, host_time, info)
+
+    def settings(self, host_time: float, settings: Mapping[str, Any]) -> None:
+        """How the run is set."""
+        self._put(0, self._session.settings, host_time, settings)
 
     def clock(self, host_time: float, fit: Any) -> None:
         """A fit of the device's clock."""

@@ -97,7 +97,8 @@ class SessionReader:
 
     def log_time(self, host_time: float) -> int:
         """Ns at which something at ``host_time`` is logged."""
-        return max(0, round((host_time + self.epoch) * 1e9))
+        seconds = host_time + self.epoch
+        return round(1e9 * seconds) if seconds > 0 else 0
 
     def attachments(self) -> dict[str, bytes]:
         """Files inside by their name."""
@@ -112,6 +113,13 @@ class SessionReader:
         """(host time, bytes as they were read from the source)."""
         for message in self._messages(channels.RAW, since):
             yield decode_raw(message.data, self._place(message))
+
+    def reads(self, since: float | None = None) -> Iterator[tuple[float, bytes] | MarkedFrame]:
+        """Raw bytes, each followed by the frames that they completed, as they were recorded."""
+        start = 0 if since is None else self.log_time(since)
+        for message in self._file.messages(frozenset({channels.RAW, channels.FRAMES}), start):
+            decode = decode_raw if message.channel == channels.RAW else decode_frame
+            yield decode(message.data, self._place(message))
 
     def touches(self) -> Iterator[RecordedTouches]:
         """Touches of every frame that had some, or none after some."""

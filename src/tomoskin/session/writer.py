@@ -63,7 +63,7 @@ class SessionWriter:
     def __init__(self, path: Path, skin: Skin, *, epoch: float = 0.0, start: float = 0.0) -> None:
         self.path = path
         self.epoch = epoch
-        self._now = start
+        self._now = self._start = start
         self._flushed = 0
         with self._said():
             file = path.open("xb", buffering=0)
@@ -81,8 +81,11 @@ class SessionWriter:
         self._put(channels.RAW, host_time, encode_raw(host_time, data))
 
     def frame(self, frame: Frame, mark: Mark = Mark.NONE) -> None:
-        """One frame, and what became of it."""
-        self._put(channels.FRAMES, frame.host_time, encode_frame(frame, mark))
+        """One frame, and what became of it; after the raw bytes that it came in.
+
+        A frame from before ``start`` is logged at ``start``.
+        """
+        self._put(channels.FRAMES, max(frame.host_time, self._start), encode_frame(frame, mark))
 
     def touches(self, host_time: float, sequence: int, touches: Sequence[Touch]) -> None:
         """Touches of the frame ``sequence``; none is worth saying when there were some before."""

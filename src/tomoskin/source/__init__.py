@@ -12,7 +12,7 @@ from tomoskin.source.settings import (
     conversion_time,
     scan_time,
 )
-from tomoskin.source.transport import Transport
+from tomoskin.source.transport import Played, Transport
 
 __all__ = [
     "GROUP",
@@ -22,6 +22,7 @@ __all__ = [
     "FrameCounters",
     "FrameGate",
     "Link",
+    "Played",
     "ScanSettings",
     "Stage",
     "Timing",

@@ -8,6 +8,8 @@ from tomoskin.core import Event, Frame
 from tomoskin.source.configuration import Configuration
 
 _MODULUS = 2**32
+_ANY = -1
+"""Stands for the number of a frame that may be any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +40,11 @@ class FrameGate:
         """START has been answered: the sequence begins at 0."""
         self._expected = 0
 
+    def expect_any(self) -> None:
+        """The next frame may have any number: what it comes from has been set to another place."""
+        if self._expected is not None:
+            self._expected = _ANY
+
     def close(self) -> None:
         """No frame passes until START is answered again."""
         self._expected = None
@@ -58,7 +65,7 @@ class FrameGate:
             first, self._foreign_run = not self._foreign_run, True
             return [Event(frame.host_time, "foreign", fault)] if first else []
         self._foreign_run = False
-        gap = (frame.sequence - self._expected) % _MODULUS
+        gap = 0 if self._expected == _ANY else (frame.sequence - self._expected) % _MODULUS
         if gap >= _MODULUS // 2:
             self._stale += 1
             return []

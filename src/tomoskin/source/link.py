@@ -12,7 +12,7 @@ from tomoskin.pattern import Scan
 from tomoskin.source.conversation import Conversation, Stage
 from tomoskin.source.gate import FrameCounters
 from tomoskin.source.settings import ScanSettings, Timing
-from tomoskin.source.transport import Transport
+from tomoskin.source.transport import Played, Transport
 from tomoskin.wire import Ack, Counters, Decoder, Info
 
 
@@ -31,13 +31,20 @@ class Link:
         *,
         timing: Timing | None = None,
         clock: Callable[[], float] = time.monotonic,
+        tap: Callable[[float, bytes], None] | None = None,
     ) -> None:
-        """A link that has not spoken yet; ``clock`` gives monotonic seconds."""
+        """A link that has not spoken yet.
+
+        ``clock`` gives monotonic seconds; a transport that plays a recording brings its own.
+        ``tap`` is called with the host time and bytes of every read, before they are decoded.
+        """
         self.transport = transport
-        self._clock = clock
+        self._played = transport if isinstance(transport, Played) else None
+        self._clock = self._played.now if self._played else clock
+        self._tap = tap
         self._timing = timing or Timing()
         self._decoder = Decoder()
-        self._talk = Conversation(scan, settings, self._timing, clock(), transport.name)
+        self._talk = Conversation(scan, settings, self._timing, self._clock(), transport.name)
         self._closed = False
 
     @property
@@ -117,6 +124,11 @@ class Link:
     def _listen(self, timeout: float) -> list[Frame | Event]:
         data = self.transport.read(timeout)
         now = self._clock()
+        if data and self._tap:
+            self._tap(now, data)
+        if data and self._played and self._played.jumped():
+            self._decoder = Decoder()
+            self._talk.gate.expect_any()
         found = []
         for message in self._decoder.feed(data, now):
             found += self._talk.receive(message, now)

@@ -30,3 +30,14 @@ class Transport(Protocol):
 
     def close(self) -> None:
         """Give the device back; a second call does nothing."""
+
+
+@runtime_checkable
+class Played(Protocol):
+    """A transport that plays a recording: it has a time of its own, and may jump in it."""
+
+    def now(self) -> float:
+        """Monotonic seconds in the recording: exactly those of what was read last."""
+
+    def jumped(self) -> bool:
+        """Whether what was read last does not follow what was read before it."""

@@ -1,0 +1,43 @@
+"""A recorded session through the pipeline again, without a clock: the same touches to the bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tomoskin.core import DataError, Frame
+from tomoskin.live.pipeline import Pipeline
+from tomoskin.live.prepare import Prepared
+from tomoskin.live.result import Result
+from tomoskin.session import Mark, SessionReader
+
+
+def advance(pipeline: Pipeline, frame: Frame, mark: Mark) -> Result | None:
+    """Give the pipeline one frame as its ``mark`` says; None where there is no picture of it.
+
+    Raises
+    ------
+    DataError
+        When the frame has another number of samples than the scan.
+    """
+    if mark & Mark.SKIPPED:
+        return None
+    if mark & Mark.REFERENCE:
+        pipeline.take_reference()
+    pipeline.paused = bool(mark & Mark.HELD)
+    return pipeline.push(frame)
+
+
+def replayed(prepared: Prepared, session: SessionReader) -> Iterator[Result]:
+    """What the pipeline made of every frame of ``session``, and makes of it again.
+
+    ``prepared`` is that of the session's own skin for the same touches, or of another with the
+    same scan. Frames that the pipeline refused are refused again.
+    """
+    pipeline = Pipeline(prepared)
+    for item in session.frames():
+        try:
+            result = advance(pipeline, item.frame, item.mark)
+        except DataError:
+            continue
+        if result is not None and not item.mark & Mark.EARLIER:
+            yield result

@@ -1,0 +1,93 @@
+"""The board of a replay: agrees to everything, and says who it was."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from tomoskin.wire import (
+    SCHEMA,
+    Ack,
+    Deframer,
+    GetInfo,
+    Hello,
+    Info,
+    Reset,
+    Result,
+    Start,
+    Stop,
+    decode_payload,
+    encode,
+    is_command,
+    type_byte,
+)
+
+if TYPE_CHECKING:
+    from tomoskin.skin import Skin
+
+
+class ReplayBoard:
+    """Answers commands as the board that was recorded would; no I/O.
+
+    ``scanning`` says whether it has been started.
+    """
+
+    def __init__(self, skin: Skin, device: dict[str, Any]) -> None:
+        """``device`` is what the session holds of the board, perhaps nothing."""
+        self._skin, self._device = skin, device
+        self._deframer = Deframer(SCHEMA.to_device_bytes)
+        self._out = bytearray(encode(Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash)))
+        self.scanning = False
+
+    def obey(self, data: bytes) -> None:
+        """Act on commands."""
+        for payload in self._deframer.feed(data):
+            command = decode_payload(payload, 0.0)
+            if command is None or not is_command(command):
+                continue
+            if isinstance(command, Start | Stop):
+                self.scanning = isinstance(command, Start)
+            if isinstance(command, GetInfo):
+                self._out += encode(self._info(command.request))
+            else:
+                self._out += encode(Ack(command.request, type_byte(type(command)), Result.OK, 0))
+
+    def answer(self) -> bytes:
+        """What it has to say, once."""
+        data = bytes(self._out)
+        self._out.clear()
+        return data
+
+    def _info(self, request: int) -> Info:
+        skin = self._skin
+        return Info(
+            request=request,
+            major=SCHEMA.major,
+            minor=SCHEMA.minor,
+            schema_hash=SCHEMA.hash,
+            firmware=_version(self._device.get("firmware")),
+            reset=Reset.UNKNOWN,
+            channels=32,
+            adc_bits=skin.readout.adc_bits,
+            max_oversampling=64,
+            max_drives=2**16 - 1,
+            max_samples=2**16 - 1,
+            tick_rate=round(self._device.get("tick_rate", skin.readout.tick_rate)),
+            current=round(skin.current * 1e6),
+            max_baud=0,
+            unique_id=_identity(self._device.get("unique_id")),
+        )
+
+
+def _version(text: Any) -> bytes:
+    """Three numbers of "1.2.3"; zeros where it is not said."""
+    parts = str(text or "").split(".")
+    known = len(parts) == 3 and all(part.isdigit() and int(part) < 256 for part in parts)
+    return bytes(map(int, parts)) if known else bytes(3)
+
+
+def _identity(text: Any) -> bytes:
+    try:
+        found = bytes.fromhex(str(text or ""))
+    except ValueError:
+        found = b""
+    return found if len(found) == 8 else b"replay\0\0"
