@@ -14,7 +14,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from tomoskin import __version__
-from tomoskin.cli import bench, doctor, image, live, skin
+from tomoskin.cli import bench, doctor, image, live, simulate, skin
 from tomoskin.core import TomoskinError
 
 DEBUG = "TOMOSKIN_DEBUG"
@@ -29,6 +29,7 @@ app = typer.Typer(
 )
 app.command("live")(live.live)
 app.command("image")(image.image)
+app.command("simulate")(simulate.simulate)
 app.command("bench")(bench.bench)
 app.add_typer(skin.app, name="skin")
 app.command("doctor")(doctor.doctor)

@@ -1,6 +1,15 @@
 """The running pipeline, and the server of its page."""
 
 from tomoskin.live.hub import Hub
+from tomoskin.live.labelled import (
+    SetMade,
+    Workers,
+    in_processes,
+    in_this_process,
+    make_set,
+    on_cluster,
+    processors,
+)
 from tomoskin.live.offline import DOUBTED, Changes, Reconstruction, changes_of, reconstruct
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.prepare import Prepared, prepare
@@ -17,6 +26,7 @@ from tomoskin.live.server import (
     check_page,
     listen,
 )
+from tomoskin.live.simulate import Simulated, simulate
 
 __all__ = [
     "DEFAULT_PORT",
@@ -32,13 +42,22 @@ __all__ = [
     "Runner",
     "Server",
     "ServerError",
+    "SetMade",
+    "Simulated",
     "Snapshot",
+    "Workers",
     "application",
     "changes_of",
     "check_page",
     "colour_limit",
+    "in_processes",
+    "in_this_process",
     "is_loopback",
     "listen",
+    "make_set",
+    "on_cluster",
     "prepare",
+    "processors",
     "reconstruct",
+    "simulate",
 ]

@@ -2,6 +2,7 @@
 
 from tomoskin.session.alpha_picture import write_choices
 from tomoskin.session.interchange import write_interchange
+from tomoskin.session.labelled_set import is_done, join_shards, shard_path, write_whole
 from tomoskin.session.layout import Mark, MarkedFrame
 from tomoskin.session.picture import MOST_PANELS, Panel, write_picture
 from tomoskin.session.reader import read_recording
@@ -28,11 +29,15 @@ __all__ = [
     "SessionReader",
     "SessionWriter",
     "Truth",
+    "is_done",
+    "join_shards",
     "read_recording",
     "read_session",
+    "shard_path",
     "write_choices",
     "write_interchange",
     "write_picture",
     "write_touches",
     "write_vtu",
+    "write_whole",
 ]

@@ -2,22 +2,31 @@
 
 from tomoskin.twin.board import Board
 from tomoskin.twin.circuit import Lines, line_potentials
+from tomoskin.twin.clock import VirtualClock
 from tomoskin.twin.contact import ContactSettings, Dented, Grid, solve_contact
 from tomoskin.twin.dent import Load, indent
 from tomoskin.twin.device import TwinDevice
+from tomoskin.twin.disturbance import Disturbance, disturbed, reboots
 from tomoskin.twin.faults import FaultEvent, Faults, faults_at
+from tomoskin.twin.labelled import SetPlan, make_shard
 from tomoskin.twin.line import FaultyLine, Line, LineSettings
 from tomoskin.twin.material import MaterialSettings, MaterialState, advance, conductivity
+from tomoskin.twin.population import COMMON_PRESSES, Population
 from tomoskin.twin.probe import Contact, Press, Probe
 from tomoskin.twin.readout import ElectronicsSettings, TwinElectronics, convert
 from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, sample_table
+from tomoskin.twin.script import Script
+from tomoskin.twin.script_check import check_script
+from tomoskin.twin.script_page import script_page
 from tomoskin.twin.settings import PRESETS, TwinSettings
 from tomoskin.twin.shape import Circle, Face, Finger, Shape, Square
 from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.source import make_electronics, make_twin, open_twin
+from tomoskin.twin.timeline import pressed
 from tomoskin.twin.transport import Clock, TwinTransport, WallClock
 
 __all__ = [
+    "COMMON_PRESSES",
     "PRESETS",
     "Analogue",
     "Board",
@@ -26,6 +35,7 @@ __all__ = [
     "Contact",
     "ContactSettings",
     "Dented",
+    "Disturbance",
     "ElectronicsSettings",
     "Face",
     "FaultEvent",
@@ -39,10 +49,13 @@ __all__ = [
     "Load",
     "MaterialSettings",
     "MaterialState",
+    "Population",
     "Press",
     "Probe",
     "SampleTable",
     "ScanClock",
+    "Script",
+    "SetPlan",
     "Shape",
     "Square",
     "TwinDevice",
@@ -50,16 +63,23 @@ __all__ = [
     "TwinSettings",
     "TwinSkin",
     "TwinTransport",
+    "VirtualClock",
     "WallClock",
     "advance",
+    "check_script",
     "conductivity",
     "convert",
+    "disturbed",
     "faults_at",
     "indent",
     "line_potentials",
     "make_electronics",
+    "make_shard",
     "make_twin",
     "open_twin",
+    "pressed",
+    "reboots",
     "sample_table",
+    "script_page",
     "solve_contact",
 ]

@@ -1,0 +1,140 @@
+"""``tomoskin simulate``: the twin follows a script, or makes labelled frames."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.progress import Bar
+from tomoskin.core import DataError
+
+if TYPE_CHECKING:
+    from tomoskin.live import Workers
+    from tomoskin.skin import Skin
+
+_LARGEST = 10_000_000
+"""A script has at most so many bytes."""
+
+
+def simulate(
+    *,
+    skin: Annotated[str, typer.Option(help="Built-in name or path.")] = "textile-disc-8",
+    script: Annotated[
+        Path | None, typer.Option(metavar="X.toml", help="What happens; see docs/simulate.md.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Session file; with --presses a folder, or FILE.npz.")],
+    presses: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help="Instead of a timeline, N labelled frames."),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Same seed, same data; wins over the script's.")
+    ] = None,
+    processes: Annotated[
+        int | None, typer.Option(min=1, help="For --presses; otherwise one a processor.")
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="For --presses: a Dask scheduler, tcp://HOST:8786."),
+    ] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Run a script on the twin into a session file, or draw labelled frames."""
+    from tomoskin.skin import Skin
+
+    chosen = Skin.load(skin)
+    if presses is not None:
+        workers = _workers(processes, cluster)
+        _labelled(chosen, script, out, presses, seed or 0, workers, json=json)
+        return
+    if script is None:
+        raise typer.BadParameter("give a script, or --presses N", param_hint="--script")
+    if processes is not None or cluster is not None:
+        raise typer.BadParameter("goes with --presses", param_hint="--processes, --cluster")
+    _timeline(chosen, script, out, seed, json=json)
+
+
+def _timeline(skin: Skin, script: Path, out: Path, seed: int | None, *, json: bool) -> None:
+    from tomoskin.live import simulate as run
+    from tomoskin.twin import Script
+
+    read = Script.from_toml(_text(script), source=str(script))
+    begun = time.monotonic()
+    try:
+        with Bar("simulating") as bar:
+            found = run(read, skin, out, seed=seed, advance=bar)
+    except KeyboardInterrupt:
+        typer.echo(f"tomoskin: stopped; {out} holds what was simulated until then", err=True)
+        raise typer.Exit(1) from None
+    took = time.monotonic() - begun
+    if json:
+        emit(
+            {"out": str(out), "frames": found.frames, "lost": found.lost, "seconds": found.seconds}
+        )
+        return
+    lost = f", {found.lost} lost on the line" if found.lost else ""
+    typer.echo(
+        f"{out}: {found.frames} frames{lost}, {found.seconds:g} s of the skin in {took:.1f} s"
+    )
+
+
+def _labelled(
+    skin: Skin,
+    script: Path | None,
+    out: Path,
+    n: int,
+    seed: int,
+    workers: Workers,
+    *,
+    json: bool,
+) -> None:
+    from tomoskin.live import make_set
+    from tomoskin.twin import COMMON_PRESSES, Population, SetPlan
+
+    population = COMMON_PRESSES
+    if script is not None:
+        population = Population.from_toml(_text(script), source=str(script))
+    preset = population.preset or skin.twin.preset
+    plan = SetPlan(skin.to_toml(), population, preset, seed, n)
+    begun = time.monotonic()
+    try:
+        with Bar("drawing presses") as bar:
+            found = make_set(plan, out, workers, bar)
+    except KeyboardInterrupt:
+        typer.echo(
+            "tomoskin: stopped; the same command goes on where this one was stopped", err=True
+        )
+        raise typer.Exit(1) from None
+    took = time.monotonic() - begun
+    if json:
+        files = [str(file) for file in found.files]
+        emit({"frames": n, "made": found.made, "found": found.found, "files": files})
+        return
+    before = f"; {found.found} of {plan.n_shards} parts were there already" if found.found else ""
+    typer.echo(f"{out}: {n} labelled frames in {took:.1f} s{before}")
+
+
+def _workers(processes: int | None, cluster: str | None) -> Workers:
+    from tomoskin.live import in_processes, in_this_process, on_cluster, processors
+
+    if cluster is not None:
+        if processes is not None:
+            raise typer.BadParameter("goes without --cluster", param_hint="--processes")
+        return on_cluster(cluster)
+    n = processes or processors()
+    return in_this_process if n == 1 else in_processes(n)
+
+
+def _text(path: Path) -> str:
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise DataError("is too large for a script (over 10 MB)", where=str(path))
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise DataError(f"is not text (byte {error.start} is not UTF-8)", where=str(path)) from None
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror}", where=str(path)) from None

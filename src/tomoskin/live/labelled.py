@@ -1,0 +1,151 @@
+"""Labelled frames by the thousand: shards made by many processes or machines, then written."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from tomoskin.core import DataError, SourceError
+from tomoskin.session import is_done, join_shards, shard_path, write_whole
+from tomoskin.twin import SetPlan, make_shard
+
+Made = Iterator[tuple[int, dict[str, Any]]]
+"""Shards with their numbers, in whatever order they are finished."""
+
+Workers = Callable[[SetPlan, Sequence[int]], Made]
+"""What makes shards of a plan."""
+
+
+@dataclass(frozen=True)
+class SetMade:
+    """What became of a set: shards that were there already, and made now; the files."""
+
+    found: int
+    made: int
+    files: tuple[Path, ...]
+
+
+def make_set(
+    plan: SetPlan, out: Path, workers: Workers, advance: Callable[[int, int], None]
+) -> SetMade:
+    """Make the shards of ``plan`` that are missing, and write them.
+
+    Parameters
+    ----------
+    out
+        A folder of shards; or a name that ends in .npz for one file: its shards then stand in a
+        folder beside it until all are there.
+    advance
+        Called with the frames that are done and all of them.
+
+    Raises
+    ------
+    DataError
+        When a file cannot be written, or the folder holds frames of another set.
+    ScriptError
+        When there is no room on the skin for what is to be drawn.
+    """
+    single = out.suffix == ".npz"
+    if single and out.exists():
+        raise DataError("exists already", where=str(out), hint="choose another name")
+    folder = out.with_name(f"{out.name}.parts") if single else out
+    paths = [shard_path(folder, shard) for shard in range(plan.n_shards)]
+    missing = [s for s, path in enumerate(paths) if not is_done(path, shard_identity(plan, s))]
+    done = plan.n_frames - sum(map(plan.size, missing))
+    advance(done, plan.n_frames)
+    for shard, arrays in workers(plan, missing):
+        write_whole(paths[shard], arrays)
+        done += plan.size(shard)
+        advance(done, plan.n_frames)
+    if single:
+        join_shards(paths, out)
+        for path in paths:
+            path.unlink()
+        folder.rmdir()
+    files = (out,) if single else tuple(paths)
+    return SetMade(plan.n_shards - len(missing), len(missing), files)
+
+
+def shard_identity(plan: SetPlan, shard: int) -> str:
+    """What a shard's file says of itself."""
+    return f"{plan.identity} {shard} {plan.size(shard)}"
+
+
+def in_this_process(plan: SetPlan, shards: Sequence[int]) -> Made:
+    """One shard after the other."""
+    for shard in shards:
+        yield shard, _made(plan, shard)
+
+
+def in_processes(n: int) -> Workers:
+    """Workers that are ``n`` processes of this machine."""
+
+    def run(plan: SetPlan, shards: Sequence[int]) -> Made:
+        count = min(n, len(shards) or 1)
+        with ProcessPoolExecutor(count, get_context("spawn"), _leave_signals_alone) as pool:
+            futures = {pool.submit(_made, plan, shard): shard for shard in shards}
+            with _cancelled(list(futures)):
+                for future in as_completed(futures):
+                    yield futures[future], future.result()
+
+    return run
+
+
+def on_cluster(address: str) -> Workers:
+    """Workers of a Dask cluster whose scheduler is at ``address``; they need tomoskin too."""
+
+    def run(plan: SetPlan, shards: Sequence[int]) -> Made:
+        try:
+            from dask import distributed  # type: ignore[import-not-found] # noqa: PLC0415
+        except ImportError as error:
+            raise SourceError(
+                "needs Dask's distributed", where=address, hint="pip install 'tomoskin[cluster]'"
+            ) from error
+        try:
+            client = distributed.Client(address, timeout=10)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise SourceError(f"no scheduler answers: {error}", where=address) from error
+        with client:
+            futures = client.map(_made, [plan] * len(shards), list(shards), pure=False)
+            number = dict(zip((future.key for future in futures), shards, strict=True))
+            for future, arrays in distributed.as_completed(futures, with_results=True):
+                yield number[future.key], arrays
+
+    return run
+
+
+def processors() -> int:
+    """Processors that this process may use."""
+    with contextlib.suppress(AttributeError):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _made(plan: SetPlan, shard: int) -> dict[str, Any]:
+    """One thread a process: a frame's products are small, and sums keep their order."""
+    with threadpool_limits(1):
+        return make_shard(plan, shard)
+
+
+def _leave_signals_alone() -> None:
+    """Ctrl-C reaches every process of a terminal; the first one ends the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextlib.contextmanager
+def _cancelled(futures: list[Future[dict[str, Any]]]) -> Iterator[None]:
+    """Shards that nobody waits for any more are not begun."""
+    try:
+        yield
+    finally:
+        for future in futures:
+            future.cancel()

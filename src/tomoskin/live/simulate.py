@@ -1,0 +1,190 @@
+"""A script run on a twin, faster than real time, into a session file with the truth inside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from threadpoolctl import threadpool_limits
+
+from tomoskin.core import Event, Frame
+from tomoskin.pattern import Scan
+from tomoskin.session import SessionWriter
+from tomoskin.skin import Skin
+from tomoskin.source import Configuration, Link, ScanSettings, Transport
+from tomoskin.twin import (
+    Contact,
+    Disturbance,
+    Line,
+    LineSettings,
+    Probe,
+    Script,
+    TwinSettings,
+    TwinTransport,
+    VirtualClock,
+    check_script,
+    disturbed,
+    make_twin,
+    pressed,
+    reboots,
+)
+
+_EMPTY_READ = 0.5
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What a script has left: frames in the file, frames lost on the line, seconds of the skin."""
+
+    frames: int
+    lost: int
+    seconds: float
+
+
+def simulate(
+    script: Script,
+    skin: Skin,
+    out: Path,
+    *,
+    seed: int | None = None,
+    advance: Callable[[float, float], None],
+) -> Simulated:
+    """Run ``script`` on the twin of ``skin`` into the new session file ``out``.
+
+    The same script, skin and seed give the same bytes. Whatever ends it, the file is readable up
+    to there.
+
+    Parameters
+    ----------
+    seed
+        Instead of the script's own.
+    advance
+        Called with the seconds that have gone by on the skin, and all of them.
+
+    Raises
+    ------
+    ScriptError
+        When the script cannot be run on this skin; then no file is made.
+    DataError
+        When the file exists already or cannot be written.
+    SourceError
+        When the board cannot be brought to scan any more, for all the script's faults.
+    """
+    check_script(script, skin)
+    chosen = script.seed if seed is None else seed
+    settings = TwinSettings.preset(script.preset or skin.twin.preset, chosen)
+    with threadpool_limits(1), SessionWriter(out, skin) as writer:
+        return _Run(script, skin, settings, writer).to_the_end(advance)
+
+
+class _Recorded:
+    """A transport whose bytes go over the script's line, and into the file as they arrive."""
+
+    def __init__(self, twin: TwinTransport, seed: int, clock: VirtualClock, writer: SessionWriter):
+        self.name = twin.name
+        self.line = Line(LineSettings(), seed)
+        self._twin, self._clock, self._writer = twin, clock, writer
+
+    def read(self, timeout: float) -> bytes:
+        """What arrives of the twin's next bytes."""
+        data = self.line.carry(self._twin.read(timeout))
+        if data:
+            self._writer.raw(self._clock.now(), data)
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send ``data`` to the twin."""
+        self._twin.write(data)
+
+    def close(self) -> None:
+        """Switch the twin off."""
+        self._twin.close()
+
+
+class _Run:
+    """One run of a script: a clock, a twin, and the conversation with it."""
+
+    def __init__(
+        self, script: Script, skin: Skin, settings: TwinSettings, writer: SessionWriter
+    ) -> None:
+        self._script, self._settings, self._writer = script, settings, writer
+        self._clock = VirtualClock()
+        self._twin = make_twin(skin, settings, self._clock)
+        self._wire = _Recorded(self._twin, settings.seed, self._clock, writer)
+        self._scan, self._asked = Scan.of(skin.pattern()), ScanSettings.of(skin)
+        self._frame_time = Configuration.of(self._scan, self._asked).scan_time
+        contact = settings.contact
+        self._friction = {"slide": contact.friction, "roll": contact.rolling_friction}
+        self._presses: tuple[Contact, ...] = ()
+        self._disturbance = Disturbance()
+        self._marks = sorted(script.marks, key=lambda mark: mark.at)
+        self._frames = 0
+
+    def to_the_end(self, advance: Callable[[float, float], None]) -> Simulated:
+        """Connect, idle for the lead-in, then follow the script."""
+        script, clock = self._script, self._clock
+        transport: Transport = self._wire
+        with Link(transport, self._scan, self._asked, clock=clock.now) as link:
+            self._writer.device(clock.now(), link.connect())
+            self._writer.settings(clock.now(), _described(script, self._settings))
+            self._writer.truth(clock.now(), ())
+            begin, last = clock.now() + script.lead_in, -script.lead_in
+            while (time := clock.now() - begin) < script.duration:
+                self._set(begin, last, time)
+                self._take(link)
+                advance(time + script.lead_in, script.duration + script.lead_in)
+                last = time
+            return Simulated(self._frames, link.frames.lost, script.duration + script.lead_in)
+
+    def _set(self, begin: float, last: float, time: float) -> None:
+        """Bring about what the script says of ``time``, for the scan that begins now.
+
+        It is noted at the middle of the scan: the frame before has the same time as its start.
+        """
+        middle = begin + time + self._frame_time / 2
+        presses = pressed(self._script.presses, time, self._friction)
+        if presses != self._presses:
+            self._presses = presses
+            self._twin.set_presses(presses)
+            self._writer.truth(middle, [_described_probe(probe) for probe in presses])
+        self._disturb(disturbed(self._script.faults, time))
+        if reboots(self._script.faults, last, time):
+            self._twin.reboot()
+        while self._marks and begin + self._marks[0].at < middle:
+            self._writer.note(middle, self._marks.pop(0).text)
+
+    def _disturb(self, now: Disturbance) -> None:
+        before, self._disturbance = self._disturbance, now
+        if now == before:
+            return
+        self._twin.set_faults(now.faults)
+        self._twin.sheet.warm(now.warmer - before.warmer)
+        self._wire.line.settings = now.line
+        own = self._settings.electronics
+        noise = own.noise if now.noise is None else now.noise
+        self._twin.electronics.settings = replace(own, noise=noise)
+
+    def _take(self, link: Link) -> None:
+        for item in link.poll(_EMPTY_READ):
+            if isinstance(item, Frame):
+                self._writer.frame(item)
+                self._frames += 1
+            elif isinstance(item, Event):
+                self._writer.event(item)
+
+
+def _described(script: Script, settings: TwinSettings) -> dict[str, object]:
+    return {"command": "simulate", "script": script.name, "twin": asdict(settings)}
+
+
+def _described_probe(probe: Probe) -> dict[str, object]:
+    """A press as the file tells it: by the circle with the area of its face, and as it is."""
+    return {
+        "x": probe.x,
+        "y": probe.y,
+        "force": probe.force,
+        "radius": probe.radius,
+        "angle": probe.angle,
+        "shape": type(probe.shape).__name__.lower(),
+    }

@@ -1,0 +1,150 @@
+"""What labelled frames are drawn from: numbers, places, sizes and forces of presses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import FloatArray, ScriptError
+from tomoskin.mesh import Outline
+from tomoskin.skin import read_section
+from tomoskin.twin.probe import Probe
+from tomoskin.twin.script import of_script, tables_of
+from tomoskin.twin.script_schema import PRESSES
+from tomoskin.twin.shape import Circle, Finger, Shape, Square
+
+_STEP = 0.5e-3
+"""Half extents are rounded to this, m: the dent of a face is solved once and used again."""
+
+_TRIES = 2000
+"""Places drawn for one probe before there is taken to be no room for it."""
+
+
+@dataclass(frozen=True)
+class Population:
+    """Ranges that presses are drawn from, evenly and independently.
+
+    Attributes
+    ----------
+    count
+        Least and most presses at once.
+    shapes
+        Faces, one as likely as another; their angles are drawn too.
+    size, force
+        Least and greatest half extent, m, and force, N.
+    hold
+        s for which they have pressed.
+    margin, apart
+        Distance of a probe's middle from the rim and from others, at least, m.
+    preset
+        Name of the twin's settings; None for the skin's own.
+    """
+
+    count: tuple[int, int]
+    shapes: tuple[str, ...]
+    size: tuple[float, float]
+    force: tuple[float, float]
+    hold: float
+    margin: float
+    apart: float
+    preset: str | None = None
+
+    @classmethod
+    def from_toml(cls, text: str, *, source: str = "script") -> Self:
+        """Population of a script's section ``[presses]``.
+
+        Raises
+        ------
+        ScriptError
+            For an unknown or missing key, or a value that cannot be meant.
+        """
+        with of_script():
+            tables = tables_of(text, source)
+            others = [name for name in tables if name != PRESSES.name]
+            if others or PRESSES.name not in tables:
+                raise ScriptError(
+                    "expected the section [presses] alone",
+                    where=f"{source}: [{others[0]}]" if others else source,
+                    hint="labelled frames have no timeline: leave --presses out to run one",
+                )
+            return cls.of(tables[PRESSES.name], f"{source}: [{PRESSES.name}]")
+
+    @classmethod
+    def of(cls, given: object, where: str) -> Self:
+        """Population of the section's keys as written."""
+        with of_script():
+            return cls(**read_section(PRESSES, given, where))
+
+    def draw(self, outline: Outline, random: np.random.Generator) -> tuple[Probe, ...]:
+        """Presses of one frame on a sheet of that ``outline``.
+
+        Raises
+        ------
+        ScriptError
+            When there is no room for as many, so far from each other and the rim.
+        """
+        number = int(random.integers(self.count[0], self.count[1] + 1))
+        places = np.empty((0, 2))
+        for _ in range(number):
+            places = np.vstack([places, self._place(outline, places, random)])
+        return tuple(self._probe(place, random) for place in places)
+
+    def _place(
+        self, outline: Outline, others: FloatArray, random: np.random.Generator
+    ) -> FloatArray:
+        corners = outline.polyline(outline.length / 64)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        for _ in range(_TRIES):
+            place = np.asarray(random.uniform(low, high))
+            if self._has_room(outline, place, others):
+                return place
+        raise ScriptError(
+            f"found no place {1e3 * self.margin:g} mm from the rim and {1e3 * self.apart:g} mm "
+            f"from {len(others)} other probes",
+            where="[presses] margin, apart",
+            hint="ask for fewer, or let them be closer",
+        )
+
+    def _has_room(self, outline: Outline, place: FloatArray, others: FloatArray) -> bool:
+        if len(others) and np.hypot(*(others - place).T).min() < self.apart:
+            return False
+        if not outline.contains(place[None])[0]:
+            return False
+        rim = outline.point(outline.nearest(place[None]))[0]
+        return bool(np.hypot(*(rim - place)) >= self.margin)
+
+    def _probe(self, place: FloatArray, random: np.random.Generator) -> Probe:
+        shape = self.shapes[random.integers(len(self.shapes))]
+        size = _STEP * round(random.uniform(*self.size) / _STEP)
+        force, angle = random.uniform(*self.force), random.uniform(0, 2 * np.pi)
+        face = _FACES[shape](max(size, _STEP))
+        return Probe(face, float(place[0]), float(place[1]), float(force), float(angle))
+
+
+def _finger(half_length: float) -> Finger:
+    """A fingertip in proportion."""
+    usual = Finger()
+    scale = 2 * half_length / usual.length
+    return Finger(*(scale * v for v in (usual.length, usual.width, usual.along, usual.across)))
+
+
+_FACES: dict[str, Callable[[float], Shape]] = {
+    "circle": Circle,
+    "square": lambda half: Square(2 * half),
+    "finger": _finger,
+}
+"""Faces by their name and half of their extent along x, m."""
+
+COMMON_PRESSES = Population(
+    count=(1, 1),
+    shapes=("circle",),
+    size=(8e-3, 20e-3),
+    force=(1.0, 8.0),
+    hold=1.0,
+    margin=5e-3,
+    apart=40e-3,
+)
+"""What is drawn from where nothing is said: one round probe of a finger's to a palm's size."""

@@ -1,0 +1,82 @@
+"""Whether a script can be run on a skin, said before it begins."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+from tomoskin.core import ScriptError
+from tomoskin.pattern import Scan
+from tomoskin.skin import Skin
+from tomoskin.source import Configuration, ScanSettings
+from tomoskin.twin.script import Script
+from tomoskin.twin.timeline import ScriptedPress, check_stages
+
+_ROUNDING = 1e-9
+"""Times that differ by less, s, are the same."""
+
+
+def check_script(script: Script, skin: Skin) -> None:
+    """Raise ScriptError for a script that cannot be run on ``skin``.
+
+    Two presses of one id at once, something after the end, a probe off the skin, an electrode that
+    is not there, a stage that no frame would show.
+    """
+    _check_ids(script.presses)
+    _check_ends(script)
+    scan = Configuration.of(Scan.of(skin.pattern()), ScanSettings.of(skin))
+    if script.duration < scan.scan_time:
+        raise ScriptError(
+            f"expected at least one frame of this skin, {1e3 * scan.scan_time:.3g} ms, "
+            f"got {1e3 * script.duration:g} ms",
+            where=f"{script.source}: [script] duration",
+        )
+    check_stages(script.presses, scan.scan_time)
+    _check_faults(script, skin, scan.scan_time)
+    for press in script.presses:
+        press.check_on(skin.outline)
+
+
+def _check_faults(script: Script, skin: Skin, frame_time: float) -> None:
+    for fault in script.faults:
+        if 0 < fault.end - fault.start < frame_time:
+            raise ScriptError(
+                f"it lasts {1e3 * (fault.end - fault.start):g} ms, shorter than a frame of this "
+                f"skin, {1e3 * frame_time:.3g} ms",
+                where=f"{fault.where} end",
+            )
+        for key, electrode in (("electrode", fault.electrode), ("other", fault.other)):
+            if electrode >= skin.n_electrodes:
+                raise ScriptError(
+                    f"expected an electrode from 0 to {skin.n_electrodes - 1}, got {electrode}",
+                    where=f"{fault.where} {key}",
+                )
+
+
+def _check_ids(presses: tuple[ScriptedPress, ...]) -> None:
+    for first, second in combinations(presses, 2):
+        together = min(first.end, second.end) > max(first.start, second.start) + _ROUNDING
+        if first.id == second.id and together:
+            raise ScriptError(
+                f'"{first.id}" already presses from {first.start:g} s to {first.end:g} s',
+                where=f"{second.where} id",
+                hint="two presses at once need different ids",
+            )
+
+
+def _check_ends(script: Script) -> None:
+    for press in script.presses:
+        if press.end > script.duration + _ROUNDING:
+            raise ScriptError(
+                f"lasts until {press.end:g} s, the script until {script.duration:g} s",
+                where=f"{press.where} {press.force_key}",
+                hint="raise [script] duration",
+            )
+    last = [(f.end, f"{f.where} {'end' if f.end > f.start else 'start'}") for f in script.faults]
+    last += [(mark.at, f"{mark.where} at") for mark in script.marks]
+    for time, where in last:
+        if time > script.duration + _ROUNDING:
+            raise ScriptError(
+                f"expected at most {script.duration:g} s, got {time:g} s",
+                where=where,
+                hint="raise [script] duration",
+            )
