@@ -1,10 +1,12 @@
 """Recordings: sessions, interchange, import; pictures and files of their images."""
 
 from tomoskin.session.alpha_picture import write_choices
+from tomoskin.session.display import Display, circular_average
 from tomoskin.session.interchange import write_interchange
 from tomoskin.session.labelled_set import is_done, join_shards, shard_path, write_whole
 from tomoskin.session.layout import Mark, MarkedFrame
-from tomoskin.session.picture import MOST_PANELS, Panel, write_picture
+from tomoskin.session.merit_picture import write_merit, write_merit_table
+from tomoskin.session.picture import MOST_PANELS, Panel, plot, write_picture
 from tomoskin.session.reader import read_recording
 from tomoskin.session.recorder import Recorder
 from tomoskin.session.recording import Recording
@@ -20,6 +22,7 @@ from tomoskin.session.writer import SessionWriter
 
 __all__ = [
     "MOST_PANELS",
+    "Display",
     "Mark",
     "MarkedFrame",
     "Panel",
@@ -29,13 +32,17 @@ __all__ = [
     "SessionReader",
     "SessionWriter",
     "Truth",
+    "circular_average",
     "is_done",
     "join_shards",
+    "plot",
     "read_recording",
     "read_session",
     "shard_path",
     "write_choices",
     "write_interchange",
+    "write_merit",
+    "write_merit_table",
     "write_picture",
     "write_touches",
     "write_vtu",

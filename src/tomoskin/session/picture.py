@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tomoskin.core import FloatArray, Touch
+from tomoskin.core import DataError, FloatArray, Image, Touch
 from tomoskin.mesh import Mesh
+from tomoskin.session.display import Display
 from tomoskin.session.figure import new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MOST_PANELS = 16
 _COLOURS = "RdBu"
@@ -30,25 +32,75 @@ class Panel:
     touches: tuple[Touch, ...]
 
 
-def write_picture(path: Path, mesh: Mesh, panels: Sequence[Panel], unit: str) -> None:
+def write_picture(
+    path: Path, mesh: Mesh, panels: Sequence[Panel], unit: str, limit: float | None = None
+) -> None:
     """Draw at most ``MOST_PANELS`` panels on one symmetric colour scale, and save them.
+
+    Parameters
+    ----------
+    unit
+        Of the values; "relative" is drawn in per cent.
+    limit
+        End of the colour scale, in that unit; without it, the greatest value.
 
     Raises
     ------
     DataError
-        When matplotlib is not installed or the file cannot be written.
+        When matplotlib is not installed, the file cannot be written, or the mesh is a volume.
     """
+    save_figure(path, _figure(path, mesh, panels, unit, limit))
+
+
+def plot(
+    image: Image,
+    mesh: Mesh,
+    *,
+    touches: Sequence[Touch] = (),
+    title: str = "",
+    display: Display | None = None,
+) -> Figure:
+    """Draw ``image`` on its ``mesh`` as a matplotlib figure, which a notebook shows by itself.
+
+    Raises
+    ------
+    DataError
+        When matplotlib is not installed, the image is of another mesh, or the mesh is a volume.
+    """
+    how = Display() if display is None else display
+    seen = how.shown(image, mesh)
+    panel = Panel(title, seen.values, tuple(touches))
+    return _figure(Path("plot"), mesh, [panel], seen.unit, how.limit)
+
+
+def _figure(
+    path: Path, mesh: Mesh, panels: Sequence[Panel], unit: str, limit: float | None
+) -> Figure:
+    if mesh.dimension != 2:
+        raise DataError(
+            "a volume cannot be drawn as a sheet",
+            where=str(path),
+            hint="take a slice with mesh.pixels(z=…), or write a .vtu file",
+        )
     columns = min(len(panels), 4)
     rows = -(-len(panels) // columns)
     figure = new_figure(path, 3.2 * columns + 1.1, 3.3 * rows)
-    limit = max(float(np.abs(p.values).max()) for p in panels) or 1.0
+    factor, label = (100.0, "%") if unit == "relative" else (1.0, unit)
+    greatest = max(float(np.abs(p.values).max()) for p in panels)
+    end = factor * (limit or greatest or 1.0)
     axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
     for ax, panel in zip(axes, panels, strict=False):
-        drawn = _draw(ax, mesh, panel, limit)
+        drawn = _draw(ax, mesh, replace(panel, values=factor * panel.values), end)
     for ax in axes[len(panels) :]:
         ax.set_visible(False)
-    figure.colorbar(drawn, ax=list(axes), label=f"change of conductivity ({unit})", shrink=0.8)
-    save_figure(path, figure)
+    figure.colorbar(
+        drawn,
+        ax=list(axes),
+        label=f"change of conductivity ({label})",
+        shrink=0.8,
+        extend="both" if factor * greatest > end * (1 + 1e-9) else "neither",
+    )
+    return figure
 
 
 def _draw(ax: Axes, mesh: Mesh, panel: Panel, limit: float) -> Any:
