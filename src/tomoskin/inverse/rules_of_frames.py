@@ -14,7 +14,8 @@ from tomoskin.inverse.spectrum import Spectrum
 def l_curve(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
     """Corner of (log residual, log seminorm): the point of largest curvature (Hansen 1992).
 
-    Needs frames; their squares are added up. Raises ModelError when there is no corner.
+    Needs frames; their squares are added up. For very smooth images it trusts the data too much
+    (Hanke 1996). Raises ModelError when there is no corner.
     """
     frames = evidence.touched(len(spectrum.values))
     alphas = spectrum.alphas
