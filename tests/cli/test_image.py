@@ -16,6 +16,7 @@ import pytest
 from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel
 from tomoskin.mesh import triangulate
+from tomoskin.session import circular_average
 from tomoskin.skin import Skin
 
 PLACE = (0.03, 0.04)
@@ -118,6 +119,21 @@ def test_every_kind_of_output(save, image, tmp_path) -> None:
     assert len(grid.findall(".//CellData/DataArray")) == 4
 
 
+def test_per_cent_and_averaged_for_the_eye_alone(save, image, tmp_path) -> None:
+    """The files show what the options say; the touches stay as they are."""
+    plain, shown = tmp_path / "plain.npz", tmp_path / "shown.npz"
+    tables = [tmp_path / "one.csv", tmp_path / "two.csv"]
+    assert image(save(), "--out", plain, "--touches", tables[0])[0] == 0
+    options = ("--percent", "--smooth", "8 mm", "--limit", "5")
+    assert image(save(), "--out", shown, "--touches", tables[1], *options)[0] == 0
+    before, after = (np.load(path) for path in (plain, shown))
+    assert (str(before["unit"]), str(after["unit"])) == ("S", "relative")
+    average = circular_average(SKIN.mesh(), 0.008) / SKIN.conductivity
+    assert after["images"] == pytest.approx(before["images"] @ average.T)
+    assert tables[0].read_text() == tables[1].read_text()
+    assert image(save(), "--out", tmp_path / "shown.png", *options)[0] == 0
+
+
 def test_json_says_the_same(save, image) -> None:
     code, out, _ = image(save(), "--json")
     found = json.loads(out)
@@ -141,6 +157,8 @@ def test_a_frame_that_is_not_finite_is_left_out_and_named(save, image, tmp_path,
     ("arguments", "said"),
     [
         (("--reference", "first:9"), "first:1 to first:4"),
+        (("--limit", "0"), "expected a limit above 0"),
+        (("--smooth", "90 mm", "--out", "maps.png"), "radius above 0 and up to 50 mm"),
         (("--reference", "frame:4"), "0 to 3"),
         (("--reference", "banana"), "expected first:N, frame:K or a file"),
         (("--frames", "3:9"), "within 0:4"),
@@ -176,5 +194,6 @@ def test_voltages_of_something_else(save, image, frames, change, said) -> None:
 
 def test_wrong_usage(save, image) -> None:
     assert image(save(), "--out", "maps.gif")[0] == 2
+    assert image(save(), "--smooth", "8")[0] == 2
     assert image(save(), "--frames", "3")[0] == 2
     assert image()[0] == 2

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.alpha_option import AlphaOption, said, with_alpha
+from tomoskin.cli.display_option import LimitOption, PercentFlag, SmoothOption, display_of
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.recording import FramesOption, ReferenceOption, frame_range, idle_frames
 
@@ -29,6 +30,9 @@ def image(
     touches: Annotated[
         Path | None, typer.Option(metavar="X.csv", help="Where the touches go.")
     ] = None,
+    percent: PercentFlag = False,
+    limit: LimitOption = None,
+    smooth: SmoothOption = None,
     json: JsonFlag = False,
 ) -> None:
     """Reconstruct a recording: images, and the touches in them."""
@@ -38,6 +42,7 @@ def image(
 
     write = _writer(out)
     chosen, rule = with_alpha(Skin.load(skin), alpha)
+    display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
     prepared = prepare(chosen)
     whole = read_recording(recording).in_order_of(prepared.pattern)
     idle = idle_frames(whole, reference, prepared.pattern)
@@ -47,7 +52,7 @@ def image(
     if touches is not None:
         _write_touches(touches, whole, found)
     if out is not None:
-        write(out, prepared, found)
+        write(out, prepared, found, display)
     _report(recording, found, json=json)
 
 

@@ -8,29 +8,36 @@ import numpy as np
 
 from tomoskin.core import DataError
 from tomoskin.live import Prepared, Reconstruction
-from tomoskin.session import MOST_PANELS, Panel, write_picture, write_vtu
+from tomoskin.session import MOST_PANELS, Display, Panel, write_picture, write_vtu
 
 _MOST_FIELDS = 200
 
 
-def png(path: Path, prepared: Prepared, found: Reconstruction) -> None:
+def png(path: Path, prepared: Prepared, found: Reconstruction, display: Display) -> None:
     """Draw all frames, or as many as fit, evenly spread over the recording."""
     n = len(found.frames)
     chosen = np.unique(np.linspace(0, n - 1, min(n, MOST_PANELS)).round().astype(int))
-    panels = [Panel(f"frame {found.frames[i]}", found.images[i], found.touches[i]) for i in chosen]
-    write_picture(path, prepared.mesh, panels, found.unit)
+    images, unit = display.applied(found.images[chosen], prepared.mesh, found.unit)
+    panels = [
+        Panel(f"frame {found.frames[i]}", image, found.touches[i])
+        for i, image in zip(chosen, images, strict=True)
+    ]
+    write_picture(path, prepared.mesh, panels, unit, display.limit)
 
 
-def npz(path: Path, prepared: Prepared, found: Reconstruction) -> None:
+def npz(path: Path, prepared: Prepared, found: Reconstruction, display: Display) -> None:
     """Write images (n_frames, n_cells) with their mesh."""
+    images, unit = display.applied(found.images, prepared.mesh, found.unit)
     try:
         with path.open("wb") as file:
             np.savez_compressed(
                 file,
                 allow_pickle=False,
-                images=found.images,
+                images=images,
                 frames=found.frames,
-                unit=np.array(found.unit),
+                unit=np.array(unit),
+                smoothing_m=np.array(display.smoothing),
+                mesh_id=np.array(prepared.mesh.identity),
                 points=prepared.mesh.points,
                 cells=prepared.mesh.cells,
             )
@@ -38,7 +45,7 @@ def npz(path: Path, prepared: Prepared, found: Reconstruction) -> None:
         raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
 
 
-def vtu(path: Path, prepared: Prepared, found: Reconstruction) -> None:
+def vtu(path: Path, prepared: Prepared, found: Reconstruction, display: Display) -> None:
     """Write one cell field a frame."""
     if len(found.frames) > _MOST_FIELDS:
         raise DataError(
@@ -46,8 +53,9 @@ def vtu(path: Path, prepared: Prepared, found: Reconstruction) -> None:
             where=str(path),
             hint="choose some with --frames A:B",
         )
+    images, _ = display.applied(found.images, prepared.mesh, found.unit)
     names = [f"frame_{frame:06d}" for frame in found.frames.tolist()]
-    write_vtu(path, prepared.mesh, dict(zip(names, found.images, strict=True)))
+    write_vtu(path, prepared.mesh, dict(zip(names, images, strict=True)))
 
 
 WRITERS = {".png": png, ".npz": npz, ".vtu": vtu}
