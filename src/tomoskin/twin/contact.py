@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.fft import irfft2, rfft2
 
 from tomoskin.core import FloatArray, GeometryError, IntArray, ModelError
@@ -26,9 +27,12 @@ class ContactSettings:
 
     foundation: str = parameter("winkler", "", "Model of the body under the sheet.", "")
     modulus: float = parameter(
-        30e3, "Pa", "Modulus of that body in compression.", "soft polyurethane foam, assumed"
+        5e3, "Pa", "Modulus of that body in compression.", "soft polyurethane foam, assumed"
     )
-    thickness: float = parameter(10e-3, "m", "Its thickness.", "assumed")
+    thickness: float = parameter(3e-3, "m", "Its thickness.", "thin foam, assumed")
+    lock: float = parameter(
+        0.4, "", "Compression at which it is squeezed solid (inf: never).", "assumed"
+    )
     poisson: float = parameter(0.0, "", "Its Poisson ratio.", "open foam: about 0, assumed")
     tension: float = parameter(60.0, "N/m", "Tension of the sheet.", "assumed")
     stiffness: float = parameter(
@@ -50,6 +54,8 @@ class ContactSettings:
             above="modulus thickness",
             least="poisson tension stiffness sheet_poisson bulge friction rolling_friction",
         )
+        if not self.lock > 0:
+            raise ModelError(f"expected lock above 0, got {self.lock}", where="ContactSettings")
         if self.foundation == "half-space" and self.tension > 0:
             raise ModelError(
                 f"expected no tension over a half-space, got {self.tension} N/m",
@@ -65,6 +71,14 @@ class ContactSettings:
     def shear_spring(self) -> float:
         """Stiffness per area against shifting the sheet along the body, Pa/m."""
         return self.modulus / (2 * (1 + self.poisson)) / self.thickness
+
+    def locked(self, travel: float) -> float:
+        """Part that is left of a ``travel`` m which a linear body would give way by.
+
+        1/(1 + travel/limit), with the limit at the compression of ``lock``: linear at small
+        forces, and never beyond the limit (foams densify: Gibson & Ashby 1997, chapter 5).
+        """
+        return 1.0 / (1.0 + travel / (self.lock * self.thickness))
 
     @property
     def reach(self) -> float:
@@ -90,7 +104,7 @@ class Grid:
         """(n, 1) and (1, n//2 + 1) rad/m, those of a real transform."""
         qx = 2 * np.pi * np.fft.fftfreq(self.n, self.step)
         qy = 2 * np.pi * np.fft.rfftfreq(self.n, self.step)
-        return qx[:, None], qy[None, :]
+        return np.asarray(qx[:, None]), np.asarray(qy[None, :])
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +137,7 @@ class Dented:
 def local_points(probe: Probe, points: FloatArray) -> FloatArray:
     """``points`` (n, 2) in the coordinates of the probe's shape."""
     c, s = math.cos(probe.angle), math.sin(probe.angle)
-    return (points - (probe.x, probe.y)) @ np.array([[c, -s], [s, c]])
+    return np.asarray((points - (probe.x, probe.y)) @ np.array([[c, -s], [s, c]]))
 
 
 def solve_contact(probes: Sequence[Probe], settings: ContactSettings, grid: Grid) -> Dented:
@@ -212,7 +226,7 @@ def _balance(problem: _Problem) -> FloatArray:
     )
 
 
-def _means(values: FloatArray, owner: IntArray, touching: FloatArray, n: int) -> FloatArray:
+def _means(values: FloatArray, owner: IntArray, touching: NDArray[np.bool_], n: int) -> FloatArray:
     """(n,) mean over the nodes of each face that touch."""
     count = np.bincount(owner, touching, n)
     return np.asarray(np.bincount(owner, values * touching, n) / np.maximum(count, 1.0))
@@ -261,4 +275,4 @@ def _boussinesq(settings: ContactSettings, grid: Grid) -> FloatArray:
             a, b = x + sx * half, y + sy * half
             # a·asinh(b/|a|) + b·asinh(a/|b|) is the potential of a quarter plane's corner
             total += sx * sy * (a * np.arcsinh(b / np.abs(a)) + b * np.arcsinh(a / np.abs(b)))
-    return total * (1 - settings.poisson**2) / (np.pi * settings.modulus)
+    return np.asarray(total * (1 - settings.poisson**2) / (np.pi * settings.modulus))

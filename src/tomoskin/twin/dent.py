@@ -18,12 +18,16 @@ from tomoskin.twin.shape import Shape
 from tomoskin.twin.strain import bulge_strain, drag_strain, slope_strain
 
 _NODES = 128
+_ROUND = ((0, 0), (_NODES // 2, _NODES // 2), (_NODES // 2, _NODES // 2))
 _LEAST_FORCE = 1e-3
 _LADDER = math.sqrt(2.0)
 """Dents of a curved face are solved at forces that differ by this factor, and blended."""
 
 _REACHES = 6.0
 """A dent is followed this many reaches beyond the face: a part of e⁻⁶ is left out."""
+
+_SHIFTS = 4.0
+"""And the strain along the sheet so many times √(stiffness / shear spring), where it fades out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +61,8 @@ class Dent:
         Around the shape's origin, along its axes.
     force
         N at which it was solved.
+    travel
+        Of the probe, on a body that does not lock, m.
     table
         (n·n, 13): depth; strain xx, yy, xy by bulging; by the slope; by a drag of as many
         newtons as ``force`` along x; and along y.
@@ -64,6 +70,7 @@ class Dent:
 
     grid: Grid
     force: float
+    travel: float
     table: FloatArray
 
 
@@ -74,23 +81,26 @@ def solved_dent(shape: Shape, settings: ContactSettings, force: float, blur: flo
     Even out by the size of the cells that it will be read at: the read values then hold what lies
     between them.
     """
-    reach = max(settings.reach, math.sqrt(settings.stiffness / settings.shear_spring), 2 * blur)
-    grid = Grid(_NODES, 2 * (shape.extent + _REACHES * reach) / _NODES)
+    shift = math.sqrt(settings.stiffness / settings.shear_spring)
+    margin = max(_REACHES * settings.reach, _SHIFTS * shift, 4 * blur, 0.25 * shape.extent)
+    grid = Grid(_NODES, 2 * (shape.extent + margin) / _NODES)
     probe = Probe(shape, 0.0, 0.0, force)
     dented = solve_contact([probe], settings, grid)
-    pressed, still = dented.pressure, np.zeros_like(dented.pressure)
+    wide = Grid(2 * _NODES, grid.step)
+    depth, pressed = np.pad(np.stack([dented.depth, dented.pressure]), _ROUND)
+    still = np.zeros_like(pressed)
     fields = np.concatenate([
-        dented.depth[None],
-        bulge_strain(dented.depth, settings, grid),
-        slope_strain(dented.depth, settings, grid),
-        drag_strain(np.stack([pressed, still]), settings, grid),
-        drag_strain(np.stack([still, pressed]), settings, grid),
-    ])  # fmt: skip
+        depth[None],
+        bulge_strain(depth, settings, wide),
+        slope_strain(depth, settings, wide),
+        drag_strain(np.stack([pressed, still]), settings, wide),
+        drag_strain(np.stack([still, pressed]), settings, wide),
+    ])[:, _NODES // 2 : -_NODES // 2, _NODES // 2 : -_NODES // 2]  # fmt: skip
     even = gaussian_filter(fields, (0, blur / grid.step, blur / grid.step), mode="nearest")
     even *= _fading(grid)
     table = np.ascontiguousarray(even.reshape(len(fields), -1).T)
     table.flags.writeable = False
-    return Dent(grid, force, table)
+    return Dent(grid, force, float(dented.travel[0]), table)
 
 
 def indent(
@@ -124,7 +134,7 @@ def turned(strain: FloatArray, angle: float) -> FloatArray:
         [s * s, c * c, -c * s],
         [-2 * c * s, 2 * c * s, c * c - s * s],
     ])  # fmt: skip
-    return strain @ turn
+    return np.asarray(strain @ turn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,13 +153,17 @@ def _blended(
     drag: tuple[float, float],
     blur: float,
 ) -> _Blend:
-    """Where all is linear from one dent, else between two: either way the force is exact."""
+    """Where all is linear from one dent, else between two: either way the force is exact.
+
+    A body that locks makes every dent shallower, in the shape that it has.
+    """
     total, grid = np.zeros(4), Grid(1, 1.0)
     for solved_at, weight in _rungs(shape, force):
         dent = solved_dent(shape, settings, solved_at, blur)
         scale, table = force / solved_at, dent.table
-        mixed = weight * scale * table[:, :4]
-        mixed[:, 1:] += weight * scale**2 * table[:, 4:7]
+        left = settings.locked(dent.travel * scale)
+        mixed = weight * scale * left * table[:, :4]
+        mixed[:, 1:] += weight * (scale * left) ** 2 * table[:, 4:7]
         if drag != (0.0, 0.0):
             mixed[:, 1:] += weight / solved_at * drag[0] * table[:, 7:10]
             mixed[:, 1:] += weight / solved_at * drag[1] * table[:, 10:]
@@ -172,16 +186,16 @@ def _rungs(shape: Shape, force: float) -> list[tuple[float, float]]:
 def _read(dent: _Blend, local: FloatArray) -> tuple[FloatArray, IntArray]:
     """Values (m, 4), linear between the nodes, and the points (m,) that are on the grid."""
     n = dent.grid.n
-    place = local / dent.grid.step + n // 2
-    near = np.flatnonzero(((place >= 0) & (place < n - 1)).all(axis=1))
-    place = place[near]
+    half = (n // 2 - 1) * dent.grid.step
+    near = np.flatnonzero((np.abs(local[:, 0]) < half) & (np.abs(local[:, 1]) < half))
+    place = local[near] / dent.grid.step + n // 2
     corner = place.astype(np.int64)
     fx, fy = (place - corner).T[:, :, None]
     first = corner[:, 0] * n + corner[:, 1]
-    table = dent.table
-    low = table[first] * (1 - fy) + table[first + 1] * fy
-    high = table[first + n] * (1 - fy) + table[first + n + 1] * fy
-    return low * (1 - fx) + high * fx, near
+    at = [dent.table.take(first + step, axis=0) for step in (0, 1, n, n + 1)]
+    low = at[0] + (at[1] - at[0]) * fy
+    high = at[2] + (at[3] - at[2]) * fy
+    return low + (high - low) * fx, near
 
 
 def _fading(grid: Grid) -> FloatArray:

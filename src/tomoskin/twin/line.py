@@ -61,7 +61,8 @@ class Line:
         chance = self._random.random((2, len(sent)))
         bit = self._random.integers(0, 8, len(sent))
         flipped = np.where(chance[0] < self.settings.corruption, sent ^ (1 << bit), sent)
-        return flipped[chance[1] >= self.settings.loss].astype(np.uint8).tobytes()
+        left = flipped[chance[1] >= self.settings.loss].astype(np.uint8)
+        return bytes(left)
 
 
 class FaultyLine:

@@ -19,7 +19,7 @@ class MaterialSettings:
     """How a sheet conducts; the defaults are a sheet without memory."""
 
     gauge: float = parameter(
-        15.0, "", "Relative rise of resistance per mean strain in the plane.", "assumed"
+        10.0, "", "Relative rise of resistance per mean strain in the plane.", "assumed"
     )
     gauge_across: float = parameter(
         0.0, "", "The same for the strain's deviator: conduction differs by direction.", "assumed"
@@ -28,7 +28,7 @@ class MaterialSettings:
         0.0, "", "Relative rise of conductivity per compression of what lies under it.", "assumed"
     )
     thickness: float = parameter(
-        10e-3, "m", "What a depth is divided by to give that compression.", "assumed"
+        3e-3, "m", "What a depth is divided by to give that compression.", "assumed"
     )
     creep: tuple[float, ...] = parameter(
         (), "", "Parts of the response that come late (Prony series).", "assumed"
@@ -174,7 +174,7 @@ def conductivity(
     sigma /= max(1 + settings.temperature_coefficient * state.warmer, 1e-3)
     if settings.scalar:
         return np.asarray(sigma)
-    return sigma[:, None, None] * _directed(strain, settings.gauge_across)
+    return np.asarray(sigma[:, None, None] * _directed(strain, settings.gauge_across))
 
 
 def _felt(load: Load, settings: MaterialSettings) -> FloatArray:
@@ -186,7 +186,7 @@ def _effective(state: MaterialState, settings: MaterialSettings) -> FloatArray:
     total = (1 - sum(settings.creep)) * _lagged(state, settings)
     for part, late in zip(settings.creep, state.late, strict=True):
         total += part * late
-    return total
+    return np.asarray(total)
 
 
 def _lagged(state: MaterialState, settings: MaterialSettings) -> FloatArray:
@@ -194,7 +194,7 @@ def _lagged(state: MaterialState, settings: MaterialSettings) -> FloatArray:
     total = (1 - sum(settings.play)) * state.felt
     for part, lagging in zip(settings.play, state.lagging, strict=True):
         total += part * lagging
-    return total
+    return np.asarray(total)
 
 
 def _pulled(lagging: FloatArray, felt: FloatArray, settings: MaterialSettings) -> FloatArray:
@@ -209,14 +209,14 @@ def _crept(state: MaterialState, settings: MaterialSettings, dt: float) -> Float
         return state.late
     target = _lagged(state, settings)
     kept = np.exp(-dt / np.array(settings.creep_times)).reshape(-1, 1, 1)
-    return target + (state.late - target) * kept
+    return np.asarray(target + (state.late - target) * kept)
 
 
 def _worn(state: MaterialState, felt: FloatArray, settings: MaterialSettings) -> FloatArray:
     if settings.wear == 0:
         return state.worn
     rise = (felt[:, :2] - state.felt[:, :2]).sum(axis=1) / 2
-    return state.worn + np.maximum(rise, 0.0)
+    return np.asarray(state.worn + np.maximum(rise, 0.0))
 
 
 def _warmed(warmer: float, settings: MaterialSettings, dt: float, chance: float) -> float:

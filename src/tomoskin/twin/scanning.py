@@ -56,12 +56,12 @@ class SampleTable:
     @property
     def source(self) -> IntArray:
         """(n_samples,)."""
-        return self.drives[self.drive, 0]
+        return np.asarray(self.drives[self.drive, 0])
 
     @property
     def sink(self) -> IntArray:
         """(n_samples,)."""
-        return self.drives[self.drive, 1]
+        return np.asarray(self.drives[self.drive, 1])
 
     @property
     def seconds(self) -> float:
@@ -102,8 +102,8 @@ def sample_table(
         drive=drive,
         channel=channel,
         oversampling=oversampling,
-        since=since,
-        time=switched[drive] + since,
-        length=length,
+        since=np.asarray(since),
+        time=np.asarray(switched[drive] + since),
+        length=np.asarray(length),
         conversion=clock.conversion,
     )

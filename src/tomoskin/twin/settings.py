@@ -102,6 +102,7 @@ PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings]
         ContactSettings(
             modulus=20e3,
             thickness=5e-3,
+            lock=0.8,
             poisson=0.49,
             tension=0.0,
             stiffness=100.0,
@@ -125,6 +126,7 @@ PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings]
         ContactSettings(
             modulus=981.0,
             thickness=0.1,
+            lock=1.0,
             poisson=0.49,
             tension=0.0,
             stiffness=0.0,

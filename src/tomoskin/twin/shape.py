@@ -9,13 +9,18 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, GeometryError
 from tomoskin.mesh import Polygon
 
 
 class Shape(Protocol):
-    """The face of a rigid probe in coordinates of its own, m."""
+    """The face of a rigid probe in coordinates of its own, m; equal faces are solved once."""
+
+    def __hash__(self) -> int:
+        """Every kind of face has its own."""
+        return hash(type(self))
 
     @property
     @abstractmethod
@@ -193,10 +198,10 @@ class Face(Shape):
         return _within(self._polygon.contains(points), (points**2).sum(axis=1) / (2 * self.crown))
 
 
-def _within(inside: FloatArray, height: FloatArray) -> FloatArray:
+def _within(inside: NDArray[np.bool_], height: FloatArray) -> FloatArray:
     """Heights above the lowest point of the face, inf where there is none."""
     lowest = height[inside].min(initial=np.inf) if inside.any() else 0.0
-    return np.where(inside, height - lowest, np.inf)
+    return np.asarray(np.where(inside, height - lowest, np.inf))
 
 
 def _check(name: str, value: float, *, curved: bool = False) -> None:

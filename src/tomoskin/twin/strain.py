@@ -44,6 +44,8 @@ def bulge_strain(depth: FloatArray, settings: ContactSettings, grid: Grid) -> Fl
     spread = 2 * settings.bulge / settings.thickness * rfft2(depth) / squared
     pull = [-1j * q * spread * settings.shear_spring for q in (qx, qy)]
     waves = _strain(*_shift(pull[0], pull[1], settings, grid), grid)
+    for part in waves[:2]:
+        part[0, 0] = spread[0, 0] / 2  # free to spread: no grid around it holds it back
     return np.stack([irfft2(part, depth.shape) for part in waves])
 
 

@@ -1,0 +1,178 @@
+"""Dents against closed forms, the balance of forces and that of energy."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from tomoskin.core import GeometryError, ModelError
+from tomoskin.twin import (
+    Circle,
+    ContactSettings,
+    Face,
+    Finger,
+    Grid,
+    Probe,
+    Square,
+    solve_contact,
+)
+from twin.closed_forms import BallOnSprings, Hertz, even_pressure_depth, flat_punch_stiffness
+
+FOAM = ContactSettings()
+GEL = ContactSettings(foundation="half-space", modulus=1e5, poisson=0.5, tension=0.0)
+SHAPES = (
+    Circle(0.012),
+    Circle(0.012, 0.02),
+    Square(0.02),
+    Square(0.02, 0.05),
+    Finger(),
+    Face(((-0.01, -0.01), (0.014, -0.008), (0.002, 0.003), (0.0, 0.015))),
+)
+
+
+def grid(n=96, half=0.045):
+    return Grid(n, 2 * half / n)
+
+
+def carried(dented):
+    return dented.pressure.sum() * dented.grid.step**2
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=repr)
+def test_forces_balance_and_faces_are_rigid(shape):
+    probe = Probe(shape, 0.004, -0.003, 3.0, 0.4)
+    dented = solve_contact([probe], FOAM, grid())
+    assert carried(dented) == pytest.approx(3.0, rel=1e-9)
+    # the springs bear what the faces press: the membrane only hands it on
+    assert FOAM.spring * dented.depth.sum() * dented.grid.step**2 == pytest.approx(3.0, rel=1e-6)
+    assert dented.pressure.min() >= 0
+    cos, sin = math.cos(0.4), math.sin(0.4)
+    local = (dented.grid.points - (0.004, -0.003)) @ [[cos, -sin], [sin, cos]]
+    gap = shape.gap(local).reshape(dented.depth.shape)
+    off = dented.depth - (dented.travel[0] - gap)
+    pressing = dented.pressure > 0
+    assert np.abs(off[pressing]).max() < 2e-3 * dented.travel[0]
+    assert off[np.isfinite(gap)].min() > -2e-3 * dented.travel[0]
+
+
+def test_a_flat_punch_without_tension_is_a_spring():
+    free = replace(FOAM, tension=0.0)
+    dented = solve_contact([Probe(Square(0.02), 0, 0, 3.0)], free, Grid(64, 0.02 / 21))
+    assert dented.travel[0] == pytest.approx(3.0 / (free.spring * 0.02**2), rel=1e-9)
+
+
+@pytest.mark.parametrize("radius", [0.006, 0.015])
+def test_a_flat_punch_on_a_membrane(radius):
+    errors = []
+    for n in (64, 192):
+        found = solve_contact([Probe(Circle(radius), 0, 0, 3.0)], FOAM, grid(n, radius + 0.036))
+        errors.append(abs(found.travel[0] * flat_punch_stiffness(radius, FOAM) / 3.0 - 1))
+    assert errors[-1] < 0.02  # the jagged rim of the grid's circle
+    assert errors[-1] < errors[0]
+
+
+def test_the_membrane_under_an_even_pressure():
+    """The compliance alone: the pressure is given, no contact is sought."""
+    from tomoskin.twin.contact import _compliance
+
+    mesh = grid(256, 0.06)
+    r = np.hypot(*mesh.points.T)
+    inside = (r < 0.015).reshape(mesh.n, mesh.n)
+    pressure = inside * 3.0 / (inside.sum() * mesh.step**2)
+    found = _compliance(FOAM, mesh)(pressure).ravel()
+    exact = even_pressure_depth(3.0, 0.015, FOAM, np.maximum(r, 1e-9))
+    assert np.abs(found - exact).max() < 0.01 * exact.max()
+
+
+def test_a_ball_on_a_membrane():
+    def off(contact):
+        return BallOnSprings(0.02, contact, FOAM).force - 1.0
+
+    exact = BallOnSprings(0.02, brentq(off, 1e-4, 0.02), FOAM)
+    found = solve_contact([Probe(Circle(0.015, 0.02), 0, 0, 1.0)], FOAM, grid(160, 0.05))
+    assert exact.contact < 0.014  # within the face
+    assert found.travel[0] == pytest.approx(exact.travel, rel=0.01)
+    reach = math.sqrt((found.pressure > 0).sum() * found.grid.step**2 / math.pi)
+    assert reach == pytest.approx(exact.contact, rel=0.05)
+
+
+@pytest.mark.parametrize("force", [0.1, 0.5])
+def test_hertz(force):
+    exact = Hertz(force, 0.02, GEL)
+    found = solve_contact([Probe(Circle(0.02, 0.02), 0, 0, force)], GEL, Grid(96, 0.016 / 96))
+    assert found.travel[0] == pytest.approx(exact.travel, rel=3e-3)
+    assert found.pressure.max() == pytest.approx(exact.peak, rel=5e-3)
+    reach = math.sqrt((found.pressure > 0).sum() * found.grid.step**2 / math.pi)
+    assert reach == pytest.approx(exact.contact, rel=0.03)
+    assert carried(found) == pytest.approx(force, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("shape", "settings", "half"),
+    [(Circle(0.012, 0.02), FOAM, 0.045), (Circle(0.01, 0.02), GEL, 0.012)],
+)
+def test_the_work_of_the_force_is_the_stored_energy(shape, settings, half):
+    forces = np.linspace(0.0, 1.0, 33)[1:] ** 1.5
+    path = [solve_contact([Probe(shape, 0, 0, f)], settings, grid(64, half)) for f in forces]
+    travel = np.array([0.0, *(step.travel[0] for step in path)])
+    force = np.array([0.0, *forces])
+    work = float((np.diff(travel) * (force[1:] + force[:-1]) / 2).sum())
+    assert path[-1].stored == pytest.approx(work, rel=0.01)
+    assert path[-1].stored < 0.9 * force[-1] * travel[-1]
+
+
+def test_the_stored_energy_is_that_of_springs_and_membrane():
+    dented = solve_contact([Probe(Finger(), 0, 0, 2.0)], FOAM, grid(128))
+    qx, qy = dented.grid.wave_numbers
+    waves = np.fft.rfft2(dented.depth)
+    slopes = [np.fft.irfft2(1j * q * waves, dented.depth.shape) for q in (qx, qy)]
+    density = FOAM.spring * dented.depth**2 + FOAM.tension * sum(s**2 for s in slopes)
+    assert dented.stored == pytest.approx(density.sum() * dented.grid.step**2 / 2, rel=1e-3)
+
+
+def test_two_probes_hold_each_its_force_and_far_ones_do_not_feel_each_other():
+    def pair(apart):
+        probes = [Probe(Circle(0.006), s * apart / 2, 0, f) for s, f in ((-1, 1.0), (1, 3.0))]
+        return solve_contact(probes, FOAM, grid(128, 0.06))
+
+    alone = solve_contact([Probe(Circle(0.006), -0.03, 0, 1.0)], FOAM, grid(128, 0.06)).travel[0]
+    far, near = pair(0.06), pair(0.016)
+    assert far.travel[0] == pytest.approx(alone, rel=0.02)
+    assert near.travel[0] > 1.1 * alone
+    left = np.hypot(near.grid.points[:, 0] + 0.008, near.grid.points[:, 1]) < 0.0075
+    assert near.pressure.ravel()[left].sum() * near.grid.step**2 == pytest.approx(1.0, rel=1e-9)
+
+
+def test_no_force_no_dent():
+    dented = solve_contact([Probe(Circle(0.01), 0, 0, 0.0)], FOAM, grid())
+    assert np.abs(dented.depth).max() == 0.0
+
+
+def test_faces_that_overlap_are_named():
+    probes = [Probe(Circle(0.01), x, 0, 1.0) for x in (-0.02, 0.0, 0.005)]
+    with pytest.raises(GeometryError, match="press 1 and press 2: the faces overlap"):
+        solve_contact(probes, FOAM, grid())
+
+
+def test_a_face_between_the_nodes_asks_for_a_finer_grid():
+    with pytest.raises(GeometryError, match=r"press 0: its face covers no node.*finer"):
+        solve_contact([Probe(Circle(1e-5), 0.0003, 0, 1.0)], FOAM, grid())
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"foundation": "bed"}, "foundation"),
+        ({"modulus": 0.0}, "modulus above 0"),
+        ({"thickness": math.nan}, "thickness above 0"),
+        ({"tension": -1.0}, "tension of 0 or more"),
+        ({"friction": math.inf}, "friction of 0 or more"),
+        ({"lock": 0.0}, "lock above 0"),
+        ({"foundation": "half-space"}, "no tension over a half-space"),
+    ],
+)
+def test_impossible_settings(change, said):
+    with pytest.raises(ModelError, match=said):
+        replace(FOAM, **change)

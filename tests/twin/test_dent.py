@@ -1,0 +1,139 @@
+"""Dents read at any points: moved, turned, blended and added, and the strain that they bring."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tomoskin.twin import Circle, ContactSettings, Finger, Grid, Probe, Square, indent
+from tomoskin.twin.dent import solved_dent
+from tomoskin.twin.strain import bulge_strain, drag_strain, slope_strain
+
+FOAM = ContactSettings()
+LINEAR = replace(FOAM, lock=math.inf)
+SIDE = np.linspace(-0.06, 0.06, 121)
+POINTS = np.stack(np.meshgrid(SIDE, SIDE, indexing="ij"), axis=-1).reshape(-1, 2)
+CELL = (SIDE[1] - SIDE[0]) ** 2
+
+
+def borne(load):
+    return LINEAR.spring * load.depth.sum() * CELL
+
+
+@pytest.mark.parametrize("shape", [Circle(0.012), Finger(), Square(0.02, 0.05)], ids=repr)
+@pytest.mark.parametrize("force", [0.05, 1.0, 3.3])
+def test_the_body_bears_the_force(shape, force):
+    load = indent([Probe(shape, 0.003, 0.002, force, 0.5)], LINEAR, POINTS)
+    assert borne(load) == pytest.approx(force, rel=5e-3)
+
+
+def test_a_flat_dent_is_linear_in_the_force_and_its_slope_strain_quadratic():
+    one, two = (indent([Probe(Circle(0.012), 0, 0, f)], LINEAR, POINTS) for f in (1.0, 2.0))
+    assert two.depth == pytest.approx(2 * one.depth)
+    stiff = replace(LINEAR, bulge=0.0)
+    one, two = (indent([Probe(Circle(0.012), 0, 0, f)], stiff, POINTS) for f in (1.0, 2.0))
+    assert two.strain == pytest.approx(4 * one.strain, abs=1e-15)
+    assert one.strain[:, :2].max() > 1e-4
+
+
+def test_a_curved_face_blends_close_to_what_it_solves():
+    at = 0.5 * (1.0 + math.sqrt(2)) * 1e-3 * 2**9  # between two rungs
+    read = indent([Probe(Finger(), 0, 0, at)], LINEAR, POINTS)
+    dent = solved_dent(Finger(), LINEAR, at, 0.0)
+    depth = dent.table[:, 0].reshape(dent.grid.n, -1)
+    assert read.depth.max() == pytest.approx(depth.max(), rel=0.01)
+
+
+def test_a_body_that_locks_gives_way_less_and_never_beyond():
+    light, hard = (indent([Probe(Circle(0.012), 0, 0, f)], FOAM, POINTS) for f in (0.01, 1e4))
+    free = indent([Probe(Circle(0.012), 0, 0, 0.01)], LINEAR, POINTS)
+    assert light.depth == pytest.approx(free.depth, rel=0.02)
+    most = FOAM.lock * FOAM.thickness
+    assert 0.99 * most < hard.depth.max() <= 1.01 * most
+
+
+def test_a_wider_probe_of_the_same_force_stretches_more_sheet():
+    """The source's figure 5.7, and what the lock was chosen for."""
+    stretched = [
+        indent([Probe(Circle(r), 0, 0, 5.0)], FOAM, POINTS).strain[:, :2].sum()
+        for r in (0.015, 0.018, 0.025)
+    ]
+    assert stretched == sorted(stretched)
+
+
+def test_moving_and_turning_the_probe_moves_and_turns_the_load():
+    angle = 0.7
+    cos, sin = math.cos(angle), math.sin(angle)
+    turn = np.array([[cos, -sin], [sin, cos]])
+    place = np.array([0.004, -0.002])
+    straight = indent([Probe(Finger(), 0, 0, 2.0)], FOAM, POINTS)
+    turned = indent([Probe(Finger(), *place.tolist(), 2.0, angle)], FOAM, POINTS @ turn.T + place)
+    assert turned.depth == pytest.approx(straight.depth, rel=1e-9, abs=1e-12)
+    tensor = straight.strain[:, [0, 2, 2, 1]].reshape(-1, 2, 2)
+    expected = (turn @ tensor @ turn.T).reshape(-1, 4)[:, [0, 3, 1]]
+    assert turned.strain == pytest.approx(expected, abs=1e-12)
+
+
+def test_several_probes_add_up():
+    probes = [Probe(Circle(0.01), -0.02, 0, 1.0), Probe(Square(0.015), 0.02, 0.01, 2.0, 0.3)]
+    both = indent(probes, FOAM, POINTS)
+    apart = [indent([probe], FOAM, POINTS) for probe in probes]
+    assert both.depth == pytest.approx(apart[0].depth + apart[1].depth)
+    assert both.strain == pytest.approx(apart[0].strain + apart[1].strain)
+    assert indent([], FOAM, POINTS).depth.max() == 0.0
+
+
+def test_blur_keeps_what_lies_under_it():
+    sharp, even = (indent([Probe(Circle(0.01), 0, 0, 1.0)], FOAM, POINTS, b) for b in (0.0, 2e-3))
+    assert even.depth.sum() == pytest.approx(sharp.depth.sum(), rel=5e-3)
+    assert np.abs(np.diff(even.depth)).max() < np.abs(np.diff(sharp.depth)).max()
+
+
+def test_a_sliding_probe_pushes_the_sheet_together_ahead_and_stretches_it_behind():
+    def strain_at(x, probe):
+        return indent([probe], replace(FOAM, bulge=0.0), np.array([[x, 0.0]])).strain[0, 0]
+
+    still = Probe(Circle(0.01), 0, 0, 0.5)
+    slid = still.moving(1.0, 0.0, FOAM.friction)
+    assert strain_at(0.013, slid) < strain_at(0.013, still)
+    assert strain_at(-0.013, slid) > strain_at(-0.013, still)
+    rolled = still.moving(1.0, 0.0, FOAM.rolling_friction)
+    gain = strain_at(-0.013, rolled) - strain_at(-0.013, still)
+    assert 0 < gain < 0.1 * (strain_at(-0.013, slid) - strain_at(-0.013, still))
+
+
+def test_strain_obeys_the_balance_of_a_sheet_on_shear_springs():
+    """A traction along x that waves along x: (κ + (λ + 2μ)q²) u = τ."""
+    mesh = Grid(64, 1e-3)
+    q = 2 * math.pi * 3 / (64 * 1e-3)
+    wave = np.sin(q * mesh.points[:, 0]).reshape(64, 64)
+    strain = drag_strain(np.stack([100 * wave, 0 * wave]), FOAM, mesh)
+    plane = FOAM.stiffness / (1 - FOAM.sheet_poisson**2)
+    shift = 100 / (FOAM.shear_spring + plane * q**2)
+    along = np.cos(q * mesh.points[:, 0]).reshape(64, 64)
+    assert strain[0] == pytest.approx(shift * q * along, abs=1e-12)
+    assert np.abs(strain[1:]).max() < 1e-12
+
+
+def test_a_limp_sheet_keeps_the_slope_strain_and_follows_the_bulge():
+    mesh = Grid(64, 1e-3)
+    r = np.hypot(*mesh.points.T).reshape(64, 64)
+    depth = 1e-3 * np.exp(-((r / 8e-3) ** 2))
+    limp = replace(FOAM, stiffness=1e-6)
+    slope = np.gradient(depth, 1e-3)
+    strain = slope_strain(depth, limp, mesh)
+    assert strain[0] == pytest.approx(slope[0] ** 2 / 2, abs=2e-4)
+    assert strain[2] == pytest.approx(slope[0] * slope[1] / 2, abs=2e-4)
+    bulged = bulge_strain(depth, limp, mesh)
+    assert bulged[0] + bulged[1] == pytest.approx(2 * FOAM.bulge * depth / FOAM.thickness, abs=1e-6)
+
+
+def test_a_stiff_sheet_hardly_strains():
+    mesh = Grid(64, 1e-3)
+    r = np.hypot(*mesh.points.T).reshape(64, 64)
+    depth = 1e-3 * np.exp(-((r / 8e-3) ** 2))
+    soft, stiff = (
+        np.abs(bulge_strain(depth, replace(FOAM, stiffness=s), mesh)).max() for s in (1.0, 1e5)
+    )
+    assert stiff < 0.2 * soft
