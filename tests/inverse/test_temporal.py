@@ -15,7 +15,7 @@ from golden import mismatch
 from shapes import disc
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.forward import ForwardModel
-from tomoskin.inverse import OneStep, Smoother, Temporal, prior_matrix
+from tomoskin.inverse import Modes, OneStep, Operator, Smoother, Temporal, prior_matrix
 from tomoskin.pattern import Pattern
 
 ALPHA = 0.02
@@ -179,6 +179,30 @@ def test_a_touch_shows_at_once_and_noise_does_not() -> None:
         temporal.push(np.zeros(40), 0.05 * k)
     first = temporal.push(touch, 1.5).values
     assert first.min() / op(touch).values.min() > 0.5
+
+
+def test_modes_may_be_shared() -> None:
+    modes = Modes.of(operator().problem, operator().problem.operator(ALPHA))
+    filters = Temporal(modes, 0.3), Smoother(modes, 0.3, 0), Temporal(operator(), 0.3)
+    late = filters[1].push(frames()[0], 0.0)
+    assert late is not None
+    images = [filters[0].push(frames()[0], 0.0), late.image, filters[2].push(frames()[0], 0.0)]
+    assert all(mismatch(image.values, images[0].values) < 1e-5 for image in images)
+
+
+@pytest.mark.parametrize("kind", ["rows", "trained", "mesh"])
+def test_an_operator_of_something_else_has_no_modes(kind: str) -> None:
+    problem, other = operator().problem, operator()
+    matrix = {"rows": other.without([3, 17]).matrix, "trained": np.roll(other.matrix, 1, axis=1)}
+    foreign = Operator(
+        model(),
+        matrix.get(kind, other.matrix[:-1]),
+        precision=other.precision,
+        reference=other.reference,
+        difference="plain",
+    )
+    with pytest.raises(ModelError, match="solves the linear problem with all of its rows"):
+        Modes.of(problem, foreign)
 
 
 def test_reset_forgets() -> None:

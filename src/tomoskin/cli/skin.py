@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.alpha import alpha
+from tomoskin.cli.merit import merit
 from tomoskin.cli.output import JsonFlag, emit
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="List, show and check skins.", no_args_is_help=True)
 app.command("alpha")(alpha)
+app.command("merit")(merit)
 
 _Name = Annotated[str, typer.Argument(metavar="SKIN", help="Built-in name or path.")]
 

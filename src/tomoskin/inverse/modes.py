@@ -9,12 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, ModelError
 from tomoskin.inverse.one_step import OneStep
+from tomoskin.inverse.operator import Operator
+from tomoskin.inverse.problem import LinearProblem
 
 _NOTHING = 1e-12
 """A mode whose picture is this far below the strongest one is none: half of them when every row
 has a reciprocal."""
+
+_SKEW = 1e-6
+"""What an operator of the problem may deviate from symmetry by rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,16 +42,27 @@ class Modes:
         (k,) e, from 0 (only noise) to 1 (no noise).
     """
 
-    operator: OneStep
+    operator: Operator
     analysis: NDArray[Any]
     picture: NDArray[Any]
     trust: FloatArray
 
     @classmethod
-    def of(cls, operator: OneStep) -> Modes:
-        """Take ``operator`` apart; once, at the cost of an eigenvalue problem of n_meas rows."""
-        root = np.sqrt(operator.problem.weights)
-        seen = root[:, None] * (operator.problem.jacobian @ operator.matrix) / root
+    def of(cls, problem: LinearProblem, operator: Operator) -> Modes:
+        """Take an ``operator`` of ``problem`` apart: one eigenvalue problem of n_meas rows.
+
+        Raises
+        ------
+        ModelError
+            When the operator was not made from the problem as it is: trained, of another mesh
+            or pattern, or without some rows.
+        """
+        root = np.sqrt(problem.weights)
+        if operator.matrix.shape != problem.jacobian.shape[::-1]:
+            raise _foreign()
+        seen = root[:, None] * (problem.jacobian @ operator.matrix) / root
+        if np.abs(seen - seen.conj().T).max() > _SKEW * np.abs(seen).max():
+            raise _foreign()
         trust, basis = np.linalg.eigh((seen + seen.conj().T) / 2.0)
         picture = (operator.matrix / root) @ basis
         size = np.linalg.norm(picture, axis=0)
@@ -58,8 +74,20 @@ class Modes:
             np.clip(trust[kept], 0.0, 1.0),
         )
 
+    @classmethod
+    def taken_from(cls, source: OneStep | Modes) -> Modes:
+        """The modes of a one-step operator, or those that there are already."""
+        return source if isinstance(source, Modes) else cls.of(source.problem, source)
+
     @cached_property
     def quick_picture(self) -> NDArray[Any]:
         """``picture`` in single precision: half the bytes per frame."""
         kind = np.complex64 if np.iscomplexobj(self.picture) else np.float32
         return self.picture.astype(kind)
+
+
+def _foreign() -> ModelError:
+    return ModelError(
+        "expected an operator that solves the linear problem with all of its rows",
+        hint="take a OneStep; fill rows that are missing instead of leaving them out",
+    )

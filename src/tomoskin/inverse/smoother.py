@@ -36,10 +36,10 @@ class Smoother:
         When the lag is not a whole number of frames from 0, or the time constant no time.
     """
 
-    def __init__(self, operator: OneStep, time_constant: float, lag: int) -> None:
+    def __init__(self, operator: OneStep | Modes, time_constant: float, lag: int) -> None:
         if not (isinstance(lag, int) and lag >= 0):
             raise ModelError(f"expected a lag of 0 frames or more, got {lag}")
-        self.modes = Modes.of(operator)
+        self.modes = Modes.taken_from(operator)
         self.time_constant = checked_time_constant(time_constant)
         self.lag = lag
         self._beliefs: deque[Belief] = deque(maxlen=lag + 1)

@@ -63,7 +63,8 @@ class Temporal:
     Parameters
     ----------
     operator
-        Whose prior, weights and alpha state what an image is and how large the noise is.
+        Whose prior, weights and alpha state what an image is and how large the noise is; or its
+        modes, for several filters.
     time_constant
         τ, s: how long an image lasts. 0 gives the operator's own images.
 
@@ -73,8 +74,8 @@ class Temporal:
         When the time constant is below 0 or not finite.
     """
 
-    def __init__(self, operator: OneStep, time_constant: float) -> None:
-        self.modes = Modes.of(operator)
+    def __init__(self, operator: OneStep | Modes, time_constant: float) -> None:
+        self.modes = Modes.taken_from(operator)
         self.time_constant = checked_time_constant(time_constant)
         self.belief: Belief | None = None
 
