@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import Event
+from tomoskin.inverse import AlphaChoice
 from tomoskin.live import colour_limit, messages
 from tomoskin.live.result import ReferenceState
 from tomoskin.live.status import Status
@@ -25,6 +26,7 @@ def make_status(**changes):
         "p99": 0.001,
         "reference": ReferenceState(20, 20, 5.0, 1e-4),
         "reference_age": 2.0,
+        "choice": AlphaChoice(0.06, "light-touch", "said so"),
         "left_out": 0,
         "problem": None,
     }
@@ -69,6 +71,7 @@ def test_state():
     state = json.loads(messages.state(make_status()))
     assert state["p99_ms"] == 1.0
     assert state["reference"] == {"frames": 20, "needed": 20, "age_s": 2.0, "ready": True}
+    assert (state["alpha"], state["rule"]) == (0.06, "light-touch")
     assert state["problem"] is None
     assert "50 frames/s" in state["text"]
 

@@ -76,6 +76,8 @@ def state(status: Status) -> str:
             "ready": reference.ready,
         },
         noise_v=_known(reference.noise),
+        alpha=status.choice.alpha,
+        rule=status.choice.rule,
         left_out=status.left_out,
         problem=status.problem,
         text=status.text,

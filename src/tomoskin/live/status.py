@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from tomoskin.inverse import AlphaChoice
 from tomoskin.live.result import ReferenceState
 
 
@@ -38,6 +39,8 @@ class Status:
         Seconds since it stood, or None.
     recording
         The file that is being recorded to, or None.
+    choice
+        The alpha of the pictures, and what chose it.
     left_out
         Rows that the newest picture does without.
     problem
@@ -56,6 +59,7 @@ class Status:
     p99: float
     reference: ReferenceState
     reference_age: float | None
+    choice: AlphaChoice
     left_out: int
     problem: str | None
     recording: Path | None = None
