@@ -1,0 +1,145 @@
+"""``tomoskin skin alpha`` and ``tomoskin image --alpha`` on presses that a model made."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tomoskin.forward import ForwardModel
+from tomoskin.inverse import RULES
+from tomoskin.mesh import triangulate
+from tomoskin.skin import Skin
+
+SKIN = Skin.load("textile-disc-8")
+IDLE, PRESSES = 5, 6
+NOISE = 3e-5
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Idle frames, then presses whose places are known; on a mesh of its own."""
+    mesh = triangulate(SKIN.outline, SKIN.arcs, 900, seed=11)
+    model = ForwardModel(mesh, SKIN.pattern(), SKIN.contact_impedance, SKIN.current)
+    angle = 2 * np.pi * np.arange(PRESSES) / PRESSES
+    places = 0.05 * np.column_stack([np.cos(angle), np.sin(angle)])
+    rows = [model.solve(SKIN.conductivity).voltages] * IDLE
+    for place in places:
+        near = np.linalg.norm(mesh.centroids - place, axis=1) < 0.015
+        rows.append(model.solve(np.where(near, 0.7, 1.0) * SKIN.conductivity).voltages)
+    values = np.array(rows) + np.random.default_rng(5).normal(0.0, NOISE, (len(rows), 40))
+    pattern = SKIN.pattern()
+    path = tmp_path_factory.mktemp("alpha") / "presses.npz"
+    np.savez(
+        path,
+        voltages=values,
+        drive=pattern.drive,
+        measure=pattern.measure,
+        xy_m=np.vstack([np.full((IDLE, 2), np.nan), places]),
+    )
+    return path
+
+
+Command = Callable[..., tuple[int, str, str]]
+
+
+def document(output: tuple[int, str, str]) -> Any:
+    code, text, err = output
+    assert (code, err) == (0, "")
+    return json.loads(text)
+
+
+def test_with_a_recording_every_rule_chooses(
+    tomoskin: Command, recording: Path, tmp_path: Path
+) -> None:
+    picture = tmp_path / "curves.png"
+    found = document(
+        tomoskin(
+            *("skin", "alpha", "textile-disc-8", "--recording", recording),
+            *("--reference", f"first:{IDLE}", "--out", picture, "--json"),
+        )
+    )
+    assert list(found["rules"]) == list(RULES)
+    # the L-curve of so few frames may have no corner, and says so
+    for rule, row in found["rules"].items():
+        assert row["reason"]
+        assert row["alpha"] is None or 1e-4 < row["alpha"] < 10
+        assert row["alpha"] is not None or rule == "l-curve"
+    assert "6 labelled presses" in found["rules"]["labelled"]["reason"]
+    assert found["condition"] > 10
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert picture.stat().st_size > 20_000
+
+
+def test_without_a_recording_the_noise_is_predicted(tomoskin: Command) -> None:
+    code, text, err = tomoskin("skin", "alpha", "textile-disc-8")
+    assert (code, err) == (0, "")
+    lines = {line.split()[0]: line for line in text.splitlines()[2:]}
+    assert list(lines) == list(RULES)
+    assert float(lines["light-touch"].split()[1]) > 0.01
+    assert "no frames of a touched skin" in lines["gcv"]
+
+
+def test_the_picture_of_rules_without_a_recording(tomoskin: Command, tmp_path: Path) -> None:
+    picture = tmp_path / "curves.png"
+    assert tomoskin("skin", "alpha", "textile-disc-8", "--out", picture)[0] == 0
+    assert picture.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--rule", "elbow"), "expected a rule among light-touch"),
+        (("--rule", "gcv"), "there are no frames of a touched skin"),
+        (("--out", "curves.xyz"), "curves.xyz: cannot be written"),
+        (("--out", "no-such-folder/curves.png"), "cannot be written"),
+        (("--recording", "none.npz"), "none.npz"),
+    ],
+)
+def test_refusals(tomoskin: Command, arguments: tuple[str, ...], message: str) -> None:
+    code, _, err = tomoskin("skin", "alpha", "textile-disc-8", *arguments)
+    assert code == 1
+    assert message in err
+
+
+@pytest.mark.parametrize(
+    ("alpha", "rule"), [("0.08", "hand"), ("auto", "light-touch"), ("gcv", "gcv")]
+)
+def test_image_says_alpha_and_what_chose_it(
+    tomoskin: Command, recording: Path, alpha: str, rule: str
+) -> None:
+    arguments = ("image", recording, "--reference", f"first:{IDLE}", "--alpha", alpha)
+    found = document(tomoskin(*arguments, "--json"))
+    assert found["rule"] == rule
+    if rule == "hand":
+        assert found["alpha"] == 0.08
+    assert f"alpha {found['alpha']:.4g} ({rule}: " in tomoskin(*arguments)[1]
+
+
+def test_image_follows_the_noise_of_the_reference(tomoskin: Command, recording: Path) -> None:
+    """Five idle frames tell the noise; one does not, and the read-out's is taken."""
+    arguments = ("image", recording, "--alpha", "auto", "--json", "--reference")
+    measured = document(tomoskin(*arguments, f"first:{IDLE}"))["alpha"]
+    predicted = document(tomoskin(*arguments, "first:1"))["alpha"]
+    assert measured == pytest.approx(predicted * NOISE / 3.7e-5, rel=0.3)
+
+
+@pytest.mark.parametrize("alpha", ["0", "-0.1", "nan", "inf", "elbow"])
+def test_an_alpha_that_cannot_be_meant(tomoskin: Command, recording: Path, alpha: str) -> None:
+    code, _, err = tomoskin("image", recording, f"--alpha={alpha}")
+    assert code == 2
+    assert "--alpha" in err
+
+
+def test_labels_that_are_missing(tomoskin: Command, recording: Path, tmp_path: Path) -> None:
+    with np.load(recording) as whole:
+        arrays = {name: whole[name] for name in ("voltages", "drive", "measure")}
+    bare = tmp_path / "bare.npz"
+    np.savez(bare, **arrays)
+    code, _, err = tomoskin("image", bare, "--alpha", "labelled")
+    assert code == 1
+    assert "no frame says where" in err
