@@ -1,12 +1,26 @@
 """The twin's sheet against the reconstruction's model, and what a press does to it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from oracles import disc_resistance
 from tomoskin.core import GeometryError
 from tomoskin.forward import ForwardModel
 from tomoskin.pattern import Scan
-from tomoskin.twin import ElectronicsSettings, Faults, Press, line_potentials
+from tomoskin.twin import (
+    PRESETS,
+    Circle,
+    ElectronicsSettings,
+    Faults,
+    Finger,
+    Press,
+    Probe,
+    TwinSettings,
+    TwinSkin,
+    line_potentials,
+)
 
 
 def potentials(sheet, skin, drives):
@@ -84,3 +98,119 @@ def test_a_refused_press_changes_nothing(sheet):
     with pytest.raises(GeometryError, match="off the skin"):
         sheet.set_presses((Press(1, 0, 1, 0.01),))
     assert sheet.presses == good
+
+
+def test_potentials_are_those_of_the_analytic_disc(skin):
+    """A twin's own mesh, the default one and one four times as fine, against the series."""
+    width = skin.arcs[0].width(skin.outline)
+    middle = np.arctan2(skin.electrode_centres[:, 1], skin.electrode_centres[:, 0])
+    exact = disc_resistance(0.1, skin.conductivity, middle, width / 0.2, skin.contact_impedance)
+    errors = []
+    for ratio in (1.6, 6.4):
+        sheet = TwinSkin.of(skin, TwinSettings(mesh_ratio=ratio))
+        found, expected = map(sheet.model.voltages, (sheet.resistance(), exact))
+        errors.append(np.abs(found - expected).max() / np.abs(expected).max())
+    assert errors[0] < 0.02
+    assert errors[1] < 0.6 * errors[0]
+
+
+@pytest.mark.parametrize("radius", [0.002, 0.02])
+def test_either_way_of_solving_is_exact(sheet, radius):
+    sheet.set_presses((Press(0.01, 0.02, 0.5, radius),))
+    found = sheet.resistance()
+    afresh = sheet.model.transfer_resistance(sheet.conductivity())
+    assert found == pytest.approx(afresh, rel=1e-9, abs=1e-12)
+
+
+def test_few_changed_cells_are_solved_by_the_local_update(skin, monkeypatch):
+    """In the tank no tension moves what lies beside the probe."""
+    sheet = TwinSkin.of(skin, replace(TwinSettings.preset("ideal"), contact=PRESETS["tank"][0]))
+    sheet.material = replace(sheet.material, compression=-1.0, gauge=0.0)
+    rest = sheet.conductivity()
+    exact = sheet.resistance()
+    sheet.set_presses((Press(0.01, 0.02, 0.5, 0.002),))
+    changed = np.flatnonzero(sheet.conductivity() != rest)
+    assert 0 < len(changed) < 0.04 * len(rest)
+    asked = []
+    monkeypatch.setattr(
+        type(sheet._base.local),
+        "transfer_resistance",
+        lambda _, cells, sigma: asked.append((cells, sigma)) or exact,
+    )
+    sheet.resistance()
+    ((cells, sigma),) = asked
+    assert cells.tolist() == changed.tolist()
+    assert sigma.tolist() == sheet.conductivity()[changed].tolist()
+
+
+def test_a_directed_sheet_agrees_with_the_models_own_check(skin):
+    sheet = TwinSkin.of(skin, TwinSettings.preset("textile"))
+    sheet.set_presses((Probe(Finger(), 0.02, 0.01, 3.0, 0.3),))
+    sigma = sheet.conductivity()
+    assert sigma.shape == (len(sheet.model.mesh.cells), 2, 2)
+    expected = sheet.model.transfer_resistance(sigma)
+    assert sheet.resistance() == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_preset_is_pressed_and_let_go(skin, name):
+    settings = TwinSettings.preset(name)
+    still = replace(settings.material, temperature_sd=0.0)
+    sheet = TwinSkin.of(skin, replace(settings, material=still))
+    rest = sheet.resistance()
+    sheet.set_presses((Press(0.03, 0.02, 3.0, 0.012),))
+    sheet.advance(1.0)
+    pressed = sheet.resistance()
+    sheet.set_presses(())
+    sheet.advance(1e-6)
+    left = np.abs(sheet.resistance() - rest).max()
+    change = np.abs(pressed - rest).max()
+    assert change > 1e-3 * np.abs(rest).max()
+    assert left < 0.2 * change
+    assert (left == 0) == (name in {"ideal", "tank"})
+
+
+def test_a_remainder_after_unloading_that_fades(skin):
+    """The source's figure 5.10: something is left when the probe has gone."""
+    sheet = TwinSkin.of(skin, TwinSettings.preset("textile"))
+    mean = np.trace(sheet.conductivity(), axis1=1, axis2=2)
+    sheet.set_presses((Press(0.0, 0.0, 4.0, 0.015),))
+    sheet.advance(5.0)
+    sheet.set_presses(())
+
+    def deepest():
+        now = np.trace(sheet.conductivity(), axis1=1, axis2=2) / mean
+        return float(np.median(now) - now.min())
+
+    sheet.advance(0.1)
+    soon = deepest()
+    sheet.advance(60.0)
+    assert soon > 0.003
+    assert deepest() < 0.5 * soon
+
+
+def test_the_seed_decides_on_spread_and_temperature(skin):
+    def sigma(seed):
+        sheet = TwinSkin.of(skin, TwinSettings.preset("textile", seed))
+        sheet.advance(10.0)
+        return sheet.conductivity()
+
+    assert (sigma(1) == sigma(1)).all()
+    assert (sigma(1) != sigma(2)).any()
+
+
+def test_a_renewed_sheet_has_forgotten_everything(skin):
+    sheet = TwinSkin.of(skin, TwinSettings.preset("hydrogel"))
+    rest = sheet.conductivity()
+    sheet.set_presses((Probe(Circle(0.01), 0, 0, 3.0),))
+    sheet.advance(5.0)
+    sheet.renew()
+    assert sheet.presses == ()
+    assert sheet.conductivity() == pytest.approx(rest)
+
+
+def test_a_warmer_sheet_conducts_as_its_material_says(skin):
+    sheet = TwinSkin.of(skin, TwinSettings.preset("textile"))
+    rest = sheet.conductivity()
+    sheet.warm(10.0)
+    assert sheet.conductivity() == pytest.approx(rest / 1.038)

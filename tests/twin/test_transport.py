@@ -1,16 +1,26 @@
 """The twin as a source: pace, threads, options, and the whole way to voltages."""
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tomoskin.core import Frame, GeometryError, SourceError
+from tomoskin.core import Frame, GeometryError, SkinError, SourceError
 from tomoskin.forward import ForwardModel
 from tomoskin.pattern import Scan
 from tomoskin.signal import Readout
 from tomoskin.source import Link, ScanSettings, Transport
-from tomoskin.twin import Press, TwinSettings, WallClock, make_twin, open_twin
+from tomoskin.twin import (
+    PRESETS,
+    Faults,
+    LineSettings,
+    Press,
+    TwinSettings,
+    WallClock,
+    make_twin,
+    open_twin,
+)
 
 PRESS = Press(0.02, 0.01, 3.0, 0.015)
 
@@ -146,8 +156,66 @@ def test_presses_from_many_threads(skin):
     link.close()
 
 
+def test_a_reboot_forgets_the_scan_and_the_link_takes_it_up_again(skin):
+    clock = ManualClock()
+    transport = make_twin(skin, TwinSettings(), clock)
+    _, link = frames_of(transport, skin, 3, clock)
+    transport.reboot()
+    after = []
+    while len(after) < 3:
+        after += [item for item in link.poll(0.1) if isinstance(item, Frame)]
+    assert after[0].sequence == 0
+    link.close()
+
+
+def test_a_bad_line_loses_frames_and_never_alters_one(skin):
+    clock = ManualClock()
+    quiet = TwinSettings().with_noise(0.0)
+    bad = replace(quiet, line=LineSettings(loss=5e-4, corruption=5e-4))
+    (good, *_), link = frames_of(make_twin(skin, quiet, clock), skin, 1, clock)
+    link.close()
+    frames, link = frames_of(make_twin(skin, bad, clock), skin, 60, clock)
+    link.close()
+    sequences = [frame.sequence for frame in frames]
+    assert sequences == sorted(sequences)
+    assert sequences != list(range(60))
+    assert all(frame.samples.tolist() == good.samples.tolist() for frame in frames)
+
+
+def test_a_cut_electrode_shows_in_the_next_frame(skin):
+    clock = ManualClock()
+    transport = make_twin(skin, TwinSettings(), clock)
+    _, link = frames_of(transport, skin, 1, clock)
+    transport.set_faults(Faults(cut=frozenset({2})))
+    readout = Readout.of(Scan.of(skin.pattern()), skin.readout)
+    (frame,) = [item for item in link.poll(1.0) if isinstance(item, Frame)]
+    railed = readout(frame).railed
+    pattern = skin.pattern()
+    reads = (pattern.measure == 2).any(axis=1)
+    assert railed[reads].all()
+    drives = (pattern.drive == 2).any(axis=1)
+    assert not railed[~reads & ~drives].any()
+    link.close()
+
+
+def test_the_skin_file_and_the_options_choose_the_material(skin):
+    knit = skin.altered({"twin": {"preset": "textile"}})
+    assert open_twin("", knit).sheet.material == TwinSettings.preset("textile").material
+    other = open_twin("preset=hydrogel,noise=2.5", knit)
+    assert other.sheet.material == TwinSettings.preset("hydrogel").material
+    assert other.electronics.settings.noise == 2.5
+
+
+def test_the_skin_file_knows_every_preset(skin):
+    for name in PRESETS:
+        assert skin.altered({"twin": {"preset": name}}).twin.preset == name
+    with pytest.raises(SkinError, match="preset"):
+        skin.altered({"twin": {"preset": "wool"}})
+
+
 def test_options(skin):
     assert isinstance(open_twin("seed=3,fast", skin), Transport)
-    for wrong in ("slow", "seed=-1", "seed=x", "seed="):
+    of_seed = ("slow", "seed=-1", "seed=x", "seed=")
+    for wrong in (*of_seed, "preset=wool", "noise=-1", "noise=nan", "noise="):
         with pytest.raises(SourceError, match="twin: expected"):
             open_twin(wrong, skin)
