@@ -20,7 +20,7 @@ from tomoskin.inverse.weights import noise_weights
 _ZERO = 1e-9
 """A voltage below this part of the largest is zero by symmetry, and its value is rounding."""
 
-_ILL_CONDITIONED = 1e8
+_ILL_CONDITIONED = 1e12
 """Above this condition number a product with the inverse has lost digits worth getting back."""
 
 
@@ -109,7 +109,7 @@ class LinearProblem:
         system = gram.copy()
         system[np.diag_indices_from(system)] += alpha**2 / self.weights
         precision = _inverse(system)
-        matrix = spread @ precision
+        matrix = (precision.T @ spread.T).T  # by columns, as a product with a vector reads fastest
         if np.linalg.norm(system, 1) * np.linalg.norm(precision, 1) > _ILL_CONDITIONED:
             matrix += (spread - matrix @ system) @ precision  # refined once
         free = self.prior.free
