@@ -14,7 +14,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from tomoskin import __version__
-from tomoskin.cli import bench, doctor, image, live, simulate, skin
+from tomoskin.cli import bench, doctor, image, live, record, session, simulate, skin
 from tomoskin.core import TomoskinError
 
 DEBUG = "TOMOSKIN_DEBUG"
@@ -28,9 +28,11 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("live")(live.live)
+app.command("record")(record.record)
 app.command("image")(image.image)
 app.command("simulate")(simulate.simulate)
 app.command("bench")(bench.bench)
+app.add_typer(session.app, name="session")
 app.add_typer(skin.app, name="skin")
 app.command("doctor")(doctor.doctor)
 

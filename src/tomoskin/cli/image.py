@@ -11,6 +11,7 @@ from tomoskin.cli.alpha_option import AlphaOption, said, with_alpha
 from tomoskin.cli.display_option import LimitOption, PercentFlag, SmoothOption, display_of
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.recording import FramesOption, ReferenceOption, frame_range, idle_frames
+from tomoskin.cli.skin_choice import SkinOption, skin_for_file
 
 if TYPE_CHECKING:
     from tomoskin.core import IntArray
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 def image(
     recording: Annotated[Path, typer.Argument(metavar="INPUT", help="Recording or .npz file.")],
-    skin: Annotated[str, typer.Option(help="Built-in name or path.")] = "textile-disc-8",
+    skin: SkinOption = None,
     reference: ReferenceOption = None,
     frames: FramesOption = None,
     alpha: AlphaOption = None,
@@ -38,10 +39,9 @@ def image(
     """Reconstruct a recording: images, and the touches in them."""
     from tomoskin.live import prepare, reconstruct
     from tomoskin.session import read_recording
-    from tomoskin.skin import Skin
 
     write = _writer(out)
-    chosen, rule = with_alpha(Skin.load(skin), alpha)
+    chosen, rule = with_alpha(skin_for_file(skin, recording), alpha)
     display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
     prepared = prepare(chosen)
     whole = read_recording(recording).in_order_of(prepared.pattern)

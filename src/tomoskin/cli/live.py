@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-import contextlib
-import signal
 import sys
 import webbrowser
-from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tomoskin.cli.ending import ended_by_signals
 from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.record import recording_to
+from tomoskin.cli.skin_choice import SkinOption, skin_for_source
 
 if TYPE_CHECKING:
     from tomoskin.live import Door, Runner
 
-_DEFAULT_SKIN = "textile-disc-8"
-
 
 def live(
     *,
-    skin: Annotated[str, typer.Option(help="Built-in name or path.")] = _DEFAULT_SKIN,
-    source: Annotated[str, typer.Option(help="twin, serial:PORT, …")] = "twin",
+    skin: SkinOption = None,
+    source: Annotated[str, typer.Option(help="twin, serial:PORT, replay:FILE@SPEED, …")] = "twin",
+    record: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Record the session to a new file.")
+    ] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = 8765,
     host: Annotated[
         str, typer.Option(help="Address to listen on; others than this machine can reach it.")
@@ -33,20 +35,18 @@ def live(
     json: JsonFlag = False,
 ) -> None:
     """Show a skin live on a page; without options, the twin of a textile disc."""
-    with _ended_by_signals():
+    with ended_by_signals():
         from tomoskin import live as room
-        from tomoskin.skin import Skin
         from tomoskin.source import open_source
 
         room.check_page()
-        chosen = Skin.load(skin)
+        chosen = skin_for_source(skin, source)
         with room.listen(host, port) as listener:
             if not room.is_loopback(host):
                 _warn(host)
             door = room.Door(listener.getsockname()[1], host)
             runner = room.Runner(room.prepare(chosen), lambda: open_source(source, chosen))
-            runner.start()
-            try:
+            with recording_to(runner, record):
                 hub = room.Hub(runner, limit=room.colour_limit(runner.prepared))
                 server = room.Server.of(room.application(hub, door))
                 with server.stopped_by_signals():
@@ -54,20 +54,7 @@ def live(
                     if open_browser:
                         webbrowser.open(door.address)
                     server.run_on(listener)
-            finally:
-                runner.stop()
         _farewell(runner, json=json)
-
-
-@contextlib.contextmanager
-def _ended_by_signals() -> Iterator[None]:
-    """Ctrl-C and SIGTERM end the block, wherever it stands: that is no failure."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        with contextlib.suppress(KeyboardInterrupt):
-            yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _warn(host: str) -> None:

@@ -13,6 +13,7 @@ from tomoskin.live.labelled import (
 from tomoskin.live.offline import DOUBTED, Changes, Reconstruction, changes_of, reconstruct
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.prepare import Prepared, prepare
+from tomoskin.live.replayed import advance, replayed
 from tomoskin.live.result import Result
 from tomoskin.live.runner import Runner, Snapshot
 from tomoskin.live.scale import colour_limit
@@ -46,6 +47,7 @@ __all__ = [
     "Simulated",
     "Snapshot",
     "Workers",
+    "advance",
     "application",
     "changes_of",
     "check_page",
@@ -59,5 +61,6 @@ __all__ = [
     "prepare",
     "processors",
     "reconstruct",
+    "replayed",
     "simulate",
 ]

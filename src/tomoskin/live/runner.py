@@ -120,6 +120,7 @@ class Runner:
         skin = self.prepared.skin.name
         name = transport.name
         self.source = f"{name} of {skin}" if self.pressable else f"{skin} on {name}"
+        self._tape.opened(self.source)
         self._thread = threading.Thread(
             target=self._run, args=(transport,), name="tomoskin-runner", daemon=True
         )
@@ -140,7 +141,7 @@ class Runner:
         DataError
             When the file exists or cannot be made. What goes wrong later is an event.
         """
-        self._tape.record(path, self.source)
+        self._tape.record(path)
 
     def stop_recording(self) -> None:
         """End the recording, if there is one; returns when the file is whole."""

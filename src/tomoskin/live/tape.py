@@ -44,6 +44,7 @@ class Tape:
         self._reference: list[tuple[Frame, Mark]] = []
         self._info: Info | None = None
         self._truth: tuple[Press, ...] = ()
+        self._source = ""
 
     @property
     def path(self) -> Path | None:
@@ -51,7 +52,7 @@ class Tape:
         recorder = self._recorder
         return recorder.path if recorder is not None and recorder.running else None
 
-    def record(self, path: Path, source: str) -> None:
+    def record(self, path: Path) -> None:
         """Begin to record, and end what was being recorded.
 
         Raises
@@ -64,7 +65,7 @@ class Tape:
         epoch = time.time() - time.monotonic()
         session = SessionWriter(path, self._prepared.skin, epoch=epoch, start=now)
         recorder = Recorder(session, self._pixels(), self._say)
-        recorder.settings(now, {"source": source})
+        recorder.settings(now, {"source": self._source})
         recorder.truth(now, self._truth)
         for frame, mark in tuple(self._reference):
             recorder.frame(frame, mark | Mark.EARLIER)
@@ -78,6 +79,12 @@ class Tape:
         recorder, self._recorder = self._recorder, None
         if recorder is not None:
             recorder.stop()
+
+    def opened(self, source: str) -> None:
+        """A source has been opened, and this is what it is called."""
+        self._source = source
+        if self._recorder:
+            self._recorder.settings(self._clock(), {"source": source})
 
     def read(self, host_time: float, data: bytes) -> None:
         """Bytes from the source."""

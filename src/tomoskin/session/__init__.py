@@ -2,14 +2,17 @@
 
 from tomoskin.session.alpha_picture import write_choices
 from tomoskin.session.display import Display, circular_average
+from tomoskin.session.info import SessionInfo, session_info
 from tomoskin.session.interchange import write_interchange
 from tomoskin.session.labelled_set import is_done, join_shards, shard_path, write_whole
 from tomoskin.session.layout import Mark, MarkedFrame
 from tomoskin.session.merit_picture import write_merit, write_merit_table
 from tomoskin.session.picture import MOST_PANELS, Panel, plot, write_picture
-from tomoskin.session.reader import read_recording
+from tomoskin.session.reader import is_session, read_recording
 from tomoskin.session.recorder import Recorder
 from tomoskin.session.recording import Recording
+from tomoskin.session.repair import Lost, Repaired, repair
+from tomoskin.session.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.session.session_reader import (
     RecordedTouches,
     SessionReader,
@@ -23,21 +26,30 @@ from tomoskin.session.writer import SessionWriter
 __all__ = [
     "MOST_PANELS",
     "Display",
+    "Lost",
     "Mark",
     "MarkedFrame",
     "Panel",
     "RecordedTouches",
     "Recorder",
     "Recording",
+    "Repaired",
+    "ReplayTransport",
+    "SessionInfo",
     "SessionReader",
     "SessionWriter",
     "Truth",
     "circular_average",
     "is_done",
+    "is_session",
     "join_shards",
+    "open_replay",
+    "parse_replay",
     "plot",
     "read_recording",
     "read_session",
+    "repair",
+    "session_info",
     "shard_path",
     "write_choices",
     "write_interchange",

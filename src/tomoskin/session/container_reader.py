@@ -57,11 +57,12 @@ class Chunk:
     first: int
     last: int
     crc: int
+    compression: str
     records: bytes = field(repr=False)
 
 
 class Fields:
-    """Takes fields off the body of a record; ``struct.error`` or ValueError when it is short."""
+    """Takes fields off the body of a record; ValueError when it is short or no text."""
 
     def __init__(self, body: bytes) -> None:
         self._body = body
@@ -69,8 +70,8 @@ class Fields:
 
     def numbers(self, layout: str) -> tuple[int, ...]:
         """Numbers in a layout of :mod:`struct`."""
-        found: tuple[int, ...] = struct.unpack_from("<" + layout, self._body, self.place)
-        self.place += struct.calcsize("<" + layout)
+        data = self.bytes(struct.calcsize("<" + layout))
+        found: tuple[int, ...] = struct.unpack("<" + layout, data)
         return found
 
     def bytes(self, length: int) -> bytes:
@@ -150,10 +151,9 @@ class ContainerReader:
         found = {}
         for opcode, offset, body in self._front():
             if opcode == mcap.METADATA:
-                fields = Fields(body)
                 with self._understood(offset):
-                    name = fields.text()
-                    found[name] = fields.mapping()
+                    name, values = parse_metadata(body)
+                found[name] = values
         return found
 
     def attachments(self) -> Iterator[Attachment]:
@@ -176,9 +176,9 @@ class ContainerReader:
 
     def chunks(self, since: int = 0) -> Iterator[Chunk]:
         """Chunks from the first that may hold log times of ``since`` ns or later; CRC checked."""
-        for opcode, offset, length in self._records(self._offset_of(since)):
+        for opcode, offset, _ in self._records(self._offset_of(since)):
             if opcode == mcap.CHUNK:
-                yield self._chunk(offset, length)
+                yield self._chunk(offset)
 
     def messages(self, wanted: frozenset[int], since: int = 0) -> Iterator[Message]:
         """Messages of the channels ``wanted`` logged at ``since`` ns or later, in file order."""
@@ -245,17 +245,8 @@ class ContainerReader:
                 yield offset
 
     def _attachment(self, offset: int) -> Attachment:
-        body = self._body(offset)
-        fields = Fields(body)
         with self._understood(offset):
-            fields.numbers("QQ")
-            name, media_type = fields.text(), fields.text()
-            data = fields.bytes(fields.numbers("Q")[0])
-            end = fields.place
-            crc = fields.numbers("I")[0]
-        if crc and zlib.crc32(body[:end]) != crc:
-            raise self._damaged(offset, f"the file {name} inside has another CRC")
-        return Attachment(name, media_type, data)
+            return parse_attachment(self._body(offset))
 
     def _offset_of(self, since: int) -> int:
         """Where to begin so as to meet everything from ``since`` on."""
@@ -295,22 +286,18 @@ class ContainerReader:
             raise self._damaged(place, why)
         self.torn = f"was not ended: {why} at byte {place} of {self.size}"
 
-    def _chunk(self, offset: int, length: int) -> Chunk:
-        fields = Fields(self._body(offset))
+    def _chunk(self, offset: int) -> Chunk:
         with self._understood(offset):
-            first, last = fields.numbers("QQ")
-            size, crc = fields.numbers("QI")
-            compression = fields.text()
-            data = fields.bytes(fields.numbers("Q")[0])
-        if compression:
+            chunk = parse_chunk(self._body(offset), offset)
+        if chunk.compression:
             raise DataError(
-                f"its chunks are compressed ({compression}); those of a session are not",
+                f"its chunks are compressed ({chunk.compression}); those of a session are not",
                 where=f"{self.where}, byte {offset}",
                 hint="decompress it first: mcap decompress",
             )
-        if len(data) != size or zlib.crc32(data) != crc:
+        if zlib.crc32(chunk.records) != chunk.crc:
             raise self._damaged(offset, "the CRC of a chunk differs")
-        return Chunk(offset, mcap.PREFIX.size + length, first, last, crc, data)
+        return chunk
 
     def _body(self, offset: int) -> bytes:
         head = self._read(offset, mcap.PREFIX.size)
@@ -336,6 +323,38 @@ class ContainerReader:
         return _Understood(lambda why: self._damaged(offset, why))
 
 
+def parse_chunk(body: bytes, offset: int) -> Chunk:
+    """A chunk whose record is at ``offset``; ValueError when it does not add up."""
+    fields = Fields(body)
+    first, last = fields.numbers("QQ")
+    size, crc = fields.numbers("QI")
+    compression = fields.text()
+    data = fields.bytes(fields.numbers("Q")[0])
+    if not compression and len(data) != size:
+        raise ValueError(f"a chunk of {size} bytes holds {len(data)}")
+    length = mcap.PREFIX.size + len(body)
+    return Chunk(offset, length, first, last, crc, compression, data)
+
+
+def parse_attachment(body: bytes) -> Attachment:
+    """A file inside; ValueError when it does not add up or its CRC differs."""
+    fields = Fields(body)
+    fields.numbers("QQ")
+    name, media_type = fields.text(), fields.text()
+    data = fields.bytes(fields.numbers("Q")[0])
+    end = fields.place
+    if zlib.crc32(body[:end]) != fields.numbers("I")[0]:
+        raise ValueError(f"the CRC of the file {name} inside differs")
+    return Attachment(name, media_type, data)
+
+
+def parse_metadata(body: bytes) -> tuple[str, dict[str, str]]:
+    """Named strings; ValueError when they do not add up."""
+    fields = Fields(body)
+    name = fields.text()
+    return name, fields.mapping()
+
+
 @dataclass
 class _Understood:
     """Turns what a malformed body raises into the reader's error."""
@@ -346,7 +365,7 @@ class _Understood:
         pass
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, struct.error | ValueError):
+        if isinstance(error, ValueError):
             raise self.error(str(error)) from error
 
 

@@ -30,7 +30,7 @@ def read_recording(path: Path) -> Recording:
     DataError
         When the file cannot be read or is of no known kind; the message lists its keys.
     """
-    if _beginning(path) == MAGIC:
+    if is_session(path):
         return read_session(path)
     arrays = load_arrays(path)
     for detects, parse in FORMATS:
@@ -41,6 +41,11 @@ def read_recording(path: Path) -> Recording:
         f"{', '.join(sorted(arrays)) or 'of an empty archive'}",
         where=str(path),
     )
+
+
+def is_session(path: Path) -> bool:
+    """Whether the file begins as a session does; DataError when it cannot be read."""
+    return _beginning(path) == MAGIC
 
 
 def _beginning(path: Path) -> bytes:

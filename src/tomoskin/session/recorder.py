@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tomoskin.core import DataError, Event, Frame, Image, PixelMap, Touch
+from tomoskin.session.clock import ClockFitter
 from tomoskin.session.layout import Mark
 from tomoskin.session.writer import SessionWriter
 
@@ -18,6 +19,9 @@ MOST_WAITING = 64 << 20
 
 IMAGE_PERIOD = 0.2
 """Seconds between two images in the file, by host time."""
+
+CLOCK_PERIOD = 10.0
+"""Seconds between two fits of the device's clock."""
 
 _ROUTINE = 1.0
 """Seconds after which the thread looks after the file though nothing came."""
@@ -67,6 +71,7 @@ class Recorder:
         self._behind = 0
         self._last_image = float("-inf")
         self._had_touches = False
+        self._clock, self._next_fit = ClockFitter(), float("-inf")
         self._failed = False
         self._thread = threading.Thread(target=self._run, name="tomoskin-recorder", daemon=True)
         self._thread.start()
@@ -82,6 +87,9 @@ class Recorder:
 
     def frame(self, frame: Frame, mark: Mark) -> None:
         """One frame, and what becomes of it; after the raw bytes that it came in."""
+        if not mark & Mark.EARLIER:
+            self._clock.add(frame.ticks, frame.host_time)
+            self._fit_clock(frame.host_time)
         self._put(frame.samples.nbytes, self._session.frame, frame, mark)
 
     def result(
@@ -116,14 +124,16 @@ class Recorder:
         """How the run is set."""
         self._put(0, self._session.settings, host_time, settings)
 
-    def clock(self, host_time: float, fit: Any) -> None:
-        """A fit of the device's clock."""
-        self._put(0, self._session.clock, host_time, fit)
-
     def stop(self) -> None:
         """Write what waits, end the file and return; a second call does nothing."""
         self._queue.put(None)
         self._thread.join()
+
+    def _fit_clock(self, host_time: float) -> None:
+        """Now and then a fit of the device's clock."""
+        if host_time >= self._next_fit and (fit := self._clock.fit) is not None:
+            self._put(0, self._session.clock, host_time, fit)
+            self._next_fit = host_time + CLOCK_PERIOD
 
     def _image_is_due(self, host_time: float) -> bool:
         """Whether a period has gone by, or the time has been set back."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -99,6 +100,14 @@ class SessionReader:
         """Ns at which something at ``host_time`` is logged."""
         seconds = host_time + self.epoch
         return round(1e9 * seconds) if seconds > 0 else 0
+
+    def counts(self) -> dict[str, int]:
+        """Messages by topic; goes through a file without its end."""
+        if self.totals:
+            found = self.totals.counts
+        else:
+            found = Counter(m.channel for m in self._file.messages(frozenset(channels.TOPICS)))
+        return {topic: found.get(number, 0) for number, topic in channels.TOPICS.items()}
 
     def attachments(self) -> dict[str, bytes]:
         """Files inside by their name."""

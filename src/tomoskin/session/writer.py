@@ -65,7 +65,7 @@ class SessionWriter:
         self.epoch = epoch
         self._now = self._start = start
         self._flushed = 0
-        with self._said():
+        with said_of(self.path):
             file = path.open("xb", buffering=0)
             self._file = ContainerWriter(file, LIBRARY, channels.SCHEMAS, channels.CHANNELS)
             self._file.describe(ABOUT, _about(skin, epoch))
@@ -133,7 +133,7 @@ class SessionWriter:
 
     def settle(self) -> None:
         """Write the open chunk, and see that the file is still in its folder."""
-        with self._said():
+        with said_of(self.path):
             self._file.flush()
         if not self._file.is_linked:
             raise DataError("has been removed while it was written", where=str(self.path))
@@ -148,12 +148,12 @@ class SessionWriter:
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Put a file inside: a calibration, a photograph."""
-        with self._said():
+        with said_of(self.path):
             self._file.attach(name, media_type, data, self._log_time(self._now))
 
     def close(self) -> None:
         """End the file with its index; a second call does nothing."""
-        with self._said():
+        with said_of(self.path):
             self._file.close()
 
     def __enter__(self) -> Self:
@@ -175,7 +175,7 @@ class SessionWriter:
     def _put(self, channel: int, host_time: float, data: bytes) -> None:
         log_time = self._log_time(host_time)
         self._now = host_time
-        with self._said():
+        with said_of(self.path):
             self._file.message(channel, log_time, data)
             if log_time - self._flushed >= PATIENCE:
                 self._file.flush()
@@ -191,23 +191,24 @@ class SessionWriter:
             )
         return round(seconds * 1e9)
 
-    @contextmanager
-    def _said(self) -> Iterator[None]:
-        """OSError → DataError with the file's name."""
-        try:
-            yield
-        except FileExistsError:
-            raise DataError(
-                "exists already, and recordings are never written over",
-                where=str(self.path),
-                hint="choose another name",
-            ) from None
-        except OSError as error:
-            raise DataError(
-                f"cannot be written: {error.strerror or error}",
-                where=str(self.path),
-                hint="look at the disk",
-            ) from error
+
+@contextmanager
+def said_of(path: Path) -> Iterator[None]:
+    """OSError → DataError that names the file."""
+    try:
+        yield
+    except FileExistsError:
+        raise DataError(
+            "exists already, and recordings are never written over",
+            where=str(path),
+            hint="choose another name",
+        ) from None
+    except OSError as error:
+        raise DataError(
+            f"cannot be read or written: {error.strerror or error}",
+            where=str(path),
+            hint="look at the disk",
+        ) from error
 
 
 def _about(skin: Skin, epoch: float) -> dict[str, str]:

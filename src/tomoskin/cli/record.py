@@ -1,0 +1,100 @@
+"""``tomoskin record``: from a source to a session file, without a page."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tomoskin.cli.ending import ended_by_signals
+from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.progress import Bar
+from tomoskin.cli.skin_choice import SkinOption, skin_for_source
+from tomoskin.core import DataError
+
+if TYPE_CHECKING:
+    from tomoskin.live import Runner
+
+_OFTEN = 0.1
+
+
+def record(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A new file, such as run.mcap.")],
+    skin: SkinOption = None,
+    source: Annotated[str, typer.Option(help="twin, serial:PORT, replay:FILE, …")] = "twin",
+    seconds: Annotated[
+        float | None, typer.Option(min=0.0, help="How long; without it until Ctrl-C.")
+    ] = None,
+    frames: Annotated[int | None, typer.Option(min=1, help="How many frames.")] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Record a session: raw bytes, frames, touches and images, without a page."""
+    from tomoskin import live as room
+    from tomoskin.source import open_source
+
+    chosen = skin_for_source(skin, source)
+    runner = room.Runner(room.prepare(chosen), lambda: open_source(source, chosen))
+    with ended_by_signals(), recording_to(runner, file):
+        _wait(runner, seconds, frames)
+        if (problem := _problem(runner)) is not None:
+            raise DataError(problem)
+    _report(file, runner, json=json)
+
+
+@contextlib.contextmanager
+def recording_to(runner: Runner, file: Path | None) -> Iterator[None]:
+    """The runner runs while the block lasts, and records from its first byte to ``file``."""
+    if file is not None:
+        runner.record(file)
+    try:
+        runner.start()
+    except BaseException:
+        runner.stop()
+        if file is not None:
+            file.unlink(missing_ok=True)
+        raise
+    try:
+        yield
+    finally:
+        runner.stop()
+
+
+def _wait(runner: Runner, seconds: float | None, frames: int | None) -> None:
+    """Until there is enough, the recording has ended by itself, or a signal comes."""
+    nothing = threading.Event()
+    elapsed = 0.0
+    with Bar("recording") as bar:
+        while runner.status().recording is not None:
+            done = runner.status().frames
+            shares = [(elapsed, seconds), (done, frames)]
+            known = [(part, whole) for part, whole in shares if whole is not None]
+            for part, whole in known:
+                if part >= whole:
+                    return
+            for part, whole in known[:1]:
+                bar(part, whole)
+            nothing.wait(_OFTEN if seconds is None else min(_OFTEN, seconds - elapsed))
+            elapsed += _OFTEN
+
+
+def _problem(runner: Runner) -> str | None:
+    """Why the recording has ended by itself, or None."""
+    if runner.status().recording is not None:
+        return None
+    _, events = runner.events.since(0)
+    texts = [event.text for event in events if event.kind == "recording-stopped"]
+    return texts[-1] if texts else "the recording has ended"
+
+
+def _report(file: Path, runner: Runner, *, json: bool) -> None:
+    status = runner.status()
+    size = file.stat().st_size
+    if json:
+        emit({"file": str(file), "bytes": size, "frames": status.frames, "lost": status.gaps,
+              "dropped": status.dropped, "corrupt": status.corrupt})  # fmt: skip
+        return
+    typer.echo(f"{file}: {status.frames} frames, {size / 1e6:.1f} MB, {status.gaps} lost")

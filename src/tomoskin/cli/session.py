@@ -1,0 +1,102 @@
+"""``tomoskin session``: what a recorded session holds, mended, and in other formats."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.progress import Bar
+
+if TYPE_CHECKING:
+    from tomoskin.session import Lost, Repaired, SessionInfo
+
+app = typer.Typer(help="Inspect, mend and convert recorded sessions.", no_args_is_help=True)
+
+_File = Annotated[Path, typer.Argument(metavar="FILE", help="A session, such as run.mcap.")]
+
+
+@app.command()
+def info(file: _File, json: JsonFlag = False) -> None:
+    """Say what a session holds: duration, rate, gaps, drops, skin, touches."""
+    from tomoskin.session import session_info
+
+    with Bar("reading") as bar:
+        found = session_info(file, bar)
+    if json:
+        emit(asdict(found))
+        return
+    for name, text in _lines(found):
+        typer.echo(f"{name:<12} {text}")
+    if found.torn:
+        typer.echo(f"tomoskin: {file}: {found.torn} (tomoskin session repair ends it)", err=True)
+
+
+@app.command()
+def repair(
+    file: _File,
+    out: Annotated[
+        Path | None, typer.Option(help="Where to; without it FILE with .repaired in its name.")
+    ] = None,
+    skin: Annotated[
+        str | None, typer.Option(help="Built-in name or path, where the file's own is lost.")
+    ] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Recover every whole chunk of a damaged session into a new file."""
+    from tomoskin.session import repair
+    from tomoskin.skin import Skin
+
+    target = out or file.with_suffix(f".repaired{file.suffix}")
+    with Bar("repairing") as bar:
+        found = repair(file, target, skin=Skin.load(skin) if skin else None, advance=bar)
+    if json:
+        emit(asdict(found))
+        return
+    frames = found.messages.get("/frames", 0)
+    typer.echo(f"{target}: {found.chunks} chunks, {frames} frames recovered; {file} is untouched")
+    for text in _losses(found):
+        typer.echo(text)
+
+
+def _lines(found: SessionInfo) -> list[tuple[str, str]]:
+    begun = ""
+    if found.begun is not None:
+        begun = f", begun {datetime.fromtimestamp(found.begun, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    lines = [
+        ("file", f"{found.path}, {found.size / 1e6:.2f} MB"),
+        ("duration", f"{found.duration:.2f} s{begun}"),
+        ("skin", f"{found.skin}: {found.electrodes} electrodes, {found.rows} measurements"),
+        ("frames", f"{found.frames}, {found.rate:.1f} frames/s, longest pause "
+                   f"{1e3 * found.longest_pause:.0f} ms"),
+        ("missing", f"{found.lost} frames in {found.gaps} gaps, {found.dropped} dropped by the "
+                    f"board, {found.skipped} skipped, {found.held} held"),
+        ("touches", str(found.touches)),
+    ]  # fmt: skip
+    if found.device:
+        board, firmware = found.device.get("unique_id"), found.device.get("firmware")
+        lines.append(("board", f"{board}, firmware {firmware}"))
+    if found.clock:
+        rate, residual = found.clock.tick_rate, 1e3 * found.clock.residual
+        lines.append(("clock", f"{rate:.1f} ticks/s by this host, jitter {residual:.3f} ms"))
+    if found.events:
+        counted = ", ".join(f"{kind} {count}" for kind, count in sorted(found.events.items()))
+        lines.append(("events", counted))
+    return lines
+
+
+def _losses(found: Repaired) -> list[str]:
+    if not found.lost:
+        return ["nothing is lost" if found.ended else "nothing is lost but the open chunk's end"]
+    return [_loss(lost) for lost in found.lost]
+
+
+def _loss(lost: Lost) -> str:
+    size = lost.stop - lost.start
+    when = f"after {lost.after / 1e9:.3f} s" if lost.after else "at the beginning"
+    until = f", before {lost.before / 1e9:.3f} s" if lost.before is not None else ""
+    return f"lost: {size} bytes from byte {lost.start} on, {when}{until} of the log"

@@ -1,0 +1,106 @@
+"""``tomoskin record`` and ``tomoskin session``: from a twin to a file, and what it says of it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tomoskin.session import SessionReader
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A short recording of a twin that does not wait."""
+    from tomoskin.cli import main
+
+    path = tmp_path_factory.mktemp("run") / "run.mcap"
+    with pytest.raises(SystemExit) as end:
+        main(["record", str(path), "--source", "twin:fast", "--frames", "60"])
+    assert not end.value.code
+    return path
+
+
+def test_record_writes_what_was_asked_for(recorded):
+    with SessionReader(recorded) as session:
+        frames = [item.frame for item in session.frames()]
+        assert session.device()["firmware"]
+        assert session.settings()["source"] == "twin of textile-disc-8"
+        assert session.epoch > 1e9
+    assert len(frames) >= 60
+    assert [frame.sequence for frame in frames] == list(range(len(frames)))
+
+
+def test_info(tomoskin, recorded):
+    code, out, errors = tomoskin("session", "info", recorded)
+    assert (code, errors) == (0, "")
+    assert "textile-disc-8: 8 electrodes, 40 measurements" in out
+    code, out, _ = tomoskin("session", "info", recorded, "--json")
+    found = json.loads(out)
+    assert found["frames"] >= 60
+    assert found["lost"] == found["gaps"] == 0
+    assert found["torn"] == ""
+    assert found["events"]["connected"] == 1
+
+
+def test_repair_mends_a_cut_file_and_leaves_it_alone(tomoskin, recorded, tmp_path):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(recorded.read_bytes()[:-5000])
+    before = cut.read_bytes()
+    code, _, errors = tomoskin("session", "info", cut)
+    assert code == 0
+    assert "was not ended" in errors
+    code, out, _ = tomoskin("session", "repair", cut)
+    assert code == 0
+    assert "recovered" in out
+    assert cut.read_bytes() == before
+    code, _, errors = tomoskin("session", "info", tmp_path / "cut.repaired.mcap")
+    assert (code, errors) == (0, "")
+    code, _, errors = tomoskin("session", "repair", cut)
+    assert code == 1
+    assert "exists already" in errors
+
+
+def test_a_session_is_imaged_with_its_own_skin(tomoskin, tmp_path):
+    path = tmp_path / "sixteen.mcap"
+    tomoskin("record", path, "--skin", "textile-disc-16", "--source", "twin:fast", "--frames", 5)
+    code, out, _ = tomoskin("image", path, "--frames", "0:2", "--json")
+    assert code == 0
+    assert json.loads(out)["frames"] == 2
+
+
+def test_a_replay_is_recorded_with_the_skin_in_the_file(tomoskin, recorded, tmp_path):
+    again = tmp_path / "again.mcap"
+    code, _, errors = tomoskin(
+        "record", again, "--source", f"replay:{recorded}@max", "--frames", "60"
+    )
+    assert (code, errors) == (0, "")
+    with SessionReader(again) as one, SessionReader(recorded) as other:
+        pairs = zip(one.frames(), other.frames(), strict=False)
+        assert all(a.frame.host_time == b.frame.host_time for a, b in pairs)
+
+
+def test_a_source_that_cannot_be_opened_leaves_no_file(tomoskin, tmp_path):
+    code, _, errors = tomoskin("record", tmp_path / "x.mcap", "--source", "serial:nowhere")
+    assert code == 1
+    assert "no such port" in errors
+    assert not (tmp_path / "x.mcap").exists()
+
+
+def test_an_existing_file_is_refused(tomoskin, recorded):
+    code, _, errors = tomoskin("record", recorded, "--source", "twin:fast", "--frames", "1")
+    assert code == 1
+    assert "exists already" in errors
+
+
+@pytest.mark.parametrize("command", ["info", "repair"])
+def test_what_is_no_session_is_one_sentence(tomoskin, tmp_path, command):
+    path = tmp_path / "x.mcap"
+    path.write_text("not at all")
+    code, _, errors = tomoskin("session", command, path)
+    assert code == 1
+    assert errors.startswith(f"tomoskin: {path}")
+    assert len(errors.splitlines()) == 1
+    code, _, errors = tomoskin("session", command, tmp_path / "none.mcap")
+    assert code == 1
+    assert len(errors.splitlines()) == 1
