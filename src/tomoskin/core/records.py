@@ -92,12 +92,23 @@ class Image:
     """A change of conductivity per cell.
 
     ``values`` is (n_cells,) in ``unit``: "S" (sheet), "S/m" (volume) or "relative" (Δσ/σ₀).
-    ``mesh_id`` names the mesh that the values live on (``Mesh.identity``).
+    ``mesh_id`` names the mesh that the values live on (``Mesh.identity``). Images of complex
+    data are complex: conductivity, and ω times permittivity.
     """
 
     values: FloatArray
     unit: str
     mesh_id: str
+
+    @property
+    def real(self) -> Image:
+        """The change of conductivity alone."""
+        return Image(self.values.real, self.unit, self.mesh_id)
+
+    @property
+    def imag(self) -> Image:
+        """The change of ω times permittivity alone."""
+        return Image(self.values.imag, self.unit, self.mesh_id)
 
     def relative_to(self, conductivity: float) -> Image:
         """Share of the sheet's own ``conductivity`` (S or S/m): Δσ/σ₀.

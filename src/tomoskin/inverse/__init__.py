@@ -2,7 +2,13 @@
 
 from tomoskin.inverse.assembly import Assembly
 from tomoskin.inverse.choice import AlphaChoice, Curve, Evidence
+from tomoskin.inverse.cole import Cole, cole_of_regions
 from tomoskin.inverse.desired import Desired
+from tomoskin.inverse.frequency_difference import (
+    FrequencyDifference,
+    simple_change,
+    weighted_change,
+)
 from tomoskin.inverse.greit import Greit
 from tomoskin.inverse.high_pass import GaussianHighPass
 from tomoskin.inverse.laplace import Laplace, Structural
@@ -17,6 +23,7 @@ from tomoskin.inverse.picard import Picard, picard
 from tomoskin.inverse.pictures import MOST_LEFT_OUT, Pictures, pictures
 from tomoskin.inverse.priors import PRIORS, Identity, Noser, Prior, prior_matrix
 from tomoskin.inverse.problem import LinearProblem
+from tomoskin.inverse.regions import Regions
 from tomoskin.inverse.resolution import (
     averaging,
     condition_number,
@@ -39,9 +46,11 @@ __all__ = [
     "RULES",
     "AlphaChoice",
     "Assembly",
+    "Cole",
     "Curve",
     "Desired",
     "Evidence",
+    "FrequencyDifference",
     "GaussianHighPass",
     "Greit",
     "Identity",
@@ -57,6 +66,7 @@ __all__ = [
     "Picard",
     "Pictures",
     "Prior",
+    "Regions",
     "Smoothed",
     "Smoother",
     "SourceMetrics",
@@ -68,6 +78,7 @@ __all__ = [
     "along",
     "averaging",
     "choose",
+    "cole_of_regions",
     "condition_number",
     "figures",
     "noise_figure",
@@ -79,4 +90,6 @@ __all__ = [
     "resolution_matrix",
     "resolved",
     "sensitivity",
+    "simple_change",
+    "weighted_change",
 ]

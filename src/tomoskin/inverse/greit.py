@@ -124,7 +124,7 @@ class Greit(Operator):
 def _target_radius(mesh: Mesh) -> float:
     """Small, but not so small that it falls between the points that stand for a cell."""
     cell = float(mesh.volumes.max()) ** (1.0 / mesh.dimension)
-    return max(TARGET_RADIUS * float(np.ptp(mesh.points, axis=0).max()), cell)
+    return float(max(TARGET_RADIUS * np.ptp(mesh.points, axis=0).max(), cell))
 
 
 def spread_over(mesh: Mesh, count: int) -> FloatArray:

@@ -119,7 +119,8 @@ def advance(
     if not np.isfinite(time):
         raise DataError(f"expected a finite time, got {time}")
     if last is None:
-        nothing = Belief(time, np.zeros_like(data), *(2 * [np.ones(len(data))]), kept=0.0)
+        unknown = np.ones(len(data))
+        nothing = Belief(time, np.zeros_like(data), unknown, unknown, 0.0)
         return _updated(nothing, data, modes.trust)
     if time <= last.time:
         raise DataError(
