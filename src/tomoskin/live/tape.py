@@ -18,12 +18,16 @@ from tomoskin.wire import Info
 _PIXELS = 48
 """Pixels along the longer side of a recorded image: what a glance needs."""
 
+_KEPT = 3 * REFERENCE_FRAMES
+"""Frames from a reference's first on that a later recording begins with: those that made it, and
+those during which the operator followed its noise."""
+
 
 class Tape:
     """Passes everything on to the recorder of the moment, and remembers what a new one needs.
 
     The frames that made the reference are kept, so that a recording that begins later can be
-    replayed with the same reference. :meth:`record` and :meth:`stop` may come from any thread;
+    replayed with the same reference and operator. :meth:`record` and :meth:`stop` may come from any thread;
     the rest is the runner's.
 
     Parameters
@@ -124,7 +128,7 @@ class Tape:
         if mark & Mark.REFERENCE:
             self._reference = []
         left_out = mark & (Mark.HELD | Mark.SKIPPED)
-        if not left_out and len(self._reference) < REFERENCE_FRAMES:
+        if not left_out and len(self._reference) < _KEPT:
             self._reference.append((frame, mark))
 
     def _pixels(self) -> PixelMap | None:

@@ -32,7 +32,7 @@ class Mark(IntFlag):
     OPENED = 8
     """First frame since the source was opened."""
     EARLIER = 16
-    """From before the recording began: one of those that its reference was made of."""
+    """From before the recording began: what its reference and operator were made of."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
