@@ -199,6 +199,13 @@ def test_the_seed_decides_on_spread_and_temperature(skin):
     assert (sigma(1) != sigma(2)).any()
 
 
+def test_asking_for_the_load_first_changes_nothing(sheet):
+    rest = sheet.conductivity()
+    sheet.set_presses((Press(0.01, 0.02, 2.0, 0.01),))
+    assert sheet.load.depth.max() > 0
+    assert sheet.conductivity().min() < 0.95 * rest.min()
+
+
 def test_a_renewed_sheet_has_forgotten_everything(skin):
     sheet = TwinSkin.of(skin, TwinSettings.preset("hydrogel"))
     rest = sheet.conductivity()

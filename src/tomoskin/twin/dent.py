@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray
 from tomoskin.twin.contact import ContactSettings, Grid, local_points, solve_contact
 from tomoskin.twin.probe import Probe
 from tomoskin.twin.shape import Shape
@@ -26,7 +26,7 @@ _LADDER = math.sqrt(2.0)
 _REACHES = 6.0
 """A dent is followed this many reaches beyond the face: a part of e⁻⁶ is left out."""
 
-_SHIFTS = 4.0
+_SHIFTS = 3.0
 """And the strain along the sheet so many times √(stiffness / shear spring), where it fades out."""
 
 
@@ -113,6 +113,7 @@ def indent(
     (:func:`solve_contact` solves them together).
     """
     total = Load.none(len(points))
+    x, y = np.ascontiguousarray(points.T)
     for probe in probes:
         if probe.force == 0:
             continue
@@ -120,7 +121,9 @@ def indent(
         (dx, dy), turn = probe.drag, probe.angle
         along = (c * dx + s * dy, c * dy - s * dx)
         dent = _blended(probe.shape, settings, probe.force, along, blur)
-        values, near = _read(dent, local_points(probe, points))
+        reach = (dent.grid.n // 2 - 1) * dent.grid.step
+        near = np.flatnonzero((x - probe.x) ** 2 + (y - probe.y) ** 2 < reach**2)
+        values = _read(dent, local_points(probe, points[near]))
         total.depth[near] += values[:, 0]
         total.strain[near] += turned(values[:, 1:], turn)
     return total
@@ -183,24 +186,21 @@ def _rungs(shape: Shape, force: float) -> list[tuple[float, float]]:
     return [(below, 1 - part), (above, part)]
 
 
-def _read(dent: _Blend, local: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Values (m, 4), linear between the nodes, and the points (m,) that are on the grid."""
+def _read(dent: _Blend, local: FloatArray) -> FloatArray:
+    """Values (m, 4) at points (m, 2) on the grid, linear between its nodes."""
     n = dent.grid.n
-    half = (n // 2 - 1) * dent.grid.step
-    near = np.flatnonzero((np.abs(local[:, 0]) < half) & (np.abs(local[:, 1]) < half))
-    place = local[near] / dent.grid.step + n // 2
+    place = local / dent.grid.step + n // 2
     corner = place.astype(np.int64)
     fx, fy = (place - corner).T[:, :, None]
     first = corner[:, 0] * n + corner[:, 1]
     at = [dent.table.take(first + step, axis=0) for step in (0, 1, n, n + 1)]
     low = at[0] + (at[1] - at[0]) * fy
     high = at[2] + (at[3] - at[2]) * fy
-    return low + (high - low) * fx, near
+    return np.asarray(low + (high - low) * fx)
 
 
 def _fading(grid: Grid) -> FloatArray:
     """(n, n) from 1 to 0 over the outer eighth, so that nothing ends with a step."""
-    x = np.abs(np.arange(grid.n) - grid.n / 2) / (grid.n / 2)
-    fade = np.clip((1 - x) * 8, 0.0, 1.0)
-    smooth = fade**2 * (3 - 2 * fade)
-    return np.asarray(smooth[:, None] * smooth)
+    reach = (grid.n // 2 - 1) * grid.step
+    fade = np.clip((1 - np.hypot(*grid.points.T) / reach) * 8, 0.0, 1.0)
+    return np.asarray((fade**2 * (3 - 2 * fade)).reshape(grid.n, grid.n))

@@ -120,7 +120,7 @@ class TwinElectronics:
         self._time: float | None = None
         self._before = np.zeros(n)
         self._known: tuple[object, ...] = ()
-        self._lines = Lines(np.zeros((0, n)), np.zeros(n))
+        self._lines = Lines(np.zeros((0, n)), np.zeros((0, n), dtype=bool))
 
     @property
     def faults(self) -> Faults:

@@ -65,6 +65,7 @@ class TwinSkin:
         self._nothing = self._load = Load.none(n)
         self._presses: tuple[Contact, ...] = ()
         self._loaded: tuple[Contact, ...] = ()
+        self._stood: tuple[Contact, ...] = ()
         self._state = MaterialState.fresh(self.material, n)
         self._conductivity: FloatArray | None = None
         self._solved_for: FloatArray = np.empty(0)
@@ -133,9 +134,11 @@ class TwinSkin:
         ModelError
             When dt is negative or not finite.
         """
-        settled = self._presses is self._loaded and (self.material.still or dt == 0)
+        presses = self._presses
+        settled = presses is self._stood and (self.material.still or dt == 0)
         if settled and self._conductivity is not None and dt >= 0:
             return
+        self._stood = presses
         chance = self._random.standard_normal() if self.material.temperature_sd > 0 else 0.0
         self._state = material.advance(self._state, self.material, self.load, dt, chance)
         self._conductivity = material.conductivity(self._state, self.material, self._unloaded)
@@ -147,7 +150,7 @@ class TwinSkin:
         """
         if chance is not None:
             self._random = np.random.default_rng(chance)
-        self._presses = self._loaded = ()
+        self._presses = self._loaded = self._stood = ()
         self._load = self._nothing
         self._state = MaterialState.fresh(self.material, len(self._unloaded))
         self._conductivity = None

@@ -1,0 +1,128 @@
+"""The twin: exact frames per second with three moving presses, stage by stage, on one core."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from report import Report
+from tomoskin.pattern import Scan
+from tomoskin.skin import Skin
+from tomoskin.source import ScanSettings
+from tomoskin.twin import (
+    Press,
+    SampleTable,
+    ScanClock,
+    TwinElectronics,
+    TwinSettings,
+    TwinSkin,
+    make_electronics,
+    sample_table,
+)
+from tomoskin.wire import Drive
+
+CASES = (
+    ("textile-disc-16", "ideal", 3000),
+    ("textile-disc-16", "textile", 3000),
+    ("textile-disc-16", "ideal", 4800),
+    ("textile-disc-8", "textile", 1056),
+    ("tank-16", "tank", 3000),
+)
+FRAMES, ROUND = 300, 100
+PROMISED = 500
+SEED = 1
+
+
+def run(data: Path | None) -> tuple[Report, ...]:
+    """Time every case; ``data`` is not needed."""
+    del data
+    rows = tuple(_row(*case) for case in CASES)
+    report = Report(
+        "twin: presses → counts",
+        (
+            "skin",
+            "preset",
+            "triangles",
+            "dent ms",
+            "material ms",
+            "solve ms",
+            "whole frame ms",
+            "frames/s",
+            "× real time",
+        ),
+        rows,
+        (
+            f"{FRAMES} frames, each with three flat round presses of 12 mm and 3 N that have moved "
+            f"on a circle since the frame before; seed {SEED}",
+            "processor time of this process; every frame is solved exactly",
+            f"promised: {PROMISED} frames/s for 16 electrodes at 3k triangles",
+            "ideal: a sheet that conducts alike in all directions; textile: a tensor per cell, "
+            "creep, play, temperature, all vices of the board",
+        ),
+    )
+    return (report,)
+
+
+def _row(name: str, preset: str, triangles: int) -> tuple[object, ...]:
+    settings = TwinSettings.preset(preset, SEED)
+    cells = round(triangles / settings.mesh_ratio)
+    skin = Skin.load(name).altered({"mesh": {"cells": cells}})
+    board, table = make_electronics(skin, settings), _table(skin)
+    sheet = board.sheet
+    for number in range(10):
+        _frame(board, table, number, skin)
+    whole, dent, sigma, solve = np.sum(
+        [
+            (_spent(lambda k=k: _frame(board, table, k, skin)), *_stages(sheet, _presses(k, skin)))
+            for k in range(10, FRAMES)
+        ],
+        axis=0,
+    ) * (1e3 / (FRAMES - 10))
+    rate = 1e3 / whole
+    return (
+        name,
+        preset,
+        len(sheet.model.mesh.cells),
+        *(round(float(part), 3) for part in (dent, sigma, solve, whole)),
+        round(float(rate)),
+        round(float(rate * table.seconds), 1),
+    )
+
+
+def _frame(board: TwinElectronics, table: SampleTable, number: int, skin: Skin) -> None:
+    board.sheet.set_presses(_presses(number, skin))
+    board.sample(table, number * table.seconds)
+
+
+def _stages(sheet: TwinSkin, presses: tuple[Press, ...]) -> tuple[float, float, float]:
+    """s of dent, material and solve: each is asked for by itself and kept for the next."""
+    sheet.set_presses(())
+    sheet.resistance()
+    sheet.set_presses(presses)
+    return _spent(lambda: sheet.load), _spent(sheet.conductivity), _spent(sheet.resistance)
+
+
+def _spent(work: Callable[[], object]) -> float:
+    start = time.process_time()
+    work()
+    return time.process_time() - start
+
+
+def _presses(number: int, skin: Skin) -> tuple[Press, ...]:
+    turn = 2 * np.pi * (number / ROUND + np.arange(3) / 3)
+    reach = 0.5 * float(np.linalg.norm(skin.electrode_centres, axis=1).min())
+    places = reach * np.column_stack([np.cos(turn), np.sin(turn)])
+    return tuple(Press(x, y, 3.0, 0.012) for x, y in places.tolist())
+
+
+def _table(skin: Skin) -> SampleTable:
+    scan, asked = Scan.of(skin.pattern()), ScanSettings.of(skin)
+    drives = [
+        Drive(source, sink, mask)
+        for (source, sink), mask in zip(scan.drives.tolist(), scan.masks.tolist(), strict=True)
+    ]
+    clock = ScanClock(asked.dead_time, asked.settling, asked.conversion)
+    return sample_table(drives, asked.oversampling, clock)
