@@ -11,7 +11,15 @@ from scipy.special import gamma, kv
 from golden import mismatch
 from shapes import box, disc
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.inverse import PRIORS, Laplace, Matern, Noser, Structural, prior_matrix
+from tomoskin.inverse import (
+    PRIORS,
+    Laplace,
+    Matern,
+    Noser,
+    Structural,
+    named_prior,
+    prior_matrix,
+)
 from tomoskin.mesh import Mesh
 
 
@@ -179,3 +187,12 @@ def test_a_smoothness_that_is_not_known() -> None:
     plane = disc(8)
     with pytest.raises(ModelError, match=r"expected a smoothness among 0.5, 1.5, 2.5, got 1.0"):
         Matern(0.1, smoothness=1.0).penalty(plane, jacobian(plane))
+
+
+def test_a_named_prior_takes_what_the_skin_file_says() -> None:
+    assert named_prior("noser", exponent=1.0) == Noser(1.0)
+    assert named_prior("exponential", correlation_length=0.02) == Matern(0.02, 0.5)
+    assert named_prior("matern") == Matern(None, 1.5)
+    assert named_prior("laplace", exponent=1.0) == Laplace()
+    with pytest.raises(ModelError, match=r'expected a prior among .*, got "tv"'):
+        named_prior("tv")

@@ -186,7 +186,7 @@ ADDED = {
     "infinite": ("[inverse]\nalpha = inf", "[inverse] alpha", "got inf"),
     "alpha as text": ('[inverse]\nalpha = "1"', "[inverse] alpha", 'got "1"'),
     "alpha of zero": ("[inverse]\nalpha = 0", "[inverse] alpha", "a number from 1e-09"),
-    "unknown prior": ('[inverse]\nprior = "tv"', "[inverse] prior", 'or "noser", got "tv"'),
+    "unknown prior": ('[inverse]\nprior = "tv"', "[inverse] prior", 'or "matern", got "tv"'),
     "unknown pattern": ('pattern = "adjacnt"', "[drive]", "expected a pattern among adjacent"),
     "pattern that cannot be": ('pattern = "skip:9"', "[drive]", "expected k from 0 to 6"),
     "pattern and tables": (

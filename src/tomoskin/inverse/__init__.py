@@ -21,7 +21,7 @@ from tomoskin.inverse.one_step import OneStep
 from tomoskin.inverse.operator import Operator
 from tomoskin.inverse.picard import Picard, picard
 from tomoskin.inverse.pictures import MOST_LEFT_OUT, Pictures, pictures
-from tomoskin.inverse.priors import PRIORS, Identity, Noser, Prior, prior_matrix
+from tomoskin.inverse.priors import PRIORS, Identity, Noser, Prior, named_prior, prior_matrix
 from tomoskin.inverse.problem import LinearProblem
 from tomoskin.inverse.regions import Regions
 from tomoskin.inverse.resolution import (
@@ -81,6 +81,7 @@ __all__ = [
     "cole_of_regions",
     "condition_number",
     "figures",
+    "named_prior",
     "noise_figure",
     "noise_weights",
     "picard",

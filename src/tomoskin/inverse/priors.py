@@ -6,7 +6,7 @@ penalty xᵀQx. The names in a skin file stand for the priors in ``PRIORS``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -69,6 +69,26 @@ PRIORS: dict[str, Prior] = {
 """Priors by the name that a skin file uses."""
 
 
+def named_prior(
+    name: str, *, exponent: float = 0.5, correlation_length: float | None = None
+) -> Prior:
+    """The prior of that name, with what it takes: NOSER's exponent, a Matérn prior's length, m.
+
+    Raises
+    ------
+    ModelError
+        When the name is not known.
+    """
+    if name not in PRIORS:
+        raise ModelError(f'expected a prior among {", ".join(PRIORS)}, got "{name}"')
+    prior = PRIORS[name]
+    if isinstance(prior, Noser):
+        return replace(prior, exponent=exponent)
+    if isinstance(prior, Matern):
+        return replace(prior, length=correlation_length)
+    return prior
+
+
 def penalty_of(prior: PriorLike, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
     """Penalty of a prior by name, of a prior, or of a matrix of the caller's own, checked.
 
@@ -79,9 +99,7 @@ def penalty_of(prior: PriorLike, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
         Q is not positive semi-definite.
     """
     if isinstance(prior, str):
-        if prior not in PRIORS:
-            raise ModelError(f'expected a prior among {", ".join(PRIORS)}, got "{prior}"')
-        prior = PRIORS[prior]
+        prior = named_prior(prior)
     if hasattr(prior, "penalty"):
         penalty: Penalty = prior.penalty(mesh, jacobian)
         return penalty

@@ -8,7 +8,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel
-from tomoskin.inverse import AlphaChoice, LightTouch, LinearProblem, Operator, Spectrum
+from tomoskin.inverse import AlphaChoice, LightTouch, LinearProblem, Operator, Spectrum, named_prior
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.signal import Readout, Reference, difference_noise
@@ -79,7 +79,11 @@ def prepare(skin: Skin) -> Prepared:
     settings = skin.inverse
     problem = LinearProblem.of(
         model,
-        settings.prior,
+        named_prior(
+            settings.prior,
+            exponent=settings.exponent,
+            correlation_length=settings.correlation_length,
+        ),
         conductivity=skin.conductivity,
         difference=settings.difference,
     )

@@ -263,9 +263,21 @@ SECTIONS: tuple[Section, ...] = (
         (
             Key(
                 "prior",
-                Choice(("identity", "laplace", "gaussian", "noser")),
+                Choice(("identity", "laplace", "gaussian", "noser", "exponential", "matern")),
                 "What is held to be likely.",
                 default="noser",
+            ),
+            Key(
+                "exponent",
+                Number(0, 2),
+                "With noser: the power of a cell's sensitivity that weighs it down.",
+                default=0.5,
+            ),
+            Key(
+                "correlation_length",
+                Quantity("length", "mm", 0.1, 5000),
+                "With exponential and matern: how far a change is alike; without it a tenth of "
+                "the sheet's extent.",
             ),
             Key(
                 "alpha",

@@ -20,14 +20,17 @@ class ReadoutSettings:
 
 @dataclass(frozen=True, slots=True)
 class InverseSettings:
-    """Prior ("identity", "laplace", "gaussian", "noser"), its weight, and the difference.
+    """Prior by name, its weight, the difference, and what the prior takes.
 
-    ``alpha`` is a number or "auto": chosen by the noise.
+    ``alpha`` is a number or "auto": chosen by the noise. ``correlation_length`` is in m; None is
+    a tenth of the sheet's extent.
     """
 
     prior: str
     alpha: float | str
     difference: str
+    exponent: float = 0.5
+    correlation_length: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
