@@ -76,6 +76,8 @@ def test_idle_frames_with_known_noise_give_no_touch(save, image, tmp_path) -> No
 
 
 def test_reference_from_a_file_or_in_the_file(save, image, tmp_path, frames) -> None:
+    """With alpha by hand: the noise, which only the first tells, would choose another one."""
+    image = partial(image, "--alpha", "0.05")
     idle = save("idle.npz", voltages=frames[:3])
     one, two = tmp_path / "one.csv", tmp_path / "two.csv"
     assert image(save("a.npz", voltages=frames[3:]), "--reference", idle, "--touches", one)[0] == 0
