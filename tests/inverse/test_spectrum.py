@@ -61,6 +61,15 @@ def test_operator_with_a_prior_and_weights_of_the_users_own(form: str) -> None:
     assert mismatch(Spectrum.of(p).operator(0.05).matrix, p.operator(0.05).matrix) < 1e-9
 
 
+@pytest.mark.parametrize("prior", ["noser", "laplace"])
+def test_operator_of_a_complex_problem(prior: str) -> None:
+    p = problem(prior, conductivity=1.0 + 0.3j)
+    got, expected = Spectrum.of(p).operator(0.05), p.operator(0.05)
+    assert np.iscomplexobj(expected.matrix)
+    assert mismatch(got.matrix, expected.matrix) < 1e-9
+    assert mismatch(got.precision, expected.precision) < 1e-9
+
+
 def test_operator_where_every_part_of_the_mesh_is_free() -> None:
     """A prior that looks at differences within two halves only: two free images."""
     centroids = model().mesh.centroids

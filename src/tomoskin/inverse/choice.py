@@ -88,6 +88,8 @@ class Evidence:
             raise DataError(
                 "there are no frames of a touched skin", hint="give a recording with touches"
             )
+        if np.iscomplexobj(self.frames):
+            raise DataError("expected real difference data, got complex")
         frames = np.asarray(self.frames, dtype=np.float64)
         if frames.ndim != 2 or frames.shape[1] != n_meas:
             raise DataError(f"expected frames of shape (n, {n_meas}), got {frames.shape}")
