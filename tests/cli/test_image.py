@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -143,6 +144,26 @@ def test_json_says_the_same(save, image) -> None:
     assert found["frames"] == 4
     assert [t["frame"] for t in found["touches"]][-1] == 3
     assert found["agreement"] > 0.99
+
+
+def test_a_dead_channel_is_left_out_and_named(save, image, tmp_path, frames) -> None:
+    broken = frames.copy()
+    rows = SKIN.pattern().rows_of(6)[:10]
+    broken[:, rows] = np.nan
+    table = tmp_path / "touches.csv"
+    code, _, err = image(save(voltages=broken), "--touches", table)
+    assert code == 0
+    assert "10 rows hold no finite values and were left out" in err
+    assert all(SKIN.pattern().row_text(row) in err for row in rows)
+    assert math.dist(places(table)[3], PLACE) < 0.015
+
+
+def test_too_many_dead_channels_are_refused(save, image, frames) -> None:
+    broken = frames.copy()
+    broken[:, :11] = np.nan
+    code, _, err = image(save(voltages=broken))
+    assert code == 1
+    assert "11 of 40 rows hold no finite values, too many to leave out: row 0: source" in err
 
 
 def test_a_frame_that_is_not_finite_is_left_out_and_named(save, image, tmp_path, frames) -> None:

@@ -16,6 +16,7 @@ from tomoskin.cli.skin_choice import SkinOption, skin_for_file
 if TYPE_CHECKING:
     from tomoskin.core import IntArray
     from tomoskin.live import Reconstruction
+    from tomoskin.pattern import Pattern
     from tomoskin.session import Recording
 
 
@@ -53,7 +54,7 @@ def image(
         _write_touches(touches, whole, found)
     if out is not None:
         write(out, prepared, found, display)
-    _report(recording, found, json=json)
+    _report(recording, found, prepared.pattern, json=json)
 
 
 def _writer(out: Path | None) -> Any:
@@ -75,9 +76,16 @@ def _write_touches(path: Path, recording: Recording, found: Reconstruction) -> N
     write_touches(path, ((f, float(recording.time[f]), t) for f, t in rows))
 
 
-def _report(source: Path, found: Reconstruction, *, json: bool) -> None:
+def _report(source: Path, found: Reconstruction, pattern: Pattern, *, json: bool) -> None:
     from tomoskin.live import DOUBTED
 
+    if len(found.rows_left_out):
+        rows = found.rows_left_out.tolist()
+        typer.echo(
+            f"tomoskin: {source}: {len(rows)} rows hold no finite values and were left out: "
+            + "; ".join(map(pattern.row_text, rows)),
+            err=True,
+        )
     if len(found.left_out):
         typer.echo(
             f"tomoskin: {source}: {len(found.left_out)} frames hold values that are not finite and "
@@ -113,6 +121,7 @@ def _document(found: Reconstruction) -> dict[str, Any]:
     return {
         "frames": len(found.frames),
         "left_out": found.left_out.tolist(),
+        "rows_left_out": found.rows_left_out.tolist(),
         "agreement": found.agreement,
         "unit": found.unit,
         "alpha": found.choice.alpha,

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray, Touch
 from tomoskin.inverse import AlphaChoice, Evidence
+from tomoskin.live.dead_rows import as_the_model, dead_rows
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.tune import tuned, tuned_by_rule
+from tomoskin.pattern import Pattern
 from tomoskin.session import Recording
 from tomoskin.signal import Reference, difference, in_phase
 from tomoskin.touch import NoiseFloor, Tracker
@@ -43,6 +45,8 @@ class Reconstruction:
         Cosine between the reference and the model's voltages, NaN where there is no reference.
     choice
         The alpha of the images, and what chose it.
+    rows_left_out
+        (r,) rows of the pattern that hold no finite values, left out of every image.
     """
 
     frames: IntArray
@@ -52,6 +56,7 @@ class Reconstruction:
     touches: tuple[tuple[Touch, ...], ...]
     agreement: float
     choice: AlphaChoice
+    rows_left_out: IntArray
 
     def numbered_from(self, first: int) -> Reconstruction:
         """Frames counted from ``first``, for a part of a longer recording."""
@@ -72,7 +77,7 @@ class Changes:
         (n, 2) m, where the skin was touched, or None.
     reference
         Mean and noise of the idle frames; None where the recording holds differences.
-    agreement
+    agreement, rows_left_out
         As in :class:`Reconstruction`.
     """
 
@@ -82,6 +87,7 @@ class Changes:
     places: FloatArray | None
     reference: Reference | None
     agreement: float
+    rows_left_out: IntArray
 
     def evidence(self, prepared: Prepared) -> Evidence:
         """What the recording tells a rule that chooses alpha."""
@@ -117,37 +123,47 @@ def reconstruct(
     Raises
     ------
     DataError
-        When the reference does not look like this skin, no frame is left, or the recording
-        lacks what the rule needs.
+        When the rows are not in the pattern's order, the reference does not look like this
+        skin, too few frames or rows are left, or the recording lacks what the rule needs.
     ModelError
         When the rule is not known or finds no alpha.
     """
     changes = changes_of(prepared, recording, idle)
     prepared = _tuned(prepared, changes, rule)
+    operator = prepared.operator.without(changes.rows_left_out)
+    prepared = replace(prepared, operator=operator)
     floor = None if changes.reference is None else prepared.noise_floor(changes.reference)
-    images = np.stack([prepared.operator.quick(dv).values for dv in changes.values])
+    images = np.stack([operator.quick(dv).values for dv in changes.values])
     times = recording.time[changes.frames]
     return Reconstruction(
         frames=changes.frames,
         left_out=changes.left_out,
         images=images,
-        unit=prepared.operator.unit,
+        unit=operator.unit,
         touches=_touches(prepared, images, times, floor),
         agreement=changes.agreement,
         choice=prepared.choice,
+        rows_left_out=changes.rows_left_out,
     )
 
 
 def changes_of(prepared: Prepared, recording: Recording, idle: NDArray[Any] | None) -> Changes:
     """Difference data of every frame of ``recording``; parameters and errors as above."""
-    finite = np.isfinite(recording.voltages).all(axis=1)
+    pattern, model = prepared.pattern, prepared.operator.reference
+    prepared.operator.accept(
+        Pattern.from_tables(recording.drive, recording.measure, pattern.n_electrodes)
+    )
+    dead = dead_rows(recording.voltages, idle, pattern, recording.source)
+    finite = np.isfinite(np.delete(recording.voltages, dead, axis=1)).all(axis=1)
     if not finite.any():
         raise DataError("no frame has finite values in every row", where=recording.source)
     values = recording.voltages[finite]
     if idle is None:
         dv, reference, agreement = _given_changes(prepared, recording, values), None, np.nan
     else:
+        values, idle = as_the_model(values, idle, dead, model)
         dv, reference, agreement = _changes(prepared, recording.source, values, idle)
+    dv[:, dead] = 0.0
     return Changes(
         frames=np.flatnonzero(finite),
         left_out=np.flatnonzero(~finite),
@@ -155,6 +171,7 @@ def changes_of(prepared: Prepared, recording: Recording, idle: NDArray[Any] | No
         places=None if recording.labels is None else recording.labels[finite],
         reference=reference,
         agreement=agreement,
+        rows_left_out=dead,
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, Frame, Image, Touch, Voltages
-from tomoskin.inverse import AlphaChoice
+from tomoskin.inverse import MOST_LEFT_OUT, AlphaChoice
 from tomoskin.live.collector import Collector
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.result import ReferenceState, Result
@@ -18,9 +18,6 @@ from tomoskin.touch import NoiseFloor, Tracker
 
 REFERENCE_FRAMES = 20
 """Frames of the untouched skin that make a reference."""
-
-_MOST_LEFT_OUT = 0.25
-"""Above this fraction of unusable rows there is no picture: it would be mostly prior."""
 
 
 class Pipeline:
@@ -111,7 +108,7 @@ class Pipeline:
         self, voltages: Voltages, unusable: NDArray[np.bool_], reference: Reference
     ) -> Result:
         p = self._prepared
-        if np.count_nonzero(unusable) > _MOST_LEFT_OUT * len(unusable):
+        if np.count_nonzero(unusable) > MOST_LEFT_OUT * len(unusable):
             touches = self._tracker.update([], voltages.host_time)
             return self._result(voltages, self._image, touches, unusable, pictured=False)
         values = np.where(unusable, reference.mean, voltages.values)
