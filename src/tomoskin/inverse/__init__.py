@@ -5,12 +5,12 @@ from tomoskin.inverse.assembly import Assembly
 from tomoskin.inverse.choice import AlphaChoice, Curve, Evidence
 from tomoskin.inverse.cole import Cole, cole_of_regions
 from tomoskin.inverse.desired import Desired
+from tomoskin.inverse.field import RandomField
 from tomoskin.inverse.frequency_difference import (
     FrequencyDifference,
     simple_change,
     weighted_change,
 )
-from tomoskin.inverse.field import RandomField
 from tomoskin.inverse.greit import Greit
 from tomoskin.inverse.high_pass import GaussianHighPass
 from tomoskin.inverse.laplace import Laplace, Structural
