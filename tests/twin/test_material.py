@@ -109,6 +109,14 @@ def test_play_is_a_loop_that_time_does_not_change():
     assert at(0.003, 0.0) == 0.0  # too little to move the play
 
 
+def test_play_knows_no_direction():
+    settings = replace(PLAIN, gauge_across=5.0, play=(0.3,), play_widths=(0.004,))
+    along, turned = (0.02, 0.0, 0.0), (0.01, 0.01, 0.01)  # by 45 degrees
+    left = [response(settings, (loaded(s), 0.0), (REST, 0.0)) for s in (along, turned)]
+    assert left[0] == pytest.approx(left[1])
+    assert left[0] > 0
+
+
 def test_the_textiles_remainder_is_small_and_mostly_goes():
     pulled, seconds = loaded((0.02, 0.02, 0.0)), 5.0
     whole = response(TEXTILE, (pulled, seconds))

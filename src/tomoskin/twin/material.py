@@ -198,9 +198,18 @@ def _lagged(state: MaterialState, settings: MaterialSettings) -> FloatArray:
 
 
 def _pulled(lagging: FloatArray, felt: FloatArray, settings: MaterialSettings) -> FloatArray:
-    """Each play is pulled along at its ends (Krasnosel'skii & Pokrovskii 1989, chapter 1)."""
-    widths = np.array(settings.play_widths).reshape(-1, 1, 1)
-    return np.clip(lagging, felt - widths, felt + widths)
+    """Each play is pulled along at its ends (Krasnosel'skii & Pokrovskii 1989, chapter 1).
+
+    The strain as a whole, whatever its direction: its size is √((xx² + yy² + 2xy²)/2), the mean
+    strain where both directions are strained alike. Compression has a play of its own.
+    """
+    if not settings.play:
+        return lagging
+    slack = lagging - felt
+    size = np.sqrt(slack**2 @ np.array([[0.5, 0], [0.5, 0], [1.0, 0], [0, 1.0]]))
+    width = np.array(settings.play_widths).reshape(-1, 1, 1)
+    kept = width / np.maximum(size, width)
+    return np.asarray(felt + slack * kept[..., [0, 0, 0, 1]])
 
 
 def _crept(state: MaterialState, settings: MaterialSettings, dt: float) -> FloatArray:

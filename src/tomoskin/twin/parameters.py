@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import Field, field, fields
+from dataclasses import field, fields
 from typing import TYPE_CHECKING, Any
 
 from tomoskin.core import ModelError
@@ -22,12 +22,11 @@ def parameter(default: Any, unit: str, meaning: str, source: str) -> Any:
     return field(default=default, metadata=metadata)
 
 
-def documented(record: type[DataclassInstance]) -> Iterator[tuple[Field[Any], Row]]:
+def documented(record: type[DataclassInstance]) -> Iterator[Row]:
     """The parameters of a settings record, in their order."""
     for one in fields(record):
-        if "unit" in one.metadata:
-            data = one.metadata
-            yield one, (one.name, data["unit"], data["meaning"], data["source"])
+        data = one.metadata
+        yield one.name, data["unit"], data["meaning"], data["source"]
 
 
 def check_numbers(record: DataclassInstance, above: str = "", least: str = "") -> None:

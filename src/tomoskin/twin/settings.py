@@ -59,8 +59,8 @@ class TwinSettings:
 
 
 BOARD = ElectronicsSettings(
-    compliance=7.0,  # 12 V less two drop-outs of the LM317 and the sense resistor
-    output_resistance=20e3,
+    compliance=7.75,
+    output_resistance=25e3,
     switch_resistance=0.07,
     contact_sd=2e-3,
     contact_time=10.0,
@@ -75,10 +75,24 @@ BOARD = ElectronicsSettings(
     hum_frequency=50.0,
     nonlinearity=0.5,
 )
-"""The source's board: LM317, IRLML6344 and IRLML9301 switches, INA118, an ATmega2560's converter.
+"""The source's board: LM317, IRLML6344 and IRLML9301, INA118, an ATmega2560's converter."""
 
-Typical values of the parts' datasheets, as far as they state them; contacts, hum and crosstalk
-are assumed."""
+SOURCES = {
+    "compliance": "12 V less the LM317's 3 V drop-out and 1.25 V reference",
+    "output_resistance": "LM317 datasheet: line regulation of at most 0.04 %/V, at 100 and 1 mA",
+    "switch_resistance": "IRLML9301 datasheet: at most 64 mΩ; the IRLML6344 has less",
+    "rejection": "INA118 datasheet: 90 dB at a gain of 1",
+    "offset_sd": "INA118 datasheet: at most 50 µV",
+    "low_rail": "supply of the converter's board",
+    "high_rail": "supply of the converter's board",
+    "nonlinearity": "ATmega2560 datasheet: 0.5 LSB",
+    "hum_frequency": "Europe; 60 Hz in America",
+    "temperature_coefficient": "silver 0.38 %/K; salt water about −2 %/K (handbooks)",
+    "modulus": "foam and gel assumed; tank: ρg · thickness (Archimedes)",
+    "lock": "textile: chosen so that wider probes change more, as in the source's figure 5.7",
+    "compression": "gel and tank: −1, the layer that conducts gets thinner",
+}
+"""Where the presets' numbers come from; those not named are assumed."""
 
 PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings]] = {
     "ideal": (ContactSettings(), MaterialSettings(), ElectronicsSettings()),
@@ -120,7 +134,7 @@ PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings]
             temperature_sd=0.2,
             spread=0.02,
         ),
-        replace(BOARD, contact_sd=1.0, time_constant=100e-6),
+        replace(BOARD, output_resistance=2.5e6, contact_sd=1.0, time_constant=100e-6),
     ),
     "tank": (
         ContactSettings(
@@ -141,7 +155,7 @@ PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings]
             temperature_coefficient=-0.02,
             temperature_sd=0.1,
         ),
-        replace(BOARD, contact_sd=0.5, time_constant=100e-6),
+        replace(BOARD, output_resistance=2.5e6, contact_sd=0.5, time_constant=100e-6),
     ),
 }
 """Contact, material and electronics by name.
