@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import AlphaChoice, LightTouch, LinearProblem, Operator, Spectrum, named_prior
 from tomoskin.mesh import Mesh
@@ -41,6 +41,16 @@ class Prepared:
     readout: Readout
     choice: AlphaChoice
     light_touch: LightTouch | None
+
+    def __post_init__(self) -> None:
+        """Refuse stages of different meshes or patterns."""
+        self.operator.accept(self.pattern)
+        made_for = self.operator.model.mesh.identity
+        for stage, mesh in (("skin", self.mesh), ("segmenter", self.segmenter.mesh)):
+            if mesh.identity != made_for:
+                raise ModelError(
+                    f"the operator is of mesh {made_for}, the {stage} of mesh {mesh.identity}"
+                )
 
     def noise_floor(self, reference: Reference) -> NoiseFloor | None:
         """What the noise of a reference does to the picture; None where it is not known."""
