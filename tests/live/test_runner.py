@@ -1,15 +1,18 @@
 """The thread between source and pages: newest result, losses, clean ends."""
 
+import errno
 import threading
+from pathlib import Path
 
 import pytest
 
 from live.board import Board
-from tomoskin.core import SourceError
+from tomoskin.core import DataError, SourceError
 from tomoskin.live import Runner
 from tomoskin.live.events import EventLog
 from tomoskin.live.pipeline import REFERENCE_FRAMES
 from tomoskin.live.runner import MOST_AT_ONCE
+from tomoskin.session import session_info
 from tomoskin.twin import Press
 from tomoskin.wire import Start, Stop
 
@@ -197,3 +200,60 @@ def test_the_event_log_is_bounded_and_numbered():
     assert log.since(0) == (5, (2, 3, 4))
     assert log.since(4) == (5, (4,))
     assert log.since(5) == (5, ())
+
+
+class FullPath(type(Path())):
+    """A path on a disk that is full after the file has been made."""
+
+    def open(self, mode="r", buffering=-1, **_):
+        file = super().open(mode, buffering)
+        return NoRoom(file) if "x" in mode else file
+
+
+class NoRoom:
+    """A file with room for 20 kB."""
+
+    def __init__(self, file):
+        self._file = file
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+    def write(self, data):
+        if self._file.tell() + len(data) > 20_000:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return self._file.write(data)
+
+
+def test_a_full_disk_ends_the_recording_but_not_the_run(runner, until, tmp_path):
+    path = FullPath(tmp_path / "x.mcap")
+    runner.record(path)
+    assert runner.status().recording == path
+    runner.start()
+    until(lambda: runner.status().recording is None)
+    before = runner.status().frames
+    until(lambda: runner.status().frames > before + 20)
+    status = runner.status()
+    assert status.running
+    assert status.problem is None
+    events = {event.kind: event.text for event in runner.events.since(0)[1]}
+    assert "No space left" in events["recording-stopped"]
+
+
+def test_a_recording_can_be_ended_and_another_begun(runner, until, tmp_path):
+    runner.start()
+    until(lambda: runner.newest)
+    runner.record(tmp_path / "one.mcap")
+    until(lambda: runner.status().frames > 30)
+    runner.record(tmp_path / "two.mcap")
+    until(lambda: runner.status().frames > 60)
+    runner.stop_recording()
+    assert runner.status().recording is None
+    for name in ("one.mcap", "two.mcap"):
+        assert session_info(tmp_path / name).torn == ""
+        assert session_info(tmp_path / name).frames > 0
+
+
+def test_a_recording_that_cannot_begin_is_said(runner, tmp_path):
+    with pytest.raises(DataError, match="cannot be"):
+        runner.record(tmp_path / "none" / "x.mcap")
