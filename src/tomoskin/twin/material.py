@@ -224,7 +224,8 @@ def _crept(state: MaterialState, settings: MaterialSettings, dt: float) -> Float
 def _worn(state: MaterialState, felt: FloatArray, settings: MaterialSettings) -> FloatArray:
     if settings.wear == 0:
         return state.worn
-    rise = (felt[:, :2] - state.felt[:, :2]).sum(axis=1) / 2
+    before = state.felt
+    rise = (felt[:, 0] + felt[:, 1] - before[:, 0] - before[:, 1]) / 2
     return np.asarray(state.worn + np.maximum(rise, 0.0))
 
 
@@ -240,8 +241,10 @@ def _directed(strain: FloatArray, gauge: float) -> FloatArray:
     half = gauge * (strain[:, 0] - strain[:, 1]) / 2
     cross = gauge * strain[:, 2]
     size = np.hypot(half, cross)
-    safe = np.where(size > 0, size, 1.0)
-    cosh, sinhc = np.cosh(size), np.where(size > 0, np.sinh(safe) / safe, 1.0)
+    size[size < 1e-12] = 1e-12  # sinh(d)/d is 1 there
+    grown = np.expm1(size)
+    shrunk = grown / (1 + grown)  # 1 − e⁻ᵈ
+    cosh, sinhc = 1 + (grown - shrunk) / 2, (grown + shrunk) / (2 * size)
     tensor = np.empty((len(strain), 2, 2))
     tensor[:, 0, 0], tensor[:, 1, 1] = cosh - sinhc * half, cosh + sinhc * half
     tensor[:, 0, 1] = tensor[:, 1, 0] = -sinhc * cross

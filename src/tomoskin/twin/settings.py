@@ -80,12 +80,14 @@ BOARD = ElectronicsSettings(
 SOURCES = {
     "compliance": "12 V less the LM317's 3 V drop-out and 1.25 V reference",
     "output_resistance": "LM317 datasheet: line regulation of at most 0.04 %/V, at 100 and 1 mA",
-    "switch_resistance": "IRLML9301 datasheet: at most 64 mΩ; the IRLML6344 has less",
-    "rejection": "INA118 datasheet: 90 dB at a gain of 1",
+    "switch_resistance": "assumed, of the size of the IRLML9301's and IRLML6344's",
+    "rejection": "assumed; INA118 datasheet: at least 110 dB at a gain of 1000, less at lower ones",
     "offset_sd": "INA118 datasheet: at most 50 µV",
     "low_rail": "supply of the converter's board",
     "high_rail": "supply of the converter's board",
-    "nonlinearity": "ATmega2560 datasheet: 0.5 LSB",
+    "nonlinearity": "assumed, of the size of the ATmega2560's",
+    "gauge": "assumed; published for knitted sensors: up to 1.2 (Bozali et al. 2022, Sensors 22, "
+    "7688), 2.4 (others)",
     "hum_frequency": "Europe; 60 Hz in America",
     "temperature_coefficient": "silver 0.38 %/K; salt water about −2 %/K (handbooks)",
     "modulus": "foam and gel assumed; tank: ρg · thickness (Archimedes)",
