@@ -214,6 +214,14 @@ def test_the_deviation_of_a_region_is_what_noise_makes_of_it() -> None:
     assert said == pytest.approx(spread, rel=0.4)
 
 
+@pytest.mark.parametrize("wrong", ["nothing", "reversed"])
+def test_voltages_of_no_such_sheet(wrong: str) -> None:
+    model = ForwardModel(mesh(500), Pattern.adjacent(8), 0.01)
+    v = model.solve(np.array([0.2, 0.5])[labels(500)]).voltages
+    with pytest.raises(ModelError, match="no admittivities fit the voltages"):
+        Regions.fit(model, {"nothing": 0 * v, "reversed": -v}[wrong], labels(500))
+
+
 @pytest.mark.parametrize(
     ("given_labels", "data", "message"),
     [

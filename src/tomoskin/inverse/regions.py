@@ -15,6 +15,9 @@ _STEPS = 50
 _DONE = 1e-9
 _HALVINGS = 20
 
+_WIDEST = 10.0
+"""A region that leaves the even start by this power of e is on its way to zero or infinity."""
+
 
 @dataclass(frozen=True, eq=False)
 class Regions:
@@ -57,21 +60,23 @@ class Regions:
             When voltages or labels do not fit the model, a region has no cell, or there are
             fewer voltages than regions.
         ModelError
-            When it does not converge.
+            When it does not converge, or a region runs to zero or infinity.
         """
         region = _labels(labels, model)
         data = _data(voltages, model, int(region.max()) + 1)
-        gamma = _first(model, data, region, start)
+        gamma = first = _first(model, data, region, start)
         for _ in range(_STEPS):
             state = model.at(gamma[region])
             jacobian = _by_region(state.jacobian, region)
             residual = data - state.voltages
             step = np.linalg.lstsq(jacobian, residual, rcond=None)[0]
             gamma = _stepped(model, data, region, gamma, step)
+            if np.abs(np.log(np.abs(gamma / first))).max() > _WIDEST:
+                break
             if np.abs(step).max() < _DONE * np.abs(gamma).max():
                 return cls(gamma, *_spread(jacobian, residual))
         raise ModelError(
-            f"the admittivities did not settle in {_STEPS} steps",
+            "no admittivities fit the voltages: the steps do not settle",
             hint="start nearer, take fewer regions, or check the model",
         )
 
@@ -99,11 +104,11 @@ def _stepped(
     gamma: NDArray[Any],
     step: NDArray[Any],
 ) -> NDArray[Any]:
-    """The step, halved until conductivities stay positive and the misfit does not grow."""
+    """The step, halved until conductivities change no more than tenfold and the misfit falls."""
     before = np.linalg.norm(data - model.at(gamma[region]).voltages)
     for halving in range(_HALVINGS):
         tried = gamma + 0.5**halving * step
-        if (tried.real > 0).all():
+        if (tried.real > 0.1 * gamma.real).all() and (np.abs(tried) < 10.0 * np.abs(gamma)).all():
             after = np.linalg.norm(data - model.at(tried[region]).voltages)
             if after <= before * (1 + _DONE):
                 return tried
