@@ -74,7 +74,7 @@ def _against_library(model: ForwardModel, sigma: FloatArray) -> dict[str, float]
 def _bare(state: State) -> Callable[[], object]:
     """Return a call that factorises and solves on ready arrays, and does nothing else."""
     model, matrix = state.model, state.model.assembly.matrix
-    ready = matrix(state.conductivity, model.contact_impedance)
+    ready = matrix(state.conductivity, model.contacts).values
     n, n_basis = model.assembly.n_points, model.assembly.n_electrodes - 1
     rhs = np.zeros((model.assembly.n_unknowns, n_basis))
     rhs[n + np.arange(n_basis), np.arange(n_basis)] = 1.0

@@ -42,6 +42,59 @@ class Factor:
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
         """Solution (n, k), C-contiguous, for ``rhs`` (n, k) of the matrix's type, any layout."""
 
+@final
+class Patches:
+    """Changes of a state by touches, exact, from the inverse between the nodes of each rim."""
+
+    def __new__(
+        cls,
+        cells: NDArray[np.int64],
+        local: NDArray[np.float64],
+        held: NDArray[np.bool_],
+        conductivity: NDArray[Any],
+        fields: NDArray[Any],
+        grounded: NDArray[Any],
+    ) -> Patches:
+        """Lay out cells (n, k) with matrices (n, k, k) for a conductivity of one.
+
+        ``held`` (n_nodes,): nodes on electrodes. ``conductivity`` (n,), ``fields`` (n_nodes, w)
+        and ``grounded`` (w, w) are those of the state, all float64 or all complex128.
+        """
+
+    def keep(self, nodes: NDArray[np.int64], columns: NDArray[Any]) -> None:
+        """Store columns (n_nodes, m) of the inverse, those of ``nodes`` (m,)."""
+
+    def forget(self) -> None:
+        """Drop all columns."""
+
+    def change(
+        self,
+        starts: NDArray[np.int64],
+        cells: NDArray[np.int64],
+        conductivity: NDArray[Any],
+        threads: int | None = None,
+    ) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.int64]]:
+        """Transfer resistances (t, w, w), what rounding may cost them, nodes to be kept first.
+
+        Touch t changes ``cells[starts[t]:starts[t + 1]]``. ``threads``: as in
+        :func:`transposed_product`.
+
+        Raises
+        ------
+        ValueError
+            When a cell does not exist or stands twice in a touch, a conductivity is not positive,
+            or the system is singular.
+        """
+
+def residual(
+    indptr: NDArray[np.int32],
+    indices: NDArray[np.int32],
+    data: NDArray[Any],
+    rhs: NDArray[Any],
+    x: NDArray[Any],
+) -> tuple[NDArray[Any], float]:
+    """Xᵀ (B − A X), A symmetric, and the largest entry of B − A X; NaN where X is no number."""
+
 def transposed_product(
     indptr: NDArray[np.int32],
     indices: NDArray[np.int32],

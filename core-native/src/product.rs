@@ -9,27 +9,27 @@ use crate::scalar::Scalar;
 use crate::threads::{Shared, split};
 
 /// Vectors that one pass over the matrix serves.
-const ABREAST: usize = 16;
+pub const ABREAST: usize = 16;
 /// Results that are gathered before they are written out.
 const TILE: usize = 64;
 /// Fewer rows than this are not worth a thread.
 const GRAIN: usize = 16 * 1024;
 
-/// A real matrix by rows.
+/// A matrix by rows.
 #[derive(Clone, Copy)]
-pub struct Rows<'a> {
+pub struct Rows<'a, V = f64> {
     starts: &'a [i32],
     columns: &'a [i32],
-    values: &'a [f64],
+    values: &'a [V],
     n_columns: usize,
 }
 
-impl<'a> Rows<'a> {
+impl<'a, V: Copy> Rows<'a, V> {
     /// Checks the three arrays of a compressed-row matrix.
     ///
     /// # Errors
     /// When they are none.
-    pub fn new(starts: &'a [i32], columns: &'a [i32], values: &'a [f64]) -> Result<Self, String> {
+    pub fn new(starts: &'a [i32], columns: &'a [i32], values: &'a [V]) -> Result<Self, String> {
         let ascending = starts.windows(2).all(|ends| ends[0] <= ends[1]);
         let (Some(&0), Some(&end), true) = (starts.first(), starts.last(), ascending) else {
             return Err("indptr: expected ascending entries from 0".into());
@@ -64,6 +64,30 @@ impl<'a> Rows<'a> {
     pub fn n_columns(&self) -> usize {
         self.n_columns
     }
+
+    /// Columns and values of one row.
+    #[inline(always)]
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, V)> {
+        let entries = self.starts[row] as usize..self.starts[row + 1] as usize;
+        let columns = self.columns[entries.clone()].iter();
+        let pairs = columns.zip(&self.values[entries]);
+        pairs.map(|(&column, &value)| (column as usize, value))
+    }
+}
+
+/// Up to sixteen columns from `first` on of a matrix, side by side, zero beyond its last.
+pub fn abreast<T: Scalar>(vectors: ArrayView2<'_, T>, first: usize) -> Vec<[T; ABREAST]> {
+    let count = ABREAST.min(vectors.ncols() - first);
+    let lane = |row, i| {
+        if i < count {
+            vectors[[row, first + i]]
+        } else {
+            T::ZERO
+        }
+    };
+    (0..vectors.nrows())
+        .map(|row| std::array::from_fn(|i| lane(row, i)))
+        .collect()
 }
 
 /// Writes (A V)ᵀ, row-major (k, rows of A), for V of any layout, (columns of A, k).
@@ -82,16 +106,7 @@ pub fn transposed_product<T: Scalar>(
     let out = Shared::new(out);
     for first in (0..k).step_by(ABREAST) {
         let count = ABREAST.min(k - first);
-        let lane = |row, i| {
-            if i < count {
-                vectors[[row, first + i]]
-            } else {
-                T::ZERO
-            }
-        };
-        let abreast: Vec<[T; ABREAST]> = (0..vectors.nrows())
-            .map(|row| std::array::from_fn(|i| lane(row, i)))
-            .collect();
+        let abreast = abreast(vectors, first);
         split(n, GRAIN, threads, |rows| {
             let rows = Tiles {
                 matrix,
@@ -138,13 +153,9 @@ impl<T: Scalar> WithSimd for Tiles<'_, T> {
 
 #[inline(always)]
 fn row_product<T: Scalar>(matrix: Rows<'_>, row: usize, vectors: &[[T; ABREAST]]) -> [T; ABREAST] {
-    let entries = matrix.starts[row] as usize..matrix.starts[row + 1] as usize;
     let mut sum = [T::ZERO; ABREAST];
-    for (&column, &value) in matrix.columns[entries.clone()]
-        .iter()
-        .zip(&matrix.values[entries])
-    {
-        for (s, &v) in sum.iter_mut().zip(&vectors[column as usize]) {
+    for (column, value) in matrix.row(row) {
+        for (s, &v) in sum.iter_mut().zip(&vectors[column]) {
             *s += v * value;
         }
     }

@@ -12,18 +12,19 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::jacobian::{Fields, Table};
+use crate::patches::Patches;
 use crate::product::Rows;
 use crate::scalar::Scalar;
-use crate::{factor, jacobian, product, solve, symbolic, threads};
+use crate::{factor, jacobian, product, residual, solve, symbolic, threads};
 
-type Any<'py> = Bound<'py, PyAny>;
+pub(crate) type Any<'py> = Bound<'py, PyAny>;
 
-fn invalid(message: impl Into<String>) -> PyErr {
+pub(crate) fn invalid(message: impl Into<String>) -> PyErr {
     PyValueError::new_err(message.into())
 }
 
 /// An argument as an array of this type and number of axes.
-fn array<'py, T: Element, D: Dimension>(
+pub(crate) fn array<'py, T: Element, D: Dimension>(
     name: &str,
     value: &Any<'py>,
 ) -> PyResult<PyReadonlyArray<'py, T, D>> {
@@ -36,7 +37,7 @@ fn array<'py, T: Element, D: Dimension>(
     })
 }
 
-fn contiguous<'a, T: Element, D: Dimension>(
+pub(crate) fn contiguous<'a, T: Element, D: Dimension>(
     name: &str,
     value: &'a PyReadonlyArray<'_, T, D>,
 ) -> PyResult<&'a [T]> {
@@ -45,7 +46,7 @@ fn contiguous<'a, T: Element, D: Dimension>(
         .map_err(|_| invalid(format!("{name}: expected a C-contiguous array")))
 }
 
-fn same(what: &str, expected: usize, got: usize) -> PyResult<()> {
+pub(crate) fn same(what: &str, expected: usize, got: usize) -> PyResult<()> {
     if expected == got {
         return Ok(());
     }
@@ -61,7 +62,7 @@ fn unsigned(name: &str, value: &Any<'_>) -> PyResult<Vec<u32>> {
         .map_err(|_| invalid(format!("{name}: a negative entry")))
 }
 
-fn is_complex(value: &Any<'_>) -> bool {
+pub(crate) fn is_complex(value: &Any<'_>) -> bool {
     let name = value.getattr("dtype").and_then(|kind| kind.getattr("kind"));
     name.is_ok_and(|kind| kind.eq("c").unwrap_or(false))
 }
@@ -187,6 +188,54 @@ fn product_into<T: Scalar + Element>(
 }
 
 #[pyfunction]
+#[pyo3(name = "residual")]
+fn residual_of<'py>(
+    indptr: &Any<'py>,
+    indices: &Any<'_>,
+    data: &Any<'_>,
+    rhs: &Any<'_>,
+    x: &Any<'_>,
+) -> PyResult<(Any<'py>, f64)> {
+    let py = indptr.py();
+    let starts = array::<i32, Ix1>("indptr", indptr)?;
+    let columns = array::<i32, Ix1>("indices", indices)?;
+    let (starts, columns) = (
+        contiguous("indptr", &starts)?,
+        contiguous("indices", &columns)?,
+    );
+    if is_complex(data) {
+        return left_over::<c64>(py, starts, columns, [data, rhs, x]);
+    }
+    left_over::<f64>(py, starts, columns, [data, rhs, x])
+}
+
+fn left_over<'py, T: Scalar + Element>(
+    py: Python<'py>,
+    starts: &[i32],
+    columns: &[i32],
+    [data, rhs, x]: [&Any<'_>; 3],
+) -> PyResult<(Any<'py>, f64)> {
+    let values = array::<T, Ix1>("data", data)?;
+    let matrix = Rows::new(starts, columns, contiguous("data", &values)?).map_err(invalid)?;
+    let (rhs, x) = (array::<T, Ix2>("rhs", rhs)?, array::<T, Ix2>("x", x)?);
+    let (n, k) = (x.shape()[0], x.shape()[1]);
+    same("rows of x", matrix.n_rows(), n)?;
+    same("rows of rhs", n, rhs.shape()[0])?;
+    same("columns of rhs", k, rhs.shape()[1])?;
+    if matrix.n_columns() > n {
+        return Err(invalid("indices: a column beyond the rows of x"));
+    }
+    let lost = PyArray2::<T>::zeros(py, [k, k], false);
+    let largest = {
+        let mut writable = lost.readwrite();
+        let values = writable.as_slice_mut()?;
+        let (rhs, x) = (rhs.as_array(), x.as_array());
+        py.detach(|| residual::residual(matrix, rhs, x, values))
+    };
+    Ok((lost.into_any(), largest))
+}
+
+#[pyfunction]
 #[pyo3(name = "jacobian", signature = (gradient, drives, current, drive_index, measure, threads=None))]
 fn jacobian_rows<'py>(
     gradient: &Any<'py>,
@@ -265,6 +314,8 @@ fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<Symbolic>()?;
     module.add_class::<Factor>()?;
+    module.add_class::<Patches>()?;
     module.add_function(wrap_pyfunction!(jacobian_rows, module)?)?;
+    module.add_function(wrap_pyfunction!(residual_of, module)?)?;
     module.add_function(wrap_pyfunction!(transposed_product, module)?)
 }

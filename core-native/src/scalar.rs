@@ -33,6 +33,12 @@ pub trait Scalar:
     /// `None` where the real part is not positive: each pivot's is, when that of the matrix is
     /// positive definite.
     fn pivot(self) -> Option<Self>;
+
+    /// Whether it is finite, with a positive real part.
+    fn conducts(self) -> bool;
+
+    /// Square of its absolute value.
+    fn norm_sqr(self) -> f64;
 }
 
 impl Scalar for f64 {
@@ -41,7 +47,17 @@ impl Scalar for f64 {
 
     #[inline(always)]
     fn pivot(self) -> Option<Self> {
-        (self > 0.0 && self.is_finite()).then(|| self.sqrt())
+        self.conducts().then(|| self.sqrt())
+    }
+
+    #[inline(always)]
+    fn conducts(self) -> bool {
+        self > 0.0 && self.is_finite()
+    }
+
+    #[inline(always)]
+    fn norm_sqr(self) -> f64 {
+        self * self
     }
 }
 
@@ -51,6 +67,16 @@ impl Scalar for faer::c64 {
 
     #[inline(always)]
     fn pivot(self) -> Option<Self> {
-        (self.re > 0.0 && self.is_finite()).then(|| self.sqrt())
+        self.conducts().then(|| self.sqrt())
+    }
+
+    #[inline(always)]
+    fn conducts(self) -> bool {
+        self.re > 0.0 && self.is_finite()
+    }
+
+    #[inline(always)]
+    fn norm_sqr(self) -> f64 {
+        self.re * self.re + self.im * self.im
     }
 }

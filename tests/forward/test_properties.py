@@ -266,5 +266,5 @@ def test_shapes_and_what_a_state_shares() -> None:
     assert state.solution.electrode_potentials.shape == (PATTERN.n_drive, N)
     assert state.solution.potentials.shape == (PATTERN.n_drive, len(model.mesh.points))
     assert state.jacobian.shape == (PATTERN.n_meas, len(model.mesh.cells))
-    assert state.solution is state.solution
+    assert state.solution.potentials is state.solution.potentials
     assert np.array_equal(model.jacobian(1.0), state.jacobian)

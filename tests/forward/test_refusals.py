@@ -10,7 +10,7 @@ import pytest
 from shapes import disc
 from tomoskin.core import ModelError
 from tomoskin.forward import ForwardModel
-from tomoskin.forward.factor import factorise, solve_checked
+from tomoskin.forward.factor import solve_checked
 from tomoskin.pattern import Pattern
 
 MESH = disc()
@@ -110,10 +110,10 @@ def test_a_cut_off_electrode_is_noticed() -> None:
 
 def test_residual_is_checked() -> None:
     """A factor that belongs to another matrix is found out."""
-    assembly = ForwardModel(MESH, PATTERN, 0.01).assembly
-    one, z = np.ones(N_CELLS), np.full(8, 0.01)
+    model = ForwardModel(MESH, PATTERN, 0.01)
+    assembly, one = model.assembly, np.ones(N_CELLS)
     rhs = np.zeros((assembly.n_unknowns, 1))
     rhs[-1] = 1.0
-    factor = factorise(assembly.matrix(2 * one, z))
+    factor = model.factorise(assembly.matrix(2 * one, model.contacts).values)
     with pytest.raises(ModelError, match="singular"):
-        solve_checked(assembly.matrix(one, z), factor, rhs)
+        solve_checked(model.engine, assembly.matrix(one, model.contacts), factor, rhs)

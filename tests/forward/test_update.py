@@ -107,6 +107,55 @@ def test_the_order_of_calls_and_of_cells_does_not_matter() -> None:
     assert np.array_equal(base.solution.voltages, state(mesh).solution.voltages)
 
 
+def spread(mesh: Mesh, count: int) -> list[tuple[IntArray, FloatArray]]:
+    rng, touches = np.random.default_rng(3), []
+    for size in rng.integers(1, 60, count):
+        start = rng.integers(len(mesh.cells) - size)
+        touches.append((np.arange(start, start + size), 10.0 ** rng.uniform(-2, 2, size)))
+    return touches
+
+
+def test_many_touches_at_once_are_those_one_by_one(mesh: Mesh) -> None:
+    base, touches = state(mesh), [*spread(mesh, 20), (np.zeros(0, int), np.zeros(0))]
+    voltages, resistances = (
+        ask(touches) for ask in (base.local.voltages_of, base.local.transfer_resistances_of)
+    )
+    for number, touch in enumerate(touches):
+        assert mismatch(voltages[number], base.local.voltages(*touch)) < 1e-12
+        assert mismatch(resistances[number], base.local.transfer_resistance(*touch)) < 1e-12
+    assert mismatch(voltages[5], full(base, *touches[5])) < 1e-10
+
+
+def test_no_touch_at_all(mesh: Mesh) -> None:
+    base = state(mesh)
+    assert base.local.voltages_of([]).shape == (0, base.model.pattern.n_meas)
+
+
+def test_a_wrong_one_among_many_is_named() -> None:
+    base, touches = state(disc()), spread(disc(), 5)
+    touches[3] = (np.array([7, 8]), np.array([1.0, -2.0]))
+    with pytest.raises(ModelError, match="positive finite") as caught:
+        base.local.voltages_of(touches)
+    assert caught.value.where == "touch 3, cell 8"
+
+
+def test_a_large_patch_is_factorised_anew(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    base, touches = state(mesh), spread(mesh, 6)
+    expected = base.local.voltages_of(touches)
+    monkeypatch.setattr(update, "MOST_CELLS", 30)
+    assert max(len(cells) for cells, _ in touches) > 30
+    assert mismatch(state(mesh).local.voltages_of(touches), expected) < 1e-10
+    with pytest.raises(ModelError, match="each cell once"):
+        base.local.voltages(np.zeros(31, int), np.ones(31))
+
+
+def test_a_store_too_small_for_all_touches(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    touches = spread(mesh, 12)
+    expected = state(mesh).local.voltages_of(touches)
+    monkeypatch.setattr(update, "MOST_BYTES", 1)
+    assert mismatch(state(mesh).local.voltages_of(touches), expected) < 1e-12
+
+
 def test_columns_are_computed_once() -> None:
     mesh = disc(8, 500)
     base, cells = state(mesh), touched(mesh, 40)

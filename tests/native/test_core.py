@@ -27,7 +27,7 @@ def system(kind: Any, cells: int = 800) -> tuple[csc_array, NDArray[Any]]:
     sigma = generator.uniform(0.5, 2.0, len(model.mesh.cells)).astype(kind)
     if kind is np.complex128:
         sigma += 1j * generator.uniform(-1.0, 1.0, len(sigma))
-    matrix = model.assembly.matrix(sigma, model.contact_impedance)
+    matrix = model.assembly.matrix(sigma, model.contacts).matrix
     return matrix, generator.normal(size=(matrix.shape[0], 16)).astype(kind)
 
 
@@ -145,6 +145,71 @@ def test_an_indefinite_matrix_is_refused() -> None:
 def test_what_is_no_structure_is_refused(n: int, indptr: list[int], indices: list[int]) -> None:
     with pytest.raises(ValueError, match=r"ind|row|column"):
         core.Symbolic(n, np.array(indptr, np.int32), np.array(indices, np.int32))
+
+
+def patch_arguments() -> list[Any]:
+    """Two triangles of a square, with its corners at the first and the last node held."""
+    cells = np.array([[0, 1, 2], [1, 2, 3]])
+    local = np.broadcast_to(np.eye(3) - 1 / 3, (2, 3, 3)).copy()
+    held = np.array([True, False, False, True])
+    return [cells, local, held, np.ones(2), np.arange(8.0).reshape(4, 2), np.eye(2)]
+
+
+def test_wrong_patches_are_refused() -> None:
+    good = patch_arguments()
+    core.Patches(*good)
+    worse: list[tuple[int, Any]] = [
+        (0, np.array([[0, 1, 2], [1, 2, 4]])),
+        (0, np.array([[0, 1, 2], [1, 2, -1]])),
+        (0, good[0][:1]),
+        (1, good[1][:, :2]),
+        (2, good[2][:3]),
+        (2, np.ones(4)),
+        (3, np.ones(3)),
+        (3, np.ones(2, complex)),
+        (4, np.ones((3, 2))),
+        (5, np.eye(3)),
+    ]
+    for place, value in worse:
+        wrong = list(good)
+        wrong[place] = value
+        with pytest.raises(ValueError, match=r"expected|node"):
+            core.Patches(*wrong)
+
+
+def test_wrong_touches_are_refused() -> None:
+    patches, one = core.Patches(*patch_arguments()), np.ones(1)
+    starts, cells = np.array([0, 1]), np.array([1])
+    assert patches.change(starts, cells, one)[2].tolist() == [1, 2, 3]
+    wrong: list[tuple[Any, ...]] = [
+        (starts, np.array([2]), one),
+        (starts, np.array([-1]), one),
+        (starts, cells, -one),
+        (starts, cells, one * np.nan),
+        (starts, cells, np.ones(2)),
+        (np.array([0, 2]), np.array([1, 1]), np.ones(2)),
+        (np.array([0, 2]), cells, one),
+        (np.array([1, 0, 1]), cells, one),
+        (starts[:0], cells, one),
+    ]
+    for arguments in wrong:
+        with pytest.raises(ValueError, match=r"touch 0|expected"):
+            patches.change(*arguments)
+    with pytest.raises(ValueError, match="rows of columns"):
+        patches.keep(np.array([1]), np.ones((3, 1)))
+    with pytest.raises(ValueError, match="node"):
+        patches.keep(np.array([4]), np.ones((4, 1)))
+
+
+def test_a_residual_that_is_no_number_stays_none() -> None:
+    matrix, rhs = system(np.float64)
+    x = np.zeros_like(rhs)
+    lost, largest = core.residual(matrix.indptr, matrix.indices, matrix.data, rhs, x)
+    assert largest == np.abs(rhs).max()
+    assert not lost.any()
+    x[5, 3] = np.nan
+    _, largest = core.residual(matrix.indptr, matrix.indices, matrix.data, rhs, x)
+    assert np.isnan(largest)
 
 
 def test_wrong_arrays_are_refused() -> None:

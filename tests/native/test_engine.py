@@ -90,6 +90,8 @@ def test_the_engines_agree_on_tensors_and_local_updates(monkeypatch: pytest.Monk
     cells = np.arange(40)
     changed = [model.at(1.0).local.voltages(cells, np.full(40, 3.0)) for model in both]
     assert_same(*changed)
+    touches = [(np.arange(first, first + 40), np.full(40, 3.0 + 1j)) for first in (0, 90, 150)]
+    assert_same(*(model.at(1.0).local.voltages_of(touches) for model in both))
 
 
 def test_a_system_that_is_singular_to_rounding_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

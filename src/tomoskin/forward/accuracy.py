@@ -29,15 +29,15 @@ def checked_voltages(
     lost: NDArray[Any],
     sharper: Callable[[], NDArray[Any]] | None = None,
 ) -> NDArray[Any]:
-    """(n_meas,) V, of which the residual leaves six digits of the largest of each drive.
+    """(…, n_meas) V, of which the residual leaves six digits of the largest of each drive.
 
     Parameters
     ----------
     grounded
-        (k, k) Ω transfer resistance against the ground electrode.
+        (…, k, k) Ω transfer resistance against the ground electrode.
     lost
-        (k, k) Ω, fields of 1 A into each electrode times their residuals, Σ over nodes: how far
-        ``grounded`` may be off.
+        (…, k, k) Ω, fields of 1 A into each electrode times their residuals, Σ over nodes: how
+        far ``grounded`` may be off.
     sharper
         A dearer estimate of the voltages' errors (n_meas,) V, asked for where that is too large.
 
@@ -46,22 +46,37 @@ def checked_voltages(
     ModelError
         When more than that is lost.
     """
-    pattern, resistance = model.pattern, padded(grounded)
+    resistance = padded(grounded)
     voltages = model.voltages(resistance)
+    order, starts = model.by_drive
+    largest = np.maximum.reduceat(np.abs(voltages[..., order]), starts, axis=-1)
+    least = MOST_RESIDUAL * largest.min(axis=-1)
+    most = 4.0 * model.most_current * np.abs(lost).max(axis=(-2, -1), initial=0.0)
+    if not (most <= least).all():
+        for place in np.argwhere(~(most <= least)):
+            at = tuple(place)
+            _confirm(model, resistance[at], voltages[at], lost[at], sharper)
+    return voltages
+
+
+def _confirm(
+    model: ForwardModel,
+    resistance: NDArray[Any],
+    voltages: NDArray[Any],
+    lost: NDArray[Any],
+    sharper: Callable[[], NDArray[Any]] | None,
+) -> None:
+    """Refuse voltages (n_meas,) that the residual may have spoilt, row by row."""
+    pattern = model.pattern
     largest = np.zeros(pattern.n_drive)
     np.maximum.at(largest, pattern.drive_index, np.abs(voltages))
-    largest = largest[pattern.drive_index]
-    most = 4.0 * np.abs(model.current).max() * np.abs(lost).max(initial=0.0)
-    if most <= MOST_RESIDUAL * largest.min():
-        return voltages
     inner = _inner(model, resistance, pattern.drive) * _inner(model, resistance, pattern.measure)
     floor = _FLOOR * np.abs(model.current[pattern.drive_index]) * np.sqrt(inner)
-    allowed = np.maximum(MOST_RESIDUAL * largest, floor)
+    allowed = np.maximum(MOST_RESIDUAL * largest[pattern.drive_index], floor)
     if (np.abs(model.voltages(padded(lost))) <= allowed).all():
-        return voltages
-    if sharper is not None and (np.abs(sharper()) <= allowed).all():
-        return voltages
-    raise singular()
+        return
+    if sharper is None or not (np.abs(sharper()) <= allowed).all():
+        raise singular()
 
 
 def _inner(model: ForwardModel, resistance: NDArray[Any], pairs: IntArray) -> FloatArray:

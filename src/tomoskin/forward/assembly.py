@@ -17,10 +17,11 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csc_array, csr_array
+from scipy.sparse import coo_array, csr_array
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.forward.element import Element
+from tomoskin.forward.factor import Compressed
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,19 +49,17 @@ class Assembly:
     @classmethod
     def of(cls, element: Element) -> Self:
         """Structure and maps for the elements of a mesh."""
-        n_electrodes = len(element.facets)
-        n = element.n_nodes + n_electrodes - 1
-        cells = element.cells
+        cells, n_electrodes = element.cells, len(element.facets)
         rows, cols, values, owner = _contact_entries(element)
-        of_cells = (cells[:, None, :] * n + cells[:, :, None]).ravel()
-        keys, place = np.unique(np.concatenate([of_cells, cols * n + rows]), return_inverse=True)
-        split = len(of_cells)
-        maps = coo_array((values, (place[split:], owner)), shape=(len(keys), n_electrodes))
+        numbers = _numbered(cells, (rows, cols), element.n_nodes + n_electrodes - 1)
+        k = cells.shape[1]
+        place = numbers[np.tile(cells, k).ravel(), np.repeat(cells, k)]
+        maps = coo_array((values, (numbers[cols, rows], owner)), shape=(numbers.nnz, n_electrodes))
         return cls(
             element=element,
-            indices=(keys % n).astype(np.int32),
-            indptr=np.searchsorted(keys, np.arange(n + 1) * n).astype(np.int32),
-            place=place[:split].reshape(*cells.shape, cells.shape[1]),
+            indices=numbers.indices,
+            indptr=numbers.indptr,
+            place=np.asarray(place).reshape(len(cells), k, k),
             contact=csr_array(maps),
         )
 
@@ -92,12 +91,16 @@ class Assembly:
         local = np.einsum("nqia,nqjb->nijab", g, g)
         return self._stiffness_map(local.reshape(*local.shape[:3], -1))
 
-    def matrix(self, conductivity: NDArray[Any], contact_impedance: NDArray[Any]) -> csc_array:
-        """System matrix for σ (n_cells,) or (n_cells, d, d) and z (n_electrodes,)."""
+    def matrix(self, conductivity: NDArray[Any], contacts: NDArray[Any]) -> Compressed:
+        """System matrix for σ (n_cells,) or (n_cells, d, d), and the values of the contacts."""
         maps = self.stiffness if conductivity.ndim == 1 else self.tensor_stiffness
-        values = maps @ conductivity.ravel() + self.contact @ (1.0 / contact_impedance)
-        shape = (self.n_unknowns, self.n_unknowns)
-        return csc_array((values, self.indices, self.indptr), shape=shape)
+        values = maps @ conductivity.ravel()
+        values = np.add(values, contacts, out=values if values.dtype == contacts.dtype else None)
+        return Compressed(values, self.indices, self.indptr)
+
+    def contacts(self, contact_impedance: NDArray[Any]) -> NDArray[Any]:
+        """(n_values,): what the contacts add to the system matrix, for z (n_electrodes,)."""
+        return np.asarray(self.contact @ (1.0 / contact_impedance))
 
     def _stiffness_map(self, local: FloatArray) -> csr_array:
         """``local`` (n_cells, k, k, c) → (n_values, n_cells·c)."""
@@ -106,6 +109,24 @@ class Assembly:
         cols = np.arange(n_cells * c).reshape(n_cells, 1, 1, c)
         entries = (local.ravel(), (rows.ravel(), np.broadcast_to(cols, local.shape).ravel()))
         return csr_array(coo_array(entries, shape=(len(self.indices), n_cells * c)))
+
+
+def _numbered(cells: IntArray, others: tuple[IntArray, IntArray], n: int) -> csr_array:
+    """(n, n): the entries of a symmetric matrix, numbered row by row.
+
+    Those that two nodes of a cell share, the ``others`` and the diagonal; in linear time, since
+    scipy sorts them by counting.
+    """
+    first, second = np.triu_indices(cells.shape[1], 1)
+    low, high, every = cells[:, first].ravel(), cells[:, second].ravel(), np.arange(n)
+    rows, cols = (
+        np.concatenate(part).astype(np.int32)
+        for part in ((low, high, others[0], every), (high, low, others[1], every))
+    )
+    once = csr_array(coo_array((np.ones(len(rows), np.bool_), (rows, cols)), shape=(n, n)))
+    once.sort_indices()
+    numbers = np.arange(once.nnz, dtype=np.int32)
+    return csr_array((numbers, once.indices, once.indptr), shape=(n, n))
 
 
 Entries = tuple[IntArray, IntArray, FloatArray, IntArray]

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.forward.factor import Factorise
+from tomoskin.forward.factor import Compressed, Factorise
 from tomoskin.forward.native import Native
+from tomoskin.forward.patches import BaseState, Patches
 from tomoskin.forward.plain import Scipy
 from tomoskin.pattern import Pattern
 
@@ -39,7 +40,13 @@ class Engine(Protocol):
     def reason(self) -> str: ...  # noqa: D102
 
     def analyse(self, indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> Factorise:
-        """Return what factorises symmetric matrices of this structure."""
+        """Return what factorises symmetric matrices of this structure, given their values."""
+        ...
+
+    def residual(
+        self, matrix: Compressed, rhs: NDArray[Any], solution: NDArray[Any]
+    ) -> tuple[NDArray[Any], float]:
+        """Xᵀ (B − A X), and the largest entry of B − A X; NaN where X is no number."""
         ...
 
     def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
@@ -50,6 +57,10 @@ class Engine(Protocol):
         self, gradient: NDArray[Any], pattern: Pattern, current: FloatArray
     ) -> NDArray[Any]:
         """(n_meas, n_cells) from scaled gradients (n_electrodes, components, n_cells)."""
+        ...
+
+    def patches(self, base: BaseState) -> Patches:
+        """What computes the changes of a state by a touch."""
         ...
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,9 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 from tomoskin.core import ModelError
+
+if TYPE_CHECKING:
+    from tomoskin.forward.engine import Engine
 
 MOST_RESIDUAL = 1e-6
 """A relative residual above this means that the matrix was singular to working precision."""
@@ -24,7 +29,23 @@ class Factor(Protocol):
         ...
 
 
-Factorise = Callable[[csc_array], Factor]
+Factorise = Callable[[NDArray[Any]], Factor]
+"""From the values of a matrix, whose structure is known, to its factor."""
+
+
+@dataclass(frozen=True, eq=False)
+class Compressed:
+    """A symmetric matrix by columns: values on a fixed structure."""
+
+    values: NDArray[Any]
+    indices: NDArray[np.int32]
+    indptr: NDArray[np.int32]
+
+    @cached_property
+    def matrix(self) -> csc_array:
+        """The same as scipy has it."""
+        n = len(self.indptr) - 1
+        return csc_array((self.values, self.indices, self.indptr), shape=(n, n))
 
 
 def factorise(matrix: csc_array) -> Factor:
@@ -51,9 +72,9 @@ def factorise(matrix: csc_array) -> Factor:
 
 
 def solve_checked(
-    matrix: csc_array, factor: Factor, rhs: NDArray[Any]
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Solution and residual, each (n_unknowns, n_rhs).
+    engine: Engine, matrix: Compressed, factor: Factor, rhs: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any], float]:
+    """Solution X (n_unknowns, n_rhs), what the residual costs Xᵀ (B − A X), and its largest entry.
 
     Raises
     ------
@@ -61,10 +82,10 @@ def solve_checked(
         When the residual shows that the matrix is singular to working precision.
     """
     solution = factor.solve(rhs)
-    residual = rhs - matrix @ solution
-    if not np.abs(residual).max() < MOST_RESIDUAL * np.abs(rhs).max():
+    lost, largest = engine.residual(matrix, rhs, solution)
+    if not largest < MOST_RESIDUAL * rhs.real.max():
         raise singular()
-    return solution, residual
+    return solution, lost, largest
 
 
 def singular() -> ModelError:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
-from tomoskin.core import FloatArray, ModelError
+from tomoskin.core import FloatArray, IntArray, ModelError
 from tomoskin.forward.assembly import Assembly, gradient_operator
 from tomoskin.forward.conductivity import checked_conductivity, number_type, numbers
 from tomoskin.forward.element import Element
@@ -61,6 +61,7 @@ class ForwardModel:
         self.pattern = pattern
         self.contact_impedance = _impedance(contact_impedance, pattern.n_electrodes)
         self.current = _current(current, pattern.n_drive)
+        self.most_current = float(np.abs(self.current).max())
         self.order = order
         self.engine = choose_engine()
         self.assembly = Assembly.of(Element.of(mesh, order))
@@ -75,6 +76,26 @@ class ForwardModel:
         """Factorises system matrices; their structure is analysed once."""
         return self.engine.analyse(self.assembly.indptr, self.assembly.indices)
 
+    @cached_property
+    def contacts(self) -> NDArray[Any]:
+        """What the contacts add to the values of the system matrix."""
+        return self.assembly.contacts(self.contact_impedance)
+
+    @cached_property
+    def _rows(self) -> tuple[IntArray, FloatArray]:
+        """(4, n_meas) entries of a flat transfer resistance, and the current of each row."""
+        (source, sink), (plus, minus) = self.pattern.drive.T, self.pattern.measure.T
+        n = self.pattern.n_electrodes
+        entries = [plus * n + source, plus * n + sink, minus * n + source, minus * n + sink]
+        return np.stack(entries), self.current[self.pattern.drive_index]
+
+    @cached_property
+    def by_drive(self) -> tuple[IntArray, IntArray]:
+        """Rows in the order of their drives, and where in it each drive that is read begins."""
+        index = self.pattern.drive_index
+        order = np.argsort(index, kind="stable")
+        return order, np.flatnonzero(np.diff(index[order], prepend=-1))
+
     def at(self, conductivity: ArrayLike) -> State:
         """Return the model at a conductivity, S or S/m.
 
@@ -85,12 +106,13 @@ class ForwardModel:
         return State(self, checked_conductivity(conductivity, self.mesh))
 
     def voltages(self, transfer_resistance: NDArray[Any]) -> NDArray[Any]:
-        """(n_meas,) V of the pattern, from (n_electrodes, n_electrodes) Ω."""
-        (source, sink), (plus, minus) = self.pattern.drive.T, self.pattern.measure.T
-        r = transfer_resistance
-        driven_plus = r[..., plus, source] - r[..., plus, sink]
-        driven_minus = r[..., minus, source] - r[..., minus, sink]
-        return np.asarray(self.current[self.pattern.drive_index] * (driven_plus - driven_minus))
+        """(…, n_meas) V of the pattern, from (…, n_electrodes, n_electrodes) Ω."""
+        entries, current = self._rows
+        *many, n, _ = transfer_resistance.shape
+        r = transfer_resistance.reshape(*many, n * n).take(entries, axis=-1)
+        driven_plus = r[..., 0, :] - r[..., 1, :]
+        driven_minus = r[..., 2, :] - r[..., 3, :]
+        return np.asarray(current * (driven_plus - driven_minus))
 
     def solve(self, conductivity: ArrayLike) -> Solution:
         """Voltages and potentials; see :meth:`at`."""

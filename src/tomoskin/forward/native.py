@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import csr_array
 
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.forward.factor import Factor, Factorise, singular
+from tomoskin.forward.factor import Compressed, Factor, Factorise, singular
+from tomoskin.forward.patches import BaseState, Patches
 from tomoskin.pattern import Pattern
 
 
@@ -26,14 +27,23 @@ class Native:
         """Order the unknowns and lay out the factor, once for all matrices of this structure."""
         symbolic = self.core.Symbolic(len(indptr) - 1, indptr, indices)
 
-        def factorise_natively(matrix: csc_array) -> Factor:
+        def factorise_natively(values: NDArray[Any]) -> Factor:
             try:
-                factor: Factor = symbolic.factor(matrix.data)
+                factor: Factor = symbolic.factor(values)
             except ValueError as error:
                 raise singular() from error
             return factor
 
         return factorise_natively
+
+    def residual(
+        self, matrix: Compressed, rhs: NDArray[Any], solution: NDArray[Any]
+    ) -> tuple[NDArray[Any], float]:
+        """See :class:`Engine`."""
+        found: tuple[NDArray[Any], float] = self.core.residual(
+            matrix.indptr, matrix.indices, matrix.values, rhs, solution
+        )
+        return found
 
     def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
         """See :class:`Engine`."""
@@ -51,6 +61,13 @@ class Native:
         )
         return rows
 
+    def patches(self, base: BaseState) -> Patches:
+        """See :class:`Engine`."""
+        made: Patches = self.core.Patches(
+            base.cells, base.local, base.held, base.conductivity, base.fields, base.grounded
+        )
+        return made
+
     def check(self) -> None:
         """Let it do a sum of each kind.
 
@@ -60,13 +77,19 @@ class Native:
             Of any kind, when a part is missing or a result wrong.
         """
         starts, rows = (np.array(part, dtype=np.int32) for part in ([0, 2, 4], [0, 1, 0, 1]))
-        matrix = csc_array((np.array([2.0, 1.0, 1.0, 3.0]), rows, starts), shape=(2, 2))
-        solved = self.analyse(starts, rows)(matrix).solve(np.array([[3.0], [4.0]]))
+        matrix = Compressed(np.array([2.0, 1.0, 1.0, 3.0]), rows, starts)
+        rhs = np.array([[3.0], [4.0]])
+        solved = self.analyse(starts, rows)(matrix.values).solve(rhs)
+        lost, _ = self.residual(matrix, rhs + 1.0, solved)
         fields = np.empty((1, 2))
-        self.fields(matrix.tocsr(), solved, fields)
+        self.fields(matrix.matrix.tocsr(), solved, fields)
         pattern = Pattern.adjacent(4)
         jacobian = self.jacobian(np.ones((4, 2, 3)), pattern, np.ones(pattern.n_drive))
-        if not (
-            np.allclose(solved, 1.0) and np.allclose(fields, [[3.0, 4.0]]) and not jacobian.any()
-        ):
+        right: list[tuple[Any, Any]] = [
+            (solved, 1.0),
+            (fields, [[3.0, 4.0]]),
+            (lost, 2.0),
+            (jacobian, 0.0),
+        ]
+        if not all(np.allclose(*pair) for pair in right):
             raise ModelError("its results are wrong")

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from tomoskin.core import FloatArray
-from tomoskin.forward.factor import Factorise, factorise
+from tomoskin.forward.factor import Compressed, Factorise, factorise
+from tomoskin.forward.patches import BaseState, Patches
+from tomoskin.forward.plain_patches import PlainPatches
 from tomoskin.pattern import Pattern
 
 
@@ -23,11 +25,18 @@ class Scipy:
 
     def analyse(
         self,
-        indptr: NDArray[np.int32],  # noqa: ARG002
-        indices: NDArray[np.int32],  # noqa: ARG002
+        indptr: NDArray[np.int32],
+        indices: NDArray[np.int32],
     ) -> Factorise:
         """See :class:`Engine`; SuperLU keeps no analysis."""
-        return factorise
+        return lambda values: factorise(Compressed(values, indices, indptr).matrix)
+
+    def residual(
+        self, matrix: Compressed, rhs: NDArray[Any], solution: NDArray[Any]
+    ) -> tuple[NDArray[Any], float]:
+        """See :class:`Engine`."""
+        left = rhs - matrix.matrix @ solution
+        return solution.T @ left, float(np.abs(left).max())
 
     def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
         """See :class:`Engine`."""
@@ -45,3 +54,7 @@ class Scipy:
             projected = np.einsum("edc,dc->ec", gradient, driven)
             out[rows] = projected[plus] - projected[minus]
         return out
+
+    def patches(self, base: BaseState) -> Patches:
+        """See :class:`Engine`."""
+        return PlainPatches(base)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tomoskin.forward import derivatives
 from tomoskin.forward.accuracy import checked_voltages, error_of_drives
-from tomoskin.forward.factor import Factor, solve_checked
+from tomoskin.forward.factor import Compressed, Factor, solve_checked
 from tomoskin.forward.movement import by_movement
 from tomoskin.forward.pairs import centred, pair_differences
 from tomoskin.forward.solution import Solution
@@ -34,26 +34,27 @@ class State:
     @cached_property
     def factor(self) -> Factor:
         """The factorised system."""
-        return self.model.factorise(self._matrix)
+        return self.model.factorise(self._matrix.values)
 
     @cached_property
-    def _matrix(self) -> Any:
-        return self.model.assembly.matrix(self.conductivity, self.model.contact_impedance)
+    def _matrix(self) -> Compressed:
+        return self.model.assembly.matrix(self.conductivity, self.model.contacts)
 
     @cached_property
     def _solved(self) -> tuple[NDArray[Any], NDArray[Any], float]:
         assembly = self.model.assembly
         n_basis = assembly.n_electrodes - 1
-        rhs = np.zeros((assembly.n_unknowns, n_basis), dtype=self._matrix.dtype)
-        rhs[assembly.n_points + np.arange(n_basis), np.arange(n_basis)] = 1.0
-        basis, residual = solve_checked(self._matrix, self.factor, rhs)
+        rhs = np.zeros((assembly.n_unknowns, n_basis), dtype=self._matrix.values.dtype)
+        np.fill_diagonal(rhs[assembly.n_points :], 1.0)
+        matrix = self._matrix
+        basis, lost, largest = solve_checked(self.model.engine, matrix, self.factor, rhs)
         voltages = checked_voltages(
             self.model,
             basis[assembly.n_points :],
-            basis.T @ residual,
-            sharper=lambda: error_of_drives(self.model, self._matrix, basis),
+            lost,
+            sharper=lambda: error_of_drives(self.model, matrix.matrix, basis),
         )
-        return basis, voltages, float(np.abs(residual).max())
+        return basis, voltages, largest
 
     @property
     def basis(self) -> NDArray[Any]:
@@ -73,18 +74,30 @@ class State:
         """(n_meas,) V of the pattern."""
         return self._solved[1]
 
-    @cached_property
+    @property
+    def residual(self) -> float:
+        """Largest relative residual of the linear solves."""
+        return self._solved[2]
+
+    @property
     def solution(self) -> Solution:
         """Voltages and potentials for every drive of the pattern."""
-        model, drives = self.model, self.model.pattern.drives
-        electrode = model.current[:, None] * pair_differences(self.transfer_resistance, drives)
-        nodal = model.current[:, None] * pair_differences(self._nodal, drives)
-        return Solution(
-            voltages=self.voltages,
-            electrode_potentials=electrode,
-            potentials=nodal + electrode[:, -1:],
-            residual=self._solved[2],
-        )
+        self._solved  # noqa: B018  # what has no answer is refused now, not at the first look
+        return Solution(self)
+
+    @cached_property
+    def electrode_potentials(self) -> NDArray[Any]:
+        """(n_drive, n_electrodes) V; each row sums to zero, which fixes the free constant."""
+        model, resistance = self.model, self.transfer_resistance
+        differences = pair_differences(resistance, model.pattern.drives)
+        return np.asarray(model.current[:, None] * differences)
+
+    @cached_property
+    def potentials(self) -> NDArray[Any]:
+        """(n_drive, n_points) V at the mesh's points."""
+        model = self.model
+        nodal = model.current[:, None] * pair_differences(self._nodal, model.pattern.drives)
+        return np.asarray(nodal + self.electrode_potentials[:, -1:])
 
     @property
     def _nodal(self) -> NDArray[Any]:
@@ -135,4 +148,4 @@ class State:
     @cached_property
     def local(self) -> LocalUpdate:
         """Exact voltages when few cells change, without a new factorisation."""
-        return LocalUpdate(self)
+        return LocalUpdate(self.model, self.conductivity, basis=self.basis, solve=self.factor.solve)

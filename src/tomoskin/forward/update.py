@@ -1,17 +1,23 @@
 """The local update: a touch changes few cells, and few nodes lie on them.
 
-With the inverse of the base system between the touched nodes in hand, the voltages of the changed
-sheet follow exactly from a small dense system (Woodbury 1950):
+Nodes inside the touched patch, and on no electrode, see the rest of the sheet through its rim
+only. They are eliminated (Schur complement), from the cells as they were and as they are; the
+difference A is the change of the system as the rim sees it. With the inverse of the base system
+between the rim's nodes in hand, the voltages of the changed sheet follow exactly from a small
+dense system (Woodbury 1950):
 
     R' = R − Uᵀ (I + A C)⁻¹ A U,
 
-where A is the change of the system on the touched nodes, C = (K⁻¹) between them and U the basis
-fields on them. A constant changes nothing, so all three are taken against the first touched node:
-what the nodes have in common would cost digits, and does not enter.
+where C = (K⁻¹) between them and U the basis fields on them. A constant changes nothing, so all
+three are taken against the first node: what the nodes have in common would cost digits, and does
+not enter. How many are left shows in the residual, and in the current that a constant drives
+through A, which should be none.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,38 +25,48 @@ from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import IntArray, ModelError
 from tomoskin.forward.accuracy import checked_voltages
-from tomoskin.forward.conductivity import numbers
 from tomoskin.forward.factor import singular
 from tomoskin.forward.pairs import centred
+from tomoskin.forward.patches import BaseState, Patches
+from tomoskin.forward.touches import Touch, Touches
 
 if TYPE_CHECKING:
-    from tomoskin.forward.state import State
+    from tomoskin.forward.model import ForwardModel
 
 MOST_BYTES = 1 << 30
-"""Columns of the inverse are kept up to this size, then those of the oldest call go."""
+"""Columns of the inverse are kept up to this size, then they go."""
+
+MOST_CELLS = 4000
+"""A larger patch is no local change: the changed sheet is factorised anew."""
 
 
 class LocalUpdate:
     """Exact transfer resistance and voltages of a state with some cells changed.
 
-    Columns of the inverse are computed as nodes are first touched, and kept: the first touch at
-    a place costs a solve with as many right-hand sides as it has nodes, later ones do not.
+    Columns of the inverse are computed as nodes are first needed, and kept: the first touch at
+    a place costs a solve with as many right-hand sides as its rim has nodes, later ones do not.
     """
 
-    def __init__(self, state: State) -> None:
-        """Prepare for changes of ``state``; nothing is computed yet."""
-        self._state = state
-        assembly = state.model.assembly
-        gradients = assembly.element.gradients
-        self._local = np.einsum("nqid,nqjd->nij", gradients, gradients)
-        self._cells = assembly.element.cells
-        self._slot = np.full(assembly.n_points, -1)
-        self._columns: NDArray[Any] = np.empty((0, assembly.n_points), state.basis.dtype)
+    def __init__(
+        self,
+        model: ForwardModel,
+        conductivity: NDArray[Any],
+        *,
+        basis: NDArray[Any],
+        solve: Callable[[NDArray[Any]], NDArray[Any]],
+    ) -> None:
+        """Prepare for changes of a state; nothing is computed yet."""
+        self._model, self._conductivity = model, conductivity
+        self._basis, self._solve = basis, solve
+        self._known = np.zeros(model.assembly.n_points, dtype=bool)
 
     def warm_up(self, cells: ArrayLike | None = None) -> None:
         """Compute the columns for ``cells`` (all of them without an argument) beforehand."""
-        chosen = self._cells if cells is None else self._cells[np.asarray(cells)]
-        self._need(np.unique(chosen))
+        all_cells = self._model.assembly.element.cells
+        chosen = all_cells if cells is None else all_cells[np.asarray(cells)]
+        nodes = np.unique(chosen)
+        while len(missing := nodes[~self._known[nodes]]):
+            self._need(missing)
 
     def transfer_resistance(self, cells: ArrayLike, conductivity: ArrayLike) -> NDArray[Any]:
         """(n_electrodes, n_electrodes) Ω with ``cells`` (n,) changed to ``conductivity`` (n,).
@@ -61,99 +77,98 @@ class LocalUpdate:
             For cells that do not exist or stand twice, a conductivity that is not positive, or
             a change that leaves the system singular to working precision.
         """
-        return centred(self._changed(cells, conductivity)[0])
+        return np.asarray(self.transfer_resistances_of([(cells, conductivity)])[0])
 
     def voltages(self, cells: ArrayLike, conductivity: ArrayLike) -> NDArray[Any]:
         """(n_meas,) V with ``cells`` changed; see :meth:`transfer_resistance`."""
-        return self._changed(cells, conductivity)[1]
+        return np.asarray(self.voltages_of([(cells, conductivity)])[0])
 
-    def _changed(
-        self, cells: ArrayLike, conductivity: ArrayLike
-    ) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Transfer resistance against the ground electrode, and voltages.
+    def transfer_resistances_of(self, touches: Sequence[Touch]) -> NDArray[Any]:
+        """(n_touches, n_electrodes, n_electrodes) Ω of touches (cells, conductivity), each alone.
 
-        The residual is that of the whole changed system: what A drives in the changed fields must
-        be the currents that were found.
+        Raises
+        ------
+        ModelError
+            See :meth:`transfer_resistance`; it names the touch.
         """
-        index, change = self._change(cells, conductivity)
-        nodes, block = self._block(index, change)
-        block, between, base = block[1:, 1:], self._between(nodes), self._state.basis
-        between = between[1:] - between[:1]
-        between = between[:, 1:] - between[:, :1]
-        fields = base[nodes[1:]] - base[nodes[:1]]
-        current = _currents(block, between, fields)
-        changed = fields - between @ current
-        residual = block @ changed - current
-        model = self._state.model
-        grounded = base[model.assembly.n_points :] - fields.T @ current
-        return grounded, checked_voltages(model, grounded, changed.T @ residual)
+        grounded, lost = self._changed(touches)
+        checked_voltages(self._model, grounded, lost)
+        return centred(grounded)
 
-    def _change(self, cells: ArrayLike, conductivity: ArrayLike) -> tuple[IntArray, NDArray[Any]]:
-        state = self._state
-        if state.conductivity.ndim > 1:
+    def voltages_of(self, touches: Sequence[Touch]) -> NDArray[Any]:
+        """(n_touches, n_meas) V; see :meth:`transfer_resistances_of`."""
+        return checked_voltages(self._model, *self._changed(touches))
+
+    def _changed(self, touches: Sequence[Touch]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Transfer resistance against the ground electrode, and what rounding may cost it."""
+        if self._conductivity.ndim > 1:
             raise ModelError("a local update needs a scalar conductivity")
-        index, sigma = numbers(cells, "cells"), numbers(conductivity, "conductivity")
-        if not index.size:
-            index = index.astype(np.int64)
-        n = len(self._cells)
-        if index.dtype.kind not in "iu" or index.ndim != 1 or sigma.shape != index.shape:
-            raise ModelError(
-                f"expected cells (n,) and as many conductivities, got {index.shape} "
-                f"{index.dtype} and {sigma.shape}"
-            )
-        if len(index) and not (index.min() >= 0 and index.max() < n):
-            raise ModelError(f"expected cells from 0 to {n - 1}")
-        if not (np.isfinite(sigma) & (sigma.real > 0)).all():
-            bad = int(np.argmin(np.isfinite(sigma) & (sigma.real > 0)))
-            raise ModelError(
-                f"expected a positive finite conductivity, got {sigma[bad]}",
-                where=f"cell {index[bad]}",
-            )
-        if len(np.unique(index)) < len(index):
-            raise ModelError("expected each cell once")
-        return index, sigma - state.conductivity[index]
+        joined = Touches.of(touches, self._basis.dtype)
+        if len(joined.cells) <= MOST_CELLS or np.diff(joined.starts).max() <= MOST_CELLS:
+            return self._by_patches(joined)
+        if len(joined) > 1:
+            single = [self._changed([joined[number]]) for number in range(len(joined))]
+            grounded, lost = zip(*single, strict=True)
+            return np.concatenate(grounded), np.concatenate(lost)
+        return self._anew(joined)
 
-    def _block(self, index: IntArray, change: NDArray[Any]) -> tuple[IntArray, NDArray[Any]]:
-        """Touched nodes (p,), and the change of the system between them, (p, p)."""
-        cells = self._cells[index]
-        nodes, place = np.unique(cells, return_inverse=True)
-        place = place.reshape(cells.shape)
-        p = len(nodes)
-        entries = self._local[index] * change[:, None, None]
-        keys = (place[:, :, None] * p + place[:, None, :]).ravel()
-        if np.iscomplexobj(entries):
-            flat = entries.ravel()
-            block = np.bincount(keys, flat.real, p * p) + 1j * np.bincount(keys, flat.imag, p * p)
-        else:
-            block = np.bincount(keys, entries.ravel(), p * p)
-        return nodes, block.reshape(p, p)
+    def _anew(self, touch: Touches) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Results of a large patch; the new state checks its own voltages."""
+        if fault := touch.fault(len(self._conductivity)):
+            raise fault
+        kind = np.result_type(self._conductivity, touch.conductivity)
+        changed = self._conductivity.astype(kind)
+        changed[touch.cells] = touch.conductivity
+        grounded = self._model.at(changed).basis[self._model.assembly.n_points :]
+        return grounded[None], np.zeros_like(grounded)[None]
 
-    def _between(self, nodes: IntArray) -> NDArray[Any]:
-        """(p, p): the base system's inverse between ``nodes``."""
-        self._need(nodes)
-        return np.asarray(self._columns[self._slot[nodes][:, None], nodes])
+    def _by_patches(self, touches: Touches) -> tuple[NDArray[Any], NDArray[Any]]:
+        arrays = touches.starts, touches.cells, touches.conductivity
+        try:
+            grounded, lost, missing = self._patches.change(*arrays)
+            while len(missing):
+                if len(touches) > 1 and self._size(len(missing)) > MOST_BYTES:
+                    return self._by_halves(touches)
+                self._need(missing)
+                grounded, lost, missing = self._patches.change(*arrays)
+        except ValueError as error:
+            raise touches.fault(len(self._conductivity)) or singular() from error
+        return grounded, lost
 
-    def _need(self, nodes: IntArray) -> None:
-        missing = nodes[self._slot[nodes] < 0]
-        if not len(missing):
+    def _by_halves(self, touches: Touches) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Results of more touches than the store has room for."""
+        end = len(touches)
+        parts = touches.part(0, end // 2), touches.part(end // 2, end)
+        grounded, lost = zip(*map(self._by_patches, parts), strict=True)
+        return np.concatenate(grounded), np.concatenate(lost)
+
+    @cached_property
+    def _patches(self) -> Patches:
+        element, basis = self._model.assembly.element, self._basis
+        held = np.zeros(element.n_nodes, dtype=bool)
+        for facets in element.facets:
+            held[facets] = True
+        base = BaseState(
+            cells=element.cells,
+            local=np.einsum("nqid,nqjd->nij", element.gradients, element.gradients),
+            held=held,
+            conductivity=self._conductivity.astype(basis.dtype),
+            fields=basis[: element.n_nodes],
+            grounded=basis[element.n_nodes :],
+        )
+        return self._model.engine.patches(base)
+
+    def _size(self, n_columns: int) -> int:
+        return n_columns * self._model.assembly.n_points * self._basis.itemsize
+
+    def _need(self, missing: IntArray) -> None:
+        """Compute the columns of nodes; where the store is full, empty it for the next attempt."""
+        known = int(np.count_nonzero(self._known))
+        if known and self._size(known + len(missing)) > MOST_BYTES:
+            self._patches.forget()
+            self._known[:] = False
             return
-        state, n = self._state, self._state.model.assembly.n_points
-        if (len(self._columns) + len(missing)) * n * self._columns.itemsize > MOST_BYTES:
-            self._slot[:] = -1
-            self._columns = self._columns[:0]
-            missing = nodes
-        rhs = np.zeros((state.model.assembly.n_unknowns, len(missing)), self._columns.dtype)
+        rhs = np.zeros((len(self._basis), len(missing)), self._basis.dtype)
         rhs[missing, np.arange(len(missing))] = 1.0
-        solved = state.factor.solve(rhs)[:n].T
-        self._slot[missing] = len(self._columns) + np.arange(len(missing))
-        self._columns = np.vstack([self._columns, solved])
-
-
-def _currents(change: NDArray[Any], between: NDArray[Any], fields: NDArray[Any]) -> NDArray[Any]:
-    """(I + A C)⁻¹ A U, what the change drives out of each node."""
-    system = change @ between
-    system[np.diag_indices_from(system)] += 1.0
-    try:
-        return np.linalg.solve(system, change @ fields)
-    except np.linalg.LinAlgError as error:
-        raise singular() from error
+        self._patches.keep(missing, self._solve(rhs)[: self._model.assembly.n_points])
+        self._known[missing] = True

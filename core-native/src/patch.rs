@@ -1,0 +1,556 @@
+//! The local update: a patch of cells changes, and only its rim is seen from outside.
+//!
+//! Nodes inside the patch are eliminated, from the cells as they were and as they are, side by
+//! side, in the order of least degree. The difference of what is left on the rim changes the
+//! system there (Woodbury), with the inverse of the base system between the nodes of the rim.
+
+use faer::linalg::matmul::matmul;
+use faer::linalg::solvers::{PartialPivLu, Solve};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+use pulp::{Arch, Simd, WithSimd};
+
+use crate::scalar::Scalar;
+
+/// Up to this size short loops solve a dense system faster than faer.
+const SMALL: usize = 96;
+
+/// A number of a base state as one of a changed state, which may be complex where the base is not.
+pub trait Lift<T>: Scalar {
+    /// The same number.
+    fn lift(self) -> T;
+}
+
+impl<T: Scalar> Lift<T> for T {
+    #[inline(always)]
+    fn lift(self) -> T {
+        self
+    }
+}
+
+impl Lift<faer::c64> for f64 {
+    #[inline(always)]
+    fn lift(self) -> faer::c64 {
+        faer::c64::new(self, 0.0)
+    }
+}
+
+/// The cells of a mesh.
+#[derive(Debug)]
+pub struct Cells {
+    /// Nodes of each cell.
+    nodes: Vec<u32>,
+    /// Nodes of one cell.
+    per_cell: usize,
+    /// The matrix of each cell for a unit conductivity, row-major.
+    matrices: Vec<f64>,
+    /// Cells at each node; of a node that must stay, more than there are.
+    valence: Vec<u32>,
+}
+
+impl Cells {
+    /// Lays out the cells; nodes that are `held` (on electrodes) are never eliminated.
+    ///
+    /// # Errors
+    /// When a size does not fit or a node is not there.
+    pub fn new(
+        nodes: Vec<u32>,
+        per_cell: usize,
+        matrices: Vec<f64>,
+        held: &[bool],
+    ) -> Result<Self, String> {
+        if per_cell == 0 || nodes.len() * per_cell != matrices.len() {
+            return Err("local: expected a matrix for each cell".into());
+        }
+        let mut valence: Vec<u32> = held.iter().map(|&held| u32::from(held) << 31).collect();
+        for &node in &nodes {
+            let count = valence.get_mut(node as usize);
+            *count.ok_or_else(|| format!("cells: there is no node {node}"))? += 1;
+        }
+        Ok(Self {
+            nodes,
+            per_cell,
+            matrices,
+            valence,
+        })
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.nodes.len() / self.per_cell
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Number of nodes.
+    #[must_use]
+    pub fn n_nodes(&self) -> usize {
+        self.valence.len()
+    }
+
+    fn nodes_of(&self, cell: usize) -> &[u32] {
+        &self.nodes[cell * self.per_cell..][..self.per_cell]
+    }
+}
+
+/// What is known of the base state.
+#[derive(Debug)]
+pub struct Base<B> {
+    /// Conductivity of each cell.
+    pub conductivity: Vec<B>,
+    /// Fields of 1 A into each electrode but the last, `width` to a node.
+    pub fields: Vec<B>,
+    /// Number of those fields.
+    pub width: usize,
+    /// Their potentials at these electrodes, row-major.
+    pub grounded: Vec<B>,
+    /// Columns of the inverse, of those nodes that have been asked for.
+    pub columns: Vec<Option<Box<[B]>>>,
+}
+
+/// Cells and what they change to.
+#[derive(Clone, Copy, Debug)]
+pub struct Touch<'a, T> {
+    /// The cells.
+    pub cells: &'a [i64],
+    /// Conductivity of each.
+    pub conductivity: &'a [T],
+}
+
+/// Why there is no result.
+#[derive(Debug)]
+pub enum Refusal {
+    /// A cell that is not there or stands twice, or a conductivity that is not positive.
+    Impossible,
+    /// A pivot was not positive.
+    Singular,
+    /// The columns of these nodes are needed first.
+    Missing(Vec<u32>),
+}
+
+/// Results of a touch, row-major, one row and column for each field.
+#[derive(Debug)]
+pub struct Changed<'a, T> {
+    /// Transfer resistance against the ground electrode.
+    pub grounded: &'a mut [T],
+    /// How far rounding may have shifted it.
+    pub lost: &'a mut [T],
+}
+
+/// Memory that touches share, one after the other.
+#[derive(Debug)]
+pub struct Workspace<T> {
+    seen: Vec<bool>,
+    place: Vec<u32>,
+    patch: Patch<T>,
+}
+
+/// A touched patch, its nodes numbered as they were found.
+#[derive(Debug)]
+struct Patch<T> {
+    nodes: Vec<u32>,
+    touched: Vec<u32>,
+    rim: Vec<u32>,
+    inside: Vec<u32>,
+    /// Nodes of the cells in the patch's numbers.
+    corners: Vec<u32>,
+    /// Neighbours of each node, a bit for each.
+    graph: Vec<u64>,
+    degree: Vec<u32>,
+    /// Matrix before and after, lower triangle, row-major.
+    matrix: Vec<[T; 2]>,
+    list: Vec<u32>,
+    column: Vec<[T; 2]>,
+}
+
+impl<T: Scalar> Workspace<T> {
+    /// Memory for touches of these cells.
+    #[must_use]
+    pub fn new(cells: &Cells) -> Self {
+        Self {
+            seen: vec![false; cells.len()],
+            place: vec![0; cells.n_nodes()],
+            patch: Patch {
+                nodes: Vec::new(),
+                touched: Vec::new(),
+                rim: Vec::new(),
+                inside: Vec::new(),
+                corners: Vec::new(),
+                graph: Vec::new(),
+                degree: Vec::new(),
+                matrix: Vec::new(),
+                list: Vec::new(),
+                column: Vec::new(),
+            },
+        }
+    }
+
+    /// Computes what one touch changes.
+    ///
+    /// # Errors
+    /// See [`Refusal`].
+    pub fn update<B: Lift<T>>(
+        &mut self,
+        cells: &Cells,
+        base: &Base<B>,
+        touch: Touch<'_, T>,
+        out: Changed<'_, T>,
+    ) -> Result<(), Refusal> {
+        for (to, from) in out.grounded.iter_mut().zip(&base.grounded) {
+            *to = from.lift();
+        }
+        out.lost.fill(T::ZERO);
+        self.check(cells.len(), touch)?;
+        self.number(cells, touch.cells);
+        let rim = &self.patch.rim;
+        let node = |&local: &u32| self.patch.nodes[local as usize];
+        let nodes: Vec<u32> = rim.iter().map(node).collect();
+        let absent = |&node: &u32| base.columns[node as usize].is_none();
+        let missing: Vec<u32> = nodes.iter().copied().filter(absent).collect();
+        if !missing.is_empty() {
+            return Err(Refusal::Missing(missing));
+        }
+        if nodes.len() < 2 {
+            return Ok(());
+        }
+        self.patch.assemble(cells, base, touch);
+        let condense = Condense {
+            patch: &mut self.patch,
+        };
+        Arch::new()
+            .dispatch(condense)
+            .ok_or(Refusal::Singular)
+            .map(|()| woodbury(&self.patch, &nodes, base, out))
+    }
+
+    fn check(&mut self, n_cells: usize, touch: Touch<'_, T>) -> Result<(), Refusal> {
+        let positive = touch.conductivity.iter().all(|value| value.conducts());
+        let mut marked = 0;
+        for &cell in touch.cells {
+            let cell = usize::try_from(cell).unwrap_or(usize::MAX);
+            if cell >= n_cells || self.seen[cell] {
+                break;
+            }
+            self.seen[cell] = true;
+            marked += 1;
+        }
+        for &cell in &touch.cells[..marked] {
+            self.seen[cell as usize] = false;
+        }
+        if positive && marked == touch.cells.len() && marked == touch.conductivity.len() {
+            return Ok(());
+        }
+        Err(Refusal::Impossible)
+    }
+
+    /// Numbers the nodes of the patch; inside are those all of whose cells are touched.
+    fn number(&mut self, cells: &Cells, index: &[i64]) {
+        let patch = &mut self.patch;
+        patch.nodes.clear();
+        patch.touched.clear();
+        patch.corners.clear();
+        for &cell in index {
+            for &node in cells.nodes_of(cell as usize) {
+                let place = &mut self.place[node as usize];
+                if *place == 0 {
+                    patch.nodes.push(node);
+                    patch.touched.push(0);
+                    *place = patch.nodes.len() as u32;
+                }
+                patch.touched[*place as usize - 1] += 1;
+                patch.corners.push(*place - 1);
+            }
+        }
+        patch.rim.clear();
+        patch.inside.clear();
+        for (local, (&node, &touched)) in (0_u32..).zip(patch.nodes.iter().zip(&patch.touched)) {
+            self.place[node as usize] = 0;
+            if cells.valence[node as usize] == touched {
+                patch.inside.push(local);
+            } else {
+                patch.rim.push(local);
+            }
+        }
+    }
+}
+
+impl<T: Scalar> Patch<T> {
+    fn words(&self) -> usize {
+        self.nodes.len().div_ceil(64)
+    }
+
+    /// Fills matrix and graph from the cells.
+    fn assemble<B: Lift<T>>(&mut self, cells: &Cells, base: &Base<B>, touch: Touch<'_, T>) {
+        let (n, words, k) = (self.nodes.len(), self.words(), cells.per_cell);
+        self.matrix.clear();
+        self.matrix.resize(n * n, [T::ZERO; 2]);
+        self.graph.clear();
+        self.graph.resize(n * words, 0);
+        let touched = touch.cells.iter().zip(touch.conductivity);
+        for ((&cell, &after), corners) in touched.zip(self.corners.chunks_exact(k)) {
+            let before: T = base.conductivity[cell as usize].lift();
+            let unit = &cells.matrices[cell as usize * k * k..][..k * k];
+            for (&i, row) in corners.iter().zip(unit.chunks_exact(k)) {
+                for (&j, &value) in corners.iter().zip(row) {
+                    self.graph[i as usize * words + j as usize / 64] |= 1 << (j % 64);
+                    if j <= i {
+                        let [first, second] = &mut self.matrix[i as usize * n + j as usize];
+                        *first += before * value;
+                        *second += after * value;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes the node inside that has the fewest neighbours.
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let degree = |&(_, &local): &(usize, &u32)| self.degree[local as usize];
+        let (at, _) = self.inside.iter().enumerate().min_by_key(degree)?;
+        Some(self.inside.swap_remove(at) as usize)
+    }
+
+    /// Lists the neighbours of a node, makes them neighbours of each other, and drops the node.
+    #[inline(always)]
+    fn unlink(&mut self, node: usize) {
+        let words = self.words();
+        self.graph[node * words + node / 64] &= !(1 << (node % 64));
+        self.list.clear();
+        for word in 0..words {
+            let mut bits = self.graph[node * words + word];
+            while bits != 0 {
+                self.list.push((word * 64) as u32 + bits.trailing_zeros());
+                bits &= bits - 1;
+            }
+        }
+        for &other in &self.list {
+            let other = other as usize;
+            let mut degree = 0;
+            for word in 0..words {
+                let own = self.graph[node * words + word];
+                let theirs = &mut self.graph[other * words + word];
+                *theirs |= own;
+                if word == node / 64 {
+                    *theirs &= !(1 << (node % 64));
+                }
+                degree += theirs.count_ones();
+            }
+            self.degree[other] = degree;
+        }
+    }
+
+    /// Subtracts from the listed nodes what the eliminated one contributes.
+    #[inline(always)]
+    fn subtract(&mut self, node: usize) -> Option<()> {
+        let n = self.nodes.len();
+        let [first, second] = self.matrix[node * n + node];
+        let scale = [T::ONE / first.pivot()?, T::ONE / second.pivot()?];
+        self.column.clear();
+        for &other in &self.list {
+            let (low, high) = (node.min(other as usize), node.max(other as usize));
+            let [a, b] = self.matrix[high * n + low];
+            self.column.push([a * scale[0], b * scale[1]]);
+        }
+        for (at, (&i, &by)) in self.list.iter().zip(&self.column).enumerate() {
+            let row = &mut self.matrix[i as usize * n..][..n];
+            for (&j, value) in self.list[..=at].iter().zip(&self.column) {
+                let [first, second] = &mut row[j as usize];
+                *first -= by[0] * value[0];
+                *second -= by[1] * value[1];
+            }
+        }
+        Some(())
+    }
+}
+
+impl<T: Scalar> Patch<T> {
+    /// The change of the system on the rim without its first node, and the current that leaks
+    /// from each of the others.
+    fn change(&self) -> (Mat<T>, Vec<T>) {
+        let (n, m) = (self.nodes.len(), self.rim.len() - 1);
+        let mut change = Mat::zeros(m, m);
+        let mut leak = vec![T::ZERO; m + 1];
+        for (i, &row) in self.rim.iter().enumerate() {
+            // The rim's numbers ascend, so that this is the lower triangle.
+            let row = &self.matrix[row as usize * n..][..n];
+            for (j, &column) in self.rim[..=i].iter().enumerate() {
+                let [before, after] = row[column as usize];
+                let value = after - before;
+                leak[i] += value;
+                if j < i {
+                    leak[j] += value;
+                }
+                if j > 0 {
+                    change[(i - 1, j - 1)] = value;
+                    change[(j - 1, i - 1)] = value;
+                }
+            }
+        }
+        leak.remove(0);
+        (change, leak)
+    }
+}
+
+struct Condense<'a, T> {
+    patch: &'a mut Patch<T>,
+}
+
+impl<T: Scalar> WithSimd for Condense<'_, T> {
+    type Output = Option<()>;
+
+    /// Eliminates all nodes inside; nothing where a pivot is not positive.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let patch = self.patch;
+        let rows = patch.graph.chunks_exact(patch.words());
+        let degree = |row: &[u64]| row.iter().map(|word| word.count_ones()).sum::<u32>();
+        patch.degree.clear();
+        patch.degree.extend(rows.map(degree));
+        while let Some(node) = patch.next() {
+            patch.unlink(node);
+            patch.subtract(node)?;
+        }
+        Some(())
+    }
+}
+
+/// R' = R − Uᵀ (I + A C)⁻¹ A U on the rim, against its first node; see `update.py`.
+///
+/// Rounding shows in what the solve leaves over, and in the current that leaks from a rim at one
+/// potential, where none should flow.
+fn woodbury<T: Scalar, B: Lift<T>>(
+    patch: &Patch<T>,
+    nodes: &[u32],
+    base: &Base<B>,
+    out: Changed<'_, T>,
+) {
+    let (m, width) = (nodes.len() - 1, base.width);
+    let (change, leak) = patch.change();
+    let between = between(nodes, base);
+    let field = |row: usize, k: usize| -> T { base.fields[nodes[row] as usize * width + k].lift() };
+    let fields = Mat::from_fn(m, width, |row, k| field(row + 1, k) - field(0, k));
+
+    let mut system = Mat::identity(m, m);
+    add(&mut system, change.as_ref(), between.as_ref(), T::ONE);
+    let mut current = Mat::zeros(m, width);
+    add(&mut current, change.as_ref(), fields.as_ref(), T::ONE);
+    if m <= SMALL {
+        let (system, current) = (system.as_mut(), current.as_mut());
+        Arch::new().dispatch(Small { system, current });
+    } else {
+        PartialPivLu::new(system.as_ref()).solve_in_place(current.as_mut());
+    }
+    let mut changed = fields.clone();
+    add(&mut changed, between.as_ref(), current.as_ref(), -T::ONE);
+    let mut residual = Mat::from_fn(m, width, |i, k| leak[i] * changed[(i, k)] - current[(i, k)]);
+    add(&mut residual, change.as_ref(), changed.as_ref(), T::ONE);
+
+    let mut result = Mat::zeros(width, width);
+    add(&mut result, fields.transpose(), current.as_ref(), T::ONE);
+    let mut lost = Mat::zeros(width, width);
+    add(&mut lost, changed.transpose(), residual.as_ref(), T::ONE);
+    for i in 0..width {
+        for j in 0..width {
+            out.grounded[i * width + j] -= result[(i, j)];
+            out.lost[i * width + j] = lost[(i, j)];
+        }
+    }
+}
+
+/// The inverse of the base system between the rim's nodes, against the first; it is symmetric.
+fn between<T: Scalar, B: Lift<T>>(nodes: &[u32], base: &Base<B>) -> Mat<T> {
+    let m = nodes.len() - 1;
+    let origin = base.columns[nodes[0] as usize]
+        .as_deref()
+        .unwrap_or_default();
+    let origin: Vec<T> = nodes
+        .iter()
+        .map(|&row| origin[row as usize].lift())
+        .collect();
+    let mut out = Mat::zeros(m, m);
+    for (j, &node) in nodes[1..].iter().enumerate() {
+        let column = base.columns[node as usize].as_deref().unwrap_or_default();
+        let first = column[nodes[0] as usize].lift() - origin[0];
+        for (i, &row) in nodes[1..].iter().enumerate().skip(j) {
+            let value = column[row as usize].lift() - origin[i + 1] - first;
+            out[(i, j)] = value;
+            out[(j, i)] = value;
+        }
+    }
+    out
+}
+
+/// Gaussian elimination with row exchanges; NaN where the system is singular.
+struct Small<'a, T> {
+    system: MatMut<'a, T>,
+    current: MatMut<'a, T>,
+}
+
+impl<T: Scalar> WithSimd for Small<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (m, width) = self.current.shape();
+        let row = m + width;
+        let mut joined = vec![T::ZERO; m * row];
+        for (i, joined) in joined.chunks_exact_mut(row).enumerate() {
+            for (j, value) in joined.iter_mut().enumerate() {
+                *value = if j < m {
+                    self.system[(i, j)]
+                } else {
+                    self.current[(i, j - m)]
+                };
+            }
+        }
+        for k in 0..m {
+            let size = |&i: &usize| joined[i * row + k].norm_sqr();
+            let largest = |a: &usize, b: &usize| size(a).total_cmp(&size(b));
+            let pivot = (k..m).max_by(largest).unwrap_or(k);
+            let (above, below) = joined.split_at_mut((k + 1) * row);
+            let top = &mut above[k * row..];
+            if pivot > k {
+                top.swap_with_slice(&mut below[(pivot - k - 1) * row..][..row]);
+            }
+            let inverse = T::ONE / top[k];
+            for other in below.chunks_exact_mut(row) {
+                let factor = other[k] * inverse;
+                reduce(&mut other[k + 1..], factor, &top[k + 1..]);
+            }
+        }
+        for k in (0..m).rev() {
+            let (above, below) = joined.split_at_mut(k * row);
+            let inverse = T::ONE / below[k];
+            let known = &mut below[m..row];
+            for value in known.iter_mut() {
+                *value *= inverse;
+            }
+            for other in above.chunks_exact_mut(row) {
+                let factor = other[k];
+                reduce(&mut other[m..], factor, known);
+            }
+        }
+        let mut current = self.current;
+        for (i, joined) in joined.chunks_exact(row).enumerate() {
+            for (j, &value) in joined[m..].iter().enumerate() {
+                current[(i, j)] = value;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn reduce<T: Scalar>(row: &mut [T], factor: T, by: &[T]) {
+    for (value, &other) in row.iter_mut().zip(by) {
+        *value -= factor * other;
+    }
+}
+
+fn add<T: Scalar>(target: &mut Mat<T>, left: MatRef<'_, T>, right: MatRef<'_, T>, scale: T) {
+    matmul(target, Accum::Add, left, right, scale, Par::Seq);
+}
