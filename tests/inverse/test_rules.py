@@ -190,7 +190,7 @@ def simulated_errors(s: Spectrum, noise: FloatArray, choice: AlphaChoice) -> lis
     radius = 0.055 * np.sqrt(mesh.volumes.sum())
     inside = np.flatnonzero(np.hypot(*mesh.centroids.T) < 0.1 - radius)
     near = np.linalg.norm(mesh.centroids[:, None] - mesh.centroids[inside], axis=2) <= radius
-    truth = np.where(near, 0.2, 0.0)
+    truth = np.where(near, 0.25, 0.0)
     data = s.problem.jacobian @ truth
     data = data + noise[:, None] * rng.standard_normal(data.shape)
     errors = []

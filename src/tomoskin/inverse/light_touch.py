@@ -18,7 +18,7 @@ from tomoskin.mesh import Mesh
 RADIUS = 0.055
 """Radius of the touch, in parts of the breadth of a square (a cube) as large as the mesh."""
 
-DEPTH = 0.2
+DEPTH = 0.25
 """Its relative change of conductivity."""
 
 _PLACES = 80
