@@ -35,6 +35,8 @@ def test_a_dead_channel_leaves_every_frame_and_is_named(changes: FloatArray) -> 
     changes[:6, 4] = np.inf
     found = pictures(OPERATOR, changes, PATTERN)
     assert found.dropped.tolist() == [4, 17]
+    assert found.left_out[:, [4, 17]].all()
+    assert found.left_out.sum() == 20
     assert found.report == f"rows left out: {PATTERN.row_text(4)}; {PATTERN.row_text(17)}"
     expected = OPERATOR.without([4, 17])
     for frame in range(10):
