@@ -94,6 +94,11 @@ class Grid:
     step: float
 
     @property
+    def reach(self) -> float:
+        """Radius of the largest circle around the origin with nodes all around it, m."""
+        return (self.n // 2 - 1) * self.step
+
+    @property
     def points(self) -> FloatArray:
         """(n·n, 2) m; x changes slowest."""
         x = (np.arange(self.n) - self.n // 2) * self.step

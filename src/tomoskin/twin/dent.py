@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from tomoskin.core import FloatArray
-from tomoskin.twin.contact import ContactSettings, Grid, local_points, solve_contact
+from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
 from tomoskin.twin.probe import Probe
 from tomoskin.twin.shape import Shape
 from tomoskin.twin.strain import bulge_strain, drag_strain, slope_strain
@@ -112,21 +112,23 @@ def indent(
     face within a few reaches of another would in truth press a little otherwise
     (:func:`solve_contact` solves them together).
     """
-    total = Load.none(len(points))
+    total = np.zeros((len(points), 4))
     x, y = np.ascontiguousarray(points.T)
     for probe in probes:
         if probe.force == 0:
             continue
         c, s = math.cos(probe.angle), math.sin(probe.angle)
-        (dx, dy), turn = probe.drag, probe.angle
+        dx, dy = probe.drag
         along = (c * dx + s * dy, c * dy - s * dx)
         dent = _blended(probe.shape, settings, probe.force, along, blur)
-        reach = (dent.grid.n // 2 - 1) * dent.grid.step
-        near = np.flatnonzero((x - probe.x) ** 2 + (y - probe.y) ** 2 < reach**2)
-        values = _read(dent, local_points(probe, points[near]))
-        total.depth[near] += values[:, 0]
-        total.strain[near] += turned(values[:, 1:], turn)
-    return total
+        ax, ay = x - probe.x, y - probe.y
+        near = np.flatnonzero(ax * ax + ay * ay < dent.grid.reach**2)
+        ax, ay = ax[near], ay[near]
+        values = _read(dent, c * ax + s * ay, c * ay - s * ax)
+        if probe.angle:
+            values[:, 1:] = turned(values[:, 1:], probe.angle)
+        total[near] += values
+    return Load(strain=total[:, 1:], depth=total[:, 0])
 
 
 def turned(strain: FloatArray, angle: float) -> FloatArray:
@@ -186,14 +188,14 @@ def _rungs(shape: Shape, force: float) -> list[tuple[float, float]]:
     return [(below, 1 - part), (above, part)]
 
 
-def _read(dent: _Blend, local: FloatArray) -> FloatArray:
-    """Values (m, 4) at points (m, 2) on the grid, linear between its nodes."""
-    n = dent.grid.n
-    place = local / dent.grid.step + n // 2
-    corner = place.astype(np.int64)
-    fx, fy = (place - corner).T[:, :, None]
-    first = corner[:, 0] * n + corner[:, 1]
-    at = [dent.table.take(first + step, axis=0) for step in (0, 1, n, n + 1)]
+def _read(dent: _Blend, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Values (m, 4) at points on the grid, linear between its nodes."""
+    n, step = dent.grid.n, dent.grid.step
+    x, y = x / step + n // 2, y / step + n // 2
+    i, j = x.astype(np.int64), y.astype(np.int64)
+    fx, fy = (x - i)[:, None], (y - j)[:, None]
+    first = i * n + j
+    at = [dent.table.take(first + corner, axis=0) for corner in (0, 1, n, n + 1)]
     low = at[0] + (at[1] - at[0]) * fy
     high = at[2] + (at[3] - at[2]) * fy
     return np.asarray(low + (high - low) * fx)
@@ -201,6 +203,5 @@ def _read(dent: _Blend, local: FloatArray) -> FloatArray:
 
 def _fading(grid: Grid) -> FloatArray:
     """(n, n) from 1 to 0 over the outer eighth, so that nothing ends with a step."""
-    reach = (grid.n // 2 - 1) * grid.step
-    fade = np.clip((1 - np.hypot(*grid.points.T) / reach) * 8, 0.0, 1.0)
+    fade = np.clip((1 - np.hypot(*grid.points.T) / grid.reach) * 8, 0.0, 1.0)
     return np.asarray((fade**2 * (3 - 2 * fade)).reshape(grid.n, grid.n))
