@@ -59,6 +59,9 @@ export interface Status {
     readonly ready: boolean;
   };
   readonly noise_v: number | null;
+  /** Weight of the prior in the pictures, and the rule that chose it ("hand": the skin file). */
+  readonly alpha: number;
+  readonly rule: string;
   /** Rows that the newest picture does without. */
   readonly left_out: number;
   /** What someone must act on, in words. */

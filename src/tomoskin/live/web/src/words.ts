@@ -94,3 +94,9 @@ export function facts(status: Status | null): Fact[] {
     },
   ];
 }
+
+/** Alpha of the pictures and what chose it, for the title of the skin. */
+export function alpha(status: Status): string {
+  const by = status.rule === "hand" ? "set by hand" : `chosen by the rule ${status.rule}`;
+  return `alpha ${Number(status.alpha.toPrecision(3))}, ${by}`;
+}

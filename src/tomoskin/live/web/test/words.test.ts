@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { Scene, Status } from "../src/protocol";
 import { backOff, socketAddress } from "../src/socket";
-import { facts, sentence } from "../src/words";
+import { alpha, facts, sentence } from "../src/words";
 
 const scene = { source: "twin of textile-disc-8" } as Scene;
 const status: Status = {
@@ -16,6 +16,8 @@ const status: Status = {
   p99_ms: 0.8,
   reference: { frames: 20, needed: 20, age_s: 75, ready: true },
   noise_v: 1e-5,
+  alpha: 0.0509,
+  rule: "light-touch",
   left_out: 0,
   problem: null,
   text: "",
@@ -52,6 +54,11 @@ it("adds up what was lost and says what it was", () => {
   const lost = facts(status).find(({ id }) => id === "dropped");
   expect(lost).toMatchObject({ value: "6", title: "1 dropped, 2 corrupt, 3 gaps" });
   expect(facts(null)).toEqual([]);
+});
+
+it("says alpha and what chose it", () => {
+  expect(alpha(status)).toBe("alpha 0.0509, chosen by the rule light-touch");
+  expect(alpha({ ...status, alpha: 0.05, rule: "hand" })).toBe("alpha 0.05, set by hand");
 });
 
 it("waits longer after each failed try, up to a bound", () => {
