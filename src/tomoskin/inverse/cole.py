@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -84,22 +84,7 @@ class Cole:
         """
         f, gamma = _checked(frequency, admittivity)
         weight = _weight(sd, gamma)
-        starts = product((f.min(), np.sqrt(f.min() * f.max()), f.max()), (0.0, 0.3))
-        low, high = np.maximum(gamma.real[[f.argmin(), f.argmax()]], 1e-3 * np.abs(gamma).max())
-        found = [
-            least_squares(
-                _residual,
-                [np.log(low), np.log(high), -np.log(2 * np.pi * middle), spread],
-                bounds=_bounds(f, gamma),
-                args=(f, gamma, weight),
-                x_scale="jac",
-                xtol=1e-12,
-                ftol=1e-12,
-                gtol=1e-12,
-            )
-            for middle, spread in starts
-        ]
-        best = min(found, key=lambda result: float(result.cost))
+        best = min(_fits(f, gamma, weight), key=lambda found: float(found.cost))
         free = 2 * len(f) - 4
         scale = 1.0 if sd is not None else 2.0 * float(best.cost) / free
         sigma0, sigma1, tau = (float(value) for value in np.exp(best.x[:3]))
@@ -158,6 +143,24 @@ def _residual(
     low, high, time_constant = np.exp(parameters[:3])
     left = weight * (cole(frequency, low, high, time_constant, parameters[3]) - gamma)
     return np.concatenate([left.real, left.imag])
+
+
+def _fits(frequency: FloatArray, gamma: ComplexArray, weight: FloatArray) -> Iterator[Any]:
+    """Minima from relaxations at the ends and in the middle, sharp and spread out."""
+    ends = gamma.real[[frequency.argmin(), frequency.argmax()]]
+    low, high = np.log(np.maximum(ends, 1e-3 * np.abs(gamma).max()))
+    slow, fast = frequency.min(), frequency.max()
+    for middle, spread in product((slow, np.sqrt(slow * fast), fast), (0.0, 0.3)):
+        yield least_squares(
+            _residual,
+            [low, high, -np.log(2 * np.pi * middle), spread],
+            bounds=_bounds(frequency, gamma),
+            args=(frequency, gamma, weight),
+            x_scale="jac",
+            xtol=1e-12,
+            ftol=1e-12,
+            gtol=1e-12,
+        )
 
 
 def _bounds(frequency: FloatArray, gamma: ComplexArray) -> tuple[list[float], list[float]]:

@@ -69,7 +69,7 @@ def _error(mesh: Mesh, cells: IntArray, truth: ArrayLike) -> float:
     place = np.asarray(truth, dtype=np.float64)
     d = mesh.points.shape[1]
     if place.shape != (d,) or not np.isfinite(place).all():
-        raise DataError(f"expected the true centroid as {d} finite coordinates, got {truth}")
+        raise DataError(f"expected the true centroid as {d} finite coordinates, got {truth!r}")
     weight = mesh.volumes[cells]
     return float(np.linalg.norm(weight @ mesh.centroids[cells] / weight.sum() - place))
 

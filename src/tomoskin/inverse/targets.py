@@ -12,9 +12,6 @@ from tomoskin.forward import ForwardModel
 from tomoskin.inverse.ball import Balls
 from tomoskin.mesh import Mesh
 
-_TOGETHER = 64
-"""Targets whose nodes are solved for at once."""
-
 
 @dataclass(frozen=True, eq=False)
 class Targets:
@@ -76,23 +73,17 @@ class Targets:
             raise ModelError("expected a real conductivity per cell and a real contact impedance")
         shares = list(Balls(model.mesh).each(table, radius))
         _refuse_empty(shares)
-        rows, middles, amounts = [], [], []
-        for number, (cells, share) in enumerate(shares):
-            if number % _TOGETHER == 0:
-                state.local.warm_up(np.concatenate([c for c, _ in shares[number:][:_TOGETHER]]))
-            sigma = state.conductivity[cells]
-            content = share * model.mesh.volumes[cells]
-            rows.append(state.local.voltages(cells, sigma * (1.0 + contrast * share)))
-            middles.append(content @ model.mesh.centroids[cells] / content.sum())
-            amounts.append(contrast * content @ sigma)
-        dv = np.array(rows) - state.voltages
+        sigma, content = state.conductivity, model.mesh.volumes
+        touches = [(c, sigma[c] * (1.0 + contrast * share)) for c, share in shares]
+        dv = state.local.voltages_of(touches) - state.voltages
+        weights = [(c, share * content[c]) for c, share in shares]
         if difference == "normalised":
             dv /= np.abs(state.voltages)
         return cls(
-            np.array(middles),
+            np.array([w @ model.mesh.centroids[c] / w.sum() for c, w in weights]),
             radius,
             contrast,
-            np.array(amounts),
+            np.array([contrast * w @ sigma[c] for c, w in weights]),
             dv,
             difference,
             model.pattern.identity,
