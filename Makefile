@@ -1,7 +1,7 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help live test test-all bench lint lock native wheel clean page dev
+.PHONY: help live test test-all bench bench-docs lint lock native wheel clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -28,11 +28,17 @@ test-all: lint native  ## the same, with what is slow
 bench: native  ## time from bytes to touches
 	@$(VENV)/bin/tomoskin bench frame $(ARGS)
 
-lint: dev page  ## ruff, mypy and the page's types
+bench-docs: native  ## measure the forward engine anew into docs/benchmarks.md; half an hour
+	@sh $(PINNED) requirements/bench.txt
+	@$(VENV)/bin/tomoskin bench forward --into docs/benchmarks.md
+	@$(VENV)/bin/tomoskin bench forward_large --into docs/benchmarks.md
+
+lint: dev page  ## ruff, mypy, the page's types, and the native engine's where Rust is installed
 	@$(PY) -m ruff check .
 	@$(PY) -m ruff format --check .
 	@$(PY) -m mypy
 	@$(PY) scripts/page.py run check
+	@$(PY) scripts/native.py check
 
 native: dev  ## the native engine, where Rust is installed; live runs without
 	@$(PY) scripts/native.py

@@ -61,12 +61,14 @@ def _promises(measured: Sequence[Measured], touch: Measured) -> list[Promise]:
     for n, least in (("3k", 12), ("50k", 5)):
         found = ratio(n, "script jacobian", "jacobian, script run")
         rows.append((f"script: Jacobian at {n}, ×", found, least, True))
-    fresh = touch.ratio("bare", "update")
     return [
         *rows,
         ("forward / bare factor and solve, worst", worst(measured, "forward", "bare"), 1.3, False),
         ("Jacobian after solves / copy, worst", worst(measured, "rows", "copy"), 2.0, False),
         ("local update at 3k, ms", 1e3 * touch.times["update"], 0.5, False),
-        ("fresh factor and solve / local update, ×", fresh, 20, True),
+        ("bare factor and solve / local update, ×", touch.ratio("bare", "update"), 20, True),
+        ("the same, each of many touches, ×", touch.ratio("bare", "many"), 20, True),
+        ("fresh forward / each of many touches, ×", touch.ratio("forward", "many"), 20, True),
+        ("script's forward / local update, ×", touch.ratio("script forward", "update"), 20, True),
         ("exponent of the forward time, worst step", growth(measured), 1.5, False),
     ]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from forward_cases import Case, disc, refined
 from forward_measure import measure
-from forward_tables import forward_table, growth, jacobian_table, promises
+from forward_tables import forward_table, growth, jacobian_table, promises, set_up_table
 from report import Report
 
 
@@ -20,6 +20,7 @@ def run(data: Path | None) -> tuple[Report, ...]:
     return (
         forward_table(measured),
         jacobian_table(measured),
+        set_up_table(measured),
         promises(
             [
                 ("peak of a solve at 1M, GB", peak.get("forward", 0) / 1e3 or None, 8.0, False),

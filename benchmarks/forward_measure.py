@@ -11,7 +11,7 @@ import forward_peer
 from forward_cases import PATTERN, Case, medians
 from forward_peak import peaks
 from forward_script import Script
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, IntArray
 from tomoskin.forward import ForwardModel, State
 from tomoskin.inverse import OneStep
 from tomoskin.mesh import Mesh
@@ -19,7 +19,7 @@ from tomoskin.mesh import Mesh
 ALPHA = 1e-3
 AGREE = 1e-9
 SECONDS = 4.0
-TOUCH = 150
+TOUCH, MANY = 150, 64
 MOST_SET_UP = 300_000
 """Cells; the operator of more would not fit the memory of many a machine."""
 
@@ -50,6 +50,7 @@ def measure(case: Case, *, script: bool = True, peer: str = "") -> Measured:
         times |= _against_script(model, sigma)
     if len(case.mesh.cells) <= MOST_SET_UP:
         times |= medians({"set-up": lambda: _set_up(case)}, SECONDS / 2)
+    times |= medians({"model": lambda: _model(case)}, SECONDS / 2)
     if forward_peer.INSTALLED:
         times |= _against_peer(model, sigma, peer)
     return Measured(case, model.assembly.n_unknowns, times, peaks(case))
@@ -121,6 +122,12 @@ def _against_peer(model: ForwardModel, sigma: FloatArray, which: str) -> dict[st
     return medians(chosen, SECONDS) if chosen else {}
 
 
+def _model(case: Case) -> object:
+    """From a checked mesh to a model with its maps and its analysis."""
+    model = ForwardModel(case.mesh, PATTERN, case.contact_impedance)
+    return model.assembly.stiffness, model.contacts, model.factorise
+
+
 def _set_up(case: Case) -> OneStep:
     """From points and cells to the one-step operator."""
     mesh = Mesh(case.mesh.points, case.mesh.cells, case.mesh.electrodes)
@@ -128,20 +135,33 @@ def _set_up(case: Case) -> OneStep:
 
 
 def measure_touch(case: Case) -> Measured:
-    """Time the local update of a touch, its columns in hand, and what it saves."""
+    """Time local updates, their columns in hand, one and many, and what they save."""
     model = ForwardModel(case.mesh, PATTERN, case.contact_impedance)
     base = np.ones(len(case.mesh.cells))
-    gap = np.linalg.norm(case.mesh.centroids - [0.03, 0.02], axis=1)
-    cells = np.argsort(gap)[:TOUCH]
-    changed, own = np.full(TOUCH, 0.8), base.copy()
+    touches = _touches(case)
+    cells, changed = touches[0]
+    own = base.copy()
     own[cells] = changed
-    state = model.at(base)
-    _agree(state.local.voltages(cells, changed), model.solve(own).voltages)
+    local = model.at(base).local
+    _agree(local.voltages_of(touches)[0], model.solve(own).voltages)
     script = Script(case.mesh, PATTERN, case.contact_impedance)
     calls = {
-        "update": lambda: state.local.voltages(cells, changed),
+        "update": lambda: local.voltages(cells, changed),
+        "many": lambda: local.voltages_of(touches),
         "bare": _bare(model.at(own)),
         "forward": lambda: model.solve(own),
         "script forward": lambda: script.voltages(own),
     }
-    return Measured(case, model.assembly.n_unknowns, medians(calls, SECONDS))
+    times = medians(calls, SECONDS, least=3)
+    times["many"] /= len(touches)
+    return Measured(case, model.assembly.n_unknowns, times)
+
+
+def _touches(case: Case) -> list[tuple[IntArray, FloatArray]]:
+    """MANY touches of TOUCH cells, the first off the middle, the others anywhere."""
+    rng = np.random.default_rng(2)
+    radius, angle = 0.07 * np.sqrt(rng.random(MANY)), rng.uniform(0, 2 * np.pi, MANY)
+    places = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+    places[0] = 0.03, 0.02
+    gaps = (np.linalg.norm(case.mesh.centroids - place, axis=1) for place in places)
+    return [(np.argsort(gap)[:TOUCH], np.full(TOUCH, 0.8)) for gap in gaps]

@@ -9,7 +9,7 @@ import numpy as np
 
 import forward_peer
 from forward_cases import ELECTRODES, clock
-from forward_measure import TOUCH, Measured
+from forward_measure import MANY, TOUCH, Measured
 from report import Report
 
 Value = float | None
@@ -96,6 +96,7 @@ def set_up_table(measured: Sequence[Measured]) -> Report:
     rows = [
         (
             _size(m)[0],
+            _ms(m, "model"),
             _ms(m, "set-up"),
             _ms(m, "peer set-up"),
             cell(m.ratio("peer set-up", "set-up")),
@@ -104,19 +105,25 @@ def set_up_table(measured: Sequence[Measured]) -> Report:
     ]
     return Report(
         "set-up: points and cells → one-step operator (NOSER)",
-        ("cells", "ms", "pyEIT ms", "pyEIT ×"),
+        ("cells", "model ms", "ms", "pyEIT ms", "pyEIT ×"),
         tuple(rows),
-        ("check of the mesh included; pyEIT: JAC with p = 0.5",),
+        (
+            "model: structure, maps and analysis alone, from a checked mesh",
+            "check of the mesh included in the rest; pyEIT: JAC with p = 0.5",
+        ),
     )
 
 
 def touch_table(m: Measured) -> Report:
     """Local update."""
-    row = (_size(m)[0], _ms(m, "update"), *(cell(m.ratio(n, "update")) for n in _FRESH))
+    rows = tuple(
+        (_size(m)[0], what, _ms(m, own), *(cell(m.ratio(n, own)) for n in _FRESH))
+        for what, own in (("one", "update"), (f"each of {MANY}", "many"))
+    )
     return Report(
-        f"local update: a touch of {TOUCH} cells, columns in hand",
-        ("cells", "ms", "factor and solve ×", "forward ×", "script ×"),
-        (row,),
+        f"local update: touches of {TOUCH} cells, columns in hand",
+        ("cells", "touches", "ms", "factor and solve ×", "forward ×", "script ×"),
+        rows,
         ("× is how many times longer a fresh one takes",),
     )
 

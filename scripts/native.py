@@ -1,5 +1,8 @@
 """The native engine's build: the wheel of core-native, where a cargo that works is on the PATH.
 
+With the argument ``check``: format, clippy and tests of its sources instead, unless they have
+passed already.
+
 Without one nothing is built and nothing fails: scipy does the same job more slowly. Standard
 library only; run by the virtual environment's Python, which has maturin and pip.
 """
@@ -17,6 +20,12 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "core-native"
 STAMP = Path(sys.prefix) / ".native.sha256"
+CHECKED = Path(sys.prefix) / ".native-checked.sha256"
+CHECKS = (
+    ("fmt", "--check"),
+    ("clippy", "--quiet", "--release", "--all-targets", "--", "-D", "warnings"),
+    ("test", "--quiet", "--release"),
+)
 
 
 def why_not() -> str:
@@ -31,10 +40,11 @@ def why_not() -> str:
     return ""
 
 
-def sources() -> str:
-    """Return the hash of all that the wheel is built from."""
+def sources(*more: str) -> str:
+    """Return the hash of all that the wheel is built from, and of ``more``."""
     digest = hashlib.sha256()
-    for file in sorted([*CORE.glob("*.toml"), *CORE.glob("*.pyi"), *CORE.glob("src/**/*.rs")]):
+    patterns = ("*.toml", "*.pyi", "src/**/*.rs", *more)
+    for file in sorted(file for pattern in patterns for file in CORE.glob(pattern)):
         digest.update(file.relative_to(CORE).as_posix().encode())
         digest.update(file.read_bytes())
     return digest.hexdigest()
@@ -68,6 +78,24 @@ def build() -> None:
     STAMP.write_text(sources(), encoding="ascii")
 
 
+def check() -> int:
+    """Check format, clippy and tests where cargo has them; nothing when nothing has changed."""
+    found = sources("tests/**/*.rs")
+    if CHECKED.is_file() and CHECKED.read_text(encoding="ascii") == found:
+        return 0
+    if reason := why_not():
+        print(f"core-native is not checked: {reason}")
+        return 0
+    for name, *options in CHECKS:
+        asked = subprocess.run(["cargo", name, "--help"], capture_output=True, check=False)
+        if asked.returncode:
+            print(f"core-native: cargo {name} is not installed")
+        elif subprocess.run(["cargo", name, *options], cwd=CORE, check=False).returncode:
+            return 1
+    CHECKED.write_text(found, encoding="ascii")
+    return 0
+
+
 def main() -> int:
     """Build unless fresh or impossible; a build that fails is said, and scipy goes on."""
     if is_fresh():
@@ -86,4 +114,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(check() if sys.argv[1:] == ["check"] else main())

@@ -78,6 +78,15 @@ impl<'a, V: Copy> Rows<'a, V> {
 /// Up to sixteen columns from `first` on of a matrix, side by side, zero beyond its last.
 pub fn abreast<T: Scalar>(vectors: ArrayView2<'_, T>, first: usize) -> Vec<[T; ABREAST]> {
     let count = ABREAST.min(vectors.ncols() - first);
+    if let Some(values) = vectors.as_slice() {
+        let rows = values.chunks_exact(vectors.ncols());
+        let padded = rows.map(|row| {
+            let mut padded = [T::ZERO; ABREAST];
+            padded[..count].copy_from_slice(&row[first..first + count]);
+            padded
+        });
+        return padded.collect();
+    }
     let lane = |row, i| {
         if i < count {
             vectors[[row, first + i]]

@@ -66,8 +66,11 @@ impl<T: Scalar> WithSimd for Pass<'_, T> {
         let mut poison = 0.0_f64;
         for row in 0..self.matrix.n_rows() {
             let mut left = [T::ZERO; ABREAST];
-            for (value, column) in left.iter_mut().zip(columns.clone()) {
-                *value = self.rhs[[row, column]];
+            for (value, &given) in left
+                .iter_mut()
+                .zip(self.rhs.row(row).iter().skip(columns.start))
+            {
+                *value = given;
             }
             for (column, value) in self.matrix.row(row) {
                 for (sum, &x) in left.iter_mut().zip(&self.known[column]) {
@@ -79,8 +82,15 @@ impl<T: Scalar> WithSimd for Pass<'_, T> {
                 *most = if size > *most { size } else { *most };
                 poison += size * 0.0; // NaN from now on where a number is not finite
             }
-            for (sum, &by) in self.sums.iter_mut().zip(self.x.row(row)) {
+            let own = &self.known[row];
+            for (sum, &by) in self.sums[columns.clone()].iter_mut().zip(own) {
                 for (sum, &value) in sum.iter_mut().zip(&left) {
+                    *sum += value * by;
+                }
+            }
+            for column in (0..columns.start).chain(columns.end..self.x.ncols()) {
+                let by = self.x[[row, column]];
+                for (sum, &value) in self.sums[column].iter_mut().zip(&left) {
                     *sum += value * by;
                 }
             }

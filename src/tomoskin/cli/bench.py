@@ -6,8 +6,10 @@ import ast
 import importlib
 import os
 import sys
+from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import typer
 
@@ -31,6 +33,9 @@ def bench(
         Path | None, typer.Option(help="Folder of public recordings, for those that need it.")
     ] = None,
     cores: Annotated[int, typer.Option(min=1, help="Processor cores that may be used.")] = 1,
+    into: Annotated[
+        Path | None, typer.Option(help="Markdown file whose part of that name is written anew.")
+    ] = None,
     json: JsonFlag = False,
 ) -> None:
     """Measure speed on this machine."""
@@ -46,7 +51,10 @@ def bench(
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-cores:])
     os.environ["RAYON_NUM_THREADS"] = str(cores)  # the native engine reads it at each call
     with threadpool_limits(cores):
+        place = into and _Place.of(into, name)
         reports = _load(name).run(data)
+    if place:
+        place.write(reports)
     if json:
         emit(reports)
     else:
@@ -87,6 +95,41 @@ def _show(reports: Sequence[Any]) -> None:
             console.print(f"  {note}", highlight=False)
     known = ", ".join(f"{k} {v}" for k, v in reports[-1].machine.items())
     console.print(f"  {known}", highlight=False)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A part of a Markdown file, between ``<!-- bench NAME -->`` and ``<!-- end NAME -->``."""
+
+    file: Path
+    before: str
+    after: str
+
+    @classmethod
+    def of(cls, file: Path, name: str) -> Self:
+        """Find it, before anything is measured."""
+        begin, end = f"<!-- bench {name} -->\n", f"<!-- end {name} -->\n"
+        text = file.read_text(encoding="utf-8") if file.is_file() else ""
+        if text.count(begin) != 1 or text.count(end) != 1:
+            raise DataError(f"expected one {begin.strip()} and {end.strip()}", where=str(file))
+        before, rest = text.split(begin)
+        return cls(file, before + begin, end + rest.split(end)[1])
+
+    def write(self, reports: Sequence[Any]) -> None:
+        """Put tables, their notes and the machine there."""
+        machine = ", ".join(f"{key} {value}" for key, value in reports[-1].machine.items())
+        parts = [f"\n{date.today():%-d %B %Y}; {machine}.\n", *map(_markdown, reports)]
+        text = self.before + "\n".join(parts) + "\n" + self.after
+        self.file.write_text(text, encoding="utf-8")
+
+
+def _markdown(report: Any) -> str:
+    rule = ["---"] + ["---:"] * (len(report.columns) - 1)
+    rows = (report.columns, rule, *report.rows)
+    table = "\n".join(f"| {' | '.join(map(str, row))} |" for row in rows)
+    notes = "\n".join(f"- {note}" for note in report.notes)
+    title = report.title[:1].upper() + report.title[1:]
+    return f"### {title}\n\n{table}\n" + (f"\n{notes}\n" if notes else "")
 
 
 def _table(report: Any) -> Table:
