@@ -180,6 +180,14 @@ def test_impossible_settings(change, said):
         replace(PLAIN, **change)
 
 
+@pytest.mark.parametrize("settings", [PLAIN, TEXTILE], ids=["scalar", "tensor"])
+def test_a_needle_does_not_cut_the_sheet(settings):
+    sigma = conductivity(after(settings, (loaded((1e4, -3e3, 2e3), 1.0), 1.0)), settings, UNLOADED)
+    assert np.isfinite(sigma).all()
+    principal = np.linalg.eigvalsh(sigma) if sigma.ndim == 3 else sigma
+    assert principal.min() > 0
+
+
 @pytest.mark.parametrize("dt", [-0.1, math.nan, math.inf])
 def test_impossible_steps(dt):
     with pytest.raises(ModelError, match="time step of 0 s or more"):

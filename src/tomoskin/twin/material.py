@@ -12,6 +12,8 @@ from tomoskin.twin.dent import Load
 from tomoskin.twin.parameters import check_numbers, parameter
 
 _MOST_COMPRESSION = 0.99
+_MOST_LOG = 12.0
+"""A conductivity leaves its value at rest by at most e to this: a needle must not cut the sheet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +171,7 @@ def conductivity(
     strain = _effective(state, settings)
     mean = (strain[:, 0] + strain[:, 1]) / 2
     squeezed = np.clip(strain[:, 3], -_MOST_COMPRESSION, _MOST_COMPRESSION)
-    exponent = -settings.gauge * mean - settings.wear * state.worn
+    exponent = np.clip(-settings.gauge * mean - settings.wear * state.worn, -_MOST_LOG, _MOST_LOG)
     sigma = unloaded * np.exp(exponent) * np.maximum(1 + settings.compression * squeezed, 1e-3)
     sigma /= max(1 + settings.temperature_coefficient * state.warmer, 1e-3)
     if settings.scalar:
@@ -242,7 +244,7 @@ def _directed(strain: FloatArray, gauge: float) -> FloatArray:
     cross = gauge * strain[:, 2]
     size = np.hypot(half, cross)
     size[size < 1e-12] = 1e-12  # sinh(d)/d is 1 there
-    grown = np.expm1(size)
+    grown = np.expm1(np.minimum(size, _MOST_LOG))
     shrunk = grown / (1 + grown)  # 1 − e⁻ᵈ
     cosh, sinhc = 1 + (grown - shrunk) / 2, (grown + shrunk) / (2 * size)
     tensor = np.empty((len(strain), 2, 2))

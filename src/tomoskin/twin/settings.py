@@ -91,6 +91,7 @@ SOURCES = {
     "hum_frequency": "Europe; 60 Hz in America",
     "temperature_coefficient": "silver 0.38 %/K; salt water about −2 %/K (handbooks)",
     "modulus": "foam and gel assumed; tank: ρg · thickness (Archimedes)",
+    "tension": "sheet assumed; gel: its shear modulus · thickness / 3 (Pasternak)",
     "lock": "textile: chosen so that wider probes change more, as in the source's figure 5.7",
     "compression": "gel and tank: −1, the layer that conducts gets thinner",
 }
@@ -120,7 +121,7 @@ PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings]
             thickness=5e-3,
             lock=0.8,
             poisson=0.49,
-            tension=0.0,
+            tension=11.0,
             stiffness=100.0,
             sheet_poisson=0.49,
             bulge=0.3,
