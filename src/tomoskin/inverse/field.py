@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -36,6 +36,8 @@ class RandomField:
         (k, k) lower triangular: the basis at those places.
     correlation, scale
         The covariance of two places: ``correlation(scale · distance)``.
+    mean
+        (k,) what is taken off the basis everywhere.
     """
 
     basis: FloatArray
@@ -43,6 +45,7 @@ class RandomField:
     factor: FloatArray
     correlation: Callable[[FloatArray], FloatArray]
     scale: float
+    mean: FloatArray
 
     @classmethod
     def on(
@@ -67,7 +70,13 @@ class RandomField:
             return correlation(scale * gap)
 
         basis, pivots = _pivoted(column, len(mesh.cells), left_out)
-        return cls(basis, mesh.centroids[pivots], basis[pivots], correlation, float(scale))
+        places, none = mesh.centroids[pivots], np.zeros(len(pivots))
+        return cls(basis, places, basis[pivots], correlation, float(scale), none)
+
+    def centred(self, mesh: Mesh) -> Self:
+        """The field less its mean over ``mesh``, for images that stand on a background."""
+        mean = mesh.volumes @ self.basis / mesh.volumes.sum()
+        return replace(self, basis=self.basis - mean, mean=self.mean + mean)
 
     @property
     def size(self) -> int:
@@ -77,7 +86,7 @@ class RandomField:
     def at(self, points: FloatArray) -> FloatArray:
         """(n, k) basis at ``points`` (n, d) m: the same image between the cells' centres."""
         covariance = self.correlation(self.scale * cdist(points, self.places))
-        return np.asarray(solve_triangular(self.factor, covariance.T, lower=True).T)
+        return np.asarray(solve_triangular(self.factor, covariance.T, lower=True).T - self.mean)
 
 
 def _pivoted(

@@ -27,7 +27,7 @@ from tomoskin.inverse.unknowns import BACKGROUND_SPREAD, Contacts, Joint, others
 BACKGROUND, LESS, MORE = 0, 1, 2
 """Labels."""
 
-SOFTNESS = (0.6, 0.4, 0.3, 0.2, 0.2, 0.15, 0.15, 0.15)
+SOFTNESS = (0.6, 0.4, 0.3, 0.2, 0.2, 0.15, 0.15, 0.1, 0.1, 0.1)
 """Width of the edges in the field's unit, step by step."""
 
 CONTRAST = 100.0
@@ -147,7 +147,8 @@ class ShapeImaging:
         if not (len(softness) and np.isfinite(softness).all() and min(softness) > 0):
             raise ModelError(f"expected softness above 0, step by step, got {list(softness)}")
         self.model = model
-        self.field = RandomField.on(model.mesh, length)
+        # a uniform change is the background's to explain
+        self.field = RandomField.on(model.mesh, length).centred(model.mesh)
         self.contacts = contacts
         self.most = (contrast - 1.0) / (contrast + 1.0)
         self.drift = drift

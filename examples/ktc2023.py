@@ -1,0 +1,467 @@
+"""Kuopio Tomography Challenge 2023: plastic and metal in a water tank, found without a person.
+
+    python examples/ktc2023.py DATA [--truth FOLDER] [--level N ...] [--figure FILE]
+
+DATA is a folder of the challenge's files (ref.mat and data1.mat, data2.mat, …) or an .npz with
+the same arrays. Level n leaves out what touches the first 2(n − 1) electrodes. Prints the score of
+each sample and level where there is a truth, beside a linear method and a picture of water only.
+
+The tank (Räsänen et al., 23 cm across, 32 electrodes) has its own faults, which are measured on
+water: each channel lets some of the common voltage through, and each electrode has its contact
+impedance. What is left is told by how well the redundant rows agree, and enters as noise. Regions
+come from :class:`tomoskin.inverse.ShapeImaging`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import loadmat
+from scipy.ndimage import correlate1d
+from scipy.spatial import cKDTree
+
+from tomoskin.core import DataError, FloatArray, TomoskinError
+from tomoskin.forward import ForwardModel
+from tomoskin.inverse import AbsoluteImaging, Matern, Observation, ShapeImaging, homogeneous
+from tomoskin.mesh import Disc, ElectrodeArc, Mesh, triangulate
+from tomoskin.pattern import Pattern
+
+Labels = NDArray[np.uint8]
+WATER, RESISTIVE, CONDUCTIVE = 0, 1, 2
+PIXELS = 256
+
+RADIUS, N_ELECTRODES, WIDTH = 0.115, 32, 0.0125
+"""The tank, and its electrodes' width as the voltages of water tell it, m."""
+
+CELLS = 2000
+SIGMA, CONTACT = 0.73, 3e-4
+"""Water, S, and a usual contact impedance, Ω·m: where the fit to the reference begins."""
+
+LENGTH = 0.025
+"""Correlation length of shapes, m: about half a target's width."""
+
+DRIFT = 0.05
+"""Change of the water between reference and target, relative."""
+
+REFERENCE_NOISE, REFERENCE_TOUCHED = 5e-3, 0.17
+"""What the model leaves unexplained of water, V, and where a driven electrode is read."""
+
+NOISE, RELATIVE, TOUCHED = 3.2e-3, 0.064, 24e-3
+"""The same of a change of voltage: V, a part of the change, V at driven electrodes."""
+
+
+# The challenge's score.
+
+
+def score(labels: NDArray[Any], truth: NDArray[Any]) -> float:
+    """Half the similarity of what is conductive, half that of what is resistive; 1 is best."""
+    kinds = (CONDUCTIVE, RESISTIVE)
+    return float(np.mean([similarity(labels == kind, truth == kind).mean() for kind in kinds]))
+
+
+_WINDOW = np.exp(-0.5 * (np.arange(-160, 161) / 80.0) ** 2)
+
+
+def _smooth(image: FloatArray) -> FloatArray:
+    along = correlate1d(image, _WINDOW, axis=0, mode="constant")
+    return np.asarray(correlate1d(along, _WINDOW, axis=1, mode="constant"))
+
+
+@cache
+def _norm() -> FloatArray:
+    return _smooth(np.ones((PIXELS, PIXELS)))
+
+
+def similarity(one: NDArray[Any], other: NDArray[Any]) -> FloatArray:
+    """(256, 256) structural similarity with one very wide window (Wang et al. 2004)."""
+    a, b = one.astype(np.float64), other.astype(np.float64)
+    mean_a, mean_b = _smooth(a) / _norm(), _smooth(b) / _norm()
+    var_a = _smooth(a * a) / _norm() - mean_a**2
+    var_b = _smooth(b * b) / _norm() - mean_b**2
+    both = _smooth(a * b) / _norm() - mean_a * mean_b
+    light = (2 * mean_a * mean_b + 1e-4) / (mean_a**2 + mean_b**2 + 1e-4)
+    return np.asarray(light * (2 * both + 9e-4) / (var_a + var_b + 9e-4))
+
+
+# The tank.
+
+
+@cache
+def tank() -> Mesh:
+    """Electrode 0 at the top, the others counter-clockwise."""
+    rim = Disc(RADIUS)
+    centres = (0.25 + np.arange(N_ELECTRODES) / N_ELECTRODES) * rim.length
+    return triangulate(rim, [ElectrodeArc.around(float(c), WIDTH) for c in centres], CELLS)
+
+
+@cache
+def resistances() -> Pattern:
+    """Every pair of electrodes against the last one: all that currents and voltages can tell."""
+    i, j = np.triu_indices(N_ELECTRODES - 1)
+    last = np.full(len(i), N_ELECTRODES - 1)
+    return Pattern.from_tables(np.column_stack([i, last]), np.column_stack([j, last]))
+
+
+@cache
+def model() -> ForwardModel:
+    """Of 1 A, so that the pattern's voltages are resistances."""
+    return ForwardModel(tank(), resistances(), CONTACT)
+
+
+@cache
+def pixels() -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Centres (n, 2) m of the pixels in the tank, and which those are."""
+    step = (np.arange(PIXELS) + 0.5) / PIXELS * 2 - 1
+    x, y = np.meshgrid(RADIUS * step, -RADIUS * step)
+    inside = np.hypot(x, y) < RADIUS
+    return np.column_stack([x[inside], y[inside]]), inside
+
+
+@dataclass(frozen=True, eq=False)
+class Readout:
+    """Which currents were driven and which voltages read; row 31·injection + measurement.
+
+    Attributes
+    ----------
+    inj
+        (32, n) mA of each electrode.
+    mpat
+        (32, k) what each measurement is of the electrodes' potentials.
+    keep
+        (n·k,) bool: rows that count.
+    """
+
+    inj: FloatArray
+    mpat: FloatArray
+    keep: NDArray[np.bool_]
+
+    @property
+    def channel(self) -> NDArray[np.int64]:
+        """Measurement of each row that counts."""
+        return np.asarray(np.tile(np.arange(self.mpat.shape[1]), self.inj.shape[1])[self.keep])
+
+    @property
+    def touched(self) -> NDArray[np.bool_]:
+        """Whether a row that counts reads a driven electrode."""
+        return np.asarray(((self.inj != 0).T @ (self.mpat != 0)).ravel()[self.keep])
+
+    def rows(self, leak: FloatArray) -> FloatArray:
+        """(rows, resistances): each value from the resistances, with ``leak`` (k,) V per V."""
+        return self._between() + leak[self.channel, None] * self.common()
+
+    def common(self) -> FloatArray:
+        """The same for the common voltage of a row: of its electrodes, over the sink's."""
+        half = np.abs(self.mpat).T / 2.0
+        sink = np.maximum(-self.inj, 0.0)
+        at = half[None] - (sink / sink.sum(axis=0)).T[:, None]
+        return self._rows(at)
+
+    def slopes(self, x: FloatArray, y: FloatArray, noise: FloatArray) -> FloatArray:
+        """(k,) of y over x through the origin, channel by channel; 0 where nothing is read."""
+        k = self.mpat.shape[1]
+        product, square = (np.bincount(self.channel, x * v / noise**2, k) for v in (y, x))
+        return np.asarray(product / np.where(square > 0, square, 1.0))
+
+    def _between(self) -> FloatArray:
+        return self._rows(np.broadcast_to(self.mpat.T, (self.inj.shape[1], *self.mpat.T.shape)))
+
+    def _rows(self, at: FloatArray) -> FloatArray:
+        """From what each row reads of the potentials, (n, k, 32)."""
+        i, j = np.triu_indices(N_ELECTRODES - 1)
+        drive = self.inj.T[:, None]
+        twice = at[..., i] * drive[..., j] + at[..., j] * drive[..., i]
+        return (twice * np.where(i == j, 0.5, 1.0)).reshape(-1, len(i))[self.keep]
+
+
+# From voltages to labels.
+
+
+def segment(
+    u: NDArray[Any],
+    u_ref: NDArray[Any],
+    inj: NDArray[Any],
+    mpat: NDArray[Any],
+    keep: NDArray[Any] | None = None,
+) -> Labels:
+    """Labels (256, 256) of a tank: 0 water, 1 resistive, 2 conductive; row 0 at the top.
+
+    Parameters
+    ----------
+    u, u_ref
+        (n·k,) V with targets and of water only; rows that are not finite do not count.
+    inj
+        (32, n) mA.
+    mpat
+        (32, k).
+    keep
+        (n·k,) bool, rows that count; without it, all.
+    """
+    readout, u, u_ref = checked(u, u_ref, inj, mpat, keep)
+    water, leak, sigma = calibrate(readout, u_ref)
+    rows, change = readout.rows(leak), u - u_ref
+    noise = np.sqrt(NOISE**2 + (RELATIVE * change) ** 2 + (TOUCHED * readout.touched) ** 2)
+    # the change is measured, the model's own water stands for the reference
+    expected = rows @ water.solve(sigma).voltages
+    found = ShapeImaging(water, LENGTH, drift=DRIFT)(
+        Observation.of(expected + change, noise, rows), sigma
+    )
+    places, inside = pixels()
+    labels = np.zeros((PIXELS, PIXELS), np.uint8)
+    labels[inside] = found.at(places)
+    return labels
+
+
+def calibrate(readout: Readout, u_ref: FloatArray) -> tuple[ForwardModel, FloatArray, float]:
+    """Model with the contacts that water shows, leak of each channel (k,), and the water, S."""
+    noise = np.where(readout.touched, REFERENCE_TOUCHED, REFERENCE_NOISE)
+    leak, sigma, water = np.zeros(readout.mpat.shape[1]), SIGMA, model()
+    plain, common = readout.rows(leak), readout.common()
+    for _ in range(2):
+        resistance = water.solve(sigma).voltages
+        leak = readout.slopes(common @ resistance, u_ref - plain @ resistance, noise)
+        rows = plain + leak[readout.channel, None] * common
+        found = homogeneous(model(), Observation.of(u_ref, noise, rows), "each", sigma)
+        sigma = found.background
+        water = ForwardModel(tank(), resistances(), found.contact_impedance)
+    return water, leak, sigma
+
+
+def checked(
+    u: NDArray[Any],
+    u_ref: NDArray[Any],
+    inj: NDArray[Any],
+    mpat: NDArray[Any],
+    keep: NDArray[Any] | None,
+) -> tuple[Readout, FloatArray, FloatArray]:
+    """Read-out and the rows that count. Raises DataError for arrays that do not fit together."""
+    currents, reads = np.asarray(inj, np.float64), np.asarray(mpat, np.float64)
+    for name, table in (("inj", currents), ("mpat", reads)):
+        if table.ndim != 2 or len(table) != N_ELECTRODES:
+            raise DataError(f"expected {name} of shape (32, n), got {table.shape}")
+    n = currents.shape[1] * reads.shape[1]
+    values, reference = (np.asarray(v, np.float64).ravel() for v in (u, u_ref))
+    counts = np.ones(n, bool) if keep is None else np.asarray(keep, bool).ravel()
+    if not len(values) == len(reference) == len(counts) == n:
+        raise DataError(
+            f"expected {n} rows, got {len(values)} of u, {len(reference)} of u_ref "
+            f"and {len(counts)} of keep"
+        )
+    counts = counts & np.isfinite(values) & np.isfinite(reference)
+    if not counts.any():
+        raise DataError("no row counts")
+    return Readout(currents, reads, counts), values[counts], reference[counts]
+
+
+# What it is compared with.
+
+
+def linear(
+    u: NDArray[Any],
+    u_ref: NDArray[Any],
+    inj: NDArray[Any],
+    mpat: NDArray[Any],
+    keep: NDArray[Any] | None = None,
+) -> Labels:
+    """One linear step with a smoothness prior, cut in three by Otsu's rule.
+
+    The kind of method that the organisers give as reference: no calibration of the tank, noise
+    of 0.05 % of each voltage and 0.01 % of the largest, and the largest class is water.
+    """
+    readout, u, u_ref = checked(u, u_ref, inj, mpat, keep)
+    rows = readout.rows(np.zeros(readout.mpat.shape[1]))
+    water = ForwardModel(tank(), resistances(), 1e-6)
+    noise = 5e-4 * np.abs(u) + 1e-4 * np.abs(u).max()
+    sigma = homogeneous(water, Observation.of(u_ref, noise, rows), "fixed", SIGMA).background
+    imaging = AbsoluteImaging(water, Matern(RADIUS, 0.5), alpha=16.0, steps=1)
+    expected = rows @ water.solve(sigma).voltages
+    image = imaging(Observation.of(expected + u - u_ref, noise, rows), sigma).conductivity
+    places, inside = pixels()
+    picture = np.full((PIXELS, PIXELS), sigma)
+    picture[inside] = image.values[cKDTree(tank().centroids).query(places)[1]]
+    return _by_otsu(picture)
+
+
+def _by_otsu(picture: FloatArray) -> Labels:
+    """Two thresholds that leave the least variance within three classes (Otsu 1979)."""
+    count, edge = np.histogram(picture, bins=PIXELS)
+    centre = (edge[1:] + edge[:-1]) / 2.0
+    weight = np.append(0.0, np.cumsum(count))
+    moment = np.append(0.0, np.cumsum(count * centre))
+    low, high = np.triu_indices(PIXELS + 1, 1)
+    between = sum(
+        (moment[b] - moment[a]) ** 2 / np.maximum(weight[b] - weight[a], 1.0)
+        for a, b in ((np.zeros_like(low), low), (low, high), (high, np.full_like(high, PIXELS)))
+    )
+    best = int(np.argmax(between))
+    classes = np.digitize(picture, [edge[low[best]], edge[high[best]]])
+    water = int(np.bincount(classes.ravel(), minlength=3).argmax())
+    return np.where(
+        classes < water, RESISTIVE, np.where(classes > water, CONDUCTIVE, WATER)
+    ).astype(np.uint8)
+
+
+# The challenge's files.
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One target: what was measured with and without it, and the truth where it is known."""
+
+    name: str
+    u: FloatArray
+    u_ref: FloatArray
+    inj: FloatArray
+    mpat: FloatArray
+    truth: NDArray[Any] | None
+
+
+def kept(inj: FloatArray, mpat: FloatArray, level: int) -> NDArray[np.bool_]:
+    """(n·k,) bool: rows of a difficulty, which do without the first 2(level − 1) electrodes."""
+    lost = slice(0, 2 * (level - 1))
+    drive, read = (inj[lost] != 0).any(axis=0), (mpat[lost] != 0).any(axis=0)
+    return np.asarray((~drive[:, None] & ~read).ravel())
+
+
+def samples(data: Path, truth: Path | None = None) -> Iterator[Sample]:
+    """Samples of an .npz or of a folder of .mat files.
+
+    ``truth`` is a folder of .mat files with one picture each, in the order of the samples.
+    Raises DataError when there are none, or a file lacks something.
+    """
+    if data.is_file():
+        yield from _packed(data)
+        return
+    found = sorted(data.glob("data*.mat"))
+    if not found or not (data / "ref.mat").exists():
+        raise DataError("expected ref.mat and data1.mat, …", where=str(data))
+    pictures = sorted(truth.glob("*.mat")) if truth else []
+    if pictures and len(pictures) != len(found):
+        raise DataError(f"expected {len(found)} truths, got {len(pictures)}", where=str(truth))
+    reference = _arrays(data / "ref.mat")
+    u_ref = _one_of(reference, data / "ref.mat", "Uelref", "Uel").ravel()
+    for i, file in enumerate(found):
+        held = _arrays(file)
+        yield Sample(
+            file.stem,
+            _one_of(held, file, "Uel").ravel(),
+            u_ref,
+            _one_of(held, file, "Inj"),
+            _one_of(held, file, "Mpat"),
+            _one_of(_arrays(pictures[i]), pictures[i], "truth") if pictures else None,
+        )
+
+
+def _packed(file: Path) -> Iterator[Sample]:
+    try:
+        with np.load(file) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except Exception as error:  # as many kinds of errors as kinds of damage
+        raise DataError(f"is not an .npz that can be read: {error}", where=str(file)) from error
+    u_ref, inj, mpat = (_one_of(arrays, file, name) for name in ("U_ref", "inj", "mpat"))
+    truths = arrays.get("truth")
+    for i, u in enumerate(_one_of(arrays, file, "U")):
+        yield Sample(f"{i + 1}", u, u_ref, inj, mpat, None if truths is None else truths[i])
+
+
+def _arrays(file: Path) -> dict[str, Any]:
+    try:
+        return dict(loadmat(file))
+    except Exception as error:  # scipy makes all sorts of errors of damaged files
+        raise DataError(f"is not a .mat file that can be read: {error}", where=str(file)) from error
+
+
+def _one_of(arrays: dict[str, Any], file: Path, *names: str) -> FloatArray:
+    for name in names:
+        if name in arrays:
+            return np.asarray(arrays[name], np.float64)
+    raise DataError(f"expected {' or '.join(names)}, got {sorted(arrays)}", where=str(file))
+
+
+# The command line.
+
+COLOURS = np.array([[0.93, 0.95, 0.97], [0.84, 0.37, 0.0], [0.0, 0.45, 0.70]])
+"""Water, resistive, conductive."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """One sample at one level: labels, their score, those of a linear step and of water only."""
+
+    sample: Sample
+    level: int
+    labels: Labels
+    seconds: float
+    scores: tuple[float, float, float] | None
+
+
+def scored(sample: Sample, level: int) -> Scored:
+    """Segment, and compare where there is a truth."""
+    arrays = (sample.u, sample.u_ref, sample.inj, sample.mpat)
+    keep = kept(sample.inj, sample.mpat, level)
+    begun = time.perf_counter()
+    labels = segment(*arrays, keep)
+    seconds = time.perf_counter() - begun
+    if sample.truth is None:
+        return Scored(sample, level, labels, seconds, None)
+    others = linear(*arrays, keep), np.zeros_like(labels)
+    scores = [score(picture, sample.truth) for picture in (labels, *others)]
+    return Scored(sample, level, labels, seconds, (scores[0], scores[1], scores[2]))
+
+
+def draw(results: Sequence[Scored], file: Path) -> None:
+    """Labels with the outline of the truth, samples down and levels across."""
+    import figures  # noqa: PLC0415 - the examples' look, which needs matplotlib
+
+    names = list(dict.fromkeys(r.sample.name for r in results))
+    levels = sorted({r.level for r in results})
+    size = (1.4 * len(levels) + 0.2, 1.6 * len(names))
+    made, axes = figures.figure(len(names), len(levels), size)
+    for r in results:
+        ax = axes[names.index(r.sample.name), levels.index(r.level)]
+        ax.imshow(COLOURS[r.labels], interpolation="nearest")
+        if r.sample.truth is not None:
+            ax.contour(r.sample.truth, [0.5, 1.5], colors="black", linewidths=0.7)
+        tail = f": {r.scores[0]:.2f}" if r.scores else ""
+        ax.set_title(f"{r.sample.name}, level {r.level}{tail}")
+        ax.set_axis_off()
+    made.savefig(file)
+
+
+def main(arguments: Sequence[str] | None = None) -> list[Scored]:
+    """Segment what the arguments name, print the table, draw the figure."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("data", type=Path, help="a folder of .mat files, or an .npz")
+    parser.add_argument("--truth", type=Path, help="folder of the true pictures")
+    parser.add_argument("--level", type=int, nargs="+", default=range(1, 8))
+    parser.add_argument("--figure", type=Path)
+    chosen = parser.parse_args(arguments)
+    results = []
+    print("sample   level  score  linear  water  seconds")
+    for sample in samples(chosen.data, chosen.truth):
+        for level in chosen.level:
+            results.append(scored(sample, level))
+            last = results[-1]
+            numbers = "".join(f"{s:7.3f}" for s in last.scores or ()) or " " * 21
+            print(f"{sample.name:8} {level:5d} {numbers} {last.seconds:8.1f}", flush=True)
+    known = [r.scores for r in results if r.scores]
+    if known:
+        print("mean          ", "".join(f"{s:7.3f}" for s in np.mean(known, axis=0)))
+    if chosen.figure:
+        draw(results, chosen.figure)
+    return results
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except TomoskinError as error:
+        sys.exit(f"ktc2023: {error}")
