@@ -70,7 +70,7 @@ def _draw_picard(ax: Axes, picard: Picard) -> None:
         ax.semilogy(index, picard.noise, color=_MARK, linestyle=":", label="noise")
     ax.set_title(f"Picard plot: condition {_condition(picard):.2g}", fontsize=10)
     ax.set_xlabel("mode", fontsize=8)
-    ax.xaxis.get_major_locator().set_params(integer=True)
+    ax.locator_params(axis="x", integer=True)
     ax.tick_params(labelsize=7, which="both")
     ax.grid(alpha=0.25)
     ax.legend(fontsize=7)
