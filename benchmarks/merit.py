@@ -27,7 +27,7 @@ from tomoskin.inverse import (
 from tomoskin.skin import Skin
 
 SKINS = ("textile-disc-8", "textile-disc-16", "textile-square-16", "tank-16")
-FIGURES = (1.0, 1.5)
+FIGURES = (1.0, 1.5)  # below 1.2 no NOSER of the tank has one
 CELLS, TRAINED_ON, TESTED_ON = 900, 3600, 6000
 LAG = 5
 
@@ -113,10 +113,10 @@ def _pair(name: str, figure: float) -> list[tuple[object, ...]]:
 
 
 def _crossing(excess: Callable[[float], float], decades: np.ndarray) -> float | None:
-    """The largest alpha at which the noise figure is met."""
+    """The alpha at which the noise figure falls to what is asked; far beyond, it rises again."""
     values = [excess(float(decade)) for decade in decades[::8]]
     for i in range(len(values) - 1, 0, -1):
-        if values[i] * values[i - 1] <= 0:
+        if values[i] <= 0 < values[i - 1]:
             low, high = float(decades[::8][i - 1]), float(decades[::8][i])
             return float(10.0 ** brentq(excess, low, high, xtol=1e-3))
     return None

@@ -54,7 +54,7 @@ class Trainer:
 
     @classmethod
     def of(cls, mesh: Mesh, training: Targets, desired: Desired, noise: ArrayLike) -> Trainer:
-        """Set up for ``training`` targets and noise, one deviation or (n_meas,). Raises ModelError."""
+        """Set up for targets and noise, one deviation or (n_meas,). Raises ModelError."""
         data = (training.dv / training.amount[:, None]).T
         sd = np.asarray(noise, dtype=np.float64)
         if sd.shape not in ((), (len(data),)):
