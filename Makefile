@@ -28,7 +28,7 @@ test-all: lint native  ## the same, with what is slow
 bench: native  ## time from bytes to touches
 	@$(VENV)/bin/tomoskin bench frame $(ARGS)
 
-bench-docs: native  ## measure the forward engine anew into docs/benchmarks.md; half an hour
+bench-docs: native  ## measure the forward engine anew into docs/benchmarks.md; many minutes
 	@sh $(PINNED) requirements/bench.txt
 	@$(VENV)/bin/tomoskin bench forward --into docs/benchmarks.md
 	@$(VENV)/bin/tomoskin bench forward_large --into docs/benchmarks.md
