@@ -32,6 +32,8 @@ class Recording:
         True when the file holds differences (``dv``) rather than voltages.
     source
         Where it came from, for messages.
+    notes
+        What of the file was left out, in sentences.
     """
 
     voltages: NDArray[Any]
@@ -42,6 +44,7 @@ class Recording:
     labels: FloatArray | None
     is_change: bool
     source: str
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that the shapes belong together and that there is a frame."""
