@@ -7,7 +7,7 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.inverse.choice import AlphaChoice, Evidence
 from tomoskin.inverse.noise_figure import noise_figure
-from tomoskin.inverse.search import Told, crossing
+from tomoskin.inverse.search import Level, Told, crossing
 from tomoskin.inverse.spectrum import Spectrum
 
 TARGET = 1.0
@@ -23,7 +23,9 @@ def noise_figure_rule(
     """The alpha whose noise figure is ``target``, for a contrast in the middle of the mesh.
 
     The noise's size does not count, only how it is spread over the rows: all alike where the
-    evidence does not say. Raises ModelError when no alpha has that figure.
+    evidence does not say. The figure falls as alpha grows; at large alphas it may rise again,
+    where the image is no better for being smoother. Raises ModelError when no alpha has that
+    figure before.
     """
     n = len(spectrum.values)
     noise = np.ones(n) if evidence.noise is None else evidence.known_noise(n)
@@ -34,9 +36,12 @@ def noise_figure_rule(
         return noise_figure(spectrum.operator(alpha).matrix, volumes, change, noise)
 
     reason = f"the noise figure is {target:g} for a contrast in the middle"
-    hints = ("aim at a larger noise figure", "aim at a smaller noise figure")
+    hints = (
+        "aim at a larger noise figure, or choose another rule",
+        "aim at a smaller noise figure, or choose another rule",
+    )
     told = Told("noise-figure", reason, "noise figure")
-    return crossing(spectrum, figure, target, told, hints)
+    return crossing(spectrum, figure, Level(target, "falling", hints), told)
 
 
 def in_the_middle(spectrum: Spectrum) -> FloatArray:

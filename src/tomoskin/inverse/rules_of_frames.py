@@ -7,7 +7,7 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.inverse.choice import AlphaChoice, Curve, Evidence
 from tomoskin.inverse.corner import corner
-from tomoskin.inverse.search import Told, crossing, least
+from tomoskin.inverse.search import Level, Told, crossing, least
 from tomoskin.inverse.spectrum import Spectrum
 
 
@@ -81,7 +81,7 @@ def discrepancy(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
     )
     reason = f"the residual of {_frames(frames)} is as large as the noise"
     told = Told("discrepancy", reason, "residual / noise")
-    return crossing(spectrum, excess, 1.0, told, hints)
+    return crossing(spectrum, excess, Level(1.0, "rising", hints), told)
 
 
 def _frames(frames: FloatArray) -> str:
