@@ -63,6 +63,40 @@ def repair(
         typer.echo(text)
 
 
+@app.command()
+def export(
+    file: _File,
+    out: Annotated[
+        Path,
+        typer.Argument(
+            metavar="OUT", help="X.csv, .parquet, .h5, .npz, .mat, .vtu, .png, .gif or .mp4."
+        ),
+    ],
+    touches: Annotated[
+        Path | None, typer.Option(metavar="X.csv", help="Where the recorded touches go.")
+    ] = None,
+    every: Annotated[
+        float, typer.Option(min=1e-3, help="Seconds between two images, where there are images.")
+    ] = 0.1,
+) -> None:
+    """Convert a session: voltages, or the images that they give again."""
+    from tomoskin.cli.session_export import WRITERS, Export
+    from tomoskin.session import SessionReader, write_touches
+
+    write = WRITERS.get(out.suffix.lower())
+    if write is None:
+        raise typer.BadParameter(
+            f"expected a name that ends in {', '.join(WRITERS)}, got {out}", param_hint="OUT"
+        )
+    with SessionReader(file) as session, Bar(f"writing {out}") as bar:
+        write(Export(session, every, bar), out)
+        if touches is not None:
+            found = session.touches()
+            write_touches(touches, ((t.sequence, t.host_time, t.touches) for t in found))
+        if session.torn:
+            typer.echo(f"tomoskin: {file}: {session.torn}", err=True)
+
+
 def _lines(found: SessionInfo) -> list[tuple[str, str]]:
     begun = ""
     if found.begun is not None:

@@ -1,13 +1,19 @@
 """Recordings: sessions, interchange, import; pictures and files of their images."""
 
 from tomoskin.session.alpha_picture import write_choices
+from tomoskin.session.blocks import Rows, all_blocks
 from tomoskin.session.display import Display, circular_average
+from tomoskin.session.exports.hdf5 import write_hdf5
+from tomoskin.session.exports.matlab import write_matlab
+from tomoskin.session.exports.movie import WRITERS as FILMS
+from tomoskin.session.exports.series import write_series
+from tomoskin.session.exports.table import write_csv, write_parquet
 from tomoskin.session.info import SessionInfo, session_info
 from tomoskin.session.interchange import write_interchange
 from tomoskin.session.labelled_set import is_done, join_shards, shard_path, write_whole
 from tomoskin.session.layout import Mark, MarkedFrame
 from tomoskin.session.merit_picture import write_merit, write_merit_table
-from tomoskin.session.picture import MOST_PANELS, Panel, plot, write_picture
+from tomoskin.session.picture import MOST_PANELS, Panel, plot, rendered, write_picture
 from tomoskin.session.reader import is_session, read_recording
 from tomoskin.session.recorder import Recorder
 from tomoskin.session.recording import Recording
@@ -17,13 +23,14 @@ from tomoskin.session.session_reader import (
     RecordedTouches,
     SessionReader,
     Truth,
-    read_session,
 )
 from tomoskin.session.touch_csv import write_touches
 from tomoskin.session.vtu import write_vtu
+from tomoskin.session.whole import read_session, recording_of
 from tomoskin.session.writer import SessionWriter
 
 __all__ = [
+    "FILMS",
     "MOST_PANELS",
     "Display",
     "Lost",
@@ -35,10 +42,12 @@ __all__ = [
     "Recording",
     "Repaired",
     "ReplayTransport",
+    "Rows",
     "SessionInfo",
     "SessionReader",
     "SessionWriter",
     "Truth",
+    "all_blocks",
     "circular_average",
     "is_done",
     "is_session",
@@ -48,14 +57,21 @@ __all__ = [
     "plot",
     "read_recording",
     "read_session",
+    "recording_of",
+    "rendered",
     "repair",
     "session_info",
     "shard_path",
     "write_choices",
+    "write_csv",
+    "write_hdf5",
     "write_interchange",
+    "write_matlab",
     "write_merit",
     "write_merit_table",
+    "write_parquet",
     "write_picture",
+    "write_series",
     "write_touches",
     "write_vtu",
     "write_whole",

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, Image, Touch
 from tomoskin.mesh import Mesh
@@ -71,6 +72,13 @@ def plot(
     seen = how.shown(image, mesh)
     panel = Panel(title, seen.values, tuple(touches))
     return _figure(Path("plot"), mesh, [panel], seen.unit, how.limit)
+
+
+def rendered(path: Path, mesh: Mesh, panel: Panel, unit: str, limit: float) -> NDArray[np.uint8]:
+    """One panel as pixels (h, w, 3), for the film ``path``; raises as :func:`write_picture`."""
+    canvas: Any = _figure(path, mesh, [panel], unit, limit).canvas
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())[..., :3]
 
 
 def _figure(

@@ -26,7 +26,7 @@ from tomoskin.session.imports.matlab import is_matlab, load_matlab
 from tomoskin.session.imports.text_log import text_lines
 from tomoskin.session.mcap import MAGIC
 from tomoskin.session.recording import Recording
-from tomoskin.session.session_reader import read_session
+from tomoskin.session.whole import read_session
 
 Detect = Callable[[Arrays], bool]
 Parse = Callable[[Arrays, str], Recording]

@@ -12,14 +12,11 @@ from typing import Any, Self
 import msgspec
 import numpy as np
 
-from tomoskin.core import DataError, Event, FloatArray, Reading, SkinError, Touch
-from tomoskin.pattern import Scan
+from tomoskin.core import DataError, Event, Reading, SkinError, Touch
 from tomoskin.session import channels
 from tomoskin.session.container_reader import ContainerReader, Message, Totals
 from tomoskin.session.layout import MarkedFrame, decode_frame, decode_raw
-from tomoskin.session.recording import Recording
 from tomoskin.session.writer import ABOUT, FORMAT, SKIN_FILE
-from tomoskin.signal import Readout
 from tomoskin.skin import Skin
 
 _NO_CELLS = np.empty(0, dtype=np.int64)
@@ -161,38 +158,13 @@ class SessionReader:
         """How the run was set."""
         return self._last(channels.SETTINGS)
 
-    def recording(self) -> Recording:
-        """All frames as voltages in the order of the skin's pattern.
+    @property
+    def n_frames(self) -> int:
+        """Number of frames by the index; 0 where there is none."""
+        return self.totals.counts.get(channels.FRAMES, 0) if self.totals else 0
 
-        Frames of another scan are left out. A row at a rail of the converter is NaN. ``labels``
-        are there when the file holds truth: the place of the press where there was exactly one,
-        else NaN.
-
-        Raises
-        ------
-        DataError
-            Also when no frame is in the file, or some that were written are missing.
-        """
-        pattern = self.skin.pattern()
-        readout = Readout.of(Scan.of(pattern), self.skin.readout)
-        found = [item.frame for item in self._counted_frames()]
-        frames = [f for f in found if len(f.samples) == readout.scan.n_samples]
-        if not frames:
-            raise DataError(f"holds no frame of its skin{self._but()}", where=str(self.path))
-        read = [readout(frame) for frame in frames]
-        time = np.array([frame.host_time for frame in frames])
-        return Recording(
-            voltages=np.stack([np.where(v.railed, np.nan, v.values) for v in read]),
-            drive=pattern.drive,
-            measure=pattern.measure,
-            time=time,
-            reference=None,
-            labels=self._labels(time),
-            is_change=False,
-            source=str(self.path),
-        )
-
-    def _counted_frames(self) -> Iterator[MarkedFrame]:
+    def counted_frames(self) -> Iterator[MarkedFrame]:
+        """All frames; DataError at the end when some that were written are missing."""
         count = 0
         for count, item in enumerate(self.frames(), start=1):  # noqa: B007
             yield item
@@ -202,17 +174,6 @@ class SessionReader:
                 f"is damaged: {expected} frames were written, {count} are there",
                 where=str(self.path),
             )
-
-    def _labels(self, time: FloatArray) -> FloatArray | None:
-        truth = list(self.truth())
-        if not truth:
-            return None
-        places = np.full((len(truth) + 1, 2), np.nan)
-        for number, item in enumerate(truth, start=1):
-            if len(item.presses) == 1:
-                places[number] = _place_of(item.presses[0])
-        changes = np.array([item.host_time for item in truth])
-        return places[np.searchsorted(changes, time, side="right")]
 
     def _about(self) -> dict[str, str]:
         about = self._file.describes().get(ABOUT)
@@ -264,12 +225,6 @@ class SessionReader:
         return f"{self.path}, chunk at byte {message.chunk}"
 
 
-def read_session(path: Path) -> Recording:
-    """All frames of a session file as voltages; see :meth:`SessionReader.recording`."""
-    with SessionReader(path) as session:
-        return session.recording()
-
-
 def _epoch(about: dict[str, str], where: str) -> float:
     try:
         return float(about["epoch_s"])
@@ -287,7 +242,3 @@ def _touch(item: dict[str, Any]) -> Touch:
         item["x"], item["y"], sd_x, sd_y, item["area"], item["peak"], _NO_CELLS
     )  # fmt: skip
     return Touch(item["id"], item["kind"], item["since"], reading)
-
-
-def _place_of(press: dict[str, Any]) -> tuple[float, float]:
-    return float(press["x"]), float(press["y"])

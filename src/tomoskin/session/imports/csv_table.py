@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from tomoskin.core import DataError, FloatArray
+from tomoskin.core import DataError, IntArray
 from tomoskin.session.recording import Recording, frame_times
 
 _COLUMN = re.compile(r"(dv|v)_(\d+)_(\d+)_(\d+)_(\d+)")
@@ -70,7 +70,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     )
 
 
-def column_names(drive: FloatArray, measure: FloatArray, kind: str = "v") -> list[str]:
+def column_names(drive: IntArray, measure: IntArray, kind: str = "v") -> list[str]:
     """Names of the columns of a table of rows."""
     tables = np.hstack([drive, measure]).tolist()
     return ["_".join([kind, *map(str, row)]) for row in tables]

@@ -1,0 +1,125 @@
+"""Files that a session is exported to, by the ending of their name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tomoskin.core import DataError
+from tomoskin.live import Prepared, colour_limit, prepare, replayed
+from tomoskin.session import (
+    FILMS,
+    MOST_PANELS,
+    Panel,
+    SessionReader,
+    recording_of,
+    rendered,
+    write_csv,
+    write_hdf5,
+    write_interchange,
+    write_matlab,
+    write_parquet,
+    write_picture,
+    write_series,
+)
+
+if TYPE_CHECKING:
+    from tomoskin.live import Result
+
+Advance = Callable[[float, float], None]
+
+
+@dataclass(frozen=True)
+class Export:
+    """A session to be exported: ``every`` s between two images, ``advance`` told how far it is."""
+
+    session: SessionReader
+    every: float
+    advance: Advance
+
+    def npz(self, path: Path) -> None:
+        """Write the interchange file."""
+        write_interchange(path, recording_of(self.session))
+
+    def csv(self, path: Path) -> None:
+        """Write a table of voltages."""
+        write_csv(path, self.session, self.advance)
+
+    def parquet(self, path: Path) -> None:
+        """Write a table of voltages for data tools."""
+        write_parquet(path, self.session, self.advance)
+
+    def hdf5(self, path: Path) -> None:
+        """Write everything."""
+        write_hdf5(path, self.session, self.advance)
+
+    def matlab(self, path: Path) -> None:
+        """Write EIDORS' structures."""
+        skin = self.session.skin
+        write_matlab(path, recording_of(self.session), skin.current, skin.n_electrodes)
+
+    def series(self, path: Path) -> None:
+        """Write a series of meshes with their images."""
+        prepared = prepare(self.session.skin)
+        moments = ((r.host_time, r.image.values) for r in self._images(prepared))
+        write_series(path.with_suffix(".pvd"), prepared.mesh, moments)
+
+    def film(self, path: Path) -> None:
+        """Write a film of the map."""
+        prepared = prepare(self.session.skin)
+        unit, limit = prepared.operator.unit, colour_limit(prepared)
+        pictures = (
+            rendered(path, prepared.mesh, panel, unit, limit) for panel in self._panels(prepared)
+        )
+        FILMS[path.suffix.lower()](path, pictures, 1.0 / self.every)
+
+    def picture(self, path: Path) -> None:
+        """Write a sheet of maps, evenly spread over the session."""
+        prepared = prepare(self.session.skin)
+        panels = list(self._panels(prepared))
+        chosen = np.linspace(0, len(panels) - 1, min(len(panels), MOST_PANELS)).round()
+        some = [panels[int(number)] for number in np.unique(chosen)]
+        write_picture(path, prepared.mesh, some, prepared.operator.unit, colour_limit(prepared))
+
+    def _panels(self, prepared: Prepared) -> Iterator[Panel]:
+        first: float | None = None
+        for result in self._images(prepared):
+            first = result.host_time if first is None else first
+            title = f"{result.host_time - first:.1f} s"
+            yield Panel(title, result.image.values, result.touches)
+
+    def _images(self, prepared: Prepared) -> Iterator[Result]:
+        """A result every so often; those before the reference stands are left out."""
+        total = self.session.n_frames
+        due = float("-inf")
+        shown = False
+        for done, result in enumerate(replayed(prepared, self.session)):
+            self.advance(done, max(done + 1, total))
+            if result.ready and not due - self.every <= result.host_time < due:
+                due = result.host_time + self.every
+                shown = True
+                yield result
+        if not shown:
+            raise DataError(
+                "holds too few frames for a reference, so there are no images",
+                where=str(self.session.path),
+            )
+
+
+WRITERS: dict[str, Callable[[Export, Path], None]] = {
+    ".csv": Export.csv,
+    ".parquet": Export.parquet,
+    ".h5": Export.hdf5,
+    ".npz": Export.npz,
+    ".mat": Export.matlab,
+    ".vtu": Export.series,
+    ".pvd": Export.series,
+    ".png": Export.picture,
+    ".gif": Export.film,
+    ".mp4": Export.film,
+}
+"""What writes a file, by the ending of its name."""

@@ -1,0 +1,62 @@
+"""A session whole in memory: its frames as a recording, with the places of the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tomoskin.core import FloatArray
+from tomoskin.session.blocks import Rows, all_blocks
+from tomoskin.session.recording import Recording
+from tomoskin.session.session_reader import SessionReader
+
+
+def read_session(path: Path) -> Recording:
+    """All frames of a session file as voltages; see :func:`recording_of`."""
+    with SessionReader(path) as session:
+        return recording_of(session)
+
+
+def recording_of(session: SessionReader) -> Recording:
+    """All frames as voltages in the order of the skin's pattern.
+
+    Frames of another scan are left out. A row at a rail of the converter is NaN. ``labels`` are
+    there when the file holds truth: the place of the press where there was exactly one, else NaN.
+
+    Raises
+    ------
+    DataError
+        When the file is damaged, no frame is in it, or some that were written are missing.
+    """
+    rows = Rows.of(session)
+    found = list(all_blocks(session, rows))
+    time = np.concatenate([block.time for block in found])
+    return Recording(
+        voltages=np.concatenate([block.voltages for block in found]),
+        drive=rows.pattern.drive,
+        measure=rows.pattern.measure,
+        time=time,
+        reference=None,
+        labels=_labels(session, time),
+        is_change=False,
+        source=str(session.path),
+        notes=(f"the file {session.torn}",) if session.torn else (),
+    )
+
+
+def _labels(session: SessionReader, time: FloatArray) -> FloatArray | None:
+    truth = list(session.truth())
+    if not truth:
+        return None
+    places = np.full((len(truth) + 1, 2), np.nan)
+    for number, item in enumerate(truth, start=1):
+        if len(item.presses) == 1:
+            places[number] = _place(item.presses[0])
+    changes = np.array([item.host_time for item in truth])
+    return places[np.searchsorted(changes, time, side="right")]
+
+
+def _place(press: dict[str, Any]) -> tuple[float, float]:
+    return float(press["x"]), float(press["y"])
