@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat
-from scipy.ndimage import correlate1d
+from scipy.ndimage import correlate1d, label
 from scipy.spatial import cKDTree
 
 from tomoskin.core import DataError, FloatArray, TomoskinError
@@ -49,8 +49,11 @@ SIGMA, CONTACT = 0.73, 3e-4
 LENGTH = 0.025
 """Correlation length of shapes, m: about half a target's width."""
 
-DRIFT = 0.05
+DRIFT = 0.2
 """Change of the water between reference and target, relative."""
+
+SMALLEST = 200
+"""Pixels: a smaller region, 14 mm across, is below what the electrodes resolve."""
 
 REFERENCE_NOISE, REFERENCE_TOUCHED = 5e-3, 0.17
 """What the model leaves unexplained of water, V, and where a driven electrode is read."""
@@ -217,7 +220,17 @@ def segment(
     places, inside = pixels()
     labels = np.zeros((PIXELS, PIXELS), np.uint8)
     labels[inside] = found.at(places)
-    return labels
+    return without_specks(labels)
+
+
+def without_specks(labels: Labels) -> Labels:
+    """Regions of fewer than ``SMALLEST`` pixels become water."""
+    kept = labels.copy()
+    for kind in (RESISTIVE, CONDUCTIVE):
+        region, _ = label(labels == kind)
+        small = np.bincount(region.ravel()) < SMALLEST
+        kept[(region > 0) & small[region]] = WATER
+    return kept
 
 
 def calibrate(readout: Readout, u_ref: FloatArray) -> tuple[ForwardModel, FloatArray, float]:

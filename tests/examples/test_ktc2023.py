@@ -123,6 +123,15 @@ def test_targets_of_a_simulated_tank_are_found(ktc: Any, level: int, least: floa
     assert ktc.score(labels, picture()) > least
 
 
+def test_specks_become_water(ktc: Any) -> None:
+    labels = picture()
+    labels[10:24, 120:134] = 2
+    labels[60:64, 84:88] = 0  # a hole in the square is none of these
+    kept = ktc.without_specks(labels)
+    assert not kept[10:24, 120:134].any()
+    assert np.array_equal(kept[30:], labels[30:])
+
+
 def test_faults_of_the_read_out_are_found(ktc: Any) -> None:
     inj, mpat = tables()
     readout, _, u_ref = ktc.checked(*tank(), inj, mpat, None)
