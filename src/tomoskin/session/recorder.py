@@ -142,6 +142,13 @@ class Recorder:
         self._last_image = host_time
         return True
 
+    def wait_until_written(self) -> None:
+        """Return when nothing waits for the disk any more."""
+        done = threading.Event()
+        self._put(0, done.set)
+        while not done.wait(_ROUTINE) and self.running:
+            pass
+
     def _put(self, size: int, write: Callable[..., None], *arguments: Any) -> None:
         with self._put_lock:
             if self._failed:

@@ -1,0 +1,152 @@
+"""Recording at 1,000 frames/s, opening and seeking an hour, exporting it to Parquet."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import tempfile
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from report import Report
+from tomoskin.core import Frame
+from tomoskin.pattern import Scan
+from tomoskin.session import Mark, Recorder, SessionReader, SessionWriter, write_parquet
+from tomoskin.skin import Skin
+from tomoskin.wire import encode
+
+SKIN = "textile-disc-16"
+RATE = 1000.0
+LONG, PACED = 600, 20
+"""Seconds recorded: as fast as they are written, and at their own rate."""
+
+HOUR, HOUR_RATE = 3600, 100.0
+SEED, SEEKS = 1, 40
+_BATCH = 200
+_KINDS = 500
+"""Different frames; they are sent again and again with new numbers and times."""
+
+
+def run(data: Path | None) -> tuple[Report, ...]:
+    """Time every case; ``data`` is not needed."""
+    del data
+    skin = Skin.load(SKIN)
+    frames = _frames(skin)
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        rows = (
+            _recorded(place / "long.mcap", skin, frames, LONG, paced=False),
+            _recorded(place / "paced.mcap", skin, frames, PACED, paced=True),
+        )
+        (place / "long.mcap").unlink()
+        hour = _hour(place / "hour.mcap", skin, frames)
+        opened = _opened(hour)
+        exported = _exported(hour, place / "hour.parquet")
+    size = encode(frames[0]), Scan.of(skin.pattern()).n_samples
+    return (
+        Report(
+            "recording raw bytes and frames beside a pipeline",
+            ("seconds", "frames/s", "MB", "% of a core", "growth MB", "left out"),
+            rows,
+            (
+                f"{SKIN}: {size[1]} samples, {len(size[0])} bytes a frame, seed {SEED}",
+                "processor time of both threads by the seconds recorded; growth of the process",
+                "the first row is not paced: what is written in one batch waits for the disk",
+            ),
+        ),
+        Report(
+            "a session of one hour",
+            ("frames", "MB", "open ms", "open and seek ms", "worst ms", "Parquet s", "Parquet MB"),
+            ((*opened, *exported),),
+            (f"{HOUR_RATE:.0f} frames/s of {SKIN}, {SEEKS} random places, seed {SEED}",),
+        ),
+    )
+
+
+def _frames(skin: Skin) -> list[Frame]:
+    rng = np.random.default_rng(SEED)
+    n = Scan.of(skin.pattern()).n_samples
+    samples = rng.integers(200, 3000, (_KINDS, n)).astype("<u2")
+    return [Frame(0, 0, 0.0, 0x1A2B, 0, 0, row) for row in samples]
+
+
+def _at(frames: list[Frame], number: int, rate: float) -> Frame:
+    frame = frames[number % _KINDS]
+    return replace(
+        frame, sequence=number, ticks=round(number * 16e6 / rate), host_time=number / rate
+    )
+
+
+def _recorded(
+    path: Path, skin: Skin, frames: list[Frame], seconds: int, *, paced: bool
+) -> tuple[object, ...]:
+    raw = [encode(frame) for frame in frames]
+    nothing = threading.Event()
+    recorder = Recorder(SessionWriter(path, skin), None, lambda *_: None)
+    _feed(recorder, frames, raw, range(_BATCH))  # warm
+    memory, processor, begun = _resident(), time.process_time(), time.monotonic()
+    for start in range(_BATCH, int(seconds * RATE), _BATCH if not paced else 1):
+        count = _BATCH if not paced else 1
+        _feed(recorder, frames, raw, range(start, start + count))
+        if paced:
+            ahead = start / RATE - (time.monotonic() - begun)
+            if ahead > 0:
+                nothing.wait(ahead)
+        else:
+            recorder.wait_until_written()
+    used = time.process_time() - processor
+    grown = _resident() - memory
+    recorder.stop()
+    size = path.stat().st_size / 1e6
+    share = round(100 * used / seconds, 1)
+    return seconds, round(RATE), round(size), share, round(grown, 1), recorder.left_out
+
+
+def _feed(recorder: Recorder, frames: list[Frame], raw: list[bytes], numbers: range) -> None:
+    for number in numbers:
+        frame = _at(frames, number, RATE)
+        recorder.raw(frame.host_time, raw[number % _KINDS])
+        recorder.frame(frame, Mark.NONE)
+
+
+def _hour(path: Path, skin: Skin, frames: list[Frame]) -> Path:
+    raw = [encode(frame) for frame in frames]
+    with SessionWriter(path, skin) as session:
+        for number in range(int(HOUR * HOUR_RATE)):
+            frame = _at(frames, number, HOUR_RATE)
+            session.raw(frame.host_time, raw[number % _KINDS])
+            session.frame(frame)
+    return path
+
+
+def _opened(path: Path) -> tuple[object, ...]:
+    rng = np.random.default_rng(SEED)
+    opened, sought = [], []
+    for place in rng.uniform(0, HOUR - 1, SEEKS):
+        start = time.perf_counter()
+        with SessionReader(path) as session:
+            opened.append(time.perf_counter() - start)
+            first = next(session.frames(since=place)).frame
+            sought.append(time.perf_counter() - start)
+        assert abs(first.host_time - place) <= 1 / HOUR_RATE
+    times = [1e3 * value for value in (statistics.median(opened), statistics.median(sought))]
+    worst = 1e3 * max(sought)
+    size = round(path.stat().st_size / 1e6)
+    return int(HOUR * HOUR_RATE), size, *(round(t, 1) for t in (*times, worst))
+
+
+def _exported(path: Path, target: Path) -> tuple[object, ...]:
+    start = time.perf_counter()
+    with SessionReader(path) as session:
+        write_parquet(target, session, lambda _done, _total: None)
+    return round(time.perf_counter() - start, 1), round(target.stat().st_size / 1e6)
+
+
+def _resident() -> float:
+    """Resident memory, MB."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
