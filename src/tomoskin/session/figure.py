@@ -10,6 +10,9 @@ from tomoskin.core import DataError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_MARGIN = 0.12
+"""Empty rim of a picture and of each of its panels, inch: titles keep off the edge."""
+
 
 def new_figure(path: Path, width: float, height: float) -> Figure:
     """Empty figure of that size in inches, for the file ``path``.
@@ -19,11 +22,13 @@ def new_figure(path: Path, width: float, height: float) -> Figure:
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
+        from matplotlib.layout_engine import ConstrainedLayoutEngine
     except ImportError as error:
         raise DataError(
             "pictures need matplotlib", where=str(path), hint="pip install 'tomoskin[plot]'"
         ) from error
-    figure = Figure(figsize=(width, height), layout="constrained")
+    layout = ConstrainedLayoutEngine(h_pad=_MARGIN, w_pad=_MARGIN, hspace=0.0, wspace=0.0)
+    figure = Figure(figsize=(width, height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
