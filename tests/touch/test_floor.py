@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 
 import numpy as np
 import pytest
 from numpy.random import Generator
 
 from shapes import disc
-from tomoskin.core import FloatArray
+from tomoskin.core import DataError, FloatArray, Image
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import OneStep
 from tomoskin.pattern import Pattern
@@ -18,21 +18,27 @@ from tomoskin.skin import TouchSettings
 from tomoskin.touch import NoiseFloor, Segmenter
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Chain:
     """Operator, floor and Jacobian of a disc at 100 mA, 5 to 20 µV of noise."""
 
     operator: OneStep
     jacobian: FloatArray
     noise: FloatArray
-    floor: NoiseFloor
+
+    @cached_property
+    def floor(self) -> NoiseFloor:
+        return self.floor_of(self.noise)
 
     def segmenter(self, snr: float, sign: str = "decrease") -> Segmenter:
         settings = TouchSettings(0.65, 0.9, 0.005, sign, snr, "centroid", 8)
         return Segmenter(self.operator.model.mesh, settings)
 
-    def image(self, dv: FloatArray, rng: Generator) -> FloatArray:
-        return self.operator(dv + self.noise * rng.standard_normal(len(self.noise))).values
+    def image(self, dv: FloatArray, rng: Generator) -> Image:
+        return self.operator(dv + self.noise * rng.standard_normal(len(self.noise)))
+
+    def floor_of(self, noise: FloatArray) -> NoiseFloor:
+        return NoiseFloor.of(self.operator.matrix * noise, self.operator.model.mesh.identity)
 
     def press(self, x: float, y: float, ratio: float) -> FloatArray:
         """Voltages of a press whose image exceeds its noise ``ratio`` times at best."""
@@ -56,12 +62,12 @@ def chain_of(n: int, cells: int) -> Chain:
     model = ForwardModel(disc(n, cells), pattern, 0.01, current=0.1)
     operator = OneStep(model, "noser", alpha=0.003)
     noise = 1e-5 * np.random.default_rng(0).uniform(0.5, 2.0, pattern.n_meas)
-    return Chain(operator, model.jacobian(1.0), noise, NoiseFloor.of(operator.matrix, noise))
+    return Chain(operator, model.jacobian(1.0), noise)
 
 
 def test_floor_is_the_spread_of_noise_images() -> None:
     rng, n = np.random.default_rng(1), 4000
-    images = np.stack([chain().image(np.zeros(40), rng) for _ in range(n)])
+    images = np.stack([chain().image(np.zeros(40), rng).values for _ in range(n)])
     ratio = images.std(axis=0, ddof=1) / chain().floor.sd
     assert np.abs(ratio - 1).max() < 5 / np.sqrt(2 * (n - 1))
 
@@ -81,7 +87,7 @@ def test_alarms_come_only_where_the_ratio_is_exceeded() -> None:
         readings = segmenter(image, chain().floor)
         found += bool(readings)
         for reading in readings:
-            ratio = -image[reading.cells] / chain().floor.sd[reading.cells]
+            ratio = -image.values[reading.cells] / chain().floor.sd[reading.cells]
             assert ratio.max() >= 2.5
     assert 0 < found < 150
     without_floor = [segmenter(chain().image(np.zeros(40), rng)) for _ in range(100)]
@@ -106,7 +112,7 @@ def test_a_press_below_the_ratio_is_no_touch() -> None:
 
 
 def test_without_a_floor_no_deviation_is_claimed() -> None:
-    image = chain().operator(chain().press(0.0, 0.0, ratio=15.0)).values
+    image = chain().operator(chain().press(0.0, 0.0, ratio=15.0))
     (reading,) = chain().segmenter(snr=5.0)(image)
     assert np.isnan([reading.sd_x, reading.sd_y]).all()
 
@@ -134,8 +140,8 @@ def test_deviation_of_a_region_that_noise_shifts_is_the_shift(axis: int, sign: f
     offset = mesh.centroids - [0.01, -0.02]
     blob = sign * np.exp(-0.5 * (offset**2).sum(axis=1) / width**2)
     column = (blob * offset[:, axis] / width**2)[:, None]
-    floor = NoiseFloor.of(column, np.array([shift]))
-    (reading,) = fine().segmenter(0.0, sign="both")(blob, floor)
+    floor = NoiseFloor.of(shift * column, mesh.identity)
+    (reading,) = fine().segmenter(0.0, sign="both")(Image(blob, "S", mesh.identity), floor)
     expected = np.where(np.arange(2) == axis, shift, 0.0)
     assert (reading.sd_x, reading.sd_y) == pytest.approx(tuple(expected), abs=0.15 * shift)
 
@@ -145,20 +151,27 @@ def test_a_change_of_strength_does_not_move_a_region() -> None:
     # lopsided, so that edge and inside pull to one side unless the threshold follows the peak
     x, y = (mesh.centroids / 0.03).T
     blob = np.exp(-(x**2) - y**2) * np.exp(0.8 * x)
-    floor = NoiseFloor.of(blob[:, None], np.array([0.1]))
-    (reading,) = fine().segmenter(0.0, sign="both")(blob, floor)
+    floor = NoiseFloor.of(0.1 * blob[:, None], mesh.identity)
+    (reading,) = fine().segmenter(0.0, sign="both")(Image(blob, "S", mesh.identity), floor)
     assert np.hypot(reading.sd_x, reading.sd_y) < 3e-4
 
 
 def test_deviation_scales_with_the_noise() -> None:
-    image = fine().operator(fine().press(0.04, 0.02, ratio=20.0)).values
-    twice = NoiseFloor.of(fine().operator.matrix, 2 * fine().noise)
+    image = fine().operator(fine().press(0.04, 0.02, ratio=20.0))
+    twice = fine().floor_of(2 * fine().noise)
     (one,), (two,) = (fine().segmenter(1.0)(image, f) for f in (fine().floor, twice))
     assert (two.sd_x, two.sd_y) == pytest.approx((2 * one.sd_x, 2 * one.sd_y))
 
 
+def test_a_floor_of_another_mesh_with_as_many_cells_is_refused() -> None:
+    image = chain().operator(chain().press(0.0, 0.0, ratio=15.0))
+    other = replace(chain().floor, mesh_id="another")
+    with pytest.raises(DataError, match=r"noise floor of mesh \w+, got one of mesh another"):
+        chain().segmenter(snr=5.0)(image, other)
+
+
 def test_noise_of_no_channel_is_no_deviation() -> None:
-    silent = NoiseFloor.of(chain().operator.matrix, np.zeros(40))
-    image = chain().operator(chain().press(0.0, 0.0, ratio=15.0)).values
+    silent = chain().floor_of(np.zeros(40))
+    image = chain().operator(chain().press(0.0, 0.0, ratio=15.0))
     (reading,) = chain().segmenter(snr=5.0)(image, silent)
     assert (reading.sd_x, reading.sd_y) == (0.0, 0.0)

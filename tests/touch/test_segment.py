@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from shapes import disc
-from tomoskin.core import FloatArray, Reading
+from tomoskin.core import DataError, FloatArray, Image, Reading
 from tomoskin.mesh import Mesh
 from tomoskin.skin import TouchSettings
 from tomoskin.touch import Segmenter
@@ -37,8 +37,15 @@ def blob(x: float, y: float, height: float = -1.0, width: float = 0.012) -> Floa
     return np.asarray(height * np.exp(-0.5 * (offset**2).sum(axis=1) / width**2))
 
 
-def segment(image: FloatArray, **changes: object) -> list[Reading]:
+def segment(values: FloatArray, **changes: object) -> list[Reading]:
+    image = Image(values, "S", sheet().identity)
     return Segmenter(sheet(), replace(SETTINGS, **changes))(image)  # type: ignore[arg-type]
+
+
+def test_an_image_of_another_mesh_with_as_many_cells_is_refused() -> None:
+    image = Image(blob(0.0, 0.0), "S", "another")
+    with pytest.raises(DataError, match=f"image of mesh {sheet().identity}, got one of mesh ano"):
+        Segmenter(sheet(), SETTINGS)(image)
 
 
 @pytest.mark.parametrize("place", [(0.0, 0.0), (0.05, 0.01), (-0.03, -0.06)])

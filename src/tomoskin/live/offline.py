@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, IntArray, Touch
+from tomoskin.core import DataError, FloatArray, Image, IntArray, Touch
 from tomoskin.inverse import AlphaChoice, Evidence
 from tomoskin.live.dead_rows import as_the_model, dead_rows
 from tomoskin.live.prepare import Prepared
@@ -133,12 +133,12 @@ def reconstruct(
     operator = prepared.operator.without(changes.rows_left_out)
     prepared = replace(prepared, operator=operator)
     floor = None if changes.reference is None else prepared.noise_floor(changes.reference)
-    images = np.stack([operator.quick(dv).values for dv in changes.values])
+    images = [operator.quick(dv) for dv in changes.values]
     times = recording.time[changes.frames]
     return Reconstruction(
         frames=changes.frames,
         left_out=changes.left_out,
-        images=images,
+        images=np.stack([image.values for image in images]),
         unit=operator.unit,
         touches=_touches(prepared, images, times, floor),
         agreement=changes.agreement,
@@ -239,7 +239,7 @@ def _check_scale(reference: FloatArray, model: FloatArray, source: str) -> None:
 
 
 def _touches(
-    prepared: Prepared, images: FloatArray, times: FloatArray, floor: NoiseFloor | None
+    prepared: Prepared, images: list[Image], times: FloatArray, floor: NoiseFloor | None
 ) -> tuple[tuple[Touch, ...], ...]:
     tracker = Tracker(patience=0, debounce=1)
     return tuple(

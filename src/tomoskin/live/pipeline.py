@@ -114,7 +114,7 @@ class Pipeline:
         values = np.where(unusable, reference.mean, voltages.values)
         dv = difference(values, reference.mean, p.skin.inverse.difference)
         image = p.operator.quick(p.operator.filled(dv, unusable))
-        readings = p.segmenter(image.values, self._floor)
+        readings = p.segmenter(image, self._floor)
         touches = self._tracker.update(readings, voltages.host_time)
         return self._result(voltages, image, touches, unusable, pictured=True)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tomoskin.core import FloatArray, ModelError
+from tomoskin.core import FloatArray, Image, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import AlphaChoice, LightTouch, LinearProblem, Operator, Spectrum, named_prior
 from tomoskin.mesh import Mesh
@@ -56,7 +56,8 @@ class Prepared:
         """What the noise of a reference does to the picture; None where it is not known."""
         if not reference.noise_is_known:
             return None
-        return NoiseFloor.of(self.operator.matrix, self.difference_noise(reference))
+        spread = self.operator.matrix * self.difference_noise(reference)
+        return NoiseFloor.of(spread, self.mesh.identity)
 
     def difference_noise(self, reference: Reference) -> FloatArray:
         """(n_meas,) standard deviation of difference data against that reference."""
@@ -68,7 +69,8 @@ class Prepared:
 
     def places(self, image: FloatArray) -> FloatArray:
         """(k, 2) m, where the touches of an image (n_cells,) are."""
-        found = [(reading.x, reading.y) for reading in self.segmenter(image)]
+        picture = Image(image, self.operator.unit, self.mesh.identity)
+        found = [(reading.x, reading.y) for reading in self.segmenter(picture)]
         return np.array(found).reshape(-1, 2)
 
 

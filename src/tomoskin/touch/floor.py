@@ -13,22 +13,22 @@ from tomoskin.core import FloatArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class NoiseFloor:
-    """Measurement noise carried through a linear operator.
+    """Measurement noise as it stands in the images of one mesh.
 
-    ``spread`` (n_cells, n_meas): the operator times each row's standard deviation, so that
-    spread · spreadᵀ is the image's covariance for independent noise; ``sd`` (n_cells,) the
-    square root of its diagonal. Single precision is plenty for a deviation, and half to read.
+    ``spread`` (n_cells, k): spread · spreadᵀ is the image's covariance; ``sd`` (n_cells,) the
+    square root of its diagonal; ``mesh_id`` names the mesh. Single precision is plenty for a
+    deviation, and half to read.
     """
 
     spread: NDArray[np.float32]
     sd: FloatArray
+    mesh_id: str
 
     @classmethod
-    def of(cls, operator: FloatArray, noise: FloatArray) -> Self:
-        """Floor of ``operator`` (n_cells, n_meas) under ``noise`` (n_meas,) of its input."""
-        spread = operator * noise
+    def of(cls, spread: FloatArray, mesh_id: str) -> Self:
+        """Floor of that ``spread``: of an operator, its matrix times each row's deviation."""
         sd = np.sqrt(np.einsum("cm,cm->c", spread, spread))
-        return cls(spread.astype(np.float32, order="C"), sd)  # rows are taken one by one
+        return cls(spread.astype(np.float32, order="C"), sd, mesh_id)  # rows are taken one by one
 
     def sd_of(self, cells: IntArray, lever: FloatArray) -> FloatArray:
         """Standard deviation, (k,), of Σ lever · image over ``cells`` (n,), ``lever`` (n, k)."""

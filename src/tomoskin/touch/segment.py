@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial import cKDTree
 
-from tomoskin.core import FloatArray, IntArray, Reading
+from tomoskin.core import DataError, FloatArray, Image, IntArray, Reading
 from tomoskin.mesh import Mesh
 from tomoskin.skin import TouchSettings
 from tomoskin.touch.centroid import centroid, centroid_sd
@@ -43,12 +43,20 @@ class Segmenter:
         self._filter = _gaussian_filter(mesh, settings.smoothing)
         self._neighbours = neighbour_table(mesh)
 
-    def __call__(self, values: FloatArray, floor: NoiseFloor | None = None) -> list[Reading]:
-        """Regions of an image ``values`` (n_cells,), strongest first.
+    def __call__(self, picture: Image, floor: NoiseFloor | None = None) -> list[Reading]:
+        """Regions of ``picture``, strongest first.
 
         With a ``floor``, a region counts only where the image exceeds ``snr`` times its noise.
+
+        Raises
+        ------
+        DataError
+            When image or floor are of another mesh.
         """
-        image = _of_sign(values, self.settings.sign)
+        self._accept("image", picture.mesh_id)
+        if floor is not None:
+            self._accept("noise floor", floor.mesh_id)
+        image = _of_sign(picture.values, self.settings.sign)
         strength = np.abs(image)
         limit = self.settings.gamma1 * strength.max()
         if not limit > 0:
@@ -66,6 +74,13 @@ class Segmenter:
             found = [self._centroid(cells, image, floor) for cells in regions]
         found.sort(key=lambda reading: -abs(reading.peak))
         return found[: self.settings.max_touches]
+
+    def _accept(self, what: str, mesh_id: str) -> None:
+        if mesh_id != self.mesh.identity:
+            raise DataError(
+                f"expected the {what} of mesh {self.mesh.identity}, got one of mesh {mesh_id}",
+                hint="make the segmenter from the mesh that the image was made on",
+            )
 
     def _centroid(self, cells: IntArray, image: FloatArray, floor: NoiseFloor | None) -> Reading:
         weights = image[cells]
