@@ -17,7 +17,7 @@ from tomoskin.core import DataError
 ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared" / "data"
 LEVELS = range(1, 8)
-SEEDS = range(2000, 2016)
+SEEDS = range(2000, 2010)
 """Simulated tanks; those that settings were chosen on are others."""
 
 
