@@ -20,7 +20,8 @@ from tomoskin.inverse import (
     TotalVariation,
     homogeneous,
 )
-from tomoskin.inverse.newton import minimiser
+from tomoskin.inverse.absolute import Quadratic
+from tomoskin.inverse.newton import Descent, Goal, descend, minimiser
 from tomoskin.inverse.penalty import Diagonal
 from tomoskin.inverse.unknowns import Cells, Joint, Unknowns, others
 from tomoskin.mesh import Mesh
@@ -236,3 +237,49 @@ def test_data_of_another_pattern() -> None:
     model = ForwardModel(coarse(300), Pattern.adjacent(16), 0.01)
     with pytest.raises(DataError, match="expected an observation of 208 voltages, got one of 256"):
         AbsoluteImaging(model, alpha=1.0)(seen())
+
+
+class Bowl:
+    """f(x) = x² in one unknown: its minimum is where no step helps, its walls are steep."""
+
+    def at(self, unknowns: FloatArray) -> Bowl:
+        found = Bowl()
+        found.x = unknowns
+        return found
+
+    x: FloatArray
+
+    @property
+    def predicted(self) -> FloatArray:
+        return np.asarray(self.x**2)
+
+    @property
+    def jacobian(self) -> FloatArray:
+        return np.diag(2.0 * self.x)
+
+
+def bowl(target: float, start: float, **settings: Any) -> Descent:
+    goal = Goal(Bowl(), Quadratic(Diagonal(np.array([1e-12]))), np.array([target]))
+    begin = Descent(np.array([start]), np.array([1e-12 * start]), (), "not begun", False)
+    return descend(goal, begin, **{"most": 50, "tolerance": 1e-12, **settings})
+
+
+def test_a_descent_reaches_the_minimum_and_says_so() -> None:
+    found = bowl(4.0, 0.5)
+    assert found.unknowns == pytest.approx([2.0])
+    assert found.converged
+    assert found.force == pytest.approx([2e-12])
+
+
+def test_where_no_step_helps_it_stops() -> None:
+    found = bowl(-1.0, 1e-9)
+    assert found.reason == "no step lowers the objective any more"
+    assert found.converged
+    assert len(found.steps) == 1
+
+
+def test_no_step_goes_beyond_its_reach() -> None:
+    free, bound = bowl(4.0, 0.01, most=1), bowl(4.0, 0.01, most=1, reach=0.5)
+    assert bound.unknowns == pytest.approx([0.51])
+    assert free.unknowns > 1.0
+    assert not bound.converged

@@ -17,6 +17,9 @@ from tomoskin.mesh import Mesh
 LEFT_OUT = 0.02
 """Part of the field's variance that the modes may leave out, at the worst place."""
 
+_ROOM = 128
+"""Modes for which there is room at first."""
+
 
 @dataclass(frozen=True, eq=False)
 class RandomField:
@@ -94,15 +97,16 @@ def _pivoted(
 ) -> tuple[FloatArray, IntArray]:
     """Pivoted Cholesky factor (n, k) of a matrix with unit diagonal, given by its columns."""
     rest = np.ones(n)
-    columns: list[FloatArray] = []
+    basis = np.zeros((n, _ROOM))
     pivots: list[int] = []
     while len(pivots) < n and rest.max() > left_out:
-        pivot = int(rest.argmax())
-        known = np.stack(columns, axis=1) if columns else np.empty((n, 0))
-        fresh = (column(pivot) - known @ known[pivot]) / np.sqrt(rest[pivot])
-        fresh[pivots] = 0.0
-        columns.append(fresh)
+        pivot, k = int(rest.argmax()), len(pivots)
+        if k == basis.shape[1]:
+            basis = np.hstack([basis, np.zeros_like(basis)])
+        known = basis[:, :k] @ basis[pivot, :k]
+        basis[:, k] = (column(pivot) - known) / np.sqrt(rest[pivot])
+        basis[pivots, k] = 0.0
         pivots.append(pivot)
-        rest -= fresh**2
+        rest -= basis[:, k] ** 2
         rest[pivots] = 0.0
-    return np.stack(columns, axis=1), np.array(pivots)
+    return np.ascontiguousarray(basis[:, : len(pivots)]), np.array(pivots)
