@@ -15,7 +15,15 @@ from golden import mismatch
 from shapes import disc
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.forward import ForwardModel
-from tomoskin.inverse import Modes, OneStep, Operator, Smoother, Temporal, prior_matrix
+from tomoskin.inverse import (
+    Modes,
+    OneStep,
+    Operator,
+    Smoother,
+    Spectrum,
+    Temporal,
+    prior_matrix,
+)
 from tomoskin.pattern import Pattern
 
 ALPHA = 0.02
@@ -137,6 +145,39 @@ def test_noise_is_reduced_as_theory_says(tau: float) -> None:
     theory = np.sqrt((temporal.noise_left(0.1) ** 2 @ power) / power.sum())
     assert measured == pytest.approx(theory, rel=0.1)
     assert theory < 1.0
+
+
+def test_spread_of_white_noise_is_the_noise_that_is_left() -> None:
+    temporal = Temporal(operator(), 0.3)
+    noise = 1.0 / np.sqrt(operator().problem.weights)
+    spread = temporal.spread(noise, 0.1)
+    plain = np.linalg.norm(operator().matrix * noise, axis=1)
+    left = np.linalg.norm(spread, axis=1) / plain
+    assert left == pytest.approx(temporal.noise_left(0.1), rel=1e-9)
+
+
+def test_spread_of_uneven_noise_is_what_a_simulation_finds() -> None:
+    """Noise that differs from row to row couples modes; with one mode alone it would not."""
+    temporal, rng = Temporal(operator(), 0.2), np.random.default_rng(5)
+    noise = rng.uniform(0.2, 3.0, 40)
+    data = noise * rng.standard_normal((6000, 40))
+    images = np.array([temporal.push(dv, 0.1 * k).values for k, dv in enumerate(data)])[100:]
+    spread = temporal.spread(noise, 0.1)
+    assert np.cov(images.T) == pytest.approx(spread @ spread.T, abs=0.08 * (spread**2).sum(1).max())
+    sd = np.linalg.norm(spread, axis=1)
+    assert images.std(axis=0) == pytest.approx(sd, rel=0.08)
+
+
+@pytest.mark.parametrize("prior", ["noser", "laplace"])
+def test_modes_of_a_spectrum_are_those_of_its_operator(prior: str) -> None:
+    problem = operator(prior=prior).problem
+    spectrum = Spectrum.of(problem)
+    made = spectrum.operator(ALPHA)
+    known, found = Modes.of_spectrum(spectrum, ALPHA, made), Modes.of(problem, made)
+    a, b = Temporal(known, 0.3), Temporal(found, 0.3)
+    for dv, t in zip(frames(), TIMES, strict=True):
+        assert mismatch(a.push(dv, t).values, b.push(dv, t).values) < 1e-5  # single precision
+    assert known.trust.sum() == pytest.approx(found.trust.sum())
 
 
 def test_the_longer_it_remembers_the_quieter_it_is() -> None:

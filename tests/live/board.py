@@ -31,7 +31,8 @@ from tomoskin.wire import (
 class Board:
     """Transport whose other end is here.
 
-    With ``free`` samples it scans by itself, a frame every ``period`` s at most.
+    With ``free`` samples it scans by itself, a frame every ``period`` s at most. Its clock goes
+    on by ``tick`` with each frame.
     """
 
     def __init__(self, free=None, period=0.002):
@@ -40,6 +41,7 @@ class Board:
         self.presses = ()
         self.commands = []
         self.lost = False
+        self.tick = 0
         self.closed = False
         self.scanning = threading.Event()
         self._period = period
@@ -78,9 +80,9 @@ class Board:
         """One frame, after leaving ``skip`` out."""
         for _ in range(skip):
             next(self._sequence)
-        frame = Frame(
-            next(self._sequence), 0, 0.0, self._configuration, 0, drops, samples.astype("<u2")
-        )
+        number = next(self._sequence)
+        ticks = number * self.tick
+        frame = Frame(number, ticks, 0.0, self._configuration, 0, drops, samples.astype("<u2"))
         self.raw(encode(frame))
 
     def raw(self, data):

@@ -13,6 +13,7 @@ from tomoskin.core import FloatArray, ModelError
 from tomoskin.inverse.one_step import OneStep
 from tomoskin.inverse.operator import Operator
 from tomoskin.inverse.problem import LinearProblem
+from tomoskin.inverse.spectrum import Spectrum
 
 _NOTHING = 1e-12
 """A mode whose picture is this far below the strongest one is none: half of them when every row
@@ -64,12 +65,28 @@ class Modes:
         if np.abs(seen - seen.conj().T).max() > _SKEW * np.abs(seen).max():
             raise _foreign()
         trust, basis = np.linalg.eigh((seen + seen.conj().T) / 2.0)
-        picture = (operator.matrix / root) @ basis
+        analysis = (root[:, None] * basis).conj().T
+        return cls._without_nothing(operator, analysis, (operator.matrix / root) @ basis, trust)
+
+    @classmethod
+    def of_spectrum(cls, spectrum: Spectrum, alpha: float, operator: Operator) -> Modes:
+        """The same of ``spectrum.operator(alpha)``, whose modes are known: no eigenvalues."""
+        picture = spectrum.modes * spectrum.gains(alpha)
+        return cls._without_nothing(operator, spectrum.analysis, picture, spectrum.filters(alpha))
+
+    @classmethod
+    def _without_nothing(
+        cls,
+        operator: Operator,
+        analysis: NDArray[Any],
+        picture: NDArray[Any],
+        trust: FloatArray,
+    ) -> Modes:
         size = np.linalg.norm(picture, axis=0)
         kept = size > _NOTHING * size.max()
         return cls(
             operator,
-            np.ascontiguousarray((root[:, None] * basis[:, kept]).conj().T),
+            np.ascontiguousarray(analysis[kept]),
             np.ascontiguousarray(picture[:, kept]),
             np.clip(trust[kept], 0.0, 1.0),
         )

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from tomoskin.core import FloatArray, ModelError
+from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse.operator import Operator
 from tomoskin.inverse.penalty import Carried, Penalty
 from tomoskin.inverse.priors import PriorLike, penalty_of
 from tomoskin.inverse.weights import noise_weights
+from tomoskin.pattern import Pattern
 
 _ZERO = 1e-9
 """A voltage below this part of the largest is zero by symmetry, and its value is rounding."""
@@ -90,6 +91,28 @@ class LinearProblem:
     def weighted(self, noise: NDArray[np.floating]) -> Self:
         """The problem with weights from the noise of each row; see :func:`noise_weights`."""
         return replace(self, weights=noise_weights(noise, self.weights))
+
+    def without(self, rows: NDArray[Any]) -> Self:
+        """The problem of a pattern that never had ``rows``; prior and linearisation stay.
+
+        Raises DataError when no row is left.
+        """
+        kept = np.delete(np.arange(len(self.weights)), rows)
+        if not len(kept):
+            raise DataError("no row is left")
+        whole = self.model
+        pattern = Pattern.from_tables(
+            whole.pattern.drive[kept], whole.pattern.measure[kept], whole.pattern.n_electrodes
+        )
+        return replace(
+            self,
+            model=ForwardModel(
+                whole.mesh, pattern, whole.contact_impedance, whole.current, order=whole.order
+            ),
+            jacobian=self.jacobian[kept],
+            weights=self.weights[kept],
+            reference=self.reference[kept],
+        )
 
     def operator(self, alpha: float) -> Operator:
         """Minimiser of the problem as a matrix, made in the space of the measurements.

@@ -110,6 +110,19 @@ class Temporal:
         power = np.abs(self.modes.picture) ** 2
         return np.asarray(np.sqrt(power @ self.steady(interval).noise / power.sum(axis=1)))
 
+    def spread(self, noise: FloatArray, interval: float) -> FloatArray:
+        """(n_cells, k) S with S·Sᵀ the covariance of the image, frames every ``interval`` s.
+
+        ``noise`` (n_meas,) is the deviation of each row of difference data, independent from
+        row to row and from frame to frame; what the modes have in common is Σ over the past of
+        gᵢpᵢⁿ cᵢⱼ gⱼpⱼⁿ, with gain g, pole p and their covariance c in one frame.
+        """
+        steady = self.steady(interval)
+        analysis = self.modes.analysis * noise
+        shared = (analysis @ analysis.conj().T) / (1.0 - np.outer(steady.pole, steady.pole))
+        values, vectors = np.linalg.eigh(shared * np.outer(steady.gain, steady.gain))
+        return np.asarray(self.modes.picture @ (vectors * np.sqrt(np.maximum(values, 0.0))))
+
 
 def advance(
     modes: Modes, time_constant: float, last: Belief | None, dv: NDArray[Any], time: float

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, Frame, Image, Touch, Voltages
 from tomoskin.inverse import MOST_LEFT_OUT, AlphaChoice
 from tomoskin.live.collector import Collector
+from tomoskin.live.imaging import Alone, Filtered, imaging
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.result import ReferenceState, Result
 from tomoskin.live.tune import tune
 from tomoskin.signal import Reference, difference
-from tomoskin.touch import NoiseFloor, Tracker
+from tomoskin.touch import Tracker
 
 REFERENCE_FRAMES = 20
 """Frames of the untouched skin that make a reference."""
@@ -38,7 +39,8 @@ class Pipeline:
         self._tracker = Tracker()
         self._image = _none(prepared)
         self._reference: Reference | None = None
-        self._floor: NoiseFloor | None = None
+        self._imaging: Alone | Filtered = Alone(prepared, None)
+        self._times: list[float] = []
         self._tuning: Generator[None, None, Prepared] | None = None
         self._since = 0.0
         self.paused = False
@@ -51,6 +53,7 @@ class Pipeline:
         self._reference = None
         self._tuning = None
         self._tracker.reset()
+        self._times = []
         self._collector = Collector(self._needed, self._prepared.operator.reference)
 
     @property
@@ -82,12 +85,13 @@ class Pipeline:
 
     def _collect(self, voltages: Voltages, unusable: NDArray[np.bool_]) -> Result:
         self._collector.add(voltages.values, unusable)
+        self._times.append(self._time(voltages))
         if self._collector.done:
             self._settle(self._collector.reference(), voltages.host_time)
         return self._result(voltages, self._image, (), unusable, pictured=True)
 
     def _settle(self, reference: Reference, host_time: float) -> None:
-        self._floor = self._prepared.noise_floor(reference)
+        self._imaging = imaging(self._prepared, reference, self._interval())
         self._tuning = tune(self._prepared, reference)
         self._reference = reference
         self._since = host_time
@@ -102,7 +106,7 @@ class Pipeline:
             self._tuning = None
             if end.value is not self._prepared:
                 self._prepared = end.value
-                self._floor = self._prepared.noise_floor(reference)
+                self._imaging = imaging(self._prepared, reference, self._interval())
 
     def _picture(
         self, voltages: Voltages, unusable: NDArray[np.bool_], reference: Reference
@@ -113,8 +117,9 @@ class Pipeline:
             return self._result(voltages, self._image, touches, unusable, pictured=False)
         values = np.where(unusable, reference.mean, voltages.values)
         dv = difference(values, reference.mean, p.skin.inverse.difference)
-        image = p.operator.quick(p.operator.filled(dv, unusable))
-        readings = p.segmenter(image, self._floor)
+        filled = p.operator.filled(dv, unusable)
+        image, floor = self._imaging.push(filled, self._time(voltages))
+        readings = p.segmenter(image, floor)
         touches = self._tracker.update(readings, voltages.host_time)
         return self._result(voltages, image, touches, unusable, pictured=True)
 
@@ -138,6 +143,14 @@ class Pipeline:
             touches=touches,
             left_out=int(np.count_nonzero(unusable)),
         )
+
+    def _time(self, voltages: Voltages) -> float:
+        """The device's own seconds: host times of frames that were read together are the same."""
+        return voltages.ticks / self._prepared.skin.readout.tick_rate
+
+    def _interval(self) -> float:
+        """Between frames while the reference was taken, s; NaN where a single one was."""
+        return float(np.median(np.diff(self._times))) if len(self._times) > 1 else np.nan
 
     def _expected(self) -> FloatArray:
         return self._reference.mean if self._reference else self._prepared.operator.reference

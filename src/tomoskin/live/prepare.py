@@ -6,9 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tomoskin.core import FloatArray, Image, ModelError
+from tomoskin.core import FloatArray, Image, IntArray, ModelError
 from tomoskin.forward import ForwardModel
-from tomoskin.inverse import AlphaChoice, LightTouch, LinearProblem, Operator, Spectrum, named_prior
+from tomoskin.inverse import (
+    AlphaChoice,
+    LightTouch,
+    LinearProblem,
+    Modes,
+    Operator,
+    Spectrum,
+    named_prior,
+)
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.signal import Readout, Reference, difference_noise
@@ -24,6 +32,8 @@ class Prepared:
     ----------
     skin, mesh, pattern, scan, model, problem, operator, segmenter, readout
         The stages, in the order of the flow.
+    modes
+        The operator's, for a filter over frames; None where the skin has no time constant.
     choice
         The operator's alpha, and what chose it.
     light_touch
@@ -37,6 +47,7 @@ class Prepared:
     model: ForwardModel
     problem: LinearProblem
     operator: Operator
+    modes: Modes | None
     segmenter: Segmenter
     readout: Readout
     choice: AlphaChoice
@@ -51,6 +62,20 @@ class Prepared:
                 raise ModelError(
                     f"the operator is of mesh {made_for}, the {stage} of mesh {mesh.identity}"
                 )
+
+    def with_alpha(self, choice: AlphaChoice, spectrum: Spectrum, operator: Operator) -> Prepared:
+        """The skin with the ``operator`` of ``choice``, made from the ``spectrum``."""
+        modes = None
+        if self.skin.inverse.time_constant:
+            modes = Modes.of_spectrum(spectrum, choice.alpha, operator)
+        return replace(self, operator=operator, modes=modes, choice=choice)
+
+    def without(self, rows: IntArray) -> Prepared:
+        """The skin as if its pattern had never had ``rows``; an alpha of "auto" is chosen anew.
+
+        Raises DataError when no row is left.
+        """
+        return _prepared(self.skin, self.problem.without(rows)) if len(rows) else self
 
     def noise_floor(self, reference: Reference) -> NoiseFloor | None:
         """What the noise of a reference does to the picture; None where it is not known."""
@@ -84,10 +109,7 @@ def prepare(skin: Skin) -> Prepared:
     TomoskinError
         When the skin cannot be meshed, modelled or inverted; the message says which.
     """
-    mesh, pattern = skin.mesh(), skin.pattern()
-    scan = Scan.of(pattern)
-    readout = Readout.of(scan, skin.readout)
-    model = ForwardModel(mesh, pattern, skin.contact_impedance, skin.current)
+    model = ForwardModel(skin.mesh(), skin.pattern(), skin.contact_impedance, skin.current)
     settings = skin.inverse
     problem = LinearProblem.of(
         model,
@@ -99,16 +121,24 @@ def prepare(skin: Skin) -> Prepared:
         conductivity=skin.conductivity,
         difference=settings.difference,
     )
-    light_touch, choice, operator = _chosen(problem, settings.alpha, readout)
+    return _prepared(skin, problem)
+
+
+def _prepared(skin: Skin, problem: LinearProblem) -> Prepared:
+    model = problem.model
+    scan = Scan.of(model.pattern)
+    readout = Readout.of(scan, skin.readout)
+    light_touch, choice, operator = _chosen(problem, skin.inverse.alpha, readout)
     return Prepared(
         skin=skin,
-        mesh=mesh,
-        pattern=pattern,
+        mesh=model.mesh,
+        pattern=model.pattern,
         scan=scan,
         model=model,
         problem=problem,
         operator=operator,
-        segmenter=Segmenter(mesh, skin.touch),
+        modes=Modes.of(problem, operator) if skin.inverse.time_constant else None,
+        segmenter=Segmenter(model.mesh, skin.touch),
         readout=readout,
         choice=choice,
         light_touch=light_touch,

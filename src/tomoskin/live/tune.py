@@ -41,7 +41,7 @@ def tune(prepared: Prepared, reference: Reference) -> Generator[None, None, Prep
         assembly.advance(rows)
         yield
     reason = f"{choice.reason}, measured on {reference.n_frames} idle frames"
-    return replace(prepared, operator=assembly.operator(), choice=replace(choice, reason=reason))
+    return prepared.with_alpha(replace(choice, reason=reason), spectrum, assembly.operator())
 
 
 def tuned(prepared: Prepared, reference: Reference) -> Prepared:
@@ -67,6 +67,5 @@ def tuned_by_rule(prepared: Prepared, rule: str, evidence: Evidence) -> Prepared
     """
     spectrum = Spectrum.of(prepared.problem)
     choice = choose(spectrum, rule, evidence)
-    return replace(
-        prepared, operator=spectrum.operator(choice.alpha), choice=choice, light_touch=None
-    )
+    found = prepared.with_alpha(choice, spectrum, spectrum.operator(choice.alpha))
+    return replace(found, light_touch=None)

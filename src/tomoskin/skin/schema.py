@@ -292,6 +292,13 @@ SECTIONS: tuple[Section, ...] = (
                 "v − v_ref, or (v − v_ref)/|v_ref|.",
                 default="plain",
             ),
+            Key(
+                "time_constant",
+                Quantity("time", "s", 0, 3600),
+                "How long a picture lasts: each rests on the frames before it too, the more the "
+                "longer this is (Kalman filter). 0 s: on its own frame alone.",
+                default="0 s",
+            ),
         ),
     ),
     Section(

@@ -23,7 +23,7 @@ class InverseSettings:
     """Prior by name, its weight, the difference, and what the prior takes.
 
     ``alpha`` is a number or "auto": chosen by the noise. ``correlation_length`` is in m; None is
-    a tenth of the sheet's extent.
+    a tenth of the sheet's extent. ``time_constant`` in s; 0 is no filter over frames.
     """
 
     prior: str
@@ -31,6 +31,7 @@ class InverseSettings:
     difference: str
     exponent: float = 0.5
     correlation_length: float | None = None
+    time_constant: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
