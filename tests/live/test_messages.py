@@ -1,6 +1,7 @@
 """Scene and state as a page needs them."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -73,7 +74,13 @@ def test_state():
     assert state["reference"] == {"frames": 20, "needed": 20, "age_s": 2.0, "ready": True}
     assert (state["alpha"], state["rule"]) == (0.06, "light-touch")
     assert state["problem"] is None
+    assert state["recording"] is None
     assert "50 frames/s" in state["text"]
+
+
+def test_of_a_recording_only_the_files_name_is_told():
+    state = json.loads(messages.state(make_status(recording=Path("folder") / "run.mcap")))
+    assert state["recording"] == "run.mcap"
 
 
 def test_what_is_not_known_is_null():

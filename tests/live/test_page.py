@@ -8,6 +8,7 @@ from playwright.sync_api import sync_playwright
 
 from live.serving import Site
 from tomoskin.live import STATIC, Runner
+from tomoskin.session import session_info
 from tomoskin.source import open_source
 
 pytestmark = pytest.mark.page
@@ -234,3 +235,17 @@ def test_presses_are_lifted_when_the_page_goes(opened):
         for message in watcher:
             if isinstance(message, bytes) and not opened.site.runner.newest.truth:
                 break
+
+
+def test_the_record_button_records(opened, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    button = opened.test_id("do-record")
+    button.click()
+    opened.test_id("state").filter(has_text="Live, recording").wait_for()
+    assert button.get_attribute("aria-pressed") == "true"
+    opened.page.keyboard.press("c")
+    opened.test_id("do-record").filter(has_text="Record").filter(has_not_text="End").wait_for()
+    [path] = tmp_path.glob("*.mcap")
+    assert session_info(path).frames > 0
+    height, room = opened.page.evaluate("[document.scrollingElement.scrollHeight, innerHeight]")
+    assert height <= room

@@ -9,6 +9,7 @@ from tomoskin.live.requests import (
     PressRequest,
     SetPause,
     SetPresses,
+    SetRecording,
     TakeReference,
     decode_request,
 )
@@ -19,6 +20,7 @@ PRESS = {"x": 0.01, "y": -0.02, "force": 3.0, "radius": 0.015}
 def test_requests():
     assert decode_request('{"type":"reference"}') == TakeReference()
     assert decode_request('{"type":"pause","on":true}') == SetPause(True)
+    assert decode_request('{"type":"record","on":false}') == SetRecording(False)
     asked = decode_request(json.dumps({"type": "presses", "presses": [PRESS]}))
     assert asked == SetPresses((PressRequest(**PRESS),))
 
@@ -36,6 +38,7 @@ def test_requests():
         '{"type":1}',
         '{"type":"reference","path":"/etc/passwd"}',
         '{"type":"pause"}',
+        '{"type":"record","on":true,"path":"x.mcap"}',
         '{"type":"pause","on":"yes"}',
         '{"type":"presses","presses":[{}]}',
         '{"type":"presses","presses":[' + ",".join([json.dumps(PRESS)] * 9) + "]}",

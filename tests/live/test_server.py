@@ -24,6 +24,7 @@ from tomoskin.live import (
     listen,
     page,
 )
+from tomoskin.session import session_info
 
 
 @pytest.fixture
@@ -390,3 +391,41 @@ def test_a_runner_without_touchable_source_is_not_pressable(prepared, idle, stat
     assert not scene["pressable"]
     assert scene["source"] == "textile-disc-8 on board on the table"
     assert frame["n_truth"] == 0
+
+
+# recording
+
+
+def until_state(socket, wanted):
+    while not wanted(state := first(socket, "state")):
+        pass
+    return state
+
+
+def test_a_page_records_to_a_file_of_the_servers_choice(site, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with site.connect() as socket:
+        ask(socket, type="record", on=True)
+        name = until_state(socket, lambda state: state["recording"])["recording"]
+        first(socket, ready)
+        ask(socket, type="record", on=False)
+        while (event := first(socket, "event"))["kind"] != "recorded":
+            pass
+        until_state(socket, lambda state: state["recording"] is None)
+    assert name in event["text"]
+    found = session_info(tmp_path / name)
+    assert found.frames > 0
+    assert not found.torn
+
+
+def test_a_recording_that_cannot_begin_is_said_on_the_page(site, tmp_path, monkeypatch):
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    folder.rmdir()
+    with site.connect() as socket:
+        ask(socket, type="record", on=True)
+        while (event := first(socket, "event"))["kind"] != "recording-stopped":
+            pass
+    assert "nothing is recorded" in event["text"]
+    assert site.runner.status().running

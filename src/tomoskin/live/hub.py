@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import time
 from collections import deque
 from collections.abc import AsyncIterator
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
+from tomoskin.core import DataError
 from tomoskin.live import messages
 from tomoskin.live.frames import encode_result
-from tomoskin.live.requests import Request, SetPause, SetPresses
+from tomoskin.live.requests import Request, SetPause, SetPresses, SetRecording
 from tomoskin.live.runner import Runner, Snapshot
 from tomoskin.twin import Press
 
@@ -20,6 +23,7 @@ MAX_PAGES = 16
 """Pages that are served at once."""
 
 _STATE_PERIOD = 0.25
+_FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"
 _FIRST_EVENTS = 20
 """Events of the past that a new page is told."""
 
@@ -43,10 +47,13 @@ class Hub:
         Where results come from.
     limit
         End of the colour scale, in the image's unit.
+    folder
+        Where a page's recordings go, under names of their own.
     """
 
-    def __init__(self, runner: Runner, *, limit: float) -> None:
+    def __init__(self, runner: Runner, *, limit: float, folder: Path | None = None) -> None:
         self.runner = runner
+        self._folder = folder or Path()
         self._pages: set[Listener] = set()
         self._wake_is_due = False
         self._encoded: tuple[Snapshot, bytes] | None = None
@@ -107,8 +114,20 @@ class Hub:
             self.runner.set_presses(page, self._on_skin(request))
         elif isinstance(request, SetPause):
             self.runner.pause(request.on)
+        elif isinstance(request, SetRecording):
+            asyncio.get_running_loop().run_in_executor(None, self._record, request.on)
         else:
             self.runner.take_reference()
+
+    def _record(self, on: bool) -> None:
+        """Begin or end a recording; in a thread, since a disk may take its time."""
+        if not on:
+            self.runner.stop_recording()
+            return
+        try:
+            self.runner.record(self._folder / time.strftime(_FILE_NAME))
+        except DataError as error:
+            self.runner.say("recording-stopped", f"nothing is recorded: {error}")
 
     def _on_skin(self, request: SetPresses) -> tuple[Press, ...]:
         """A finger that has slid off the sheet presses nothing."""

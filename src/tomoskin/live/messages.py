@@ -79,6 +79,7 @@ def state(status: Status) -> str:
         alpha=status.choice.alpha,
         rule=status.choice.rule,
         left_out=status.left_out,
+        recording=status.recording and status.recording.name,
         problem=status.problem,
         text=status.text,
     )

@@ -46,7 +46,13 @@ class SetPause(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="pau
     on: bool
 
 
-Request = SetPresses | TakeReference | SetPause
+class SetRecording(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="record"):
+    """Record to a new file in the server's folder, or end the recording."""
+
+    on: bool
+
+
+Request = SetPresses | TakeReference | SetPause | SetRecording
 
 _DECODER: msgspec.json.Decoder[Request] = msgspec.json.Decoder(Request)
 

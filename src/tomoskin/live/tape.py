@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -27,8 +28,8 @@ class Tape:
     """Passes everything on to the recorder of the moment, and remembers what a new one needs.
 
     The frames that made the reference are kept, so that a recording that begins later can be
-    replayed with the same reference and operator. :meth:`record` and :meth:`stop` may come from any thread;
-    the rest is the runner's.
+    replayed with the same reference and operator. :meth:`record` and :meth:`stop` may come from
+    any thread; the rest is the runner's.
 
     Parameters
     ----------
@@ -49,6 +50,7 @@ class Tape:
         self._info: Info | None = None
         self._truth: tuple[Press, ...] = ()
         self._source = ""
+        self._changing = threading.Lock()
 
     @property
     def path(self) -> Path | None:
@@ -64,7 +66,16 @@ class Tape:
         DataError
             When the file cannot be made.
         """
-        self.stop()
+        with self._changing:
+            self._end()
+            self._begin(path)
+
+    def stop(self) -> None:
+        """End the recording, if there is one; returns when the file is whole."""
+        with self._changing:
+            self._end()
+
+    def _begin(self, path: Path) -> None:
         now = self._clock()
         epoch = time.time() - time.monotonic()
         session = SessionWriter(path, self._prepared.skin, epoch=epoch, start=now)
@@ -78,11 +89,12 @@ class Tape:
         self._recorder = recorder
         self._say("recording", f"recording to {path}")
 
-    def stop(self) -> None:
-        """End the recording, if there is one; returns when the file is whole."""
+    def _end(self) -> None:
         recorder, self._recorder = self._recorder, None
         if recorder is not None:
             recorder.stop()
+            if recorder.is_whole:
+                self._say("recorded", f"recorded to {recorder.path}")
 
     def opened(self, source: str) -> None:
         """A source has been opened, and this is what it is called."""

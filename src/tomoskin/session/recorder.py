@@ -81,6 +81,11 @@ class Recorder:
         """Whether what comes is still written."""
         return self._thread.is_alive() and not self._failed
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether it was stopped, and not by the disk."""
+        return not self._thread.is_alive() and not self._failed
+
     def raw(self, host_time: float, data: bytes) -> None:
         """Bytes as they were read."""
         self._put(len(data), self._session.raw, host_time, data)

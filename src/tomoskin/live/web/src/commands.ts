@@ -42,6 +42,15 @@ export const pause: Command = {
   run: () => state.send({ type: "pause", on: !(state.status.value?.paused ?? false) }),
 };
 
+export const record: Command = {
+  id: "record",
+  label: "Record",
+  key: "C",
+  code: "c",
+  title: "Record this session to a file where tomoskin runs; again to end it",
+  run: () => state.send({ type: "record", on: !state.status.value?.recording }),
+};
+
 export const lift: Command = {
   id: "lift",
   label: "Lift all",
@@ -109,6 +118,7 @@ export const autoOnce: Command = {
 export const available = computed<readonly Command[]>(() => [
   takeReference,
   pause,
+  record,
   ...(state.scene.value?.pressable ? [lift, keep, softer, harder, truth] : []),
   flat,
   autoOnce,

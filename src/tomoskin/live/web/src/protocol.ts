@@ -64,6 +64,8 @@ export interface Status {
   readonly rule: string;
   /** Rows that the newest picture does without. */
   readonly left_out: number;
+  /** The file that is being recorded to. */
+  readonly recording: string | null;
   /** What someone must act on, in words. */
   readonly problem: string | null;
   readonly text: string;
@@ -94,4 +96,5 @@ export interface Press {
 export type PageMessage =
   | { readonly type: "presses"; readonly presses: readonly Press[] }
   | { readonly type: "reference" }
-  | { readonly type: "pause"; readonly on: boolean };
+  | { readonly type: "pause"; readonly on: boolean }
+  | { readonly type: "record"; readonly on: boolean };

@@ -49,7 +49,7 @@ export function sentence(
   }
   if (status && !status.running) return act("Stopped: no frames come from the source");
   if (age !== null && age > OLD) return act(`No new picture for ${duration(age)}`, "No new picture");
-  return calm("Live");
+  return calm(status?.recording ? "Live, recording" : "Live");
 }
 
 export interface Fact {

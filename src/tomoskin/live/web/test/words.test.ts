@@ -19,6 +19,7 @@ const status: Status = {
   alpha: 0.0509,
   rule: "light-touch",
   left_out: 0,
+  recording: null,
   problem: null,
   text: "",
 };
@@ -28,6 +29,8 @@ describe("the sentence", () => {
   it("is calm while all is well", () => {
     expect(sentence(open, scene, status, 10, 0.1)).toMatchObject({ text: "Live", act: false });
     expect(sentence(open, scene, { ...status, paused: true }, 10, 60).act).toBe(false);
+    const recording = { ...status, recording: "run.mcap" };
+    expect(sentence(open, scene, recording, 10, 0.1).text).toBe("Live, recording");
     expect(sentence({ phase: "connecting" }, null, null, 0, null).text).toBe("Connecting");
   });
 

@@ -50,6 +50,7 @@ function Force() {
 export function Controls() {
   const pressable = scene.value?.pressable ?? false;
   const paused = status.value?.paused ?? false;
+  const recording = status.value?.recording != null;
   return (
     <footer class="controls">
       <div role="group" aria-label="Measurement">
@@ -59,6 +60,12 @@ export function Controls() {
           command={commands.pause}
           pressed={paused}
           label={paused ? "Go on" : "Pause"}
+        />
+        <Button
+          remote
+          command={commands.record}
+          pressed={recording}
+          label={recording ? "End recording" : "Record"}
         />
       </div>
       {pressable && (
