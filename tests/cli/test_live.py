@@ -7,13 +7,18 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 from contextlib import ExitStack
 from functools import partial
 
 import httpx
+import numpy as np
 import pytest
 
+from tomoskin.core import Frame
 from tomoskin.live.server import STATIC
+from tomoskin.session import Mark, SessionReader, SessionWriter, session_info
+from tomoskin.skin import Skin
 
 COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]
 PATIENCE = 60
@@ -136,3 +141,34 @@ def test_what_cannot_start_is_one_sentence(refused, arguments, said):
 @pytest.mark.parametrize("arguments", [["--port", "many"], ["--port", "70000"], ["--nonsense"]])
 def test_wrong_usage(refused, arguments):
     assert refused(*arguments)[0] == 2
+
+
+def test_it_records_from_the_first_byte_to_the_end(start, tmp_path):
+    path = tmp_path / "run.mcap"
+    process = start("--port", "0", "--source", "twin:fast", "--record", str(path), "--json")
+    assert json.loads(process.stdout.readline())["type"] == "listening"
+    while session_info(path).frames < 30:
+        threading.Event().wait(0.05)
+    code, _, errors = end(process, signal.SIGTERM)
+    assert (code, errors) == (0, "")
+    found = session_info(path)
+    assert not found.torn
+    assert found.frames >= 30
+    with SessionReader(path) as session:
+        assert next(session.frames()).mark & Mark.REFERENCE
+
+
+def test_it_replays_with_the_skin_in_the_file(start, refused, tmp_path):
+    path = tmp_path / "run.mcap"
+    with SessionWriter(path, Skin.load("textile-disc-16")) as session:
+        frame = Frame(0, 0, 0.0, 1, 1, 0, np.full(224, 500, "<u2"))
+        session.frame(frame)
+    process = start("--port", "0", "--source", f"replay:{path}")
+    assert process.stdout.readline().startswith("textile-disc-16 on replay:")
+    assert end(process, signal.SIGTERM)[0] == 0
+    code, _, errors = refused("--port", "0", "--source", f"replay:{path}", "--skin", "tank-16")
+    assert code == 1
+    assert "leave --skin out" in errors
+    code, _, errors = refused("--port", "0", "--source", "replay:none.mcap")
+    assert code == 1
+    assert "there is no such file" in errors

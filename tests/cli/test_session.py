@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from tomoskin.session import SessionReader
+from tomoskin.session import SessionReader, read_recording
 
 
 @pytest.fixture(scope="module")
@@ -104,3 +104,12 @@ def test_what_is_no_session_is_one_sentence(tomoskin, tmp_path, command):
     code, _, errors = tomoskin("session", command, tmp_path / "none.mcap")
     assert code == 1
     assert len(errors.splitlines()) == 1
+
+
+def test_a_session_is_imaged_against_the_frames_that_the_run_took(tomoskin, recorded):
+    """So the noise is known, and an idle skin has no touches."""
+    assert read_recording(recorded).idle == 20
+    code, out, _ = tomoskin("image", recorded, "--json")
+    assert code == 0
+    found = json.loads(out)
+    assert len(found["touches"]) <= found["frames"] // 20

@@ -17,7 +17,8 @@ ReferenceOption = Annotated[
     str | None,
     typer.Option(
         metavar="first:N|frame:K|FILE",
-        help="Untouched frames; without it the file's own reference, else its first frame.",
+        help="Untouched frames; without it the file's own reference, else its first frame "
+        "(of a session those that the run took).",
     ),
 ]
 FramesOption = Annotated[
@@ -39,7 +40,7 @@ def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Any
         return None
     if spec is None and recording.reference is not None:
         return recording.reference[None]
-    kind, _, number = (spec or "first:1").partition(":")
+    kind, _, number = (spec or f"first:{recording.idle}").partition(":")
     if kind in ("first", "frame") and number.isdigit():
         return _frames_of(recording, kind, int(number))
     path = Path(spec or "")

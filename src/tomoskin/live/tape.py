@@ -80,7 +80,7 @@ class Tape:
         epoch = time.time() - time.monotonic()
         session = SessionWriter(path, self._prepared.skin, epoch=epoch, start=now)
         recorder = Recorder(session, self._pixels(), self._say)
-        recorder.settings(now, {"source": self._source})
+        recorder.settings(now, self._settings())
         recorder.truth(now, self._truth)
         for frame, mark in tuple(self._reference):
             recorder.frame(frame, mark | Mark.EARLIER)
@@ -100,7 +100,7 @@ class Tape:
         """A source has been opened, and this is what it is called."""
         self._source = source
         if self._recorder:
-            self._recorder.settings(self._clock(), {"source": source})
+            self._recorder.settings(self._clock(), self._settings())
 
     def read(self, host_time: float, data: bytes) -> None:
         """Bytes from the source."""
@@ -135,6 +135,9 @@ class Tape:
         self._truth = presses
         if self._recorder:
             self._recorder.truth(self._clock(), presses)
+
+    def _settings(self) -> dict[str, object]:
+        return {"source": self._source, "reference_frames": REFERENCE_FRAMES}
 
     def _remember(self, frame: Frame, mark: Mark) -> None:
         if mark & Mark.REFERENCE:

@@ -34,6 +34,8 @@ class Recording:
         Where it came from, for messages.
     notes
         What of the file was left out, in sentences.
+    idle
+        Frames at the beginning that are known to be of the untouched skin; 1 where it is assumed.
     """
 
     voltages: NDArray[Any]
@@ -45,6 +47,7 @@ class Recording:
     is_change: bool
     source: str
     notes: tuple[str, ...] = ()
+    idle: int = 1
 
     def __post_init__(self) -> None:
         """Check that the shapes belong together and that there is a frame."""

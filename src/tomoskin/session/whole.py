@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, IntArray
 from tomoskin.session.blocks import Rows, all_blocks
+from tomoskin.session.layout import Mark
 from tomoskin.session.recording import Recording
 from tomoskin.session.session_reader import SessionReader
 
@@ -24,6 +25,7 @@ def recording_of(session: SessionReader) -> Recording:
 
     Frames of another scan are left out. A row at a rail of the converter is NaN. ``labels`` are
     there when the file holds truth: the place of the press where there was exactly one, else NaN.
+    ``idle`` are the frames that the run took its first reference from.
 
     Raises
     ------
@@ -43,7 +45,15 @@ def recording_of(session: SessionReader) -> Recording:
         is_change=False,
         source=str(session.path),
         notes=(f"the file {session.torn}",) if session.torn else (),
+        idle=_idle(session, found[0].mark),
     )
+
+
+def _idle(session: SessionReader, marks: IntArray) -> int:
+    """Frames of the first reference, where the recording begins with it."""
+    needed = session.settings().get("reference_frames", 1)
+    begins = bool(marks[0] & Mark.REFERENCE) and isinstance(needed, int)
+    return max(1, min(needed, len(marks))) if begins else 1
 
 
 def _labels(session: SessionReader, time: FloatArray) -> FloatArray | None:
