@@ -113,3 +113,14 @@ def test_a_session_is_imaged_against_the_frames_that_the_run_took(tomoskin, reco
     assert code == 0
     found = json.loads(out)
     assert len(found["touches"]) <= found["frames"] // 20
+
+
+@pytest.mark.data
+def test_import_keeps_what_is_whole_and_lists_the_rest(tomoskin, data_dir, tmp_path):
+    log = data_dir / "ert_cbsr16_dirty_stream" / "expABX_100mm_9p5wt_6.npz"
+    code, out, errors = tomoskin("session", "import", log, tmp_path / "log.npz")
+    assert code == 0
+    assert "145 frames of 208 rows" in out
+    assert "lines left out, parts of torn frames" in errors
+    assert len(read_recording(tmp_path / "log.npz")) == 145
+    assert tomoskin("session", "import", log, tmp_path / "log.doc")[0] == 2

@@ -10,7 +10,13 @@ import typer
 from tomoskin.cli.alpha_option import AlphaOption, said, with_alpha
 from tomoskin.cli.display_option import LimitOption, PercentFlag, SmoothOption, display_of
 from tomoskin.cli.output import JsonFlag, emit
-from tomoskin.cli.recording import FramesOption, ReferenceOption, frame_range, idle_frames
+from tomoskin.cli.recording import (
+    FramesOption,
+    ReferenceOption,
+    frame_range,
+    idle_frames,
+    say_notes,
+)
 from tomoskin.cli.skin_choice import SkinOption, skin_for_file
 
 if TYPE_CHECKING:
@@ -46,6 +52,7 @@ def image(
     display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
     prepared = prepare(chosen)
     whole = read_recording(recording).in_order_of(prepared.pattern)
+    say_notes(whole)
     idle = idle_frames(whole, reference, prepared.pattern)
     start, stop = frame_range(whole, frames)
     found = reconstruct(prepared, whole.part(start, stop), idle, rule=rule)

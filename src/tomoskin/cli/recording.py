@@ -52,6 +52,12 @@ def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Any
     return other.in_order_of(pattern).voltages
 
 
+def say_notes(recording: Recording) -> None:
+    """What of the file was left out, on stderr."""
+    for note in recording.notes:
+        typer.echo(f"tomoskin: {recording.source}: {note}", err=True)
+
+
 def _frames_of(recording: Recording, kind: str, number: int) -> Any:
     n = len(recording)
     if kind == "frame":

@@ -11,6 +11,7 @@ import typer
 
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
+from tomoskin.cli.recording import say_notes
 
 if TYPE_CHECKING:
     from tomoskin.session import Lost, Repaired, SessionInfo
@@ -95,6 +96,22 @@ def export(
             write_touches(touches, ((t.sequence, t.host_time, t.touches) for t in found))
         if session.torn:
             typer.echo(f"tomoskin: {file}: {session.torn}", err=True)
+
+
+@app.command("import")
+def import_recording(
+    file: Annotated[Path, typer.Argument(metavar="INPUT", help="Any recording that can be read.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT.npz", help="Interchange file.")],
+) -> None:
+    """Convert a recording of another program to the interchange file."""
+    from tomoskin.session import read_recording, write_interchange
+
+    if out.suffix.lower() != ".npz":
+        raise typer.BadParameter(f"expected a name that ends in .npz, got {out}", param_hint="OUT")
+    recording = read_recording(file)
+    write_interchange(out, recording)
+    typer.echo(f"{out}: {len(recording)} frames of {len(recording.drive)} rows")
+    say_notes(recording)
 
 
 def _lines(found: SessionInfo) -> list[tuple[str, str]]:
