@@ -183,6 +183,17 @@ def test_a_slow_disk_loses_messages_but_delays_nobody(tmp_path, said, monkeypatc
     assert len(found) < 2020
 
 
+def test_a_fault_of_our_own_ends_the_recording_and_is_said(tmp_path, said, caplog):
+    path = tmp_path / "x.mcap"
+    recorder = Recorder(SessionWriter(path, SKIN), None, said)
+    record(recorder, 50)
+    recorder.truth(0.0, [object()])
+    assert "internal error" in said.wait_for("recording-stopped")
+    recorder.stop()
+    assert "the recording thread ended" in caplog.text
+    assert len(frames_in(path)) == 50
+
+
 @pytest.mark.parametrize("name", ["none/x.mcap", "file/x.mcap"])
 def test_a_place_that_cannot_be_written_is_said_at_once(tmp_path, name):
     (tmp_path / "file").write_text("")

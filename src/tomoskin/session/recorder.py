@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import queue
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -28,6 +29,9 @@ _ROUTINE = 1.0
 
 _OBJECT = 256
 """Bytes that a waiting message is taken for, beside its data."""
+
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +184,10 @@ class Recorder:
                     self._caught_up()
             self._session.close()
         except DataError as error:
-            self._fail(error)
+            self._fail(str(error))
+        except Exception as error:
+            _log.exception("the recording thread ended")
+            self._fail(f"internal error, {type(error).__name__}: {error}")
 
     def _next(self) -> _Task | None:
         while True:
@@ -194,11 +201,11 @@ class Recorder:
             count, self._behind = self._behind, 0
         self._say("recording-gap", f"{self.path}: {count} messages were not recorded")
 
-    def _fail(self, error: DataError) -> None:
+    def _fail(self, why: str) -> None:
         with self._put_lock:
             self._failed = True
         with contextlib.suppress(DataError):  # what could be written is in the file
             self._session.close()
         while not self._queue.empty():
             self._queue.get()
-        self._say("recording-stopped", f"the recording has ended: {error}")
+        self._say("recording-stopped", f"the recording has ended: {why}")
