@@ -43,13 +43,13 @@ class Observation:
         Raises
         ------
         DataError
-            For shapes that do not fit, values that count and are not finite, which are named,
+            For what is not real numbers, shapes that do not fit, values that count and are not finite, which are named,
             noise that is not positive, or when nothing counts.
         """
-        taken = np.asarray(values, dtype=np.float64)
+        taken = _real(values, "values")
         if taken.ndim != 1:
             raise DataError(f"expected values of shape (n,), got {taken.shape}")
-        deviation = np.asarray(noise, dtype=np.float64)
+        deviation = _real(noise, "noise")
         if deviation.shape not in ((), taken.shape):
             raise DataError(f"expected one noise or {len(taken)}, got shape {deviation.shape}")
         deviation = np.broadcast_to(deviation, taken.shape)
@@ -109,6 +109,16 @@ class Whitened:
     rows: FloatArray
     unexplained: float
     redundant: int
+
+
+def _real(value: ArrayLike, name: str) -> FloatArray:
+    try:
+        raw = np.asarray(value)
+    except ValueError as error:
+        raise DataError("expected rows of equal length", where=name) from error
+    if raw.dtype.kind not in "biuf":
+        raise DataError(f"expected real numbers, got {raw.dtype}", where=name)
+    return raw.astype(np.float64)
 
 
 def _reduced(target: FloatArray, rows: FloatArray) -> Whitened:
