@@ -255,12 +255,12 @@ def checked(
     keep: NDArray[Any] | None,
 ) -> tuple[Readout, FloatArray, FloatArray]:
     """Read-out and the rows that count. Raises DataError for arrays that do not fit together."""
-    currents, reads = np.asarray(inj, np.float64), np.asarray(mpat, np.float64)
+    currents, reads = _real(inj, "inj"), _real(mpat, "mpat")
     for name, table in (("inj", currents), ("mpat", reads)):
         if table.ndim != 2 or len(table) != N_ELECTRODES:
             raise DataError(f"expected {name} of shape (32, n), got {table.shape}")
     n = currents.shape[1] * reads.shape[1]
-    values, reference = (np.asarray(v, np.float64).ravel() for v in (u, u_ref))
+    values, reference = _real(u, "u").ravel(), _real(u_ref, "u_ref").ravel()
     counts = np.ones(n, bool) if keep is None else np.asarray(keep, bool).ravel()
     if not len(values) == len(reference) == len(counts) == n:
         raise DataError(
@@ -271,6 +271,13 @@ def checked(
     if not counts.any():
         raise DataError("no row counts")
     return Readout(currents, reads, counts), values[counts], reference[counts]
+
+
+def _real(value: Any, name: str) -> FloatArray:
+    raw = np.asarray(value)
+    if raw.dtype.kind not in "biuf":
+        raise DataError(f"expected real numbers, got {raw.dtype}", where=name)
+    return raw.astype(np.float64)
 
 
 # What it is compared with.
@@ -394,7 +401,7 @@ def _arrays(file: Path) -> dict[str, Any]:
 def _one_of(arrays: dict[str, Any], file: Path, *names: str) -> FloatArray:
     for name in names:
         if name in arrays:
-            return np.asarray(arrays[name], np.float64)
+            return _real(arrays[name], f"{file}, {name}")
     raise DataError(f"expected {' or '.join(names)}, got {sorted(arrays)}", where=str(file))
 
 

@@ -197,6 +197,7 @@ def test_files_of_the_challenge(ktc: Any, tmp_path: Path) -> None:
         ({"ref.mat": {"Uelref": np.ones(3)}}, "expected ref.mat and data1.mat"),
         ({"ref.mat": {"x": 1.0}, "data1.mat": {"Uel": np.ones(3)}}, "expected Uelref or Uel"),
         ({"ref.mat": {"Uelref": 1.0}, "data1.mat": {"Uel": 1.0}}, "data1.mat: expected Inj"),
+        ({"ref.mat": {"Uelref": "x"}, "data1.mat": {"Uel": 1.0}}, "ref.mat, Uelref: expected real"),
     ],
 )
 def test_folders_that_lack_something(
@@ -230,6 +231,7 @@ def test_an_archive_that_lacks_something(ktc: Any, tmp_path: Path) -> None:
         ({"inj": np.ones((16, 3))}, r"expected inj of shape \(32, n\), got \(16, 3\)"),
         ({"mpat": np.ones(32)}, r"expected mpat of shape \(32, n\), got \(32,\)"),
         ({"u": np.ones(5)}, "got 5 of u"),
+        ({"u": np.full(5, "x")}, "u: expected real numbers, got <U1"),
         ({"keep": np.ones(5, bool)}, "5 of keep"),
         ({"u": np.nan}, "no row counts"),
     ],

@@ -43,8 +43,8 @@ class Observation:
         Raises
         ------
         DataError
-            For what is not real numbers, shapes that do not fit, values that count and are not finite, which are named,
-            noise that is not positive, or when nothing counts.
+            For what is not real numbers, shapes that do not fit, values that count and are not
+            finite, which are named, noise that is not positive, or when nothing counts.
         """
         taken = _real(values, "values")
         if taken.ndim != 1:
