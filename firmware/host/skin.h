@@ -1,0 +1,38 @@
+/* The skin before an emulated converter: a memory that the host's side writes at any time. */
+#ifndef TOMOSKIN_SKIN_H
+#define TOMOSKIN_SKIN_H
+
+#include <stdint.h>
+
+#define SKIN_MOST 32u
+#define SKIN_MAGIC UINT64_C(0x31306E696B736F74) /* "toskin01" */
+
+/* A seqlock: `sequence` is odd while the rest is written. Python: tomoskin.emulator.memory. */
+struct skin_memory {
+    uint64_t magic;
+    uint32_t sequence;
+    uint32_t n;          /* electrodes */
+    double current;      /* A */
+    double compliance;   /* V, most across the driven pair */
+    double gain;         /* code = (gain V + offset) levels / reference */
+    double offset;       /* V */
+    double reference;    /* V */
+    double levels;       /* 2^bits */
+    double noise;        /* LSB, standard deviation of one conversion */
+    double resistance[SKIN_MOST * SKIN_MOST]; /* ohm, transfer, row by row, n by n */
+};
+
+/* Map `path`, or exit with a sentence. */
+const struct skin_memory *skin_open(const char *path);
+
+/* A skin for want of another: each electrode at the end of a resistor of 1 + e ohm to one point. */
+const struct skin_memory *skin_star(void);
+
+/* V of a channel against the sink; 0 beyond the skin's electrodes or with nothing connected. */
+double skin_volts(const struct skin_memory *skin, unsigned source, unsigned sink, unsigned channel);
+
+/* One conversion. */
+uint16_t skin_code(const struct skin_memory *skin, unsigned source, unsigned sink,
+                   unsigned channel);
+
+#endif

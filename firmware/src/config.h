@@ -1,0 +1,41 @@
+/* The configuration of the scan: what the host has set, checked. */
+#ifndef TOMOSKIN_CONFIG_H
+#define TOMOSKIN_CONFIG_H
+
+#include "limits.h"
+
+#include <stdint.h>
+
+struct drive {
+    uint8_t source;
+    uint8_t sink;
+    channel_set mask;
+};
+
+struct config {
+    uint16_t identity; /* 0: none */
+    uint16_t n_drives;
+    uint32_t settling;  /* us */
+    uint16_t dead_time; /* us */
+    uint8_t oversampling;
+    uint8_t prescaler;
+    uint16_t n_samples; /* of a frame; known when config_check_start is content */
+    struct drive drives[MOST_DRIVES];
+};
+
+/* Result and detail of an ACK. */
+struct verdict {
+    uint8_t result;
+    uint16_t detail;
+};
+
+extern struct config config;
+
+void config_forget(void);
+
+/* Each takes the payload of its command, of the right length; refused, it changes nothing. */
+struct verdict config_set_scan(const uint8_t *payload);
+struct verdict config_set_pattern(const uint8_t *payload, uint8_t size);
+struct verdict config_check_start(uint16_t identity);
+
+#endif

@@ -1,0 +1,62 @@
+/* What the portable firmware needs of a machine; each folder beside src/ links one.
+   Functions named *_on_* are the firmware's own, called by the machine, from interrupts where it
+   has them. */
+#ifndef TOMOSKIN_HAL_H
+#define TOMOSKIN_HAL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define TICKS_PER_SECOND UINT32_C(250000)
+#define TICKS_PER_MS UINT32_C(250)
+#define US_PER_TICK 4u
+
+/* Pins safe before anything else; then clock, serial line, watchdog. */
+void hal_init(void);
+
+/* Why the machine started: RESET_... of the protocol. */
+uint8_t hal_reset_cause(void);
+
+/* (eight bytes) tells one board from another; and the setting of its current limiter in uA. */
+void hal_unique_id(uint8_t *id);
+uint32_t hal_current(void);
+
+/* Switches. Only switches.c may call these. Address and latch do not connect anything. */
+void hal_switches_disable(void);
+void hal_switches_address(uint8_t source, uint8_t sink);
+void hal_switches_latch(void);
+void hal_switches_enable(uint8_t source, uint8_t sink);
+
+/* Clock: ticks since start, modulo 2^32; and a busy wait. */
+uint32_t hal_ticks(void);
+void hal_delay_us(uint16_t us);
+
+/* One timer: scan_on_timer() comes no sooner than `ticks` from now; setting it again replaces it. */
+void hal_timer_set(uint16_t ticks);
+void hal_timer_cancel(void);
+
+/* Converter: scan_on_conversion(code) comes once for each start. */
+void hal_adc_prepare(uint8_t prescaler);
+void hal_adc_start(uint8_t channel);
+void hal_adc_cancel(void);
+
+/* Serial line. get: -1 when there is nothing. put: only as many bytes as there is room for. */
+int16_t hal_uart_get(void);
+uint8_t hal_uart_room(void);
+void hal_uart_put(uint8_t byte);
+bool hal_uart_sent(void);
+bool hal_uart_can(uint32_t baud);
+void hal_uart_set_baud(uint32_t baud);
+
+/* Between lock and unlock no scan_on_... comes. Not nested; not from scan_on_.... */
+void hal_lock(void);
+void hal_unlock(void);
+
+/* idle sleeps until wake has been called, a byte has come, or about 10 ms have gone by. */
+void hal_wake(void);
+void hal_idle(void);
+
+/* Without a kick for 120 ms the machine resets. */
+void hal_watchdog_kick(void);
+
+#endif

@@ -1,0 +1,26 @@
+/* What this firmware can hold: static memory, chosen for the 8 kB of an ATmega2560. */
+#ifndef TOMOSKIN_LIMITS_H
+#define TOMOSKIN_LIMITS_H
+
+#include <stdint.h>
+
+#ifndef CHANNELS
+#define CHANNELS 16u /* a board with 8: make CHANNELS=8 */
+#endif
+
+#define MOST_DRIVES 128u
+#define MOST_SAMPLES 400u
+#define MOST_OVERSAMPLING 64u
+#define MOST_SETTLING_US UINT32_C(100000)
+#define ADC_BITS 10u
+#define FIRST_BAUD UINT32_C(1000000)
+
+#define FIRMWARE_MAJOR 1u
+#define FIRMWARE_MINOR 0u
+#define FIRMWARE_PATCH 0u
+
+/* Bit e: channel e. */
+typedef uint16_t channel_set;
+_Static_assert(CHANNELS <= 16u, "channel_set has 16 bits");
+
+#endif

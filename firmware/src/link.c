@@ -1,0 +1,141 @@
+#include "link.h"
+
+#include "bytes.h"
+#include "config.h"
+#include "framing.h"
+#include "hal.h"
+#include "limits.h"
+#include "protocol.h"
+#include "scan.h"
+
+#include <stddef.h>
+
+static uint8_t small[SIZE_INFO + FRAMING_AFTER];
+static uint8_t small_size; /* of the payload; 0: free */
+static struct outgoing out;
+static bool frame_under_way;
+
+void link_reset(void) {
+    small_size = 0u;
+    out.active = false;
+    frame_under_way = false;
+}
+
+bool link_free(void) {
+    return small_size == 0u;
+}
+
+void link_say_hello(void) {
+    small[0] = MSG_HELLO;
+    small[AT_HELLO_MAJOR] = PROTOCOL_MAJOR;
+    small[AT_HELLO_MINOR] = PROTOCOL_MINOR;
+    put_u32(small + AT_HELLO_SCHEMA_HASH, PROTOCOL_HASH);
+    small_size = SIZE_HELLO;
+}
+
+void link_say_info(uint8_t request, uint8_t reset_cause) {
+    small[0] = MSG_INFO;
+    small[AT_INFO_REQUEST] = request;
+    small[AT_INFO_MAJOR] = PROTOCOL_MAJOR;
+    small[AT_INFO_MINOR] = PROTOCOL_MINOR;
+    put_u32(small + AT_INFO_SCHEMA_HASH, PROTOCOL_HASH);
+    small[AT_INFO_FIRMWARE] = FIRMWARE_MAJOR;
+    small[AT_INFO_FIRMWARE + 1u] = FIRMWARE_MINOR;
+    small[AT_INFO_FIRMWARE + 2u] = FIRMWARE_PATCH;
+    small[AT_INFO_RESET] = reset_cause;
+    small[AT_INFO_CHANNELS] = CHANNELS;
+    small[AT_INFO_ADC_BITS] = ADC_BITS;
+    small[AT_INFO_MAX_OVERSAMPLING] = MOST_OVERSAMPLING;
+    put_u16(small + AT_INFO_MAX_DRIVES, MOST_DRIVES);
+    put_u16(small + AT_INFO_MAX_SAMPLES, MOST_SAMPLES);
+    put_u32(small + AT_INFO_TICK_RATE, TICKS_PER_SECOND);
+    put_u32(small + AT_INFO_CURRENT, hal_current());
+    put_u32(small + AT_INFO_MAX_BAUD, FIRST_BAUD);
+    hal_unique_id(small + AT_INFO_UNIQUE_ID);
+    small_size = SIZE_INFO;
+}
+
+void link_say_ack(uint8_t request, uint8_t command, uint8_t result, uint16_t detail) {
+    small[0] = MSG_ACK;
+    small[AT_ACK_REQUEST] = request;
+    small[AT_ACK_COMMAND] = command;
+    small[AT_ACK_RESULT] = result;
+    put_u16(small + AT_ACK_DETAIL, detail);
+    small_size = SIZE_ACK;
+}
+
+void link_say_fault(uint32_t ticks_high, uint32_t ticks, uint8_t code, uint16_t detail) {
+    small[0] = MSG_FAULT;
+    put_u32(small + AT_FAULT_TICKS, ticks);
+    put_u32(small + AT_FAULT_TICKS + 4u, ticks_high);
+    small[AT_FAULT_CODE] = code;
+    put_u16(small + AT_FAULT_DETAIL, detail);
+    small_size = SIZE_FAULT;
+}
+
+/* Upper half of a tick whose lower half is given, less than half a turn from now. */
+static uint32_t high_of(uint32_t ticks, uint32_t now_high, uint32_t now) {
+    if (now - ticks < UINT32_C(0x80000000)) {
+        return ticks > now ? now_high - 1u : now_high;
+    }
+    return ticks < now ? now_high + 1u : now_high;
+}
+
+static void begin_frame(struct frame *frame, uint32_t now_high, uint32_t now) {
+    uint8_t *payload = frame->payload;
+    payload[0] = MSG_FRAME;
+    put_u32(payload + AT_FRAME_SEQUENCE, frame->sequence);
+    put_u32(payload + AT_FRAME_TICKS, frame->started);
+    put_u32(payload + AT_FRAME_TICKS + 4u, high_of(frame->started, now_high, now));
+    put_u16(payload + AT_FRAME_CONFIGURATION, config.identity);
+    payload[AT_FRAME_FLAGS] = frame->flags;
+    put_u16(payload + AT_FRAME_DROPS, frame->drops);
+    outgoing_begin(&out, payload, (uint16_t)(SIZE_FRAME + 2u * frame->n_samples));
+    frame_under_way = true;
+}
+
+/* Whatever is next: a small message before a frame. */
+static bool begin_next(uint32_t now_high, uint32_t now) {
+    if (small_size != 0u) {
+        outgoing_begin(&out, small, small_size);
+        return true;
+    }
+    hal_lock();
+    struct frame *frame = scan_take();
+    hal_unlock();
+    if (frame == NULL) {
+        return false;
+    }
+    begin_frame(frame, now_high, now);
+    return true;
+}
+
+static void end_message(void) {
+    if (frame_under_way) {
+        frame_under_way = false;
+        hal_lock();
+        scan_give_back();
+        hal_unlock();
+    } else {
+        small_size = 0u;
+    }
+}
+
+void link_send(uint32_t now_high, uint32_t now) {
+    while (out.active || begin_next(now_high, now)) {
+        for (uint8_t room = hal_uart_room(); room != 0u; room--) {
+            hal_uart_put(outgoing_next(&out));
+            if (!out.active) {
+                end_message();
+                break;
+            }
+        }
+        if (out.active) {
+            return;
+        }
+    }
+}
+
+bool link_sent(void) {
+    return !out.active && link_free() && hal_uart_sent();
+}

@@ -1,0 +1,205 @@
+/* The wire protocol. Made from src/tomoskin/wire/protocol.toml by
+   scripts/firmware_header.py: change that file, not this one. */
+
+#ifndef TOMOSKIN_PROTOCOL_H
+#define TOMOSKIN_PROTOCOL_H
+
+#include <stdint.h>
+
+#define PROTOCOL_MAJOR 1u
+#define PROTOCOL_MINOR 0u
+#define PROTOCOL_HASH UINT32_C(0x8B6ABBBD)
+#define MOST_TO_DEVICE 62u
+#define MOST_FROM_DEVICE 4096u
+
+/* MSG_: type byte. SIZE_: payload, type byte included, without what fills the rest.
+   AT_: place in the payload. FIELD_: number of the field, from 0. */
+
+#define MSG_HELLO 0x01u
+#define SIZE_HELLO 7u
+#define AT_HELLO_MAJOR 1u
+#define AT_HELLO_MINOR 2u
+#define AT_HELLO_SCHEMA_HASH 3u
+#define FIELD_HELLO_MAJOR 0u
+#define FIELD_HELLO_MINOR 1u
+#define FIELD_HELLO_SCHEMA_HASH 2u
+
+#define MSG_INFO 0x02u
+#define SIZE_INFO 39u
+#define AT_INFO_REQUEST 1u
+#define AT_INFO_MAJOR 2u
+#define AT_INFO_MINOR 3u
+#define AT_INFO_SCHEMA_HASH 4u
+#define AT_INFO_FIRMWARE 8u
+#define AT_INFO_RESET 11u
+#define AT_INFO_CHANNELS 12u
+#define AT_INFO_ADC_BITS 13u
+#define AT_INFO_MAX_OVERSAMPLING 14u
+#define AT_INFO_MAX_DRIVES 15u
+#define AT_INFO_MAX_SAMPLES 17u
+#define AT_INFO_TICK_RATE 19u
+#define AT_INFO_CURRENT 23u
+#define AT_INFO_MAX_BAUD 27u
+#define AT_INFO_UNIQUE_ID 31u
+#define FIELD_INFO_REQUEST 0u
+#define FIELD_INFO_MAJOR 1u
+#define FIELD_INFO_MINOR 2u
+#define FIELD_INFO_SCHEMA_HASH 3u
+#define FIELD_INFO_FIRMWARE 4u
+#define FIELD_INFO_RESET 5u
+#define FIELD_INFO_CHANNELS 6u
+#define FIELD_INFO_ADC_BITS 7u
+#define FIELD_INFO_MAX_OVERSAMPLING 8u
+#define FIELD_INFO_MAX_DRIVES 9u
+#define FIELD_INFO_MAX_SAMPLES 10u
+#define FIELD_INFO_TICK_RATE 11u
+#define FIELD_INFO_CURRENT 12u
+#define FIELD_INFO_MAX_BAUD 13u
+#define FIELD_INFO_UNIQUE_ID 14u
+
+#define MSG_ACK 0x03u
+#define SIZE_ACK 6u
+#define AT_ACK_REQUEST 1u
+#define AT_ACK_COMMAND 2u
+#define AT_ACK_RESULT 3u
+#define AT_ACK_DETAIL 4u
+#define FIELD_ACK_REQUEST 0u
+#define FIELD_ACK_COMMAND 1u
+#define FIELD_ACK_RESULT 2u
+#define FIELD_ACK_DETAIL 3u
+
+#define MSG_FAULT 0x04u
+#define SIZE_FAULT 12u
+#define AT_FAULT_TICKS 1u
+#define AT_FAULT_CODE 9u
+#define AT_FAULT_DETAIL 10u
+#define FIELD_FAULT_TICKS 0u
+#define FIELD_FAULT_CODE 1u
+#define FIELD_FAULT_DETAIL 2u
+
+#define MSG_FRAME 0x10u
+#define SIZE_FRAME 18u
+#define AT_FRAME_SEQUENCE 1u
+#define AT_FRAME_TICKS 5u
+#define AT_FRAME_CONFIGURATION 13u
+#define AT_FRAME_FLAGS 15u
+#define AT_FRAME_DROPS 16u
+#define AT_FRAME_SAMPLES 18u
+#define FIELD_FRAME_SEQUENCE 0u
+#define FIELD_FRAME_TICKS 1u
+#define FIELD_FRAME_CONFIGURATION 2u
+#define FIELD_FRAME_FLAGS 3u
+#define FIELD_FRAME_DROPS 4u
+#define FIELD_FRAME_SAMPLES 5u
+
+#define MSG_GET_INFO 0x81u
+#define SIZE_GET_INFO 2u
+#define AT_GET_INFO_REQUEST 1u
+#define FIELD_GET_INFO_REQUEST 0u
+
+#define MSG_PING 0x82u
+#define SIZE_PING 2u
+#define AT_PING_REQUEST 1u
+#define FIELD_PING_REQUEST 0u
+
+#define MSG_STOP 0x83u
+#define SIZE_STOP 2u
+#define AT_STOP_REQUEST 1u
+#define FIELD_STOP_REQUEST 0u
+
+#define MSG_SAFE_OFF 0x84u
+#define SIZE_SAFE_OFF 2u
+#define AT_SAFE_OFF_REQUEST 1u
+#define FIELD_SAFE_OFF_REQUEST 0u
+
+#define MSG_SET_SCAN 0x85u
+#define SIZE_SET_SCAN 18u
+#define AT_SET_SCAN_REQUEST 1u
+#define AT_SET_SCAN_CONFIGURATION 2u
+#define AT_SET_SCAN_N_DRIVES 4u
+#define AT_SET_SCAN_SETTLING 6u
+#define AT_SET_SCAN_DEAD_TIME 10u
+#define AT_SET_SCAN_OVERSAMPLING 12u
+#define AT_SET_SCAN_PRESCALER 13u
+#define AT_SET_SCAN_CURRENT_LIMIT 14u
+#define FIELD_SET_SCAN_REQUEST 0u
+#define FIELD_SET_SCAN_CONFIGURATION 1u
+#define FIELD_SET_SCAN_N_DRIVES 2u
+#define FIELD_SET_SCAN_SETTLING 3u
+#define FIELD_SET_SCAN_DEAD_TIME 4u
+#define FIELD_SET_SCAN_OVERSAMPLING 5u
+#define FIELD_SET_SCAN_PRESCALER 6u
+#define FIELD_SET_SCAN_CURRENT_LIMIT 7u
+
+#define MSG_SET_PATTERN 0x86u
+#define SIZE_SET_PATTERN 6u
+#define AT_SET_PATTERN_REQUEST 1u
+#define AT_SET_PATTERN_CONFIGURATION 2u
+#define AT_SET_PATTERN_FIRST 4u
+#define AT_SET_PATTERN_DRIVES 6u
+#define FIELD_SET_PATTERN_REQUEST 0u
+#define FIELD_SET_PATTERN_CONFIGURATION 1u
+#define FIELD_SET_PATTERN_FIRST 2u
+#define FIELD_SET_PATTERN_DRIVES 3u
+
+#define MSG_START 0x87u
+#define SIZE_START 4u
+#define AT_START_REQUEST 1u
+#define AT_START_CONFIGURATION 2u
+#define FIELD_START_REQUEST 0u
+#define FIELD_START_CONFIGURATION 1u
+
+#define MSG_SET_BAUD 0x88u
+#define SIZE_SET_BAUD 6u
+#define AT_SET_BAUD_REQUEST 1u
+#define AT_SET_BAUD_BAUD 2u
+#define FIELD_SET_BAUD_REQUEST 0u
+#define FIELD_SET_BAUD_BAUD 1u
+
+#define MSG_SET_HEARTBEAT 0x89u
+#define SIZE_SET_HEARTBEAT 4u
+#define AT_SET_HEARTBEAT_REQUEST 1u
+#define AT_SET_HEARTBEAT_INTERVAL 2u
+#define FIELD_SET_HEARTBEAT_REQUEST 0u
+#define FIELD_SET_HEARTBEAT_INTERVAL 1u
+
+#define AT_DRIVE_SOURCE 0u
+#define AT_DRIVE_SINK 1u
+#define AT_DRIVE_MASK 2u
+#define SIZE_DRIVE 6u
+
+/* Outcome of a command. */
+#define RESULT_OK 0u
+#define RESULT_UNKNOWN_COMMAND 1u
+#define RESULT_BAD_LENGTH 2u
+#define RESULT_BAD_VALUE 3u
+#define RESULT_SAME_ELECTRODE 4u
+#define RESULT_NO_SUCH_CHANNEL 5u
+#define RESULT_TOO_MANY_DRIVES 6u
+#define RESULT_TOO_MANY_SAMPLES 7u
+#define RESULT_WRONG_CONFIGURATION 8u
+#define RESULT_INCOMPLETE 9u
+#define RESULT_BUSY 10u
+#define RESULT_CURRENT_TOO_HIGH 11u
+
+/* Why the board went to its safe state by itself. */
+#define FAULT_HOST_SILENT 1u
+#define FAULT_WATCHDOG 2u
+#define FAULT_BROWN_OUT 3u
+#define FAULT_CURRENT_TOO_LONG 4u
+#define FAULT_SWITCH_REFUSED 5u
+#define FAULT_CONVERTER 6u
+#define FAULT_INTERNAL 7u
+
+/* Why the board started. */
+#define RESET_UNKNOWN 0u
+#define RESET_POWER 1u
+#define RESET_EXTERNAL 2u
+#define RESET_BROWN_OUT 3u
+#define RESET_WATCHDOG 4u
+
+/* Bits of a frame's flags. */
+#define FLAG_FIRST 1u
+#define FLAG_DROPPED 2u
+
+#endif

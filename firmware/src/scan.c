@@ -1,0 +1,248 @@
+#include "scan.h"
+
+#include "bytes.h"
+#include "config.h"
+#include "hal.h"
+#include "switches.h"
+
+#include <stddef.h>
+
+/* Longer dead times are waited for by the timer, not in the interrupt. */
+#define LONGEST_BUSY_US 50u
+#define CLOCKS_PER_CONVERSION 14u /* 13, and up to one to begin with */
+#define CLOCKS_PER_TICK 64u        /* 16 MHz */
+#define SLACK_TICKS (2u * TICKS_PER_MS)
+
+enum phase { IDLE, DEAD, SETTLING, CONVERTING };
+
+static struct {
+    enum phase phase;
+    uint8_t channel;
+    uint8_t left; /* conversions of this sample to come */
+    channel_set rest;
+    uint16_t drive;
+    uint16_t sum;
+    uint8_t *place; /* of the next sample */
+    uint16_t settling_ticks;
+    uint32_t since;   /* tick at which the phase's drive began */
+    uint32_t allowed; /* ticks that it may take */
+    uint32_t sequence;
+    uint16_t drops;
+    bool dropped;
+} scan;
+
+static struct frame frames[2];
+static uint8_t filling;
+static volatile bool waiting; /* the other frame is whole and not given back */
+static bool taken;
+static struct scan_fault fault;
+static struct {
+    uint16_t drive;
+    uint8_t channel;
+    uint8_t left;
+    uint32_t sequence;
+} seen; /* where the guard found the scan last */
+
+/* At least `us`: one tick more, since the present one has begun already. */
+static uint16_t ticks_of(uint32_t us) {
+    return (uint16_t)((us + US_PER_TICK - 1u) / US_PER_TICK + 1u);
+}
+
+static void halt(void) {
+    switches_off();
+    scan.phase = IDLE;
+    hal_timer_cancel();
+    hal_adc_cancel();
+}
+
+static void fail(uint8_t code, uint16_t detail) {
+    halt();
+    fault.code = code;
+    fault.detail = detail;
+    hal_wake();
+}
+
+static uint32_t allowed_ticks(const struct drive *drive) {
+    uint8_t channels = 0u;
+    for (channel_set rest = drive->mask; rest != 0u; rest &= (channel_set)(rest - 1u)) {
+        channels++;
+    }
+    uint16_t conversions = (uint16_t)(channels * config.oversampling);
+    uint32_t each = (CLOCKS_PER_CONVERSION * config.prescaler) / CLOCKS_PER_TICK + 1u;
+    uint32_t converting = conversions * each;
+    return scan.settling_ticks + 2u * converting + SLACK_TICKS;
+}
+
+static void begin_frame(void) {
+    struct frame *frame = &frames[filling];
+    frame->started = hal_ticks();
+    scan.place = frame->payload + SIZE_FRAME;
+    scan.drive = 0u;
+}
+
+static void connect(uint16_t dead_time) {
+    const struct drive *drive = &config.drives[scan.drive];
+    scan.rest = drive->mask;
+    scan.channel = 0u;
+    scan.allowed = allowed_ticks(drive);
+    if (!switches_set(drive->source, drive->sink, dead_time)) {
+        fail(FAULT_SWITCH_REFUSED, scan.drive);
+        return;
+    }
+    scan.since = hal_ticks();
+    scan.phase = SETTLING;
+    hal_timer_set(scan.settling_ticks);
+}
+
+static void begin_drive(void) {
+    if (config.dead_time <= LONGEST_BUSY_US) {
+        connect(config.dead_time);
+        return;
+    }
+    uint16_t ticks = ticks_of(config.dead_time);
+    scan.phase = DEAD;
+    scan.since = hal_ticks();
+    scan.allowed = ticks + SLACK_TICKS;
+    hal_timer_set(ticks);
+}
+
+static void end_frame(void) {
+    struct frame *frame = &frames[filling];
+    if (waiting) {
+        scan.dropped = true;
+        scan.drops = scan.drops == UINT16_MAX ? UINT16_MAX : (uint16_t)(scan.drops + 1u);
+    } else {
+        frame->sequence = scan.sequence;
+        frame->drops = scan.drops;
+        frame->n_samples = config.n_samples;
+        frame->flags = (uint8_t)((scan.sequence == 0u ? FLAG_FIRST : 0u) |
+                                 (scan.dropped ? FLAG_DROPPED : 0u));
+        scan.dropped = false;
+        waiting = true;
+        filling ^= 1u;
+        hal_wake();
+    }
+    scan.sequence++;
+    begin_frame();
+}
+
+static void end_drive(void) {
+    switches_off();
+    scan.drive++;
+    if (scan.drive == config.n_drives) {
+        end_frame();
+    }
+    begin_drive();
+}
+
+/* Start converting the next channel of the drive; false when there is none. */
+static bool next_channel(void) {
+    if (scan.rest == 0u) {
+        return false;
+    }
+    while ((scan.rest & 1u) == 0u) {
+        scan.rest >>= 1;
+        scan.channel++;
+    }
+    hal_adc_start(scan.channel);
+    scan.left = config.oversampling;
+    return true;
+}
+
+void scan_on_timer(void) {
+    if (scan.phase == DEAD) {
+        connect(0u);
+    } else if (scan.phase == SETTLING) {
+        scan.phase = CONVERTING;
+        scan.sum = 0u;
+        if (!next_channel()) {
+            end_drive();
+        }
+    }
+}
+
+void scan_on_conversion(uint16_t code) {
+    if (scan.phase != CONVERTING) {
+        return;
+    }
+    /* The next conversion runs while this one is booked. */
+    if (--scan.left != 0u) {
+        hal_adc_start(scan.channel);
+        scan.sum = (uint16_t)(scan.sum + code);
+        return;
+    }
+    scan.rest >>= 1;
+    scan.channel++;
+    bool more = next_channel();
+    put_u16(scan.place, (uint16_t)(scan.sum + code));
+    scan.place += 2;
+    scan.sum = 0u;
+    if (!more) {
+        end_drive();
+    }
+}
+
+void scan_start(void) {
+    scan.sequence = 0u;
+    scan.drops = 0u;
+    scan.dropped = false;
+    scan.settling_ticks = ticks_of(config.settling);
+    hal_adc_prepare(config.prescaler);
+    begin_frame();
+    begin_drive();
+}
+
+void scan_stop(void) {
+    halt();
+    fault.code = 0u;
+    waiting = taken; /* a frame that is being sent goes on */
+}
+
+bool scan_running(void) {
+    return scan.phase != IDLE;
+}
+
+static bool stands_still(void) {
+    bool same = seen.drive == scan.drive && seen.channel == scan.channel &&
+                seen.left == scan.left && seen.sequence == scan.sequence;
+    seen.drive = scan.drive;
+    seen.channel = scan.channel;
+    seen.left = scan.left;
+    seen.sequence = scan.sequence;
+    return same;
+}
+
+void scan_guard(uint32_t now) {
+    if (scan.phase == IDLE) {
+        return;
+    }
+    bool still = stands_still();
+    if (now - scan.since <= scan.allowed) {
+        return;
+    }
+    if (scan.phase == DEAD) {
+        fail(FAULT_INTERNAL, scan.drive);
+    } else if (scan.phase == CONVERTING && still) {
+        fail(FAULT_CONVERTER, scan.channel);
+    } else {
+        fail(FAULT_CURRENT_TOO_LONG, scan.drive);
+    }
+}
+
+struct scan_fault scan_take_fault(void) {
+    struct scan_fault found = fault;
+    fault.code = 0u;
+    return found;
+}
+
+struct frame *scan_take(void) {
+    if (!waiting || taken) {
+        return NULL;
+    }
+    taken = true;
+    return &frames[filling ^ 1u];
+}
+
+void scan_give_back(void) {
+    taken = waiting = false;
+}

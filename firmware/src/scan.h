@@ -1,0 +1,49 @@
+/* The scan engine: drives, waits, converts, fills frames. It runs in interrupts. */
+#ifndef TOMOSKIN_SCAN_H
+#define TOMOSKIN_SCAN_H
+
+#include "framing.h"
+#include "limits.h"
+#include "protocol.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* A whole frame: its samples lie where the payload has them, the head is still to be written. */
+struct frame {
+    uint32_t started; /* tick */
+    uint32_t sequence;
+    uint16_t drops;
+    uint8_t flags;
+    uint16_t n_samples;
+    uint8_t payload[SIZE_FRAME + 2u * MOST_SAMPLES + FRAMING_AFTER];
+};
+
+/* What made the scan stop itself; `code` 0: nothing. */
+struct scan_fault {
+    uint8_t code;
+    uint16_t detail;
+};
+
+/* Interrupts. */
+void scan_on_timer(void);
+void scan_on_conversion(uint16_t code);
+
+/* The configuration must be complete. Under lock. */
+void scan_start(void);
+
+/* All channels high-impedance; frames not yet taken are forgotten. Under lock. */
+void scan_stop(void);
+bool scan_running(void);
+
+/* Stop a drive that is on for longer than it can need. Under lock, often. */
+void scan_guard(uint32_t now);
+
+/* What stopped the scan, once. Under lock. */
+struct scan_fault scan_take_fault(void);
+
+/* The oldest whole frame or NULL; it is the caller's until given back. Under lock. */
+struct frame *scan_take(void);
+void scan_give_back(void);
+
+#endif

@@ -1,0 +1,98 @@
+"""The firmware as a process on a pty, built with sanitizers, and what tests ask of it."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tomoskin.pattern import Pattern, Scan
+from tomoskin.source import ScanSettings
+from tomoskin.wire import Decoder, Message, encode
+
+ROOT = Path(__file__).parents[2]
+FIRMWARE = ROOT / "firmware"
+SCAN = Scan.of(Pattern.adjacent(8))
+SETTINGS = ScanSettings(oversampling=4, settling=200e-6, current_limit=0.1, adc_bits=10)
+PATIENCE = 20.0
+"""Seconds until a test gives up; a board answers within milliseconds."""
+
+
+def built(target: str, product: str) -> Path:
+    """Make ``target`` in firmware/; the file that it makes."""
+    made = subprocess.run(
+        ["make", "--silent", "-C", str(FIRMWARE), target],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert made.returncode == 0, made.stderr
+    return ROOT / "build" / "firmware" / product
+
+
+class Process:
+    """A board that runs; ``path`` is its serial port."""
+
+    def __init__(self, program: Path, link: Path, *options: str) -> None:
+        self.path = str(link)
+        self._process = subprocess.Popen(
+            [program, "-l", link, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+        assert self._process.stdout is not None
+        assert self._process.stdout.readline().strip() == str(link).encode()
+
+    def kill(self) -> None:
+        """Unplug it."""
+        self._process.kill()
+        self._process.wait()
+
+    def end(self) -> None:
+        """Unplug it, unless it has ended by itself: then say why."""
+        ended = self._process.poll()
+        self.kill()
+        said = self._process.stderr.read().decode() if self._process.stderr else ""
+        for stream in (self._process.stdout, self._process.stderr):
+            assert stream is not None
+            stream.close()
+        assert ended in (None, -9), said
+        assert not said, said
+
+
+@contextmanager
+def running(program: Path, link: Path, *options: str) -> Iterator[Process]:
+    """A board, unplugged at the end; whatever it says on stderr fails the test."""
+    process = Process(program, link, *options)
+    try:
+        yield process
+    finally:
+        process.end()
+
+
+class Talk:
+    """Plain messages with a board."""
+
+    def __init__(self, transport) -> None:
+        self.transport = transport
+        self._decoder = Decoder()
+        self._waiting: list[Message] = []
+
+    def say(self, message: Message) -> None:
+        self.transport.write(encode(message))
+
+    def next(self, kind: type, timeout: float = PATIENCE):
+        """The next message of a kind, the others left out."""
+        end = time.monotonic() + timeout
+        while time.monotonic() < end:
+            while self._waiting:
+                message = self._waiting.pop(0)
+                if isinstance(message, kind):
+                    return message
+            data = self.transport.read(0.1)
+            self._waiting += self._decoder.feed(data, time.monotonic())
+        raise AssertionError(f"no {kind.__name__} within {timeout} s")
+
+    def ask(self, message: Message, kind: type):
+        self.say(message)
+        return self.next(kind)
