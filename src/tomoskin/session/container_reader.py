@@ -3,97 +3,30 @@
 from __future__ import annotations
 
 import io
-import struct
 import zlib
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, Self
 
 from tomoskin.core import DataError
 from tomoskin.session import mcap
 from tomoskin.session.container import SEEK_ROW, SEEK_TABLE
+from tomoskin.session.parts import (
+    MEND,
+    Attachment,
+    Chunk,
+    Fields,
+    Message,
+    Totals,
+    messages_in,
+    parse_attachment,
+    parse_chunk,
+    parse_metadata,
+)
 
 LARGEST = 64 << 20
 """A longer record is no record of a session."""
-
-_MEND = "tomoskin session repair recovers what is whole"
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """One message: its channel's number, log time in ns, data, and the chunk that it was in."""
-
-    channel: int
-    log_time: int
-    data: bytes
-    chunk: int
-
-
-@dataclass(frozen=True)
-class Attachment:
-    """A file inside the file."""
-
-    name: str
-    media_type: str
-    data: bytes
-
-
-@dataclass(frozen=True)
-class Totals:
-    """Messages by channel, and first and last log time in ns."""
-
-    counts: dict[int, int]
-    first: int
-    last: int
-
-
-@dataclass
-class Chunk:
-    """Where a chunk's record is, and what its head says."""
-
-    offset: int
-    length: int
-    first: int
-    last: int
-    crc: int
-    compression: str
-    records: bytes = field(repr=False)
-
-
-class Fields:
-    """Takes fields off the body of a record; ValueError when it is short or no text."""
-
-    def __init__(self, body: bytes) -> None:
-        self._body = body
-        self.place = 0
-
-    def numbers(self, layout: str) -> tuple[int, ...]:
-        """Numbers in a layout of :mod:`struct`."""
-        data = self.bytes(struct.calcsize("<" + layout))
-        found: tuple[int, ...] = struct.unpack("<" + layout, data)
-        return found
-
-    def bytes(self, length: int) -> bytes:
-        """So many bytes."""
-        if length > len(self._body) - self.place:
-            raise ValueError(f"{length} bytes are said to follow, {len(self._body)} in all")
-        self.place += length
-        return self._body[self.place - length : self.place]
-
-    def text(self) -> str:
-        """A string behind its length."""
-        return self.bytes(self.numbers("I")[0]).decode()
-
-    def mapping(self) -> dict[str, str]:
-        """A map of strings."""
-        length = self.numbers("I")[0]
-        end = self.place + length
-        found = {}
-        while self.place < end:
-            key = self.text()
-            found[key] = self.text()
-        return found
 
 
 class ContainerReader:
@@ -207,10 +140,10 @@ class ContainerReader:
     def _open_summary(self, start: int, offsets: int, crc: int) -> None:
         where = f"{self.where}, byte {start}"
         if not len(mcap.MAGIC) <= start <= offsets <= self._end:
-            raise DataError("the index is not in the file", where=where, hint=_MEND)
+            raise DataError("the index is not in the file", where=where, hint=MEND)
         length = self.size - mcap.FOOTER_SIZE + mcap.PREFIX.size + 16 - start
         if crc and crc != self._crc(start, length):
-            raise DataError("the index is damaged (its CRC differs)", where=where, hint=_MEND)
+            raise DataError("the index is damaged (its CRC differs)", where=where, hint=MEND)
         for opcode, offset, _ in self._records(offsets):
             if opcode == mcap.SUMMARY_OFFSET:
                 with self._understood(offset):
@@ -317,85 +250,12 @@ class ContainerReader:
             raise DataError(f"cannot be read: {reason}", where=self.where) from error
 
     def _damaged(self, place: int, why: str) -> DataError:
-        return DataError(f"is damaged: {why}", where=f"{self.where}, byte {place}", hint=_MEND)
+        return DataError(f"is damaged: {why}", where=f"{self.where}, byte {place}", hint=MEND)
 
-    def _understood(self, offset: int) -> _Understood:
-        return _Understood(lambda why: self._damaged(offset, why))
-
-
-def parse_chunk(body: bytes, offset: int) -> Chunk:
-    """A chunk whose record is at ``offset``; ValueError when it does not add up."""
-    fields = Fields(body)
-    first, last = fields.numbers("QQ")
-    size, crc = fields.numbers("QI")
-    compression = fields.text()
-    data = fields.bytes(fields.numbers("Q")[0])
-    if not compression and len(data) != size:
-        raise ValueError(f"a chunk of {size} bytes holds {len(data)}")
-    length = mcap.PREFIX.size + len(body)
-    return Chunk(offset, length, first, last, crc, compression, data)
-
-
-def parse_attachment(body: bytes) -> Attachment:
-    """A file inside; ValueError when it does not add up or its CRC differs."""
-    fields = Fields(body)
-    fields.numbers("QQ")
-    name, media_type = fields.text(), fields.text()
-    data = fields.bytes(fields.numbers("Q")[0])
-    end = fields.place
-    if zlib.crc32(body[:end]) != fields.numbers("I")[0]:
-        raise ValueError(f"the CRC of the file {name} inside differs")
-    return Attachment(name, media_type, data)
-
-
-def parse_metadata(body: bytes) -> tuple[str, dict[str, str]]:
-    """Named strings; ValueError when they do not add up."""
-    fields = Fields(body)
-    name = fields.text()
-    return name, fields.mapping()
-
-
-@dataclass
-class _Understood:
-    """Turns what a malformed body raises into the reader's error."""
-
-    error: Callable[[str], DataError]
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, ValueError):
-            raise self.error(str(error)) from error
-
-
-def messages_in(chunk: Chunk, where: str) -> Iterator[Message]:
-    """Messages of a chunk whose CRC was right.
-
-    Raises
-    ------
-    DataError
-        When its records do not add up all the same: written wrongly, by another program.
-    """
-    records, place, end = chunk.records, 0, len(chunk.records)
-    prefix, head = mcap.PREFIX, mcap.MESSAGE_HEAD
-    while place < end:
-        if end - place < prefix.size:
-            break
-        opcode, length = prefix.unpack_from(records, place)
-        place += prefix.size
-        if length > end - place:
-            break
-        if opcode == mcap.MESSAGE:
-            if length < head.size:
-                break
-            channel, _, log_time, _ = head.unpack_from(records, place)
-            data = records[place + head.size : place + length]
-            yield Message(channel, log_time, data, chunk.offset)
-        place += length
-    if place != end:
-        raise DataError(
-            "the records of a chunk do not add up",
-            where=f"{where}, byte {chunk.offset}",
-            hint=_MEND,
-        )
+    @contextmanager
+    def _understood(self, offset: int) -> Iterator[None]:
+        """Turns what a malformed body raises into the reader's error."""
+        try:
+            yield
+        except ValueError as error:
+            raise self._damaged(offset, str(error)) from error

@@ -14,8 +14,8 @@ from typing import BinaryIO
 from tomoskin.core import DataError, SkinError
 from tomoskin.session import channels, mcap
 from tomoskin.session.container import SEEK_TABLE, ContainerWriter
-from tomoskin.session.container_reader import (
-    LARGEST,
+from tomoskin.session.container_reader import LARGEST
+from tomoskin.session.parts import (
     Attachment,
     Chunk,
     messages_in,

@@ -14,8 +14,9 @@ import numpy as np
 
 from tomoskin.core import DataError, Event, Reading, SkinError, Touch
 from tomoskin.session import channels
-from tomoskin.session.container_reader import ContainerReader, Message, Totals
+from tomoskin.session.container_reader import ContainerReader
 from tomoskin.session.layout import MarkedFrame, decode_frame, decode_raw
+from tomoskin.session.parts import Message, Totals
 from tomoskin.session.writer import ABOUT, FORMAT, SKIN_FILE
 from tomoskin.skin import Skin
 
