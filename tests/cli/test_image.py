@@ -166,14 +166,83 @@ def test_too_many_dead_channels_are_refused(save, image, frames) -> None:
     assert "11 of 40 rows hold no finite values, too many to leave out: row 0: source" in err
 
 
-def test_a_frame_that_is_not_finite_is_left_out_and_named(save, image, tmp_path, frames) -> None:
+def test_a_frame_without_some_rows_is_imaged_without_them_and_named(
+    save, image, tmp_path, frames
+) -> None:
     broken = frames.copy()
-    broken[1, 5] = np.nan
+    broken[3, SKIN.pattern().rows_of(6)[:3]] = np.nan
+    broken[1, 5] = np.inf
     table = tmp_path / "touches.csv"
-    code, _, err = image(save(voltages=broken), "--touches", table)
+    code, out, err = image(save(voltages=broken), "--touches", table)
     assert code == 0
-    assert "left out: 1" in err
+    assert "2 frames hold rows that are not finite, and were imaged without these" in err
+    assert "1 (1 row), 3 (3 rows)\n" in err
+    assert math.dist(places(table)[3], PLACE) < 0.015
+    assert out.startswith("4 frames")
+    assert json.loads(image(save(voltages=broken), "--json")[1])["rows_missing"] == {
+        "1": 1,
+        "3": 3,
+    }
+
+
+def test_a_frame_without_a_quarter_of_its_rows_is_left_out_and_named(
+    save, image, tmp_path, frames
+) -> None:
+    broken = frames.copy()
+    broken[1, 5:16] = np.nan
+    table = tmp_path / "touches.csv"
+    code, out, err = image(save(voltages=broken), "--touches", table)
+    assert code == 0
+    assert "1 frames hold too many values that are not finite and were left out: 1\n" in err
+    assert out.startswith("3 frames")
     assert 3 in places(table)
+
+
+def test_dynamic_imaging_holds_each_frame_against_the_one_before(
+    save, image, tmp_path, frames
+) -> None:
+    shown, table = tmp_path / "maps.npz", tmp_path / "touches.csv"
+    pressed_twice = np.vstack([frames, frames[3:] + 1e-7])
+    source = save(voltages=pressed_twice)
+    options = ("--reference", "previous", "--out", shown, "--touches", table)
+    assert image(source, *options)[0] == 0
+    found = np.load(shown)
+    assert found["frames"].tolist() == [1, 2, 3, 4]
+    depth = -found["images"].min(axis=1)
+    assert depth[2] > 5 * depth[[0, 1, 3]].max()  # the press comes in frame 3, and stays
+    assert math.dist(places(table)[3], PLACE) < 0.012
+    code, _, err = image(source, "--reference", "previous", "--time-constant", "0.1 s")
+    assert code == 1
+    assert "cannot be filtered over frames too" in err
+    code, _, err = image(save(voltages=frames[:1]), "--reference", "previous")
+    assert code == 1
+    assert "expected two frames at least" in err
+
+
+def test_a_time_constant_filters_the_images(save, image, tmp_path, frames) -> None:
+    plain, slow = tmp_path / "plain.npz", tmp_path / "slow.npz"
+    source = save(voltages=np.vstack([frames, frames[:3]]), time_s=np.arange(7) / 10)
+    options = ("--alpha", "0.05", "--reference", "first:3")
+    assert image(source, *options, "--out", plain)[0] == 0
+    code, out, _ = image(source, *options, "--time-constant", "0.3 s", "--out", slow)
+    assert code == 0
+    assert "filtered over frames, time constant 0.3 s" in out
+    before, after = (np.load(path)["images"].min(axis=1) for path in (plain, slow))
+    assert after[3] > 0.95 * before[3]  # it comes later
+    assert after[4] < 3 * before[4]  # and lasts
+    off = tmp_path / "off.npz"
+    assert image(source, *options, "--time-constant", "0 s", "--out", off)[0] == 0
+    assert np.array_equal(np.load(off)["images"], np.load(plain)["images"])
+
+
+def test_a_time_constant_needs_times_that_go_on(save, image) -> None:
+    source = save(time_s=np.array([0.0, 0.1, 0.1, 0.2]))
+    code, _, err = image(source, "--time-constant", "0.3 s")
+    assert code == 1
+    assert "expected times that go on" in err
+    assert "frame 2" in err
+    assert image(source, "--time-constant", "0.3")[0] == 2
+    assert image(source, "--time-constant", "-1 s")[0] == 1
 
 
 @pytest.mark.parametrize(
@@ -183,7 +252,7 @@ def test_a_frame_that_is_not_finite_is_left_out_and_named(save, image, tmp_path,
         (("--limit", "0"), "expected a limit above 0"),
         (("--smooth", "90 mm", "--out", "maps.png"), "radius above 0 and up to 50 mm"),
         (("--reference", "frame:4"), "0 to 3"),
-        (("--reference", "banana"), "expected first:N, frame:K or a file"),
+        (("--reference", "banana"), "expected first:N, frame:K, previous or a file"),
         (("--frames", "3:9"), "within 0:4"),
         (("--skin", "tank-16"), "rows are not in the recording"),
         (("--skin", "nothing"), "built-in skins"),

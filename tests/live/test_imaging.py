@@ -162,7 +162,7 @@ def test_without_a_time_constant_nothing_is_filtered() -> None:
 def test_a_replay_gives_the_same_touches_to_the_bit(tmp_path: Path) -> None:
     path, prepared = tmp_path / "run.mcap", filtered("auto")
     with Recorded(prepared, path) as live:
-        live.board.tick = TICKS
+        live.board.tick = round(INTERVAL * 16_000_000)  # what the board says of its clock
         live.idle(REFERENCE_FRAMES + 5)
         live.touch(0, 12)
         live.idle(3)

@@ -38,7 +38,7 @@ def frame_of(number, *, rate=100.0, seed=0, n_samples=SCAN.n_samples):
     rng = np.random.default_rng((seed, number))
     return Frame(
         sequence=number,
-        ticks=number * 160_000,
+        ticks=round(number / rate * INFO.tick_rate),
         host_time=number / rate + 1e-9 * number**2,  # not a whole number of ns
         configuration=0x1A2B,
         flags=int(number == 0),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -62,7 +63,7 @@ def test_the_recording_has_the_voltages_of_the_readout_and_labels_from_truth(who
     assert np.array_equal(np.isnan(got.voltages[7]), expected.railed)
     assert np.array_equal(got.drive, SKIN.pattern().drive)
     assert np.array_equal(got.measure, SKIN.pattern().measure)
-    assert got.time[7] == frame_of(7).host_time
+    assert got.time[7] == pytest.approx(frame_of(7).host_time, abs=1e-6)  # by its ticks
     assert np.isnan(got.labels[:10]).all()
     assert np.array_equal(got.labels[10:], np.tile((PRESS["x"], PRESS["y"]), (20, 1)))
 
@@ -173,3 +174,18 @@ def test_frames_are_cdr_as_their_schema_says(whole):
     assert values["host_time"] == (first.host_time,)
     assert values["configuration"] == (first.configuration,)
     assert values["samples"] == tuple(first.samples.tolist())
+
+
+def test_frames_of_one_read_are_as_far_apart_as_they_were_scanned(tmp_path):
+    """Two by two they share a host time; where the ticks go back, host times are all there is."""
+    frames = [replace(frame_of(n), host_time=0.1 * (n // 2)) for n in range(6)]
+    times = []
+    for name, last in (("on", frames[5]), ("back", replace(frames[5], ticks=3))):
+        path = tmp_path / f"{name}.mcap"
+        with SessionWriter(path, SKIN, epoch=1e9) as session:
+            session.device(0.0, INFO)
+            for frame in (*frames[:5], last):
+                put(session, frame)
+        times.append(read_recording(path).time)
+    assert np.diff(times[0]) == pytest.approx(np.diff([f.ticks for f in frames]) / 16e6)
+    assert times[1].tolist() == [f.host_time for f in frames]

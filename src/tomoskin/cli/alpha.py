@@ -38,7 +38,7 @@ def alpha(
     from tomoskin.skin import Skin
 
     prepared = prepare(Skin.load(skin))
-    evidence = _evidence(prepared, recording, reference, frames)
+    prepared, evidence = _evidence(prepared, recording, reference, frames)
     spectrum = Spectrum.of(prepared.problem)
     outcomes = [(name, _outcome(spectrum, name, evidence)) for name in ([rule] if rule else RULES)]
     if rule and isinstance(outcomes[0][1], TomoskinError):
@@ -50,17 +50,21 @@ def alpha(
 
 def _evidence(
     prepared: Prepared, recording: Path | None, reference: str | None, frames: str | None
-) -> Evidence:
-    """What the recording tells; without one, the noise that the read-out predicts."""
+) -> tuple[Prepared, Evidence]:
+    """What the recording tells, and the skin without the rows that are dead in it.
+
+    Without a recording: the noise that the read-out predicts.
+    """
     from tomoskin.inverse import Evidence
     from tomoskin.live import changes_of
     from tomoskin.session import read_recording
 
     if recording is None:
-        return Evidence(noise=prepared.predicted_noise())
+        return prepared, Evidence(noise=prepared.predicted_noise())
     whole = read_recording(recording).in_order_of(prepared.pattern)
     idle = idle_frames(whole, reference, prepared.pattern)
-    return changes_of(prepared, whole.part(*frame_range(whole, frames)), idle).evidence(prepared)
+    changes = changes_of(prepared, whole.part(*frame_range(whole, frames)), idle)
+    return changes.prepared, changes.evidence()
 
 
 def _outcome(spectrum: Spectrum, rule: str, evidence: Evidence) -> AlphaChoice | TomoskinError:

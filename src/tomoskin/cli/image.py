@@ -18,10 +18,12 @@ from tomoskin.cli.recording import (
     say_notes,
 )
 from tomoskin.cli.skin_choice import SkinOption, skin_for_file
+from tomoskin.cli.time_option import TimeConstantOption, filter_said, with_time_constant
 
 if TYPE_CHECKING:
-    from tomoskin.core import IntArray
-    from tomoskin.live import Reconstruction
+    from collections.abc import Sequence
+
+    from tomoskin.live import Prepared, Reconstruction
     from tomoskin.pattern import Pattern
     from tomoskin.session import Recording
 
@@ -32,6 +34,7 @@ def image(
     reference: ReferenceOption = None,
     frames: FramesOption = None,
     alpha: AlphaOption = None,
+    time_constant: TimeConstantOption = None,
     out: Annotated[
         Path | None, typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go.")
     ] = None,
@@ -49,6 +52,7 @@ def image(
 
     write = _writer(out)
     chosen, rule = with_alpha(skin_for_file(skin, recording), alpha)
+    chosen = with_time_constant(chosen, time_constant)
     display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
     prepared = prepare(chosen)
     whole = read_recording(recording).in_order_of(prepared.pattern)
@@ -61,7 +65,7 @@ def image(
         _write_touches(touches, whole, found)
     if out is not None:
         write(out, prepared, found, display)
-    _report(recording, found, prepared.pattern, json=json)
+    _report(recording, found, prepared, json=json)
 
 
 def _writer(out: Path | None) -> Any:
@@ -83,33 +87,15 @@ def _write_touches(path: Path, recording: Recording, found: Reconstruction) -> N
     write_touches(path, ((f, float(recording.time[f]), t) for f, t in rows))
 
 
-def _report(source: Path, found: Reconstruction, pattern: Pattern, *, json: bool) -> None:
-    from tomoskin.live import DOUBTED
-
-    if len(found.rows_left_out):
-        rows = found.rows_left_out.tolist()
-        typer.echo(
-            f"tomoskin: {source}: {len(rows)} rows hold no finite values and were left out: "
-            + "; ".join(map(pattern.row_text, rows)),
-            err=True,
-        )
-    if len(found.left_out):
-        typer.echo(
-            f"tomoskin: {source}: {len(found.left_out)} frames hold values that are not finite and "
-            f"were left out: {_listed(found.left_out)}",
-            err=True,
-        )
-    if found.agreement < DOUBTED:
-        typer.echo(
-            f"tomoskin: {source}: the reference agrees with this skin's model by only "
-            f"{found.agreement:.2f} (1 = proportional): check --skin and the electrodes' order",
-            err=True,
-        )
+def _report(source: Path, found: Reconstruction, prepared: Prepared, *, json: bool) -> None:
+    _warn(source, found, prepared.pattern)
     if json:
-        emit(_document(found))
+        emit(_document(found, prepared))
         return
     typer.echo(f"{len(found.frames)} frames, {sum(map(len, found.touches))} touches")
     typer.echo(said(found.choice))
+    if prepared.modes is not None:
+        typer.echo(filter_said(prepared.skin))
     for frame, touches in list(zip(found.frames.tolist(), found.touches, strict=True))[:_SHOWN]:
         for t in touches:
             r = t.reading
@@ -121,18 +107,54 @@ def _report(source: Path, found: Reconstruction, pattern: Pattern, *, json: bool
         typer.echo(f"… and {len(found.frames) - _SHOWN} frames more: --touches writes them all")
 
 
+def _warn(source: Path, found: Reconstruction, pattern: Pattern) -> None:
+    """Say on stderr what was left out, and what looks wrong."""
+    from tomoskin.live import DOUBTED
+
+    if len(found.rows_left_out):
+        rows = found.rows_left_out.tolist()
+        typer.echo(
+            f"tomoskin: {source}: {len(rows)} rows hold no finite values and were left out: "
+            + "; ".join(map(pattern.row_text, rows)),
+            err=True,
+        )
+    counted = zip(found.frames.tolist(), found.rows_missing.tolist(), strict=True)
+    named = [f"{frame} ({_rows(count)})" for frame, count in counted if count]
+    if named:
+        typer.echo(
+            f"tomoskin: {source}: {len(named)} frames hold rows that are not finite, and were "
+            f"imaged without these: {_listed(named)}",
+            err=True,
+        )
+    if len(found.left_out):
+        typer.echo(
+            f"tomoskin: {source}: {len(found.left_out)} frames hold too many values that are not "
+            f"finite and were left out: {_listed(found.left_out.tolist())}",
+            err=True,
+        )
+    if found.agreement < DOUBTED:
+        typer.echo(
+            f"tomoskin: {source}: the reference agrees with this skin's model by only "
+            f"{found.agreement:.2f} (1 = proportional): check --skin and the electrodes' order",
+            err=True,
+        )
+
+
 _SHOWN = 20
 
 
-def _document(found: Reconstruction) -> dict[str, Any]:
+def _document(found: Reconstruction, prepared: Prepared) -> dict[str, Any]:
+    lacking = zip(found.frames.tolist(), found.rows_missing.tolist(), strict=True)
     return {
         "frames": len(found.frames),
+        "rows_missing": {str(frame): rows for frame, rows in lacking if rows},
         "left_out": found.left_out.tolist(),
         "rows_left_out": found.rows_left_out.tolist(),
         "agreement": found.agreement,
         "unit": found.unit,
         "alpha": found.choice.alpha,
         "rule": found.choice.rule,
+        "time_constant_s": prepared.skin.inverse.time_constant,
         "touches": [
             {"frame": f, "id": t.id, "x_m": t.reading.x, "y_m": t.reading.y, "peak": t.reading.peak}
             for f, touches in zip(found.frames.tolist(), found.touches, strict=True)
@@ -141,6 +163,10 @@ def _document(found: Reconstruction) -> dict[str, Any]:
     }
 
 
-def _listed(frames: IntArray) -> str:
-    shown = ", ".join(map(str, frames[:10].tolist()))
+def _listed(frames: Sequence[object]) -> str:
+    shown = ", ".join(map(str, frames[:10]))
     return f"{shown}, …" if len(frames) > 10 else shown
+
+
+def _rows(count: int) -> str:
+    return "1 row" if count == 1 else f"{count} rows"

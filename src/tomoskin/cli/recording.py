@@ -10,15 +10,18 @@ import typer
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tomoskin.live import Idle
     from tomoskin.pattern import Pattern
     from tomoskin.session import Recording
 
 ReferenceOption = Annotated[
     str | None,
     typer.Option(
-        metavar="first:N|frame:K|FILE",
-        help="Untouched frames; without it the file's own reference, else its first frame "
-        "(of a session those that the run took).",
+        metavar="first:N|frame:K|previous|FILE",
+        help="Untouched frames, or previous: each frame against the one before. Without it the "
+        "file's own reference, else its first frame (of a session those that the run took).",
     ),
 ]
 FramesOption = Annotated[
@@ -26,8 +29,8 @@ FramesOption = Annotated[
 ]
 
 
-def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Any:
-    """(n, n_meas) frames of the untouched skin, None for a file of differences."""
+def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Idle:
+    """What the frames are held against; None for a file of differences."""
     from tomoskin.session import read_recording
 
     if recording.is_change:
@@ -38,6 +41,8 @@ def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Any
                 hint="leave --reference out",
             )
         return None
+    if spec == "previous":
+        return "previous"
     if spec is None and recording.reference is not None:
         return recording.reference[None]
     kind, _, number = (spec or f"first:{recording.idle}").partition(":")
@@ -45,7 +50,9 @@ def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Any
         return _frames_of(recording, kind, int(number))
     path = Path(spec or "")
     if not path.exists():
-        raise DataError(f'expected first:N, frame:K or a file, got "{spec}"', where="--reference")
+        raise DataError(
+            f'expected first:N, frame:K, previous or a file, got "{spec}"', where="--reference"
+        )
     other = read_recording(path)
     if other.is_change:
         raise DataError("holds differences, not an untouched skin", where=other.source)
@@ -58,7 +65,7 @@ def say_notes(recording: Recording) -> None:
         typer.echo(f"tomoskin: {recording.source}: {note}", err=True)
 
 
-def _frames_of(recording: Recording, kind: str, number: int) -> Any:
+def _frames_of(recording: Recording, kind: str, number: int) -> NDArray[Any]:
     n = len(recording)
     if kind == "frame":
         if number >= n:

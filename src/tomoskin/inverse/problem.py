@@ -104,10 +104,12 @@ class LinearProblem:
         pattern = Pattern.from_tables(
             whole.pattern.drive[kept], whole.pattern.measure[kept], whole.pattern.n_electrodes
         )
+        current = np.empty(pattern.n_drive)
+        current[pattern.drive_index] = whole.current[whole.pattern.drive_index[kept]]
         return replace(
             self,
             model=ForwardModel(
-                whole.mesh, pattern, whole.contact_impedance, whole.current, order=whole.order
+                whole.mesh, pattern, whole.contact_impedance, current, order=whole.order
             ),
             jacobian=self.jacobian[kept],
             weights=self.weights[kept],

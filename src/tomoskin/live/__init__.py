@@ -1,5 +1,6 @@
 """The running pipeline, and the server of its page."""
 
+from tomoskin.live.changes import DOUBTED, Changes, Idle, changes_of
 from tomoskin.live.hub import Hub
 from tomoskin.live.labelled import (
     SetMade,
@@ -10,7 +11,7 @@ from tomoskin.live.labelled import (
     on_cluster,
     processors,
 )
-from tomoskin.live.offline import DOUBTED, Changes, Reconstruction, changes_of, reconstruct
+from tomoskin.live.offline import Reconstruction, reconstruct
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.prepare import Prepared, prepare
 from tomoskin.live.replayed import advance, replayed
@@ -36,6 +37,7 @@ __all__ = [
     "Changes",
     "Door",
     "Hub",
+    "Idle",
     "Pipeline",
     "Prepared",
     "Reconstruction",

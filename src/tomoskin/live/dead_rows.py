@@ -1,4 +1,4 @@
-"""Rows that a whole recording lacks: found, and set so that they say nothing."""
+"""Rows that a whole recording lacks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.core import DataError, IntArray
 from tomoskin.inverse import MOST_LEFT_OUT
 from tomoskin.pattern import Pattern
 
@@ -44,16 +44,3 @@ def dead_rows(
             where=source,
         )
     return rows
-
-
-def as_the_model(
-    values: NDArray[Any], idle: NDArray[Any], rows: IntArray, model: FloatArray
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """``values`` and ``idle`` with ``rows`` as ``model`` has them, to the scale of the others."""
-    if not len(rows):
-        return values, idle
-    mean, expected = np.delete(idle.mean(axis=0), rows), np.delete(model, rows)
-    fill = model[rows] * (mean @ expected) / (expected @ expected)
-    values, idle = values.copy(), idle.copy()
-    values[:, rows] = idle[:, rows] = fill
-    return values, idle

@@ -43,6 +43,8 @@ class Pipeline:
         self._times: list[float] = []
         self._tuning: Generator[None, None, Prepared] | None = None
         self._since = 0.0
+        self.tick_rate = prepared.skin.readout.tick_rate
+        """Of the frames' ticks, Hz: the skin's, until the board has said its own."""
         self.paused = False
         self.refused = 0
         """Frames that were not of this skin's scan."""
@@ -146,7 +148,7 @@ class Pipeline:
 
     def _time(self, voltages: Voltages) -> float:
         """The device's own seconds: host times of frames that were read together are the same."""
-        return voltages.ticks / self._prepared.skin.readout.tick_rate
+        return voltages.ticks / self.tick_rate
 
     def _interval(self) -> float:
         """Between frames while the reference was taken, s; NaN where a single one was."""

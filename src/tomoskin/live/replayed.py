@@ -34,6 +34,7 @@ def replayed(prepared: Prepared, session: SessionReader) -> Iterator[Result]:
     same scan. Frames that the pipeline refused are refused again.
     """
     pipeline = Pipeline(prepared)
+    pipeline.tick_rate = session.tick_rate
     for item in session.frames():
         try:
             result = advance(pipeline, item.frame, item.mark)

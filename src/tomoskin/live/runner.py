@@ -227,6 +227,8 @@ class Runner:
                     found = link.poll(_POLL)
                     self._trouble = None if link.running else _WAITING
                     self._tape.linked(link)
+                    if link.info is not None and link.info.tick_rate:
+                        self._pipeline.tick_rate = link.info.tick_rate
                     frames = [item for item in found if isinstance(item, Frame)]
                     drops = frames[-1].drops if frames else drops
                     self._tally = Tally.of(link, drops)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.session.blocks import Rows, all_blocks
@@ -34,19 +35,30 @@ def recording_of(session: SessionReader) -> Recording:
     """
     rows = Rows.of(session)
     found = list(all_blocks(session, rows))
-    time = np.concatenate([block.time for block in found])
+    read = np.concatenate([block.time for block in found])
+    ticks = np.concatenate([block.ticks for block in found])
     return Recording(
         voltages=np.concatenate([block.voltages for block in found]),
         drive=rows.pattern.drive,
         measure=rows.pattern.measure,
-        time=time,
+        time=_scanned(read, ticks, session.tick_rate),
         reference=None,
-        labels=_labels(session, time),
+        labels=_labels(session, read),
         is_change=False,
         source=str(session.path),
         notes=(f"the file {session.torn}",) if session.torn else (),
         idle=_idle(session, found[0].mark),
     )
+
+
+def _scanned(read: FloatArray, ticks: NDArray[np.uint64], rate: float) -> FloatArray:
+    """When each frame was scanned, s: frames of one read have one host time, but not one tick.
+
+    Where the device's clock does not go on throughout, when they were read.
+    """
+    if not (ticks[1:] > ticks[:-1]).all():
+        return read
+    return np.asarray(read[0] + (ticks - ticks[0]) / rate)
 
 
 def _idle(session: SessionReader, marks: IntArray) -> int:
