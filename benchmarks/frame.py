@@ -23,6 +23,7 @@ CASES = (
     ("textile-disc-16", 660),
     ("textile-disc-16", 3000),
 )
+TIME_CONSTANTS = ("0 s", "0.2 s")
 IDLE, PRESSED, REPEATS = 30, 60, 40
 SEED = 1
 
@@ -32,14 +33,16 @@ def run(data: Path | None) -> tuple[Report, ...]:
     del data
     rows = []
     for name, cells in CASES:
-        prepared = prepare(Skin.load(name).altered({"mesh": {"cells": cells}}))
-        rows.append(_row(prepared))
+        skin = Skin.load(name).altered({"mesh": {"cells": cells}})
+        for filtered in TIME_CONSTANTS:
+            rows.append(_row(prepare(skin.altered({"inverse": {"time_constant": filtered}}))))
     table = Report(
         "bytes in → touches out",
         (
             "electrodes",
             "triangles",
             "rows",
+            "filter s",
             "bytes",
             "p50 ms",
             "p99 ms",
@@ -51,6 +54,7 @@ def run(data: Path | None) -> tuple[Report, ...]:
         (
             f"{PRESSED * REPEATS} frames with two moving presses of a twin, seed {SEED}",
             "decode, voltages, difference, one-step image, segmentation, tracking",
+            "filter: the time constant of the Kalman filter over frames, 0 without it",
             "growth: allocated memory that stays, per frame",
         ),
     )
@@ -77,6 +81,7 @@ def _row(prepared: Prepared) -> tuple[object, ...]:
         prepared.pattern.n_electrodes,
         len(prepared.mesh.cells),
         prepared.pattern.n_meas,
+        prepared.skin.inverse.time_constant,
         len(pressed[0]),
         round(p50, 3),
         round(p99, 3),
