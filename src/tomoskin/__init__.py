@@ -11,11 +11,13 @@ if TYPE_CHECKING:
     from tomoskin.mesh import Mesh
     from tomoskin.pattern import Pattern
     from tomoskin.skin import Skin
+    from tomoskin.touch import Locator
 
 __version__ = "0.1.0"
 
 _HOME = {
     "ForwardModel": "forward",
+    "Locator": "touch",
     "Mesh": "mesh",
     "OneStep": "inverse",
     "Pattern": "pattern",
@@ -23,7 +25,7 @@ _HOME = {
 }
 """Where each public name lives; it is imported when it is first asked for."""
 
-__all__ = ["ForwardModel", "Mesh", "OneStep", "Pattern", "Skin", "__version__"]
+__all__ = ["ForwardModel", "Locator", "Mesh", "OneStep", "Pattern", "Skin", "__version__"]
 
 
 def __getattr__(name: str) -> Any:

@@ -1,7 +1,8 @@
-"""Image → readings → touches with an identity."""
+"""Image → readings → touches with an identity; labelled presses → places."""
 
 from tomoskin.touch.floor import NoiseFloor
+from tomoskin.touch.locator import Locator
 from tomoskin.touch.segment import Segmenter
 from tomoskin.touch.track import Tracker
 
-__all__ = ["NoiseFloor", "Segmenter", "Tracker"]
+__all__ = ["Locator", "NoiseFloor", "Segmenter", "Tracker"]

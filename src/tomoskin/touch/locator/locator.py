@@ -1,0 +1,182 @@
+"""The locator: labelled presses → where a frame's touch is, and how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from threadpoolctl import threadpool_limits
+
+from tomoskin.core import DataError, FloatArray
+from tomoskin.pattern import Pattern
+from tomoskin.skin import Skin
+from tomoskin.touch.locator.doubt import Doubt, dispute_of
+from tomoskin.touch.locator.features import Features
+from tomoskin.touch.locator.held_out import Estimates
+from tomoskin.touch.locator.presses import Presses, frames
+from tomoskin.touch.locator.region import Region
+from tomoskin.touch.locator.review import Remark, outliers, twins
+from tomoskin.touch.locator.stack import Stack
+from tomoskin.touch.locator.strength import Strength
+
+Advance = Callable[[float, float], None]
+"""Told how much of how much is done."""
+
+_STEPS = 4
+
+
+def _silent(_done: float, _total: float) -> None:
+    pass
+
+
+@dataclass(frozen=True, eq=False)
+class Locator:
+    """Places of single touches, learnt from labelled presses; made by :meth:`fit`.
+
+    Attributes
+    ----------
+    presses
+        What it was learnt from.
+    region
+        Where a touch may be: the skin, or where the presses were.
+    pattern_id, skin_id
+        Identity of the pattern and the skin, "" where they are not known.
+    remarks
+        Labels that the other presses contradict.
+    """
+
+    presses: Presses
+    region: Region
+    pattern_id: str
+    skin_id: str
+    features: Features
+    estimates: Estimates
+    stack: Stack
+    doubt: Doubt
+    power: Strength
+    remarks: tuple[Remark, ...]
+
+    @classmethod
+    def fit(
+        cls,
+        dv: ArrayLike,
+        xy: ArrayLike,
+        *,
+        pattern: Pattern | None = None,
+        skin: Skin | None = None,
+        strength: ArrayLike | None = None,
+        progress: Advance = _silent,
+    ) -> Self:
+        """Learn from presses.
+
+        Parameters
+        ----------
+        dv
+            (n, n_meas) pressed frame minus untouched frame, in any one unit; NaN is missing.
+        xy
+            (n, 2) m, the place of each press, in the order in which they were made.
+        pattern, skin
+            What was measured and on what; the skin's outline bounds where a touch may be.
+        strength
+            (n,) force or depth of each press in any unit; without it, see :meth:`strength`.
+        progress
+            Told how much of how much is done.
+
+        Raises
+        ------
+        DataError
+            For arrays that do not belong together, fewer than six presses, labels outside the
+            skin, presses on one line, data that never change.
+        """
+        table = pattern or (skin.pattern() if skin else None)
+        presses = Presses.of(dv, xy, strength)
+        if table is not None:
+            frames(presses.dv, table.n_meas)
+        region = Region.of(skin) if skin else Region.around(presses.xy)
+        identities = table.identity if table else "", skin.identity if skin else ""
+        with threadpool_limits(1):  # many small products: more threads only wait for each other
+            return cls._learn(presses.within(region), region, identities, progress)
+
+    @classmethod
+    def _learn(
+        cls, presses: Presses, region: Region, identities: tuple[str, str], progress: Advance
+    ) -> Self:
+        places = region.scaled(presses.xy)
+        features = Features.of(presses.dv)
+        data = features(presses.dv)
+        progress(0, _STEPS)
+        estimates = Estimates.of(data, places, region.grid)
+        progress(1, _STEPS)
+        stack = Stack.of(data, estimates.left_out, places)
+        progress(2, _STEPS)
+        dispute = dispute_of(stack.left_out_told, stack.left_out)
+        doubt = Doubt.of(stack.left_out - places, estimates.left_out_spread, dispute)
+        covariance = doubt(estimates.left_out_spread, dispute)
+        remarks = (
+            *twins(data, places, region.unit),
+            *outliers(stack.left_out, places, covariance, region.unit),
+        )
+        progress(3, _STEPS)
+        power = Strength.of(presses, stack.left_out)
+        progress(_STEPS, _STEPS)
+        return cls(presses, region, *identities, features, estimates, stack, doubt, power, remarks)
+
+    def predict(self, dv: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Place (n, 2) m and its covariance (n, 2, 2) m² for frames (n, n_meas).
+
+        Values that are not finite are left out. Raises DataError for another number of rows, and
+        for a frame without any value that is used.
+        """
+        data = self.features(frames(dv, self.presses.dv.shape[1]))
+        guess, spread = self.estimates(data)
+        told = self.stack.told(data, guess)
+        answer = self.stack.combined(told)
+        covariance = self.doubt(spread, dispute_of(told, answer))
+        return self.region.metres(answer), self.region.unit**2 * covariance
+
+    def strength(self, dv: ArrayLike) -> FloatArray:
+        """(n,) strength of each frame's touch.
+
+        In the unit of the labels; without labels, how many times as large the frame is as those
+        of the presses at its place.
+        """
+        data = frames(dv, self.presses.dv.shape[1])
+        guess = self.region.scaled(self.predict(data)[0])
+        return self.power(data, guess)
+
+    def updated(self, dv: ArrayLike, xy: ArrayLike, strength: ArrayLike | None = None) -> Self:
+        """Locator with more presses: the same as one fitted to all of them."""
+        more = Presses.of_more(dv, xy, strength)
+        presses = self.presses.and_then(more)
+        region = self.region if self.skin_id else Region.around(presses.xy)
+        with threadpool_limits(1):
+            identities = self.pattern_id, self.skin_id
+            return self._learn(presses.within(region), region, identities, _silent)
+
+    @property
+    def errors(self) -> FloatArray:
+        """(n,) m by which each press is missed when it is left out."""
+        return np.asarray(
+            self.region.unit
+            * np.linalg.norm(self.stack.left_out - self.region.scaled(self.presses.xy), axis=1)
+        )
+
+    def next_place(self) -> FloatArray:
+        """(2,) m where the next labelled press tells most: the maps are least certain there."""
+        return self.region.metres(self.estimates.least_known)
+
+    def check(self, pattern: Pattern | None = None, skin: Skin | None = None) -> None:
+        """Refuse data of another pattern or skin. Raises DataError."""
+        pairs = (
+            ("pattern", self.pattern_id, pattern and pattern.identity),
+            ("skin", self.skin_id, skin and skin.identity),
+        )
+        for name, mine, other in pairs:
+            if mine and other and mine != other:
+                raise DataError(
+                    f"the calibration is of {name} {mine}, the data are of {name} {other}",
+                    hint="calibrate this one: tomoskin calibrate touch",
+                )

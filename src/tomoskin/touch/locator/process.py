@@ -1,0 +1,126 @@
+"""Gaussian-process regression from several blocks of inputs to a place, by marginal likelihood."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg.lapack import dpotri
+from scipy.optimize import minimize
+
+from tomoskin.core import FloatArray
+
+_PRIOR = {"amplitude": (-2.0, 2.0), "length": (0.3, 1.0), "noise": (-3.5, 2.0)}
+"""Mean and deviation of the logarithm of each hyper-parameter."""
+
+_LEARNT_ON = 300
+"""Presses from which hyper-parameters are learnt; all of them make the answer."""
+
+_NOISE_FLOOR = 1e-6
+_STEPS = 40
+_FAILED = 1e10
+
+Distances = Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Process:
+    """A sum of products of squared-exponential kernels, one for each named block of inputs.
+
+    ``terms`` names the blocks of each product; ``logs`` holds, term by term, the logarithm of
+    the amplitude and of the lengths, and last that of the noise. ``weights`` (n, 2) is
+    (K + noise)⁻¹ targets; ``left_out`` (n, 2) what each press would be told without itself
+    (Rasmussen & Williams 2006, 5.12).
+    """
+
+    terms: tuple[tuple[str, ...], ...]
+    logs: FloatArray
+    weights: FloatArray
+    left_out: FloatArray
+
+    @classmethod
+    def of(cls, terms: Sequence[tuple[str, ...]], squares: Distances, targets: FloatArray) -> Self:
+        """Fit ``targets`` (n, 2), of order one, from squared distances (n, n) of each block."""
+        terms = tuple(terms)
+        n = len(targets)
+        chosen = np.unique(np.linspace(0, n - 1, min(n, _LEARNT_ON)).astype(int))
+        few = {name: square[np.ix_(chosen, chosen)] for name, square in squares.items()}
+        logs = _learn(terms, few, targets[chosen])
+        kernel = _kernel(terms, logs, squares)
+        kernel[np.diag_indices(n)] += _noise(logs)
+        factor = cho_factor(kernel, lower=True, overwrite_a=True, check_finite=False)
+        weights = cho_solve(factor, targets, check_finite=False)
+        inverse, _ = dpotri(factor[0], lower=1, overwrite_c=0)
+        left_out = targets - weights / np.diag(inverse)[:, None]
+        return cls(terms, logs, weights, left_out)
+
+    def __call__(self, squares: Distances) -> FloatArray:
+        """(m, 2) answers for frames at squared distances (m, n) from the presses."""
+        return np.asarray(_kernel(self.terms, self.logs, squares) @ self.weights)
+
+
+def _noise(logs: FloatArray) -> float:
+    return float(np.exp(logs[-1])) + _NOISE_FLOOR
+
+
+def _products(
+    terms: Sequence[tuple[str, ...]], logs: FloatArray, squares: Distances
+) -> list[tuple[FloatArray, list[tuple[int, FloatArray]]]]:
+    """Each term's kernel, and the index of each of its lengths with its scaled distances."""
+    products, at = [], 0
+    for term in terms:
+        amplitude, lengths = np.exp(logs[at]), logs[at + 1 : at + 1 + len(term)]
+        parts = [np.exp(-2 * x) * squares[name] for x, name in zip(lengths, term, strict=True)]
+        kernel = amplitude * np.exp(-0.5 * sum(parts[1:], parts[0]))
+        products.append((kernel, [(at + 1 + i, part) for i, part in enumerate(parts)]))
+        at += 1 + len(term)
+    return products
+
+
+def _kernel(terms: Sequence[tuple[str, ...]], logs: FloatArray, squares: Distances) -> FloatArray:
+    kernels = [kernel for kernel, _ in _products(terms, logs, squares)]
+    return np.asarray(sum(kernels[1:], kernels[0]))
+
+
+def _learn(terms: Sequence[tuple[str, ...]], squares: Distances, targets: FloatArray) -> FloatArray:
+    kinds = [kind for term in terms for kind in ("amplitude", *("length" for _ in term))]
+    prior = np.array([_PRIOR[kind] for kind in (*kinds, "noise")])
+
+    def cost(logs: FloatArray) -> tuple[float, FloatArray]:
+        value, slope = _cost(terms, logs, squares, targets)
+        away = (logs - prior[:, 0]) / prior[:, 1]
+        return value + 0.5 * float(away @ away), slope + away / prior[:, 1]
+
+    bounds = [(m - 4 * s, m + 4 * s) for m, s in prior]
+    found = minimize(
+        cost, prior[:, 0], jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _STEPS}
+    )
+    return np.asarray(found.x)
+
+
+def _cost(
+    terms: Sequence[tuple[str, ...]], logs: FloatArray, squares: Distances, targets: FloatArray
+) -> tuple[float, FloatArray]:
+    """Negative log marginal likelihood and its slope (Rasmussen & Williams 2006, 5.9)."""
+    products = _products(terms, logs, squares)
+    n, q = targets.shape
+    kernel = sum((kernel for kernel, _ in products[1:]), products[0][0].copy())
+    kernel[np.diag_indices(n)] += _noise(logs)
+    slope = np.zeros(len(logs))
+    try:
+        factor = cho_factor(kernel, lower=True, check_finite=False)
+    except LinAlgError:
+        return _FAILED, slope
+    weights = cho_solve(factor, targets, check_finite=False)
+    pull = q * cho_solve(factor, np.eye(n), check_finite=False) - weights @ weights.T
+    for product, parts in products:
+        pulled = pull * product
+        slope[parts[0][0] - 1] = 0.5 * pulled.sum()
+        for index, part in parts:
+            slope[index] = 0.5 * float((pulled * part).sum())
+    slope[-1] = 0.5 * float(np.trace(pull)) * np.exp(logs[-1])
+    value = 0.5 * float((targets * weights).sum()) + q * float(np.log(np.diag(factor[0])).sum())
+    return value, slope

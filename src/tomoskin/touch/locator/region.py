@@ -1,0 +1,109 @@
+"""Where a touch may be: a polygon, its own unit of length, and a grid of places in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from tomoskin.core import DataError, FloatArray
+from tomoskin.skin import Skin
+
+_PLACES = 1500
+"""Places in the grid."""
+
+_CORNERS = 120
+"""Corners of a round outline."""
+
+_BEYOND = 1.5
+"""The hull of n presses is grown by this part of n^(−2/3): so far its edge lies inside."""
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """A polygon with the corners ``outline`` (k, 2) m.
+
+    Inside the locator a place is measured from ``centre`` in units of ``unit``, the radius of the
+    disc of the same area.
+    """
+
+    outline: FloatArray
+
+    @classmethod
+    def of(cls, skin: Skin) -> Self:
+        """The skin's outline."""
+        rim = skin.outline
+        return cls(rim.polyline(rim.length / _CORNERS))
+
+    @classmethod
+    def around(cls, xy: FloatArray) -> Self:
+        """The hull of presses (n, 2) m, grown by what their number leaves unseen.
+
+        Raises DataError when the presses lie on one line.
+        """
+        try:
+            hull = ConvexHull(xy)
+        except (QhullError, ValueError) as error:
+            raise DataError(
+                f"expected presses that are spread over the skin, got {len(xy)} on one line",
+                where="xy",
+            ) from error
+        corners = xy[hull.vertices]
+        middle = _centroid(corners)
+        return cls(middle + (1 + _BEYOND * len(xy) ** (-2 / 3)) * (corners - middle))
+
+    @cached_property
+    def centre(self) -> FloatArray:
+        """(2,) m centroid."""
+        return _centroid(self.outline)
+
+    @cached_property
+    def unit(self) -> float:
+        """Radius of the disc of the same area, m."""
+        return float(np.sqrt(abs(_area(self.outline)) / np.pi))
+
+    def scaled(self, xy: FloatArray) -> FloatArray:
+        """Places (n, 2) m in the locator's own unit."""
+        return np.asarray((xy - self.centre) / self.unit)
+
+    def metres(self, places: FloatArray) -> FloatArray:
+        """The reverse."""
+        return np.asarray(self.centre + self.unit * places)
+
+    def holds(self, xy: FloatArray) -> NDArray[np.bool_]:
+        """(n,) whether the places (n, 2) m are inside, by the even-odd rule."""
+        a, b = self.outline, np.roll(self.outline, -1, axis=0)
+        x, y = xy[:, 0, None], xy[:, 1, None]
+        crosses = (a[:, 1] > y) != (b[:, 1] > y)
+        rise = np.where(crosses, b[:, 1] - a[:, 1], 1.0)
+        left = x < (b[:, 0] - a[:, 0]) * (y - a[:, 1]) / rise + a[:, 0]
+        return np.asarray((crosses & left).sum(axis=1) % 2 == 1)
+
+    @cached_property
+    def grid(self) -> FloatArray:
+        """(g, 2) places in the locator's unit, on a hexagonal lattice."""
+        step = np.sqrt(2 * np.pi / (np.sqrt(3) * _PLACES))
+        corners = self.scaled(self.outline)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        x = np.arange(low[0], high[0] + step, step)
+        y = np.arange(low[1], high[1] + step, step * np.sqrt(3) / 2)
+        across, up = np.meshgrid(x, y)
+        across[1::2] += step / 2
+        places = np.column_stack([across.ravel(), up.ravel()])
+        return places[self.holds(self.metres(places))]
+
+
+def _area(corners: FloatArray) -> float:
+    x, y = corners.T
+    return float(0.5 * (x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+
+
+def _centroid(corners: FloatArray) -> FloatArray:
+    x, y = (corners - corners[0]).T
+    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
+    sums = [((v + np.roll(v, -1)) * cross).sum() for v in (x, y)]
+    return np.asarray(corners[0] + np.array(sums) / (3 * cross.sum()))
