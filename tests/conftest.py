@@ -70,6 +70,15 @@ def chromium(pytestconfig: pytest.Config) -> Path:
     return require_chromium(pytestconfig)
 
 
+@pytest.fixture(scope="session")
+def built_page(pytestconfig: pytest.Config) -> None:
+    """The page has been built; skip where it has not (under CI=true: fail)."""
+    from tomoskin.live import STATIC
+
+    if not (STATIC / "index.html").is_file():
+        missing(pytestconfig, "the page: it has not been built (make page)")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def no_network() -> Iterator[None]:
     """Let sockets reach this machine only."""

@@ -1,7 +1,6 @@
 """``tomoskin live`` as a program: its address, its end, and what it says when it cannot start."""
 
 import json
-import os
 import re
 import signal
 import socket
@@ -16,20 +15,12 @@ import numpy as np
 import pytest
 
 from tomoskin.core import Frame
-from tomoskin.live.server import STATIC
 from tomoskin.session import Mark, SessionReader, SessionWriter, session_info
 from tomoskin.skin import Skin
 
 COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]
 PATIENCE = 60
-
-
-@pytest.fixture(autouse=True)
-def built_page():
-    if not (STATIC / "index.html").is_file():
-        if os.environ.get("CI") == "true":
-            pytest.fail("the page must be built: make page", pytrace=False)
-        pytest.skip("the page has not been built: make page")
+pytestmark = pytest.mark.usefixtures("built_page")
 
 
 @pytest.fixture

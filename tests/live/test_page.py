@@ -1,17 +1,15 @@
 """The built page in real Chromium, on the real server and the twin."""
 
-import os
-
 import numpy as np
 import pytest
 from playwright.sync_api import sync_playwright
 
 from live.serving import Site
-from tomoskin.live import STATIC, Runner
+from tomoskin.live import Runner
 from tomoskin.session import session_info
 from tomoskin.source import open_source
 
-pytestmark = pytest.mark.page
+pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 
 ARGUMENTS = [
     "--no-sandbox",
@@ -30,14 +28,6 @@ READ = """() => {
     const { image, touches, truths, referenceReady, sequence } = window.tomoskin.last;
     return { image: [...image], touches, truths, referenceReady, sequence };
 }"""
-
-
-@pytest.fixture(scope="module", autouse=True)
-def built_page():
-    if not (STATIC / "index.html").is_file():
-        if os.environ.get("CI") == "true":
-            pytest.fail("the page must be built: make page", pytrace=False)
-        pytest.skip("the page has not been built: make page")
 
 
 @pytest.fixture(scope="module")
@@ -141,6 +131,7 @@ def distance(one, two):
 
 
 def test_it_loads_and_says_that_it_is_live(opened, prepared):
+    assert "(light-touch)" in opened.test_id("alpha").inner_text()
     state = opened.test_id("state")
     state.filter(has_text="Live").wait_for()
     assert "twin of textile-disc-8" in state.inner_text()

@@ -95,8 +95,14 @@ export function facts(status: Status | null): Fact[] {
   ];
 }
 
-/** Alpha of the pictures and what chose it, for the title of the skin. */
+/** Alpha of the pictures and what chose it. */
 export function alpha(status: Status): string {
+  const by = status.rule === "hand" ? "by hand" : status.rule;
+  return `alpha ${Number(status.alpha.toPrecision(2))} (${by})`;
+}
+
+/** The same in full, for a tooltip. */
+export function alphaInFull(status: Status): string {
   const by = status.rule === "hand" ? "set by hand" : `chosen by the rule ${status.rule}`;
-  return `alpha ${Number(status.alpha.toPrecision(3))}, ${by}`;
+  return `Weight of the prior, ${status.alpha.toPrecision(4)}, ${by}`;
 }

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { Scene, Status } from "../src/protocol";
 import { backOff, socketAddress } from "../src/socket";
-import { alpha, facts, sentence } from "../src/words";
+import { alpha, alphaInFull, facts, sentence } from "../src/words";
 
 const scene = { source: "twin of textile-disc-8" } as Scene;
 const status: Status = {
@@ -60,8 +60,11 @@ it("adds up what was lost and says what it was", () => {
 });
 
 it("says alpha and what chose it", () => {
-  expect(alpha(status)).toBe("alpha 0.0509, chosen by the rule light-touch");
-  expect(alpha({ ...status, alpha: 0.05, rule: "hand" })).toBe("alpha 0.05, set by hand");
+  expect(alpha(status)).toBe("alpha 0.051 (light-touch)");
+  expect(alphaInFull(status)).toBe("Weight of the prior, 0.05090, chosen by the rule light-touch");
+  const byHand = { ...status, alpha: 0.1, rule: "hand" };
+  expect(alpha(byHand)).toBe("alpha 0.1 (by hand)");
+  expect(alphaInFull(byHand)).toContain("set by hand");
 });
 
 it("waits longer after each failed try, up to a bound", () => {

@@ -1,7 +1,7 @@
 /** One line of state in words: what is shown, how it goes, and what someone must do. */
 
 import { connection, link, newest, notice, now, scene, status } from "../state";
-import { alpha, facts, sentence } from "../words";
+import { alpha, alphaInFull, facts, sentence } from "../words";
 
 function age(): number | null {
   return newest.count ? now.value - newest.arrived : null;
@@ -19,9 +19,10 @@ export function TopLine() {
       <p class="state" data-testid="state">
         <span class="lamp" aria-hidden="true" />
         <strong>{said.text}</strong>
-        {scene.value && !said.act && (
-          <span class="source" title={status.value ? alpha(status.value) : ""}>
-            {scene.value.source}
+        {scene.value && !said.act && <span class="source">{scene.value.source}</span>}
+        {status.value && !said.act && (
+          <span class="alpha" data-testid="alpha" title={alphaInFull(status.value)}>
+            {alpha(status.value)}
           </span>
         )}
         {notice.value && !said.act && <span class="notice">{notice.value}</span>}
