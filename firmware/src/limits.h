@@ -2,6 +2,7 @@
 #ifndef TOMOSKIN_LIMITS_H
 #define TOMOSKIN_LIMITS_H
 
+#include <assert.h>
 #include <stdint.h>
 
 #ifndef CHANNELS
@@ -21,6 +22,6 @@
 
 /* Bit e: channel e. */
 typedef uint16_t channel_set;
-_Static_assert(CHANNELS <= 16u, "channel_set has 16 bits");
+static_assert(CHANNELS <= 16u, "channel_set has 16 bits");
 
 #endif

@@ -1,0 +1,409 @@
+// The portable firmware on a watched machine: safety, scan, protocol.
+#include "machine.h"
+
+#include <gtest/gtest.h>
+
+namespace {
+
+uint32_t u32_at(const Bytes &b, size_t at) {
+    return static_cast<uint32_t>(b[at] | b[at + 1] << 8 | b[at + 2] << 16) |
+           static_cast<uint32_t>(b[at + 3]) << 24;
+}
+unsigned u16_at(const Bytes &b, size_t at) { return b[at] | static_cast<unsigned>(b[at + 1]) << 8; }
+uint8_t low(unsigned value) { return static_cast<uint8_t>(value & 0xFF); }
+uint8_t high(unsigned value) { return static_cast<uint8_t>(value >> 8 & 0xFF); }
+
+struct Drive {
+    uint8_t source, sink;
+    uint16_t mask;
+};
+
+class Board : public testing::Test {
+  protected:
+    static constexpr int kElectrodes = 8;
+    unsigned settling = 200, dead = 5, oversampling = 4;
+    std::vector<Drive> drives;
+    uint8_t request = 0;
+
+    void SetUp() override {
+        machine = Machine{};
+        machine.power_on();
+        for (int k = 0; k < kElectrodes; k++) {
+            auto source = static_cast<uint8_t>((k + 1) % kElectrodes);
+            auto sink = static_cast<uint8_t>(k);
+            drives.push_back({source, sink, static_cast<uint16_t>(0xFF & ~(1 << source | 1 << sink))});
+        }
+    }
+
+    void TearDown() override { EXPECT_EQ(machine.wrongs, std::vector<std::string>{}); }
+
+    // The messages of a type among what was sent.
+    static std::vector<Bytes> of(uint8_t type, const std::vector<Bytes> &all) {
+        std::vector<Bytes> found;
+        for (const Bytes &payload : all) {
+            if (!payload.empty() && payload[0] == type) {
+                found.push_back(payload);
+            }
+        }
+        return found;
+    }
+
+    unsigned ask(Bytes payload) {
+        payload.insert(payload.begin() + 1, ++request);
+        machine.say(payload);
+        machine.run_us(200);
+        auto acks = of(MSG_ACK, machine.heard());
+        EXPECT_EQ(acks.size(), 1u);
+        if (acks.empty()) {
+            return 999;
+        }
+        EXPECT_EQ(acks[0][AT_ACK_REQUEST], request);
+        EXPECT_EQ(acks[0][AT_ACK_COMMAND], payload[0]);
+        detail = u16_at(acks[0], AT_ACK_DETAIL);
+        return acks[0][AT_ACK_RESULT];
+    }
+    unsigned detail = 0;
+
+    unsigned set_scan(unsigned n_drives) {
+        machine.dead_ns = dead * uint64_t{1000};
+        return ask({MSG_SET_SCAN, 5, 0, low(n_drives), high(n_drives), low(settling), high(settling),
+                    low(settling >> 16), 0, low(dead), high(dead), low(oversampling), 64, 0xA0, 0x86,
+                    1, 0});
+    }
+    unsigned set_drive(unsigned number, Drive d) {
+        return ask({MSG_SET_PATTERN, 5, 0, low(number), high(number), d.source, d.sink, low(d.mask),
+                    high(d.mask), 0, 0});
+    }
+    unsigned start() { return ask({MSG_START, 5, 0}); }
+    void set_up() {
+        ASSERT_EQ(set_scan(static_cast<unsigned>(drives.size())), RESULT_OK);
+        for (unsigned k = 0; k < drives.size(); k++) {
+            ASSERT_EQ(set_drive(k, drives[k]), RESULT_OK);
+        }
+    }
+    void scan() {
+        set_up();
+        ASSERT_EQ(start(), RESULT_OK);
+    }
+    void expect_off() {
+        EXPECT_EQ(machine.source, -1);
+        size_t moves = machine.events.size();
+        machine.hang_us(1'000'000);
+        for (size_t k = moves; k < machine.events.size(); k++) {
+            EXPECT_EQ(machine.events[k].move, Machine::Move::kDisable);
+        }
+    }
+    void expect_fault(uint8_t code, unsigned what) {
+        auto faults = of(MSG_FAULT, machine.heard());
+        ASSERT_EQ(faults.size(), 1u);
+        EXPECT_EQ(faults[0][AT_FAULT_CODE], code);
+        EXPECT_EQ(u16_at(faults[0], AT_FAULT_DETAIL), what);
+    }
+    std::vector<unsigned> expected() const {
+        std::vector<unsigned> samples;
+        for (const Drive &d : drives) {
+            for (int e = 0; e < 16; e++) {
+                if (d.mask >> e & 1) {
+                    samples.push_back(oversampling * code_of(d.source, d.sink, e));
+                }
+            }
+        }
+        return samples;
+    }
+    void expect_frames(const std::vector<Bytes> &frames) {
+        auto wanted = expected();
+        for (size_t k = 0; k < frames.size(); k++) {
+            ASSERT_EQ(frames[k].size(), SIZE_FRAME + 2 * wanted.size());
+            EXPECT_EQ(u32_at(frames[k], AT_FRAME_SEQUENCE), k);
+            EXPECT_EQ(u16_at(frames[k], AT_FRAME_CONFIGURATION), 5u);
+            EXPECT_EQ(frames[k][AT_FRAME_FLAGS], k == 0 ? FLAG_FIRST : 0u);
+            for (size_t s = 0; s < wanted.size(); s++) {
+                ASSERT_EQ(u16_at(frames[k], SIZE_FRAME + 2 * s), wanted[s]) << "sample " << s;
+            }
+        }
+    }
+};
+
+TEST_F(Board, IsSafeFromResetOn) {
+    ASSERT_FALSE(machine.events.empty());
+    EXPECT_EQ(machine.events[0].move, Machine::Move::kDisable);
+    machine.run_us(3'000'000);
+    expect_off();
+}
+
+TEST_F(Board, SaysHelloEveryHalfSecondUntilSpokenTo) {
+    machine.run_us(1'900'000);
+    auto hellos = of(MSG_HELLO, machine.heard());
+    ASSERT_EQ(hellos.size(), 4u);
+    EXPECT_EQ(u32_at(hellos[0], AT_HELLO_SCHEMA_HASH), PROTOCOL_HASH);
+    EXPECT_EQ(ask({MSG_PING}), RESULT_OK);
+    machine.run_us(1'500'000);
+    EXPECT_TRUE(machine.heard().empty());
+}
+
+TEST_F(Board, FramesHoldWhatTheDrivesRead) {
+    scan();
+    machine.run_us(200'000);
+    auto frames = of(MSG_FRAME, machine.heard());
+    EXPECT_GT(frames.size(), 10u);
+    expect_frames(frames);
+}
+
+TEST_F(Board, AnyTableOfDrives) {
+    drives = {{3, 0, 0x0001}, {15, 7, 0xFFFF}, {0, 15, 0x8000}, {1, 2, 0}};
+    oversampling = 64;
+    settling = 0;
+    scan();
+    machine.run_us(500'000);
+    auto frames = of(MSG_FRAME, machine.heard());
+    EXPECT_GT(frames.size(), 3u);
+    expect_frames(frames);
+}
+
+TEST_F(Board, ASettlingTimeIsKept) {
+    settling = 20'000;
+    drives = {{1, 0, 4}, {2, 0, 2}};
+    scan();
+    machine.run_us(100'000);
+    auto frames = of(MSG_FRAME, machine.heard());
+    ASSERT_GE(frames.size(), 2u);
+    uint32_t period = u32_at(frames[1], AT_FRAME_TICKS) - u32_at(frames[0], AT_FRAME_TICKS);
+    double wanted_us = 2 * (20'000 + 4 * 52 + 5);
+    EXPECT_NEAR(period * 4.0, wanted_us, 40);
+    EXPECT_GE(machine.longest_on_ns, 20'000'000u);
+}
+
+TEST_F(Board, DeadTimesOfAllLengths) {
+    for (unsigned us : {0u, 1u, 50u, 51u, 3000u}) {
+        SCOPED_TRACE(us);
+        machine.power_on();
+        dead = us;
+        scan();
+        machine.run_us(100'000);
+        EXPECT_GE(of(MSG_FRAME, machine.heard()).size(), 2u);
+        EXPECT_EQ(machine.wrongs, std::vector<std::string>{});
+    }
+}
+
+TEST_F(Board, StopSwitchesOffAtOnce) {
+    scan();
+    machine.run_us(7'777);
+    EXPECT_EQ(ask({MSG_STOP}), RESULT_OK);
+    expect_off();
+    machine.heard();
+    EXPECT_EQ(start(), RESULT_OK);
+    machine.run_us(50'000);
+    expect_frames(of(MSG_FRAME, machine.heard()));
+}
+
+TEST_F(Board, SafeOffForgets) {
+    scan();
+    EXPECT_EQ(ask({MSG_SAFE_OFF}), RESULT_OK);
+    expect_off();
+    EXPECT_EQ(start(), RESULT_WRONG_CONFIGURATION);
+}
+
+TEST_F(Board, HostSilenceSwitchesOff) {
+    scan();
+    machine.run_us(1'990'000, 1000);
+    EXPECT_NE(of(MSG_FRAME, machine.heard()).size(), 0u);
+    machine.run_us(20'000, 1000);
+    auto all = machine.heard();
+    EXPECT_EQ(of(MSG_FAULT, all).size(), 1u);
+    EXPECT_EQ(of(MSG_FAULT, all)[0][AT_FAULT_CODE], FAULT_HOST_SILENT);
+    EXPECT_EQ(of(MSG_HELLO, all).size(), 1u);
+    expect_off();
+}
+
+TEST_F(Board, PingKeepsItAlive) {
+    scan();
+    for (int k = 0; k < 8; k++) {
+        machine.run_us(500'000, 1000);
+        machine.heard();
+        ASSERT_EQ(ask({MSG_PING}), RESULT_OK);
+    }
+    EXPECT_EQ(of(MSG_FAULT, machine.heard()).size(), 0u);
+}
+
+TEST_F(Board, DirtDoesNotKeepItAlive) {
+    scan();
+    for (int k = 0; k < 25; k++) {
+        machine.run_us(100'000, 1000);
+        machine.say_raw({1, 2, 3, 0});
+        machine.say({0x55, 1});
+    }
+    expect_off();
+}
+
+TEST_F(Board, AConverterThatHangsIsAFault) {
+    scan();
+    machine.run_us(1'000);
+    machine.heard();
+    machine.converter_works = false;
+    machine.run_us(30'000);
+    EXPECT_EQ(machine.source, -1);
+    auto faults = of(MSG_FAULT, machine.heard());
+    ASSERT_EQ(faults.size(), 1u);
+    EXPECT_EQ(faults[0][AT_FAULT_CODE], FAULT_CONVERTER);
+    expect_off();
+}
+
+TEST_F(Board, ATimerThatHangsDoesNotLeaveTheCurrentOn) {
+    machine.timer_works = false;
+    scan();
+    machine.run_us(5'000);
+    expect_fault(FAULT_CURRENT_TOO_LONG, 0);
+    expect_off();
+    EXPECT_LT(machine.longest_on_ns, 10'000'000u);
+}
+
+TEST_F(Board, OnlyTheMainLoopKicksTheWatchdog) {
+    scan();
+    uint64_t before = machine.kicked_ns;
+    machine.hang_us(300'000);
+    EXPECT_EQ(machine.kicked_ns, before);
+    machine.run_us(100);
+    EXPECT_GT(machine.kicked_ns, before);
+}
+
+TEST_F(Board, CausesOfAResetAreToldAsFaults) {
+    machine.reset_cause = RESET_WATCHDOG;
+    machine.power_on();
+    machine.run_us(1000);
+    expect_fault(FAULT_WATCHDOG, 0);
+    machine.reset_cause = RESET_BROWN_OUT;
+    machine.power_on();
+    machine.run_us(1000);
+    expect_fault(FAULT_BROWN_OUT, 0);
+}
+
+TEST_F(Board, SourceAndSinkAreNeverTheSame) {
+    ASSERT_EQ(set_scan(2), RESULT_OK);
+    EXPECT_EQ(set_drive(1, {3, 3, 1}), RESULT_SAME_ELECTRODE);
+    EXPECT_EQ(detail, 1u);
+    EXPECT_FALSE(switches_set(3, 3, 0));
+    EXPECT_FALSE(switches_set(16, 3, 0));
+    EXPECT_FALSE(switches_set(3, 16, 0));
+    EXPECT_FALSE(switches_set(SWITCHES_OFF, 3, 0));
+    EXPECT_EQ(machine.source, -1);
+}
+
+TEST_F(Board, RefusesWhatItCannotDo) {
+    EXPECT_EQ(set_scan(129), RESULT_TOO_MANY_DRIVES);
+    EXPECT_EQ(set_scan(0), RESULT_BAD_VALUE);
+    ASSERT_EQ(set_scan(3), RESULT_OK);
+    EXPECT_EQ(set_drive(0, {16, 3, 1}), RESULT_NO_SUCH_CHANNEL);
+    EXPECT_EQ(set_drive(3, {1, 0, 1}), RESULT_BAD_VALUE);
+    EXPECT_EQ(set_drive(1, {1, 0, 1}), RESULT_OK);
+    EXPECT_EQ(start(), RESULT_INCOMPLETE);
+    EXPECT_EQ(detail, 0u);
+    EXPECT_EQ(ask({MSG_SET_BAUD, 1, 0, 0, 0}), RESULT_BAD_VALUE);
+    EXPECT_EQ(ask({MSG_SET_HEARTBEAT, 99, 0}), RESULT_BAD_VALUE);
+    EXPECT_EQ(ask({MSG_START, 5}), RESULT_BAD_LENGTH);
+    EXPECT_EQ(ask({0x55, 5}), RESULT_UNKNOWN_COMMAND);
+    machine.current = 100'001;
+    EXPECT_EQ(set_scan(3), RESULT_CURRENT_TOO_HIGH);
+}
+
+TEST_F(Board, TooManySamplesAreRefused) {
+    drives.assign(26, {1, 0, 0xFFFF});
+    set_up();
+    EXPECT_EQ(start(), RESULT_TOO_MANY_SAMPLES);
+    EXPECT_EQ(detail, MOST_SAMPLES);
+}
+
+TEST_F(Board, BusyWhileScanning) {
+    scan();
+    EXPECT_EQ(set_scan(1), RESULT_BUSY);
+    EXPECT_EQ(start(), RESULT_BUSY);
+    EXPECT_EQ(ask({MSG_SET_BAUD, 0x20, 0xA1, 7, 0}), RESULT_BUSY);
+}
+
+TEST_F(Board, ARepeatedCommandIsAnsweredNotRun) {
+    scan();
+    machine.run_us(20'000);
+    machine.heard();
+    machine.say({MSG_START, request, 5, 0});
+    machine.run_us(200);
+    auto acks = of(MSG_ACK, machine.heard());
+    ASSERT_EQ(acks.size(), 1u);
+    EXPECT_EQ(acks[0][AT_ACK_RESULT], RESULT_OK);
+}
+
+TEST_F(Board, ASlowLineDropsWholeFramesAndCountsThem) {
+    scan();
+    for (int k = 0; k < 10; k++) {
+        machine.room = 0;  // the line stands still for eight frames or so
+        machine.run_us(100'000);
+        machine.room = 255;
+        machine.run_us(30'000);
+    }
+    auto frames = of(MSG_FRAME, machine.heard());
+    ASSERT_GT(frames.size(), 3u);
+    uint32_t expected_sequence = 0;
+    unsigned drops = 0;
+    for (const Bytes &frame : frames) {
+        uint32_t sequence = u32_at(frame, AT_FRAME_SEQUENCE);
+        EXPECT_GE(sequence, expected_sequence);
+        EXPECT_EQ((frame[AT_FRAME_FLAGS] & FLAG_DROPPED) != 0, sequence != expected_sequence);
+        drops += sequence - expected_sequence;
+        EXPECT_EQ(u16_at(frame, AT_FRAME_DROPS), drops);
+        expected_sequence = sequence + 1;
+    }
+    EXPECT_GT(drops, 10u);
+}
+
+TEST_F(Board, AFrameBeingSentOutlivesStopAndStart) {
+    scan();
+    machine.room = 1;
+    machine.run_us(9'000, 500);
+    machine.heard();
+    machine.room = 255;
+    EXPECT_EQ(ask({MSG_STOP}), RESULT_OK);
+    EXPECT_EQ(start(), RESULT_OK);
+    machine.run_us(30'000);
+    expect_frames(of(MSG_FRAME, machine.heard()));
+}
+
+TEST_F(Board, LongRunsWithoutZeroAreEnclosed) {
+    drives.assign(25, {15, 14, 0xFFFF});
+    oversampling = 63;
+    scan();
+    machine.run_us(6'000'000, 1000);
+    auto frames = of(MSG_FRAME, machine.heard());
+    ASSERT_GE(frames.size(), 1u);
+    expect_frames({frames[0]});
+}
+
+TEST_F(Board, ARateThatNobodyConfirmsIsGivenUp) {
+    ASSERT_EQ(ask({MSG_SET_BAUD, 0x20, 0xA1, 7, 0}), RESULT_OK);
+    EXPECT_EQ(machine.baud, 500'000u);
+    machine.run_us(990'000, 1000);
+    EXPECT_EQ(machine.baud, 500'000u);
+    machine.run_us(20'000, 1000);
+    EXPECT_EQ(machine.baud, FIRST_BAUD);
+    ASSERT_EQ(ask({MSG_SET_BAUD, 0x20, 0xA1, 7, 0}), RESULT_OK);
+    ASSERT_EQ(ask({MSG_PING}), RESULT_OK);
+    machine.run_us(1'500'000, 1000);
+    EXPECT_EQ(machine.baud, 500'000u);
+}
+
+TEST_F(Board, TheClockGoesOnBeyondThirtyTwoBits) {
+    machine.ns = (uint64_t{1} << 32) * 4000 - 5'000'000;
+    machine.run_us(1000);
+    scan();
+    machine.run_us(60'000);
+    auto frames = of(MSG_FRAME, machine.heard());
+    ASSERT_GT(frames.size(), 3u);
+    uint64_t before = 0;
+    for (const Bytes &frame : frames) {
+        uint64_t ticks = u32_at(frame, AT_FRAME_TICKS) |
+                         static_cast<uint64_t>(u32_at(frame, AT_FRAME_TICKS + 4)) << 32;
+        EXPECT_GT(ticks, before);
+        EXPECT_LT(ticks - (before != 0 ? before : ticks - 1), 100'000u);
+        before = ticks;
+    }
+    EXPECT_EQ(before >> 32, 1u);
+}
+
+}  // namespace

@@ -1,0 +1,146 @@
+"""The portable part under GoogleTest, its coverage and static analysis; and mutants of it.
+
+Each mutant is a mistake that hurts a skin or a measurement; a test that lets one live is no test.
+"""
+
+import json
+import os
+import subprocess
+
+import pytest
+
+from firmware.boards import FIRMWARE, ROOT
+from firmware.conftest import need
+
+BUILD = ROOT / "build" / "firmware"
+LEAST_LINES, LEAST_BRANCHES = 94.0, 80.0
+
+MUTANTS = {
+    "swapped demultiplexers": (
+        "switches.c",
+        "hal_switches_address(source, sink);",
+        "hal_switches_address(sink, source);",
+    ),
+    "swapped on both sides": (
+        "scan.c",
+        "switches_set(drive->source, drive->sink, dead_time)",
+        "switches_set(drive->sink, drive->source, dead_time)",
+    ),
+    "no dead time": (
+        "switches.c",
+        "hal_delay_us(dead_time > LEAST_DEAD_TIME_US ? dead_time : LEAST_DEAD_TIME_US);",
+        "(void)dead_time;",
+    ),
+    "the host's dead time forgotten": (
+        "switches.c",
+        "dead_time > LEAST_DEAD_TIME_US ? dead_time : LEAST_DEAD_TIME_US",
+        "LEAST_DEAD_TIME_US + 0u * dead_time",
+    ),
+    "no break": ("switches.c", "    hal_switches_disable();\n", ""),
+    "no latch": ("switches.c", "    hal_switches_latch();\n", ""),
+    "source = sink let through": ("switches.c", "source == sink || source", "source"),
+    "source = sink accepted": (
+        "config.c",
+        "if (source == sink)",
+        "if (source == sink && source > 9u)",
+    ),
+    "hang with current on": ("scan.c", "now - scan.since <= scan.allowed", "true"),
+    "a halt that leaves the current on": (
+        "scan.c",
+        "    switches_off();\n    scan.phase",
+        "    scan.phase",
+    ),
+    "a drive that is not ended": (
+        "scan.c",
+        "    switches_off();\n    scan.drive++",
+        "    scan.drive++",
+    ),
+    "host silence ignored": ("board.c", "if (board.hello_due ||", "if (true ||"),
+    "dirt counts as a host": (
+        "commands.c",
+        "RESULT_UNKNOWN_COMMAND, 0u);\n        return false;",
+        "RESULT_UNKNOWN_COMMAND, 0u);\n        return true;",
+    ),
+    "stuck sequence number": ("scan.c", "    scan.sequence++;\n", ""),
+    "drops not counted": ("scan.c", "(uint16_t)(scan.drops + 1u)", "scan.drops"),
+    "a frame overwritten while it is sent": ("scan.c", "        filling ^= 1u;\n", ""),
+    "the first conversion lost": (
+        "scan.c",
+        "scan.left = config.oversampling;",
+        "scan.left = (uint8_t)(config.oversampling - (config.oversampling > 1u));",
+    ),
+    "channels in the wrong order": (
+        "scan.c",
+        "hal_adc_start(scan.channel);\n    scan.left",
+        "hal_adc_start(scan.channel ^ 1u);\n    scan.left",
+    ),
+    "a command run twice": ("commands.c", "if (!again)", "if (true || !again)"),
+    "limiter not looked at": (
+        "config.c",
+        "hal_current() > get_u32",
+        "hal_current() > 1u + get_u32",
+    ),
+    "a rate never given up": ("board.c", "board.old_baud = board.baud;", "board.old_baud = 0u;"),
+    "checksum not looked at": ("framing.c", " || crc16(in->block, size) != 0u", ""),
+    "watchdog kicked by the scan": (
+        "scan.c",
+        "    switches_off();\n    scan.drive++",
+        "    hal_watchdog_kick();\n    switches_off();\n    scan.drive++",
+    ),
+    "settling cut short": (
+        "scan.c",
+        "scan.settling_ticks = ticks_of(config.settling)",
+        "scan.settling_ticks = ticks_of(config.settling / 2u)",
+    ),
+}
+
+
+def make(*arguments):
+    return subprocess.run(
+        ["make", "--silent", "-C", str(FIRMWARE), *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "MAKEFLAGS": ""},
+    )
+
+
+@pytest.fixture(scope="session")
+def googletest(pytestconfig):
+    need(pytestconfig, ["make", "cc", "c++", "gcovr"], "make g++ libgtest-dev gcovr")
+    made = make("coverage")
+    assert made.returncode == 0, made.stdout + made.stderr
+    return json.loads((BUILD / "coverage.json").read_text(encoding="utf-8"))
+
+
+def test_the_portable_part_passes_and_is_covered(googletest):
+    assert googletest["line_percent"] >= LEAST_LINES
+    assert googletest["branch_percent"] >= LEAST_BRANCHES
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_mutant_is_caught(name, googletest, tmp_path):
+    assert googletest
+    file, old, new = MUTANTS[name]
+    text = (FIRMWARE / "src" / file).read_text(encoding="utf-8")
+    assert text.count(old) == 1, f"{name}: its place is gone or not the only one"
+    mutant, program = tmp_path / file, tmp_path / "mutant"
+    mutant.write_text(text.replace(old, new), encoding="utf-8")
+    with_object = f"OBJECT={file[:-2]}.o"
+    built = make("mutant", f"MUTANT={mutant}", f"PROGRAM={program}", with_object)
+    assert built.returncode == 0, built.stderr
+    tests = "Framing" if file == "framing.c" else "Board"
+    ran = subprocess.run(
+        [program, "--gtest_brief=1", f"--gtest_filter={tests}.*"],
+        capture_output=True,
+        check=False,
+        timeout=60,
+        env={**os.environ, "GCOV_PREFIX": str(tmp_path)},
+    )
+    assert ran.returncode != 0, f"nothing noticed: {name}"
+
+
+def test_static_analysis_finds_nothing(pytestconfig):
+    need(pytestconfig, ["make", "cppcheck"], "make cppcheck")
+    checked = make("cppcheck")
+    assert checked.returncode == 0, checked.stderr
