@@ -14,7 +14,18 @@ from typing import Annotated, NoReturn
 import typer
 
 from tomoskin import __version__
-from tomoskin.cli import bench, doctor, image, live, record, session, simulate, skin
+from tomoskin.cli import (
+    bench,
+    calibrate,
+    doctor,
+    image,
+    live,
+    locate,
+    record,
+    session,
+    simulate,
+    skin,
+)
 from tomoskin.core import TomoskinError
 
 DEBUG = "TOMOSKIN_DEBUG"
@@ -30,6 +41,8 @@ app = typer.Typer(
 app.command("live")(live.live)
 app.command("record")(record.record)
 app.command("image")(image.image)
+app.add_typer(calibrate.app, name="calibrate")
+app.command("locate")(locate.locate)
 app.command("simulate")(simulate.simulate)
 app.command("bench")(bench.bench)
 app.add_typer(session.app, name="session")

@@ -2,6 +2,7 @@
 
 from tomoskin.session.alpha_picture import write_choices
 from tomoskin.session.blocks import Rows, all_blocks
+from tomoskin.session.calibration import Calibration, read_calibration, write_calibration
 from tomoskin.session.display import Display, circular_average
 from tomoskin.session.exports.hdf5 import write_hdf5
 from tomoskin.session.exports.matlab import write_matlab
@@ -32,6 +33,7 @@ from tomoskin.session.writer import SessionWriter
 __all__ = [
     "FILMS",
     "MOST_PANELS",
+    "Calibration",
     "Display",
     "Lost",
     "Mark",
@@ -55,6 +57,7 @@ __all__ = [
     "open_replay",
     "parse_replay",
     "plot",
+    "read_calibration",
     "read_recording",
     "read_session",
     "recording_of",
@@ -62,6 +65,7 @@ __all__ = [
     "repair",
     "session_info",
     "shard_path",
+    "write_calibration",
     "write_choices",
     "write_csv",
     "write_hdf5",

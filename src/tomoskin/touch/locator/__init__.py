@@ -1,6 +1,8 @@
 """Where a touch is, learnt from labelled presses."""
 
 from tomoskin.touch.locator.locator import Locator
+from tomoskin.touch.locator.presses import Presses
+from tomoskin.touch.locator.region import Region
 from tomoskin.touch.locator.review import Remark
 
-__all__ = ["Locator", "Remark"]
+__all__ = ["Locator", "Presses", "Region", "Remark"]

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from tomoskin.core import DataError, FloatArray
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
-from tomoskin.touch.locator.doubt import Doubt, dispute_of
+from tomoskin.touch.locator.doubt import NINE_IN_TEN, Doubt, dispute_of, squared_lengths
 from tomoskin.touch.locator.features import Features
 from tomoskin.touch.locator.held_out import Estimates
 from tomoskin.touch.locator.presses import Presses, frames
@@ -44,6 +44,8 @@ class Locator:
         Where a touch may be: the skin, or where the presses were.
     pattern_id, skin_id
         Identity of the pattern and the skin, "" where they are not known.
+    held
+        Part of the presses that lie in their own 90 % ellipse when they are left out.
     remarks
         Labels that the other presses contradict.
     """
@@ -57,6 +59,7 @@ class Locator:
     stack: Stack
     doubt: Doubt
     power: Strength
+    held: float
     remarks: tuple[Remark, ...]
 
     @classmethod
@@ -97,11 +100,22 @@ class Locator:
             frames(presses.dv, table.n_meas)
         region = Region.of(skin) if skin else Region.around(presses.xy)
         identities = table.identity if table else "", skin.identity if skin else ""
-        with threadpool_limits(1):  # many small products: more threads only wait for each other
-            return cls._learn(presses.within(region), region, identities, progress)
+        return cls.learn(presses.within(region), region, identities, progress)
 
     @classmethod
-    def _learn(
+    def learn(
+        cls,
+        presses: Presses,
+        region: Region,
+        identities: tuple[str, str] = ("", ""),
+        progress: Advance = _silent,
+    ) -> Self:
+        """Learn from checked presses in a region; ``identities`` of pattern and skin."""
+        with threadpool_limits(1):  # many small products: more threads only wait for each other
+            return cls._learnt(presses, region, identities, progress)
+
+    @classmethod
+    def _learnt(
         cls, presses: Presses, region: Region, identities: tuple[str, str], progress: Advance
     ) -> Self:
         places = region.scaled(presses.xy)
@@ -115,6 +129,7 @@ class Locator:
         dispute = dispute_of(stack.left_out_told, stack.left_out)
         doubt = Doubt.of(stack.left_out - places, estimates.left_out_spread, dispute)
         covariance = doubt(estimates.left_out_spread, dispute)
+        held = float(np.mean(squared_lengths(stack.left_out - places, covariance) < NINE_IN_TEN))
         remarks = (
             *twins(data, places, region.unit),
             *outliers(stack.left_out, places, covariance, region.unit),
@@ -122,7 +137,9 @@ class Locator:
         progress(3, _STEPS)
         power = Strength.of(presses, stack.left_out)
         progress(_STEPS, _STEPS)
-        return cls(presses, region, *identities, features, estimates, stack, doubt, power, remarks)
+        return cls(
+            presses, region, *identities, features, estimates, stack, doubt, power, held, remarks
+        )
 
     def predict(self, dv: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Place (n, 2) m and its covariance (n, 2, 2) m² for frames (n, n_meas).
@@ -152,9 +169,8 @@ class Locator:
         more = Presses.of_more(dv, xy, strength)
         presses = self.presses.and_then(more)
         region = self.region if self.skin_id else Region.around(presses.xy)
-        with threadpool_limits(1):
-            identities = self.pattern_id, self.skin_id
-            return self._learn(presses.within(region), region, identities, _silent)
+        identities = self.pattern_id, self.skin_id
+        return self.learn(presses.within(region), region, identities)
 
     @property
     def errors(self) -> FloatArray:
@@ -163,6 +179,12 @@ class Locator:
             self.region.unit
             * np.linalg.norm(self.stack.left_out - self.region.scaled(self.presses.xy), axis=1)
         )
+
+    @property
+    def drift(self) -> float:
+        """How many times as far as usual the last eighth of the presses is missed (medians)."""
+        errors = self.errors
+        return float(np.median(errors[-max(len(errors) // 8, 5) :]) / np.median(errors))
 
     def next_place(self) -> FloatArray:
         """(2,) m where the next labelled press tells most: the maps are least certain there."""

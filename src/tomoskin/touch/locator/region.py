@@ -56,6 +56,14 @@ class Region:
         middle = _centroid(corners)
         return cls(middle + (1 + _BEYOND * len(xy) ** (-2 / 3)) * (corners - middle))
 
+    @classmethod
+    def checked(cls, outline: FloatArray) -> Self:
+        """The polygon; DataError unless it has three finite corners that enclose something."""
+        good = outline.ndim == 2 and outline.shape[1:] == (2,) and len(outline) >= 3
+        if not good or not np.isfinite(outline).all() or not abs(_area(outline)) > 0:
+            raise DataError("expected an outline of at least three corners around an area")
+        return cls(outline)
+
     @cached_property
     def centre(self) -> FloatArray:
         """(2,) m centroid."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.touch.locator.doubt import squared_lengths
 from tomoskin.touch.locator.kernel import squared_distances
 
 _SAME = 1e-6
@@ -46,9 +47,8 @@ def outliers(
 ) -> list[Remark]:
     """Presses that lie far from where the others say they are: ``told`` (n, 2) left out."""
     error = told - places
-    solved = np.linalg.solve(covariance, error[:, :, None])[:, :, 0]
     length = np.linalg.norm(error, axis=1)
-    rows = np.flatnonzero(((error * solved).sum(axis=1) > _UNLIKELY) & (length > _FAR))
+    rows = np.flatnonzero((squared_lengths(error, covariance) > _UNLIKELY) & (length > _FAR))
     return [
         Remark(row, f"the others say that it was {1e3 * unit * length[row]:.0f} mm away")
         for row in rows.tolist()

@@ -1,0 +1,111 @@
+"""``tomoskin locate``: places of touches by a calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.progress import Bar
+from tomoskin.cli.recording import ReferenceOption, say_notes
+
+if TYPE_CHECKING:
+    from tomoskin.core import FloatArray, Touch
+    from tomoskin.session import Calibration, Recording
+
+_BLOCK = 256
+_SHOWN = 20
+
+
+def locate(
+    recording: Annotated[Path, typer.Argument(metavar="INPUT", help="Recording or .npz file.")],
+    calibration: Annotated[
+        Path, typer.Option(metavar="C.npz", help="From tomoskin calibrate touch.")
+    ],
+    touches: Annotated[
+        Path | None, typer.Option(metavar="X.csv", help="Where the touches go.")
+    ] = None,
+    skin: Annotated[
+        str | None, typer.Option(help="Built-in name or path: refused unless calibrated on it.")
+    ] = None,
+    reference: ReferenceOption = None,
+    json: JsonFlag = False,
+) -> None:
+    """Locate the one touch in every frame by a calibration."""
+    from tomoskin.cli.labelled import changes
+    from tomoskin.session import read_calibration, read_recording, write_touches
+
+    with Bar("learning") as bar:
+        known = read_calibration(calibration, bar)
+    whole = read_recording(recording)
+    say_notes(whole)
+    _check_skin(known, skin, recording)
+    whole = whole.in_order_of(known.pattern)
+    dv = changes(whole, reference, known.pattern)
+    frames = np.flatnonzero(np.isfinite(dv[:, known.locator.features.rows]).any(axis=1))
+    if len(frames) < len(dv):
+        typer.echo(
+            f"tomoskin: {recording}: {len(dv) - len(frames)} frames hold no finite value "
+            "and were left out",
+            err=True,
+        )
+    found = list(_touches(known, dv[frames]))
+    if touches is not None:
+        rows = zip(frames.tolist(), found, strict=True)
+        write_touches(touches, ((k, float(whole.time[k]), (t,)) for k, t in rows))
+    _report(whole, frames.tolist(), found, json=json)
+
+
+def _check_skin(known: Calibration, name: str | None, path: Path) -> None:
+    from tomoskin.cli.skin_choice import skin_for_file
+    from tomoskin.session import is_session
+
+    if name is not None or is_session(path):
+        known.locator.check(skin=skin_for_file(name, path))
+
+
+def _touches(known: Calibration, dv: FloatArray) -> Iterator[Touch]:
+    from tomoskin.core import Reading, Touch
+
+    locator = known.locator
+    for start in range(0, len(dv), _BLOCK):
+        part = dv[start : start + _BLOCK]
+        places, covariance = locator.predict(part)
+        deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        strength = locator.strength(part)
+        for place, sd, peak in zip(places, deviation, strength, strict=True):
+            (x, y), (sd_x, sd_y) = place.tolist(), sd.tolist()
+            nothing = np.empty(0, dtype=np.int64)
+            reading = Reading(x, y, sd_x, sd_y, area=np.nan, peak=float(peak), cells=nothing)
+            yield Touch(id=1, kind="touch", since=0.0, reading=reading)
+
+
+def _report(whole: Recording, frames: list[int], found: list[Touch], *, json: bool) -> None:
+    if json:
+        emit(
+            [
+                {
+                    "frame": frame,
+                    "time_s": float(whole.time[frame]),
+                    "x_m": touch.reading.x,
+                    "y_m": touch.reading.y,
+                    "sd_x_m": touch.reading.sd_x,
+                    "sd_y_m": touch.reading.sd_y,
+                    "strength": touch.reading.peak,
+                }
+                for frame, touch in zip(frames, found, strict=True)
+            ]
+        )
+        return
+    for frame, touch in list(zip(frames, found, strict=True))[:_SHOWN]:
+        r = touch.reading
+        typer.echo(
+            f"frame {frame:>4}  x {1e3 * r.x:+7.1f} ± {1e3 * r.sd_x:4.1f} mm  "
+            f"y {1e3 * r.y:+7.1f} ± {1e3 * r.sd_y:4.1f} mm  strength {r.peak:.2f}"
+        )
+    if len(found) > _SHOWN:
+        typer.echo(f"… and {len(found) - _SHOWN} frames more: --touches writes them all")

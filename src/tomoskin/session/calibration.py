@@ -1,0 +1,107 @@
+"""A calibration of touch as a file: the labelled presses, and what they were made on.
+
+Keys of the .npz: ``kind``, ``version``; ``dv`` (n, n_meas), ``xy_m`` (n, 2), optional ``strength``
+(n,); ``outline_m`` (k, 2); ``drive``, ``measure`` (n_meas, 2), ``n_electrodes``; ``pattern``,
+``skin`` identities, ``skin_name``. What was learnt is learnt again when the file is read, which
+gives the same locator: a file outlives the method.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tomoskin.core import DataError, PatternError
+from tomoskin.pattern import Pattern
+from tomoskin.session.archive import Arrays, load_arrays
+from tomoskin.session.interchange import electrode_table, real_numbers
+from tomoskin.touch import Locator, Presses, Region
+
+_KIND, _VERSION = "tomoskin touch calibration", 1
+_NEEDED = frozenset({"version", "dv", "xy_m", "outline_m", "drive", "measure", "n_electrodes"})
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A locator with the pattern of its rows and the name of its skin ("" where there is none)."""
+
+    locator: Locator
+    pattern: Pattern
+    skin_name: str = ""
+
+
+def write_calibration(path: Path, calibration: Calibration) -> None:
+    """Write the file whole or not at all. Raises DataError when it cannot be written."""
+    locator, pattern = calibration.locator, calibration.pattern
+    arrays: Arrays = {
+        "kind": np.array(_KIND),
+        "version": np.array(_VERSION),
+        "dv": locator.presses.dv,
+        "xy_m": locator.presses.xy,
+        "outline_m": locator.region.outline,
+        "drive": pattern.drive,
+        "measure": pattern.measure,
+        "n_electrodes": np.array(pattern.n_electrodes),
+        "pattern": np.array(locator.pattern_id),
+        "skin": np.array(locator.skin_id),
+        "skin_name": np.array(calibration.skin_name),
+    }
+    if locator.presses.strength is not None:
+        arrays["strength"] = locator.presses.strength
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        part = Path(name)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                np.savez_compressed(file, allow_pickle=False, **arrays)
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+
+
+def read_calibration(
+    path: Path, progress: Callable[[float, float], None] = lambda _done, _total: None
+) -> Calibration:
+    """Read the file and learn from its presses again.
+
+    Raises
+    ------
+    DataError
+        When it is missing, damaged, or no calibration of touch.
+    """
+    arrays, where = load_arrays(path), str(path)
+    if str(arrays.get("kind", "")) != _KIND or not set(arrays) >= _NEEDED:
+        raise DataError(
+            "is not a calibration of touch", where=where, hint="make one: tomoskin calibrate touch"
+        )
+    if _number(arrays, "version", where) != _VERSION:
+        raise DataError(f"expected version {_VERSION}, got {arrays['version']}", where=where)
+    drive, measure = (electrode_table(arrays, key, where) for key in ("drive", "measure"))
+    strength = real_numbers(arrays, "strength", where) if "strength" in arrays else None
+    try:
+        pattern = Pattern.from_tables(drive, measure, _number(arrays, "n_electrodes", where))
+        presses = Presses.of(
+            real_numbers(arrays, "dv", where), real_numbers(arrays, "xy_m", where), strength
+        )
+        region = Region.checked(real_numbers(arrays, "outline_m", where))
+        ids = (pattern.identity, str(arrays.get("skin", "")))
+        locator = Locator.learn(presses.within(region), region, ids, progress)
+    except (DataError, PatternError) as error:
+        raise DataError(error.message, where=f"{where}, {error.where}".rstrip(", ")) from error
+    if presses.dv.shape[1] != pattern.n_meas:
+        raise DataError(f"expected {pattern.n_meas} rows of dv", where=where)
+    return Calibration(locator, pattern, str(arrays.get("skin_name", "")))
+
+
+def _number(arrays: Arrays, key: str, where: str) -> int:
+    value = real_numbers(arrays, key, where)
+    if value.shape or not np.isfinite(value) or value != np.round(value):
+        raise DataError(f"expected one whole number as {key}", where=where)
+    return int(value)

@@ -1,0 +1,122 @@
+"""``tomoskin calibrate touch`` and ``tomoskin locate``."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from tomoskin.pattern import Pattern
+
+SKIN = "textile-disc-8"
+PATTERN = Pattern.adjacent(8)
+
+
+def frames(n, seed):
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform(-0.05, 0.05, (n, 2))
+    waves = np.random.default_rng(9).normal(scale=30.0, size=(2, PATTERN.n_meas))
+    return np.sin(xy @ waves) + 0.02 * rng.normal(size=(n, PATTERN.n_meas)), xy
+
+
+@pytest.fixture
+def presses(tmp_path):
+    dv, xy = frames(40, 0)
+    dv[7] = dv[2]
+    path = tmp_path / "presses.npz"
+    np.savez(path, dv=dv, xy_m=xy, drive=PATTERN.drive, measure=PATTERN.measure)
+    return path
+
+
+@pytest.fixture
+def touched(tmp_path):
+    """Other frames, as voltages, in another order of rows."""
+    dv, xy = frames(30, 1)
+    order = np.random.default_rng(0).permutation(PATTERN.n_meas)
+    path = tmp_path / "touched.npz"
+    reference = np.linspace(1, 2, PATTERN.n_meas)
+    np.savez(
+        path,
+        voltages=(reference + dv)[:, order],
+        reference=reference[order],
+        drive=PATTERN.drive[order],
+        measure=PATTERN.measure[order],
+    )
+    return path, xy
+
+
+def test_what_is_learnt_is_used(tomoskin, tmp_path, presses, touched):
+    calibration, table = tmp_path / "c.npz", tmp_path / "touches.csv"
+    code, out, err = tomoskin("calibrate", "touch", presses, "--skin", SKIN, "--out", calibration)
+    assert (code, err) == (0, "")
+    assert out.startswith("40 presses; left out")
+    assert "frame    7  doubtful: has the same data as press 2" in out
+    assert "next press" in out
+    path, xy = touched
+    code, out, err = tomoskin(
+        "locate", path, "--calibration", calibration, "--touches", table, "--skin", SKIN
+    )
+    assert (code, err) == (0, "")
+    assert "10 frames more" in out
+    with table.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    told = np.array([[float(row["x_m"]), float(row["y_m"])] for row in rows])
+    assert np.median(np.linalg.norm(told - xy, axis=1)) < 5e-3
+    assert all(float(row["sd_x_m"]) > 0 for row in rows)
+
+
+def test_for_programs(tomoskin, tmp_path, presses, touched):
+    calibration = tmp_path / "c.npz"
+    code, out, _ = tomoskin("calibrate", "touch", presses, "--out", calibration, "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert found["presses"] == 40
+    assert found["remarks"][0]["frame"] == 7
+    assert found["mean_mm"] >= found["median_mm"] > 0
+    assert 0.8 <= found["held_by_90_percent_ellipses"] <= 1
+    code, out, _ = tomoskin("locate", touched[0], "--calibration", calibration, "--json")
+    assert code == 0
+    assert len(json.loads(out)) == 30
+
+
+def test_frames_without_a_label_are_not_learnt_from(tomoskin, tmp_path):
+    dv, xy = frames(30, 0)
+    xy[10:20] = np.nan
+    path = tmp_path / "some.npz"
+    np.savez(path, dv=dv, xy_m=xy, drive=PATTERN.drive, measure=PATTERN.measure)
+    code, out, _ = tomoskin("calibrate", "touch", path, "--out", tmp_path / "c.npz")
+    assert code == 0
+    assert out.startswith("20 presses")
+
+
+def test_a_calibration_of_another_skin_is_refused(tomoskin, tmp_path, presses, touched):
+    calibration = tmp_path / "c.npz"
+    assert tomoskin("calibrate", "touch", presses, "--skin", SKIN, "--out", calibration)[0] == 0
+    code, _, err = tomoskin(
+        "locate", touched[0], "--calibration", calibration, "--skin", "textile-disc-16"
+    )
+    assert code == 1
+    assert "the calibration is of skin" in err
+    more = tmp_path / "sixteen.npz"
+    wide = Pattern.adjacent(16)
+    np.savez(more, dv=np.ones((3, wide.n_meas)), drive=wide.drive, measure=wide.measure)
+    code, _, err = tomoskin("locate", more, "--calibration", calibration)
+    assert code == 1
+    assert "E1 to E16" in err
+
+
+def test_what_holds_no_labels_or_wrong_ones_is_refused(tomoskin, tmp_path, presses, touched):
+    out = tmp_path / "c.npz"
+    code, _, err = tomoskin("calibrate", "touch", touched[0], "--out", out)
+    assert code == 1
+    assert "no labels" in err
+    with np.load(presses) as kept:
+        arrays = dict(kept)
+    np.savez(presses, **(arrays | {"xy_m": 1e3 * arrays["xy_m"]}))
+    code, _, err = tomoskin("calibrate", "touch", presses, "--skin", SKIN, "--out", out)
+    assert code == 1
+    assert "outside the skin" in err
+    assert not out.exists()
+    code, _, err = tomoskin("locate", presses, "--calibration", presses)
+    assert code == 1
+    assert "not a calibration" in err
