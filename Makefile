@@ -36,7 +36,7 @@ bench-docs: native  ## measure the forward engine anew into docs/benchmarks.md; 
 lint: dev page  ## ruff, mypy, the page's types, and the native engine's where Rust is installed
 	@$(PY) -m ruff check .
 	@$(PY) -m ruff format --check .
-	@$(PY) -m mypy
+	@$(PY) -m mypy src tests
 	@$(PY) scripts/page.py run check
 	@$(PY) scripts/native.py check
 

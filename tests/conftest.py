@@ -54,7 +54,8 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     seed = config.getoption("randomly_seed", None)
     if seed is not None:
         terminalreporter.write_line(f"to repeat this order: --randomly-seed={seed}")
-    for thing in sorted(config.stash[missing_things]):
+    things: set[str] = config.stash[missing_things]
+    for thing in sorted(things):
         terminalreporter.write_line(f"NOT TESTED: {thing}", yellow=True, bold=True)
 
 

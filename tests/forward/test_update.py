@@ -91,7 +91,7 @@ def test_transfer_resistance_stays_symmetric_and_centred(mesh: Mesh) -> None:
 
 def test_nothing_touched_is_the_base_state() -> None:
     base = state(disc())
-    for cells in ([], np.zeros(0, dtype=int)):
+    for cells in (list[int](), np.zeros(0, dtype=int)):
         assert np.array_equal(base.local.voltages(cells, []), base.solution.voltages)
 
 

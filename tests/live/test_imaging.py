@@ -17,6 +17,7 @@ from live.test_replay import Recorded, recorded_touches, same, touches_of
 from tomoskin.core import FloatArray, Frame
 from tomoskin.inverse import Temporal
 from tomoskin.live import Pipeline, Prepared, Result, prepare, replayed
+from tomoskin.live.imaging import Filtered
 from tomoskin.live.pipeline import REFERENCE_FRAMES
 from tomoskin.session import SessionReader
 from tomoskin.signal import difference
@@ -146,7 +147,9 @@ def test_the_floor_is_the_noise_of_the_filtered_images() -> None:
     pipeline = settled(filtered(), source)
     results = [shown(pipeline.push(make(False))) for make in islice(source, 3000)]
     images = np.array([r.image.values for r in results])[200:]
-    floor = pipeline._imaging._floor(np.inf)
+    stage = pipeline._imaging
+    assert isinstance(stage, Filtered)
+    floor = stage._floor(np.inf)
     alone = filtered().noise_floor(pipeline._reference)  # type: ignore[arg-type]
     ratio = images.std(axis=0) / floor.sd  # type: ignore[union-attr]
     # the reference tells each row's noise from 20 frames only: as far off as that, over all rows
