@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -150,6 +151,14 @@ class SessionReader:
     def device(self) -> dict[str, Any]:
         """What the board last said of itself; empty when it did not."""
         return self._last(channels.DEVICE)
+
+    @property
+    def tick_rate(self) -> float:
+        """Of the device's clock, Hz, as the board said; the skin's where it did not."""
+        said = self.device().get("tick_rate")
+        if isinstance(said, int | float) and 0 < said < math.inf:
+            return float(said)
+        return self.skin.readout.tick_rate
 
     def clock(self) -> dict[str, Any]:
         """The last fit of the device's clock."""
