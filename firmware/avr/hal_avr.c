@@ -1,0 +1,271 @@
+/* The machine as an ATmega2560 at 16 MHz: timer 1 counts ticks of 4 us (compare A: the scan's
+   timer, compare B: a wake-up every 10 ms), USART 0 the host, the converter one conversion at a
+   time, started in the interrupt of the one before. */
+#include "hal.h"
+
+#include "limits.h"
+#include "pins.h"
+#include "protocol.h"
+#include "scan.h"
+
+#include <avr/eeprom.h>
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/sleep.h>
+#include <avr/wdt.h>
+#include <util/delay_basic.h>
+
+#define WAKE_TICKS (10u * TICKS_PER_MS)
+#define SOON_TICKS 2u /* a compare nearer than this may be missed */
+#define SEND_SIZE 256u /* so that an index wraps by itself */
+#define RECEIVE_SIZE 128u
+
+/* Set by `tomoskin firmware flash`; an EEPROM that was never written reads 0xFF. */
+struct identity {
+    uint32_t current; /* uA */
+    uint8_t unique_id[8];
+};
+static EEMEM struct identity identity;
+
+static uint8_t reset_flags __attribute__((section(".noinit")));
+static volatile uint16_t ticks_high;
+static volatile bool awake;
+static uint8_t converter; /* ADCSRA without the start bit */
+
+static uint8_t to_send[SEND_SIZE];
+static volatile uint8_t send_first, send_end;
+static uint8_t received[RECEIVE_SIZE];
+static volatile uint8_t receive_first, receive_end;
+
+/* Before main: the enables low before anything is an output; the watchdog off that the bootloader
+   or the reset has left on. */
+void first_of_all(void) __attribute__((naked, used, section(".init3")));
+void first_of_all(void) {
+    CONTROL_PORT = LATCH;
+    CONTROL_DDR = ENABLES | LATCH;
+    reset_flags = MCUSR;
+    MCUSR = 0u;
+    wdt_disable();
+}
+
+void hal_init(void) {
+    ADDRESS_PORT = 0u;
+    ADDRESS_DDR = ADDRESS_MASK;
+    DIDR0 = 0xFFu; /* digital inputs off where potentials come in */
+    DIDR2 = 0xFFu;
+    TCCR1A = 0u;
+    TCCR1B = _BV(CS11) | _BV(CS10); /* 16 MHz / 64 */
+    OCR1B = WAKE_TICKS;
+    TIMSK1 = _BV(TOIE1) | _BV(OCIE1B);
+    hal_uart_set_baud(FIRST_BAUD);
+    UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
+    UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
+    SMCR = 0u; /* idle: timer, line and converter go on */
+    wdt_enable(WDTO_120MS);
+    sei();
+}
+
+uint8_t hal_reset_cause(void) {
+    if ((reset_flags & _BV(WDRF)) != 0u) {
+        return RESET_WATCHDOG;
+    }
+    if ((reset_flags & _BV(PORF)) != 0u) {
+        return RESET_POWER; /* power coming up sets the brown-out flag too */
+    }
+    if ((reset_flags & _BV(BORF)) != 0u) {
+        return RESET_BROWN_OUT;
+    }
+    return (reset_flags & _BV(EXTRF)) != 0u ? RESET_EXTERNAL : RESET_UNKNOWN;
+}
+
+void hal_unique_id(uint8_t *id) {
+    eeprom_read_block(id, identity.unique_id, sizeof identity.unique_id);
+}
+
+uint32_t hal_current(void) {
+    uint32_t current = eeprom_read_dword(&identity.current);
+    return current == UINT32_MAX ? BOARD_CURRENT_UA : current;
+}
+
+void hal_switches_disable(void) {
+    CONTROL_PORT = LATCH;
+}
+
+void hal_switches_address(uint8_t source, uint8_t sink) {
+    ADDRESS_PORT = (uint8_t)((source & 7u) | (uint8_t)((sink & 7u) << SINK_SHIFT));
+}
+
+void hal_switches_latch(void) {
+    CONTROL_PORT = 0u;
+    CONTROL_PORT = LATCH;
+}
+
+void hal_switches_enable(uint8_t source, uint8_t sink) {
+    CONTROL_PORT = (uint8_t)(LATCH | (source < 8u ? SOURCE_ENABLE_0 : SOURCE_ENABLE_8) |
+                             (sink < 8u ? SINK_ENABLE_0 : SINK_ENABLE_8));
+}
+
+uint32_t hal_ticks(void) {
+    uint8_t state = SREG;
+    cli();
+    uint16_t low = TCNT1;
+    uint16_t high = ticks_high;
+    if ((TIFR1 & _BV(TOV1)) != 0u && low < 0x8000u) {
+        high++; /* it has overflowed, and the interrupt has not run yet */
+    }
+    SREG = state;
+    return ((uint32_t)high << 16) | low;
+}
+
+void hal_delay_us(uint16_t us) {
+    while (us-- != 0u) {
+        _delay_loop_1(5); /* 15 cycles, and 4 for the loop */
+    }
+}
+
+void hal_timer_set(uint16_t ticks) {
+    OCR1A = (uint16_t)(TCNT1 + (ticks < SOON_TICKS ? SOON_TICKS : ticks));
+    TIFR1 = _BV(OCF1A);
+    TIMSK1 |= _BV(OCIE1A);
+}
+
+void hal_timer_cancel(void) {
+    TIMSK1 &= (uint8_t)~_BV(OCIE1A);
+}
+
+void hal_adc_prepare(uint8_t prescaler) {
+    uint8_t power = 4u;
+    for (uint8_t by = 16u; by != prescaler && power < 7u; power++) {
+        by = (uint8_t)(by << 1);
+    }
+    ADMUX = _BV(REFS0);
+    converter = (uint8_t)(_BV(ADEN) | _BV(ADIE) | power);
+    ADCSRA = (uint8_t)(converter | _BV(ADIF));
+}
+
+void hal_adc_start(uint8_t channel) {
+    ADCSRB = channel < 8u ? 0u : _BV(MUX5);
+    ADMUX = (uint8_t)(_BV(REFS0) | (channel & 7u));
+    ADCSRA = (uint8_t)(converter | _BV(ADSC));
+}
+
+void hal_adc_cancel(void) {
+    ADCSRA = _BV(ADIF); /* off: a conversion under way is dropped */
+}
+
+int16_t hal_uart_get(void) {
+    uint8_t at = receive_first;
+    if (at == receive_end) {
+        return -1;
+    }
+    uint8_t byte = received[at];
+    receive_first = (uint8_t)((at + 1u) % RECEIVE_SIZE);
+    return byte;
+}
+
+uint8_t hal_uart_room(void) {
+    return (uint8_t)(send_first - (uint8_t)(send_end + 1u));
+}
+
+void hal_uart_put(uint8_t byte) {
+    uint8_t end = send_end;
+    to_send[end] = byte;
+    send_end = (uint8_t)(end + 1u);
+    if ((UCSR0B & _BV(UDRIE0)) == 0u) {
+        UCSR0B |= _BV(UDRIE0);
+    }
+}
+
+bool hal_uart_sent(void) {
+    return send_first == send_end && (UCSR0A & _BV(UDRE0)) != 0u;
+}
+
+static uint16_t divider(uint32_t baud) {
+    return (uint16_t)((F_CPU / 8u + baud / 2u) / baud - 1u);
+}
+
+bool hal_uart_can(uint32_t baud) {
+    if (baud < 9600u || baud > FIRST_BAUD) {
+        return false;
+    }
+    uint32_t exact = F_CPU / 8u;
+    uint32_t off = exact % baud;
+    off = off > baud / 2u ? baud - off : off;
+    return off <= exact / 45u; /* 2.2 % */
+}
+
+void hal_uart_set_baud(uint32_t baud) {
+    UCSR0A = _BV(U2X0); /* before UBRR */
+    UBRR0 = divider(baud);
+}
+
+void hal_lock(void) {
+    cli();
+}
+
+void hal_unlock(void) {
+    sei();
+}
+
+void hal_wake(void) {
+    awake = true;
+}
+
+void hal_idle(void) {
+    cli();
+    while (!awake) {
+        SMCR = _BV(SE);
+        sei(); /* the next instruction still runs: no wake-up is lost */
+        sleep_cpu();
+        SMCR = 0u;
+        cli();
+    }
+    awake = false;
+    sei();
+}
+
+void hal_watchdog_kick(void) {
+    wdt_reset();
+}
+
+ISR(TIMER1_OVF_vect) {
+    ticks_high++;
+}
+
+ISR(TIMER1_COMPB_vect) {
+    OCR1B = (uint16_t)(OCR1B + WAKE_TICKS);
+    awake = true;
+}
+
+ISR(TIMER1_COMPA_vect) {
+    TIMSK1 &= (uint8_t)~_BV(OCIE1A);
+    scan_on_timer();
+}
+
+ISR(ADC_vect) {
+    scan_on_conversion(ADC);
+}
+
+ISR(USART0_RX_vect) {
+    uint8_t byte = UDR0;
+    uint8_t next = (uint8_t)((receive_end + 1u) % RECEIVE_SIZE);
+    if (next != receive_first) {
+        received[receive_end] = byte;
+        receive_end = next;
+    }
+    awake = true;
+}
+
+ISR(USART0_UDRE_vect) {
+    uint8_t at = send_first;
+    UDR0 = to_send[at];
+    at = (uint8_t)(at + 1u);
+    send_first = at;
+    uint8_t left = (uint8_t)(send_end - at);
+    if (left == 0u) {
+        UCSR0B &= (uint8_t)~_BV(UDRIE0);
+    }
+    if (left == SEND_SIZE / 4u) {
+        awake = true; /* time to encode more */
+    }
+}

@@ -1,0 +1,288 @@
+/* tomoskin-emulator [-s SKIN_MEMORY] [-c MICROAMPERES] [-l LINK] [-f] ELF: the firmware on a simulated
+   ATmega2560. Its switches and converter inputs are as in avr/pins.h; what they must never do is
+   said on stderr. -f: as fast as it goes, not in real time. */
+#include "skin.h"
+
+#include <avr_adc.h>
+#include <avr_eeprom.h>
+#include <avr_ioport.h>
+#include <avr_uart.h>
+#include <sim_avr.h>
+#include <sim_elf.h>
+#include <sim_io.h>
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <pty.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#define CLOCK 16000000ull
+#define SLICE 16000ull /* cycles between two looks at line and clock: 1 ms */
+#define LEAST_DEAD_CYCLES 16ull
+#define OFF 0xFFu
+
+/* Places in data space. */
+enum { PORT_A = 0x22, DDR_C = 0x27, PORT_C = 0x28, ADC_L = 0x78, ADC_H = 0x79, ADC_SRB = 0x7B, ADC_MUX = 0x7C };
+enum { SOURCE_0 = 1, SOURCE_8 = 2, SINK_0 = 4, SINK_8 = 8, LATCH = 16, MUX5 = 8 };
+
+static avr_t *avr;
+static const struct skin_memory *skin;
+static int line = -1;
+static bool fast;
+static avr_irq_t *line_input;
+static bool may_feed = true;
+static uint8_t address;       /* that the demultiplexers hold */
+static unsigned source = OFF; /* connected */
+static unsigned sink = OFF;
+static avr_cycle_count_t opened;
+static uint16_t code; /* of the conversion */
+static uint8_t out[4096];
+static size_t n_out;
+
+static _Noreturn void give_up(const char *what) {
+    (void)fprintf(stderr, "tomoskin-emulator: %s\n", what);
+    exit(1);
+}
+
+static void complain(const char *what) {
+    (void)fprintf(stderr, "cycle %llu: %s\n", (unsigned long long)avr->cycle, what);
+}
+
+static unsigned chosen(uint8_t low, uint8_t high, unsigned number, const char *both) {
+    uint8_t control = avr->data[PORT_C] & avr->data[DDR_C];
+    if ((control & low) != 0 && (control & high) != 0) {
+        complain(both);
+    }
+    return (control & low) != 0 ? number : (control & high) != 0 ? number + 8u : OFF;
+}
+
+static void on_control(struct avr_irq_t *irq, uint32_t value, void *unused) {
+    (void)irq;
+    (void)unused;
+    if ((value & LATCH) == 0) {
+        address = avr->data[PORT_A];
+    }
+    unsigned was_on = source != OFF || sink != OFF;
+    avr->data[PORT_C] = (uint8_t)value;
+    unsigned new_source = chosen(SOURCE_0, SOURCE_8, address & 7u, "two sources");
+    unsigned new_sink = chosen(SINK_0, SINK_8, address >> 3 & 7u, "two sinks");
+    if (new_source == source && new_sink == sink) {
+        return;
+    }
+    unsigned is_on = new_source != OFF || new_sink != OFF;
+    if (is_on && was_on) {
+        complain("make before break");
+    }
+    if (is_on && !was_on && opened != 0 && avr->cycle - opened < LEAST_DEAD_CYCLES) {
+        complain("dead time too short");
+    }
+    if (is_on && new_source == new_sink) {
+        complain("source = sink");
+    }
+    if (!is_on) {
+        opened = avr->cycle;
+    }
+    source = new_source;
+    sink = new_sink;
+}
+
+static void on_conversion(struct avr_irq_t *irq, uint32_t value, void *unused) {
+    (void)irq;
+    (void)value;
+    (void)unused;
+    unsigned channel = (avr->data[ADC_MUX] & 7u) | ((avr->data[ADC_SRB] & MUX5) != 0 ? 8u : 0u);
+    code = skin_code(skin, source, sink, channel);
+}
+
+static uint8_t read_code(struct avr_t *machine, avr_io_addr_t at, void *unused) {
+    (void)unused;
+    machine->data[at] = (uint8_t)(at == ADC_L ? code & 0xFF : code >> 8);
+    return machine->data[at];
+}
+
+static void on_output(struct avr_irq_t *irq, uint32_t value, void *unused) {
+    (void)irq;
+    (void)unused;
+    if (n_out < sizeof out) {
+        out[n_out++] = (uint8_t)value;
+    }
+}
+
+static void on_xon(struct avr_irq_t *irq, uint32_t value, void *flag) {
+    (void)irq;
+    (void)value;
+    may_feed = flag != NULL;
+}
+
+/* Nobody who reads: what does not fit is lost, as on a wire. At full speed the board waits. */
+static void flush_line(void) {
+    for (size_t done = 0; done < n_out;) {
+        ssize_t sent = write(line, out + done, n_out - done);
+        if (sent > 0) {
+            done += (size_t)sent;
+        } else if (!fast || errno != EAGAIN) {
+            break;
+        } else {
+            struct pollfd can = {line, POLLOUT, 0};
+            (void)poll(&can, 1, 1000);
+        }
+    }
+    n_out = 0;
+}
+
+static void feed_line(void) {
+    static uint8_t in[32];
+    static ssize_t n_in;
+    static ssize_t next;
+    if (next == n_in) {
+        n_in = read(line, in, sizeof in);
+        next = 0;
+        n_in = n_in > 0 ? n_in : 0;
+    }
+    while (next < n_in && may_feed) {
+        avr_raise_irq(line_input, in[next++]);
+    }
+}
+
+static void no_sleep(struct avr_t *machine, avr_cycle_count_t cycles) {
+    (void)machine;
+    (void)cycles;
+}
+
+static uint64_t now_ns(void) {
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000000000ull + (uint64_t)now.tv_nsec;
+}
+
+/* Wait until the wall clock is as far as the simulated one; time once lost is not caught up. */
+static void keep_pace(void) {
+    static uint64_t start;
+    static avr_cycle_count_t from;
+    uint64_t now = now_ns();
+    uint64_t due = start + (avr->cycle - from) * 125u / 2u;
+    if (start == 0 || now > due + 50000000u) {
+        start = now;
+        from = avr->cycle;
+    } else if (due > now) {
+        struct timespec nap = {0, (long)(due - now)};
+        (void)nanosleep(&nap, NULL);
+    }
+}
+
+static void open_line(const char *link_path) {
+    int terminal;
+    char name[128];
+    struct termios raw;
+    if (openpty(&line, &terminal, name, NULL, NULL) != 0) {
+        give_up("no pty");
+    }
+    (void)tcgetattr(terminal, &raw);
+    cfmakeraw(&raw);
+    (void)tcsetattr(terminal, TCSANOW, &raw);
+    (void)fcntl(line, F_SETFL, O_NONBLOCK);
+    if (link_path != NULL) {
+        (void)unlink(link_path);
+        if (symlink(name, link_path) != 0) {
+            give_up("the link cannot be made");
+        }
+    }
+    (void)printf("%s\n", link_path != NULL ? link_path : name);
+    (void)fflush(stdout);
+}
+
+static void set_identity(uint32_t current) {
+    uint8_t identity[12] = {0, 0, 0, 0, 'e', 'm', 'u', 'l', 'a', 't', 'e', 'd'};
+    for (int byte = 0; byte < 4; byte++) {
+        identity[byte] = (uint8_t)(current >> 8 * byte);
+    }
+    avr_eeprom_desc_t eeprom = {.ee = identity, .offset = 0, .size = sizeof identity};
+    (void)avr_ioctl(avr, AVR_IOCTL_EEPROM_SET, &eeprom);
+}
+
+static void say_errors(struct avr_t *machine, const int level, const char *format, va_list values) {
+    (void)machine;
+    if (level == LOG_ERROR) {
+        (void)vfprintf(stderr, format, values);
+    }
+}
+
+static void build_board(const char *path) {
+    elf_firmware_t firmware;
+    avr_global_logger_set(say_errors);
+    (void)memset(&firmware, 0, sizeof firmware);
+    if (elf_read_firmware(path, &firmware) != 0) {
+        give_up("the ELF cannot be read");
+    }
+    avr = avr_make_mcu_by_name("atmega2560");
+    if (avr == NULL || avr_init(avr) != 0) {
+        give_up("simavr has no atmega2560");
+    }
+    firmware.frequency = CLOCK;
+    avr_load_firmware(avr, &firmware);
+    avr->vcc = avr->avcc = avr->aref = 5000;
+    avr->sleep = no_sleep;
+    avr->log = LOG_ERROR;
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('C'), IOPORT_IRQ_REG_PORT),
+                            on_control, NULL);
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_OUT_TRIGGER),
+                            on_conversion, NULL);
+    avr->io[ADC_L - 32].r.c = read_code;
+    avr->io[ADC_H - 32].r.c = read_code;
+    uint32_t flags = 0;
+    (void)avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
+    line_input = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT),
+                            on_output, NULL);
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUT_XON), on_xon,
+                            &may_feed);
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUT_XOFF), on_xon,
+                            NULL);
+}
+
+int main(int count, char **arguments) {
+    const char *link = NULL;
+    uint32_t current = 100000;
+    skin = skin_star();
+    for (int option; (option = getopt(count, arguments, "s:c:l:f")) != -1;) {
+        if (option == 's') {
+            skin = skin_open(optarg);
+        } else if (option == 'c') {
+            current = (uint32_t)strtoul(optarg, NULL, 10);
+        } else if (option == 'l') {
+            link = optarg;
+        } else if (option == 'f') {
+            fast = true;
+        } else {
+            return 2;
+        }
+    }
+    if (optind + 1 != count) {
+        give_up("expected one ELF");
+    }
+    build_board(arguments[optind]);
+    set_identity(current);
+    open_line(link);
+    avr_cycle_count_t next = 0;
+    for (;;) {
+        int state = avr_run(avr);
+        if (state == cpu_Done || state == cpu_Crashed) {
+            give_up("the firmware has crashed");
+        }
+        if (avr->cycle >= next) {
+            next = avr->cycle + SLICE;
+            flush_line();
+            feed_line();
+            if (!fast) {
+                keep_pace();
+            }
+        }
+    }
+}
