@@ -89,6 +89,23 @@ def test_frames_without_a_label_are_not_learnt_from(tomoskin, tmp_path):
     assert out.startswith("20 presses")
 
 
+def test_presses_are_added_to_an_older_calibration(tomoskin, tmp_path, presses):
+    old, new = tmp_path / "old.npz", tmp_path / "new.npz"
+    assert tomoskin("calibrate", "touch", presses, "--skin", SKIN, "--out", old)[0] == 0
+    dv, xy = frames(3, 5)
+    few = tmp_path / "few.npz"
+    np.savez(few, dv=dv, xy_m=xy, drive=PATTERN.drive, measure=PATTERN.measure)
+    code, out, err = tomoskin("calibrate", "touch", few, "--onto", old, "--out", new)
+    assert (code, err) == (0, "")
+    assert out.startswith("43 presses")
+    assert "an older press  doubtful: has the same data as press 2" in out
+    code, _, err = tomoskin(
+        "calibrate", "touch", few, "--onto", old, "--out", new, "--skin", "textile-square-16"
+    )
+    assert code == 1
+    assert "the calibration is of skin" in err
+
+
 def test_a_calibration_of_another_skin_is_refused(tomoskin, tmp_path, presses, touched):
     calibration = tmp_path / "c.npz"
     assert tomoskin("calibrate", "touch", presses, "--skin", SKIN, "--out", calibration)[0] == 0

@@ -229,3 +229,25 @@ def test_a_hundred_presses_of_a_public_skin(data_dir: Path) -> None:
     error = told - xy[tested]
     assert np.linalg.norm(error, axis=1).mean() < 3.2e-3
     assert 0.82 < held(error, covariance) < 0.97
+
+
+@pytest.mark.data
+def test_a_few_presses_align_an_old_calibration_to_another_session(data_dir: Path) -> None:
+    """Two sessions of one kind of skin: 12 mm as it is, 18 mm from ten new presses alone."""
+    folder = data_dir / "eskin_hydrogel_round"
+    (old, there), (new, here) = (
+        _differences(folder / f"round16_{name}.npz") for name in ("single550", "single500_ohmc")
+    )
+    locator = Locator.fit(old[:200], there[:200])
+    asked, truth = new[200:300], here[200:300]
+    aligned = locator.updated(new[:10], here[:10])
+    before, after = (
+        np.linalg.norm(known.predict(asked)[0] - truth, axis=1).mean()
+        for known in (locator, aligned)
+    )
+    assert after < 0.75 * before
+
+
+def _differences(path: Path) -> tuple[Floats, Floats]:
+    with np.load(path) as kept:
+        return kept["v_down"].astype(float) - kept["v_up"], 1e-3 * kept["xy_mm"].astype(float)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,9 +15,12 @@ from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
 if TYPE_CHECKING:
+    from tomoskin.core import FloatArray
     from tomoskin.pattern import Pattern
     from tomoskin.session import Calibration, Recording
     from tomoskin.skin import Skin
+
+    Learn = Callable[[FloatArray, FloatArray], Calibration]
 
 app = typer.Typer(help="Learn from labelled presses.", no_args_is_help=True)
 
@@ -38,29 +43,63 @@ def touch(
         str | None,
         typer.Option(help="Built-in name or path; without it the rows are taken as they are."),
     ] = None,
+    onto: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="OLD.npz",
+            help="Calibration that these presses are added to: ten or twenty align it to today.",
+        ),
+    ] = None,
     reference: ReferenceOption = None,
     json: JsonFlag = False,
 ) -> None:
     """Learn where a touch is from presses at known places."""
     from tomoskin.cli.labelled import changes, labels
-    from tomoskin.session import Calibration, read_recording, write_calibration
-    from tomoskin.touch import Locator
+    from tomoskin.session import read_recording, write_calibration
 
     whole = read_recording(recording)
     say_notes(whole)
-    known, pattern = _what_of(skin, recording, whole)
+    learn, pattern = (
+        _onto(onto, skin, recording) if onto else _anew(*_what_of(skin, recording, whole))
+    )
     whole = whole.in_order_of(pattern)
     xy, dv = labels(whole), changes(whole, reference, pattern)
     frames = np.flatnonzero(np.isfinite(xy).all(axis=1))
-    with Bar("learning") as bar:
-        locator = Locator.fit(dv[frames], xy[frames], pattern=pattern, skin=known, progress=bar)
-    calibration = Calibration(locator, pattern, known.name if known else "")
+    calibration = learn(dv[frames], xy[frames])
     write_calibration(out, calibration)
     found = _findings(calibration, frames.tolist())
     if json:
         emit(found)
     else:
         _say(found)
+
+
+def _anew(skin: Skin | None, pattern: Pattern) -> tuple[Learn, Pattern]:
+    """What learns from these presses alone."""
+    from tomoskin.session import Calibration
+    from tomoskin.touch import Locator
+
+    def learn(dv: FloatArray, xy: FloatArray) -> Calibration:
+        with Bar("learning") as bar:
+            locator = Locator.fit(dv, xy, pattern=pattern, skin=skin, progress=bar)
+        return Calibration(locator, pattern, skin.name if skin else "")
+
+    return learn, pattern
+
+
+def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern]:
+    """What learns from these presses and those of an older calibration of the same skin."""
+    from tomoskin.cli.skin_choice import skin_for_file
+    from tomoskin.session import is_session, read_calibration
+
+    old = read_calibration(path)
+    if name is not None or is_session(recording):
+        old.locator.check(skin=skin_for_file(name, recording))
+
+    def learn(dv: FloatArray, xy: FloatArray) -> Calibration:
+        return replace(old, locator=old.locator.updated(dv, xy))
+
+    return learn, old.pattern
 
 
 def _what_of(name: str | None, path: Path, whole: Recording) -> tuple[Skin | None, Pattern]:
@@ -77,6 +116,7 @@ def _what_of(name: str | None, path: Path, whole: Recording) -> tuple[Skin | Non
 
 def _findings(calibration: Calibration, frames: list[int]) -> dict[str, Any]:
     locator = calibration.locator
+    older = len(locator.presses) - len(frames)
     errors = 1e3 * locator.errors
     x, y = (1e3 * locator.next_place()).tolist()
     return {
@@ -87,7 +127,10 @@ def _findings(calibration: Calibration, frames: list[int]) -> dict[str, Any]:
         "held_by_90_percent_ellipses": locator.held,
         "drift": locator.drift,
         "next_press_mm": [x, y],
-        "remarks": [{"frame": frames[r.row], "reason": r.reason} for r in locator.remarks],
+        "remarks": [
+            {"frame": frames[r.row - older] if r.row >= older else None, "reason": r.reason}
+            for r in locator.remarks
+        ],
     }
 
 
@@ -98,7 +141,9 @@ def _say(found: dict[str, Any]) -> None:
         f"and their 90 % ellipses hold {100 * found['held_by_90_percent_ellipses']:.0f} %"
     )
     for remark in found["remarks"][:_SHOWN]:
-        typer.echo(f"frame {remark['frame']:>4}  doubtful: {remark['reason']}")
+        frame = remark["frame"]
+        who = "an older press" if frame is None else f"frame {frame:>4}"
+        typer.echo(f"{who}  doubtful: {remark['reason']}")
     if len(found["remarks"]) > _SHOWN:
         typer.echo(f"… and {len(found['remarks']) - _SHOWN} more: --json lists them all")
     if found["drift"] > _DRIFTED:
