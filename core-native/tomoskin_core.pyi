@@ -43,6 +43,28 @@ class Factor:
         """Solution (n, k), C-contiguous, for ``rhs`` (n, k) of the matrix's type, any layout."""
 
 @final
+class Reference:
+    """faer's own Cholesky of a real matrix, for benchmarks: minimum degree, one thread."""
+
+    def __new__(
+        cls, n: int, indptr: NDArray[np.int32], indices: NDArray[np.int32], n_rhs: int
+    ) -> Reference:
+        """Analyse a structure as :class:`Symbolic` does, for ``n_rhs`` right-hand sides."""
+
+    @property
+    def factor_len(self) -> int:
+        """Number of values in faer's factor."""
+
+    def solve(self, values: NDArray[np.float64], rhs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Factorise the matrix with these values, and solve for ``rhs`` (n_rhs, n).
+
+        Raises
+        ------
+        ValueError
+            When the matrix is not positive definite.
+        """
+
+@final
 class Patches:
     """Changes of a state by touches, exact, from the inverse between the nodes of each rim."""
 

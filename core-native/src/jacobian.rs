@@ -7,10 +7,15 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::scalar::Scalar;
 use crate::threads::{Shared, split};
 
-/// Most cells of a block: one row's part and the fields of two pairs stay in the first cache.
-const CELLS: usize = 512;
-/// Bytes of all pairs' fields that stay in the second cache while the rows are written.
-const CACHE: usize = 512 * 1024;
+/// Least and most cells of a block.
+const CELLS: [usize; 2] = [64, 512];
+/// Bytes of all pairs' fields that stay in the first cache while the rows are written: of what is
+/// there at the same time, lines of the result that were fetched ahead take the rest.
+const CACHES: [usize; 2] = [24 * 1024, 16 * 1024];
+/// The lines of a larger result are fetched ahead: it lies in no cache of one core.
+const LARGE: usize = 8 << 20;
+/// Numbers in a line of the caches, at least; parts that begin with one are read faster.
+const LINE: usize = 8;
 /// Fewer cells than this are not worth a thread.
 const GRAIN: usize = 4096;
 
@@ -107,6 +112,7 @@ pub fn jacobian<T: Scalar>(fields: Fields<'_, T>, table: &Table, out: &mut [T], 
     if fields.shape[1] == 0 {
         return out.fill(T::ZERO);
     }
+    let far = size_of_val(out) > LARGE;
     let out = Shared::new(out);
     split(fields.shape[2], GRAIN, threads, |cells| {
         Arch::new().dispatch(Blocks {
@@ -114,6 +120,7 @@ pub fn jacobian<T: Scalar>(fields: Fields<'_, T>, table: &Table, out: &mut [T], 
             table,
             cells,
             out: &out,
+            far,
         });
     });
 }
@@ -123,22 +130,34 @@ struct Blocks<'a, T> {
     table: &'a Table,
     cells: Range<usize>,
     out: &'a Shared<T>,
+    far: bool,
 }
 
 impl<T: Scalar> WithSimd for Blocks<'_, T> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let per_cell = self.fields.shape[1] * self.table.pairs.len();
-        let size = (CACHE / (size_of::<T>() * per_cell.max(1))).clamp(64, CELLS);
-        let mut pairs = vec![T::ZERO; per_cell * size];
-        let mut driven = vec![T::ZERO; self.fields.shape[1] * size];
+        let room = CACHES[usize::from(self.far)] / size_of::<T>();
+        let size = (room / per_cell.max(1)).clamp(CELLS[0], CELLS[1]) & !(LINE - 1);
+        let n_driven = self.fields.shape[1] * size;
+        let mut scratch = vec![T::ZERO; per_cell * size + n_driven + LINE];
+        let begin = scratch
+            .as_ptr()
+            .align_offset(LINE * size_of::<T>())
+            .min(LINE);
+        let (pairs, rest) = scratch[begin..].split_at_mut(per_cell * size);
+        let driven = &mut rest[..n_driven];
         for begin in self.cells.clone().step_by(size) {
             let cells = begin..self.cells.end.min(begin + size);
-            self.pair_fields(&cells, size, &mut pairs);
+            self.pair_fields(&cells, size, pairs);
             for drive in &self.table.drives {
-                self.rows(drive, &cells, &pairs, &mut driven);
+                let unit = &pairs[drive.pair * driven.len()..][..driven.len()];
+                for (value, &unit) in driven.iter_mut().zip(unit) {
+                    *value = unit * drive.current;
+                }
+                self.rows(simd, drive, &cells, pairs, driven);
             }
         }
     }
@@ -159,21 +178,57 @@ impl<T: Scalar> Blocks<'_, T> {
         }
     }
 
+    /// Writes one drive's rows of a block, two at a time, which share what they read of the drive.
     #[inline(always)]
-    fn rows(&self, drive: &Drive, cells: &Range<usize>, pairs: &[T], driven: &mut [T]) {
-        let driven_len = driven.len();
-        let size = driven_len / self.fields.shape[1];
-        let field = |pair: usize| &pairs[pair * driven_len..][..driven_len];
-        for (value, &unit) in driven.iter_mut().zip(field(drive.pair)) {
-            *value = unit * drive.current;
+    fn rows<S: Simd>(
+        &self,
+        simd: S,
+        drive: &Drive,
+        cells: &Range<usize>,
+        pairs: &[T],
+        driven: &[T],
+    ) {
+        let size = driven.len() / self.fields.shape[1];
+        let field = |pair: usize| &pairs[pair * driven.len()..][..driven.len()];
+        let (twos, last) = drive.rows.as_chunks::<2>();
+        for &[(row, pair), (next, other)] in twos {
+            let targets = [self.target(row, cells), self.target(next, cells)];
+            two_products(simd, targets, driven, [field(pair), field(other)], size);
         }
-        for &(row, measured) in &drive.rows {
-            let at = row * self.fields.shape[2];
-            // SAFETY: each thread has cells of its own.
-            let target = unsafe { self.out.part(at + cells.start..at + cells.end) };
-            scalar_product(target, driven, field(measured), size);
+        for &(row, pair) in last {
+            scalar_product(self.target(row, cells), driven, field(pair), size);
         }
     }
+
+    /// A row's part of a block, to be written.
+    #[inline(always)]
+    #[allow(clippy::mut_from_ref)]
+    fn target(&self, row: usize, cells: &Range<usize>) -> &mut [T] {
+        let at = row * self.fields.shape[2];
+        if self.far {
+            let next = cells.end..self.cells.end.min(cells.end + cells.len());
+            self.out.fetch(at + next.start..at + next.end);
+        }
+        // SAFETY: each thread has cells of its own, and a row is written once.
+        unsafe { self.out.part(at + cells.start..at + cells.end) }
+    }
+}
+
+/// Two products at once; see [`scalar_product`].
+#[inline(always)]
+fn two_products<S: Simd, T: Scalar>(
+    simd: S,
+    [first, second]: [&mut [T]; 2],
+    a: &[T],
+    [b, c]: [&[T]; 2],
+    size: usize,
+) {
+    if a.len() != 2 * size {
+        scalar_product(first, a, b, size);
+        return scalar_product(second, a, c, size);
+    }
+    let ((x, y), (b0, b1), (c0, c1)) = (a.split_at(size), b.split_at(size), c.split_at(size));
+    T::two_sums(simd, [first, second], [x, y], [b0, b1, c0, c1]);
 }
 
 /// Sum over the components of products, cell by cell; each component has `size` cells.

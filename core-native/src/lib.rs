@@ -8,6 +8,7 @@ pub mod patch;
 mod patches;
 pub mod product;
 mod python;
+pub mod reference;
 pub mod residual;
 pub mod scalar;
 pub mod solve;

@@ -1,7 +1,7 @@
 //! Ordering of the unknowns and symbolic analysis: once per mesh.
 //!
-//! Minimum degree (faer's AMD) is quick, and nearly as good as nested dissection on sheets. Volumes
-//! fill in more: there nested dissection pays for itself within a few factorisations.
+//! Minimum degree (faer's AMD) is quick, and as good as nested dissection on small sheets. Large
+//! sheets and volumes fill in more: there nested dissection saves half of the work or more.
 
 use faer::Side;
 use faer::perm::PermRef;
@@ -17,9 +17,10 @@ use feral_ordering_core::CscPattern;
 /// Adjacent panels are merged up to this many columns with up to this part of zeros.
 const MERGE: &[(usize, f64)] = &[(2, 1.0), (8, 0.5), (32, 0.1), (usize::MAX, 0.02)];
 
-/// Multiplications per unknown in a factorisation above which nested dissection pays within a few:
-/// it takes as long as some 80 000 of them, and saves half or more of those on a volume.
-const COSTLY: f64 = 40_000.0;
+/// Multiplications per unknown in a factorisation from which nested dissection is tried: sheets of
+/// 50 000 triangles have some 3000. It takes 10 µs per unknown, which 20 solves on such a sheet, or
+/// 10 on a million triangles, win back.
+const COSTLY: f64 = 2000.0;
 
 /// Orders and analyses the structure of a symmetric matrix given in full, by columns.
 ///
@@ -96,7 +97,7 @@ fn dissect(size: usize, column_starts: &[u32], rows: &[u32]) -> Option<Vec<u32>>
 }
 
 /// Checks that the arrays hold the whole structure of a symmetric matrix, rows ascending.
-fn check(size: usize, column_starts: &[u32], rows: &[u32]) -> Result<(), String> {
+pub(crate) fn check(size: usize, column_starts: &[u32], rows: &[u32]) -> Result<(), String> {
     if size == 0 || column_starts.len() != size + 1 {
         return Err(format!(
             "expected indptr of length n + 1 with n > 0, got n = {size} and length {}",

@@ -30,7 +30,10 @@ impl<'a, V: Copy> Rows<'a, V> {
     /// # Errors
     /// When they are none.
     pub fn new(starts: &'a [i32], columns: &'a [i32], values: &'a [V]) -> Result<Self, String> {
-        let ascending = starts.windows(2).all(|ends| ends[0] <= ends[1]);
+        // without early ends: these loops run for every product, and several entries at a time
+        let ascending = starts
+            .windows(2)
+            .fold(true, |so_far, ends| so_far & (ends[0] <= ends[1]));
         let (Some(&0), Some(&end), true) = (starts.first(), starts.last(), ascending) else {
             return Err("indptr: expected ascending entries from 0".into());
         };
@@ -41,10 +44,17 @@ impl<'a, V: Copy> Rows<'a, V> {
                 values.len()
             ));
         }
-        if columns.iter().any(|&column| column < 0) {
+        let last = columns
+            .iter()
+            .fold(0, |last, &column| last.max(column as u32));
+        if last > i32::MAX as u32 {
             return Err("indices: a negative entry".into());
         }
-        let n_columns = columns.iter().max().map_or(0, |&last| last as usize + 1);
+        let n_columns = if columns.is_empty() {
+            0
+        } else {
+            last as usize + 1
+        };
         Ok(Self {
             starts,
             columns,
@@ -75,28 +85,41 @@ impl<'a, V: Copy> Rows<'a, V> {
     }
 }
 
+/// One row of several vectors, in cache lines of its own.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+pub struct Lanes<T>(pub [T; ABREAST]);
+
+impl<T: Scalar> Lanes<T> {
+    /// Zeros.
+    pub const ZERO: Self = Self([T::ZERO; ABREAST]);
+}
+
 /// Up to sixteen columns from `first` on of a matrix, side by side, zero beyond its last.
-pub fn abreast<T: Scalar>(vectors: ArrayView2<'_, T>, first: usize) -> Vec<[T; ABREAST]> {
-    let count = ABREAST.min(vectors.ncols() - first);
-    if let Some(values) = vectors.as_slice() {
-        let rows = values.chunks_exact(vectors.ncols());
-        let padded = rows.map(|row| {
-            let mut padded = [T::ZERO; ABREAST];
-            padded[..count].copy_from_slice(&row[first..first + count]);
-            padded
-        });
-        return padded.collect();
-    }
-    let lane = |row, i| {
-        if i < count {
-            vectors[[row, first + i]]
-        } else {
-            T::ZERO
-        }
+#[inline(always)]
+pub fn abreast<T: Scalar>(vectors: ArrayView2<'_, T>, first: usize) -> Vec<Lanes<T>> {
+    let (n, k) = vectors.dim();
+    let count = ABREAST.min(k - first);
+    let within = |i, value| if i < count { value } else { T::ZERO };
+    let one = |row| {
+        let entry = |i| {
+            if i < count {
+                vectors[[row, first + i]]
+            } else {
+                T::ZERO
+            }
+        };
+        Lanes(std::array::from_fn(entry))
     };
-    (0..vectors.nrows())
-        .map(|row| std::array::from_fn(|i| lane(row, i)))
-        .collect()
+    let Some(values) = vectors.as_slice() else {
+        return (0..n).map(one).collect();
+    };
+    // reads sixteen wherever that many follow, whosever they are, since a constant length is quick
+    let row = |row| match values[row * k + first..].first_chunk::<ABREAST>() {
+        Some(all) => Lanes(std::array::from_fn(|i| within(i, all[i]))),
+        None => one(row),
+    };
+    (0..n).map(row).collect()
 }
 
 /// Writes (A V)ᵀ, row-major (k, rows of A), for V of any layout, (columns of A, k).
@@ -131,7 +154,7 @@ pub fn transposed_product<T: Scalar>(
 
 struct Tiles<'a, T> {
     matrix: Rows<'a>,
-    abreast: &'a [[T; ABREAST]],
+    abreast: &'a [Lanes<T>],
     rows: Range<usize>,
     vectors: Range<usize>,
     out: &'a Shared<T>,
@@ -143,7 +166,7 @@ impl<T: Scalar> WithSimd for Tiles<'_, T> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let n = self.matrix.n_rows();
-        let mut tile = [[T::ZERO; ABREAST]; TILE];
+        let mut tile = [Lanes::ZERO; TILE];
         for begin in self.rows.clone().step_by(TILE) {
             let end = self.rows.end.min(begin + TILE);
             for (sum, row) in tile.iter_mut().zip(begin..end) {
@@ -153,7 +176,7 @@ impl<T: Scalar> WithSimd for Tiles<'_, T> {
                 // SAFETY: each thread has rows of its own.
                 let target = unsafe { self.out.part(vector * n + begin..vector * n + end) };
                 for (value, sum) in target.iter_mut().zip(&tile) {
-                    *value = sum[lane];
+                    *value = sum.0[lane];
                 }
             }
         }
@@ -161,10 +184,10 @@ impl<T: Scalar> WithSimd for Tiles<'_, T> {
 }
 
 #[inline(always)]
-fn row_product<T: Scalar>(matrix: Rows<'_>, row: usize, vectors: &[[T; ABREAST]]) -> [T; ABREAST] {
-    let mut sum = [T::ZERO; ABREAST];
+fn row_product<T: Scalar>(matrix: Rows<'_>, row: usize, vectors: &[Lanes<T>]) -> Lanes<T> {
+    let mut sum = Lanes::ZERO;
     for (column, value) in matrix.row(row) {
-        for (s, &v) in sum.iter_mut().zip(&vectors[column]) {
+        for (s, &v) in sum.0.iter_mut().zip(&vectors[column].0) {
             *s += v * value;
         }
     }

@@ -1,6 +1,7 @@
 //! The two number types of a system matrix.
 
 use faer::traits::ComplexField;
+use pulp::Simd;
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
@@ -39,6 +40,24 @@ pub trait Scalar:
 
     /// Square of its absolute value.
     fn norm_sqr(self) -> f64;
+
+    /// Writes x b₀ + y b₁ to the first and x c₀ + y c₁ to the second, entry by entry.
+    #[inline(always)]
+    fn two_sums<S: Simd>(
+        _: S,
+        [first, second]: [&mut [Self]; 2],
+        [x, y]: [&[Self]; 2],
+        [b0, b1, c0, c1]: [&[Self]; 4],
+    ) {
+        let n = first.len();
+        let (second, x, y) = (&mut second[..n], &x[..n], &y[..n]);
+        let (b0, b1, c0, c1) = (&b0[..n], &b1[..n], &c0[..n], &c1[..n]);
+        for i in 0..n {
+            let (x, y) = (x[i], y[i]);
+            first[i] = x * b0[i] + y * b1[i];
+            second[i] = x * c0[i] + y * c1[i];
+        }
+    }
 }
 
 impl Scalar for f64 {
@@ -58,6 +77,39 @@ impl Scalar for f64 {
     #[inline(always)]
     fn norm_sqr(self) -> f64 {
         self * self
+    }
+
+    /// By hand: the compiler works out anew in each turn how many there are.
+    #[inline(always)]
+    fn two_sums<S: Simd>(
+        simd: S,
+        [first, second]: [&mut [Self]; 2],
+        [x, y]: [&[Self]; 2],
+        [b0, b1, c0, c1]: [&[Self]; 4],
+    ) {
+        let n = first.len();
+        let (x, xs) = S::as_simd_f64s(&x[..n]);
+        let (y, ys) = S::as_simd_f64s(&y[..n]);
+        let (b0, b0s) = S::as_simd_f64s(&b0[..n]);
+        let (b1, b1s) = S::as_simd_f64s(&b1[..n]);
+        let (c0, c0s) = S::as_simd_f64s(&c0[..n]);
+        let (c1, c1s) = S::as_simd_f64s(&c1[..n]);
+        let (first, firsts) = S::as_mut_simd_f64s(first);
+        let (second, seconds) = S::as_mut_simd_f64s(&mut second[..n]);
+        let known = x
+            .iter()
+            .zip(y)
+            .zip(b0.iter().zip(b1))
+            .zip(c0.iter().zip(c1));
+        let targets = first.iter_mut().zip(second);
+        for ((first, second), (((&x, &y), (&b0, &b1)), (&c0, &c1))) in targets.zip(known) {
+            *first = simd.add_f64s(simd.mul_f64s(x, b0), simd.mul_f64s(y, b1));
+            *second = simd.add_f64s(simd.mul_f64s(x, c0), simd.mul_f64s(y, c1));
+        }
+        for i in 0..firsts.len() {
+            firsts[i] = xs[i] * b0s[i] + ys[i] * b1s[i];
+            seconds[i] = xs[i] * c0s[i] + ys[i] * c1s[i];
+        }
     }
 }
 
