@@ -63,12 +63,13 @@ def _promises(measured: Sequence[Measured], touch: Measured) -> list[Promise]:
         rows.append((f"script: Jacobian at {n}, ×", found, least, True))
     return [
         *rows,
-        ("forward / bare factor and solve, worst", worst(measured, "forward", "bare"), 1.3, False),
-        ("Jacobian after solves / copy, worst", worst(measured, "rows", "copy"), 2.0, False),
+        ("forward / faer alone, worst", worst(measured, "forward", "faer"), 1.3, False),
+        ("Jacobian after solves / copy, worst", worst(measured, "rows", "new copy"), 2.0, False),
         ("local update at 3k, ms", 1e3 * touch.times["update"], 0.5, False),
-        ("bare factor and solve / local update, ×", touch.ratio("bare", "update"), 20, True),
-        ("the same, each of many touches, ×", touch.ratio("bare", "many"), 20, True),
-        ("fresh forward / each of many touches, ×", touch.ratio("forward", "many"), 20, True),
+        ("faer alone / local update, ×", touch.ratio("faer", "update"), 20, True),
+        ("the same, each of many touches, ×", touch.ratio("faer", "many"), 20, True),
+        ("own factor and solve / local update, ×", touch.ratio("own", "update"), 20, True),
+        ("the same, each of many touches, ×", touch.ratio("own", "many"), 20, True),
         ("script's forward / local update, ×", touch.ratio("script forward", "update"), 20, True),
         ("exponent of the forward time, worst step", growth(measured), 1.5, False),
     ]

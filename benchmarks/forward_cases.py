@@ -20,7 +20,7 @@ CONTACT = {2: 1e-3, 3: 1e-4}
 """Contact impedance, Ω·m on a sheet and Ω·m² on a volume."""
 
 PATTERN = Pattern.adjacent(ELECTRODES)
-MOST_REPEATS = 25
+MOST_REPEATS = 200
 
 
 @dataclass(frozen=True, eq=False)

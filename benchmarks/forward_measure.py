@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -57,13 +58,13 @@ def measure(case: Case, *, script: bool = True, peer: str = "") -> Measured:
 
 
 def _against_library(model: ForwardModel, sigma: FloatArray) -> dict[str, float]:
-    """Own calls; the factor and solve inside them alone; and copies of the Jacobian's size."""
+    """Own calls; factor and solve alone, by faer and by us; copies of the Jacobian's size."""
     state = model.at(sigma)
     result = state.jacobian
     target = result.copy()  # memory in use
     calls = {
         "forward": lambda: model.solve(sigma),
-        "bare": _bare(state),
+        **_factor_and_solve(state),
         "jacobian": lambda: model.jacobian(sigma),
         "rows": lambda: _rows(state),
         "copy": lambda: np.copyto(target, result),
@@ -72,14 +73,26 @@ def _against_library(model: ForwardModel, sigma: FloatArray) -> dict[str, float]
     return medians(calls, SECONDS, least=3)
 
 
-def _bare(state: State) -> Callable[[], object]:
-    """Return a call that factorises and solves on ready arrays, and does nothing else."""
+def _factor_and_solve(state: State) -> dict[str, Callable[[], object]]:
+    """Calls that factorise and solve on ready arrays, and do nothing else.
+
+    ``own`` by our engine; ``faer``, where the native engine is installed, by that library as it
+    comes: minimum degree, panels or not as it finds better, all of it analysed beforehand.
+    """
     model, matrix = state.model, state.model.assembly.matrix
-    ready = matrix(state.conductivity, model.contacts).values
+    ready = matrix(state.conductivity, model.contacts)
     n, n_basis = model.assembly.n_points, model.assembly.n_electrodes - 1
     rhs = np.zeros((model.assembly.n_unknowns, n_basis))
     rhs[n + np.arange(n_basis), np.arange(n_basis)] = 1.0
-    return lambda: model.factorise(ready).solve(rhs)
+    calls = {"own": lambda: model.factorise(ready.values).solve(rhs)}
+    if find_spec("tomoskin_core") is None:
+        return calls
+    from tomoskin_core import Reference
+
+    faer = Reference(len(rhs), ready.indptr, ready.indices, n_basis)
+    columns = np.ascontiguousarray(rhs.T)
+    _agree(faer.solve(ready.values, columns).T, state.basis, "faer")
+    return {**calls, "faer": lambda: faer.solve(ready.values, columns)}
 
 
 def _rows(state: State) -> FloatArray:
@@ -91,8 +104,8 @@ def _rows(state: State) -> FloatArray:
 
 def _against_script(model: ForwardModel, sigma: FloatArray) -> dict[str, float]:
     script = Script(model.mesh, model.pattern, float(model.contact_impedance[0]))
-    _agree(script.voltages(sigma), model.solve(sigma).voltages)
-    _agree(script.jacobian(sigma), model.jacobian(sigma))
+    _agree(script.voltages(sigma), model.solve(sigma).voltages, "the script")
+    _agree(script.jacobian(sigma), model.jacobian(sigma), "the script")
     return medians(
         {
             "forward, script run": lambda: model.solve(sigma),
@@ -104,10 +117,10 @@ def _against_script(model: ForwardModel, sigma: FloatArray) -> dict[str, float]:
     )
 
 
-def _agree(other: FloatArray, own: FloatArray) -> None:
+def _agree(other: FloatArray, own: FloatArray, whose: str) -> None:
     off = np.abs(other - own).max() / np.abs(own).max()
     if not off < AGREE:
-        raise AssertionError(f"the script is off by {off:.1e}")
+        raise AssertionError(f"{whose}: off by {off:.1e}")
 
 
 def _against_peer(model: ForwardModel, sigma: FloatArray, which: str) -> dict[str, float]:
@@ -143,12 +156,12 @@ def measure_touch(case: Case) -> Measured:
     own = base.copy()
     own[cells] = changed
     local = model.at(base).local
-    _agree(local.voltages_of(touches)[0], model.solve(own).voltages)
+    _agree(local.voltages_of(touches)[0], model.solve(own).voltages, "local update")
     script = Script(case.mesh, PATTERN, case.contact_impedance)
     calls = {
         "update": lambda: local.voltages(cells, changed),
         "many": lambda: local.voltages_of(touches),
-        "bare": _bare(model.at(own)),
+        **_factor_and_solve(model.at(own)),
         "forward": lambda: model.solve(own),
         "script forward": lambda: script.voltages(own),
     }

@@ -212,6 +212,32 @@ def test_a_residual_that_is_no_number_stays_none() -> None:
     assert np.isnan(largest)
 
 
+def test_a_large_jacobian_is_fetched_ahead() -> None:
+    gradient, drives, current, drive_index, measure = jacobian_arguments(27_001)
+    rows = core.jacobian(gradient, drives, current, drive_index, measure)
+    assert rows.nbytes > 8 << 20
+    driven = gradient[drives[drive_index, 1]] - gradient[drives[drive_index, 0]]
+    read = gradient[measure[:, 0]] - gradient[measure[:, 1]]
+    np.testing.assert_allclose(rows, (driven * read).sum(axis=1), rtol=0, atol=1e-12)
+    turned = core.jacobian(1j * gradient, drives, current, drive_index, measure)
+    np.testing.assert_allclose(turned, -rows, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("cells", [200, 800])
+def test_the_reference_solves_what_we_solve(cells: int) -> None:
+    matrix, rhs = system(np.float64, cells)
+    columns = np.ascontiguousarray(rhs.T)
+    faer = core.Reference(len(rhs), matrix.indptr, matrix.indices, len(columns))
+    for scale in (1.0, 4.0):
+        expected = symbolic(matrix).factor(matrix.data * scale).solve(rhs)
+        solved = faer.solve(matrix.data * scale, columns)
+        off = np.abs(solved.T - expected).max()
+        assert off <= 1e-12 * np.abs(expected).max()
+    for wrong in ((matrix.data[1:], columns), (matrix.data, columns[1:]), (-matrix.data, columns)):
+        with pytest.raises(ValueError, match=r"expected|definite"):
+            faer.solve(*wrong)
+
+
 def test_wrong_arrays_are_refused() -> None:
     matrix, rhs = system(np.float64)
     analysis = symbolic(matrix)

@@ -34,8 +34,11 @@ def checked_conductivity(value: ArrayLike, mesh: Mesh) -> NDArray[Any]:
     sigma = raw.astype(number_type(raw))
     if sigma.ndim == 3:
         return _checked_tensor(sigma, mesh)
-    sigma = np.array(np.broadcast_to(sigma, (n,)))
-    _refuse_first(~(np.isfinite(sigma) & (sigma.real > 0)), sigma, "a positive finite conductivity")
+    if sigma.ndim == 0:
+        sigma = np.full(n, sigma)
+    if not (sigma.real.min(initial=1.0) > 0 and np.isfinite(sigma).all()):
+        bad = ~(np.isfinite(sigma) & (sigma.real > 0))
+        _refuse_first(bad, sigma, "a positive finite conductivity")
     return sigma
 
 

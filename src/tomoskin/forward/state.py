@@ -45,7 +45,7 @@ class State:
         assembly = self.model.assembly
         n_basis = assembly.n_electrodes - 1
         rhs = np.zeros((assembly.n_unknowns, n_basis), dtype=self._matrix.values.dtype)
-        np.fill_diagonal(rhs[assembly.n_points :], 1.0)
+        rhs[assembly.n_points :].flat[:: n_basis + 1] = 1.0
         matrix = self._matrix
         basis, lost, largest = solve_checked(self.model.engine, matrix, self.factor, rhs)
         voltages = checked_voltages(
@@ -112,7 +112,8 @@ class State:
         """(n_electrodes, d·q, n_cells): scaled gradient of each basis field, see Element."""
         n, operator = self.model.assembly.n_electrodes, self.model.gradient
         fields = self.basis[: self.model.assembly.n_points]
-        gradient = np.zeros((n, operator.shape[0]), dtype=fields.dtype)
+        gradient = np.empty((n, operator.shape[0]), dtype=fields.dtype)
+        gradient[-1] = 0.0
         self.model.engine.fields(operator, fields, gradient[:-1])
         return gradient.reshape(n, -1, len(self.conductivity))
 
