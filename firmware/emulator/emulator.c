@@ -1,6 +1,6 @@
-/* tomoskin-emulator [-s SKIN_MEMORY] [-c MICROAMPERES] [-l LINK] [-f] ELF: the firmware on a simulated
-   ATmega2560. Its switches and converter inputs are as in avr/pins.h; what they must never do is
-   said on stderr. -f: as fast as it goes, not in real time. */
+/* tomoskin-emulator [-s SKIN_MEMORY] [-c MICROAMPERES] [-l LINK] [-f] [-d] ELF: the firmware on
+   a simulated ATmega2560. Its switches and converter inputs are as in avr/pins.h; what they must never do is
+   said on stderr. -f: as fast as it goes, not in real time. -d: end when stdin does. */
 #include "skin.h"
 
 #include <avr_adc.h>
@@ -36,6 +36,7 @@ static avr_t *avr;
 static const struct skin_memory *skin;
 static int line = -1;
 static bool fast;
+static bool dependent;
 static avr_irq_t *line_input;
 static bool may_feed = true;
 static uint8_t address;       /* that the demultiplexers hold */
@@ -151,6 +152,12 @@ static void feed_line(void) {
     }
 }
 
+/* Whoever started this has gone, however it ended. */
+static bool abandoned(void) {
+    struct pollfd owner = {STDIN_FILENO, 0, 0};
+    return dependent && poll(&owner, 1, 0) == 1 && (owner.revents & (POLLHUP | POLLERR)) != 0;
+}
+
 static void no_sleep(struct avr_t *machine, avr_cycle_count_t cycles) {
     (void)machine;
     (void)cycles;
@@ -251,7 +258,7 @@ int main(int count, char **arguments) {
     const char *link = NULL;
     uint32_t current = 100000;
     skin = skin_star();
-    for (int option; (option = getopt(count, arguments, "s:c:l:f")) != -1;) {
+    for (int option; (option = getopt(count, arguments, "s:c:l:fd")) != -1;) {
         if (option == 's') {
             skin = skin_open(optarg);
         } else if (option == 'c') {
@@ -260,6 +267,8 @@ int main(int count, char **arguments) {
             link = optarg;
         } else if (option == 'f') {
             fast = true;
+        } else if (option == 'd') {
+            dependent = true;
         } else {
             return 2;
         }
@@ -280,6 +289,9 @@ int main(int count, char **arguments) {
             next = avr->cycle + SLICE;
             flush_line();
             feed_line();
+            if (abandoned()) {
+                return 0;
+            }
             if (!fast) {
                 keep_pace();
             }

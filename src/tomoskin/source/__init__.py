@@ -5,6 +5,7 @@ from tomoskin.source.conversation import Conversation, Stage
 from tomoskin.source.gate import FrameCounters, FrameGate
 from tomoskin.source.link import Link
 from tomoskin.source.registry import GROUP, open_source, read_options, source_names
+from tomoskin.source.serial import SerialTransport
 from tomoskin.source.settings import (
     PRESCALERS,
     ScanSettings,
@@ -24,6 +25,7 @@ __all__ = [
     "Link",
     "Played",
     "ScanSettings",
+    "SerialTransport",
     "Stage",
     "Timing",
     "Transport",

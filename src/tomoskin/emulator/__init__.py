@@ -1,0 +1,8 @@
+"""The board's real firmware on a simulated processor, before the twin's sheet."""
+
+from tomoskin.emulator.memory import SkinMemory
+from tomoskin.emulator.process import BoardProcess
+from tomoskin.emulator.program import Programs, build_programs
+from tomoskin.emulator.transport import EmulatorTransport
+
+__all__ = ["BoardProcess", "EmulatorTransport", "Programs", "SkinMemory", "build_programs"]

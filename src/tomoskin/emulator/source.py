@@ -1,0 +1,54 @@
+"""The source ``emulator``, for the entry-point group ``tomoskin.sources``."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from tomoskin.core import SourceError
+from tomoskin.emulator.memory import Front
+from tomoskin.emulator.program import build_programs
+from tomoskin.emulator.transport import EmulatorTransport
+from tomoskin.source import read_options
+from tomoskin.twin import PRESETS, TwinSettings, TwinSkin
+
+if TYPE_CHECKING:
+    from tomoskin.skin import Skin
+
+
+def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
+    """``emulator``, or with options, joined by commas: ``emulator:seed=3,preset=ideal``.
+
+    The sheet is the twin's; of the twin's electronics, current, compliance, gain and noise.
+
+    Raises
+    ------
+    SourceError
+        For an unknown option, or when firmware and emulator cannot be built here.
+    """
+    options = read_options(argument, ("seed", "preset"), "emulator")
+    seed = options.get("seed", "0")
+    if not (seed.isascii() and seed.isdigit()):
+        raise SourceError(f'expected a seed of 0 or more, got "{seed}"', where="emulator")
+    preset = options.get("preset", skin.twin.preset)
+    if preset not in PRESETS:
+        known = ", ".join(PRESETS)
+        raise SourceError(f'expected a preset of {known}, got "{preset}"', where="emulator")
+    settings = TwinSettings.preset(preset, int(seed))
+    return EmulatorTransport(
+        build_programs(), TwinSkin.of(skin, settings), front_of(skin, settings)
+    )
+
+
+def front_of(skin: Skin, settings: TwinSettings) -> Front:
+    """The board of a skin, as far as the emulator knows it."""
+    compliance = settings.electronics.compliance
+    return Front(
+        current=skin.current,
+        compliance=1e300 if math.isinf(compliance) else compliance,
+        gain=skin.readout.gain,
+        offset=skin.readout.offset,
+        reference=skin.readout.reference_voltage,
+        levels=float(1 << skin.readout.adc_bits),
+        noise=settings.electronics.noise,
+    )

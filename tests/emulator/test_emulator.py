@@ -1,0 +1,135 @@
+"""The real ELF on a simulated ATmega2560, from the sheet to the frames."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from firmware.boards import FIRMWARE, SCAN, SETTINGS, built
+from firmware.conftest import need
+from tomoskin.core import Frame, SourceError
+from tomoskin.emulator import EmulatorTransport, Programs, SkinMemory
+from tomoskin.emulator import program as building
+from tomoskin.emulator.memory import Front
+from tomoskin.emulator.source import front_of, open_emulator
+from tomoskin.skin import Skin
+from tomoskin.source import Link, ScanSettings
+from tomoskin.twin import Press, TwinSettings, TwinSkin
+
+PATIENCE = 30.0
+MOST_FLASH, MOST_RAM = 16 * 1024, 4 * 1024
+
+
+@pytest.fixture(scope="session")
+def programs(pytestconfig: pytest.Config) -> Programs:
+    need(pytestconfig, ["make", "cc", "avr-gcc", "simavr"], "gcc-avr avr-libc simavr libsimavr-dev")
+    return Programs(built("avr", "tomoskin-16.elf"), built("emulator", "tomoskin-emulator"))
+
+
+@pytest.fixture(scope="module")
+def skin() -> Skin:
+    return Skin.load("textile-disc-8")
+
+
+@pytest.fixture
+def quiet() -> TwinSettings:
+    return TwinSettings.preset("ideal").with_noise(0.0)
+
+
+def frames_of(link: Link, count: int) -> list[Frame]:
+    frames: list[Frame] = []
+    end = time.monotonic() + PATIENCE
+    while len(frames) < count:
+        assert time.monotonic() < end
+        frames += [item for item in link.poll(0.05) if isinstance(item, Frame)]
+    return frames
+
+
+def expected(sheet: TwinSkin, front: Front, oversampling: int) -> np.ndarray:
+    """Codes from the sheet's own resistance, by another way than the emulator's."""
+    r = sheet.resistance()
+    source, sink = SCAN.drives[SCAN.sample_drive].T
+    e = SCAN.sample_electrode
+    volts = front.current * (r[source, e] - r[sink, e] - r[source, sink] + r[sink, sink])
+    codes = np.floor((front.gain * volts + front.offset) * front.levels / front.reference)
+    return oversampling * np.clip(codes, 0, front.levels - 1)
+
+
+def test_frames_are_what_the_sheet_says_and_follow_a_press(
+    programs: Programs, skin: Skin, quiet: TwinSettings
+) -> None:
+    sheet, front = TwinSkin.of(skin, quiet), front_of(skin, quiet)
+    transport = EmulatorTransport(programs, sheet, front)
+    with Link(transport, SCAN, SETTINGS) as link:
+        before = frames_of(link, 20)
+        wanted = expected(sheet, front, SETTINGS.oversampling)
+        for number, frame in enumerate(before):
+            assert frame.sequence == number
+            assert frame.samples.tolist() == wanted.tolist()
+        transport.set_presses((Press(0.01, 0.0, 5.0, 0.01),))
+        frames_of(link, 20)
+        pressed = frames_of(link, 1)[0].samples
+        assert np.abs(pressed.astype(int) - wanted).max() >= 10
+        assert pressed.tolist() == expected(sheet, front, SETTINGS.oversampling).tolist()
+        assert link.counters.corrupt == 0
+        assert link.frames.lost == 0
+        assert transport.complaints == ""
+
+
+def test_stop_and_closing_end_it(programs: Programs, skin: Skin, quiet: TwinSettings) -> None:
+    transport = EmulatorTransport(programs, TwinSkin.of(skin, quiet), front_of(skin, quiet))
+    link = Link(transport, SCAN, SETTINGS)
+    frames_of(link, 2)
+    link.close()
+    transport.close()
+    with pytest.raises(SourceError, match="switched off"):
+        transport.read(0.0)
+
+
+def test_the_skins_own_scan(programs: Programs, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tomoskin.emulator.source.build_programs", lambda: programs)
+    skin = Skin.load("textile-disc-8")
+    with Link(open_emulator("seed=2", skin), SCAN, ScanSettings.of(skin)) as link:
+        assert link.connect().unique_id == b"emulated"
+        frames_of(link, 2)
+
+
+@pytest.mark.parametrize("argument", ["seed=x", "preset=nowhere", "speed=3"])
+def test_bad_options_are_said(skin: Skin, argument: str) -> None:
+    with pytest.raises(SourceError, match="expected"):
+        open_emulator(argument, skin)
+
+
+def test_what_cannot_be_built_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("shutil.which", lambda _: None)
+    with pytest.raises(SourceError, match="avr-gcc"):
+        building.build_programs()
+    monkeypatch.setattr(building, "FOLDER", tmp_path / "none")
+    with pytest.raises(SourceError, match="sources are not here"):
+        building.build_programs()
+
+
+def test_a_skin_with_too_many_electrodes(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="at most 32"):
+        SkinMemory(tmp_path / "skin", Front(*[1.0] * 7), np.eye(33))
+
+
+def test_the_memory_is_the_c_structs(tmp_path: Path) -> None:
+    path = tmp_path / "skin"
+    SkinMemory(path, Front(1, 2, 3, 4, 5, 6, 7), np.eye(2)).close()
+    data = path.read_bytes()
+    header = (FIRMWARE / "host" / "skin.h").read_text(encoding="utf-8")
+    assert f"0x{int.from_bytes(data[:8], 'little'):X}" in header
+    assert int.from_bytes(data[8:12], "little") % 2 == 0
+    assert np.frombuffer(data, "<f8", 11, 16).tolist() == [1, 2, 3, 4, 5, 6, 7, 1, 0, 0, 1]
+
+
+def test_the_firmware_is_small(programs: Programs) -> None:
+    lines = subprocess.run(["avr-size", programs.elf], capture_output=True, text=True, check=True)
+    text, data, bss = map(int, lines.stdout.splitlines()[1].split()[:3])
+    assert text + data < MOST_FLASH
+    assert data + bss < MOST_RAM
