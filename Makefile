@@ -1,7 +1,7 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help live test test-all bench bench-docs lint lock native wheel clean page dev
+.PHONY: help live test test-all firmware-test bench bench-docs lint lock native wheel clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -18,12 +18,18 @@ live: $(VENV)/.installed page  ## the live page of a simulated skin
 test: lint native  ## lint, page tests and the test suite, without what is slow
 	@$(PY) scripts/page.py run test
 	@sh scripts/chromium.sh
+	@sh scripts/firmware.sh
 	@$(PY) -m pytest $(ARGS)
 
 test-all: lint native  ## the same, with what is slow
 	@$(PY) scripts/page.py run test
 	@sh scripts/chromium.sh
+	@sh scripts/firmware.sh
 	@$(PY) -m pytest -m "" $(ARGS)
+
+firmware-test: dev  ## the firmware alone: GoogleTest, mutants, host build, emulator
+	@sh scripts/firmware.sh
+	@$(PY) -m pytest tests/firmware tests/emulator $(ARGS)
 
 bench: native  ## time from bytes to touches
 	@$(VENV)/bin/tomoskin bench frame $(ARGS)
