@@ -1,0 +1,103 @@
+"""Figure 5.8: maps of an 18 mm probe between E3 and E4, between E7 and E8, and at the centre.
+
+One step with NOSER's prior on normalised differences, threshold 70 %, centre and contour drawn.
+The source names no force: 5 N here. The probe's middle is 62 mm from the centre of the disc.
+
+Source saw: each press localised; its shape poorer near the rim.
+Checked: one region each, its centre within 10 mm of the probe's; near the rim the region is longer
+than wide by at least 1.2 times, at the centre by less. The source's four metrics are reported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+import figures
+from imaging import NOSER, Imager, named_metrics
+from lab import Lab, open_lab, report
+from tomoskin.core import Image, Reading
+from tomoskin.mesh import Mesh
+from tomoskin.twin import Circle, Probe
+
+RADIUS, FORCE, FROM_CENTRE, PART = 18e-3, 5.0, 62e-3, 0.7
+LONGER = 1.2
+PLACES = ("between E3 and E4", "between E7 and E8", "at the centre")
+
+
+def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
+    """Measure, check, draw; the numbers that were checked."""
+    found: dict[str, float] = {}
+    with open_lab(arguments, __doc__, NOSER) as lab:
+        imager = Imager(lab.skin)
+        shown = []
+        for name, (x, y) in zip(PLACES, places(lab), strict=True):
+            idle = lab.measure(f"nothing touches the skin (before {name})")
+            loaded = lab.measure(f"18 mm probe, 5 N, {name}", Probe(Circle(RADIUS), x, y, FORCE))
+            image = imager.picture(idle, loaded)
+            regions = imager.regions(image, idle, PART)
+            found |= check(name, imager.mesh, regions, (x, y))
+            found |= named_metrics(name, imager.metrics(image, (x, y)))
+            shown.append((name, image, regions[0], (x, y)))
+        draw(lab, imager.mesh, shown)
+    return found
+
+
+def places(lab: Lab) -> list[tuple[float, float]]:
+    """Where the probe stands, m."""
+    centres, middle = lab.skin.electrode_centres, lab.skin.outline.centre
+    found = []
+    for first in (2, 6):
+        way = centres[first] + centres[first + 1] - 2 * middle
+        found.append(tuple(middle + FROM_CENTRE * way / np.linalg.norm(way)))
+    return [*found, tuple(middle)]
+
+
+def check(
+    name: str, mesh: Mesh, regions: Sequence[Reading], place: tuple[float, float]
+) -> dict[str, float]:
+    """Regions found where the probe stood at ``place`` m."""
+    assert len(regions) == 1, f"{name}: {len(regions)} regions"
+    miss = float(np.hypot(regions[0].x - place[0], regions[0].y - place[1]))
+    assert miss < 0.010, f"{name}: {1e3 * miss:.1f} mm off"
+    long = elongation(mesh, regions[0])
+    at_the_rim = name != PLACES[-1]
+    assert (long > LONGER) == at_the_rim, f"{name}: {long:.2f} times as long as wide"
+    return {f"{name}: miss, mm": 1e3 * miss, f"{name}: length/width": long}
+
+
+def elongation(mesh: Mesh, region: Reading) -> float:
+    """Length over width of a region: the root of the ratio of its second moments."""
+    weight = mesh.volumes[region.cells]
+    offset = mesh.centroids[region.cells] - np.average(
+        mesh.centroids[region.cells], axis=0, weights=weight
+    )
+    small, large = np.linalg.eigvalsh((offset.T * weight) @ offset)
+    return float(np.sqrt(large / small))
+
+
+def draw(
+    lab: Lab, mesh: Mesh, shown: Sequence[tuple[str, Image, Reading, tuple[float, float]]]
+) -> None:
+    """Maps above, maps with contour and centre below, one colour scale."""
+    made, axes = figures.figure(2, len(shown), (7.6, 5.2), sharex=True, sharey=True)
+    limit = figures.MS * max(float(np.abs(image.values).max()) for _, image, _, _ in shown)
+    for column, (name, image, region, place) in enumerate(shown):
+        kept = np.zeros_like(image.values)
+        kept[region.cells] = image.values[region.cells]
+        for ax, values in zip(axes[:, column], (image.values, kept), strict=True):
+            drawn = figures.draw_map(ax, mesh, figures.MS * values, limit)
+            figures.mark_probe(ax, figures.circle(*place, RADIUS))
+        axes[0, column].set_title(name)
+        axes[1, column].set_title("above 70 %")
+        figures.mark_region(axes[1, column], mesh, region)
+    for ax in axes[:, 0]:
+        ax.set_ylabel("y / mm")
+    figures.letters(axes.ravel())
+    figures.colour_bar(made, drawn, axes)
+    figures.save(made, lab.out, "fig58_single_press")
+
+
+if __name__ == "__main__":
+    report(main())

@@ -1,0 +1,52 @@
+"""Pictures of the experiments: one step, regions above a threshold, the source's metrics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tomoskin.core import FloatArray, Image, Reading
+from tomoskin.inverse import SourceMetrics
+from tomoskin.live import prepare
+from tomoskin.signal import Reference, difference
+from tomoskin.skin import Skin
+from tomoskin.touch import Segmenter
+
+NOSER = {"inverse": {"prior": "noser", "difference": "normalised", "alpha": "auto"}}
+"""The source's inverse: NOSER's prior, one step, normalised differences; alpha by the noise."""
+
+
+class Imager:
+    """Pictures of a skin: a loaded stage against an idle one."""
+
+    def __init__(self, skin: Skin) -> None:
+        self.prepared = prepare(skin)
+        self.mesh = self.prepared.mesh
+
+    def picture(self, idle: FloatArray, loaded: FloatArray) -> Image:
+        """Change of conductivity from the mean of ``idle`` to that of ``loaded`` (n, n_meas) V."""
+        reference = idle.mean(axis=0)
+        kind = self.prepared.operator.difference
+        return self.prepared.operator(difference(loaded.mean(axis=0), reference, kind))
+
+    def regions(self, image: Image, idle: FloatArray, part: float) -> list[Reading]:
+        """Regions above ``part`` of the extreme, and above the noise of a frame."""
+        settings = replace(self.prepared.skin.touch, gamma1=part)
+        floor = self.prepared.noise_floor(Reference.of(idle))
+        return Segmenter(self.mesh, settings)(image, floor)
+
+    def metrics(self, image: Image, place: tuple[float, float] | None = None) -> SourceMetrics:
+        """The source's four metrics (its section 4.4.1), the true place known or not."""
+        return SourceMetrics.of(image, self.mesh, place)
+
+
+def named_metrics(name: str, metrics: SourceMetrics) -> dict[str, float]:
+    """The four metrics as numbers of a report."""
+    return {
+        f"{name}: maximum, S": metrics.maximum,
+        f"{name}: RES50": metrics.res50,
+        f"{name}: RES75": metrics.res75,
+        f"{name}: shape angle, deg": float(np.degrees(metrics.shape_angle)),
+        f"{name}: ERR75, mm": 1e3 * metrics.error75,
+    }

@@ -1,0 +1,220 @@
+"""Where the frames of an experiment come from: a twin, a board on the table, or a recording.
+
+Every experiment here is a row of stages: "nothing touches the skin", then a probe here, then
+there. The twin presses by itself; before a board, the person at the terminal does, and says when;
+a recording made with ``--record`` is played again, stage by stage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import itertools
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from tomoskin.core import DataError, FloatArray, Frame
+from tomoskin.pattern import Pattern, Scan
+from tomoskin.session import SessionReader, SessionWriter
+from tomoskin.signal import Readout
+from tomoskin.skin import Skin
+from tomoskin.source import Link, ScanSettings, Transport, open_source
+from tomoskin.twin import Probe, TwinSettings, TwinTransport, VirtualClock, make_twin
+
+FRAMES = 10
+"""Frames of a stage, as many as the source averaged."""
+
+REST = 1.0
+"""Seconds from a change of the load to the first frame of its stage."""
+
+Changes = dict[str, dict[str, Any]]
+"""Keys of the skin file that an experiment sets, section by section."""
+
+
+def source_drive(n: int, *, driven: bool = False) -> Changes:
+    """The source's adjacent drive: current enters at Ek and leaves at the next, the ground.
+
+    Neighbouring pairs are read; with ``driven``, those that touch a driven electrode too.
+    """
+    pairs = np.column_stack([np.arange(n), (np.arange(n) + 1) % n])
+    table = Pattern.from_pairs(n, pairs, pairs, include_driven=driven)
+    rows = {"drive": table.drive.tolist(), "measure": table.measure.tolist()}
+    return {"drive": {"pattern": None, **rows}}
+
+
+class Bench(Protocol):
+    """Frames of one stage of an experiment."""
+
+    def frames(self, stage: str, probes: Sequence[Probe], n: int) -> list[Frame]:
+        """``n`` frames while ``probes`` press; ``stage`` says it in words."""
+
+
+@dataclass
+class LiveBench:
+    """A twin or a board behind a link; ``load`` brings a stage about and says when it stands."""
+
+    link: Link
+    load: Callable[[str, Sequence[Probe]], threading.Event]
+
+    def frames(self, stage: str, probes: Sequence[Probe], n: int) -> list[Frame]:
+        """The first frames once the load has stood for a while."""
+        stands = self.load(stage, probes)
+        while not stands.is_set():
+            self.link.poll(0.2)  # a board that hears nothing switches itself off
+        frames: list[Frame] = []
+        begin = None
+        while len(frames) < n:
+            for item in self.link.poll(0.2):
+                if isinstance(item, Frame):
+                    begin = item.host_time if begin is None else begin
+                    frames += [item] if item.host_time >= begin + REST else []
+        return frames[:n]
+
+
+@dataclass
+class RecordedBench:
+    """A session file whose notes say where each stage begins."""
+
+    session: SessionReader
+
+    def frames(self, stage: str, probes: Sequence[Probe], n: int) -> list[Frame]:
+        """The frames after the note ``stage``."""
+        del probes
+        at = next((note.host_time for note in self.session.notes() if note.text == stage), None)
+        later = () if at is None else self.session.frames(since=at)
+        found = [item.frame for item in itertools.islice(later, n)]
+        if len(found) < n:
+            raise DataError(f'holds no {n} frames of "{stage}"', where=str(self.session.path))
+        return found
+
+
+@dataclass
+class Lab:
+    """A skin, where its frames come from, and where figures go."""
+
+    skin: Skin
+    bench: Bench
+    out: Path
+    writer: SessionWriter | None = None
+
+    def __post_init__(self) -> None:
+        """Prepare what turns counts into volts."""
+        self._readout = Readout.of(Scan.of(self.skin.pattern()), self.skin.readout)
+
+    def measure(self, stage: str, *probes: Probe, n: int = FRAMES) -> FloatArray:
+        """(n, n_meas) V while ``probes`` press, in the order of the skin's pattern."""
+        frames = self.bench.frames(stage, probes, n)
+        if self.writer is not None:
+            self.writer.note(frames[0].host_time, stage)
+            for frame in frames:
+                self.writer.frame(frame)
+        return np.stack([self._readout(frame).values for frame in frames])
+
+    def by_ground(self, values: FloatArray) -> FloatArray:
+        """(n, n) of ``values`` (n_meas,): row by the grounded electrode, column by the pair."""
+        pattern = self.skin.pattern()
+        table = np.full((self.skin.n_electrodes,) * 2, np.nan)
+        table[pattern.drive[:, 1], pattern.measure[:, 0]] = values
+        return table
+
+
+def in_front_of(skin: Skin, electrode: int, distance: float) -> tuple[float, float]:
+    """The place ``distance`` m from an electrode towards the middle of the skin."""
+    rim, middle = skin.electrode_centres[electrode], skin.outline.centre
+    x, y = rim + (middle - rim) * distance / np.linalg.norm(middle - rim)
+    return float(x), float(y)
+
+
+@contextlib.contextmanager
+def open_lab(
+    arguments: Sequence[str] | None,
+    title: str | None,
+    changes: Changes | None = None,
+    material: Mapping[str, Any] | None = None,
+) -> Iterator[Lab]:
+    """The lab that the command line asks for.
+
+    ``changes`` to the skin that the experiment needs; ``material`` numbers of the twin's sheet that
+    are not those of its preset.
+    """
+    options = options_of(arguments, title or "")
+    options.material = dict(material or {})
+    skin = Skin.load(options.skin).altered(changes or {})
+    with contextlib.ExitStack() as stack:
+        bench = stack.enter_context(_bench(options, skin))
+        writer = (
+            stack.enter_context(SessionWriter(options.record, skin)) if options.record else None
+        )
+        yield Lab(skin, bench, options.out, writer)
+
+
+def report(found: Mapping[str, float]) -> None:
+    """Print the numbers of an experiment."""
+    for name, value in found.items():
+        print(f"{name:<40} {value:10.4g}")
+
+
+@contextlib.contextmanager
+def _bench(options: argparse.Namespace, skin: Skin) -> Iterator[Bench]:
+    kind, _, path = options.source.partition(":")
+    if kind == "replay":
+        with SessionReader(Path(path)) as session:
+            if session.skin.pattern().identity != skin.pattern().identity:
+                raise DataError("was recorded with another scan than this experiment's", where=path)
+            yield RecordedBench(session)
+    elif kind == "twin":
+        clock = VirtualClock()
+        settings = TwinSettings.preset(skin.twin.preset, options.seed)
+        settings = replace(settings, material=replace(settings.material, **options.material))
+        twin = make_twin(skin, settings, clock)
+        with _link(twin, skin, clock.now) as link:
+            yield LiveBench(link, lambda _, probes: _pressed(twin, probes))
+    else:
+        with _link(open_source(options.source, skin), skin, time.monotonic) as link:
+            yield LiveBench(link, lambda stage, _: _asked(stage))
+
+
+def _link(transport: Transport, skin: Skin, now: Callable[[], float]) -> Link:
+    link = Link(transport, Scan.of(skin.pattern()), ScanSettings.of(skin), clock=now)
+    link.connect()
+    return link
+
+
+def _pressed(twin: TwinTransport, probes: Sequence[Probe]) -> threading.Event:
+    twin.set_presses(tuple(probes))
+    done = threading.Event()
+    done.set()
+    return done
+
+
+def _asked(stage: str) -> threading.Event:
+    """Ask the person at the terminal, who may take their time."""
+    done = threading.Event()
+
+    def wait() -> None:
+        input(f"Now: {stage}. Then press Enter. ")
+        done.set()
+
+    threading.Thread(target=wait, daemon=True).start()
+    return done
+
+
+def options_of(arguments: Sequence[str] | None, title: str) -> argparse.Namespace:
+    """The command line that all experiments share."""
+    parser = argparse.ArgumentParser(
+        description=title, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--source", default="twin", help="twin, serial:PORT or replay:FILE")
+    parser.add_argument("--skin", default="textile-disc-8", help="built-in name or path")
+    parser.add_argument("--out", type=Path, default=Path("figures"), help="folder of the figure")
+    parser.add_argument("--record", type=Path, help="also keep the frames in this session file")
+    parser.add_argument("--seed", type=int, default=1, help="of the twin")
+    options = parser.parse_args(arguments)
+    options.out.mkdir(parents=True, exist_ok=True)
+    return options

@@ -1,0 +1,116 @@
+"""Every example makes its figure, and its checks pass on the twin and fail on wrong data."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import numpy as np
+import pytest
+
+from tomoskin.core import DataError
+from tomoskin.twin import TwinSettings, WallClock, make_twin
+
+MEASURED = [
+    "fig52_potentials",
+    "fig54_reference",
+    "fig55_indentation",
+    "fig57_probe_sizes",
+    "fig58_single_press",
+    "fig59_four_probes",
+    "fig510_three_presses",
+    "patterns_and_priors",
+]
+
+
+@pytest.mark.parametrize("name", [*MEASURED, "fig31_mesh"])
+def test_the_figure_is_made_and_the_numbers_hold(ran, name):
+    run = ran(name)
+    assert run.found
+    assert all(math.isfinite(value) for value in run.found.values())
+    data = run.figure.read_bytes()
+    assert data.startswith(b"\x89PNG")
+    width, height = struct.unpack(">II", data[16:24])
+    assert width > 400
+    assert height > 250
+    assert "Source saw:" in run.module.__doc__
+    assert "Checked:" in run.module.__doc__
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_a_recording_gives_the_same_numbers(ran, name, tmp_path):
+    run = ran(name)
+    again = run.module.main(["--source", f"replay:{run.recording}", "--out", str(tmp_path)])
+    assert again == run.found
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_the_checks_fail_on_rows_in_a_wrong_order(ran, imported, name, monkeypatch, tmp_path):
+    run = ran(name)
+    lab = imported("lab")
+    measure = lab.Lab.measure
+
+    def shuffled(self, stage, *probes, n=lab.FRAMES):
+        volts = measure(self, stage, *probes, n=n)
+        return volts[:, np.random.default_rng(0).permutation(volts.shape[1])]
+
+    monkeypatch.setattr(lab.Lab, "measure", shuffled)
+    with pytest.raises(AssertionError):
+        run.module.main(["--source", f"replay:{run.recording}", "--out", str(tmp_path)])
+
+
+@pytest.mark.parametrize("name", [n for n in MEASURED if n not in MEASURED[:2]])
+def test_the_checks_fail_where_nothing_is_pressed(ran, imported, name, monkeypatch, tmp_path):
+    run = ran(name)
+    lab = imported("lab")
+    monkeypatch.setattr(lab, "_pressed", lambda twin, _, press=lab._pressed: press(twin, ()))
+    with pytest.raises(AssertionError):
+        run.module.main(["--out", str(tmp_path)])
+
+
+def test_the_mesh_check_fails_on_another_mesh(imported, tmp_path):
+    with pytest.raises(AssertionError, match="triangles"):
+        imported("fig31_mesh").main(["--skin", "textile-disc-16", "--out", str(tmp_path)])
+
+
+def test_a_person_at_a_board_is_told_what_to_do(imported, monkeypatch, tmp_path):
+    lab, example = imported("lab"), imported("fig55_indentation")
+    asked = []
+
+    def opened(spec, skin):
+        assert spec == "serial:of-the-lab"
+        twin = make_twin(skin, TwinSettings(), WallClock(), pace=0.0)
+        real = []
+
+        def answer(prompt):
+            asked.append(prompt)
+            x, y = lab.in_front_of(skin, 1 if len(asked) < 3 else 6, 22.5e-3)
+            real[:] = [] if "nothing" in prompt else [lab.Probe(example.Circle(15e-3), x, y, 3.0)]
+            twin.set_presses(tuple(real))
+            return ""
+
+        monkeypatch.setattr("builtins.input", answer)
+        return twin
+
+    monkeypatch.setattr(lab, "open_source", opened)
+    monkeypatch.setattr(lab, "REST", 0.0)
+    found = example.main(["--source", "serial:of-the-lab", "--out", str(tmp_path)])
+    assert found["E2 mean of its pairs, V"] < 0
+    assert [prompt.split(".")[0] for prompt in asked] == [
+        "Now: nothing touches the skin (before E2)",
+        "Now: 15 mm probe, 3 N, 7",
+        "Now: nothing touches the skin (before E7)",
+        "Now: 15 mm probe, 3 N, 7",
+    ]
+
+
+def test_a_recording_of_another_experiment_is_refused(ran, imported, tmp_path):
+    other = ran("fig54_reference").recording
+    with pytest.raises(DataError, match="holds no 10 frames of"):
+        imported("fig57_probe_sizes").main(["--source", f"replay:{other}", "--out", str(tmp_path)])
+
+
+def test_a_recording_of_another_scan_is_refused(ran, imported, tmp_path):
+    other = ran("fig58_single_press").recording
+    with pytest.raises(DataError, match="scan"):
+        imported("fig54_reference").main(["--source", f"replay:{other}", "--out", str(tmp_path)])
