@@ -1,0 +1,114 @@
+"""``tomoskin simulate``: sessions with truth inside, labelled sets, refusals."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from tomoskin.session import SessionReader, read_recording
+from tomoskin.twin.labelled import SHARD_FRAMES
+from tomoskin.twin.script_page import EXAMPLE, PRESSES_EXAMPLE
+
+SCRIPT = """format = 1
+[script]
+duration = "1 s"
+lead_in = "300 ms"
+[[press]]
+id = "a"
+radius = "15 mm"
+at = ["20 mm", "-30 mm"]
+start = "200 ms"
+force = "3 N"
+hold = "300 ms"
+[[mark]]
+at = "500 ms"
+text = "half"
+"""
+
+
+@pytest.fixture
+def script(tmp_path):
+    path = tmp_path / "my.toml"
+    path.write_text(SCRIPT, encoding="utf-8")
+    return path
+
+
+def test_a_session_holds_frames_and_truth_and_is_the_same_again(tomoskin, script, tmp_path):
+    first, second = tmp_path / "a.mcap", tmp_path / "b.mcap"
+    for out in (first, second):
+        code, text, _ = tomoskin("simulate", "--script", script, "--out", out, "--json")
+        assert code == 0
+    assert first.read_bytes() == second.read_bytes()
+    other = tmp_path / "c.mcap"
+    tomoskin("simulate", "--script", script, "--out", other, "--seed", 5)
+    assert other.read_bytes() != first.read_bytes()
+    with SessionReader(first) as session:
+        truth = list(session.truth())
+        assert [note.text for note in session.notes()] == ["half"]
+    recording = read_recording(first)
+    assert len(recording) == json.loads(text)["frames"]
+    assert max(press["force"] for item in truth for press in item.presses) == pytest.approx(3)
+    pressed = np.isfinite(recording.labels[:, 0])
+    assert 5 < pressed.sum() < len(recording)
+    assert recording.labels[pressed] == pytest.approx(np.tile([0.02, -0.03], (pressed.sum(), 1)))
+    change = np.linalg.norm(recording.voltages - recording.voltages[0], axis=1)
+    assert change[pressed].max() > 5 * change[~pressed][:5].max()
+
+
+def test_a_set_is_the_same_whoever_makes_it_and_goes_on(tomoskin, tmp_path):
+    n = SHARD_FRAMES + 2
+    common = ("simulate", "--presses", n, "--seed", 3, "--json")
+    one, two, single = tmp_path / "one", tmp_path / "two", tmp_path / "set.npz"
+    assert tomoskin(*common, "--out", one, "--processes", 1)[0] == 0
+    assert tomoskin(*common, "--out", two, "--processes", 2)[0] == 0
+    parts = ["part-00000.npz", "part-00001.npz"]
+    assert [(one / p).read_bytes() for p in parts] == [(two / p).read_bytes() for p in parts]
+    torn = (two / parts[1]).read_bytes()
+    (two / parts[1]).write_bytes(torn[:-100])
+    _, text, _ = tomoskin(*common, "--out", two, "--processes", 1)
+    assert (json.loads(text)["made"], json.loads(text)["found"]) == (1, 1)
+    assert (two / parts[1]).read_bytes() == torn
+    code, _, error = tomoskin("simulate", "--presses", n, "--seed", 4, "--out", one)
+    assert code == 1
+    assert "is of another set" in error
+    assert tomoskin(*common, "--out", single, "--processes", 1)[0] == 0
+    recording = read_recording(single)
+    assert len(recording) == n
+    assert np.hypot(*recording.labels.T).max() < 0.0951
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (SCRIPT.replace("3 N", "-3 N"), '[[press]] 1 "a" force'),
+        (SCRIPT.replace("20 mm", "200 mm"), "off the skin"),
+        (PRESSES_EXAMPLE, "--presses N"),
+    ],
+)
+def test_bad_scripts_leave_no_file(tomoskin, script, tmp_path, text, message):
+    script.write_text(text, encoding="utf-8")
+    code, _, error = tomoskin("simulate", "--script", script, "--out", tmp_path / "x.mcap")
+    assert code == 1
+    assert message in error
+    assert not (tmp_path / "x.mcap").exists()
+
+
+def test_wrong_usage(tomoskin, script, tmp_path):
+    out = ("--out", tmp_path / "x.mcap")
+    assert tomoskin("simulate", *out)[0] == 2
+    assert tomoskin("simulate", "--script", script, "--processes", 2, *out)[0] == 2
+    assert tomoskin("simulate", "--script", tmp_path / "none.toml", *out)[0] == 1
+
+
+def test_the_page_and_its_examples(tomoskin, script, tmp_path):
+    from pathlib import Path
+
+    from tomoskin.twin import Population, script_page
+
+    page = Path(__file__).resolve().parents[2] / "docs" / "simulate.md"
+    assert page.read_text(encoding="utf-8") == script_page()
+    Population.from_toml(PRESSES_EXAMPLE)
+    script.write_text(EXAMPLE, encoding="utf-8")
+    assert tomoskin("simulate", "--script", script, "--out", tmp_path / "x.mcap")[0] == 0
