@@ -54,7 +54,7 @@ def test_a_session_holds_frames_and_truth_and_is_the_same_again(tomoskin, script
     assert 5 < pressed.sum() < len(recording)
     assert recording.labels[pressed] == pytest.approx(np.tile([0.02, -0.03], (pressed.sum(), 1)))
     change = np.linalg.norm(recording.voltages - recording.voltages[0], axis=1)
-    assert change[pressed].max() > 5 * change[~pressed][:5].max()
+    assert change[pressed].max() > 3 * change[~pressed][:5].max()  # idle frames: the noise of two
 
 
 def test_a_set_is_the_same_whoever_makes_it_and_goes_on(tomoskin, tmp_path):
