@@ -1,6 +1,7 @@
-/* The machine as an ATmega2560 at 16 MHz: timer 1 counts ticks of 4 us (compare A: the scan's
-   timer, compare B: a wake-up every 10 ms), USART 0 the host, the converter one conversion at a
-   time, started in the interrupt of the one before. */
+/* The machine as an ATmega2560 at 16 MHz: timer 1 counts ticks of 4 us, timer 3 is the scan's, timer
+   0 wakes the main loop every 16 ms; USART 0 the host; the converter one conversion at a time,
+   started in the interrupt of the one before. Each timer has one task: writing a compare register
+   disturbs the other channels of a timer in simavr. */
 #include "hal.h"
 
 #include "limits.h"
@@ -15,8 +16,7 @@
 #include <avr/wdt.h>
 #include <util/delay_basic.h>
 
-#define WAKE_TICKS (10u * TICKS_PER_MS)
-#define SOON_TICKS 2u /* a compare nearer than this may be missed */
+#define BY_64(timer) (_BV(CS##timer##1) | _BV(CS##timer##0)) /* 4 us */
 #define SEND_SIZE 256u /* so that an index wraps by itself */
 #define RECEIVE_SIZE 128u
 
@@ -54,9 +54,12 @@ void hal_init(void) {
     DIDR0 = 0xFFu; /* digital inputs off where potentials come in */
     DIDR2 = 0xFFu;
     TCCR1A = 0u;
-    TCCR1B = _BV(CS11) | _BV(CS10); /* 16 MHz / 64 */
-    OCR1B = WAKE_TICKS;
-    TIMSK1 = _BV(TOIE1) | _BV(OCIE1B);
+    TCCR1B = BY_64(1);
+    TIMSK1 = _BV(TOIE1);
+    TCCR0A = 0u;
+    TCCR0B = _BV(CS02) | _BV(CS00); /* 64 us; an overflow every 16.4 ms */
+    TIMSK0 = _BV(TOIE0);
+    TCCR3A = 0u;
     hal_uart_set_baud(FIRST_BAUD);
     UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
     UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
@@ -124,13 +127,17 @@ void hal_delay_us(uint16_t us) {
 }
 
 void hal_timer_set(uint16_t ticks) {
-    OCR1A = (uint16_t)(TCNT1 + (ticks < SOON_TICKS ? SOON_TICKS : ticks));
-    TIFR1 = _BV(OCF1A);
-    TIMSK1 |= _BV(OCIE1A);
+    TCCR3B = 0u;
+    TCNT3 = 0u;
+    OCR3A = ticks;
+    TIFR3 = _BV(OCF3A);
+    TIMSK3 = _BV(OCIE3A);
+    TCCR3B = BY_64(3);
 }
 
 void hal_timer_cancel(void) {
-    TIMSK1 &= (uint8_t)~_BV(OCIE1A);
+    TIMSK3 = 0u;
+    TCCR3B = 0u;
 }
 
 void hal_adc_prepare(uint8_t prescaler) {
@@ -232,13 +239,12 @@ ISR(TIMER1_OVF_vect) {
     ticks_high++;
 }
 
-ISR(TIMER1_COMPB_vect) {
-    OCR1B = (uint16_t)(OCR1B + WAKE_TICKS);
+ISR(TIMER0_OVF_vect) {
     awake = true;
 }
 
-ISR(TIMER1_COMPA_vect) {
-    TIMSK1 &= (uint8_t)~_BV(OCIE1A);
+ISR(TIMER3_COMPA_vect) {
+    hal_timer_cancel();
     scan_on_timer();
 }
 
@@ -265,7 +271,7 @@ ISR(USART0_UDRE_vect) {
     if (left == 0u) {
         UCSR0B &= (uint8_t)~_BV(UDRIE0);
     }
-    if (left == SEND_SIZE / 4u) {
+    if (left <= SEND_SIZE / 4u) {
         awake = true; /* time to encode more */
     }
 }

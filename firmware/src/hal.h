@@ -52,7 +52,7 @@ void hal_uart_set_baud(uint32_t baud);
 void hal_lock(void);
 void hal_unlock(void);
 
-/* idle sleeps until wake has been called, a byte has come, or about 10 ms have gone by. */
+/* idle sleeps until wake has been called, a byte has come, or some 10 ms have gone by. */
 void hal_wake(void);
 void hal_idle(void);
 
