@@ -8,16 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from firmware.boards import FIRMWARE, SCAN, SETTINGS, built
 from firmware.conftest import need
+from tomoskin.cli.app import app
 from tomoskin.core import Frame, SourceError
-from tomoskin.emulator import EmulatorTransport, Programs, SkinMemory
+from tomoskin.emulator import EmulatorTransport, Programs, SkinMemory, emulate_board
 from tomoskin.emulator import program as building
 from tomoskin.emulator.memory import Front
 from tomoskin.emulator.source import front_of, open_emulator
 from tomoskin.skin import Skin
-from tomoskin.source import Link, ScanSettings
+from tomoskin.source import Link, ScanSettings, SerialTransport
 from tomoskin.twin import Press, TwinSettings, TwinSkin
 
 PATIENCE = 30.0
@@ -133,3 +135,24 @@ def test_the_firmware_is_small(programs: Programs) -> None:
     text, data, bss = map(int, lines.stdout.splitlines()[1].split()[:3])
     assert text + data < MOST_FLASH
     assert data + bss < MOST_RAM
+
+
+def test_a_board_for_another_host(programs: Programs, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tomoskin.emulator.source.build_programs", lambda: programs)
+    skin = Skin.load("textile-disc-8")
+    with emulate_board(skin) as board, Link(SerialTransport(board.port), SCAN, SETTINGS) as link:
+        frames_of(link, 2)
+        assert board.alive
+    assert board.last_words == ""
+
+
+def test_the_command_line_builds_and_says_what_is_missing(
+    programs: Programs, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = CliRunner().invoke(app, ["firmware", "build"])
+    assert said.exit_code == 0
+    assert Path(said.output.strip()) == programs.elf
+    monkeypatch.setattr("shutil.which", lambda _: None)
+    said = CliRunner().invoke(app, ["firmware", "flash", "/dev/nowhere"])
+    assert isinstance(said.exception, SourceError)
+    assert "avrdude" in str(said.exception)

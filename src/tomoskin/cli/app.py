@@ -18,6 +18,7 @@ from tomoskin.cli import (
     bench,
     calibrate,
     doctor,
+    firmware,
     image,
     live,
     locate,
@@ -47,6 +48,7 @@ app.command("simulate")(simulate.simulate)
 app.command("bench")(bench.bench)
 app.add_typer(session.app, name="session")
 app.add_typer(skin.app, name="skin")
+app.add_typer(firmware.app, name="firmware")
 app.command("doctor")(doctor.doctor)
 
 

@@ -2,7 +2,16 @@
 
 from tomoskin.emulator.memory import SkinMemory
 from tomoskin.emulator.process import BoardProcess
-from tomoskin.emulator.program import Programs, build_programs
+from tomoskin.emulator.program import Programs, build_elf, build_programs
+from tomoskin.emulator.source import emulate_board
 from tomoskin.emulator.transport import EmulatorTransport
 
-__all__ = ["BoardProcess", "EmulatorTransport", "Programs", "SkinMemory", "build_programs"]
+__all__ = [
+    "BoardProcess",
+    "EmulatorTransport",
+    "Programs",
+    "SkinMemory",
+    "build_elf",
+    "build_programs",
+    "emulate_board",
+]

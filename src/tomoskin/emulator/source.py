@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tomoskin.core import SourceError
-from tomoskin.emulator.memory import Front
+from tomoskin.emulator.memory import Front, SkinMemory
+from tomoskin.emulator.process import BoardProcess
 from tomoskin.emulator.program import build_programs
 from tomoskin.emulator.transport import EmulatorTransport
 from tomoskin.source import read_options
@@ -38,6 +43,21 @@ def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
     return EmulatorTransport(
         build_programs(), TwinSkin.of(skin, settings), front_of(skin, settings)
     )
+
+
+@contextmanager
+def emulate_board(skin: Skin) -> Iterator[BoardProcess]:
+    """A board on the skin at rest, for a host that opens its port itself; SourceError."""
+    settings = TwinSettings.preset(skin.twin.preset)
+    resistance = TwinSkin.of(skin, settings).resistance()
+    with tempfile.TemporaryDirectory(prefix="tomoskin-") as folder:
+        memory = SkinMemory(Path(folder) / "skin", front_of(skin, settings), resistance)
+        board = BoardProcess(build_programs(), memory.path, skin.current)
+        try:
+            yield board
+        finally:
+            board.close()
+            memory.close()
 
 
 def front_of(skin: Skin, settings: TwinSettings) -> Front:

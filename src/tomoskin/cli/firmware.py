@@ -1,0 +1,59 @@
+"""``tomoskin firmware``: build it, flash it, run it in the emulator."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import time
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(no_args_is_help=True, help="The board's firmware: build, flash, emulate.")
+
+Channels = Annotated[int, typer.Option(help="8 or 16, as the board has.")]
+
+
+@app.command()
+def build(channels: Channels = 16) -> None:
+    """Build the firmware of an ATmega2560 board."""
+    from tomoskin.emulator import build_elf
+
+    typer.echo(str(build_elf(channels)))
+
+
+@app.command()
+def flash(
+    port: Annotated[str, typer.Argument(help="Such as /dev/ttyACM0.")], channels: Channels = 16
+) -> None:
+    """Build the firmware and write it to an Arduino Mega 2560 with avrdude."""
+    from tomoskin.core import SourceError
+    from tomoskin.emulator import build_elf
+
+    if shutil.which("avrdude") is None:
+        raise SourceError(
+            "avrdude is missing", where="firmware flash", hint="on Debian: apt-get install avrdude"
+        )
+    elf = build_elf(channels)
+    command = ["avrdude", "-p", "atmega2560", "-c", "wiring", "-b", "115200", "-D", "-P", port]
+    if subprocess.run([*command, "-U", f"flash:w:{elf}:e"], check=False).returncode:
+        raise SourceError(
+            "avrdude could not write the firmware", where=port, hint="is it the board's port?"
+        )
+
+
+@app.command()
+def emulate(
+    skin: Annotated[str, typer.Option(help="Built-in name or path.")] = "textile-disc-8",
+) -> None:
+    """Run the firmware on a simulated ATmega2560 until Ctrl-C; its serial port is printed."""
+    from tomoskin.emulator import emulate_board
+    from tomoskin.skin import Skin
+
+    with emulate_board(Skin.load(skin)) as board:
+        typer.echo(board.port)
+        try:
+            while board.alive:
+                time.sleep(0.2)
+        except KeyboardInterrupt:
+            pass

@@ -1,0 +1,40 @@
+"""How fast the ELF scans, by its own clock: the same on every machine."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from emulator.test_emulator import frames_of
+from firmware.boards import built, running
+from firmware.conftest import need
+from tomoskin.pattern import Pattern, Scan
+from tomoskin.source import Link, ScanSettings, SerialTransport
+
+# Electrodes, settling s, least frames/s; prescaler 64, no oversampling.
+PROMISED = [(8, 2e-3, 40), (8, 200e-6, 180), (16, 2e-3, 17), (16, 200e-6, 55)]
+
+
+@pytest.mark.parametrize(("electrodes", "settling", "least"), PROMISED)
+def test_frames_per_second_and_every_value(
+    pytestconfig: pytest.Config, tmp_path: Path, electrodes: int, settling: float, least: float
+) -> None:
+    need(pytestconfig, ["make", "cc", "avr-gcc", "simavr"], "gcc-avr avr-libc simavr libsimavr-dev")
+    elf, program = built("avr", "tomoskin-16.elf"), built("emulator", "tomoskin-emulator")
+    scan = Scan.of(Pattern.adjacent(electrodes))
+    settings = ScanSettings(1, settling, current_limit=0.1, adc_bits=10, prescaler=64)
+    with (
+        running(program, tmp_path / "port", str(elf)) as board,
+        Link(SerialTransport(board.path), scan, settings, clock=time.monotonic) as link,
+    ):
+        frames = frames_of(link, 30)
+        assert link.frames.lost == link.counters.corrupt == 0
+    source, sink = scan.drives[scan.sample_drive].T
+    volts = 0.1 * (1 + sink + (scan.sample_electrode == source) * (1 + source))
+    for frame in frames:
+        assert frame.samples.tolist() == np.floor(volts * 1024 / 5).tolist()
+    ticks = np.diff([frame.ticks for frame in frames])
+    assert 250e3 / ticks.max() >= least
