@@ -16,6 +16,8 @@ from tomoskin.core import DataError
 from tomoskin.touch.locator.kernel import squared_distances
 from tomoskin.touch.locator.process import Process
 
+SHARED = Path(__file__).parents[2] / "shared" / "data"
+
 SKINS = {"noPattern": 2.28, "fullCB": 6.74, "parallel": 3.13, "concentric": 4.99, "radial": 3.84}
 """Five skins with what their authors' network reaches after 2,000 presses, mm."""
 
@@ -47,9 +49,10 @@ class Score:
 
 
 def run(data: Path | None) -> tuple[Report, ...]:
-    """Learn from the public sets in ``data``."""
-    if data is None:
-        raise DataError("needs the public recordings", where="tomoskin bench touch", hint="--data")
+    """Learn from the public sets in ``data``, by default those beside the checkout."""
+    data = data or SHARED
+    if not data.is_dir():
+        raise DataError("expected the public recordings", where=str(data), hint="--data FOLDER")
     return (
         *_five_skins(data / "eskin_varsens16"),
         _two_splits(data),
