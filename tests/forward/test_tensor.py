@@ -154,6 +154,14 @@ def test_a_bar_of_slanted_fibres() -> None:
 # Refusals.
 
 
+def test_each_cells_matrix_is_that_of_all_components(mesh: Mesh, order: int) -> None:
+    sigma, model = tensors(mesh), ForwardModel(mesh, Pattern.adjacent(4), Z, order=order)
+    assembly, g = model.assembly, model.assembly.element.gradients
+    values = np.array(model.contacts)
+    np.add.at(values, assembly.place, np.einsum("nqia,nab,nqjb->nij", g, sigma, g))
+    assert mismatch(assembly.matrix(sigma, model.contacts).values, values) < 1e-14
+
+
 def with_cell(mesh: Mesh, tensor: Any, cell: int = 7) -> NDArray[Any]:
     d = mesh.points.shape[1]
     sigma = np.broadcast_to(np.eye(d), (len(mesh.cells), d, d)).astype(np.asarray(tensor).dtype)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations_with_replacement
 from typing import Any, Self
 
 import numpy as np
@@ -86,15 +87,23 @@ class Assembly:
 
     @cached_property
     def tensor_stiffness(self) -> csr_array:
-        """(n_values, n_cells·d·d): values per unit of each component of a conductivity tensor."""
+        """(n_values, d(d + 1)/2 · n_cells): values per unit of each component of a tensor.
+
+        Those on and above its diagonal, row by row, all cells of one after all of another.
+        """
         g = self.element.gradients
-        local = np.einsum("nqia,nqjb->nijab", g, g)
-        return self._stiffness_map(local.reshape(*local.shape[:3], -1))
+        both = np.einsum("nqia,nqjb->nijab", g, g)
+        both = both + np.triu(both.swapaxes(3, 4), 1)
+        return self._stiffness_map(both[..., *np.triu_indices(g.shape[3])])
 
     def matrix(self, conductivity: NDArray[Any], contacts: NDArray[Any]) -> Compressed:
         """System matrix for σ (n_cells,) or (n_cells, d, d), and the values of the contacts."""
-        maps = self.stiffness if conductivity.ndim == 1 else self.tensor_stiffness
-        values = maps @ conductivity.ravel()
+        if conductivity.ndim == 1:
+            values = self.stiffness @ conductivity
+        else:
+            above = combinations_with_replacement(range(conductivity.shape[1]), 2)
+            rows = np.concatenate([conductivity[:, a, b] for a, b in above])
+            values = self.tensor_stiffness @ rows
         values = np.add(values, contacts, out=values if values.dtype == contacts.dtype else None)
         return Compressed(values, self.indices, self.indptr)
 
@@ -103,12 +112,12 @@ class Assembly:
         return np.asarray(self.contact @ (1.0 / contact_impedance))
 
     def _stiffness_map(self, local: FloatArray) -> csr_array:
-        """``local`` (n_cells, k, k, c) → (n_values, n_cells·c)."""
+        """``local`` (n_cells, k, k, c) → (n_values, c·n_cells)."""
         n_cells, _, _, c = local.shape
         rows = np.broadcast_to(self.place[..., None], local.shape)
-        cols = np.arange(n_cells * c).reshape(n_cells, 1, 1, c)
+        cols = np.arange(c * n_cells, dtype=np.int32).reshape(c, n_cells).T[:, None, None]
         entries = (local.ravel(), (rows.ravel(), np.broadcast_to(cols, local.shape).ravel()))
-        return csr_array(coo_array(entries, shape=(len(self.indices), n_cells * c)))
+        return csr_array(coo_array(entries, shape=(len(self.indices), c * n_cells)))
 
 
 def _numbered(cells: IntArray, others: tuple[IntArray, IntArray], n: int) -> csr_array:
