@@ -8,7 +8,7 @@ import pytest
 
 from tomoskin.core import ModelError
 from tomoskin.twin import ElectronicsSettings, FaultEvent, Faults, faults_at, line_potentials
-from tomoskin.twin.circuit import driven, settled, shorted
+from tomoskin.twin.circuit import driven, settling, shorted
 from tomoskin.twin.faults import check_electrodes
 
 PERFECT = ElectronicsSettings()
@@ -82,11 +82,14 @@ def test_a_cut_electrode_floats_and_drives_nothing():
 
 def test_settling_starts_where_the_drive_before_was_left():
     potentials = np.array([[1.0], [3.0], [-1.0]])
-    start = settled(potentials, np.zeros(1), np.array([1.0, 2.0, 1.0]), 1.0)
+    matrix = settling(np.array([1.0, 2.0, 1.0]), 1.0)
+    start = matrix @ np.concatenate([np.zeros((1, 1)), potentials])
     first = 1 - math.exp(-1)
     second = 3 + (first - 3) * math.exp(-2)
     third = -1 + (second + 1) * math.exp(-1)
     assert start[:, 0] == pytest.approx([0.0, first, second, third])
+    later = matrix @ np.concatenate([np.full((1, 1), 0.5), potentials])
+    assert (later - start)[:, 0] == pytest.approx(0.5 * np.exp([0.0, -1.0, -3.0, -4.0]))
 
 
 def test_faults_come_and_go_in_their_order():

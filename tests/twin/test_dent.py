@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import map_coordinates
 
 from tomoskin.twin import Circle, ContactSettings, Finger, Grid, Probe, Square, indent
 from tomoskin.twin.dent import solved_dent
@@ -41,8 +42,31 @@ def test_a_curved_face_blends_close_to_what_it_solves():
     at = 0.5 * (1.0 + math.sqrt(2)) * 1e-3 * 2**9  # between two rungs
     read = indent([Probe(Finger(), 0, 0, at)], LINEAR, POINTS)
     dent = solved_dent(Finger(), LINEAR, at, 0.0)
-    depth = dent.table[:, 0].reshape(dent.grid.n, -1)
+    depth = dent.table[0].reshape(dent.grid.n, -1)
     assert read.depth.max() == pytest.approx(depth.max(), rel=0.01)
+
+
+def test_it_is_read_between_the_nodes_of_its_grid():
+    """Three presses, one turned, against scipy's interpolation of each dent by itself."""
+    probes = [
+        Probe(Circle(0.012), 0.01, 0.02, 1.0),
+        Probe(Circle(0.012), -0.03, 0.0, 1.0),
+        Probe(Square(0.02), 0.02, -0.01, 1.0, angle=0.7),
+    ]
+    depth, mean = np.zeros((2, len(POINTS)))
+    for probe in probes:
+        dent = solved_dent(probe.shape, LINEAR, 1.0, 0.0)
+        c, s = math.cos(probe.angle), math.sin(probe.angle)
+        off = (POINTS - [probe.x, probe.y]) @ np.array([[c, -s], [s, c]])
+        inside = np.linalg.norm(off, axis=1) < dent.grid.reach
+        place = (off / dent.grid.step + dent.grid.n // 2).T
+        field = dent.table.reshape(-1, dent.grid.n, dent.grid.n)
+        trace = field[1] + field[2] + field[4] + field[5]
+        depth += inside * map_coordinates(field[0], place, order=1)
+        mean += inside * map_coordinates(trace, place, order=1)
+    load = indent(probes, LINEAR, POINTS)
+    assert load.depth == pytest.approx(depth, abs=1e-15)
+    assert load.strain[:, :2].sum(axis=1) == pytest.approx(mean, abs=1e-15)
 
 
 def test_a_body_that_locks_gives_way_less_and_never_beyond():

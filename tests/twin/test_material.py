@@ -75,6 +75,41 @@ def test_stretched_one_way_it_conducts_worse_that_way():
     assert sigma[1] == pytest.approx(UNLOADED[1] * np.eye(2))
 
 
+def told(settings, steps):
+    """The settings' laws cell by cell and part by part, as they are written."""
+    late, lag, worn, before = [0.0, 0.0], 0.0, 0.0, np.zeros(4)
+    for load, dt in steps:
+        felt = np.append(load.strain[0], load.depth[0] / settings.thickness)
+        worn += max((felt[:2] - before[:2]).sum() / 2, 0.0)
+        before, slack = felt, lag - felt
+        size = math.sqrt((slack[0] ** 2 + slack[1] ** 2) / 2 + slack[2] ** 2)
+        (width,) = settings.play_widths
+        kept = np.array([min(1.0, width / size)] * 3 + [min(1.0, width / abs(slack[3]))])
+        lag = felt + slack * kept
+        prompt = 0.9 * felt + 0.1 * lag
+        late = [
+            prompt + (q - prompt) * math.exp(-dt / tau)
+            for q, tau in zip(late, settings.creep_times, strict=True)
+        ]
+    xx, yy, xy, squeezed = 0.93 * prompt + 0.04 * late[0] + 0.03 * late[1]
+    mean = (xx + yy) / 2
+    values, vectors = np.linalg.eigh(-5.0 * np.array([[xx - mean, xy], [xy, yy - mean]]))
+    level = math.exp(-settings.gauge * mean - settings.wear * worn) * (1 + 0.05 * squeezed)
+    return level * vectors @ np.diag(np.exp(values)) @ vectors.T
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_textile_as_its_laws_are_written(seed):
+    random = np.random.default_rng(seed)
+    steps = [
+        (loaded(tuple(random.uniform(-0.05, 0.1, 3)), random.uniform(0, 1e-3)), dt)
+        for dt in random.uniform(0, 3, 5)
+    ]
+    worn = replace(TEXTILE, wear=0.5)
+    sigma = conductivity(after(worn, *steps), worn, UNLOADED)
+    assert sigma[0] == pytest.approx(UNLOADED[0] * told(worn, steps), rel=1e-12, abs=1e-14)
+
+
 @given(st.lists(st.floats(0.0, 5.0), min_size=1, max_size=6))
 def test_one_long_step_is_many_short_ones(lengths):
     pulled = loaded((0.02, 0.01, 0.003), 1e-3)

@@ -60,7 +60,8 @@ def line_potentials(
     extra = settings.switch_resistance + contact
     load = field[rows, source] - field[rows, sink] + extra[source] + extra[sink]
     amperes = driven(current, load, settings)
-    broken = np.isin(np.arange(n), sorted(faults.cut))
+    broken = np.zeros(n, dtype=bool)
+    broken[sorted(faults.cut)] = True
     amperes = np.where(broken[source] | broken[sink], 0.0, amperes)
     potential = amperes[:, None] * (field - field[rows, sink][:, None])
     potential += (amperes * contact[sink])[:, None]  # against the sink line
@@ -95,24 +96,25 @@ def shorted(resistance: FloatArray, pairs: frozenset[tuple[int, int]]) -> FloatA
     return resistance
 
 
-def settled(
-    potentials: FloatArray, before: FloatArray, length: FloatArray, time_constant: float
-) -> FloatArray:
-    """(n_drives + 1, n) V that the channels start each drive from; last, what they are left at.
+def settling(length: FloatArray, time_constant: float) -> FloatArray:
+    """(n_drives + 1, n_drives + 1): where a scan begins, and the potentials of its drives, to
+    where each drive starts from; last, what the last one leaves.
 
-    ``before`` (n,) is where the scan begins, ``length`` (n_drives,) s how long each drive is on.
+    ``length`` (n_drives,) s is how long each drive is on: it leaves exp(−length/τ) of the way to
+    its potentials.
     """
-    start = [before]
-    for target, kept in zip(potentials, np.exp(-length / time_constant), strict=True):
-        start.append(target + (start[-1] - target) * kept)
-    return np.array(start)
+    rows = [np.eye(1, len(length) + 1)[0]]
+    for number, kept in enumerate(np.exp(-length / time_constant), start=1):
+        rows.append(kept * rows[-1])
+        rows[-1][number] = 1 - kept
+    return np.array(rows)
 
 
 def _mixed(read: FloatArray, part: float) -> FloatArray:
     """Each channel with ``part`` of the difference to its neighbours on the board."""
     if part == 0:
         return read
-    step = part * np.diff(read, axis=1)
+    step = part * (read[:, 1:] - read[:, :-1])
     mixed = read.copy()
     mixed[:, :-1] += step
     mixed[:, 1:] -= step

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -93,11 +93,13 @@ class MaterialState:
     Attributes
     ----------
     felt
-        (n, 4) strain xx, yy, xy and compression as the load was last.
-    late
-        (n_creep, n, 4) what each late part has reached.
+        (4, n) strain xx, yy, xy and compression as the load was last.
     lagging
-        (n_play, n, 4) where each play stands.
+        (n_play, 4, n) where each play stands.
+    prompt
+        (4, n) the part of the load that is answered without delay: itself, with its plays.
+    late
+        (n_creep, 4, n) what each late part has reached.
     worn
         (n,) mean strain, summed over all loading.
     warmer
@@ -105,8 +107,9 @@ class MaterialState:
     """
 
     felt: FloatArray
-    late: FloatArray
     lagging: FloatArray
+    prompt: FloatArray
+    late: FloatArray
     worn: FloatArray
     warmer: float = 0.0
 
@@ -114,9 +117,10 @@ class MaterialState:
     def fresh(cls, settings: MaterialSettings, n: int) -> MaterialState:
         """A sheet of ``n`` cells that nothing has touched."""
         return cls(
-            felt=np.zeros((n, 4)),
-            late=np.zeros((len(settings.creep), n, 4)),
-            lagging=np.zeros((len(settings.play), n, 4)),
+            felt=np.zeros((4, n)),
+            lagging=np.zeros((len(settings.play), 4, n)),
+            prompt=np.zeros((4, n)),
+            late=np.zeros((len(settings.creep), 4, n)),
             worn=np.zeros(n),
         )
 
@@ -140,16 +144,15 @@ def advance(
     """
     if not 0 <= dt < math.inf:
         raise ModelError(f"expected a time step of 0 s or more, got {dt}", where="twin")
-    felt = _felt(load, settings)
-    state = replace(
-        state,
+    felt = np.concatenate([load.strain.T, load.depth[None] / settings.thickness])
+    lagging = _pulled(state.lagging, felt, settings)
+    prompt = _mixed(felt, lagging, settings.play)
+    return MaterialState(
         felt=felt,
-        lagging=_pulled(state.lagging, felt, settings),
+        lagging=lagging,
+        prompt=prompt,
+        late=_crept(state.late, prompt, settings, dt),
         worn=_worn(state, felt, settings),
-    )
-    return replace(
-        state,
-        late=_crept(state, settings, dt),
         warmer=_warmed(state.warmer, settings, dt, chance),
     )
 
@@ -168,34 +171,26 @@ def conductivity(
     unloaded
         (n_cells,) S.
     """
-    strain = _effective(state, settings)
-    mean = (strain[:, 0] + strain[:, 1]) / 2
-    squeezed = np.clip(strain[:, 3], -_MOST_COMPRESSION, _MOST_COMPRESSION)
-    exponent = np.clip(-settings.gauge * mean - settings.wear * state.worn, -_MOST_LOG, _MOST_LOG)
-    sigma = unloaded * np.exp(exponent) * np.maximum(1 + settings.compression * squeezed, 1e-3)
-    sigma /= max(1 + settings.temperature_coefficient * state.warmer, 1e-3)
+    xx, yy, xy, squeezed = _mixed(state.prompt, state.late, settings.creep)
+    squeezed = np.clip(squeezed, -_MOST_COMPRESSION, _MOST_COMPRESSION)
+    rise = xx + yy
+    rise *= -settings.gauge / 2
+    if settings.wear:
+        rise -= settings.wear * state.worn
+    np.clip(rise, -_MOST_LOG, _MOST_LOG, out=rise)
+    level = unloaded * np.maximum(1 + settings.compression * squeezed, 1e-3)
+    level /= max(1 + settings.temperature_coefficient * state.warmer, 1e-3)
     if settings.scalar:
-        return np.asarray(sigma)
-    return np.asarray(sigma[:, None, None] * _directed(strain, settings.gauge_across))
+        return np.asarray(level * np.exp(rise))
+    half, cross = settings.gauge_across / 2 * (xx - yy), settings.gauge_across * xy
+    return _directed(level, rise, half, cross)
 
 
-def _felt(load: Load, settings: MaterialSettings) -> FloatArray:
-    return np.column_stack([load.strain, load.depth / settings.thickness])
-
-
-def _effective(state: MaterialState, settings: MaterialSettings) -> FloatArray:
-    """(n, 4): what is felt at once, and the late parts."""
-    total = (1 - sum(settings.creep)) * _lagged(state, settings)
-    for part, late in zip(settings.creep, state.late, strict=True):
-        total += part * late
-    return np.asarray(total)
-
-
-def _lagged(state: MaterialState, settings: MaterialSettings) -> FloatArray:
-    """(n, 4): the load with its plays."""
-    total = (1 - sum(settings.play)) * state.felt
-    for part, lagging in zip(settings.play, state.lagging, strict=True):
-        total += part * lagging
+def _mixed(whole: FloatArray, parts: FloatArray, weights: tuple[float, ...]) -> FloatArray:
+    """(4, n): ``parts`` (n_parts, 4, n) by their weights, and of the whole what these leave."""
+    total = (1 - sum(weights)) * whole
+    for weight, part in zip(weights, parts, strict=True):
+        total += weight * part
     return np.asarray(total)
 
 
@@ -205,29 +200,31 @@ def _pulled(lagging: FloatArray, felt: FloatArray, settings: MaterialSettings) -
     The strain as a whole, whatever its direction: its size is √((xx² + yy² + 2xy²)/2), the mean
     strain where both directions are strained alike. Compression has a play of its own.
     """
-    if not settings.play:
-        return lagging
     slack = lagging - felt
-    size = np.sqrt(slack**2 @ np.array([[0.5, 0], [0.5, 0], [1.0, 0], [0, 1.0]]))
-    width = np.array(settings.play_widths).reshape(-1, 1, 1)
-    kept = width / np.maximum(size, width)
-    return np.asarray(felt + slack * kept[..., [0, 0, 0, 1]])
+    xx, yy, xy, squeezed = slack.swapaxes(0, 1)
+    width = np.array(settings.play_widths).reshape(-1, 1)
+    size = np.sqrt((xx * xx + yy * yy) / 2 + xy * xy)
+    slack[:, :3] *= (width / np.maximum(size, width))[:, None]
+    squeezed *= width / np.maximum(np.abs(squeezed), width)
+    slack += felt
+    return np.asarray(slack)
 
 
-def _crept(state: MaterialState, settings: MaterialSettings, dt: float) -> FloatArray:
+def _crept(
+    late: FloatArray, target: FloatArray, settings: MaterialSettings, dt: float
+) -> FloatArray:
     """q' = (s − q)/τ with s held: q → s + (q − s) exp(−dt/τ)."""
-    if not settings.creep:
-        return state.late
-    target = _lagged(state, settings)
-    kept = np.exp(-dt / np.array(settings.creep_times)).reshape(-1, 1, 1)
-    return np.asarray(target + (state.late - target) * kept)
+    crept = late - target
+    crept *= np.exp(-dt / np.array(settings.creep_times)).reshape(-1, 1, 1)
+    crept += target
+    return np.asarray(crept)
 
 
 def _worn(state: MaterialState, felt: FloatArray, settings: MaterialSettings) -> FloatArray:
     if settings.wear == 0:
         return state.worn
     before = state.felt
-    rise = (felt[:, 0] + felt[:, 1] - before[:, 0] - before[:, 1]) / 2
+    rise = (felt[0] + felt[1] - before[0] - before[1]) / 2
     return np.asarray(state.worn + np.maximum(rise, 0.0))
 
 
@@ -238,19 +235,27 @@ def _warmed(warmer: float, settings: MaterialSettings, dt: float, chance: float)
     return warmer * kept + settings.temperature_sd * math.sqrt(1 - kept**2) * chance
 
 
-def _directed(strain: FloatArray, gauge: float) -> FloatArray:
-    """(n, 2, 2) exp(−gauge · deviator): cosh d − sinh(d)/d · gauge · deviator."""
-    half = gauge * (strain[:, 0] - strain[:, 1]) / 2
-    cross = gauge * strain[:, 2]
-    size = np.hypot(half, cross)
-    size[size < 1e-12] = 1e-12  # sinh(d)/d is 1 there
-    grown = np.expm1(np.minimum(size, _MOST_LOG))
-    shrunk = grown / (1 + grown)  # 1 − e⁻ᵈ
-    cosh, sinhc = 1 + (grown - shrunk) / 2, (grown + shrunk) / (2 * size)
-    tensor = np.empty((len(strain), 2, 2))
-    tensor[:, 0, 0], tensor[:, 1, 1] = cosh - sinhc * half, cosh + sinhc * half
-    tensor[:, 0, 1] = tensor[:, 1, 0] = -sinhc * cross
-    return tensor
+def _directed(
+    level: FloatArray, rise: FloatArray, half: FloatArray, cross: FloatArray
+) -> FloatArray:
+    """(n, 2, 2) level · exp(rise − M) for M = [[half, cross], [cross, −half]].
+
+    M² = d², so that exp(rise − M) = eʳ (cosh d − sinh(d)/d · M). The components lie in rows, as
+    they are computed and as the forward model reads them.
+    """
+    size = np.sqrt(half * half + cross * cross)
+    np.maximum(size, 1e-12, out=size)  # sinh(d)/d is 1 there
+    bounded = np.minimum(size, _MOST_LOG)
+    level = level / 2
+    most, least = level * np.exp(rise + bounded), level * np.exp(rise - bounded)
+    mean = most + least
+    slope = (most - least) / size
+    apart = slope * half
+    rows = np.empty((2, 2, len(size)))
+    np.subtract(mean, apart, out=rows[0, 0])
+    np.add(mean, apart, out=rows[1, 1])
+    rows[0, 1] = rows[1, 0] = -slope * cross
+    return rows.transpose(2, 0, 1)
 
 
 def spread_over(

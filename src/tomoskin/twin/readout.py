@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
-from tomoskin.twin.circuit import Lines, line_potentials, settled
+from tomoskin.twin.circuit import Lines, line_potentials, settling
 from tomoskin.twin.faults import Faults, check_electrodes
 from tomoskin.twin.parameters import check_numbers, parameter
 from tomoskin.twin.scanning import SampleTable
@@ -159,15 +160,16 @@ class TwinElectronics:
         lines = self._potentials(table)
         settings, drive, channel = self.settings, table.drive, table.channel
         volts = lines.read[drive, channel]
-        each = np.arange(table.oversampling)[:, None] * table.conversion
         if settings.time_constant > 0:
-            start = settled(lines.read, self._before, table.length, settings.time_constant)
+            carried, left = _settling(table, settings.time_constant)
+            start = carried @ np.concatenate([self._before[None], lines.read])
             self._before = start[-1]
-            missing = start[:-1][drive, channel] - volts
-            volts = volts + missing * np.exp(-(table.since + each) / settings.time_constant)
+            volts = volts + (start[:-1][drive, channel] - volts) * left
         if settings.hum > 0:
-            turn = 2 * np.pi * settings.hum_frequency * (time + table.time + each)
-            volts = volts + self._hum[channel] * np.sin(turn + self._phase[channel])
+            sine, cosine = _turning(table, settings.hum_frequency)
+            turn = 2 * np.pi * settings.hum_frequency * time + self._phase
+            volts = volts + (self._hum * np.sin(turn))[channel] * cosine
+            volts += (self._hum * np.cos(turn))[channel] * sine
         volts = self._gain[channel] * (volts + self._offset[channel])
         stuck = lines.stuck[drive, channel]
         if stuck.any():
@@ -201,3 +203,22 @@ class TwinElectronics:
         kept = math.exp(-dt / self.settings.contact_time)
         fresh = self._contacts.standard_normal(len(self._contact))
         self._contact = kept * self._contact + sd * math.sqrt(1 - kept**2) * fresh
+
+
+@lru_cache(maxsize=16)
+def _settling(table: SampleTable, time_constant: float) -> tuple[FloatArray, FloatArray]:
+    """What :func:`settling` gives, and (oversampling, n_samples) how much of it is left to go."""
+    left = np.exp(-(table.since + _within(table)) / time_constant)
+    return settling(table.length, time_constant), left
+
+
+@lru_cache(maxsize=16)
+def _turning(table: SampleTable, frequency: float) -> tuple[FloatArray, FloatArray]:
+    """(oversampling, n_samples) sine and cosine at each conversion, from the scan's start."""
+    turn = 2 * np.pi * frequency * (table.time + _within(table))
+    return np.sin(turn), np.cos(turn)
+
+
+def _within(table: SampleTable) -> FloatArray:
+    """(oversampling, 1) s from a sample's first conversion to each."""
+    return np.asarray(np.arange(table.oversampling)[:, None] * table.conversion)
