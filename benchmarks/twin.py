@@ -50,8 +50,8 @@ def run(data: Path | None) -> tuple[Report, ...]:
             "material ms",
             "solve ms",
             "whole frame ms",
-            "frames/s",
-            "fastest tenth",
+            "frames /s",
+            "best tenth",
             "× real time",
         ),
         rows,
@@ -59,7 +59,7 @@ def run(data: Path | None) -> tuple[Report, ...]:
             f"{FRAMES} frames, each with three flat round presses of 12 mm and 3 N that have moved "
             f"on a circle since the frame before; seed {SEED}",
             "median of the frames' processor time; every frame is solved exactly",
-            "fastest tenth: frames/s of the 10th percentile, what a quiet machine comes close to",
+            "best tenth: frames/s of the 10th percentile, what a quiet machine comes close to",
             f"promised: {PROMISED} frames/s for 16 electrodes at 3k triangles",
             "ideal: a sheet that conducts alike in all directions; textile: a tensor per cell, "
             "creep, play, temperature, all vices of the board",

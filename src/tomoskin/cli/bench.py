@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import typer
 
+from tomoskin.cli.bench_table import tables
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from types import ModuleType
-
-    from rich.table import Table
 
 _FOLDER = Path(__file__).parents[3] / "benchmarks"
 
@@ -90,7 +89,9 @@ def _show(reports: Sequence[Any]) -> None:
 
     console = Console()
     for report in reports:
-        console.print(_table(report))
+        for table in tables(report.title, report.columns, report.rows, console.width):
+            console.print(table, crop=False)
+            console.print()
         for note in report.notes:
             console.print(f"  {note}", highlight=False)
     known = ", ".join(f"{k} {v}" for k, v in reports[-1].machine.items())
@@ -130,14 +131,3 @@ def _markdown(report: Any) -> str:
     notes = "\n".join(f"- {note}" for note in report.notes)
     title = report.title[:1].upper() + report.title[1:]
     return f"### {title}\n\n{table}\n" + (f"\n{notes}\n" if notes else "")
-
-
-def _table(report: Any) -> Table:
-    from rich.table import Table
-
-    table = Table(title=report.title)
-    for column in report.columns:
-        table.add_column(column, justify="right")
-    for row in report.rows:
-        table.add_row(*map(str, row))
-    return table
