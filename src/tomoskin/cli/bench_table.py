@@ -61,9 +61,12 @@ def _table(title: str, columns: Sequence[_Column]) -> Table:
     table = Table(title=title or None, **style)  # type: ignore[arg-type]
     for column in columns:
         heading = "\n".join(textwrap.wrap(column.heading, column.width))
-        side = "left" if column.key else "right"
         table.add_column(
-            Text(heading), justify=side, no_wrap=True, min_width=column.width, vertical="bottom"
+            Text(heading),
+            justify="left" if column.key else "right",
+            no_wrap=True,
+            min_width=column.width,
+            vertical="bottom",
         )
     for row in zip(*(column.values for column in columns), strict=True):
         table.add_row(*map(Text, row))
