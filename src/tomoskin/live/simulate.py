@@ -9,8 +9,9 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from tomoskin.core import Event, Frame
+from tomoskin.live.pipeline import REFERENCE_FRAMES
 from tomoskin.pattern import Scan
-from tomoskin.session import SessionWriter
+from tomoskin.session import Mark, SessionWriter
 from tomoskin.skin import Skin
 from tomoskin.source import Configuration, Link, ScanSettings, Transport
 from tomoskin.twin import (
@@ -52,8 +53,9 @@ def simulate(
 ) -> Simulated:
     """Run ``script`` on the twin of ``skin`` into the new session file ``out``.
 
-    The same script, skin and seed give the same bytes. Whatever ends it, the file is readable up
-    to there.
+    The file says that its first reference is made of the frames before anything presses or
+    breaks. The same script, skin and seed give the same bytes. Whatever ends it, the file is
+    readable up to there.
 
     Parameters
     ----------
@@ -127,7 +129,8 @@ class _Run:
         transport: Transport = self._wire
         with Link(transport, self._scan, self._asked, clock=clock.now) as link:
             self._writer.device(clock.now(), link.connect())
-            self._writer.settings(clock.now(), _described(script, self._settings))
+            idle = _idle_frames(script, self._frame_time)
+            self._writer.settings(clock.now(), _described(script, self._settings, idle))
             self._writer.truth(clock.now(), ())
             begin, last = clock.now() + script.lead_in, -script.lead_in
             while (time := clock.now() - begin) < script.duration:
@@ -168,14 +171,26 @@ class _Run:
     def _take(self, link: Link) -> None:
         for item in link.poll(_EMPTY_READ):
             if isinstance(item, Frame):
-                self._writer.frame(item)
+                self._writer.frame(item, Mark.NONE if self._frames else Mark.REFERENCE)
                 self._frames += 1
             elif isinstance(item, Event):
                 self._writer.event(item)
 
 
-def _described(script: Script, settings: TwinSettings) -> dict[str, object]:
-    return {"command": "simulate", "script": script.name, "twin": asdict(settings)}
+def _idle_frames(script: Script, frame_time: float) -> int:
+    """Whole frames before anything presses or breaks, of at most what a live reference takes."""
+    starts = [press.start for press in script.presses] + [fault.start for fault in script.faults]
+    quiet = script.lead_in + min(starts, default=script.duration)
+    return max(1, min(REFERENCE_FRAMES, int(quiet / frame_time)))
+
+
+def _described(script: Script, settings: TwinSettings, idle: int) -> dict[str, object]:
+    return {
+        "command": "simulate",
+        "script": script.name,
+        "reference_frames": idle,
+        "twin": asdict(settings),
+    }
 
 
 def _described_probe(probe: Probe) -> dict[str, object]:
