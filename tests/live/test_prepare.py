@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from tomoskin.core import DataError, ModelError
+from tomoskin.core import DataError, ModelError, SkinError
 from tomoskin.forward import ForwardModel
-from tomoskin.inverse import OneStep
+from tomoskin.inverse import Evidence, Greit, OneStep
 from tomoskin.live import prepare
+from tomoskin.live.tune import tuned_by_rule
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
@@ -35,3 +37,22 @@ def test_an_operator_of_another_pattern_with_as_many_rows() -> None:
 def test_a_segmenter_of_another_mesh() -> None:
     with pytest.raises(ModelError, match=f"the segmenter of mesh {MOVED.identity}"):
         replace(PREPARED, segmenter=Segmenter(MOVED, PREPARED.skin.touch))
+
+
+def test_a_greit_skin_is_prepared_with_the_trained_operator() -> None:
+    coarse = Skin.load("tank-16").altered({"mesh": {"cells": 600}})
+    prepared = prepare(coarse)
+    assert isinstance(prepared.operator, Greit)
+    assert (prepared.choice.rule, prepared.light_touch) == ("greit", None)
+    assert prepared.operator.noise_figure == coarse.inverse.noise_figure == 1.0
+    fewer = prepared.without(np.arange(5))
+    assert isinstance(fewer.operator, Greit)
+    assert fewer.operator.matrix.shape[1] == prepared.operator.matrix.shape[1] - 5
+
+
+def test_a_rule_cannot_choose_the_alpha_of_a_method_without_one() -> None:
+    prepared = prepare(Skin.load("tank-16").altered({"mesh": {"cells": 600}}))
+    with pytest.raises(ModelError, match=r'method "one-step".*"greit"'):
+        tuned_by_rule(prepared, "gcv", Evidence())
+    with pytest.raises(SkinError, match=r"goes with method"):
+        prepared.skin.altered({"inverse": {"alpha": 0.1}})

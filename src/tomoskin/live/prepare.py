@@ -10,6 +10,7 @@ from tomoskin.core import FloatArray, Image, IntArray, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import (
     AlphaChoice,
+    Greit,
     LightTouch,
     LinearProblem,
     Modes,
@@ -128,7 +129,7 @@ def _prepared(skin: Skin, problem: LinearProblem) -> Prepared:
     model = problem.model
     scan = Scan.of(model.pattern)
     readout = Readout.of(scan, skin.readout)
-    light_touch, choice, operator = _chosen(problem, skin.inverse.alpha, readout)
+    light_touch, choice, operator = _chosen(problem, skin, readout)
     return Prepared(
         skin=skin,
         mesh=model.mesh,
@@ -146,8 +147,11 @@ def _prepared(skin: Skin, problem: LinearProblem) -> Prepared:
 
 
 def _chosen(
-    problem: LinearProblem, alpha: float | str, readout: Readout
+    problem: LinearProblem, skin: Skin, readout: Readout
 ) -> tuple[LightTouch | None, AlphaChoice, Operator]:
+    if skin.inverse.method == "greit":
+        return None, *_trained(problem.model, skin)
+    alpha = skin.inverse.alpha
     if not isinstance(alpha, str):
         by_hand = AlphaChoice(alpha, "hand", "set by hand")
         return None, by_hand, problem.operator(alpha)
@@ -155,6 +159,18 @@ def _chosen(
     choice = light_touch(_predicted(problem, readout))
     choice = replace(choice, reason=f"{choice.reason}, as its read-out predicts it")
     return light_touch, choice, light_touch.spectrum.operator(choice.alpha)
+
+
+def _trained(model: ForwardModel, skin: Skin) -> tuple[AlphaChoice, Operator]:
+    figure = skin.inverse.noise_figure
+    operator = Greit(
+        model,
+        conductivity=skin.conductivity,
+        difference=skin.inverse.difference,
+        noise_figure=figure,
+    )
+    reason = f"trained operator, its noise weighed for a noise figure of {figure:g}"
+    return AlphaChoice(operator.noise_weight, "greit", reason), operator
 
 
 def _predicted(problem: LinearProblem, readout: Readout) -> FloatArray:

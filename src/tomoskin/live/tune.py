@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tomoskin.core import ModelError
 from tomoskin.inverse import Assembly, Evidence, Spectrum, choose
 from tomoskin.signal import Reference
 
@@ -61,10 +62,17 @@ def tuned_by_rule(prepared: Prepared, rule: str, evidence: Evidence) -> Prepared
     Raises
     ------
     ModelError
-        When the rule is not known or finds no alpha.
+        When the rule is not known or finds no alpha, or the method has none.
     DataError
         When the evidence lacks what the rule needs.
     """
+    if prepared.skin.inverse.method != "one-step":
+        raise ModelError(
+            f'rules choose the alpha of method "one-step", and the skin\'s is '
+            f'"{prepared.skin.inverse.method}"',
+            where=prepared.skin.name,
+            hint="leave the rule out, or change the method in the skin's [inverse]",
+        )
     spectrum = Spectrum.of(prepared.problem)
     choice = choose(spectrum, rule, evidence)
     found = prepared.with_alpha(choice, spectrum, spectrum.operator(choice.alpha))

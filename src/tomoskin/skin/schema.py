@@ -74,6 +74,7 @@ _SIZE = Quantity("length", "mm", 1, 5000)
 _PLACE = Quantity("length", "mm", -5000, 5000)
 _ELECTRODE = Whole(0, 31)
 _SIDES = ("ellipse", "rectangle")
+_ONE_STEP = ("method", ("one-step",))
 
 SECTIONS: tuple[Section, ...] = (
     Section(
@@ -262,22 +263,32 @@ SECTIONS: tuple[Section, ...] = (
         "How voltages become a picture.",
         (
             Key(
+                "method",
+                Choice(("one-step", "greit")),
+                "one-step: the most likely picture under a prior. greit: an operator trained to "
+                "show small targets as a stated response; truer places, not sharper.",
+                default="one-step",
+            ),
+            Key(
                 "prior",
                 Choice(("identity", "laplace", "gaussian", "noser", "exponential", "matern")),
                 "What is held to be likely.",
                 default="noser",
+                when=_ONE_STEP,
             ),
             Key(
                 "exponent",
                 Number(0, 2),
                 "With noser: the power of a cell's sensitivity that weighs it down.",
                 default=0.5,
+                when=_ONE_STEP,
             ),
             Key(
                 "correlation_length",
                 Quantity("length", "mm", 0.1, 5000),
                 "With exponential and matern: how far a change is alike; without it a tenth of "
                 "the sheet's extent.",
+                when=_ONE_STEP,
             ),
             Key(
                 "alpha",
@@ -285,6 +296,14 @@ SECTIONS: tuple[Section, ...] = (
                 "Weight of the prior; it enters squared. auto: chosen by the noise, for a light "
                 "touch.",
                 default="auto",
+                when=_ONE_STEP,
+            ),
+            Key(
+                "noise_figure",
+                Number(0.1, 100),
+                "How much noisier the picture may be than the voltages, signal for signal.",
+                default=1.0,
+                when=("method", ("greit",)),
             ),
             Key(
                 "difference",
@@ -298,6 +317,7 @@ SECTIONS: tuple[Section, ...] = (
                 "How long a picture lasts: each rests on the frames before it too, the more the "
                 "longer this is (Kalman filter). 0 s: on its own frame alone.",
                 default="0 s",
+                when=_ONE_STEP,
             ),
         ),
     ),

@@ -20,18 +20,21 @@ class ReadoutSettings:
 
 @dataclass(frozen=True, slots=True)
 class InverseSettings:
-    """Prior by name, its weight, the difference, and what the prior takes.
+    """The kind of difference, the method, and what that takes.
 
-    ``alpha`` is a number or "auto": chosen by the noise. ``correlation_length`` is in m; None is
-    a tenth of the sheet's extent. ``time_constant`` in s; 0 is no filter over frames.
+    Method "one-step": the prior by name and what it takes; ``alpha`` is a number or "auto":
+    chosen by the noise; ``correlation_length`` is in m, None a tenth of the sheet's extent;
+    ``time_constant`` in s, 0 is no filter over frames. Method "greit": the ``noise_figure``.
     """
 
-    prior: str
-    alpha: float | str
     difference: str
+    method: str = "one-step"
+    prior: str = "noser"
+    alpha: float | str = "auto"
     exponent: float = 0.5
     correlation_length: float | None = None
     time_constant: float = 0.0
+    noise_figure: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
