@@ -14,6 +14,10 @@ pressed where and how hard. `tomoskin image my.mcap` reconstructs it, `tomoskin 
 replay:my.mcap` plays it. The same script, skin and `--seed` give the same bytes. Ctrl-C leaves a
 file that is readable up to there.
 
+The reference is what comes before the first press or fault, 20 frames of it at most: the file says
+so. With a shorter lead-in there are fewer, and each picture bears more of their noise. A replay
+always takes 20: leave it that many (on `textile-disc-8`, 1.2 s).
+
 A script is TOML, strict as the skin file is: unknown keys, wrong units, ids that overlap, probes
 off the skin and stages too short for a frame to show are errors that name file, section and key,
 said before anything is simulated.
@@ -92,6 +96,10 @@ Shards are spread over the machine's processors (`--processes N`), or over machi
 (`--cluster tcp://HOST:8786`, with `pip install 'tomoskin[cluster]'` and tomoskin on the workers).
 Each shard has a seed of its own, so that the data do not depend on the number of workers. A command
 that was stopped goes on where it was when it is given again; a folder of another set is refused.
+
+2,000 frames of `textile-disc-8`, one press each, took 5.7 and 7.0 s in one process, 290 to 350
+frames/s (two runs, two cores that others kept busy). A further process first takes some seconds to
+begin: two made so small a set no sooner. For larger ones that was not measured.
 
 """
 
