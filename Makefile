@@ -34,8 +34,8 @@ firmware-test: dev  ## the firmware alone: GoogleTest, mutants, host build, emul
 bench: native  ## time from bytes to touches
 	@$(VENV)/bin/tomoskin bench frame $(ARGS)
 
-bench-docs: native  ## measure the forward engine anew into docs/benchmarks.md; many minutes
-	@sh $(PINNED) requirements/bench.txt
+bench-docs: native  ## measure the forward engine anew into docs/benchmarks.md; seven minutes
+	@$(PIP) install --require-hashes --requirement requirements/bench.txt  # pyEIT has no wheel
 	@$(VENV)/bin/tomoskin bench forward --into docs/benchmarks.md
 	@$(VENV)/bin/tomoskin bench forward_large --into docs/benchmarks.md
 
