@@ -1,5 +1,6 @@
 //! Sparse Cholesky factors and Jacobian rows for tomoskin.
 
+mod dense;
 pub mod factor;
 pub mod jacobian;
 mod kernel;
