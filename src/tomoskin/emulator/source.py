@@ -9,13 +9,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tomoskin.core import SourceError
 from tomoskin.emulator.memory import Front, SkinMemory
 from tomoskin.emulator.process import BoardProcess
 from tomoskin.emulator.program import build_programs
 from tomoskin.emulator.transport import EmulatorTransport
 from tomoskin.source import read_options
-from tomoskin.twin import PRESETS, TwinSettings, TwinSkin
+from tomoskin.twin import TwinSettings, TwinSkin, read_settings
 
 if TYPE_CHECKING:
     from tomoskin.skin import Skin
@@ -32,14 +31,7 @@ def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
         For an unknown option, or when firmware and emulator cannot be built here.
     """
     options = read_options(argument, ("seed", "preset"), "emulator")
-    seed = options.get("seed", "0")
-    if not (seed.isascii() and seed.isdigit()):
-        raise SourceError(f'expected a seed of 0 or more, got "{seed}"', where="emulator")
-    preset = options.get("preset", skin.twin.preset)
-    if preset not in PRESETS:
-        known = ", ".join(PRESETS)
-        raise SourceError(f'expected a preset of {known}, got "{preset}"', where="emulator")
-    settings = TwinSettings.preset(preset, int(seed))
+    settings = read_settings(options, skin, "emulator")
     return EmulatorTransport(
         build_programs(), TwinSkin.of(skin, settings), front_of(skin, settings)
     )

@@ -3,7 +3,7 @@
 What reads it (:class:`Section`, :class:`Key`, kinds of values) also reads other TOML files.
 """
 
-from tomoskin.skin.kinds import Choice, Kind, Number, Quantity, Text, Whole, show
+from tomoskin.skin.kinds import Choice, Kind, Number, Quantity, Text, Whole, read_entry, show
 from tomoskin.skin.page import section_text, skin_file_page
 from tomoskin.skin.read import check_names, read_section, toml_tables
 from tomoskin.skin.schema import Key, Section
@@ -25,6 +25,7 @@ __all__ = [
     "TwinChoice",
     "Whole",
     "check_names",
+    "read_entry",
     "read_section",
     "section_text",
     "show",

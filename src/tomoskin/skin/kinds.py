@@ -167,7 +167,7 @@ class OneOrEach(Kind):
         """A tuple: of one, or of one per electrode."""
         if not isinstance(value, list):
             return (self.inner.read(value),)
-        return tuple(_entry(f"entry {i}", self.inner, item) for i, item in enumerate(value))
+        return tuple(read_entry(f"entry {i}", self.inner, item) for i, item in enumerate(value))
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ class Rows(Kind):
         if not isinstance(row, list) or len(row) != 2:
             raise ValueError(f"row {i}: expected a pair [{', '.join(self.names)}], got {show(row)}")
         first, second = (
-            _entry(f"row {i}, {name}", self.inner, item)
+            read_entry(f"row {i}, {name}", self.inner, item)
             for name, item in zip(self.names, row, strict=True)
         )
         return first, second
@@ -221,7 +221,8 @@ _ESCAPES = {chr(code): f"\\u{code:04X}" for code in [*range(32), 127]}
 _ESCAPES |= {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t"}
 
 
-def _entry(place: str, kind: Kind, value: object) -> Any:
+def read_entry(place: str, kind: Kind, value: object) -> Any:
+    """``value`` as ``kind`` reads it; ValueError that names its ``place`` in a list."""
     try:
         return kind.read(value)
     except ValueError as error:

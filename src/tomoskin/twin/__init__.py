@@ -21,7 +21,7 @@ from tomoskin.twin.script_page import script_page
 from tomoskin.twin.settings import PRESETS, TwinSettings
 from tomoskin.twin.shape import Circle, Face, Finger, Shape, Square
 from tomoskin.twin.sheet import TwinSkin
-from tomoskin.twin.source import make_electronics, make_twin, open_twin
+from tomoskin.twin.source import make_electronics, make_twin, open_twin, read_settings
 from tomoskin.twin.timeline import pressed
 from tomoskin.twin.transport import Clock, TwinTransport, WallClock
 
@@ -78,6 +78,7 @@ __all__ = [
     "make_twin",
     "open_twin",
     "pressed",
+    "read_settings",
     "reboots",
     "sample_table",
     "script_page",

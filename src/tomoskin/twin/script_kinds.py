@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from tomoskin.skin import Kind, show
+from tomoskin.skin import Kind, read_entry, show
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Row(Kind):
         if not isinstance(value, list) or len(value) != len(self.kinds):
             raise ValueError(f"expected {self.expected}, got {show(value)}")
         entries = zip(self.names, self.kinds, value, strict=True)
-        return tuple(_entry(name, kind, item) for name, kind, item in entries)
+        return tuple(read_entry(name, kind, item) for name, kind, item in entries)
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Listed(Kind):
         """The rows."""
         if not isinstance(value, list) or len(value) < self.least:
             raise ValueError(f"expected {self.expected}, got {show(value)}")
-        return tuple(_entry(f"row {i}", self.row, item) for i, item in enumerate(value))
+        return tuple(read_entry(f"row {i}", self.row, item) for i, item in enumerate(value))
 
 
 @dataclass(frozen=True)
@@ -113,10 +113,3 @@ class Words(Kind):
         if not given or len(set(known)) < len(given):
             raise ValueError(f"expected {self.expected}, got {show(value)}")
         return tuple(known)
-
-
-def _entry(name: str, kind: Kind, value: object) -> Any:
-    try:
-        return kind.read(value)
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None

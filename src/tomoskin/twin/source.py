@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from tomoskin.core import SourceError
@@ -33,17 +34,25 @@ def open_twin(argument: str, skin: Skin) -> TwinTransport:
         For an unknown option or value.
     """
     options = read_options(argument, ("seed", "fast", "preset", "noise"), "twin")
-    seed = options.get("seed", "0")
-    if not (seed.isascii() and seed.isdigit()):
-        raise SourceError(f'expected a seed of 0 or more, got "{seed}"', where="twin")
-    preset = options.get("preset", skin.twin.preset)
-    if preset not in PRESETS:
-        known = ", ".join(PRESETS)
-        raise SourceError(f'expected a preset of {known}, got "{preset}"', where="twin")
-    settings = TwinSettings.preset(preset, int(seed))
+    settings = read_settings(options, skin, "twin")
     if "noise" in options:
         settings = settings.with_noise(_noise(options["noise"]))
     return make_twin(skin, settings, WallClock(), 0.0 if "fast" in options else 1.0)
+
+
+def read_settings(options: Mapping[str, str], skin: Skin, where: str) -> TwinSettings:
+    """The twin's settings by the options ``seed`` and ``preset``, else 0 and the skin's preset.
+
+    Raises SourceError that names ``where`` for a value that is neither.
+    """
+    seed = options.get("seed", "0")
+    if not (seed.isascii() and seed.isdigit()):
+        raise SourceError(f'expected a seed of 0 or more, got "{seed}"', where=where)
+    preset = options.get("preset", skin.twin.preset)
+    if preset not in PRESETS:
+        known = ", ".join(PRESETS)
+        raise SourceError(f'expected a preset of {known}, got "{preset}"', where=where)
+    return TwinSettings.preset(preset, int(seed))
 
 
 def make_twin(skin: Skin, settings: TwinSettings, clock: Clock, pace: float = 1.0) -> TwinTransport:
