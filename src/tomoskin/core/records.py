@@ -5,6 +5,7 @@ SI units throughout; electrodes, measurements and cells are counted from 0.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -157,6 +158,12 @@ class Reading:
         Extreme value of the image in the region, signed, in the image's unit.
     cells
         (n,) indices of the region's cells.
+    cov_xy
+        Covariance of ``x`` and ``y``, m², beside ``sd_x``² and ``sd_y``².
+    snr
+        How many times its noise the reading stands out; NaN where the noise is not known.
+    close
+        Whether it may be several touches, too close to separate.
     """
 
     x: float
@@ -166,16 +173,42 @@ class Reading:
     area: float
     peak: float
     cells: IntArray
+    cov_xy: float = 0.0
+    snr: float = math.nan
+    close: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Touch:
-    """A tracked region: a reading with an identity that lasts from onset to release."""
+    """A tracked region: a reading with an identity that lasts from onset to release.
+
+    Attributes
+    ----------
+    id
+        From 1 on; never given twice.
+    kind
+        "decrease" or "increase", by the sign of its peak.
+    since
+        Host monotonic seconds of its first frame.
+    reading
+        The newest.
+    merged
+        Identities of all the touches that it stands for, its own among them, where several have
+        come too close to separate; else empty.
+    """
 
     id: int
     kind: str
     since: float
     reading: Reading = field(repr=False)
+    merged: tuple[int, ...] = ()
+
+    @property
+    def said(self) -> str:
+        """Its kind for tables: "merged 1+2" and "too close" say what cannot be told apart."""
+        if self.merged:
+            return f"merged {'+'.join(map(str, self.merged))}"
+        return "too close" if self.reading.close else self.kind
 
 
 @dataclass(frozen=True, slots=True)
