@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-import msgspec
 import typer
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="Machine-readable output.")]
@@ -13,4 +12,6 @@ JsonFlag = Annotated[bool, typer.Option("--json", help="Machine-readable output.
 
 def emit(document: Any) -> None:
     """Write ``document`` as one line of JSON on stdout, at once."""
+    import msgspec
+
     typer.echo(msgspec.json.encode(document).decode())

@@ -6,9 +6,6 @@ import time
 from types import TracebackType
 from typing import Self
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
 _PATIENCE = 2.0
 """Seconds without a bar."""
 
@@ -17,6 +14,9 @@ class Bar:
     """Shows how far a long job is, on stderr, where that is a terminal; a context manager."""
 
     def __init__(self, title: str) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
         console = Console(stderr=True)
         columns = (
             TextColumn("{task.description}"),
