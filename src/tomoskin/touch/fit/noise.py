@@ -1,0 +1,62 @@
+"""Noise of rows that share samples: its covariance, and what whitens it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import FloatArray, ModelError
+from tomoskin.pattern import Scan
+
+_LEAST = 1e-10
+"""Directions with less than this part of the largest variance hold no data: rows that follow
+from others."""
+
+
+@dataclass(frozen=True, eq=False)
+class Whitener:
+    """What makes correlated rows independent, of variance one.
+
+    ``matrix`` (r, n_meas) 1/V; r is the rank of the covariance, at most n_meas.
+    """
+
+    matrix: FloatArray
+
+    @classmethod
+    def of(cls, noise: FloatArray) -> Self:
+        """From a covariance (n_meas, n_meas) V², or a standard deviation per row (n_meas,) V.
+
+        Raises
+        ------
+        ModelError
+            When a value is not finite, or nothing varies.
+        """
+        noise = np.asarray(noise, dtype=np.float64)
+        if not np.isfinite(noise).all() or noise.ndim not in (1, 2) or not np.any(noise > 0):
+            raise ModelError("expected finite noise above 0, (n_meas,) V or (n_meas, n_meas) V²")
+        covariance = np.diag(noise**2) if noise.ndim == 1 else (noise + noise.T) / 2
+        size = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        scale = np.where(size > 0, size, 1.0)
+        variance, direction = np.linalg.eigh(covariance / scale[:, None] / scale)
+        kept = variance > _LEAST * variance[-1]
+        return cls((direction[:, kept] / np.sqrt(variance[kept])).T / scale)
+
+    def __call__(self, rows: FloatArray) -> FloatArray:
+        """(…, r) of rows (…, n_meas)."""
+        return np.asarray(rows @ self.matrix.T)
+
+
+def row_covariance(scan: Scan, sample_sd: FloatArray | float) -> FloatArray:
+    """(n_meas, n_meas) V²: rows are differences of two samples, and neighbours share one.
+
+    ``sample_sd`` is the standard deviation of a sample, V, or one per sample (n_samples,).
+    """
+    n_meas = len(scan.plus)
+    makes = np.zeros((n_meas, scan.n_samples))
+    rows = np.arange(n_meas)
+    makes[rows, scan.plus] = 1.0
+    makes[rows, scan.minus] = -1.0
+    makes *= sample_sd
+    return np.asarray(makes @ makes.T)
