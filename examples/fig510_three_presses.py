@@ -4,9 +4,6 @@ One step with NOSER's prior on normalised differences against the idle frame; th
 maximum, 60 % where all three are on. The source shows the places in a photograph only: here they
 stand 65 mm from the centre, towards E1, between E3 and E4, and between E6 and E7.
 
-The twin's textile remembers little: 1 to 2 % of the load is left, below the noise of a picture. To
-show what the source saw, its plays are widened here so that about a tenth is left (assumed).
-
 Source saw: one, two, three found (the third at 60 % only); a remainder after unloading, hysteresis.
 Checked: as many regions as probes in every loaded stage, each within 15 mm of a probe; after
 unloading a fall of conductivity remains where the probes were, more than four standard deviations
@@ -38,15 +35,12 @@ STAGES = {
 }
 """Probes that are on in each stage."""
 
-HYSTERESIS = {"play": (0.2, 0.2), "play_widths": (3e-3, 12e-3)}
-"""Parts of the sheet's response that lag, and the half widths of their plays (strain); assumed."""
-
 Shown = tuple[str, Image, list[Reading]]
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, check, draw; the numbers that were checked."""
-    with open_lab(arguments, __doc__, NOSER, HYSTERESIS) as lab:
+    with open_lab(arguments, __doc__, NOSER) as lab:
         imager = Imager(lab.skin)
         places = lab.skin.outline.centre + FROM_CENTRE * np.column_stack(
             [np.cos(TURNS), np.sin(TURNS)]

@@ -13,7 +13,7 @@ import itertools
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -136,15 +136,9 @@ def open_lab(
     arguments: Sequence[str] | None,
     title: str | None,
     changes: Changes | None = None,
-    material: Mapping[str, Any] | None = None,
 ) -> Iterator[Lab]:
-    """The lab that the command line asks for.
-
-    ``changes`` to the skin that the experiment needs; ``material`` numbers of the twin's sheet that
-    are not those of its preset.
-    """
+    """The lab that the command line asks for, with the ``changes`` that the experiment needs."""
     options = options_of(arguments, title or "")
-    options.material = dict(material or {})
     skin = Skin.load(options.skin).altered(changes or {})
     with contextlib.ExitStack() as stack:
         bench = stack.enter_context(_bench(options, skin))
@@ -170,9 +164,7 @@ def _bench(options: argparse.Namespace, skin: Skin) -> Iterator[Bench]:
             yield RecordedBench(session)
     elif kind == "twin":
         clock = VirtualClock()
-        settings = TwinSettings.preset(skin.twin.preset, options.seed)
-        settings = replace(settings, material=replace(settings.material, **options.material))
-        twin = make_twin(skin, settings, clock)
+        twin = make_twin(skin, TwinSettings.preset(skin.twin.preset, options.seed), clock)
         with _link(twin, skin, clock.now) as link:
             yield LiveBench(link, lambda _, probes: _pressed(twin, probes))
     else:

@@ -83,10 +83,10 @@ def told(settings, steps):
         worn += max((felt[:2] - before[:2]).sum() / 2, 0.0)
         before, slack = felt, lag - felt
         size = math.sqrt((slack[0] ** 2 + slack[1] ** 2) / 2 + slack[2] ** 2)
-        (width,) = settings.play_widths
+        (part,), (width,) = settings.play, settings.play_widths
         kept = np.array([min(1.0, width / size)] * 3 + [min(1.0, width / abs(slack[3]))])
         lag = felt + slack * kept
-        prompt = 0.9 * felt + 0.1 * lag
+        prompt = (1 - part) * felt + part * lag
         late = [
             prompt + (q - prompt) * math.exp(-dt / tau)
             for q, tau in zip(late, settings.creep_times, strict=True)
@@ -152,13 +152,21 @@ def test_play_knows_no_direction():
     assert left[0] > 0
 
 
-def test_the_textiles_remainder_is_small_and_mostly_goes():
-    pulled, seconds = loaded((0.02, 0.02, 0.0)), 5.0
-    whole = response(TEXTILE, (pulled, seconds))
-    at_once = response(TEXTILE, (pulled, seconds), (REST, 0.0))
-    later = response(TEXTILE, (pulled, seconds), (REST, 120.0))
-    assert 0.02 * whole < at_once < 0.1 * whole
-    assert later < 0.5 * at_once
+def test_the_textiles_loop_is_that_of_a_knit():
+    """Half-way up and down again, at the strain under a press of 4 N and 15 mm."""
+    whole, half = loaded((0.023, 0.023, 0.0)), loaded((0.0115, 0.0115, 0.0))
+    up = response(TEXTILE, (half, 0.0))
+    down = response(TEXTILE, (whole, 0.0), (half, 0.0))
+    assert (down - up) / response(TEXTILE, (whole, 0.0)) == pytest.approx(0.125, abs=0.01)
+
+
+def test_the_textiles_creep_goes_and_its_plays_remainder_stays():
+    pulled = loaded((0.02, 0.02, 0.0))
+    at_once = response(TEXTILE, (pulled, 5.0), (REST, 0.0))
+    later = response(TEXTILE, (pulled, 5.0), (REST, 300.0))
+    (part,), (width,) = TEXTILE.play, TEXTILE.play_widths
+    assert later == pytest.approx(TEXTILE.gauge * part * width, rel=0.02)
+    assert at_once > 1.1 * later
 
 
 def test_wear_adds_up_over_presses():

@@ -88,6 +88,8 @@ SOURCES = {
     "nonlinearity": "assumed, of the size of the ATmega2560's",
     "gauge": "assumed; published for knitted sensors: up to 1.2 (Bozali et al. 2022, Sensors 22, "
     "7688), 2.4 (others)",
+    "play": "textile: so that a press of 4 N and 15 mm runs through a loop of 12.5 % of its "
+    "response, published for a knit (preprints.org 202308.0816; 3 % for the best: Bozali et al.)",
     "hum_frequency": "Europe; 60 Hz in America",
     "temperature_coefficient": "silver 0.38 %/K; salt water about −2 %/K (handbooks)",
     "modulus": "foam and gel assumed; tank: ρg · thickness (Archimedes)",
@@ -106,8 +108,8 @@ PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings]
             compression=0.05,
             creep=(0.04, 0.03),
             creep_times=(1.0, 30.0),
-            play=(0.1,),
-            play_widths=(1e-3,),
+            play=(0.25,),
+            play_widths=(5.5e-3,),
             temperature_coefficient=0.0038,
             temperature_sd=0.2,
             spread=0.03,
