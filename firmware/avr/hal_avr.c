@@ -4,6 +4,7 @@
    disturbs the other channels of a timer in simavr. */
 #include "hal.h"
 
+#include "crc.h"
 #include "limits.h"
 #include "pins.h"
 #include "protocol.h"
@@ -17,7 +18,6 @@
 #include <util/delay_basic.h>
 
 #define BY_64(timer) (_BV(CS##timer##1) | _BV(CS##timer##0)) /* 4 us */
-#define SEND_SIZE 256u /* so that an index wraps by itself */
 #define RECEIVE_SIZE 128u
 
 /* Set by `tomoskin firmware flash`; an EEPROM that was never written reads 0xFF. */
@@ -32,8 +32,8 @@ static volatile uint16_t ticks_high;
 static volatile bool awake;
 static uint8_t converter; /* ADCSRA without the start bit */
 
-static uint8_t to_send[SEND_SIZE];
-static volatile uint8_t send_first, send_end;
+static const uint8_t *volatile next_to_send;
+static volatile uint16_t left_to_send;
 static uint8_t received[RECEIVE_SIZE];
 static volatile uint8_t receive_first, receive_end;
 
@@ -170,21 +170,18 @@ int16_t hal_uart_get(void) {
     return byte;
 }
 
-uint8_t hal_uart_room(void) {
-    return (uint8_t)(send_first - (uint8_t)(send_end + 1u));
+void hal_uart_send(const uint8_t *bytes, uint16_t size) {
+    next_to_send = bytes;
+    left_to_send = size;
+    UCSR0B |= _BV(UDRIE0);
 }
 
-void hal_uart_put(uint8_t byte) {
-    uint8_t end = send_end;
-    to_send[end] = byte;
-    send_end = (uint8_t)(end + 1u);
-    if ((UCSR0B & _BV(UDRIE0)) == 0u) {
-        UCSR0B |= _BV(UDRIE0);
-    }
+bool hal_uart_busy(void) {
+    return (UCSR0B & _BV(UDRIE0)) != 0u; /* the interrupt's last act is to switch itself off */
 }
 
 bool hal_uart_sent(void) {
-    return send_first == send_end && (UCSR0A & _BV(UDRE0)) != 0u;
+    return !hal_uart_busy() && (UCSR0A & _BV(TXC0)) != 0u;
 }
 
 static uint16_t divider(uint32_t baud) {
@@ -204,6 +201,10 @@ bool hal_uart_can(uint32_t baud) {
 void hal_uart_set_baud(uint32_t baud) {
     UCSR0A = _BV(U2X0); /* before UBRR */
     UBRR0 = divider(baud);
+}
+
+uint16_t hal_crc16(uint16_t crc, uint8_t byte) {
+    return crc16_by_table(crc, byte);
 }
 
 void hal_lock(void) {
@@ -263,15 +264,14 @@ ISR(USART0_RX_vect) {
 }
 
 ISR(USART0_UDRE_vect) {
-    uint8_t at = send_first;
-    UDR0 = to_send[at];
-    at = (uint8_t)(at + 1u);
-    send_first = at;
-    uint8_t left = (uint8_t)(send_end - at);
+    const uint8_t *at = next_to_send;
+    uint16_t left = (uint16_t)(left_to_send - 1u);
+    next_to_send = at + 1;
+    left_to_send = left;
     if (left == 0u) {
+        UCSR0A = _BV(U2X0) | _BV(TXC0); /* clears the flag: set again when this byte has left */
         UCSR0B &= (uint8_t)~_BV(UDRIE0);
+        awake = true;
     }
-    if (left <= SEND_SIZE / 4u) {
-        awake = true; /* time to encode more */
-    }
+    UDR0 = *at;
 }

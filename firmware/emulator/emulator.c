@@ -1,7 +1,10 @@
-/* tomoskin-emulator [-s SKIN_MEMORY] [-c MICROAMPERES] [-l LINK] [-f] [-d] ELF: the firmware on
-   a simulated ATmega2560. Its switches and converter inputs are as in avr/pins.h; what they must never do is
-   said on stderr. -f: as fast as it goes, not in real time. -d: end when stdin does. */
+/* tomoskin-emulator [-s SKIN_MEMORY] [-c MICROAMPERES] [-l LINK] [-w WATCH] [-f] [-r] [-d] ELF:
+   the firmware on a simulated ATmega2560. Its switches and converter inputs are as in avr/pins.h;
+   what they must never do is said on stderr. -f: as fast as it goes, not in real time. -r: opening
+   the port resets the board, and for a second its bootloader swallows what is said to it. -d: end
+   when stdin does. */
 #include "skin.h"
+#include "watch.h"
 
 #include <avr_adc.h>
 #include <avr_eeprom.h>
@@ -27,9 +30,10 @@
 #define SLICE 16000ull /* cycles between two looks at line and clock: 1 ms */
 #define LEAST_DEAD_CYCLES 16ull
 #define OFF 0xFFu
+#define BOOTLOADER_CYCLES CLOCK /* a second, as on a Mega 2560 */
 
 /* Places in data space. */
-enum { PORT_A = 0x22, DDR_C = 0x27, PORT_C = 0x28, ADC_L = 0x78, ADC_H = 0x79, ADC_SRB = 0x7B, ADC_MUX = 0x7C };
+enum { PORT_A = 0x22, DDR_C = 0x27, PORT_C = 0x28, MCU_SR = 0x54, SP_L = 0x5D, SP_H = 0x5E, ADC_L = 0x78, ADC_H = 0x79, ADC_SRB = 0x7B, ADC_MUX = 0x7C };
 enum { SOURCE_0 = 1, SOURCE_8 = 2, SINK_0 = 4, SINK_8 = 8, LATCH = 16, MUX5 = 8 };
 
 static avr_t *avr;
@@ -37,6 +41,8 @@ static const struct skin_memory *skin;
 static int line = -1;
 static bool fast;
 static bool dependent;
+static bool resets_on_open;
+static struct watch *watch;
 static avr_irq_t *line_input;
 static bool may_feed = true;
 static uint8_t address;       /* that the demultiplexers hold */
@@ -64,6 +70,25 @@ static unsigned chosen(uint8_t low, uint8_t high, unsigned number, const char *b
     return (control & low) != 0 ? number : (control & high) != 0 ? number + 8u : OFF;
 }
 
+/* What is connected from now on. */
+static void connect(unsigned new_source, unsigned new_sink) {
+    bool was_on = source != OFF || sink != OFF;
+    bool is_on = new_source != OFF || new_sink != OFF;
+    source = new_source;
+    sink = new_sink;
+    if (was_on && !is_on) {
+        opened = avr->cycle;
+    }
+    if (watch == NULL || was_on == is_on) {
+        return;
+    }
+    if (was_on && avr->cycle - watch->since > watch->longest_on) {
+        watch->longest_on = avr->cycle - watch->since;
+    }
+    watch->since = avr->cycle;
+    watch->connected = is_on;
+}
+
 static void on_control(struct avr_irq_t *irq, uint32_t value, void *unused) {
     (void)irq;
     (void)unused;
@@ -87,11 +112,7 @@ static void on_control(struct avr_irq_t *irq, uint32_t value, void *unused) {
     if (is_on && new_source == new_sink) {
         complain("source = sink");
     }
-    if (!is_on) {
-        opened = avr->cycle;
-    }
-    source = new_source;
-    sink = new_sink;
+    connect(new_source, new_sink);
 }
 
 static void on_conversion(struct avr_irq_t *irq, uint32_t value, void *unused) {
@@ -195,6 +216,9 @@ static void open_line(const char *link_path) {
     cfmakeraw(&raw);
     (void)tcsetattr(terminal, TCSANOW, &raw);
     (void)fcntl(line, F_SETFL, O_NONBLOCK);
+    if (resets_on_open) {
+        (void)close(terminal); /* so that an opening shows */
+    }
     if (link_path != NULL) {
         (void)unlink(link_path);
         if (symlink(name, link_path) != 0) {
@@ -221,6 +245,43 @@ static void say_errors(struct avr_t *machine, const int level, const char *forma
     }
 }
 
+static void (*core_reset)(struct avr_t *machine);
+
+/* Pins float in reset, and pull-downs keep the enables low. */
+static void on_reset(struct avr_t *machine) {
+    core_reset(machine);
+    connect(OFF, OFF);
+    address = 0;
+    n_out = 0;
+    may_feed = true;
+    if (watch != NULL) {
+        watch->resets++;
+    }
+}
+
+/* The port has been opened: DTR pulls the reset line, and the bootloader runs first. */
+static avr_cycle_count_t booted;
+static void mind_opening(void) {
+    static bool was_open;
+    struct pollfd port = {line, 0, 0};
+    (void)poll(&port, 1, 0);
+    bool is_open = (port.revents & POLLHUP) == 0;
+    if (is_open && !was_open) {
+        avr_reset(avr);
+        avr_regbit_set(avr, avr->reset_flags.extrf);
+        booted = avr->cycle + BOOTLOADER_CYCLES;
+    }
+    was_open = is_open;
+}
+
+/* The bootloader's second: nothing but time goes by. */
+static void boot(void) {
+    uint8_t swallowed[64];
+    while (read(line, swallowed, sizeof swallowed) > 0) {
+    }
+    avr->cycle += SLICE;
+}
+
 static void build_board(const char *path) {
     elf_firmware_t firmware;
     avr_global_logger_set(say_errors);
@@ -236,6 +297,8 @@ static void build_board(const char *path) {
     avr_load_firmware(avr, &firmware);
     avr->vcc = avr->avcc = avr->aref = 5000;
     avr->sleep = no_sleep;
+    core_reset = avr->reset;
+    avr->reset = on_reset;
     avr->log = LOG_ERROR;
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('C'), IOPORT_IRQ_REG_PORT),
                             on_control, NULL);
@@ -254,17 +317,41 @@ static void build_board(const char *path) {
                             NULL);
 }
 
+/* One instruction, and the time until the next one may run. */
+static void run(void) {
+    avr_flashaddr_t at = avr->pc;
+    avr_cycle_count_t before = avr->cycle;
+    int state = avr_run(avr);
+    if (state == cpu_Done || state == cpu_Crashed) {
+        give_up("the firmware has crashed");
+    }
+    if (watch == NULL) {
+        return;
+    }
+    uint16_t stack = (uint16_t)(avr->data[SP_L] | avr->data[SP_H] << 8);
+    if (state == cpu_Running) {
+        watch->spent[at / 2u % WATCH_WORDS] += avr->cycle - before;
+    }
+    if (stack >= 0x200u && stack < watch->lowest_stack) { /* not yet set up: 0 */
+        watch->lowest_stack = stack;
+    }
+}
+
 int main(int count, char **arguments) {
     const char *link = NULL;
     uint32_t current = 100000;
     skin = skin_star();
-    for (int option; (option = getopt(count, arguments, "s:c:l:fd")) != -1;) {
+    for (int option; (option = getopt(count, arguments, "s:c:l:w:frd")) != -1;) {
         if (option == 's') {
             skin = skin_open(optarg);
         } else if (option == 'c') {
             current = (uint32_t)strtoul(optarg, NULL, 10);
         } else if (option == 'l') {
             link = optarg;
+        } else if (option == 'w') {
+            watch = watch_make(optarg);
+        } else if (option == 'r') {
+            resets_on_open = true;
         } else if (option == 'f') {
             fast = true;
         } else if (option == 'd') {
@@ -281,14 +368,21 @@ int main(int count, char **arguments) {
     open_line(link);
     avr_cycle_count_t next = 0;
     for (;;) {
-        int state = avr_run(avr);
-        if (state == cpu_Done || state == cpu_Crashed) {
-            give_up("the firmware has crashed");
+        if (avr->cycle < booted) {
+            boot();
+        } else {
+            run();
         }
         if (avr->cycle >= next) {
             next = avr->cycle + SLICE;
             flush_line();
             feed_line();
+            if (resets_on_open) {
+                mind_opening();
+            }
+            if (watch != NULL) {
+                watch->cycle = avr->cycle;
+            }
             if (abandoned()) {
                 return 0;
             }

@@ -38,7 +38,7 @@ static uint8_t adc_channel;
 static uint8_t connected[2] = {SWITCHES_OFF, SWITCHES_OFF};
 static uint8_t addressed[2];
 static int line = -1;
-static uint8_t unsent[256];
+static const uint8_t *unsent;
 static uint16_t n_unsent;
 static uint8_t unread[64];
 static uint8_t n_unread;
@@ -179,25 +179,27 @@ static void flush_line(void) {
     ssize_t sent = write(line, unsent, n_unsent);
     if (sent > 0) {
         n_unsent = (uint16_t)(n_unsent - sent);
-        (void)memmove(unsent, unsent + sent, n_unsent);
+        unsent += sent;
     }
 }
 
-uint8_t hal_uart_room(void) {
-    if (n_unsent > 128u) {
-        flush_line();
-    }
-    uint16_t room = (uint16_t)(sizeof unsent - n_unsent);
-    return room > 255u ? 255u : (uint8_t)room;
+void hal_uart_send(const uint8_t *bytes, uint16_t size) {
+    unsent = bytes;
+    n_unsent = size;
+    flush_line();
 }
 
-void hal_uart_put(uint8_t byte) {
-    unsent[n_unsent++] = byte;
+bool hal_uart_busy(void) {
+    flush_line();
+    return n_unsent != 0u;
 }
 
 bool hal_uart_sent(void) {
-    flush_line();
-    return n_unsent == 0u;
+    return !hal_uart_busy();
+}
+
+uint16_t hal_crc16(uint16_t crc, uint8_t byte) {
+    return crc16_step(crc, byte);
 }
 
 bool hal_uart_can(uint32_t baud) {

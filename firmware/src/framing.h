@@ -7,35 +7,22 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Bytes that a buffer needs behind its payload: the checksum. */
-#define FRAMING_AFTER 2u
+/* A message is enclosed where it lies: its payload begins at FRAMING_BEFORE, and its buffer has
+   FRAMING_AFTER bytes behind it: checksum, 0x00, and a code byte for every 254 bytes. */
+#define FRAMING_BEFORE 1u
+#define FRAMING_AFTER 8u
 
-static inline uint16_t crc16_step(uint16_t crc, uint8_t byte) {
-    uint8_t x = (uint8_t)((uint8_t)(crc >> 8) ^ byte);
-    x ^= (uint8_t)(x >> 4);
-    return (uint16_t)((uint16_t)(crc << 8) ^ (uint16_t)((uint16_t)x << 12) ^
-                      (uint16_t)((uint16_t)x << 5) ^ x);
-}
+#define MOST_BLOCK (MOST_TO_DEVICE + 1u) /* from the host, between two 0x00 */
+#define CHECKSUM_SIZE 2u
 
 uint16_t crc16(const uint8_t *data, uint16_t size);
 
-/* Sends one buffer, byte by byte. */
-struct outgoing {
-    const uint8_t *at;  /* next byte */
-    const uint8_t *end; /* behind the checksum */
-    uint8_t run;        /* bytes to go before the next code byte */
-    bool full;          /* the run is as long as a code byte can say: no zero follows it */
-    bool active;
-};
-
-void outgoing_begin(struct outgoing *out, uint8_t *buffer, uint16_t payload_size);
-
-/* The next byte of the line; after the 0x00 `active` is false. */
-uint8_t outgoing_next(struct outgoing *out);
+/* Enclose a payload of `size` bytes, at most 1,000; how many bytes of `buffer` go on the line. */
+uint16_t framing_enclose(uint8_t *buffer, uint16_t size);
 
 /* Gathers the bytes from the host. */
 struct incoming {
-    uint8_t block[MOST_TO_DEVICE + 1u];
+    uint8_t block[MOST_BLOCK];
     uint8_t size;
     bool overlong;
 };

@@ -40,19 +40,29 @@ void hal_adc_prepare(uint8_t prescaler);
 void hal_adc_start(uint8_t channel);
 void hal_adc_cancel(void);
 
-/* Serial line. get: -1 when there is nothing. put: only as many bytes as there is room for. */
+/* Serial line. get: -1 when there is nothing. send: the bytes are read as they go, and may be
+   changed when `busy` has become false; only then the next. sent: they have left the machine. */
 int16_t hal_uart_get(void);
-uint8_t hal_uart_room(void);
-void hal_uart_put(uint8_t byte);
+void hal_uart_send(const uint8_t *bytes, uint16_t size);
+bool hal_uart_busy(void);
 bool hal_uart_sent(void);
 bool hal_uart_can(uint32_t baud);
 void hal_uart_set_baud(uint32_t baud);
+
+/* One step of CRC-16/CCITT: by arithmetic, or faster where the machine knows a way. */
+uint16_t hal_crc16(uint16_t crc, uint8_t byte);
+static inline uint16_t crc16_step(uint16_t crc, uint8_t byte) {
+    uint8_t x = (uint8_t)((uint8_t)(crc >> 8) ^ byte);
+    x ^= (uint8_t)(x >> 4);
+    return (uint16_t)((uint16_t)(crc << 8) ^ (uint16_t)((uint16_t)x << 12) ^
+                      (uint16_t)((uint16_t)x << 5) ^ x);
+}
 
 /* Between lock and unlock no scan_on_... comes. Not nested; not from scan_on_.... */
 void hal_lock(void);
 void hal_unlock(void);
 
-/* idle sleeps until wake has been called, a byte has come, or some 10 ms have gone by. */
+/* idle sleeps until wake has been called, a byte has come, all is sent, or some 10 ms have gone by. */
 void hal_wake(void);
 void hal_idle(void);
 

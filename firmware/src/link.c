@@ -10,18 +10,33 @@
 
 #include <stddef.h>
 
-static uint8_t small[SIZE_INFO + FRAMING_AFTER];
+static uint8_t buffer[FRAMING_BEFORE + SIZE_INFO + FRAMING_AFTER];
+static uint8_t *const small = buffer + FRAMING_BEFORE;
 static uint8_t small_size; /* of the payload; 0: free */
-static struct outgoing out;
-static bool frame_under_way;
+static enum { NOTHING, SMALL, FRAME } under_way;
 
 void link_reset(void) {
     small_size = 0u;
-    out.active = false;
-    frame_under_way = false;
+    under_way = NOTHING;
+}
+
+/* The message under way, once it is sent: its buffer is free again. */
+static void note_sent(void) {
+    if (hal_uart_busy()) {
+        return;
+    }
+    if (under_way == FRAME) {
+        hal_lock();
+        scan_give_back();
+        hal_unlock();
+    } else if (under_way == SMALL) {
+        small_size = 0u;
+    }
+    under_way = NOTHING;
 }
 
 bool link_free(void) {
+    note_sent();
     return small_size == 0u;
 }
 
@@ -81,8 +96,12 @@ static uint32_t high_of(uint32_t ticks, uint32_t now_high, uint32_t now) {
     return ticks < now ? now_high + 1u : now_high;
 }
 
+static void send(uint8_t *message, uint16_t size) {
+    hal_uart_send(message, framing_enclose(message, size));
+}
+
 static void begin_frame(struct frame *frame, uint32_t now_high, uint32_t now) {
-    uint8_t *payload = frame->payload;
+    uint8_t *payload = frame->buffer + FRAMING_BEFORE;
     payload[0] = MSG_FRAME;
     put_u32(payload + AT_FRAME_SEQUENCE, frame->sequence);
     put_u32(payload + AT_FRAME_TICKS, frame->started);
@@ -90,52 +109,32 @@ static void begin_frame(struct frame *frame, uint32_t now_high, uint32_t now) {
     put_u16(payload + AT_FRAME_CONFIGURATION, config.identity);
     payload[AT_FRAME_FLAGS] = frame->flags;
     put_u16(payload + AT_FRAME_DROPS, frame->drops);
-    outgoing_begin(&out, payload, (uint16_t)(SIZE_FRAME + 2u * frame->n_samples));
-    frame_under_way = true;
+    send(frame->buffer, frame->size);
 }
 
-/* Whatever is next: a small message before a frame. */
-static bool begin_next(uint32_t now_high, uint32_t now) {
+/* A small message before a frame. */
+static void begin_next(uint32_t now_high, uint32_t now) {
     if (small_size != 0u) {
-        outgoing_begin(&out, small, small_size);
-        return true;
+        send(buffer, small_size);
+        under_way = SMALL;
+        return;
     }
     hal_lock();
     struct frame *frame = scan_take();
     hal_unlock();
-    if (frame == NULL) {
-        return false;
-    }
-    begin_frame(frame, now_high, now);
-    return true;
-}
-
-static void end_message(void) {
-    if (frame_under_way) {
-        frame_under_way = false;
-        hal_lock();
-        scan_give_back();
-        hal_unlock();
-    } else {
-        small_size = 0u;
+    if (frame != NULL) {
+        begin_frame(frame, now_high, now);
+        under_way = FRAME;
     }
 }
 
 void link_send(uint32_t now_high, uint32_t now) {
-    while (out.active || begin_next(now_high, now)) {
-        for (uint8_t room = hal_uart_room(); room != 0u; room--) {
-            hal_uart_put(outgoing_next(&out));
-            if (!out.active) {
-                end_message();
-                break;
-            }
-        }
-        if (out.active) {
-            return;
-        }
+    note_sent();
+    if (under_way == NOTHING) {
+        begin_next(now_high, now);
     }
 }
 
 bool link_sent(void) {
-    return !out.active && link_free() && hal_uart_sent();
+    return link_free() && under_way == NOTHING && hal_uart_sent();
 }

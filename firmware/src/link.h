@@ -14,7 +14,7 @@ void link_say_info(uint8_t request, uint8_t reset_cause);
 void link_say_ack(uint8_t request, uint8_t command, uint8_t result, uint16_t detail);
 void link_say_fault(uint32_t ticks_high, uint32_t ticks, uint8_t code, uint16_t detail);
 
-/* Give the line as many bytes as it takes. `now`: 64 bits of the clock. */
+/* Give the line the next message when it is free. `now`: 64 bits of the clock. */
 void link_send(uint32_t now_high, uint32_t now);
 
 /* Whether everything said has left the device. */

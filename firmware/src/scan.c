@@ -76,7 +76,7 @@ static uint32_t allowed_ticks(const struct drive *drive) {
 static void begin_frame(void) {
     struct frame *frame = &frames[filling];
     frame->started = hal_ticks();
-    scan.place = frame->payload + SIZE_FRAME;
+    scan.place = frame->buffer + FRAMING_BEFORE + SIZE_FRAME;
     scan.drive = 0u;
 }
 
@@ -114,7 +114,7 @@ static void end_frame(void) {
     } else {
         frame->sequence = scan.sequence;
         frame->drops = scan.drops;
-        frame->n_samples = config.n_samples;
+        frame->size = (uint16_t)(scan.place - (frame->buffer + FRAMING_BEFORE));
         frame->flags = (uint8_t)((scan.sequence == 0u ? FLAG_FIRST : 0u) |
                                  (scan.dropped ? FLAG_DROPPED : 0u));
         scan.dropped = false;

@@ -15,8 +15,8 @@ struct frame {
     uint32_t sequence;
     uint16_t drops;
     uint8_t flags;
-    uint16_t n_samples;
-    uint8_t payload[SIZE_FRAME + 2u * MOST_SAMPLES + FRAMING_AFTER];
+    uint16_t size; /* of the payload */
+    uint8_t buffer[FRAMING_BEFORE + SIZE_FRAME + 2u * MOST_SAMPLES + FRAMING_AFTER];
 };
 
 /* What made the scan stop itself; `code` 0: nothing. */

@@ -220,9 +220,22 @@ int16_t hal_uart_get(void) {
     machine.line.pop_front();
     return byte;
 }
-uint8_t hal_uart_room(void) { return machine.room; }
-void hal_uart_put(uint8_t byte) { machine.sent.push_back(byte); }
-bool hal_uart_sent(void) { return true; }
+void hal_uart_send(const uint8_t *bytes, uint16_t size) {
+    if (!machine.sending.empty()) {
+        machine.wrongs.push_back("a message sent over another");
+    }
+    machine.sending = {bytes, size};
+    (void)hal_uart_busy();
+}
+bool hal_uart_busy(void) {
+    size_t taken = std::min<size_t>(machine.room, machine.sending.size());
+    machine.sent.insert(machine.sent.end(), machine.sending.begin(),
+                        machine.sending.begin() + taken);
+    machine.sending.remove_prefix(taken);
+    return !machine.sending.empty();
+}
+bool hal_uart_sent(void) { return machine.sending.empty(); }
+uint16_t hal_crc16(uint16_t crc, uint8_t byte) { return crc16_step(crc, byte); }
 bool hal_uart_can(uint32_t baud) { return baud == 500000 || baud == FIRST_BAUD; }
 void hal_uart_set_baud(uint32_t baud) { machine.baud = baud; }
 

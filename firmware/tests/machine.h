@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -39,7 +40,7 @@ struct Machine {
     uint32_t current = 100000;
     uint8_t reset_cause = RESET_POWER;
     uint64_t dead_ns = 0;  // that the host has asked for
-    uint8_t room = 255;
+    uint16_t room = 2000;  // bytes that the line takes in a round
     bool timer_works = true;
     bool converter_works = true;
 
@@ -63,6 +64,7 @@ struct Machine {
     int address_source = -1, address_sink = -1;
     uint64_t disabled_ns = 0, enabled_ns = 0;
     std::deque<uint8_t> line;
+    std::basic_string_view<uint8_t> sending;  // read as it goes, as by the board's interrupt
     bool locked = false;
 
     bool deliver(uint64_t until);

@@ -335,7 +335,7 @@ TEST_F(Board, ASlowLineDropsWholeFramesAndCountsThem) {
     for (int k = 0; k < 10; k++) {
         machine.room = 0;  // the line stands still for eight frames or so
         machine.run_us(100'000);
-        machine.room = 255;
+        machine.room = 2000;
         machine.run_us(30'000);
     }
     auto frames = of(MSG_FRAME, machine.heard());
@@ -358,7 +358,7 @@ TEST_F(Board, AFrameBeingSentOutlivesStopAndStart) {
     machine.room = 1;
     machine.run_us(9'000, 500);
     machine.heard();
-    machine.room = 255;
+    machine.room = 2000;
     EXPECT_EQ(ask({MSG_STOP}), RESULT_OK);
     EXPECT_EQ(start(), RESULT_OK);
     machine.run_us(30'000);

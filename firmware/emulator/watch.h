@@ -1,0 +1,23 @@
+/* What the emulator sees of its board, in a file that a test maps: -w FILE. */
+#ifndef TOMOSKIN_WATCH_H
+#define TOMOSKIN_WATCH_H
+
+#include <stdint.h>
+
+#define WATCH_WORDS 131072u /* of flash */
+
+/* Cycles are of the simulated clock. Python: tests/emulator/watch.py. */
+struct watch {
+    uint64_t cycle;
+    uint64_t connected;    /* 1: a source or a sink is */
+    uint64_t since;        /* cycle of the last change of that */
+    uint64_t longest_on;   /* cycles that a drive was on, at most */
+    uint64_t resets;       /* after power-on */
+    uint64_t lowest_stack; /* address that the stack pointer has come down to */
+    uint64_t spent[WATCH_WORDS]; /* cycles in the instruction at each word */
+};
+
+/* A memory that shows in `path`, or exit with a sentence. */
+struct watch *watch_make(const char *path);
+
+#endif
