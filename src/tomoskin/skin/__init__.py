@@ -7,7 +7,13 @@ from tomoskin.skin.kinds import Choice, Kind, Number, Quantity, Text, Whole, rea
 from tomoskin.skin.page import section_text, skin_file_page
 from tomoskin.skin.read import check_names, read_section, toml_tables
 from tomoskin.skin.schema import Key, Section
-from tomoskin.skin.settings import InverseSettings, ReadoutSettings, TouchSettings, TwinChoice
+from tomoskin.skin.settings import (
+    InverseSettings,
+    ReadoutSettings,
+    SignalSettings,
+    TouchSettings,
+    TwinChoice,
+)
 from tomoskin.skin.skin import Skin
 
 __all__ = [
@@ -19,6 +25,7 @@ __all__ = [
     "Quantity",
     "ReadoutSettings",
     "Section",
+    "SignalSettings",
     "Skin",
     "Text",
     "TouchSettings",

@@ -322,6 +322,26 @@ SECTIONS: tuple[Section, ...] = (
         ),
     ),
     Section(
+        "signal",
+        "What becomes of the reference while time goes by.",
+        (
+            Key(
+                "baseline",
+                Choice(("follow", "hold")),
+                "follow: the reference follows the skin's drift while nothing touches, and holds "
+                "under a touch. hold: it stays as it was taken.",
+                default="follow",
+            ),
+            Key(
+                "common_modes",
+                Choice(("projected", "kept")),
+                "projected: a change of all voltages in proportion, as temperature makes it, and "
+                "directions of drift learnt while idle do not show in the picture. kept: they do.",
+                default="projected",
+            ),
+        ),
+    ),
+    Section(
         "touch",
         "How a picture becomes touches.",
         (

@@ -38,6 +38,15 @@ class InverseSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class SignalSettings:
+    """What becomes of the reference: ``baseline`` "follow" or "hold", ``common_modes``
+    "projected" or "kept"."""
+
+    baseline: str = "follow"
+    common_modes: str = "projected"
+
+
+@dataclass(frozen=True, slots=True)
 class TwinChoice:
     """Name of the twin's settings for this skin."""
 

@@ -18,7 +18,13 @@ from tomoskin.pattern import Pattern
 from tomoskin.skin.build import impedances, located, pattern_of, placed, readout_of
 from tomoskin.skin.find import built_in_names, skin_text
 from tomoskin.skin.read import Document, complete, parse, values
-from tomoskin.skin.settings import InverseSettings, ReadoutSettings, TouchSettings, TwinChoice
+from tomoskin.skin.settings import (
+    InverseSettings,
+    ReadoutSettings,
+    SignalSettings,
+    TouchSettings,
+    TwinChoice,
+)
 from tomoskin.skin.write import toml
 
 
@@ -44,7 +50,7 @@ class Skin:
         Driven current, A.
     mesh_cells
         Wanted number of triangles.
-    readout, inverse, touch, twin
+    readout, inverse, signal, touch, twin
         Settings of the rooms of that name.
     """
 
@@ -60,6 +66,7 @@ class Skin:
     mesh_cells: int
     readout: ReadoutSettings
     inverse: InverseSettings
+    signal: SignalSettings
     touch: TouchSettings
     twin: TwinChoice
     _pattern: Pattern = field(repr=False)
@@ -153,6 +160,7 @@ class Skin:
             mesh_cells=value["mesh"]["cells"],
             readout=readout_of(value, source),
             inverse=InverseSettings(**value["inverse"]),
+            signal=SignalSettings(**value["signal"]),
             touch=TouchSettings(**value["touch"]),
             twin=TwinChoice(**value["twin"]),
             _pattern=pattern_of(value, len(arcs), source),
