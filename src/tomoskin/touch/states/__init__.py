@@ -1,0 +1,8 @@
+"""What state a frame shows, learnt from labelled examples: one of several, or several flags."""
+
+from tomoskin.touch.states.classifier import Answers, StateClassifier
+from tomoskin.touch.states.codes import Codes
+from tomoskin.touch.states.examples import Examples
+from tomoskin.touch.states.rest import against_rest
+
+__all__ = ["Answers", "Codes", "Examples", "StateClassifier", "against_rest"]
