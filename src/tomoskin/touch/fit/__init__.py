@@ -6,17 +6,21 @@ from tomoskin.touch.fit.bound import (
     least_content,
     position_bound,
 )
-from tomoskin.touch.fit.noise import Whitener, row_covariance
+from tomoskin.touch.fit.finder import SpotFinder, SpotModel
+from tomoskin.touch.fit.noise import Whitener, measured_covariance, row_covariance
 from tomoskin.touch.fit.spot import Response, Spots, depth_of, spots_of
 
 __all__ = [
     "Response",
+    "SpotFinder",
+    "SpotModel",
     "Spots",
     "Whitener",
     "depth_of",
     "detection_bound",
     "fisher_information",
     "least_content",
+    "measured_covariance",
     "position_bound",
     "row_covariance",
     "spots_of",

@@ -48,7 +48,7 @@ def detection_bound(response: Response, spots: FloatArray, noise: Whitener) -> F
 
     A press is found about as often as a unit normal number exceeds the threshold less this.
     """
-    changes = np.concatenate([response.changes(spot[None, None]) for spot in spots])
+    changes = response.changes([spot[None] for spot in spots])
     return np.asarray(np.linalg.norm(noise(changes), axis=1))
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.pattern import Scan
@@ -13,6 +14,9 @@ from tomoskin.pattern import Scan
 _LEAST = 1e-10
 """Directions with less than this part of the largest variance hold no data: rows that follow
 from others."""
+
+_FRAMES = 20
+"""Idle frames that the rows' common variance is worth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +47,14 @@ class Whitener:
         kept = variance > _LEAST * variance[-1]
         return cls((direction[:, kept] / np.sqrt(variance[kept])).T / scale)
 
+    @classmethod
+    def of_some(cls, noise: FloatArray, used: NDArray[np.bool_]) -> Self:
+        """From the covariance (n_meas, n_meas) V² of rows of which only ``used`` ones count."""
+        whiten = cls.of(noise[np.ix_(used, used)])
+        matrix = np.zeros((len(whiten.matrix), len(used)))
+        matrix[:, used] = whiten.matrix
+        return cls(matrix)
+
     def __call__(self, rows: FloatArray) -> FloatArray:
         """(…, r) of rows (…, n_meas)."""
         return np.asarray(rows @ self.matrix.T)
@@ -60,3 +72,33 @@ def row_covariance(scan: Scan, sample_sd: FloatArray | float) -> FloatArray:
     makes[rows, scan.minus] = -1.0
     makes *= sample_sd
     return np.asarray(makes @ makes.T)
+
+
+def measured_covariance(
+    scan: Scan, sd: FloatArray, n_frames: int, predicted: float, least: float
+) -> FloatArray:
+    """(n_meas, n_meas) V²: of one frame less a mean of ``n_frames`` idle ones.
+
+    How rows are correlated follows from the samples that they share; how much each wavers was
+    measured, but on few frames: its variance is mixed with that of all rows, which counts as much
+    as ``_FRAMES`` frames.
+
+    Parameters
+    ----------
+    scan
+        Which sample is in which row.
+    sd
+        (n_meas,) V, standard deviation of each row over the idle frames; NaN where not known.
+    predicted
+        Standard deviation of a row by the read-out alone, V: counts where nothing was measured.
+    least
+        Standard deviation of a row that rounding causes however quiet the rest is, V.
+    """
+    if np.isfinite(sd).all():
+        pooled = np.median(sd**2)
+        variance = (n_frames * sd**2 + _FRAMES * pooled) / (n_frames + _FRAMES)
+    else:
+        variance = np.full(len(scan.plus), predicted**2)
+    size = np.sqrt(np.maximum(variance, least**2) * (1 + 1 / max(n_frames, 1)))
+    shared = row_covariance(scan, np.sqrt(0.5))
+    return np.asarray(shared * size[:, None] * size)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -16,14 +16,53 @@ X, Y, LOG_RADIUS, CONTENT = range(4)
 
 N_PARAMETERS = 4
 
-_REACH = math.sqrt(2.5)
-"""A spot ends at this many radii: (1 − u²)³ then has the second moment of an even disc."""
+_SCALES = 6.0
+"""A spot ends at this many of its scales."""
 
-_FILLING = math.pi * _REACH**2 / 4
-"""∫ (1 − u²)³ over the plane, in squared radii."""
+_NARROW = 1.15
+"""Squared reaches of :func:`bell` in one of :func:`profile`: then their second moments agree."""
 
 _SPLIT = 3
 """Each side of a cell is cut into so many, for the mean of a profile over the cell."""
+
+
+def profile(square: FloatArray) -> FloatArray:
+    """Height at squared distances from the centre, in squared reaches: 1 there, 0 from 1 on.
+
+    (1 + v) e⁻ᵛ, v the distance in scales: level at the centre, and exponential beyond, as a
+    stretched sheet goes back to rest on what carries it; the last part is drawn to 0 smoothly.
+    """
+    inside = np.minimum(square, 1.0)
+    scales = _SCALES * np.sqrt(inside)
+    return np.asarray((1.0 + scales) * np.exp(-scales) * (1.0 - inside**3) ** 2)
+
+
+def _steepness(square: FloatArray) -> FloatArray:
+    """Derivative of :func:`profile` by its argument."""
+    inside = np.minimum(square, 1.0)
+    scales = _SCALES * np.sqrt(inside)
+    taper = 1.0 - inside**3
+    fall = 0.5 * _SCALES**2 * taper + 6.0 * inside**2 * (1.0 + scales)
+    return np.asarray(-np.exp(-scales) * taper * fall)
+
+
+def _moments() -> tuple[float, float]:
+    """Reach in radii of the disc of the same second moment, and ∫ profile in squared radii."""
+    node, weight = np.polynomial.legendre.leggauss(64)
+    u = (node + 1.0) / 2.0
+    ring = weight / 2.0 * profile(u**2) * u
+    reach = math.sqrt(0.5 * float(ring.sum() / (ring @ u**2)))
+    return reach, 2.0 * math.pi * float(ring.sum()) * reach**2
+
+
+REACH, FILLING = _moments()
+"""Of a spot: where it ends, in radii, and ∫ profile over the plane, in squared radii."""
+
+
+def bell(square: FloatArray) -> FloatArray:
+    """A profile of the same content and second moment, but without the long tail."""
+    height = FILLING / REACH**2 * 4.0 * _NARROW / math.pi
+    return np.asarray(height * np.maximum(1.0 - _NARROW * square, 0.0) ** 3)
 
 
 def spots_of(
@@ -37,22 +76,25 @@ def spots_of(
     radius = np.broadcast_to(np.asarray(radius, dtype=np.float64), places.shape[:1])
     if places.ndim != 2 or places.shape[1] != 2 or not (radius > 0).all():
         raise ModelError(f"expected places (n, 2) and radii above 0, got {places.shape}, {radius}")
-    content = _FILLING * radius**2 * depth
+    content = FILLING * radius**2 * depth
     return np.column_stack([places, np.log(radius), content])
 
 
 def depth_of(spots: FloatArray) -> FloatArray:
     """(…,) log(σ/σ₀) at the centre of ``spots`` (…, 4)."""
-    return np.asarray(spots[..., CONTENT] / (_FILLING * np.exp(2 * spots[..., LOG_RADIUS])))
+    return np.asarray(spots[..., CONTENT] / (FILLING * np.exp(2 * spots[..., LOG_RADIUS])))
+
+
+Shape = Callable[[FloatArray], FloatArray]
 
 
 class Spots:
     """Spots on the cells of a flat mesh of triangles.
 
-    A spot of radius a and content m changes the logarithm of the conductivity by
-    m / ∫g · g(d), g = (1 − d²/R²)³ inside R = √2.5 a: twice differentiable, and of the same
-    second moment as an even disc of radius a. Content is ∫ log(σ/σ₀): what is far away sees of a
-    faint spot. Each cell takes the mean over 9 points, so that nothing jumps between cells.
+    A spot of radius a and content m changes log σ by a :func:`profile` that has the second
+    moment of an even disc of radius a; m is the integral of that change over the plane, which is
+    what electrodes far from a faint spot see. Each cell takes the mean over 9 points, so that
+    nothing jumps as a spot moves.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -63,26 +105,42 @@ class Spots:
         self._points = np.einsum("qk,ckd->cqd", _sub_centroids(_SPLIT), corners)
         self._margin = np.linalg.norm(corners - mesh.centroids[:, None], axis=2).max(axis=1)
 
-    def change(self, spots: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Cells (c,) that sets of spots (b, k, 4) reach, and (b, c) the change of log σ there."""
-        middle, reach = spots[..., :2], _REACH * np.exp(spots[..., LOG_RADIUS])
-        cells = self._near(middle.mean(axis=0), reach, middle)
-        points = self._points[cells].reshape(-1, 2)
-        total = np.zeros((len(spots), len(cells)))
-        for k in range(spots.shape[1]):
-            offset = points - middle[:, k, None, :]
-            square = np.einsum("bpd,bpd->bp", offset, offset) / reach[:, k, None] ** 2
-            height = np.maximum(1.0 - square, 0.0) ** 3
-            mean = height.reshape(len(spots), len(cells), _SPLIT**2).mean(axis=2)
-            total += depth_of(spots[:, k])[:, None] * mean
+    def change(self, spots: FloatArray, shape: Shape = profile) -> tuple[IntArray, FloatArray]:
+        """Cells (c,) that spots (k, 4) reach together, and (c,) the change of log σ there."""
+        cells = self._near(spots)
+        total = np.zeros(len(cells))
+        for spot in spots:
+            square, _ = self._squares(spot, cells)
+            total += depth_of(spot) * shape(square).mean(axis=1)
         return cells, total
 
-    def _near(self, centre: FloatArray, reach: FloatArray, middle: FloatArray) -> IntArray:
-        """Cells that any of the sets may reach."""
-        shift = np.abs(middle - centre).max(axis=(0, 2)) * math.sqrt(2)
-        limit = reach.max(axis=0) + shift
-        apart = np.linalg.norm(self.mesh.centroids[:, None] - centre, axis=2)
-        return np.flatnonzero((apart < limit + self._margin[:, None]).any(axis=1))
+    def slopes(self, spots: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
+        """As :meth:`change`, and (4k, c) its derivatives by each column of each spot."""
+        cells = self._near(spots)
+        total, rows = np.zeros(len(cells)), []
+        for spot in spots:
+            square, offset = self._squares(spot, cells)
+            depth, reach = float(depth_of(spot)), REACH * float(np.exp(spot[LOG_RADIUS]))
+            height, fall = profile(square), depth * _steepness(square)
+            mean = height.mean(axis=1)
+            total += depth * mean
+            towards = -2.0 / reach**2 * np.einsum("cq,cqd->dc", fall, offset) / _SPLIT**2
+            wider = -2.0 * (depth * mean + (fall * square).mean(axis=1))
+            more = mean / (FILLING * np.exp(2.0 * spot[LOG_RADIUS]))
+            rows += [towards[0], towards[1], wider, more]
+        return cells, total, np.array(rows)
+
+    def _squares(self, spot: FloatArray, cells: IntArray) -> tuple[FloatArray, FloatArray]:
+        """(c, q) squared distances in reaches of the points of cells, and (c, q, 2) offsets, m."""
+        offset = self._points[cells] - spot[:2]
+        square = np.einsum("cqd,cqd->cq", offset, offset)
+        return square * float(REACH * np.exp(spot[LOG_RADIUS])) ** -2, offset
+
+    def _near(self, spots: FloatArray) -> IntArray:
+        """Cells that any of the spots may reach."""
+        reach = REACH * np.exp(spots[:, LOG_RADIUS])
+        apart = np.linalg.norm(self.mesh.centroids[:, None] - spots[:, :2], axis=2)
+        return np.flatnonzero((apart < reach + self._margin[:, None]).any(axis=1))
 
 
 class Response:
@@ -94,40 +152,47 @@ class Response:
             raise ModelError("expected a real scalar conductivity to fit touches on")
         self.state = state
         self.spots = Spots(state.model.mesh)
-        extent = np.ptp(state.model.mesh.points, axis=0).max()
-        self._steps = np.array([1e-5 * extent, 1e-5 * extent, 1e-4, 1e-5 * extent**2 / 100])
+        self._first, self._second = np.triu_indices(len(state.model.mesh.electrodes))
 
     @property
     def reference(self) -> FloatArray:
         """(n_meas,) V without a spot."""
         return np.asarray(self.state.voltages)
 
-    def changes(self, spots: FloatArray) -> FloatArray:
-        """(b, n_meas) V that sets of spots (b, k, 4) add to the reference."""
-        cells, change = self.spots.change(spots)
-        if not len(cells):
-            return np.zeros((len(spots), len(self.reference)))
-        sigma = self.state.conductivity[cells] * np.exp(change)
-        pressed = self.state.local.voltages_of([(cells, each) for each in sigma])
-        return np.asarray(pressed - self.reference)
+    def changes(self, sets: Sequence[FloatArray], shape: Shape = profile) -> FloatArray:
+        """(b, n_meas) V that each of some sets of spots (k, 4) adds to the reference.
+
+        By the local update of the forward model, all in one call.
+        """
+        pressed = [self._pressed(*self.spots.change(spots, shape)) for spots in sets]
+        return np.asarray(self.state.local.voltages_of(pressed) - self.reference)
 
     def jacobian(self, spots: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Change (n_meas,) V of spots (k, 4), and its derivatives (n_meas, 4k) by each column.
 
-        Forward differences of the exact change: as many local updates as there are parameters.
+        The fields of the pressed sheet give both, whatever the number of spots: by reciprocity
+        dR_ij = −∫ dσ ∇u_i · ∇u_j (Geselowitz 1971).
         """
-        k = len(spots)
-        sets = np.broadcast_to(spots, (1 + N_PARAMETERS * k, k, N_PARAMETERS)).copy()
-        number = np.arange(N_PARAMETERS * k)
-        spot, column = np.divmod(number, N_PARAMETERS)
-        sets[1 + number, spot, column] += self._steps[column]
-        found = self.changes(sets)
-        return found[0], (found[1:] - found[0]).T / self._steps[column]
+        cells, change, slopes = self.spots.slopes(spots)
+        _, sigma = self._pressed(cells, change)
+        whole = self.state.conductivity.copy()
+        whole[cells] = sigma
+        model = self.state.model
+        pressed = model.at(whole)
+        field = pressed.gradient[:, :, cells]
+        pairs = np.einsum("pdc,pdc->pc", field[self._first], field[self._second])
+        change_of = np.empty((len(slopes), len(field), len(field)))
+        change_of[:, self._first, self._second] = -(slopes * sigma) @ pairs.T
+        change_of[:, self._second, self._first] = change_of[:, self._first, self._second]
+        return pressed.voltages - self.reference, model.voltages(change_of).T
 
     def each(self, spots: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
         """:meth:`jacobian` of each of ``spots`` (n, 4), alone on the sheet."""
         for spot in spots:
             yield self.jacobian(spot[None])
+
+    def _pressed(self, cells: IntArray, change: FloatArray) -> tuple[IntArray, FloatArray]:
+        return cells, self.state.conductivity[cells] * np.exp(change)
 
 
 def _sub_centroids(split: int) -> FloatArray:

@@ -1,0 +1,104 @@
+"""Where a touch may have begun: signatures of faint spots all over the sheet, matched at once."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import FloatArray
+from tomoskin.touch.fit.noise import Whitener
+from tomoskin.touch.fit.prior import Prior
+from tomoskin.touch.fit.spot import CONTENT, Response, spots_of
+
+_SPACING = 0.7
+"""Between candidates, in median radii."""
+
+_SIZES = (0.6, 1.0, 1.6)
+"""Radii of the candidates, in median radii."""
+
+_FAINT = 0.05
+"""Depth at which signatures are taken: linear, and far above rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Spots of content one, and what each does to the rows: made once for a model.
+
+    Attributes
+    ----------
+    spots
+        (n, 4) of content 1 m².
+    signatures
+        (n, n_meas) V/m².
+    """
+
+    spots: FloatArray
+    signatures: FloatArray
+
+    @classmethod
+    def of(cls, response: Response, prior: Prior) -> Self:
+        """On a hexagonal grid, in three sizes."""
+        mesh = response.spots.mesh
+        places = _places(mesh.centroids, _SPACING * prior.radius)
+        spots = np.concatenate([spots_of(places, size * prior.radius, -_FAINT) for size in _SIZES])
+        found = response.changes([spot[None] for spot in spots])
+        content = spots[:, CONTENT].copy()
+        spots[:, CONTENT] = 1.0
+        return cls(spots, found / content[:, None])
+
+    def matched(self, whiten: Whitener) -> Matched:
+        """The same for one noise."""
+        signatures = whiten(self.signatures)
+        return Matched(self.spots, signatures, np.einsum("nr,nr->n", signatures, signatures))
+
+
+@dataclass(frozen=True, eq=False)
+class Matched:
+    """Candidates, their whitened signatures (n, r), and (n,) the squares of these."""
+
+    spots: FloatArray
+    signatures: FloatArray
+    squares: FloatArray
+
+    def ratios(
+        self, residual: FloatArray, explained: FloatArray, sign: str
+    ) -> tuple[FloatArray, FloatArray]:
+        """(n,) likelihood ratio of each candidate, and (n,) its most likely content.
+
+        The ratio is the square root of twice its logarithm: deviations by which the candidate
+        stands out (GLRT; Kay 1998, section 7.6.2, for a linear model in white noise), after what
+        ``explained`` (r, p), derivatives of the spots that are there already, could take up.
+        """
+        size, projected = self.squares, self.signatures @ residual
+        if explained.shape[1]:
+            basis, _ = np.linalg.qr(explained)
+            taken = self.signatures @ basis
+            size = np.maximum(size - np.einsum("np,np->n", taken, taken), 0.0)
+            projected = projected - taken @ (basis.T @ residual)
+        useful = size > 1e-3 * self.squares
+        content = np.where(useful, projected / np.where(useful, size, 1.0), 0.0)
+        if sign != "both":
+            content = np.minimum(content, 0) if sign == "decrease" else np.maximum(content, 0)
+        return np.abs(content) * np.sqrt(size), content
+
+    def spot(self, number: int, content: FloatArray) -> FloatArray:
+        """(4,) candidate ``number`` with its content of ``contents`` (n,)."""
+        chosen = self.spots[number].copy()
+        chosen[CONTENT] = content[number]
+        return np.asarray(chosen)
+
+
+def _places(inside: FloatArray, step: float) -> FloatArray:
+    """(n, 2) hexagonal grid of places near cells whose centroids are ``inside``."""
+    low, high = inside.min(axis=0), inside.max(axis=0)
+    rows = np.arange(low[1], high[1] + step, step * math.sqrt(3) / 2)
+    x = np.arange(low[0], high[0] + step, step)
+    grid = np.concatenate([
+        np.column_stack([x + (number % 2) * step / 2, np.full(len(x), y)])
+        for number, y in enumerate(rows)
+    ])  # fmt: skip
+    apart = np.linalg.norm(grid[:, None] - inside, axis=2).min(axis=1)
+    return np.asarray(grid[apart < step / 2])

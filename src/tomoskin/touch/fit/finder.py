@@ -1,0 +1,162 @@
+"""Frames of difference data → readings, each fitted by its parameters."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray, GeometryError, Reading
+from tomoskin.forward import ForwardModel
+from tomoskin.mesh import Mesh, triangulate
+from tomoskin.skin import Skin
+from tomoskin.touch.fit.candidates import Candidates, Matched
+from tomoskin.touch.fit.noise import Whitener
+from tomoskin.touch.fit.prior import Prior
+from tomoskin.touch.fit.refine import Problem, Sheet
+from tomoskin.touch.fit.search import Found, Search, joined
+from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
+
+_CELLS = 1500
+"""Of the mesh that spots are fitted on: their profile is smooth, and a frame is quick."""
+
+_MOST = 5
+"""Touches at once: more have more parameters than 8 or 16 electrodes tell apart."""
+
+_MASKS = 8
+"""Sets of rows that are left out whose whitening is kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpotModel:
+    """What is made once for a skin and pattern.
+
+    Attributes
+    ----------
+    response
+        The forward model with spots on it.
+    prior, sheet
+        What is likely of a spot, and where it may be.
+    candidates
+        Where touches are looked for.
+    scale
+        (n_meas,) 1/V by which the model's changes become difference data; ones where these are
+        in volts.
+    """
+
+    response: Response
+    prior: Prior
+    sheet: Sheet
+    candidates: Candidates
+    scale: FloatArray
+
+    @classmethod
+    def of(cls, skin: Skin, model: ForwardModel) -> Self:
+        """For ``skin`` with the pattern of ``model``, on a mesh of its own.
+
+        Raises
+        ------
+        ModelError
+            When the sheet is not flat.
+        """
+        own = ForwardModel(_mesh(skin), model.pattern, model.contact_impedance, model.current)
+        response = Response(own.at(skin.conductivity))
+        prior = Prior.of(own.mesh)
+        normalised = skin.inverse.difference == "normalised"
+        scale = 1 / np.abs(response.reference) if normalised else np.ones(own.pattern.n_meas)
+        candidates = Candidates.of(response, prior)
+        return cls(response, prior, Sheet(own.mesh), candidates, scale)
+
+
+class SpotFinder:
+    """Finds the touches of one frame after the other; the last frame's are where it begins.
+
+    Parameters
+    ----------
+    model
+        Made once for the skin.
+    skin
+        Whose ``[touch]`` says sign, snr and how many.
+    mesh
+        Of the images: readings name its cells.
+    noise
+        (n_meas, n_meas) covariance of difference data, the reference's own part included.
+    gain
+        Of the data against the model: the ratio of their references.
+    """
+
+    def __init__(
+        self, model: SpotModel, skin: Skin, mesh: Mesh, noise: FloatArray, gain: float = 1.0
+    ) -> None:
+        self._model, self._settings, self._mesh = model, skin.touch, mesh
+        self._noise, self._gain = noise, gain
+        self._unit = skin.conductivity
+        self._most = min(skin.touch.max_touches, _MOST)
+        self._matched: OrderedDict[bytes, tuple[Whitener, Matched]] = OrderedDict()
+        self._before = np.zeros((0, N_PARAMETERS))
+
+    def reset(self) -> None:
+        """Forget the last frame."""
+        self._before = self._before[:0]
+
+    def push(self, dv: FloatArray, unusable: NDArray[np.bool_]) -> list[Reading]:
+        """Touches of ``dv`` (n_meas,), strongest first; rows that are ``unusable`` do not count."""
+        whiten, matched = self._whitened(unusable)
+        problem = Problem(
+            response=self._model.response,
+            whiten=whiten,
+            prior=self._model.prior,
+            sheet=self._model.sheet,
+            sign=self._settings.sign,
+            data=whiten(np.where(unusable, 0.0, dv) / self._model.scale / self._gain),
+        )
+        found = Search(problem, matched, self._settings.snr, self._most)(self._before)
+        self._before = found.fit.spots
+        readings = self._readings(joined(found))
+        readings.sort(key=lambda reading: -abs(reading.peak))
+        return readings
+
+    def _whitened(self, unusable: NDArray[np.bool_]) -> tuple[Whitener, Matched]:
+        key = unusable.tobytes()
+        if key not in self._matched:
+            scale = self._model.scale * self._gain
+            whiten = Whitener.of_some(self._noise / scale[:, None] / scale, ~unusable)
+            self._matched[key] = whiten, self._model.candidates.matched(whiten)
+            if len(self._matched) > _MASKS:
+                self._matched.popitem(last=False)
+        self._matched.move_to_end(key)
+        return self._matched[key]
+
+    def _readings(self, found: Found) -> list[Reading]:
+        spots = found.fit.spots
+        depth = self._unit * np.expm1(depth_of(spots)) if len(spots) else np.zeros(0)
+        return [self._reading(spots[k], float(depth[k]), found, k) for k in range(len(spots))]
+
+    def _reading(self, spot: FloatArray, peak: float, found: Found, k: int) -> Reading:
+        place = found.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
+        radius = float(np.exp(spot[LOG_RADIUS]))
+        apart = np.linalg.norm(self._mesh.centroids - spot[:2], axis=1)
+        cells = np.flatnonzero(apart <= max(radius, apart.min()))
+        return Reading(
+            x=float(spot[0]),
+            y=float(spot[1]),
+            sd_x=float(np.sqrt(place[0, 0])),
+            sd_y=float(np.sqrt(place[1, 1])),
+            area=float(np.pi * radius**2),
+            peak=peak,
+            cells=cells,
+            cov_xy=float(place[0, 1]),
+            snr=float(found.ratio[k]),
+            close=bool(found.close[k]),
+        )
+
+
+def _mesh(skin: Skin) -> Mesh:
+    """Of its own; the skin's where so few cells do not resolve the electrodes."""
+    try:
+        return triangulate(skin.outline, skin.arcs, _CELLS)
+    except GeometryError:
+        return skin.mesh()

@@ -1,0 +1,85 @@
+"""What is held to be likely of a touch before the data speak."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import FloatArray
+from tomoskin.mesh import Mesh
+from tomoskin.touch.fit.spot import CONTENT, FILLING, LOG_RADIUS
+
+_RADIUS = 0.14
+"""Median radius, in parts of the breadth of a square as large as the sheet."""
+
+_SPREAD = 0.6
+"""Standard deviation of the radius's logarithm: a factor of 1.8 either way."""
+
+_DEPTH = 0.5
+"""Standard deviation of log(σ/σ₀) at the centre of a spot of median radius, about none."""
+
+_MOST_DEPTH = 3.0
+"""A spot that is deeper (a conductivity of 5 %) differs from this one by less than its noise."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Each spot alone: its place even over the sheet, radius log-normal, content normal.
+
+    Attributes
+    ----------
+    area
+        Of the sheet, m².
+    radius
+        Median, m.
+    spread
+        Standard deviation of the radius's logarithm.
+    content
+        Standard deviation of the content about none, m².
+    """
+
+    area: float
+    radius: float
+    spread: float
+    content: float
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> Self:
+        """For the fingers of somebody who made a sheet of this size."""
+        area = float(mesh.volumes.sum())
+        radius = _RADIUS * math.sqrt(area)
+        return cls(area, radius, _SPREAD, _DEPTH * FILLING * radius**2)
+
+    def away(self, spots: FloatArray) -> FloatArray:
+        """(k, 4) deviations of spots (k, 4) from the prior's middle; places have none."""
+        found = np.zeros_like(spots)
+        found[:, LOG_RADIUS] = (spots[:, LOG_RADIUS] - math.log(self.radius)) / self.spread
+        found[:, CONTENT] = spots[:, CONTENT] / self.content
+        return found
+
+    @property
+    def weights(self) -> FloatArray:
+        """(4,) 1/deviation of each column; a place is known to be on the sheet."""
+        wide = 1 / math.sqrt(self.area)
+        return np.array([wide, wide, 1 / self.spread, 1 / self.content])
+
+    def log_density(self, spots: FloatArray) -> float:
+        """Logarithm of the prior density of spots (k, 4), in no order."""
+        k = len(spots)
+        scale = math.log(self.area * self.spread * self.content) + math.log(2 * math.pi)
+        away = float((self.away(spots) ** 2).sum())
+        return math.lgamma(k + 1) - k * scale - away / 2
+
+    def held(self, spots: FloatArray, sign: str) -> FloatArray:
+        """``spots`` (k, 4) with radius and content where they may be."""
+        kept = spots.copy()
+        middle, margin = math.log(self.radius), 2 * self.spread
+        kept[:, LOG_RADIUS] = np.clip(kept[:, LOG_RADIUS], middle - margin, middle + margin)
+        most = _MOST_DEPTH * FILLING * np.exp(2 * kept[:, LOG_RADIUS])
+        low = np.zeros_like(most) if sign == "increase" else -most
+        high = np.zeros_like(most) if sign == "decrease" else most
+        kept[:, CONTENT] = np.clip(kept[:, CONTENT], low, high)
+        return kept

@@ -1,0 +1,159 @@
+"""The most likely spots near a start, and their covariance: Levenberg–Marquardt."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial import cKDTree
+
+from tomoskin.core import FloatArray
+from tomoskin.mesh import Mesh
+from tomoskin.touch.fit.noise import Whitener
+from tomoskin.touch.fit.prior import Prior
+from tomoskin.touch.fit.spot import N_PARAMETERS, Response
+
+_SETTLED = 0.02
+"""Newton decrement, squared, at which a step is too small to matter: 0.14 deviations."""
+
+_LEAST_DAMPING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Spots that explain a frame.
+
+    Attributes
+    ----------
+    spots
+        (k, 4), see :mod:`tomoskin.touch.fit.spot`.
+    residual
+        (r,) whitened data less the model.
+    jacobian
+        (r, 4k) of the whitened model.
+    normal
+        (4k, 4k) inverse of the covariance: JᵀJ and the prior.
+    cost
+        Half the squares of residual and prior.
+    """
+
+    spots: FloatArray
+    residual: FloatArray
+    jacobian: FloatArray
+    normal: FloatArray
+    cost: float
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """(4k, 4k) of all parameters, by the curvature at the minimum."""
+        scale = 1 / np.sqrt(np.diag(self.normal))
+        even = np.linalg.inv(self.normal * scale[:, None] * scale)
+        return np.asarray(even * scale[:, None] * scale)
+
+    @property
+    def degrees(self) -> int:
+        """Entries of the residual that are left for chance."""
+        return max(len(self.residual) - len(self.normal), 1)
+
+    @cached_property
+    def misfit(self) -> float:
+        """Squares of the residual: about as many as it has entries where the model is right."""
+        return float(self.residual @ self.residual)
+
+    def log_evidence(self, prior: Prior) -> float:
+        """Logarithm of ∫ likelihood · prior by Laplace's method (MacKay 2003, eq. 28.5).
+
+        Up to what all fits of the same data have in common.
+        """
+        n = len(self.normal)
+        sign, log_det = np.linalg.slogdet(self.normal) if n else (1.0, 0.0)
+        volume = (n * math.log(2 * math.pi) - log_det) / 2 if sign > 0 else -np.inf
+        return -self.misfit / 2 + prior.log_density(self.spots) + volume
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Whitened data (r,) of one frame, and what they are explained with.
+
+    ``sign`` is "decrease", "increase" or "both".
+    """
+
+    response: Response
+    whiten: Whitener
+    prior: Prior
+    sheet: Sheet
+    sign: str
+    data: FloatArray
+
+    def nothing(self) -> Fit:
+        """The frame with no spot at all."""
+        none = np.zeros((0, N_PARAMETERS))
+        cost = float(self.data @ self.data) / 2
+        return Fit(none, self.data, np.zeros((len(self.data), 0)), np.zeros((0, 0)), cost)
+
+    def at(self, spots: FloatArray) -> Fit:
+        """The frame with these spots, as they are."""
+        change, jacobian = self.response.jacobian(spots)
+        residual = self.data - self.whiten(change)
+        slope = self.whiten(jacobian.T).T
+        away, weights = self.prior.away(spots), np.tile(self.prior.weights, len(spots))
+        normal = slope.T @ slope + np.diag(weights**2)
+        cost = (residual @ residual + float((away**2).sum())) / 2
+        return Fit(spots, residual, slope, normal, float(cost))
+
+    def refined(self, spots: FloatArray, most: int) -> Fit:
+        """The minimum of the cost near ``spots`` (k, 4), after at most so many steps.
+
+        Levenberg (1944) and Marquardt (1963): damping relative to the diagonal.
+        """
+        best, damping = self.at(self._allowed(spots)), _LEAST_DAMPING
+        for _ in range(most):
+            gradient = self._gradient(best)
+            step = _solved(best.normal, gradient, damping)
+            if gradient @ step < _SETTLED:
+                break
+            tried = self.at(self._allowed(best.spots + step.reshape(-1, N_PARAMETERS)))
+            if tried.cost < best.cost:
+                best, damping = tried, max(damping / 10, _LEAST_DAMPING)
+            elif damping > 1e3:
+                break
+            else:
+                damping = max(damping * 30, 1e-2)
+        return best
+
+    def _gradient(self, fit: Fit) -> FloatArray:
+        pull = self.prior.away(fit.spots) * self.prior.weights
+        return np.asarray(fit.jacobian.T @ fit.residual - pull.ravel())
+
+    def _allowed(self, spots: FloatArray) -> FloatArray:
+        return self.prior.held(self.sheet.held(spots), self.sign)
+
+
+class Sheet:
+    """Where a touch may be: what leaves the mesh is brought back to its nearest cell."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._centroids = mesh.centroids
+        self._tree = cKDTree(mesh.centroids)
+        corners = mesh.points[mesh.cells] - mesh.centroids[:, None]
+        self._margin = np.linalg.norm(corners, axis=2).max(axis=1)
+
+    def held(self, spots: FloatArray) -> FloatArray:
+        """``spots`` (k, 4) on the sheet."""
+        apart, cell = (np.atleast_1d(found) for found in self._tree.query(spots[:, :2]))
+        off = np.asarray(apart > self._margin[cell])
+        if not off.any():
+            return spots
+        kept = spots.copy()
+        kept[off, :2] = self._centroids[cell[off]]
+        return kept
+
+
+def _solved(normal: FloatArray, gradient: FloatArray, damping: float) -> FloatArray:
+    scale = 1 / np.sqrt(np.diag(normal))
+    even = normal * scale[:, None] * scale
+    even[np.diag_indices_from(even)] *= 1 + damping
+    return np.asarray(scale * cho_solve(cho_factor(even), scale * gradient))

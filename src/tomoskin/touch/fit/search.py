@@ -1,0 +1,221 @@
+"""How many touches a frame holds: one more as long as the evidence for it grows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray
+from tomoskin.touch.fit.candidates import Matched
+from tomoskin.touch.fit.refine import Fit, Problem
+from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, bell
+
+HELD = 0.6
+"""Part of the ratio at which a touch begins above which one that is there stays."""
+
+_DOUBTFUL = 0.8
+"""Part of that ratio from which another touch beside one is not ruled out."""
+
+_MISSHAPEN = 0.02
+"""A wrong profile leaves up to this part of what a touch changes: no evidence of another one."""
+
+_SHAPE_DOUBT = 0.3
+"""How far a true profile is from ours, of the way to a bell: a standard deviation."""
+
+_COLD, _WARM = 15, 6
+"""Steps from a rough start, and from the frame before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What explains a frame, and how sure each touch is.
+
+    Attributes
+    ----------
+    fit
+        The most likely spots.
+    ratio
+        (k,) deviations by which each stands out of the noise, the others given.
+    covariance
+        (4k, 4k), noise and a wrong profile together.
+    close
+        (k,) bool: another touch so near cannot be ruled out.
+    """
+
+    fit: Fit
+    ratio: FloatArray
+    covariance: FloatArray
+    close: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Looks for touches in one frame.
+
+    Attributes
+    ----------
+    problem
+        The frame.
+    matched
+        Candidates for its noise.
+    least
+        Likelihood ratio, in deviations, at which a touch begins.
+    most
+        Touches that are looked for at most.
+    """
+
+    problem: Problem
+    matched: Matched
+    least: float
+    most: int
+
+    def __call__(self, before: FloatArray) -> Found:
+        """Touches of the frame; ``before`` (k, 4) are those of the last one.
+
+        Where these do not go on as they were, the frame is looked at without them too, and what
+        has more evidence counts.
+        """
+        warm = self._more(self._pruned(self._started(before)))
+        if len(before) and len(warm.spots) != len(before):
+            warm = max(self._more(self.problem.nothing()), warm, key=self._evidence)
+        return self._judged(warm)
+
+    def _evidence(self, fit: Fit) -> float:
+        return fit.log_evidence(self.problem.prior)
+
+    def _started(self, before: FloatArray) -> Fit:
+        if not len(before):
+            return self.problem.nothing()
+        return self.problem.refined(before[: self.most], _WARM)
+
+    def _pruned(self, fit: Fit) -> Fit:
+        """Without the spots that have faded."""
+        while len(fit.spots):
+            ratio = self._ratios(fit)
+            weakest = int(ratio.argmin())
+            if ratio[weakest] >= HELD * self.least:
+                return fit
+            left = np.delete(fit.spots, weakest, axis=0)
+            fit = self.problem.refined(left, _WARM) if len(left) else self.problem.nothing()
+        return fit
+
+    def _more(self, fit: Fit) -> Fit:
+        """With further spots, while they are worth it."""
+        while len(fit.spots) < self.most:
+            ratio, content = self._standing_out(fit)
+            best = int(ratio.argmax())
+            if ratio[best] < self._threshold(fit, HELD if not len(fit.spots) else _DOUBTFUL):
+                return fit
+            tried = self._best(self._starts(fit, self.matched.spot(best, content)))
+            worth = self._ratios(tried).min() >= self._threshold(fit, 1.0)
+            if not worth or self._evidence(tried) <= self._evidence(fit):
+                return fit
+            fit = tried
+        return fit
+
+    def _threshold(self, fit: Fit, part: float) -> float:
+        """What a wrong profile may leave adds to the noise."""
+        seen = np.linalg.norm(self.problem.data - fit.residual) if len(fit.spots) else 0.0
+        return part * self.least * float(np.hypot(1.0, _MISSHAPEN * seen / self.least))
+
+    def _standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
+        return self.matched.ratios(fit.residual, fit.jacobian, self.problem.sign)
+
+    def _starts(self, fit: Fit, fresh: FloatArray) -> list[FloatArray]:
+        """The new spot beside the others; or instead of half of the nearest."""
+        starts = [np.concatenate([fit.spots, fresh[None]])]
+        if len(fit.spots):
+            near = int(np.linalg.norm(fit.spots[:, :2] - fresh[:2], axis=1).argmin())
+            away = fresh[:2] - fit.spots[near, :2]
+            halves = np.tile(fit.spots[near], (2, 1))
+            reach = 0.7 * np.exp(fit.spots[near, LOG_RADIUS]) / max(np.linalg.norm(away), 1e-9)
+            halves[:, :2] += np.outer([-reach, reach], away)
+            halves[:, CONTENT] /= 2
+            halves[:, LOG_RADIUS] -= 0.3
+            starts.append(np.concatenate([np.delete(fit.spots, near, axis=0), halves]))
+        return starts
+
+    def _best(self, starts: list[FloatArray]) -> Fit:
+        return min((self.problem.refined(s, _COLD) for s in starts), key=lambda fit: fit.cost)
+
+    def _ratios(self, fit: Fit) -> FloatArray:
+        """(k,) size of what each spot changes that the others could not take up."""
+        k = len(fit.spots)
+        whole = self.problem.data - fit.residual
+        if k == 1:
+            return np.array([np.linalg.norm(whole)])
+        others = [np.delete(fit.spots, number, axis=0) for number in range(k)]
+        alone = whole - self.problem.whiten(self.problem.response.changes(others))
+        for number in range(k):
+            slope = np.delete(fit.jacobian, np.s_[4 * number : 4 * number + 4], axis=1)
+            basis, _ = np.linalg.qr(slope)
+            alone[number] -= basis @ (basis.T @ alone[number])
+        return np.asarray(np.linalg.norm(alone, axis=1))
+
+    def _judged(self, fit: Fit) -> Found:
+        k = len(fit.spots)
+        if not k:
+            none = np.zeros(0)
+            return Found(fit, none, np.zeros((0, 0)), none.astype(bool))
+        covariance = self._covariance(fit)
+        return Found(fit, self._ratios(fit), covariance, self._close(fit))
+
+    def _covariance(self, fit: Fit) -> FloatArray:
+        """Curvature, scaled where the data scatter more than they should; and the profile's part.
+
+        What a bell instead of our profile would change moves the estimate by ΣJᵀd: a parameter
+        that is not fitted but considered (Schmidt 1966).
+        """
+        problem, scatter = self.problem, max(1.0, fit.misfit / fit.degrees)
+        seen = problem.data - fit.residual
+        other = problem.whiten(problem.response.changes([fit.spots], bell)[0])
+        moved = _SHAPE_DOUBT * (fit.covariance @ (fit.jacobian.T @ (other - seen)))
+        return np.asarray(scatter * fit.covariance + np.outer(moved, moved))
+
+    def _close(self, fit: Fit) -> NDArray[np.bool_]:
+        """Where a candidate within a radius of a spot stands out nearly enough."""
+        ratio, _ = self._standing_out(fit)
+        doubtful = self.matched.spots[ratio > self._threshold(fit, _DOUBTFUL), :2]
+        if not len(doubtful):
+            return np.zeros(len(fit.spots), dtype=bool)
+        apart = np.linalg.norm(fit.spots[:, None, :2] - doubtful, axis=2).min(axis=1)
+        return np.asarray(apart < 2 * np.exp(fit.spots[:, LOG_RADIUS]))
+
+
+def joined(found: Found) -> Found:
+    """The same with each two touches as one whose places cannot be told apart (2 deviations)."""
+    spots, k = found.fit.spots, len(found.fit.spots)
+    for i in range(k):
+        for j in range(i + 1, k):
+            away = spots[i, :2] - spots[j, :2]
+            pick = [4 * i, 4 * i + 1, 4 * j, 4 * j + 1]
+            block = found.covariance[np.ix_(pick, pick)]
+            turn = np.concatenate([away, -away])
+            if (away @ away) ** 2 < 4 * (turn @ block @ turn):
+                return joined(_merged(found, i, j))
+    return found
+
+
+def _merged(found: Found, i: int, j: int) -> Found:
+    """Touches i and j as one, at the middle of their contents."""
+    fit, keep = found.fit, np.delete(np.arange(len(found.fit.spots)), j)
+    share = np.abs(fit.spots[[i, j], CONTENT])
+    share = share / share.sum()
+    one = fit.spots[i].copy()
+    one[:2] = share @ fit.spots[[i, j], :2]
+    one[LOG_RADIUS] = share @ fit.spots[[i, j], LOG_RADIUS]
+    one[CONTENT] = fit.spots[[i, j], CONTENT].sum()
+    spots = fit.spots.copy()
+    spots[i] = one
+    mix = np.eye(4 * len(fit.spots))
+    for column, part in ((i, share[0]), (j, share[1])):
+        mix[4 * i : 4 * i + 2, 4 * column : 4 * column + 2] = part * np.eye(2)
+    rows = (4 * keep[:, None] + np.arange(N_PARAMETERS)).ravel()
+    covariance = (mix @ found.covariance @ mix.T)[np.ix_(rows, rows)]
+    ratio = found.ratio.copy()
+    ratio[i] = np.hypot(*found.ratio[[i, j]])
+    close = found.close.copy()
+    close[i] = True
+    return Found(replace(fit, spots=spots[keep]), ratio[keep], covariance, close[keep])
