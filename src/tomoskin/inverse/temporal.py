@@ -114,11 +114,13 @@ class Temporal:
         """(n_cells, k) S with S·Sᵀ the covariance of the image, frames every ``interval`` s.
 
         ``noise`` (n_meas,) is the deviation of each row of difference data, independent from
-        row to row and from frame to frame; what the modes have in common is Σ over the past of
+        row to row and from frame to frame, or (n_meas, m) a root of their covariance; what the
+        modes have in common is Σ over the past of
         gᵢpᵢⁿ cᵢⱼ gⱼpⱼⁿ, with gain g, pole p and their covariance c in one frame.
         """
         steady = self.steady(interval)
-        analysis = self.modes.analysis * noise
+        root = np.diag(noise) if noise.ndim == 1 else noise
+        analysis = self.modes.analysis @ root
         shared = (analysis @ analysis.conj().T) / (1.0 - np.outer(steady.pole, steady.pole))
         values, vectors = np.linalg.eigh(shared * np.outer(steady.gain, steady.gain))
         return np.asarray(self.modes.picture @ (vectors * np.sqrt(np.maximum(values, 0.0))))

@@ -1,18 +1,34 @@
-"""Counts → voltages → differences, with the noise of an idle skin."""
+"""Counts → voltages → differences: an idle skin's noise and drift, and its electrodes' health."""
 
+from tomoskin.signal.baseline import Baseline, BaselineState
+from tomoskin.signal.blind import Blind
 from tomoskin.signal.consecutive import Consecutive, at_one_time
 from tomoskin.signal.difference import DIFFERENCES, difference, difference_noise
+from tomoskin.signal.health import ElectrodeHealth, Health
+from tomoskin.signal.idle import Idle
+from tomoskin.signal.monitor import Monitor, sick_text
 from tomoskin.signal.phase import in_phase
 from tomoskin.signal.readout import Readout
 from tomoskin.signal.reference import Reference
+from tomoskin.signal.roles import Roles, lost_directions
 
 __all__ = [
     "DIFFERENCES",
+    "Baseline",
+    "BaselineState",
+    "Blind",
     "Consecutive",
+    "ElectrodeHealth",
+    "Health",
+    "Idle",
+    "Monitor",
     "Readout",
     "Reference",
+    "Roles",
     "at_one_time",
     "difference",
     "difference_noise",
     "in_phase",
+    "lost_directions",
+    "sick_text",
 ]

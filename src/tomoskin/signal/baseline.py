@@ -1,0 +1,155 @@
+"""The reference while time goes by: it follows the untouched skin, and holds under a touch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tomoskin.core import FloatArray
+from tomoskin.signal.idle import Idle
+from tomoskin.signal.reference import Reference
+from tomoskin.signal.roles import Mask
+
+SLOWEST = 60.0
+"""Time constant with which the baseline follows where no drift has been seen, s."""
+
+_LINGER = 10
+"""Frames after a touch for which the baseline still holds."""
+
+_FADING = 10.0
+"""Seconds after a release in which what the touch has left fades into the baseline."""
+
+_FADE = 1.0
+"""Time constant of that, s."""
+
+_CUT = 4.0
+"""An innovation counts for at most so many of its deviations (Huber 1964)."""
+
+_DOUBT = 3.0
+"""Deviations of a frame's noise that a held baseline may have drifted before it is called stale."""
+
+_LONGEST_STEP = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class BaselineState:
+    """How the baseline is.
+
+    Attributes
+    ----------
+    drift
+        By how much it has moved since the reference, as a part of its size (rms of all rows).
+    held
+        Seconds for which it has been held under a touch; 0 where it follows.
+    doubt
+        What it may have drifted by meanwhile, in deviations of one frame's noise; median row.
+    noise
+        V, rms of the rows.
+    """
+
+    drift: float
+    held: float
+    doubt: float
+    noise: float
+
+    @property
+    def stale(self) -> str | None:
+        """What someone should see to, or None."""
+        if self.doubt < _DOUBT:
+            return None
+        return (
+            f"held under a touch for {self.held:.0f} s, the reference may have drifted by "
+            f"{self.doubt:.0f} times the noise: lift the touch, or take a new reference"
+        )
+
+
+class Baseline:
+    """Scalar Kalman filters of a random walk, one a row (Kalman 1960), fed while nothing touches.
+
+    While a touch stands nothing is learnt, and the variance grows by what the skin drifts as a
+    rule, so that afterwards the baseline comes back the faster the longer it was held.
+
+    Parameters
+    ----------
+    reference
+        Where it begins.
+    follows
+        False: it stays there; noise is estimated all the same.
+    """
+
+    def __init__(self, reference: Reference, *, follows: bool = True) -> None:
+        self._start = reference.mean
+        self._size = float(np.sqrt(np.mean(reference.mean**2)))
+        self._known = reference.noise_is_known
+        noise = reference.noise if self._known else np.full_like(reference.mean, np.nan)
+        self._follows = follows and self._known
+        self.mean = reference.mean
+        self._n_frames = reference.n_frames
+        self.idle = Idle(noise, reference.n_frames, SLOWEST)
+        self._variance = noise**2 / reference.n_frames
+        self._time: float | None = None
+        self._held = 0.0
+        self._linger = 0
+        self._fading = 0.0
+
+    def push(self, values: FloatArray, lost: Mask, time: float, *, touched: bool) -> bool:
+        """Take a frame, (n_meas,) V at ``time`` s; True where it ended a block of idle frames.
+
+        ``lost`` rows, (n_meas,) bool, say nothing; ``touched``: whether something touches.
+        """
+        step = 0.0 if self._time is None else min(max(time - self._time, 0.0), _LONGEST_STEP)
+        self._time = time
+        if not self._known:
+            return False
+        self._variance = self._variance + self.idle.drift * step
+        if touched:
+            self._held += step
+            self._linger, self._fading = _LINGER, _FADING
+            return self._interrupted()
+        if self._linger:
+            self._linger -= 1
+            return self._interrupted()
+        self._held = 0.0
+        if self._follows:
+            self._follow(values, lost, step)
+        if self._fading > 0:
+            self._fading -= step
+            return self._interrupted()
+        return self.idle.push(values, time, lost)
+
+    def _follow(self, values: FloatArray, lost: Mask, step: float) -> None:
+        noise = self.idle.noise**2
+        if self._fading > 0:
+            gain = 1.0 - np.exp(-step / _FADE)
+            self._variance = np.maximum(self._variance, noise * gain / (1.0 - gain + 1e-12))
+        gain = self._variance / (self._variance + noise)
+        gain[lost] = 0.0
+        most = _CUT * np.sqrt(self._variance + noise)
+        self.mean = self.mean + gain * np.clip(values - self.mean, -most, most)
+        self._variance = (1.0 - gain) * self._variance
+
+    def _interrupted(self) -> bool:
+        self.idle.interrupt()
+        return False
+
+    @property
+    def reference(self) -> Reference:
+        """The reference as it is now: the noise is a frame's together with the baseline's own."""
+        if not self._known:
+            return Reference(self.mean, self.idle.noise, self._n_frames)
+        noise = np.sqrt(self.idle.noise**2 + self._variance)
+        return Reference(self.mean, noise, max(self._n_frames, 2))
+
+    @property
+    def state(self) -> BaselineState:
+        """How it is now."""
+        moved = float(np.sqrt(np.mean((self.mean - self._start) ** 2)))
+        noise = self.idle.noise
+        doubt = float(np.median(np.sqrt(self._variance) / noise)) if self._held else 0.0
+        return BaselineState(
+            drift=moved / self._size if self._size else 0.0,
+            held=self._held,
+            doubt=doubt,
+            noise=float(np.sqrt(np.mean(noise**2))),
+        )

@@ -1,0 +1,71 @@
+"""Directions of the data that do not count, taken out exactly: lost rows, floats, drift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from tomoskin.core import DataError, FloatArray
+
+_DEPENDENT = 1e-7
+"""Directions with less than this part of the largest follow from the others."""
+
+
+@dataclass(frozen=True, eq=False)
+class Blind:
+    """Noise of endless variance along ``directions`` N, (n_meas, k).
+
+    Data of covariance P⁻¹ with that noise have P − PN(NᵀPN)⁻¹NᵀP for their inverse covariance
+    (the limit of Woodbury's identity; Rasmussen & Williams 2006, equation 2.41 with its vague
+    limit, 2.42). An operator is a covariance times it, so data less N(NᵀPN)⁻¹NᵀP·data give the
+    picture of the operator that was made with that noise. ``weights`` (k, n_meas) is the
+    (NᵀPN)⁻¹NᵀP. A lost row is a direction with a single one in it.
+    """
+
+    directions: FloatArray
+    weights: FloatArray
+
+    @classmethod
+    def of(cls, directions: FloatArray, precision: FloatArray) -> Self:
+        """For data of inverse covariance ``precision`` P, (n_meas, n_meas), up to a factor.
+
+        Raises
+        ------
+        DataError
+            When what is left tells too little.
+        """
+        basis = _independent(directions)
+        carried = precision @ basis
+        try:
+            factor = cho_factor(basis.T @ carried, check_finite=False)
+        except LinAlgError as error:
+            raise DataError(
+                f"too little is left of {len(basis)} rows without {basis.shape[1]} directions"
+            ) from error
+        return cls(basis, cho_solve(factor, carried.T, check_finite=False))
+
+    @property
+    def count(self) -> int:
+        """Number of directions."""
+        return int(self.directions.shape[1])
+
+    def __call__(self, dv: FloatArray) -> FloatArray:
+        """(n_meas,) ``dv`` with its part along the directions as the rest leads one to expect."""
+        return np.asarray(dv - self.directions @ (self.weights @ dv))
+
+    def seen_by(self, matrix: FloatArray) -> FloatArray:
+        """(m, n_meas): what ``matrix`` (m, n_meas) makes of data that have been blinded."""
+        return np.asarray(matrix - (matrix @ self.directions) @ self.weights)
+
+
+def _independent(directions: FloatArray) -> FloatArray:
+    """Orthonormal columns that span the same."""
+    size = np.linalg.norm(directions, axis=0)
+    kept = directions[:, size > 0] / size[size > 0]
+    if not kept.shape[1]:
+        return np.asarray(kept)
+    basis, singular, _ = np.linalg.svd(kept, full_matrices=False)
+    return np.asarray(basis[:, singular > _DEPENDENT * singular[0]])

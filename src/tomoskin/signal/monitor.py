@@ -1,0 +1,281 @@
+"""Electrode health from frame to frame: evidence → a state that lasts, with its reason."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.pattern import Pattern, Scan
+from tomoskin.signal.evidence import Groups, Reciprocity, sign_limit, unchanged
+from tomoskin.signal.health import ElectrodeHealth, Health
+from tomoskin.signal.reference import Reference
+from tomoskin.signal.roles import Mask, Roles
+
+ENTER = 2
+"""Frames in a row that must blame an electrode before it is called sick."""
+
+LEAVE = 20
+"""Frames in a row that must clear it before it is used again."""
+
+_WINDOW = 30
+"""Frames over which reciprocity is averaged. The mean over an electrode's 26 pairs then has a
+deviation of √(2/780) = 0.05 of the noise's variance."""
+
+_LOUD = 3.0
+"""Variance beyond the noise's, in units of it, at which an electrode is sick: its deviation is
+twice the usual one. 60 deviations of the average, so the rate of false alarms is that of other
+causes; and four times the median electrode's, so that what all have in common blames none."""
+
+_STEADY = 0.5
+"""Part of an excess that comes from the mean of the errors, above which it is inconsistent
+rather than noisy."""
+
+_FROZEN = 1e-9
+"""Chance under which samples that do not change are called stuck, given how many others do."""
+
+_FLOATING = ("open", "railed", "stuck")
+"""States in which a reading is an unknown number, the same for all rows of its drive."""
+
+_OFFSET = 500
+"""Frames over which the reciprocity error at rest is followed."""
+
+
+class Monitor:
+    """Watches the electrodes of one skin after a reference.
+
+    Parameters
+    ----------
+    pattern
+        The rows.
+    reference
+        What the untouched skin reads, and its noise.
+    model
+        (n_meas,) V that the skin's model expects.
+    unusable
+        (n_meas,) bool: rows without a reference; they stay lost.
+    scan
+        The samples that rows are made of; without it samples are not looked at.
+    rank
+        (n_electrodes,) place of each electrode along the rim; None for their order.
+    """
+
+    def __init__(
+        self,
+        pattern: Pattern,
+        reference: Reference,
+        model: FloatArray,
+        *,
+        unusable: Mask,
+        scan: Scan | None = None,
+        rank: IntArray | None = None,
+    ) -> None:
+        n = pattern.n_electrodes
+        self._roles = Roles.of(pattern)
+        noise = _known(reference, model)
+        self._unusable = unusable | _silent(pattern, reference.mean, noise, model, unusable)
+        usable = ~self._unusable
+        self._groups = Groups.of(pattern, reference.mean, noise, usable)
+        self._pattern = pattern
+        order = np.arange(n) if rank is None else rank
+        self._sign, limit = sign_limit(pattern, reference.mean, noise, order)
+        self._limit = np.where(usable, limit, np.inf)
+        self._inverse = 1.0 / noise
+        self._reciprocity = Reciprocity.of(pattern)
+        self._deviation = self._reciprocity.deviation(noise)
+        self._rest = self._reciprocity.error(reference.mean)
+        usable_pairs = usable[self._reciprocity.first] & usable[self._reciprocity.second]
+        self._paired = usable_pairs & reference.noise_is_known
+        self._squared = np.ones(len(self._rest))
+        self._shift = np.zeros(len(self._rest))
+        self._members = _averages(scan, n)
+        self._still = np.zeros(n)
+        self._last: FloatArray | None = None
+        self._last_samples: NDArray[np.uint16] | None = None
+        self._blamed, self._cleared = np.zeros(n, int), np.zeros(n, int)
+        self._good = tuple(ElectrodeHealth(e) for e in range(n))
+        self._sick: dict[int, ElectrodeHealth] = {}
+        self._well = Health(self._good, self._unusable, np.zeros(n, bool))
+        self._seen: tuple[bytes, bytes] | None = None
+        self._explained: dict[int, ElectrodeHealth] = {}
+        self._masked_for: object = None
+        self._masks = (self._unusable, np.zeros(n, bool))
+
+    def push(
+        self,
+        values: FloatArray,
+        railed: Mask,
+        time: float,
+        samples: NDArray[np.uint16] | None = None,
+    ) -> Health:
+        """Health of the frame with ``values`` (n_meas,) V, ``railed`` rows and ``samples``."""
+        bad = railed | self._unusable
+        np.logical_or(bad, self._sign * values < -self._limit, out=bad)
+        dead = self._groups.dead((values * self._inverse) ** 2)
+        loud = self._loud(values, bad)
+        stuck = self._stuck(samples)
+        if not (self._sick or loud or stuck or bad.any() or dead.any()):
+            self._blamed[:] = 0
+            return self._well
+        return self._judged(bad, railed, dead, loud | stuck, time)
+
+    def _judged(
+        self, bad: Mask, railed: Mask, dead: Mask, more: dict[int, ElectrodeHealth], time: float
+    ) -> Health:
+        bad |= dead[: self._groups.n_drives][self._pattern.drive_index]
+        key = (bad.tobytes(), dead.tobytes())
+        if key != self._seen:
+            self._seen, self._explained = key, self._explain(bad, railed, dead)
+        found = more | self._explained
+        self._debounce(found, time)
+        states = {e: h.state for e, h in (found | self._sick).items()}
+        if (key, states) != self._masked_for:
+            self._masked_for = (key, states)
+            self._masks = _masks(self._pattern, self._roles, bad, states, self._unusable)
+        electrodes = tuple(self._sick.get(e, good) for e, good in enumerate(self._good))
+        return Health(electrodes, *self._masks)
+
+    def _explain(self, bad: Mask, railed: Mask, dead: Mask) -> dict[int, ElectrodeHealth]:
+        """Electrodes that explain what is not as it should be in rows, drives and pairs."""
+        groups, found = self._groups, {}
+        for electrode, state in self._roles.blamed(bad).items():
+            reason = self._reason(electrode, state, railed)
+            found[electrode] = ElectrodeHealth(electrode, state, reason)
+        for a, b in groups.pairs[dead[groups.n_drives :]].tolist():
+            if not any(e in found and found[e].state == "open" for e in (a, b)):
+                found[a] = ElectrodeHealth(a, "short", _short_text(b))
+                found[b] = ElectrodeHealth(b, "short", _short_text(a))
+        return found
+
+    def _debounce(self, found: dict[int, ElectrodeHealth], time: float) -> None:
+        for e in range(len(self._good)):
+            here = e in found
+            self._blamed[e] = self._blamed[e] + 1 if here else 0
+            self._cleared[e] = 0 if here else self._cleared[e] + 1
+            if here and self._blamed[e] >= ENTER:
+                now, known = found[e], self._sick.get(e)
+                if known is None or known.state != now.state:
+                    self._sick[e] = replace(now, since=time)
+            elif e in self._sick and self._cleared[e] >= LEAVE:
+                del self._sick[e]
+
+    def _reason(self, electrode: int, state: str, railed: Mask) -> str:
+        reads, drives = self._roles.reads[electrode], self._roles.drives[electrode]
+        at_rail = f"{int((reads & railed).sum())} of {int(reads.sum())} readings stand at a rail"
+        if state == "railed":
+            return at_rail
+        return f"no current in any of its {int(drives.sum())} driven rows, and {at_rail}"
+
+    def _loud(self, values: FloatArray, bad: Mask) -> dict[int, ElectrodeHealth]:
+        """Electrodes whose reciprocity wavers by more than the noise."""
+        last, self._last = self._last, values
+        if last is None or not self._paired.any():
+            return {}
+        pairs = self._reciprocity
+        error = pairs.error(values) - self._rest
+        squared = pairs.squared(error, self._deviation, values - last)
+        use = self._paired
+        if self._sick or bad.any():
+            use = use & ~(bad[pairs.first] | bad[pairs.second])
+        np.copyto(squared, self._squared, where=~use)
+        np.copyto(error, 0.0, where=~use)
+        self._squared += (squared - self._squared) / _WINDOW
+        self._shift += (error / self._deviation - self._shift) / _WINDOW
+        self._rest += np.clip(error, -self._deviation, self._deviation) / _OFFSET
+        if (pairs.mean @ self._squared).max() < 1.0 + _LOUD / 2:
+            return {}
+        excess = pairs.excess(self._squared)
+        limit = max(_LOUD, 4.0 * float(np.median(excess)))
+        return {e: self._wavering(e, excess[e]) for e in np.flatnonzero(excess > limit).tolist()}
+
+    def _wavering(self, electrode: int, excess: float) -> ElectrodeHealth:
+        steady = float(self._reciprocity.mean[electrode] @ np.minimum(self._shift**2, 25.0))
+        times = f"{np.sqrt(1 + excess):.1f} times the noise"
+        if steady > _STEADY * excess:
+            return ElectrodeHealth(
+                electrode, "inconsistent", f"driving and reading it disagree by {times} at rest"
+            )
+        return ElectrodeHealth(electrode, "noisy", f"it wavers by {times} at rest")
+
+    def _stuck(self, samples: NDArray[np.uint16] | None) -> dict[int, ElectrodeHealth]:
+        """Electrodes whose samples stand still while the others' go on."""
+        last, self._last_samples = self._last_samples, samples
+        if samples is None or last is None or self._members is None:
+            return {}
+        share = unchanged(samples, last, self._members)
+        alone = share[:-1] >= 1.0
+        self._still = np.where(alone, self._still + 1, 0.0)
+        if not alone.any() or share[-1] > 0.5:
+            if share[-1] > 0.5:
+                self._still[:] = 0.0
+            return {}
+        count = 1.0 / np.maximum(self._members[:-1].max(axis=1), 1e-9)
+        chance = np.log(max(share[-1], 0.05)) * count * self._still
+        return {
+            e: ElectrodeHealth(e, "stuck", f"its {round(count[e])} samples do not change")
+            for e in np.flatnonzero(chance < np.log(_FROZEN)).tolist()
+        }
+
+
+def sick_text(electrodes: Iterable[ElectrodeHealth]) -> str:
+    """Several electrodes in words: "E3 open, E7 noisy"."""
+    return ", ".join(f"E{e.electrode + 1} {e.state}" for e in electrodes)
+
+
+def _masks(
+    pattern: Pattern, roles: Roles, bad: Mask, states: Mapping[int, str], unusable: Mask
+) -> tuple[Mask, Mask]:
+    """Rows that are lost, and electrodes whose reading is an unknown number that rows share."""
+    floating = np.zeros(pattern.n_electrodes, bool)
+    taken = unusable.copy()
+    for electrode, state in states.items():
+        if state in _FLOATING:
+            floating[electrode] = True
+        if state not in ("railed", "stuck"):
+            taken |= roles.drives[electrode]
+        if state not in _FLOATING:
+            taken |= roles.reads[electrode]
+    shared = floating[pattern.measure].any(axis=1)
+    lost = taken | (bad & ~shared)
+    # a reading beside a floating one that looks bad in its other row too is bad itself
+    suspect = np.zeros((pattern.n_drive, pattern.n_electrodes), bool)
+    for end in pattern.measure[bad & ~shared].T:
+        suspect[pattern.drive_index[bad & ~shared], end] = True
+    lost |= shared & suspect[pattern.drive_index[:, None], pattern.measure].any(axis=1)
+    return lost, floating
+
+
+def _short_text(other: int) -> str:
+    return f"it reads as E{other + 1} does under every drive; take a new reference"
+
+
+def _known(reference: Reference, model: FloatArray) -> FloatArray:
+    """(n_meas,) V of noise, above zero; a small part of the voltages where it is not known."""
+    least = 1e-6 * float(np.sqrt(np.mean(model**2)))
+    if not reference.noise_is_known:
+        return np.full(len(model), max(1e-3 * float(np.sqrt(np.mean(model**2))), least))
+    return np.maximum(reference.noise, least)
+
+
+def _silent(
+    pattern: Pattern, rest: FloatArray, noise: FloatArray, model: FloatArray, unusable: Mask
+) -> Mask:
+    """(n_meas,) rows of drives that carried no current while the reference was taken."""
+    usable = ~unusable & (model != 0)
+    if not usable.any():
+        return np.zeros(len(model), bool)
+    scale = float(np.median(np.abs(rest[usable] / model[usable])))
+    groups = Groups.of(pattern, scale * model, noise, usable)
+    dead = groups.dead((rest / noise) ** 2)[: groups.n_drives]
+    return np.asarray(dead[pattern.drive_index])
+
+
+def _averages(scan: Scan | None, n: int) -> FloatArray | None:
+    if scan is None:
+        return None
+    each = (scan.sample_electrode == np.arange(n)[:, None]).astype(float)
+    rows = np.concatenate([each, np.ones((1, scan.n_samples))])
+    return np.asarray(rows / np.maximum(rows.sum(axis=1), 1.0)[:, None])
