@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
             idle = lab.measure(f"nothing touches the skin (before {name})")
             loaded = lab.measure(f"18 mm probe, 5 N, {name}", Probe(Circle(RADIUS), x, y, FORCE))
             image = imager.picture(idle, loaded)
-            regions = imager.regions(image, idle, PART)
+            regions = imager.regions(image, PART)
             found |= check(name, imager.mesh, regions, (x, y))
             found |= named_metrics(name, imager.metrics(image, (x, y)))
             shown.append((name, image, regions[0], (x, y)))

@@ -4,7 +4,7 @@
 named by their radius and the square by its side.
 
 Source saw: the size told by the maximum; round and square not told apart.
-Checked: the maximum grows from 15 to 18 to 25 mm, each time by more than 2.5 standard deviations
+Checked: the maximum grows from 15 to 18 to 25 mm, each time by more than 3 standard deviations
 of its noise; the picture of the square has the shape of the circles' (correlation over 0.97, and
 RES50 within the circles' range ± 5 %). The source's four metrics are reported.
 """
@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import figures
-from imaging import NOSER, Imager, named_metrics
+from imaging import FRAMES, NOSER, Imager, named_metrics
 from lab import Lab, open_lab, report
 from tomoskin.core import FloatArray, Image
 from tomoskin.mesh import Mesh
@@ -31,6 +31,9 @@ PROBES = {
     "square, 15 mm": Square(15e-3),
 }
 
+FIRST = (Probe(PROBES["circle, r 25 mm"], 0.0, 0.0, FORCE),)
+"""Pressed once and not counted: textile answers its first loading otherwise than all later ones."""
+
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, check, draw; the numbers that were checked."""
@@ -38,9 +41,11 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     with open_lab(arguments, __doc__, NOSER) as lab:
         imager = Imager(lab.skin)
         images, deviations = {}, []
+        lab.measure("circle, r 25 mm, 3 N, at the centre, once before all", *FIRST, n=1)
         for name, shape in PROBES.items():
-            idle = lab.measure(f"nothing touches the skin (before {name})")
-            loaded = lab.measure(f"{name}, 3 N, at the centre", Probe(shape, 0.0, 0.0, FORCE))
+            idle = lab.measure(f"nothing touches the skin (before {name})", n=FRAMES)
+            probe = Probe(shape, 0.0, 0.0, FORCE)
+            loaded = lab.measure(f"{name}, 3 N, at the centre", probe, n=FRAMES)
             images[name] = imager.picture(idle, loaded)
             deviations.append(noise_of_maximum(imager, images[name], idle))
             found |= named_metrics(name, imager.metrics(images[name], (0.0, 0.0)))
@@ -61,9 +66,7 @@ def check(imager: Imager, images: Sequence[Image], deviations: Sequence[float]) 
     circles, square = images[:3], images[3]
     maxima = [float(np.abs(image.values).max()) for image in circles]
     steps = np.diff(maxima) / np.hypot(deviations[:2], deviations[1:3])
-    assert (steps > 2.5).all(), (
-        f"the maximum does not grow with size: {maxima} S, {steps} deviations"
-    )
+    assert (steps > 3).all(), f"the maximum does not grow with size: {maxima} S, {steps} deviations"
     alike = [float(np.corrcoef(square.values, image.values)[0, 1]) for image in circles]
     assert max(alike) > 0.97, f"the square's picture differs: correlations {alike}"
     res = [imager.metrics(image).res50 for image in images]

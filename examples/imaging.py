@@ -9,12 +9,16 @@ import numpy as np
 from tomoskin.core import FloatArray, Image, Reading
 from tomoskin.inverse import SourceMetrics
 from tomoskin.live import prepare
-from tomoskin.signal import Reference, difference
+from tomoskin.signal import difference
 from tomoskin.skin import Skin
 from tomoskin.touch import Segmenter
 
 NOSER = {"inverse": {"prior": "noser", "difference": "normalised", "alpha": "auto"}}
 """The source's inverse: NOSER's prior, one step, normalised differences; alpha by the noise."""
+
+
+FRAMES = 40
+"""Frames of a stage where pictures are compared: four times the source's, for half the noise."""
 
 
 class Imager:
@@ -30,11 +34,10 @@ class Imager:
         kind = self.prepared.operator.difference
         return self.prepared.operator(difference(loaded.mean(axis=0), reference, kind))
 
-    def regions(self, image: Image, idle: FloatArray, part: float) -> list[Reading]:
-        """Regions above ``part`` of the extreme, and above the noise of a frame."""
+    def regions(self, image: Image, part: float) -> list[Reading]:
+        """Regions above ``part`` of the extreme, as the source finds them (its figure 4.6)."""
         settings = replace(self.prepared.skin.touch, gamma1=part)
-        floor = self.prepared.noise_floor(Reference.of(idle))
-        return Segmenter(self.mesh, settings)(image, floor)
+        return Segmenter(self.mesh, settings)(image)
 
     def metrics(self, image: Image, place: tuple[float, float] | None = None) -> SourceMetrics:
         """The source's four metrics (its section 4.4.1), the true place known or not."""

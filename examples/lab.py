@@ -108,13 +108,33 @@ class Lab:
         self._readout = Readout.of(Scan.of(self.skin.pattern()), self.skin.readout)
 
     def measure(self, stage: str, *probes: Probe, n: int = FRAMES) -> FloatArray:
-        """(n, n_meas) V while ``probes`` press, in the order of the skin's pattern."""
+        """(n, n_meas) V while ``probes`` press, in the order of the skin's pattern.
+
+        Raises
+        ------
+        DataError
+            When a sample stood at the converter's upper rail, where it says nothing.
+        """
         frames = self.bench.frames(stage, probes, n)
         if self.writer is not None:
             self.writer.note(frames[0].host_time, stage)
             for frame in frames:
                 self.writer.frame(frame)
+        self._check_range(stage, frames)
         return np.stack([self._readout(frame).values for frame in frames])
+
+    def _check_range(self, stage: str, frames: Sequence[Frame]) -> None:
+        """A potential is never below the grounded electrode's, but may be above the converter's."""
+        most = np.max([frame.samples for frame in frames], axis=0)
+        if most.max() >= self._readout.high:
+            sample, scan = int(most.argmax()), self._readout.scan
+            source, sink = scan.drives[scan.sample_drive[sample]] + 1
+            raise DataError(
+                f"E{scan.sample_electrode[sample] + 1} stands at the converter's upper rail while "
+                f"E{source} and E{sink} drive",
+                where=stage,
+                hint="lower the amplifier's gain, and [readout] gain with it",
+            )
 
     def by_ground(self, values: FloatArray) -> FloatArray:
         """(n, n) of ``values`` (n_meas,): row by the grounded electrode, column by the pair."""

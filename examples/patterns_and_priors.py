@@ -28,7 +28,9 @@ from tomoskin.twin import Circle, Probe
 PATTERNS = ("adjacent", "opposite", "skip:2")
 PRIORS = ("identity", "laplace", "gaussian", "noser")
 RADIUS, FORCE = 18e-3, 5.0
-ALL_ROWS = {"drive": {"pattern": "+".join(PATTERNS)}}
+ALL_ROWS = {"drive": {"pattern": "+".join(PATTERNS)}, "readout": {"gain": 30}}
+"""At the skin's own gain of 35 a press near the rim brings a driven channel to the rail."""
+
 COLUMNS = {
     "maximum / mS": lambda m: 1e3 * m.maximum,
     "RES50": lambda m: m.res50,

@@ -37,6 +37,25 @@ def test_the_figure_is_made_and_the_numbers_hold(ran, name):
     assert "Checked:" in run.module.__doc__
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2, 7))
+@pytest.mark.parametrize("name", MEASURED)
+def test_the_numbers_hold_on_other_twins(imported, name, seed, tmp_path):
+    assert imported(name).main(["--seed", str(seed), "--out", str(tmp_path)])
+
+
+def test_a_potential_beyond_the_converter_is_no_measurement(imported, tmp_path):
+    """A press near the rim lifts the driven channels: the reason for a gain of 30, not 35."""
+    example, lab = imported("patterns_and_priors"), imported("lab")
+    high = {**example.ALL_ROWS, "readout": {"gain": 40}}
+    said = r"at the rail: E\d stands at the converter's upper rail.*lower the amplifier's gain"
+    with (
+        lab.open_lab(["--out", str(tmp_path)], "", high) as bench,
+        pytest.raises(DataError, match=said),
+    ):
+        bench.measure("at the rail")
+
+
 @pytest.mark.parametrize("name", MEASURED)
 def test_a_recording_gives_the_same_numbers(ran, name, tmp_path):
     run = ran(name)
