@@ -26,6 +26,7 @@ from tomoskin.cli import (
     session,
     simulate,
     skin,
+    states,
 )
 from tomoskin.core import TomoskinError
 
@@ -45,6 +46,7 @@ app.command("record")(record.record)
 app.command("image")(image.image)
 app.add_typer(calibrate.app, name="calibrate")
 app.command("locate")(locate.locate)
+app.command("states")(states.states)
 app.command("simulate")(simulate.simulate)
 app.command("bench")(bench.bench)
 app.add_typer(session.app, name="session")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+from tomoskin.cli.calibrate_states import calibrate_states
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
@@ -22,15 +23,13 @@ if TYPE_CHECKING:
 
     Learn = Callable[[FloatArray, FloatArray], Calibration]
 
-app = typer.Typer(help="Learn from labelled presses.", no_args_is_help=True)
+app = typer.Typer(help="Learn from labelled presses or states.", no_args_is_help=True)
 
 _SHOWN = 10
 _DRIFTED = 2.0
 
 
-@app.callback()
-def _calibrate() -> None:
-    """Keep the sub-command's name even while there is only one."""
+app.command("states")(calibrate_states)
 
 
 @app.command("touch")

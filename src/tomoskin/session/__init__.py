@@ -1,6 +1,7 @@
 """Recordings: sessions, interchange, import; pictures and files of their images."""
 
 from tomoskin.session.alpha_picture import write_choices
+from tomoskin.session.archive import load_arrays
 from tomoskin.session.blocks import Rows, all_blocks
 from tomoskin.session.calibration import Calibration, read_calibration, write_calibration
 from tomoskin.session.display import Display, circular_average
@@ -25,6 +26,7 @@ from tomoskin.session.session_reader import (
     SessionReader,
     Truth,
 )
+from tomoskin.session.states_file import StatesCalibration, read_states, write_states
 from tomoskin.session.touch_csv import write_touches
 from tomoskin.session.vtu import write_vtu
 from tomoskin.session.whole import read_session, recording_of
@@ -48,18 +50,21 @@ __all__ = [
     "SessionInfo",
     "SessionReader",
     "SessionWriter",
+    "StatesCalibration",
     "Truth",
     "all_blocks",
     "circular_average",
     "is_done",
     "is_session",
     "join_shards",
+    "load_arrays",
     "open_replay",
     "parse_replay",
     "plot",
     "read_calibration",
     "read_recording",
     "read_session",
+    "read_states",
     "recording_of",
     "rendered",
     "repair",
@@ -76,6 +81,7 @@ __all__ = [
     "write_parquet",
     "write_picture",
     "write_series",
+    "write_states",
     "write_touches",
     "write_vtu",
     "write_whole",

@@ -1,7 +1,9 @@
-"""Opening .npz archives that may be damaged, hostile or of another kind."""
+"""Writing .npz archives, and opening those that may be damaged, hostile or of another kind."""
 
 from __future__ import annotations
 
+import os
+import tempfile
 import tokenize
 import zipfile
 import zlib
@@ -54,6 +56,21 @@ def load_arrays(path: Path) -> Arrays:
         ) from error
     except _UNREADABLE as error:
         raise DataError(f"holds an array that cannot be read: {error}", where=where) from error
+
+
+def save_arrays(path: Path, arrays: Arrays) -> None:
+    """Write a .npz file whole or not at all. Raises DataError when it cannot be written."""
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        part = Path(name)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                np.savez_compressed(file, allow_pickle=False, **arrays)
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
 
 
 def _check_size(path: Path) -> None:

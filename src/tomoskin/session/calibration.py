@@ -8,8 +8,6 @@ gives the same locator: a file outlives the method.
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +16,8 @@ import numpy as np
 
 from tomoskin.core import DataError, PatternError
 from tomoskin.pattern import Pattern
-from tomoskin.session.archive import Arrays, load_arrays
-from tomoskin.session.interchange import electrode_table, real_numbers
+from tomoskin.session.archive import Arrays, load_arrays, save_arrays
+from tomoskin.session.interchange import electrode_table, real_numbers, whole_number
 from tomoskin.touch import Locator, Presses, Region
 
 _KIND, _VERSION = "tomoskin touch calibration", 1
@@ -53,17 +51,7 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
     }
     if locator.presses.strength is not None:
         arrays["strength"] = locator.presses.strength
-    try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        part = Path(name)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                np.savez_compressed(file, allow_pickle=False, **arrays)
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+    save_arrays(path, arrays)
 
 
 def read_calibration(
@@ -81,12 +69,12 @@ def read_calibration(
         raise DataError(
             "is not a calibration of touch", where=where, hint="make one: tomoskin calibrate touch"
         )
-    if _number(arrays, "version", where) != _VERSION:
+    if whole_number(arrays, "version", where) != _VERSION:
         raise DataError(f"expected version {_VERSION}, got {arrays['version']}", where=where)
     drive, measure = (electrode_table(arrays, key, where) for key in ("drive", "measure"))
     strength = real_numbers(arrays, "strength", where) if "strength" in arrays else None
     try:
-        pattern = Pattern.from_tables(drive, measure, _number(arrays, "n_electrodes", where))
+        pattern = Pattern.from_tables(drive, measure, whole_number(arrays, "n_electrodes", where))
         presses = Presses.of(
             real_numbers(arrays, "dv", where), real_numbers(arrays, "xy_m", where), strength
         )
@@ -98,10 +86,3 @@ def read_calibration(
     if presses.dv.shape[1] != pattern.n_meas:
         raise DataError(f"expected {pattern.n_meas} rows of dv", where=where)
     return Calibration(locator, pattern, str(arrays.get("skin_name", "")))
-
-
-def _number(arrays: Arrays, key: str, where: str) -> int:
-    value = real_numbers(arrays, key, where)
-    if value.shape or not np.isfinite(value) or value != np.round(value):
-        raise DataError(f"expected one whole number as {key}", where=where)
-    return int(value)

@@ -87,6 +87,14 @@ def real_numbers(arrays: Arrays, key: str, source: str) -> FloatArray:
     return array
 
 
+def whole_number(arrays: Arrays, key: str, where: str) -> int:
+    """Array ``key`` as one whole number."""
+    value = real_numbers(arrays, key, where)
+    if value.shape or not np.isfinite(value) or value != np.round(value):
+        raise DataError(f"expected one whole number as {key}", where=where)
+    return int(value)
+
+
 def electrode_table(arrays: Arrays, key: str, source: str) -> IntArray:
     """Array ``key`` as an (n, 2) table of electrodes from 0."""
     table = real_numbers(arrays, key, source)

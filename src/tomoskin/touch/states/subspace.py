@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 from tomoskin.core import DataError, FloatArray
 from tomoskin.touch.states.examples import Examples
 
-_MOST = 24
+_MOST = 20
 """Directions: eight electrodes have n(n − 3)/2 = 20 independent readings."""
 
 _FRAMES_EACH = 4

@@ -1,0 +1,118 @@
+"""``tomoskin calibrate states``: learn what state a frame shows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.recording import ReferenceOption, say_notes
+
+if TYPE_CHECKING:
+    from tomoskin.pattern import Pattern
+    from tomoskin.session import StatesCalibration
+    from tomoskin.skin import Skin
+    from tomoskin.touch import Examples
+
+
+def calibrate_states(
+    recording: Annotated[
+        Path, typer.Argument(metavar="INPUT", help="Frames, with the state of some of them.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="C.npz", help="Where the calibration goes.")],
+    skin: Annotated[
+        str | None,
+        typer.Option(help="Built-in name or path; without it the rows are taken as they are."),
+    ] = None,
+    state: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=A:B",
+            help="Frames A to B-1 show this state; once for each. Without it the file's own "
+            "state, or flags.",
+        ),
+    ] = None,
+    onto: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="OLD.npz",
+            help="Calibration of another session: these frames, labelled or not, fit it to this "
+            "one.",
+        ),
+    ] = None,
+    reference: ReferenceOption = None,
+    json: JsonFlag = False,
+) -> None:
+    """Learn the state of a frame, or flags, from a few examples of each."""
+    from tomoskin.cli.labelled import changes
+    from tomoskin.cli.state_labels import marked
+    from tomoskin.pattern import Pattern
+    from tomoskin.session import read_recording, read_states, write_states
+
+    whole = read_recording(recording)
+    say_notes(whole)
+    old = read_states(onto) if onto else None
+    chosen, pattern = _what_of(skin, recording, old)
+    pattern = pattern or Pattern.from_tables(whole.drive, whole.measure)
+    whole = whole.in_order_of(pattern)
+    dv = changes(whole, reference, pattern)
+    examples = marked(recording, dv, state or [], old.classifier.examples.codes if old else None)
+    made = _learnt(examples, old, pattern, chosen)
+    write_states(out, made)
+    _report(made, len(dv), old is not None, json=json)
+
+
+def _what_of(
+    name: str | None, path: Path, old: StatesCalibration | None
+) -> tuple[Skin | None, Pattern | None]:
+    """The skin, where there is one, and the table of rows where it is known beforehand."""
+    from tomoskin.cli.skin_choice import skin_for_file
+    from tomoskin.session import is_session
+
+    skin = skin_for_file(name, path) if name is not None or is_session(path) else None
+    if old is not None:
+        old.classifier.check(skin_id=skin.identity if skin else "")
+        return skin, old.pattern
+    return skin, skin.pattern() if skin else None
+
+
+def _learnt(
+    examples: Examples, old: StatesCalibration | None, pattern: Pattern, skin: Skin | None
+) -> StatesCalibration:
+    from tomoskin.session import StatesCalibration
+    from tomoskin.touch import StateClassifier
+
+    if old is not None:
+        fitted = old.classifier.in_session(examples.dv, examples.flags)
+        return replace(old, classifier=fitted)
+    identities = pattern.identity, skin.identity if skin else ""
+    classifier = StateClassifier.learn(examples, identities)
+    return StatesCalibration(classifier, pattern, skin.name if skin else "")
+
+
+def _report(made: StatesCalibration, n_frames: int, fitted: bool, *, json: bool) -> None:
+    classifier = made.classifier
+    examples, codes = classifier.examples, classifier.examples.codes
+    here = examples.part(examples.newest)
+    known = int(here.labelled.sum())
+    if json:
+        emit(
+            {
+                "names": codes.names,
+                "exclusive": codes.exclusive,
+                "frames": n_frames,
+                "labelled": known,
+                "sessions": int(examples.session.max()) + 1,
+                "right_when_left_out": classifier.right,
+            }
+        )
+        return
+    kind = "states" if codes.exclusive else "flags"
+    typer.echo(f"{len(codes.names)} {kind}: {', '.join(codes.names)}")
+    told = f"{100 * classifier.right:.0f} % of the labelled frames"
+    typer.echo(f"{known} of {n_frames} frames labelled; left out of the learning, {told} are right")
+    if fitted and known < n_frames:
+        typer.echo(f"fitted to this session by {n_frames - known} frames without a label")

@@ -1,0 +1,98 @@
+"""``tomoskin states``: what state each frame shows, by a calibration."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.recording import ReferenceOption, say_notes
+
+if TYPE_CHECKING:
+    from tomoskin.session import Recording
+    from tomoskin.touch import Answers
+
+_SHOWN = 20
+
+
+def states(
+    recording: Annotated[Path, typer.Argument(metavar="INPUT", help="Recording or .npz file.")],
+    calibration: Annotated[
+        Path, typer.Option(metavar="C.npz", help="From tomoskin calibrate states.")
+    ],
+    out: Annotated[Path | None, typer.Option(metavar="X.csv", help="Where the table goes.")] = None,
+    skin: Annotated[
+        str | None, typer.Option(help="Built-in name or path: refused unless calibrated on it.")
+    ] = None,
+    reference: ReferenceOption = None,
+    ask: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Name the N frames whose label tells most.")
+    ] = 0,
+    json: JsonFlag = False,
+) -> None:
+    """Tell the state of each frame, or that it is none of those that were learnt."""
+    from tomoskin.cli.labelled import changes
+    from tomoskin.cli.skin_choice import skin_for_file
+    from tomoskin.session import is_session, read_recording, read_states
+
+    known = read_states(calibration)
+    whole = read_recording(recording)
+    say_notes(whole)
+    if skin is not None or is_session(recording):
+        known.classifier.check(skin_id=skin_for_file(skin, recording).identity)
+    whole = whole.in_order_of(known.pattern)
+    dv = changes(whole, reference, known.pattern)
+    answers = known.classifier.predict(dv)
+    names = known.classifier.examples.codes.names
+    asked = known.classifier.most_telling(dv, min(ask, len(dv))).tolist()
+    if out is not None:
+        _write(out, whole, answers, names)
+    if json:
+        emit({"names": names, "frames": _documents(whole, answers), "ask": asked})
+    else:
+        _say(answers, asked)
+
+
+def _documents(whole: Recording, answers: Answers) -> list[dict[str, Any]]:
+    return [
+        {
+            "frame": frame,
+            "time_s": float(whole.time[frame]),
+            "state": label,
+            "probability": float(answers.probability[frame]),
+            "unknown": bool(answers.rejected[frame]),
+            "each": answers.each[frame].tolist(),
+        }
+        for frame, label in enumerate(answers.label)
+    ]
+
+
+def _write(path: Path, whole: Recording, answers: Answers, names: tuple[str, ...]) -> None:
+    from tomoskin.core import DataError
+
+    try:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            table = csv.writer(file, lineterminator="\n")
+            table.writerow(["frame", "time_s", "state", "probability", "unknown", *names])
+            for row in _documents(whole, answers):
+                each = [f"{p:.4f}" for p in row["each"]]
+                sure, unknown = f"{row['probability']:.4f}", int(row["unknown"])
+                when = f"{row['time_s']:.6f}"
+                table.writerow([row["frame"], when, row["state"], sure, unknown, *each])
+    except OSError as error:
+        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+
+
+def _say(answers: Answers, asked: list[int]) -> None:
+    rows = list(zip(answers.label, answers.probability, answers.rejected, strict=True))
+    for frame, (label, sure, unknown) in enumerate(rows[:_SHOWN]):
+        told = f"unknown (nearest: {label})" if unknown else f"{label}  {100 * sure:.0f} %"
+        typer.echo(f"frame {frame:>4}  {told}")
+    if len(rows) > _SHOWN:
+        typer.echo(f"… and {len(rows) - _SHOWN} frames more: --out writes them all")
+    typer.echo(f"{int(answers.rejected.sum())} of {len(rows)} frames are of no known state")
+    if asked:
+        typer.echo(f"labels tell most at frames {', '.join(map(str, asked))}")

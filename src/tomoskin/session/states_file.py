@@ -1,0 +1,99 @@
+"""A calibration of states as a file: the labelled examples, and what they were made on.
+
+Keys of the .npz: ``kind``, ``version``; ``dv`` (n, n_meas), ``flags`` (n, f) 0 or 1, NaN where a
+frame has no label, ``session`` (n,) from 0; ``names`` (f,), ``exclusive`` 0 or 1; ``drive``,
+``measure`` (n_meas, 2), ``n_electrodes``; ``skin`` identity, ``skin_name``. As with touch, what was
+learnt is learnt again when the file is read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from tomoskin.core import DataError, PatternError
+from tomoskin.pattern import Pattern
+from tomoskin.session.archive import Arrays, load_arrays, save_arrays
+from tomoskin.session.interchange import electrode_table, real_numbers, whole_number
+from tomoskin.touch import Codes, Examples, StateClassifier
+
+_KIND, _VERSION = "tomoskin states calibration", 1
+_NEEDED = frozenset(
+    {"version", "dv", "flags", "session", "names", "exclusive", "drive", "measure", "n_electrodes"}
+)
+
+
+@dataclass(frozen=True, eq=False)
+class StatesCalibration:
+    """A classifier with the pattern of its rows and the name of its skin ("" where none)."""
+
+    classifier: StateClassifier
+    pattern: Pattern
+    skin_name: str = ""
+
+
+def write_states(path: Path, calibration: StatesCalibration) -> None:
+    """Write the file whole or not at all. Raises DataError when it cannot be written."""
+    classifier, pattern = calibration.classifier, calibration.pattern
+    examples = classifier.examples
+    save_arrays(
+        path,
+        {
+            "kind": np.array(_KIND),
+            "version": np.array(_VERSION),
+            "dv": examples.dv,
+            "flags": examples.flags,
+            "session": examples.session,
+            "names": np.array(examples.codes.names),
+            "exclusive": np.array(int(examples.codes.exclusive)),
+            "drive": pattern.drive,
+            "measure": pattern.measure,
+            "n_electrodes": np.array(pattern.n_electrodes),
+            "skin": np.array(classifier.skin_id),
+            "skin_name": np.array(calibration.skin_name),
+        },
+    )
+
+
+def read_states(path: Path) -> StatesCalibration:
+    """Read the file and learn from its examples again.
+
+    Raises
+    ------
+    DataError
+        When it is missing, damaged, or no calibration of states.
+    """
+    arrays, where = load_arrays(path), str(path)
+    if str(arrays.get("kind", "")) != _KIND or not set(arrays) >= _NEEDED:
+        raise DataError(
+            "is not a calibration of states",
+            where=where,
+            hint="make one: tomoskin calibrate states",
+        )
+    if whole_number(arrays, "version", where) != _VERSION:
+        raise DataError(f"expected version {_VERSION}, got {arrays['version']}", where=where)
+    drive, measure = (electrode_table(arrays, key, where) for key in ("drive", "measure"))
+    try:
+        pattern = Pattern.from_tables(drive, measure, whole_number(arrays, "n_electrodes", where))
+        examples = _examples(arrays, where)
+        if examples.dv.shape[1] != pattern.n_meas:
+            raise DataError(f"expected {pattern.n_meas} rows of dv")
+        identities = (pattern.identity, str(arrays.get("skin", "")))
+        classifier = StateClassifier.learn(examples, identities)
+    except (DataError, PatternError) as error:
+        raise DataError(error.message, where=f"{where}, {error.where}".rstrip(", ")) from error
+    return StatesCalibration(classifier, pattern, str(arrays.get("skin_name", "")))
+
+
+def _examples(arrays: Arrays, where: str) -> Examples:
+    exclusive = bool(whole_number(arrays, "exclusive", where))
+    codes = Codes(tuple(map(str, arrays["names"].ravel().tolist())), exclusive)
+    examples = Examples.of(
+        codes, real_numbers(arrays, "dv", where), real_numbers(arrays, "flags", where)
+    )
+    session = real_numbers(arrays, "session", where)
+    if session.shape != (len(examples),) or not np.isin(session, range(1000)).all():
+        raise DataError(f"expected a session from 0 for each of {len(examples)} frames")
+    return replace(examples, session=session.astype(np.int64))
