@@ -43,7 +43,7 @@ uint32_t commands_take_baud(void) {
 }
 
 static bool is_command(uint8_t type) {
-    return type >= MSG_GET_INFO && type <= MSG_SET_HEARTBEAT;
+    return type >= MSG_GET_INFO && type <= MSG_SET_FORMAT;
 }
 
 static bool right_length(uint8_t type, uint8_t size) {
@@ -58,6 +58,10 @@ static bool right_length(uint8_t type, uint8_t size) {
         return size == SIZE_SET_BAUD;
     case MSG_SET_HEARTBEAT:
         return size == SIZE_SET_HEARTBEAT;
+    case MSG_GET_PATTERN:
+        return size == SIZE_GET_PATTERN;
+    case MSG_SET_FORMAT:
+        return size == SIZE_SET_FORMAT;
     default:
         return size == SIZE_PING; /* only the request id */
     }
@@ -86,6 +90,8 @@ static struct verdict run_idle(const uint8_t *payload, uint8_t size) {
         return config_set_scan(payload);
     case MSG_SET_PATTERN:
         return config_set_pattern(payload, size);
+    case MSG_SET_FORMAT:
+        return config_set_format(payload);
     case MSG_START:
         return start(payload);
     default:
@@ -133,6 +139,30 @@ static struct verdict run(const uint8_t *payload, uint8_t size) {
     return said;
 }
 
+/* Questions change nothing: they are answered whenever they come. */
+static bool answer(const uint8_t *payload, uint8_t reset_cause) {
+    uint8_t type = payload[0];
+    uint8_t request = payload[AT_PING_REQUEST];
+    if (type == MSG_GET_INFO) {
+        link_say_info(request, reset_cause);
+        return true;
+    }
+    if (type != MSG_GET_SCAN && type != MSG_GET_PATTERN) {
+        return false;
+    }
+    uint16_t first = type == MSG_GET_PATTERN ? get_u16(payload + AT_GET_PATTERN_FIRST) : 0u;
+    if (config.identity == 0u) {
+        link_say_ack(request, type, RESULT_WRONG_CONFIGURATION, 0u);
+    } else if (type == MSG_GET_SCAN) {
+        link_say_scan(request);
+    } else if (first >= config.n_drives) {
+        link_say_ack(request, type, RESULT_BAD_VALUE, FIELD_GET_PATTERN_FIRST);
+    } else {
+        link_say_pattern(request, first);
+    }
+    return true;
+}
+
 bool commands_take(const uint8_t *payload, uint8_t size, uint8_t reset_cause) {
     if (size < SIZE_PING) {
         return false;
@@ -152,8 +182,7 @@ bool commands_take(const uint8_t *payload, uint8_t size, uint8_t reset_cause) {
     last.known = true;
     last.request = request;
     last.checksum = checksum;
-    if (type == MSG_GET_INFO) {
-        link_say_info(request, reset_cause);
+    if (answer(payload, reset_cause)) {
         return true;
     }
     if (!again) {

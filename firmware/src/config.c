@@ -6,8 +6,6 @@
 
 #include <stdbool.h>
 
-#define UNSET 0xFFu /* source of a drive that has not been set */
-
 struct config config;
 
 static struct verdict verdict(uint8_t result, uint16_t detail) {
@@ -61,10 +59,16 @@ struct verdict config_set_scan(const uint8_t *payload) {
     config.dead_time = get_u16(payload + AT_SET_SCAN_DEAD_TIME);
     config.oversampling = oversampling;
     config.prescaler = prescaler;
+    config.format = FORMAT_SIXTEEN;
+    config.current_limit = get_u32(payload + AT_SET_SCAN_CURRENT_LIMIT);
     for (uint16_t number = 0u; number < n_drives; number++) {
-        config.drives[number].source = UNSET;
+        config.drives[number] = (struct drive){UNSET, UNSET, 0u};
     }
     return verdict(RESULT_OK, 0u);
+}
+
+static bool announced(uint16_t identity) {
+    return config.identity != 0u && identity == config.identity;
 }
 
 static uint8_t drive_result(const uint8_t *at) {
@@ -84,8 +88,7 @@ struct verdict config_set_pattern(const uint8_t *payload, uint8_t size) {
     uint16_t first = get_u16(payload + AT_SET_PATTERN_FIRST);
     uint8_t count = (uint8_t)((size - SIZE_SET_PATTERN) / SIZE_DRIVE);
     const uint8_t *at = payload + SIZE_SET_PATTERN;
-    if (config.identity == 0u ||
-        get_u16(payload + AT_SET_PATTERN_CONFIGURATION) != config.identity) {
+    if (!announced(get_u16(payload + AT_SET_PATTERN_CONFIGURATION))) {
         return verdict(RESULT_WRONG_CONFIGURATION, 0u);
     }
     if (count == 0u || first >= config.n_drives || count > config.n_drives - first) {
@@ -106,8 +109,20 @@ struct verdict config_set_pattern(const uint8_t *payload, uint8_t size) {
     return verdict(RESULT_OK, 0u);
 }
 
+struct verdict config_set_format(const uint8_t *payload) {
+    uint8_t format = payload[AT_SET_FORMAT_FORMAT];
+    if (!announced(get_u16(payload + AT_SET_FORMAT_CONFIGURATION))) {
+        return verdict(RESULT_WRONG_CONFIGURATION, 0u);
+    }
+    if (format > FORMAT_PACKED || (format == FORMAT_PACKED && config.oversampling != 1u)) {
+        return bad(FIELD_SET_FORMAT_FORMAT);
+    }
+    config.format = format;
+    return verdict(RESULT_OK, 0u);
+}
+
 struct verdict config_check_start(uint16_t identity) {
-    if (config.identity == 0u || identity != config.identity) {
+    if (!announced(identity)) {
         return verdict(RESULT_WRONG_CONFIGURATION, 0u);
     }
     uint16_t samples = 0u;
@@ -122,6 +137,5 @@ struct verdict config_check_start(uint16_t identity) {
     if (samples > MOST_SAMPLES) {
         return verdict(RESULT_TOO_MANY_SAMPLES, MOST_SAMPLES);
     }
-    config.n_samples = samples;
     return verdict(RESULT_OK, 0u);
 }

@@ -6,6 +6,8 @@
 
 #include <stdint.h>
 
+#define UNSET 0xFFu /* source and sink of a drive that has not been set */
+
 struct drive {
     uint8_t source;
     uint8_t sink;
@@ -19,7 +21,8 @@ struct config {
     uint16_t dead_time; /* us */
     uint8_t oversampling;
     uint8_t prescaler;
-    uint16_t n_samples; /* of a frame; known when config_check_start is content */
+    uint8_t format;
+    uint32_t current_limit; /* uA */
     struct drive drives[MOST_DRIVES];
 };
 
@@ -36,6 +39,7 @@ void config_forget(void);
 /* Each takes the payload of its command, of the right length; refused, it changes nothing. */
 struct verdict config_set_scan(const uint8_t *payload);
 struct verdict config_set_pattern(const uint8_t *payload, uint8_t size);
+struct verdict config_set_format(const uint8_t *payload);
 struct verdict config_check_start(uint16_t identity);
 
 #endif

@@ -17,7 +17,7 @@
 #define FIRST_BAUD UINT32_C(1000000)
 
 #define FIRMWARE_MAJOR 1u
-#define FIRMWARE_MINOR 0u
+#define FIRMWARE_MINOR 1u
 #define FIRMWARE_PATCH 0u
 
 /* Bit e: channel e. */

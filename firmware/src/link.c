@@ -8,9 +8,14 @@
 #include "protocol.h"
 #include "scan.h"
 
+#include <assert.h>
 #include <stddef.h>
 
-static uint8_t buffer[FRAMING_BEFORE + SIZE_INFO + FRAMING_AFTER];
+static_assert(SIZE_FRAME == SIZE_FRAME_PACKED, "one head for both");
+
+#define MOST_TOLD 9u /* drives in a PATTERN */
+
+static uint8_t buffer[FRAMING_BEFORE + SIZE_PATTERN + MOST_TOLD * SIZE_DRIVE + FRAMING_AFTER];
 static uint8_t *const small = buffer + FRAMING_BEFORE;
 static uint8_t small_size; /* of the payload; 0: free */
 static enum { NOTHING, SMALL, FRAME } under_way;
@@ -79,6 +84,36 @@ void link_say_ack(uint8_t request, uint8_t command, uint8_t result, uint16_t det
     small_size = SIZE_ACK;
 }
 
+void link_say_scan(uint8_t request) {
+    small[0] = MSG_SCAN;
+    small[AT_SCAN_REQUEST] = request;
+    put_u16(small + AT_SCAN_CONFIGURATION, config.identity);
+    put_u16(small + AT_SCAN_N_DRIVES, config.n_drives);
+    put_u32(small + AT_SCAN_SETTLING, config.settling);
+    put_u16(small + AT_SCAN_DEAD_TIME, config.dead_time);
+    small[AT_SCAN_OVERSAMPLING] = config.oversampling;
+    small[AT_SCAN_PRESCALER] = config.prescaler;
+    put_u32(small + AT_SCAN_CURRENT_LIMIT, config.current_limit);
+    small[AT_SCAN_FORMAT] = config.format;
+    small_size = SIZE_SCAN;
+}
+
+void link_say_pattern(uint8_t request, uint16_t first) {
+    uint16_t rest = (uint16_t)(config.n_drives - first);
+    small[0] = MSG_PATTERN;
+    small[AT_PATTERN_REQUEST] = request;
+    put_u16(small + AT_PATTERN_CONFIGURATION, config.identity);
+    put_u16(small + AT_PATTERN_FIRST, first);
+    small_size = SIZE_PATTERN;
+    for (uint8_t told = 0u; told < MOST_TOLD && told < rest; told++) {
+        const struct drive *drive = &config.drives[first + told];
+        small[small_size + AT_DRIVE_SOURCE] = drive->source;
+        small[small_size + AT_DRIVE_SINK] = drive->sink;
+        put_u32(small + small_size + AT_DRIVE_MASK, drive->mask);
+        small_size = (uint8_t)(small_size + SIZE_DRIVE);
+    }
+}
+
 void link_say_fault(uint32_t ticks_high, uint32_t ticks, uint8_t code, uint16_t detail) {
     small[0] = MSG_FAULT;
     put_u32(small + AT_FAULT_TICKS, ticks);
@@ -102,7 +137,7 @@ static void send(uint8_t *message, uint16_t size) {
 
 static void begin_frame(struct frame *frame, uint32_t now_high, uint32_t now) {
     uint8_t *payload = frame->buffer + FRAMING_BEFORE;
-    payload[0] = MSG_FRAME;
+    payload[0] = config.format == FORMAT_PACKED ? MSG_FRAME_PACKED : MSG_FRAME;
     put_u32(payload + AT_FRAME_SEQUENCE, frame->sequence);
     put_u32(payload + AT_FRAME_TICKS, frame->started);
     put_u32(payload + AT_FRAME_TICKS + 4u, high_of(frame->started, now_high, now));

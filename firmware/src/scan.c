@@ -1,8 +1,8 @@
 #include "scan.h"
 
-#include "bytes.h"
 #include "config.h"
 #include "hal.h"
+#include "protocol.h"
 #include "switches.h"
 
 #include <stddef.h>
@@ -23,6 +23,9 @@ static struct {
     uint16_t drive;
     uint16_t sum;
     uint8_t *place; /* of the next sample */
+    bool packed;
+    uint8_t upper; /* bits of the samples whose lower bytes have been put, the newest on top */
+    uint8_t group; /* how many those are */
     uint16_t settling_ticks;
     uint32_t since;   /* tick at which the phase's drive began */
     uint32_t allowed; /* ticks that it may take */
@@ -73,6 +76,27 @@ static uint32_t allowed_ticks(const struct drive *drive) {
     return scan.settling_ticks + 2u * converting + SLACK_TICKS;
 }
 
+/* A sample as FRAME holds it, or as FRAME_PACKED: its lower byte, and after four the upper bits. */
+static void put_sample(uint16_t sample) {
+    *scan.place++ = (uint8_t)sample;
+    if (!scan.packed) {
+        *scan.place++ = (uint8_t)(sample >> 8);
+        return;
+    }
+    scan.upper = (uint8_t)((uint8_t)(scan.upper >> 2) | (uint8_t)((uint8_t)(sample >> 8) << 6));
+    if (++scan.group == 4u) {
+        *scan.place++ = scan.upper;
+        scan.group = 0u;
+    }
+}
+
+static void end_samples(void) {
+    if (scan.group != 0u) {
+        *scan.place++ = (uint8_t)(scan.upper >> (2u * (4u - scan.group)));
+        scan.group = 0u;
+    }
+}
+
 static void begin_frame(void) {
     struct frame *frame = &frames[filling];
     frame->started = hal_ticks();
@@ -108,6 +132,7 @@ static void begin_drive(void) {
 
 static void end_frame(void) {
     struct frame *frame = &frames[filling];
+    end_samples();
     if (waiting) {
         scan.dropped = true;
         scan.drops = scan.drops == UINT16_MAX ? UINT16_MAX : (uint16_t)(scan.drops + 1u);
@@ -174,8 +199,7 @@ void scan_on_conversion(uint16_t code) {
     scan.rest >>= 1;
     scan.channel++;
     bool more = next_channel();
-    put_u16(scan.place, (uint16_t)(scan.sum + code));
-    scan.place += 2;
+    put_sample((uint16_t)(scan.sum + code));
     scan.sum = 0u;
     if (!more) {
         end_drive();
@@ -186,6 +210,8 @@ void scan_start(void) {
     scan.sequence = 0u;
     scan.drops = 0u;
     scan.dropped = false;
+    scan.packed = config.format == FORMAT_PACKED;
+    scan.group = 0u;
     scan.settling_ticks = ticks_of(config.settling);
     hal_adc_prepare(config.prescaler);
     begin_frame();

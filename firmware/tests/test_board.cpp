@@ -1,6 +1,7 @@
 // The portable firmware on a watched machine: safety, scan, protocol.
 #include "machine.h"
 
+#include <algorithm>
 #include <gtest/gtest.h>
 
 namespace {
@@ -74,6 +75,7 @@ class Board : public testing::Test {
         return ask({MSG_SET_PATTERN, 5, 0, low(number), high(number), d.source, d.sink, low(d.mask),
                     high(d.mask), 0, 0});
     }
+    unsigned set_format(uint8_t format) { return ask({MSG_SET_FORMAT, 5, 0, format}); }
     unsigned start() { return ask({MSG_START, 5, 0}); }
     void set_up() {
         ASSERT_EQ(set_scan(static_cast<unsigned>(drives.size())), RESULT_OK);
@@ -158,6 +160,72 @@ TEST_F(Board, AnyTableOfDrives) {
     auto frames = of(MSG_FRAME, machine.heard());
     EXPECT_GT(frames.size(), 3u);
     expect_frames(frames);
+}
+
+TEST_F(Board, PackedFramesHoldTheSameInTenBits) {
+    oversampling = 1;
+    drives = {{3, 0, 0x00FE}, {7, 1, 0xFFFF}, {0, 15, 0x8003}};  // 26 samples: the last two alone
+    set_up();
+    ASSERT_EQ(set_format(FORMAT_PACKED), RESULT_OK);
+    ASSERT_EQ(start(), RESULT_OK);
+    machine.run_us(50'000);
+    auto frames = of(MSG_FRAME_PACKED, machine.heard());
+    ASSERT_GT(frames.size(), 3u);
+    auto wanted = expected();
+    for (const Bytes &frame : frames) {
+        Bytes packed(frame.begin() + SIZE_FRAME_PACKED, frame.end());
+        ASSERT_EQ(packed.size(), wanted.size() + (wanted.size() + 3) / 4);
+        for (size_t s = 0; s < wanted.size(); s++) {
+            size_t group = s / 4 * 5;
+            size_t upper = std::min(group + 4, packed.size() - 1);
+            unsigned sample = packed[group + s % 4] | (packed[upper] >> 2 * (s % 4) & 3u) << 8;
+            ASSERT_EQ(sample, wanted[s]) << "sample " << s;
+        }
+    }
+}
+
+TEST_F(Board, OnlySingleConversionsArePacked) {
+    EXPECT_EQ(set_format(FORMAT_PACKED), RESULT_WRONG_CONFIGURATION);
+    oversampling = 2;
+    ASSERT_EQ(set_scan(1), RESULT_OK);
+    EXPECT_EQ(set_format(FORMAT_PACKED), RESULT_BAD_VALUE);
+    EXPECT_EQ(set_format(FORMAT_SIXTEEN), RESULT_OK);
+    oversampling = 1;
+    ASSERT_EQ(set_scan(1), RESULT_OK);
+    EXPECT_EQ(set_format(2), RESULT_BAD_VALUE);
+    EXPECT_EQ(set_format(FORMAT_PACKED), RESULT_OK);
+    ASSERT_EQ(set_scan(1), RESULT_OK);  // back to what every host understands
+    ASSERT_EQ(set_drive(0, {1, 0, 4}), RESULT_OK);
+    ASSERT_EQ(start(), RESULT_OK);
+    machine.run_us(5'000);
+    EXPECT_GT(of(MSG_FRAME, machine.heard()).size(), 0u);
+}
+
+TEST_F(Board, TellsWhatItHolds) {
+    settling = 70'000;
+    dead = 300;
+    drives.assign(11, {3, 1, 0x8F01});
+    EXPECT_EQ(ask({MSG_GET_SCAN}), RESULT_WRONG_CONFIGURATION);
+    EXPECT_EQ(ask({MSG_GET_PATTERN, 0, 0}), RESULT_WRONG_CONFIGURATION);
+    set_up();
+    auto tell = [](Bytes payload) {
+        machine.heard();
+        machine.say(payload);
+        machine.run_us(300);
+        return machine.heard();
+    };
+    EXPECT_EQ(tell({MSG_GET_SCAN, 77}),
+              std::vector<Bytes>({{MSG_SCAN, 77, 5, 0, 11, 0, 0x70, 0x11, 1, 0, 44, 1, 4, 64, 0xA0,
+                                   0x86, 1, 0, FORMAT_SIXTEEN}}));
+    Bytes last{MSG_PATTERN, 78, 5, 0, 9, 0, 3, 1, 1, 0x8F, 0, 0, 3, 1, 1, 0x8F, 0, 0};
+    EXPECT_EQ(tell({MSG_GET_PATTERN, 78, 9, 0}), std::vector<Bytes>({last}));
+    auto first = tell({MSG_GET_PATTERN, 79, 0, 0});
+    ASSERT_EQ(first.size(), 1u);
+    EXPECT_EQ(first[0].size(), SIZE_PATTERN + 9 * SIZE_DRIVE);
+    EXPECT_EQ(ask({MSG_GET_PATTERN, 11, 0}), RESULT_BAD_VALUE);
+    ASSERT_EQ(set_scan(1), RESULT_OK);
+    Bytes unset{MSG_PATTERN, 80, 5, 0, 0, 0, 255, 255, 0, 0, 0, 0};
+    EXPECT_EQ(tell({MSG_GET_PATTERN, 80, 0, 0}), std::vector<Bytes>({unset}));
 }
 
 TEST_F(Board, ASettlingTimeIsKept) {

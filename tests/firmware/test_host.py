@@ -19,13 +19,19 @@ from tomoskin.wire import (
     Drive,
     Fault,
     FaultCode,
+    Format,
     GetInfo,
+    GetPattern,
+    GetScan,
+    HeldPattern,
+    HeldScan,
     Hello,
     Info,
     Ping,
     Result,
     SafeOff,
     SetBaud,
+    SetFormat,
     SetHeartbeat,
     SetPattern,
     SetScan,
@@ -201,6 +207,9 @@ commands = st.one_of(
     st.builds(SetPattern, u8, identities, st.integers(0, 3), drives),
     st.builds(SetHeartbeat, u8, st.sampled_from([99, 10_001])),
     st.builds(Start, u8, st.sampled_from([0, 7])),
+    st.builds(SetFormat, u8, identities, st.sampled_from(list(Format))),
+    st.builds(GetScan, u8),
+    st.builds(GetPattern, u8, st.integers(0, 3)),
 )  # fmt: skip
 
 
@@ -217,6 +226,5 @@ def test_twin_and_firmware_answer_alike(board, said):
     for command in said:
         twin.receive(encode(command), 0.0)
         wanted = Decoder().feed(twin.emit(0.0), 0.0)
-        kind = Info if isinstance(command, GetInfo) else Ack
-        assert [talk.ask(command, kind)] == wanted
+        assert [talk.ask(command, (Ack, Info, HeldScan, HeldPattern))] == wanted
     transport.close()

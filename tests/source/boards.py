@@ -2,7 +2,7 @@
 
 import threading
 from collections import deque
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 
@@ -15,8 +15,15 @@ from tomoskin.wire import (
     Ack,
     Deframer,
     GetInfo,
+    GetPattern,
+    GetScan,
+    HeldPattern,
+    HeldScan,
     Hello,
     Result,
+    SetFormat,
+    SetPattern,
+    SetScan,
     decode_payload,
     encode,
     type_byte,
@@ -25,6 +32,8 @@ from tomoskin.wire import (
 SCAN = Scan.of(Pattern.adjacent(8))
 SETTINGS = ScanSettings(oversampling=4, settling=200e-6, current_limit=0.1, adc_bits=10)
 BOARD = Board(channels=8, adc_bits=10, current=0.1, tick_rate=250e3)
+PATTERN_FIELDS = ("configuration", "first", "drives")
+SET_UP = ["GetInfo", "Stop", "SetScan", "SetPattern", "SetFormat", "GetScan", "GetPattern", "Start"]
 HELLO = Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash)
 
 
@@ -64,7 +73,24 @@ class ScriptedBoard:
     def answer(self, command):
         if isinstance(command, GetInfo):
             return [BOARD.info(command.request)]
+        if isinstance(command, GetScan | GetPattern):
+            return [self.held(command)]
         return [Ack(command.request, type_byte(type(command)), Result.OK, 0)]
+
+    def held(self, command):
+        """What the commands so far have set."""
+        if isinstance(command, GetScan):
+            scan, fmt = self._last(SetScan), self._last(SetFormat)
+            return HeldScan(command.request, *astuple(scan)[1:], fmt.format)
+        pattern = self._last(SetPattern, first=command.first)
+        return HeldPattern(command.request, *(getattr(pattern, n) for n in PATTERN_FIELDS))
+
+    def _last(self, kind, **wanted):
+        """The newest command of a kind with these values."""
+        return [
+            c for c in self.commands
+            if isinstance(c, kind) and all(getattr(c, n) == v for n, v in wanted.items())
+        ][-1]  # fmt: skip
 
     def say(self, *messages):
         self._queue.extend(m if isinstance(m, bytes) else encode(m) for m in messages)

@@ -8,6 +8,8 @@ from source.boards import (
     BOARD,
     HELLO,
     SCAN,
+    SET_UP,
+    SETTINGS,
     ManualClock,
     ScriptedBoard,
     events,
@@ -18,7 +20,19 @@ from source.boards import (
 )
 from tomoskin.core import SourceError, WireError
 from tomoskin.source import Link, ScanSettings, Timing
-from tomoskin.wire import Ack, GetInfo, Result, SetPattern, SetScan, Start, Stop, type_byte
+from tomoskin.wire import (
+    OLDER,
+    Ack,
+    Format,
+    GetInfo,
+    GetScan,
+    Result,
+    SetPattern,
+    SetScan,
+    Start,
+    Stop,
+    type_byte,
+)
 
 
 @pytest.fixture
@@ -30,9 +44,11 @@ def test_the_order_of_the_handshake(clock):
     board = ScriptedBoard(clock)
     link = linked(board, clock)
     info = link.connect()
-    assert board.names == ["GetInfo", "Stop", "SetScan", "SetPattern", "Start"]
+    assert board.names == SET_UP
     assert info.channels == 8
-    scan, pattern, start = board.commands[2:]
+    scan, pattern, chosen = board.commands[2:5]
+    start = board.commands[-1]
+    assert chosen.format is Format.SIXTEEN
     assert scan.configuration == pattern.configuration == start.configuration == link.configuration
     assert (scan.n_drives, scan.settling, scan.dead_time) == (8, 200, 2)
     assert (scan.oversampling, scan.prescaler, scan.current_limit) == (4, 64, 100_000)
@@ -130,10 +146,11 @@ def test_answers_to_other_requests_are_not_taken(clock):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"major": 0}, "the board speaks 0.0: its firmware is older"),
-        ({"major": 2}, "the board speaks 2.0: this host is older"),
+        ({"major": 0}, "the board speaks 0.1: its firmware is older"),
+        ({"major": 2}, "the board speaks 2.1: this host is older"),
         ({"minor": 7, "schema_hash": 1}, "the board speaks 1.7: this host is older"),
         ({"schema_hash": 0xABC}, "different schemas .board 00000abc"),
+        ({"minor": 0, "schema_hash": 0xABC}, "both call a protocol 1.0 .* .board 00000abc"),
     ],
 )
 @pytest.mark.parametrize("where", ["hello", "info"])
@@ -165,6 +182,56 @@ def test_a_board_that_cannot_do_the_scan(clock, change, said):
     assert board.names == ["GetInfo"]
 
 
+@pytest.mark.parametrize(
+    ("kind", "change", "said"),
+    [
+        ("scan", {"settling": 2000}, "settling 2000, expected 200"),
+        ("scan", {"format": Format.PACKED}, "format"),
+        ("scan", {"n_drives": 7}, "n_drives 7, expected 8"),
+        ("pattern", {"first": 1}, "first 1, expected 0"),
+        ("pattern", {"drives": ()}, r"drives \(\), expected"),
+    ],
+)
+def test_a_board_that_holds_something_else_is_refused(clock, kind, change, said):
+    board = ScriptedBoard(clock)
+    held = board.held
+
+    def forgetful(command):
+        bent = isinstance(command, GetScan) == (kind == "scan")
+        return replace(held(command), **change) if bent else held(command)
+
+    board.held = forgetful
+    with pytest.raises(SourceError, match=f"does not hold what was sent: {said}"):
+        linked(board, clock).connect()
+    assert "Start" not in board.names
+
+
+def test_a_board_of_the_first_version_is_set_up_in_its_own_words(clock):
+    old = {"minor": 0, "schema_hash": OLDER[1, 0]}
+    board = ScriptedBoard(clock, hello=replace(HELLO, **old))
+    answer = board.answer
+
+    def first_version(command):
+        if isinstance(command, GetInfo):
+            return [replace(BOARD.info(command.request), **old)]
+        assert type_byte(type(command)) <= 0x89
+        return answer(command)
+
+    board.answer = first_version
+    linked(board, clock, oversampling=1).connect()
+    assert board.names == ["GetInfo", "Stop", "SetScan", "SetPattern", "Start"]
+
+
+def test_samples_of_one_conversion_come_packed(clock):
+    transport = twin_transport(clock, board=BOARD)
+    heard = []
+    with Link(transport, SCAN, replace(SETTINGS, oversampling=1), clock=clock.now,
+              tap=lambda _, data: heard.append(data)) as link:  # fmt: skip
+        got = frames(poll_until(link, lambda items: len(frames(items)) == 5))
+    assert got[3].samples.tolist() == list(range(3, 51))
+    assert len(heard[-1]) < 18 + 2 * 48  # shorter than its samples of 16 bits
+
+
 def test_a_refusal_is_told_in_words(clock):
     board = ScriptedBoard(clock)
     answer = board.answer
@@ -193,7 +260,7 @@ def test_a_board_that_resets_during_set_up_is_set_up_anew(clock):
     linked(board, clock).connect()
     assert board.names == [
         *("GetInfo", "Stop", "SetScan"),
-        *("GetInfo", "Stop", "SetScan", "SetPattern", "Start"),
+        *SET_UP,
     ]
 
 

@@ -7,6 +7,7 @@ from source.boards import (
     BOARD,
     HELLO,
     SCAN,
+    SET_UP,
     ManualClock,
     ScriptedBoard,
     events,
@@ -155,7 +156,7 @@ def test_a_reset_board_is_set_up_again(link, board):
     board.say(HELLO)
     items = poll_until(link, lambda items: any(e.kind == "connected" for e in events(items)))
     assert [e.kind for e in events(items)] == ["reset", "connected"]
-    assert board.names == ["GetInfo", "Stop", "SetScan", "SetPattern", "Start"]
+    assert board.names == SET_UP
     board.say(frame_of(link, 0))
     assert len(frames(drain(link, board))) == 1
 

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from tomoskin.core import Frame
-from tomoskin.wire import ENUMS, RECORDS, SCHEMA, Drive
+from tomoskin.wire import ENUMS, RECORDS, SCHEMA, Drive, PackedFrame
 
 BITS = {"u8": 8, "u16": 16, "u32": 32, "u64": 64}
 
@@ -17,6 +17,11 @@ def _field(field):
             Drive, st.integers(0, 255), st.integers(0, 255), st.integers(0, 2**32 - 1)
         )
         return st.lists(drive, max_size=9).map(tuple)
+    if field.is_tail and field.item == "u8":
+        size = st.integers(0, 300).filter(lambda n: n % 5 != 1)
+        return size.flatmap(lambda n: st.binary(min_size=n, max_size=n)).map(
+            lambda data: np.frombuffer(data, dtype=np.uint8)
+        )
     if field.is_tail:
         counts = st.integers(0, 65535) | st.sampled_from([0, 1, 255, 256])
         return st.lists(counts, max_size=300).map(lambda c: np.array(c, dtype=np.uint16))
@@ -27,7 +32,7 @@ def _field(field):
 
 def _message(spec):
     fields = {field.name: _field(field) for field in spec.fields}
-    if spec.name == "FRAME":
+    if spec.name in {"FRAME", "FRAME_PACKED"}:
         fields["host_time"] = st.just(0.0)
     return st.builds(RECORDS[spec.name], **fields)
 
@@ -39,7 +44,8 @@ def messages(to_device=None):
 
 
 def same(one, other):
-    """Equality that looks into the samples of a frame."""
+    """Equality that looks into the samples of a frame, packed or not."""
+    one, other = (m.frame if isinstance(m, PackedFrame) else m for m in (one, other))
     if isinstance(one, Frame) and isinstance(other, Frame):
         names = ("sequence", "ticks", "configuration", "flags", "drops", "host_time")
         return all(getattr(one, n) == getattr(other, n) for n in names) and np.array_equal(

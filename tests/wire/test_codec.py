@@ -12,6 +12,7 @@ from tomoskin.wire import (
     Drive,
     GetInfo,
     Hello,
+    PackedFrame,
     Ping,
     Result,
     SetPattern,
@@ -76,6 +77,7 @@ def test_values_that_do_not_fit_are_refused():
         b"\x82\x01\x02",  # too long
         b"\x03\x01\x82\x63\x00\x00",  # no such result
         encode_payload(Frame(0, 0, 0.0, 0, 0, 0, np.zeros(1, dtype=np.uint16))) + b"\x01",
+        encode_payload(PackedFrame(0, 0, 0.0, 0, 0, 0, np.zeros(6, dtype=np.uint8))),
         b"\x86\x01\x00\x00\x00\x00\x01\x02\x03",  # half a drive
     ],
 )
@@ -97,6 +99,7 @@ def test_examples_in_the_document():
         Ack(1, 0x87, Result.OK, 0),
         SetPattern(4, 0x1A2B, 0, (Drive(1, 0, 0xFC),)),
         Frame(7, 250_000, 0.0, 0x1A2B, 0, 0, counts),
+        PackedFrame.of(Frame(7, 250_000, 0.0, 0x1A2B, 0, 0, counts)),
     ):
         payload = encode_payload(message)
         parts = {

@@ -7,23 +7,23 @@ from pathlib import Path
 import pytest
 
 from tomoskin.core import WireError
-from tomoskin.wire import ENUMS, RECORDS, SCHEMA, SCHEMA_HASH, Schema, schema_tables
+from tomoskin.wire import ENUMS, OLDER, RECORDS, SCHEMA, SCHEMA_HASH, Schema, schema_tables
 
 TEXT = files("tomoskin.wire").joinpath("protocol.toml").read_text(encoding="utf-8")
 
-VERSIONS = {(1, 0): 0x8B6ABBBD}
+VERSIONS = {(1, 0): 0x8B6ABBBD, (1, 1): 0xF17AB758}
 """Hash of each version that was ever published: a change of the schema needs a new version."""
 
 
 def test_hash_of_this_version_is_the_published_one():
-    assert VERSIONS[SCHEMA.major, SCHEMA.minor] == SCHEMA_HASH
+    assert {**OLDER, (SCHEMA.major, SCHEMA.minor): SCHEMA_HASH} == VERSIONS
 
 
 def test_hash_follows_what_is_on_the_wire_only():
     reworded = TEXT.replace("Ask for INFO", "Ask the board what it is")
     assert reworded != TEXT
     assert Schema.read(reworded).hash == SCHEMA_HASH
-    for old, new in [('type = "u64"', 'type = "u32"'), ("minor = 0", "minor = 1"), ("µs", "ms")]:
+    for old, new in [('type = "u64"', 'type = "u32"'), ("minor = 1", "minor = 2"), ("µs", "ms")]:
         assert Schema.read(TEXT.replace(old, new)).hash != SCHEMA_HASH
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tomoskin.wire import (
+    OLDER,
     SCHEMA,
     Ack,
     Deframer,
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
     from tomoskin.skin import Skin
 
 
+(_VERSION, _HASH) = next(iter(OLDER.items()))
+"""It speaks the oldest protocol: what it cannot be asked need not be made up."""
+
+
 class ReplayBoard:
     """Answers commands as the board that was recorded would; no I/O.
 
@@ -35,7 +40,7 @@ class ReplayBoard:
         """``device`` is what the session holds of the board, perhaps nothing."""
         self._skin, self._device = skin, device
         self._deframer = Deframer(SCHEMA.to_device_bytes)
-        self._out = bytearray(encode(Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash)))
+        self._out = bytearray(encode(Hello(*_VERSION, _HASH)))
         self.scanning = False
 
     def obey(self, data: bytes) -> None:
@@ -61,9 +66,9 @@ class ReplayBoard:
         skin = self._skin
         return Info(
             request=request,
-            major=SCHEMA.major,
-            minor=SCHEMA.minor,
-            schema_hash=SCHEMA.hash,
+            major=_VERSION[0],
+            minor=_VERSION[1],
+            schema_hash=_HASH,
             firmware=_version(self._device.get("firmware")),
             reset=Reset.UNKNOWN,
             channels=32,

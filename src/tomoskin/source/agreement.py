@@ -2,34 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import fields
+
 from tomoskin.core import SourceError, WireError
 from tomoskin.pattern import Scan
 from tomoskin.source.settings import ScanSettings
-from tomoskin.wire import SCHEMA, Hello, Info
+from tomoskin.wire import OLDER, SCHEMA, Command, HeldPattern, HeldScan, Hello, Info
 
 _UPDATE_BOARD = "flash the firmware that belongs to this tomoskin"
 _UPDATE_HOST = "update tomoskin on this computer, or flash an older firmware"
 
 
 def check_version(board: Hello | Info, where: str) -> None:
-    """Raise WireError unless the board was made from this host's schema.
+    """Raise WireError unless the board was made from this host's schema or one that it grew from.
 
     The message says which side is older.
     """
-    if (board.major, board.minor, board.schema_hash) == (SCHEMA.major, SCHEMA.minor, SCHEMA.hash):
-        return
     theirs, ours = (board.major, board.minor), (SCHEMA.major, SCHEMA.minor)
+    known = {**OLDER, ours: SCHEMA.hash}
+    if known.get(theirs) == board.schema_hash:
+        return
     spoken = f"expected protocol {ours[0]}.{ours[1]}, the board speaks {theirs[0]}.{theirs[1]}: "
+    if theirs in known:
+        raise WireError(
+            f"board and host both call a protocol {theirs[0]}.{theirs[1]} but mean different "
+            f"schemas (board {board.schema_hash:08x}, host {known[theirs]:08x})",
+            where=where,
+            hint=f"one is a development build: {_UPDATE_BOARD}",
+        )
     if theirs < ours:
         raise WireError(spoken + "its firmware is older", where=where, hint=_UPDATE_BOARD)
-    if theirs > ours:
-        raise WireError(spoken + "this host is older", where=where, hint=_UPDATE_HOST)
-    raise WireError(
-        f"board and host both call their protocol {ours[0]}.{ours[1]} but were made from "
-        f"different schemas (board {board.schema_hash:08x}, host {SCHEMA.hash:08x})",
-        where=where,
-        hint=f"one is a development build: {_UPDATE_BOARD}",
-    )
+    raise WireError(spoken + "this host is older", where=where, hint=_UPDATE_HOST)
 
 
 def check_board(info: Info, scan: Scan, settings: ScanSettings, where: str) -> None:
@@ -62,3 +66,20 @@ def check_board(info: Info, scan: Scan, settings: ScanSettings, where: str) -> N
             where=where,
             hint="turn the limiter down before you connect the skin",
         )
+
+
+def check_held(held: HeldScan | HeldPattern, sent: Sequence[Command], where: str) -> None:
+    """Raise SourceError unless the board holds what ``sent`` has set; it names what differs.
+
+    ``sent`` are the commands behind this answer: SET_SCAN and SET_FORMAT, or one SET_PATTERN.
+    """
+    names = [field.name for field in fields(held) if field.name != "request"]
+    for name in names:
+        wanted = next(getattr(command, name) for command in sent if hasattr(command, name))
+        found = getattr(held, name)
+        if wanted != found:
+            raise SourceError(
+                f"the board does not hold what was sent: {name} {found}, expected {wanted}",
+                where=where,
+                hint="nothing is driven; start again, and flash the firmware if it comes back",
+            )

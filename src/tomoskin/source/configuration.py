@@ -7,25 +7,57 @@ from typing import Self
 
 from tomoskin.pattern import Scan
 from tomoskin.source.settings import ScanSettings, scan_time
-from tomoskin.wire import SCHEMA, Command, Drive, SetPattern, SetScan, Start, crc16, encode_payload
+from tomoskin.wire import (
+    SCHEMA,
+    Command,
+    Drive,
+    Format,
+    GetPattern,
+    GetScan,
+    SetFormat,
+    SetPattern,
+    SetScan,
+    Start,
+    crc16,
+    encode_payload,
+)
+
+_FORMATS_SINCE = 1
+"""The minor version that brought formats and reading back."""
 
 
 @dataclass(frozen=True)
 class Configuration:
     """Identity and commands; request ids are filled in when a command is sent.
 
-    The identity is a checksum of the commands, never 0: the same scan has the same identity
-    on every host, and frames of another scan are told apart.
+    The identity is a checksum of ``scan`` and ``patterns``, never 0: the same scan has the same
+    identity on every host, and frames of another scan are told apart.
     """
 
     identity: int
-    commands: tuple[Command, ...]
+    scan: SetScan
+    patterns: tuple[SetPattern, ...]
+    format: SetFormat
     n_samples: int
     scan_time: float
 
+    def commands(self, minor: int) -> tuple[Command, ...]:
+        """What sets it on a board of protocol 1.``minor``, reads it back, and starts it."""
+        start = Start(0, self.identity)
+        if minor < _FORMATS_SINCE:
+            return (self.scan, *self.patterns, start)
+        read_back = (GetPattern(0, pattern.first) for pattern in self.patterns)
+        return (self.scan, *self.patterns, self.format, GetScan(0), *read_back, start)
+
+    def behind(self, question: Command) -> tuple[Command, ...]:
+        """The commands that set what a GET_SCAN or GET_PATTERN asks for."""
+        if isinstance(question, GetPattern):
+            return tuple(pattern for pattern in self.patterns if pattern.first == question.first)
+        return (self.scan, self.format)
+
     @classmethod
     def of(cls, scan: Scan, settings: ScanSettings) -> Self:
-        """Timing, drives in chunks, and START."""
+        """Timing, and drives in chunks."""
         announce = SetScan(
             request=0,
             configuration=0,
@@ -41,11 +73,10 @@ class Configuration:
         identity = crc16(content) or 1
         return cls(
             identity,
-            (
-                replace(announce, configuration=identity),
-                *(replace(chunk, configuration=identity) for chunk in chunks),
-                Start(0, identity),
-            ),
+            replace(announce, configuration=identity),
+            tuple(replace(chunk, configuration=identity) for chunk in chunks),
+            # a sample of one conversion is shorter on the line when it is packed
+            SetFormat(0, identity, Format.PACKED if settings.packs else Format.SIXTEEN),
             scan.n_samples,
             scan_time(
                 len(scan.drives),

@@ -8,7 +8,7 @@ from enum import Enum, auto
 
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.pattern import Scan
-from tomoskin.source.agreement import check_board, check_version
+from tomoskin.source.agreement import check_board, check_held, check_version
 from tomoskin.source.configuration import Configuration
 from tomoskin.source.gate import FrameGate
 from tomoskin.source.settings import ScanSettings, Timing
@@ -18,6 +18,10 @@ from tomoskin.wire import (
     Command,
     Fault,
     GetInfo,
+    GetPattern,
+    GetScan,
+    HeldPattern,
+    HeldScan,
     Hello,
     Info,
     Message,
@@ -45,7 +49,7 @@ class _Pending:
 
 
 class Conversation:
-    """Waits for HELLO, asks for INFO, sets the scan, starts it and keeps the board alive.
+    """Waits for HELLO, asks for INFO, sets the scan, reads it back, starts it, keeps it alive.
 
     A board that says HELLO again has been reset or has missed the heartbeat: it is set up anew,
     as is one that answers but has stopped scanning.
@@ -55,7 +59,7 @@ class Conversation:
     WireError
         From ``receive``: the board speaks another protocol.
     SourceError
-        From ``receive``: the board cannot do this scan or refuses a command;
+        From ``receive``: the board cannot do this scan, refuses a command or holds another scan;
         from ``tick``: it does not answer.
     """
 
@@ -92,6 +96,8 @@ class Conversation:
                 return self._hello(message, now)
             case Info():
                 self._info(message, now)
+            case HeldScan() | HeldPattern():
+                return self._held(message, now)
             case Ack():
                 return self._ack(message, now)
             case Fault():
@@ -137,7 +143,7 @@ class Conversation:
         self.stage = Stage.SETTING_UP
         self.info = None
         self.gate.close()
-        self._queue = deque((GetInfo(0), Stop(0), *self.configuration.commands))
+        self._queue = deque((GetInfo(0), Stop(0)))
         self._ask(now)
 
     def _ask(self, now: float) -> None:
@@ -210,7 +216,18 @@ class Conversation:
             check_version(info, self._where)
             check_board(info, self._scan, self._settings, self._where)
             self.info = info
+            self._queue.extend(self.configuration.commands(info.minor))
             self._answered(now)
+
+    def _held(self, held: HeldScan | HeldPattern, now: float) -> list[Frame | Event]:
+        pending = self._pending
+        question = GetScan if isinstance(held, HeldScan) else GetPattern
+        if pending is None or not isinstance(pending.command, question):
+            return []
+        if held.request != pending.command.request:
+            return []
+        check_held(held, self.configuration.behind(pending.command), self._where)
+        return self._answered(now)
 
     def _ack(self, ack: Ack, now: float) -> list[Frame | Event]:
         pending = self._pending

@@ -17,6 +17,8 @@ _CYCLES = 13
 """Converter clocks for one conversion (ATmega2560 datasheet, table 26-1)."""
 
 
+_PACKED_BITS = 10
+
 _CLOCK = 16e6
 """Clock of the board, Hz."""
 
@@ -73,6 +75,11 @@ class ScanSettings:
             raise SourceError(f"expected a settling time from 0 to 0.1 s, got {self.settling} s")
         if self.prescaler not in PRESCALERS:
             raise SourceError(f"expected a prescaler of {PRESCALERS}, got {self.prescaler}")
+
+    @property
+    def packs(self) -> bool:
+        """Whether samples fit ten bits, so that frames can be sent packed."""
+        return self.oversampling == 1 and self.adc_bits == _PACKED_BITS
 
     @property
     def conversion(self) -> float:

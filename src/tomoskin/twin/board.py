@@ -6,7 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tomoskin.source import PRESCALERS
-from tomoskin.wire import SCHEMA, Drive, Info, Reset, Result, SetPattern, SetScan
+from tomoskin.wire import (
+    SCHEMA,
+    Drive,
+    Format,
+    Info,
+    Reset,
+    Result,
+    SetFormat,
+    SetPattern,
+    SetScan,
+)
 
 Verdict = tuple[Result, int]
 """Result and detail of an ACK."""
@@ -26,7 +36,7 @@ class Board:
     tick_rate: float
     max_drives: int = 128
     max_samples: int = 2000
-    firmware: tuple[int, int, int] = (1, 0, 0)
+    firmware: tuple[int, int, int] = (1, 1, 0)
     unique_id: bytes = b"twin\0\0\0\0"
 
     def info(self, request: int) -> Info:
@@ -79,6 +89,13 @@ class Board:
             if max(drive.source, drive.sink) >= self.channels or drive.mask >> self.channels:
                 return Result.NO_SUCH_CHANNEL, number
         return OK
+
+    def check_format(self, command: SetFormat, scan: SetScan | None) -> Verdict:
+        """Whether a SET_FORMAT fits the announced scan and this converter."""
+        if scan is None or command.configuration != scan.configuration:
+            return Result.WRONG_CONFIGURATION, 0
+        fits = scan.oversampling == 1 and self.adc_bits == 10
+        return OK if command.format is Format.SIXTEEN or fits else (Result.BAD_VALUE, 2)
 
     def check_start(
         self, configuration: int, scan: SetScan | None, drives: Sequence[Drive | None]

@@ -16,14 +16,21 @@ from tomoskin.wire import (
     Drive,
     Fault,
     FaultCode,
+    Format,
     FrameFlag,
     GetInfo,
+    GetPattern,
+    GetScan,
+    HeldPattern,
+    HeldScan,
     Hello,
     Message,
+    PackedFrame,
     Ping,
     Result,
     SafeOff,
     SetBaud,
+    SetFormat,
     SetHeartbeat,
     SetPattern,
     SetScan,
@@ -33,11 +40,14 @@ from tomoskin.wire import (
     decode_payload,
     encode,
     is_command,
+    type_byte,
 )
 
 _HELLO_INTERVAL = 0.5
 _HEARTBEAT = 2.0
 _HEARTBEAT_MS = (100, 10_000)
+_TOLD = 9
+"""Drives in a PATTERN."""
 
 
 @dataclass
@@ -73,6 +83,7 @@ class TwinDevice:
         self._next_hello: float | None = now
         self._heartbeat = _HEARTBEAT
         self._scan: SetScan | None = None
+        self._format = Format.SIXTEEN
         self._drives: list[Drive | None] = []
         self._scanning: _Scanning | None = None
         self._last: tuple[int, int] | None = None
@@ -110,7 +121,8 @@ class TwinDevice:
             self._say(Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash))
             self._next_hello = max(self._next_hello + _HELLO_INTERVAL, now)
         if self._scanning and now >= self._scanning.due:
-            self._say(self._frame(self._scanning, now))
+            frame = self._frame(self._scanning, now)
+            self._say(PackedFrame.of(frame) if self._format is Format.PACKED else frame)
         data = bytes(self._out)
         self._out.clear()
         return data
@@ -152,11 +164,28 @@ class TwinDevice:
         identity = (command.request, crc16(payload))
         if isinstance(command, GetInfo):
             self._last_reply = encode(self._board.info(command.request))
+        elif isinstance(command, GetScan | GetPattern):
+            self._last_reply = encode(self._held(command))
         elif identity != self._last:
             result, detail = self._run(command, now)
             self._last_reply = encode(Ack(command.request, payload[0], result, detail))
         self._last = identity
         self._out += self._last_reply
+
+    def _held(self, command: GetScan | GetPattern) -> Message:
+        scan, request = self._scan, command.request
+        if scan is None:
+            return Ack(request, type_byte(type(command)), Result.WRONG_CONFIGURATION, 0)
+        if isinstance(command, GetScan):
+            return HeldScan(
+                request, scan.configuration, scan.n_drives, scan.settling, scan.dead_time,
+                scan.oversampling, scan.prescaler, scan.current_limit, self._format,
+            )  # fmt: skip
+        if command.first >= scan.n_drives:
+            return Ack(request, type_byte(GetPattern), Result.BAD_VALUE, 1)
+        some = self._drives[command.first : command.first + _TOLD]
+        drives = tuple(drive or Drive(255, 255, 0) for drive in some)
+        return HeldPattern(request, scan.configuration, command.first, drives)
 
     def _run(self, command: Command, now: float) -> Verdict:
         match command:
@@ -169,22 +198,29 @@ class TwinDevice:
                 if not low <= command.interval <= high:
                     return Result.BAD_VALUE, 1
                 self._heartbeat = command.interval / 1e3
-            case SetScan() | SetPattern() | Start() | SetBaud() if self._scanning:
+            case SetScan() | SetPattern() | SetFormat() | Start() | SetBaud() if self._scanning:
                 return Result.BUSY, 0
-            case SetScan():
-                return self._set_scan(command)
-            case SetPattern():
-                return self._set_pattern(command)
+            case SetScan() | SetPattern() | SetFormat():
+                return self._configure(command)
             case Start():
                 return self._start(command, now)
-            case SetBaud() | Ping() | GetInfo():
+            case SetBaud() | Ping() | GetInfo() | GetScan() | GetPattern():
                 pass
         return OK
+
+    def _configure(self, command: SetScan | SetPattern | SetFormat) -> Verdict:
+        if isinstance(command, SetScan):
+            return self._set_scan(command)
+        if isinstance(command, SetPattern):
+            return self._set_pattern(command)
+        verdict = self._board.check_format(command, self._scan)
+        self._format = command.format if verdict == OK else self._format
+        return verdict
 
     def _set_scan(self, command: SetScan) -> Verdict:
         verdict = self._board.check_scan(command)
         if verdict == OK:
-            self._scan = command
+            self._scan, self._format = command, Format.SIXTEEN
             self._drives = [None] * command.n_drives
         return verdict
 

@@ -12,8 +12,12 @@ import numpy as np
 
 from tomoskin.core import Frame, WireError
 from tomoskin.wire.framing import enclose
-from tomoskin.wire.messages import ENUMS, RECORDS, STRUCTS, Command, Message
+from tomoskin.wire.messages import ENUMS, RECORDS, STRUCTS, Command, Message, PackedFrame
+from tomoskin.wire.packing import packed_size_fits
 from tomoskin.wire.schema import SCALARS, SCHEMA, FieldSpec, MessageSpec, Schema, StructSpec
+
+_DTYPES = {"u8": "<u1", "u16": "<u2"}
+"""Of the samples of a frame."""
 
 _HOST_FIELD = "host_time"
 """The one field of a record that is not on the wire: the host's own time of reading."""
@@ -106,19 +110,22 @@ def encode_payload(message: Message) -> bytes:
 
 def _pack_tail(layout: Layout, items: Any) -> bytes:
     if layout.tail_record is None:
-        samples = np.asarray(items)
-        if samples.dtype != np.uint16 or samples.ndim != 1:
+        samples, wanted = np.asarray(items), np.dtype(_DTYPES[layout.spec.fields[-1].item])
+        if samples.dtype != wanted or samples.ndim != 1:
             raise WireError(
-                f"expected samples (n,) of uint16, got {samples.shape} of {samples.dtype}",
+                f"expected samples (n,) of {wanted}, got {samples.shape} of {samples.dtype}",
                 where=layout.spec.name,
             )
-        return samples.astype("<u2", copy=False).tobytes()
+        return samples.tobytes()
     assert layout.tail is not None
     return b"".join(layout.tail.pack(*dataclasses.astuple(item)) for item in items)
 
 
 def decode_payload(payload: bytes, host_time: float) -> Message | None:
-    """The message in a payload whose checksum was right; None when it is not of this schema."""
+    """The message in a payload whose checksum was right; None when it is not of this schema.
+
+    Packed frames come out as frames.
+    """
     layout = _BY_TYPE.get(payload[0]) if payload else None
     if layout is None or not _fits(layout, len(payload)):
         return None
@@ -132,6 +139,8 @@ def decode_payload(payload: bytes, host_time: float) -> Message | None:
         return layout.record(*values[1:])
     if layout.record is Frame:
         return _frame(values, payload, layout.head.size, host_time)
+    if layout.record is PackedFrame:
+        return _packed_frame(values, payload, layout.head.size, host_time)
     record = layout.tail_record
     assert record is not None
     items = tuple(record(*item) for item in layout.tail.iter_unpack(payload[layout.head.size :]))
@@ -147,6 +156,14 @@ def _frame(values: list[Any], payload: bytes, size: int, host_time: float) -> Fr
     sequence, ticks, configuration, flags, drops = values[1:]
     samples = np.frombuffer(payload, dtype="<u2", offset=size)
     return Frame(sequence, ticks, host_time, configuration, flags, drops, samples)
+
+
+def _packed_frame(values: list[Any], payload: bytes, size: int, host_time: float) -> Frame | None:
+    if not packed_size_fits(len(payload) - size):
+        return None
+    sequence, ticks, configuration, flags, drops = values[1:]
+    packed = np.frombuffer(payload, dtype=np.uint8, offset=size)
+    return PackedFrame(sequence, ticks, host_time, configuration, flags, drops, packed).frame
 
 
 def is_command(message: Message) -> TypeGuard[Command]:

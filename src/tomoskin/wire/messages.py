@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import Frame
+from tomoskin.wire.packing import pack, unpack
 
 
 class Result(IntEnum):
@@ -45,6 +50,13 @@ class Reset(IntEnum):
     EXTERNAL = 2
     BROWN_OUT = 3
     WATCHDOG = 4
+
+
+class Format(IntEnum):
+    """How a frame holds its samples."""
+
+    SIXTEEN = 0
+    PACKED = 1
 
 
 class FrameFlag(IntFlag):
@@ -110,6 +122,60 @@ class Fault:
     ticks: int
     code: FaultCode
     detail: int
+
+
+@dataclass(frozen=True, slots=True)
+class HeldScan:
+    """What the board holds of SET_SCAN and SET_FORMAT."""
+
+    request: int
+    configuration: int
+    n_drives: int
+    settling: int
+    dead_time: int
+    oversampling: int
+    prescaler: int
+    current_limit: int
+    format: Format
+
+
+@dataclass(frozen=True, slots=True)
+class HeldPattern:
+    """Drives ``first``, ``first`` + 1, … that the board holds."""
+
+    request: int
+    configuration: int
+    first: int
+    drives: tuple[Drive, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PackedFrame:
+    """A frame as it is sent packed: ``samples`` (n,) of uint8. Decoders make frames of it."""
+
+    sequence: int
+    ticks: int
+    host_time: float
+    configuration: int
+    flags: int
+    drops: int
+    samples: NDArray[np.uint8]
+
+    @classmethod
+    def of(cls, frame: Frame) -> Self:
+        """Pack a frame, whose samples must be below 1,024."""
+        return cls(
+            frame.sequence, frame.ticks, frame.host_time, frame.configuration, frame.flags,
+            frame.drops, pack(frame.samples),
+        )  # fmt: skip
+
+    @property
+    def frame(self) -> Frame:
+        """The frame that it stands for."""
+        return Frame(
+            self.sequence, self.ticks, self.host_time, self.configuration, self.flags,
+            self.drops, unpack(self.samples),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,10 +254,37 @@ class SetHeartbeat:
     interval: int
 
 
-Command = GetInfo | Ping | Stop | SafeOff | SetScan | SetPattern | Start | SetBaud | SetHeartbeat
+@dataclass(frozen=True, slots=True)
+class GetScan:
+    """Ask for :class:`HeldScan`."""
+
+    request: int
+
+
+@dataclass(frozen=True, slots=True)
+class GetPattern:
+    """Ask for :class:`HeldPattern` from drive ``first`` on."""
+
+    request: int
+    first: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetFormat:
+    """How frames hold their samples."""
+
+    request: int
+    configuration: int
+    format: Format
+
+
+Command = (
+    GetInfo | Ping | Stop | SafeOff | SetScan | SetPattern | Start | SetBaud | SetHeartbeat
+    | GetScan | GetPattern | SetFormat
+)  # fmt: skip
 """Messages to the device."""
 
-Report = Hello | Info | Ack | Fault | Frame
+Report = Hello | Info | Ack | Fault | HeldScan | HeldPattern | Frame | PackedFrame
 """Messages from the device."""
 
 Message = Command | Report
@@ -201,7 +294,10 @@ RECORDS: dict[str, type[Message]] = {
     "INFO": Info,
     "ACK": Ack,
     "FAULT": Fault,
+    "SCAN": HeldScan,
+    "PATTERN": HeldPattern,
     "FRAME": Frame,
+    "FRAME_PACKED": PackedFrame,
     "GET_INFO": GetInfo,
     "PING": Ping,
     "STOP": Stop,
@@ -211,6 +307,9 @@ RECORDS: dict[str, type[Message]] = {
     "START": Start,
     "SET_BAUD": SetBaud,
     "SET_HEARTBEAT": SetHeartbeat,
+    "GET_SCAN": GetScan,
+    "GET_PATTERN": GetPattern,
+    "SET_FORMAT": SetFormat,
 }
 """Record of each message of the schema."""
 
@@ -221,6 +320,7 @@ ENUMS: dict[str, type[IntEnum] | type[IntFlag]] = {
     "result": Result,
     "fault": FaultCode,
     "reset": Reset,
+    "format": Format,
     "flag": FrameFlag,
 }
 """Python side of each enumeration."""

@@ -172,3 +172,6 @@ SCHEMA = Schema.read(files("tomoskin.wire").joinpath("protocol.toml").read_text(
 
 SCHEMA_HASH = SCHEMA.hash
 """u32 over everything in the schema but its sentences; board and host compare it."""
+
+OLDER = {(1, 0): 0x8B6ABBBD}
+"""Hashes of the published versions, by major and minor, that this host speaks beside its own."""
