@@ -22,7 +22,7 @@ _SCALES = 6.0
 _NARROW = 1.15
 """Squared reaches of :func:`bell` in one of :func:`profile`: then their second moments agree."""
 
-_SPLIT = 3
+_SPLIT = 2
 """Each side of a cell is cut into so many, for the mean of a profile over the cell."""
 
 
@@ -32,18 +32,23 @@ def profile(square: FloatArray) -> FloatArray:
     (1 + v) e⁻ᵛ, v the distance in scales: level at the centre, and exponential beyond, as a
     stretched sheet goes back to rest on what carries it; the last part is drawn to 0 smoothly.
     """
-    inside = np.minimum(square, 1.0)
-    scales = _SCALES * np.sqrt(inside)
-    return np.asarray((1.0 + scales) * np.exp(-scales) * (1.0 - inside**3) ** 2)
+    return _with_steepness(square)[0]
 
 
-def _steepness(square: FloatArray) -> FloatArray:
-    """Derivative of :func:`profile` by its argument."""
+def _with_steepness(square: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """:func:`profile`, and its derivative by its argument."""
     inside = np.minimum(square, 1.0)
     scales = _SCALES * np.sqrt(inside)
-    taper = 1.0 - inside**3
-    fall = 0.5 * _SCALES**2 * taper + 6.0 * inside**2 * (1.0 + scales)
-    return np.asarray(-np.exp(-scales) * taper * fall)
+    fading, third, more = np.exp(-scales), inside**3, 1.0 + scales
+    taper = 1.0 - third
+    fading *= taper
+    height = more * fading
+    height *= taper
+    fall = (-6.0 * third) * more
+    fall /= np.maximum(inside, 1e-30)
+    fall -= 0.5 * _SCALES**2 * taper
+    fall *= fading
+    return height, fall
 
 
 def _moments() -> tuple[float, float]:
@@ -93,7 +98,7 @@ class Spots:
 
     A spot of radius a and content m changes log σ by a :func:`profile` that has the second
     moment of an even disc of radius a; m is the integral of that change over the plane, which is
-    what electrodes far from a faint spot see. Each cell takes the mean over 9 points, so that
+    what electrodes far from a faint spot see. Each cell takes the mean over 4 points, so that
     nothing jumps as a spot moves.
     """
 
@@ -103,32 +108,41 @@ class Spots:
         corners = mesh.points[mesh.cells]
         self.mesh = mesh
         self._points = np.einsum("qk,ckd->cqd", _sub_centroids(_SPLIT), corners)
+        self._centroids = np.ascontiguousarray(mesh.centroids.T)
         self._margin = np.linalg.norm(corners - mesh.centroids[:, None], axis=2).max(axis=1)
 
     def change(self, spots: FloatArray, shape: Shape = profile) -> tuple[IntArray, FloatArray]:
         """Cells (c,) that spots (k, 4) reach together, and (c,) the change of log σ there."""
-        cells = self._near(spots)
-        total = np.zeros(len(cells))
-        for spot in spots:
-            square, _ = self._squares(spot, cells)
-            total += depth_of(spot) * shape(square).mean(axis=1)
-        return cells, total
+        near = [self._near(spot) for spot in spots]
+        cells, total = self._joined(near), np.zeros(len(self.mesh.cells))
+        for spot, own in zip(spots, near, strict=True):
+            square, _ = self._squares(spot, own)
+            total[own] += depth_of(spot) * shape(square).mean(axis=1)
+        return cells, total[cells]
 
     def slopes(self, spots: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
         """As :meth:`change`, and (4k, c) its derivatives by each column of each spot."""
-        cells = self._near(spots)
-        total, rows = np.zeros(len(cells)), []
-        for spot in spots:
-            square, offset = self._squares(spot, cells)
-            depth, reach = float(depth_of(spot)), REACH * float(np.exp(spot[LOG_RADIUS]))
-            height, fall = profile(square), depth * _steepness(square)
-            mean = height.mean(axis=1)
-            total += depth * mean
-            towards = -2.0 / reach**2 * np.einsum("cq,cqd->dc", fall, offset) / _SPLIT**2
-            wider = -2.0 * (depth * mean + (fall * square).mean(axis=1))
-            more = mean / (FILLING * np.exp(2.0 * spot[LOG_RADIUS]))
-            rows += [towards[0], towards[1], wider, more]
-        return cells, total, np.array(rows)
+        near = [self._near(spot) for spot in spots]
+        cells, total = self._joined(near), np.zeros(len(self.mesh.cells))
+        rows = np.zeros((N_PARAMETERS * len(spots), len(cells)))
+        for number, (spot, own) in enumerate(zip(spots, near, strict=True)):
+            height, slope = self._slope(spot, own)
+            total[own] += height
+            first = N_PARAMETERS * number
+            rows[first : first + N_PARAMETERS, np.searchsorted(cells, own)] = slope
+        return cells, total[cells], rows
+
+    def _slope(self, spot: FloatArray, cells: IntArray) -> tuple[FloatArray, FloatArray]:
+        """(c,) change of log σ by one spot, and (4, c) its derivatives."""
+        square, offset = self._squares(spot, cells)
+        depth, reach = float(depth_of(spot)), REACH * float(np.exp(spot[LOG_RADIUS]))
+        height, fall = _with_steepness(square)
+        fall *= depth
+        mean = height.mean(axis=1)
+        towards = -2.0 / reach**2 / _SPLIT**2 * np.einsum("cq,cqd->dc", fall, offset)
+        wider = -2.0 * (depth * mean + (fall * square).mean(axis=1))
+        more = mean * (REACH**2 / FILLING / reach**2)
+        return depth * mean, np.stack([*towards, wider, more])
 
     def _squares(self, spot: FloatArray, cells: IntArray) -> tuple[FloatArray, FloatArray]:
         """(c, q) squared distances in reaches of the points of cells, and (c, q, 2) offsets, m."""
@@ -136,11 +150,17 @@ class Spots:
         square = np.einsum("cqd,cqd->cq", offset, offset)
         return square * float(REACH * np.exp(spot[LOG_RADIUS])) ** -2, offset
 
-    def _near(self, spots: FloatArray) -> IntArray:
-        """Cells that any of the spots may reach."""
-        reach = REACH * np.exp(spots[:, LOG_RADIUS])
-        apart = np.linalg.norm(self.mesh.centroids[:, None] - spots[:, :2], axis=2)
-        return np.flatnonzero((apart < reach + self._margin[:, None]).any(axis=1))
+    def _near(self, spot: FloatArray) -> IntArray:
+        """Cells that a spot may reach."""
+        x, y = self._centroids - spot[:2, None]
+        limit = REACH * np.exp(spot[LOG_RADIUS]) + self._margin
+        return np.flatnonzero(x * x + y * y < limit * limit)
+
+    def _joined(self, near: list[IntArray]) -> IntArray:
+        reached = np.zeros(len(self.mesh.cells), dtype=bool)
+        for own in near:
+            reached[own] = True
+        return np.flatnonzero(reached)
 
 
 class Response:
@@ -152,7 +172,6 @@ class Response:
             raise ModelError("expected a real scalar conductivity to fit touches on")
         self.state = state
         self.spots = Spots(state.model.mesh)
-        self._first, self._second = np.triu_indices(len(state.model.mesh.electrodes))
 
     @property
     def reference(self) -> FloatArray:
@@ -170,21 +189,15 @@ class Response:
     def jacobian(self, spots: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Change (n_meas,) V of spots (k, 4), and its derivatives (n_meas, 4k) by each column.
 
-        The fields of the pressed sheet give both, whatever the number of spots: by reciprocity
-        dR_ij = −∫ dσ ∇u_i · ∇u_j (Geselowitz 1971).
+        The fields of the pressed sheet give both, by reciprocity, whatever the number of spots.
         """
         cells, change, slopes = self.spots.slopes(spots)
         _, sigma = self._pressed(cells, change)
         whole = self.state.conductivity.copy()
         whole[cells] = sigma
-        model = self.state.model
-        pressed = model.at(whole)
-        field = pressed.gradient[:, :, cells]
-        pairs = np.einsum("pdc,pdc->pc", field[self._first], field[self._second])
-        change_of = np.empty((len(slopes), len(field), len(field)))
-        change_of[:, self._first, self._second] = -(slopes * sigma) @ pairs.T
-        change_of[:, self._second, self._first] = change_of[:, self._first, self._second]
-        return pressed.voltages - self.reference, model.voltages(change_of).T
+        pressed = self.state.model.at(whole)
+        by_cell = pressed.jacobian.take(cells, axis=1)
+        return pressed.voltages - self.reference, by_cell @ (slopes * sigma).T
 
     def each(self, spots: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
         """:meth:`jacobian` of each of ``spots`` (n, 4), alone on the sheet."""
