@@ -97,7 +97,7 @@ lock-uv:
 lock-runtime:
 	@$(COMPILE) pyproject.toml requirements/build.in -o requirements/runtime.txt
 lock-dev:
-	@$(COMPILE) pyproject.toml --extra mesh --extra plot --extra parquet --extra hdf5 requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
+	@$(COMPILE) pyproject.toml --extra mesh --extra plot --extra parquet --extra hdf5 --extra foxglove --extra mqtt --extra lsl --extra zenoh requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
 lock-bench:
 	@$(COMPILE) pyproject.toml --extra bench -c requirements/dev.txt -o requirements/bench.txt
 lock-node:

@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = [
     *("core", "mesh", "pattern", "skin", "forward", "inverse", "signal"),
-    *("touch", "wire", "source", "twin", "emulator", "session", "live", "cli"),
+    *("touch", "wire", "source", "twin", "emulator", "session", "sink", "live", "cli"),
 ]
 Sources = Mapping[str, str]
 

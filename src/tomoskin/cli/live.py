@@ -12,6 +12,7 @@ import typer
 from tomoskin.cli.ending import ended_by_signals
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.record import recording_to
+from tomoskin.cli.sink_option import SinkOption, chosen_sinks
 from tomoskin.cli.skin_choice import SkinOption, skin_for_source
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ def live(
     record: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Record the session to a new file.")
     ] = None,
+    sink: SinkOption = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = 8765,
     host: Annotated[
         str, typer.Option(help="Address to listen on; others than this machine can reach it.")
@@ -40,12 +42,15 @@ def live(
         from tomoskin.source import open_source
 
         room.check_page()
+        sinks = chosen_sinks(sink)
         chosen = skin_for_source(skin, source)
         with room.listen(host, port) as listener:
             if not room.is_loopback(host):
                 _warn(host)
             door = room.Door(listener.getsockname()[1], host)
-            runner = room.Runner(room.prepare(chosen), lambda: open_source(source, chosen))
+            runner = room.Runner(
+                room.prepare(chosen), lambda: open_source(source, chosen), sinks=sinks
+            )
             with recording_to(runner, record):
                 hub = room.Hub(runner, limit=room.colour_limit(runner.prepared))
                 server = room.Server.of(room.application(hub, door))

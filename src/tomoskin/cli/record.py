@@ -13,6 +13,7 @@ import typer
 from tomoskin.cli.ending import ended_by_signals
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
+from tomoskin.cli.sink_option import SinkOption, chosen_sinks
 from tomoskin.cli.skin_choice import SkinOption, skin_for_source
 from tomoskin.core import DataError
 
@@ -30,14 +31,16 @@ def record(
         float | None, typer.Option(min=0.0, help="How long; without it until Ctrl-C.")
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="How many frames.")] = None,
+    sink: SinkOption = None,
     json: JsonFlag = False,
 ) -> None:
     """Record a session: raw bytes, frames, touches and images, without a page."""
     from tomoskin import live as room
     from tomoskin.source import open_source
 
+    sinks = chosen_sinks(sink)
     chosen = skin_for_source(skin, source)
-    runner = room.Runner(room.prepare(chosen), lambda: open_source(source, chosen))
+    runner = room.Runner(room.prepare(chosen), lambda: open_source(source, chosen), sinks=sinks)
     with ended_by_signals(), recording_to(runner, file):
         _wait(runner, seconds, frames)
         if (problem := _problem(runner)) is not None:

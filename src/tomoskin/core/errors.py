@@ -59,3 +59,7 @@ class WireError(TomoskinError):
 
 class SourceError(TomoskinError):
     """A source of frames that cannot be opened, or that went away."""
+
+
+class SinkError(TomoskinError):
+    """A sink of results that cannot be opened, or that went away."""

@@ -80,6 +80,7 @@ def state(status: Status) -> str:
         rule=status.choice.rule,
         left_out=status.left_out,
         recording=status.recording and status.recording.name,
+        sinks=status.sinks,
         problem=status.problem,
         text=status.text,
     )

@@ -6,7 +6,7 @@ import contextlib
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from tomoskin.live.meter import Meter
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.presses import Pressable, PressBoard
+from tomoskin.live.published import moment_of, stream_of
 from tomoskin.live.replayed import advance
 from tomoskin.live.result import Result
 from tomoskin.live.status import Status
@@ -25,6 +26,7 @@ from tomoskin.live.tally import Tally
 from tomoskin.live.tape import Tape
 from tomoskin.live.wishes import Wishes
 from tomoskin.session import Mark
+from tomoskin.sink import Outlets, Sink
 from tomoskin.source import Link, ScanSettings, Transport
 from tomoskin.twin import Press
 
@@ -64,6 +66,8 @@ class Runner:
         Opens the source; called again after a loss.
     clock
         Host monotonic seconds, the same as in ``Frame.host_time``.
+    sinks
+        Where results go, beside those who take :attr:`newest`; a slow one delays nobody.
 
     Attributes
     ----------
@@ -83,6 +87,7 @@ class Runner:
         open_transport: Callable[[], Transport],
         *,
         clock: Callable[[], float] = time.monotonic,
+        sinks: Sequence[Sink] = (),
     ) -> None:
         self.prepared = prepared
         self.newest: Snapshot | None = None
@@ -99,6 +104,7 @@ class Runner:
         self._pressed = 0
         self._wishes = Wishes()
         self._tape = Tape(prepared, self.say, clock)
+        self._outlets = Outlets(sinks, self.say)
         self._tally, self._earlier, self._skipped = Tally(), Tally(), 0
         self._trouble: str | None = "not started"
         self._standstill: str | None = None
@@ -121,6 +127,7 @@ class Runner:
         name = transport.name
         self.source = f"{name} of {skin}" if self.pressable else f"{skin} on {name}"
         self._tape.opened(self.source)
+        self._outlets.start(stream_of(self.prepared, self.source))
         self._thread = threading.Thread(
             target=self._run, args=(transport,), name="tomoskin-runner", daemon=True
         )
@@ -131,6 +138,7 @@ class Runner:
         self._stopping.set()
         if self._thread is not None:
             self._thread.join()
+        self._outlets.stop()
         self._tape.stop()
 
     def record(self, path: Path) -> None:
@@ -189,6 +197,7 @@ class Runner:
             running=self._trouble is None and self._standstill is None,
             paused=self._wishes.held,
             recording=self._tape.path,
+            sinks=self._outlets.reports(),
             frames=self._meter.frames,
             fps=self._meter.rate(now),
             dropped=total.dropped + self._skipped + self._pipeline.refused,
@@ -248,6 +257,7 @@ class Runner:
     def _publish(self, event: Event) -> None:
         self.events.add(event)
         self._tape.event(event)
+        self._outlets.put(event)
 
     def _reopened(self) -> Transport | None:
         delay = _FIRST_DELAY
@@ -298,6 +308,8 @@ class Runner:
         self._meter.took(latency)
         self.newest = Snapshot(result, self._truth, latency)
         self._tape.result(result)
+        if self._outlets:
+            self._outlets.put(moment_of(result))
         with self._watching:
             for announce in self._watchers:
                 announce()

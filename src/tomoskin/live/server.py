@@ -20,6 +20,7 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
 from tomoskin.core import TomoskinError
+from tomoskin.live import messages
 from tomoskin.live.guard import Guard
 from tomoskin.live.hub import Hub
 from tomoskin.live.page import PATIENCE, Page
@@ -77,13 +78,16 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def application(hub: Hub, door: Door, static: Path = STATIC) -> ASGIApp:
-    """ASGI application: the built page, and ``/ws`` for each open page."""
+    """ASGI application: the built page, ``/ws`` for each open page, ``/status`` for programs."""
 
     async def stream(websocket: WebSocket) -> None:
         await Page(websocket, hub).run()
 
     async def no_icon(_: Request) -> Response:
         return Response(status_code=204)
+
+    async def status(_: Request) -> Response:
+        return Response(messages.state(hub.runner.status()), media_type="application/json")
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -93,6 +97,7 @@ def application(hub: Hub, door: Door, static: Path = STATIC) -> ASGIApp:
     routes = [
         WebSocketRoute("/ws", stream),
         Route("/favicon.ico", no_icon),
+        Route("/status", status),
         Mount("/", StaticFiles(directory=static, html=True)),
     ]
     return Guard(Starlette(routes=routes, lifespan=lifespan), door)

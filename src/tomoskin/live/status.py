@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tomoskin.inverse import AlphaChoice
 from tomoskin.live.result import ReferenceState
+from tomoskin.sink import SinkReport
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +44,8 @@ class Status:
         The alpha of the pictures, and what chose it.
     left_out
         Rows that the newest picture does without.
+    sinks
+        How each sink is doing.
     problem
         What someone should see to, in one sentence, or None.
     """
@@ -63,6 +66,7 @@ class Status:
     left_out: int
     problem: str | None
     recording: Path | None = None
+    sinks: tuple[SinkReport, ...] = ()
 
     @property
     def text(self) -> str:

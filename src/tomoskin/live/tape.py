@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 
-from tomoskin.core import Event, Frame, GeometryError, PixelMap
+from tomoskin.core import Event, Frame
 from tomoskin.live.pipeline import REFERENCE_FRAMES
 from tomoskin.live.prepare import Prepared
+from tomoskin.live.published import epoch, glance
 from tomoskin.live.result import Result
 from tomoskin.session import Mark, Recorder, SessionWriter
 from tomoskin.source import Link
 from tomoskin.twin import Press
 from tomoskin.wire import Info
-
-_PIXELS = 48
-"""Pixels along the longer side of a recorded image: what a glance needs."""
 
 _KEPT = 3 * REFERENCE_FRAMES
 """Frames from a reference's first on that a later recording begins with: those that made it, and
@@ -77,9 +74,8 @@ class Tape:
 
     def _begin(self, path: Path) -> None:
         now = self._clock()
-        epoch = time.time() - time.monotonic()
-        session = SessionWriter(path, self._prepared.skin, epoch=epoch, start=now)
-        recorder = Recorder(session, self._pixels(), self._say)
+        session = SessionWriter(path, self._prepared.skin, epoch=epoch(), start=now)
+        recorder = Recorder(session, glance(self._prepared), self._say)
         recorder.settings(now, self._settings())
         recorder.truth(now, self._truth)
         for frame, mark in tuple(self._reference):
@@ -145,9 +141,3 @@ class Tape:
         left_out = mark & (Mark.HELD | Mark.SKIPPED)
         if not left_out and len(self._reference) < _KEPT:
             self._reference.append((frame, mark))
-
-    def _pixels(self) -> PixelMap | None:
-        try:
-            return self._prepared.mesh.pixels(_PIXELS)
-        except GeometryError:
-            return None  # a curved sheet

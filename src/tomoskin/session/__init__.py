@@ -4,12 +4,15 @@ from tomoskin.session.alpha_picture import write_choices
 from tomoskin.session.archive import load_arrays
 from tomoskin.session.blocks import Rows, all_blocks
 from tomoskin.session.calibration import Calibration, read_calibration, write_calibration
+from tomoskin.session.channels import schema_of
 from tomoskin.session.display import Display, circular_average
+from tomoskin.session.documents import encode_json, touches_message
 from tomoskin.session.exports.hdf5 import write_hdf5
 from tomoskin.session.exports.matlab import write_matlab
 from tomoskin.session.exports.movie import WRITERS as FILMS
 from tomoskin.session.exports.series import write_series
 from tomoskin.session.exports.table import write_csv, write_parquet
+from tomoskin.session.foxglove import grid_message, log_message, scene_message
 from tomoskin.session.info import SessionInfo, session_info
 from tomoskin.session.interchange import write_interchange
 from tomoskin.session.labelled_set import is_done, join_shards, shard_path, write_whole
@@ -54,9 +57,12 @@ __all__ = [
     "Truth",
     "all_blocks",
     "circular_average",
+    "encode_json",
+    "grid_message",
     "is_done",
     "is_session",
     "join_shards",
+    "log_message",
     "load_arrays",
     "open_replay",
     "parse_replay",
@@ -68,8 +74,11 @@ __all__ = [
     "recording_of",
     "rendered",
     "repair",
+    "scene_message",
+    "schema_of",
     "session_info",
     "shard_path",
+    "touches_message",
     "write_calibration",
     "write_choices",
     "write_csv",

@@ -155,3 +155,9 @@ CHANNELS = tuple(
 
 TOPICS = {channel.id: channel.topic for channel in CHANNELS}
 """Topic by number of the channel."""
+
+
+def schema_of(topic: str) -> Schema:
+    """Schema of the messages of a topic."""
+    numbers = {channel.topic: channel.schema for channel in CHANNELS}
+    return SCHEMAS[numbers[topic] - 1]

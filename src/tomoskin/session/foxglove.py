@@ -28,7 +28,7 @@ _UPRIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 Message = dict[str, Any]
 
 
-def log(event: Event, log_time: int) -> Message:
+def log_message(event: Event, log_time: int) -> Message:
     """A ``foxglove.Log`` of an event or note."""
     return {
         "timestamp": _timestamp(log_time),
@@ -41,7 +41,7 @@ def log(event: Event, log_time: int) -> Message:
     }
 
 
-def grid(image: Image, pixels: PixelMap, host_time: float, log_time: int) -> Message:
+def grid_message(image: Image, pixels: PixelMap, host_time: float, log_time: int) -> Message:
     """A ``foxglove.Grid`` of one image: a 32-bit float a pixel, NaN outside the sheet.
 
     Its rows begin at the lowest y, where the grid's own place is.
@@ -64,7 +64,7 @@ def grid(image: Image, pixels: PixelMap, host_time: float, log_time: int) -> Mes
     }
 
 
-def scene(touches: Sequence[Touch], log_time: int) -> Message:
+def scene_message(touches: Sequence[Touch], log_time: int) -> Message:
     """A ``foxglove.SceneUpdate`` that shows these touches and no others."""
     now = _timestamp(log_time)
     return {

@@ -9,13 +9,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-import msgspec
-import numpy as np
-
 from tomoskin import __version__
 from tomoskin.core import DataError, Event, Frame, Image, PixelMap, Touch
-from tomoskin.session import channels, foxglove
+from tomoskin.session import channels
 from tomoskin.session.container import ContainerWriter
+from tomoskin.session.documents import encode_json, plain, touches_message
+from tomoskin.session.foxglove import grid_message, log_message, scene_message
 from tomoskin.session.layout import Mark, encode_frame, encode_raw
 
 if TYPE_CHECKING:
@@ -89,17 +88,15 @@ class SessionWriter:
 
     def touches(self, host_time: float, sequence: int, touches: Sequence[Touch]) -> None:
         """Touches of the frame ``sequence``; none is worth saying when there were some before."""
-        rows = [_touch(touch) for touch in touches]
-        content = {"host_time": host_time, "sequence": sequence, "touches": rows}
-        self._say(channels.TOUCHES, host_time, content)
+        self._say(channels.TOUCHES, host_time, touches_message(host_time, sequence, touches))
 
     def image(
         self, host_time: float, image: Image, pixels: PixelMap, touches: Sequence[Touch] = ()
     ) -> None:
         """One image for tools that show it, with its touches; the frames give it exactly."""
         log_time = self._log_time(host_time)
-        self._say(channels.IMAGE, host_time, foxglove.grid(image, pixels, host_time, log_time))
-        self._say(channels.SCENE, host_time, foxglove.scene(touches, log_time))
+        self._say(channels.IMAGE, host_time, grid_message(image, pixels, host_time, log_time))
+        self._say(channels.SCENE, host_time, scene_message(touches, log_time))
 
     def truth(self, host_time: float, presses: Sequence[Any]) -> None:
         """What presses on the twin from ``host_time`` on.
@@ -107,18 +104,18 @@ class SessionWriter:
         Each press is a mapping or a record with ``x``, ``y``, ``force``, ``radius`` (SI) and
         whatever else describes it.
         """
-        rows = [_plain(press) for press in presses]
+        rows = [plain(press) for press in presses]
         self._say(channels.TRUTH, host_time, {"host_time": host_time, "presses": rows})
 
     def event(self, event: Event) -> None:
         """Something that happened."""
         log_time = self._log_time(event.host_time)
-        self._say(channels.EVENTS, event.host_time, foxglove.log(event, log_time))
+        self._say(channels.EVENTS, event.host_time, log_message(event, log_time))
 
     def note(self, host_time: float, text: str) -> None:
         """A person's remark at ``host_time``."""
         event = Event(host_time, "note", text)
-        self._say(channels.NOTES, host_time, foxglove.log(event, self._log_time(host_time)))
+        self._say(channels.NOTES, host_time, log_message(event, self._log_time(host_time)))
 
     def device(self, host_time: float, info: Info) -> None:
         """What the board says that it is."""
@@ -140,7 +137,7 @@ class SessionWriter:
 
     def clock(self, host_time: float, fit: Any) -> None:
         """A fit of the device's clock to the host's: a mapping or record, see the schema."""
-        self._say(channels.CLOCK, host_time, {"host_time": host_time} | _plain(fit))
+        self._say(channels.CLOCK, host_time, {"host_time": host_time} | plain(fit))
 
     def settings(self, host_time: float, settings: Mapping[str, Any]) -> None:
         """How the run was set: plain values by name."""
@@ -170,7 +167,7 @@ class SessionWriter:
         self.close()
 
     def _say(self, channel: int, host_time: float, content: Mapping[str, Any]) -> None:
-        self._put(channel, host_time, msgspec.json.encode(content, enc_hook=_number))
+        self._put(channel, host_time, encode_json(content))
 
     def _put(self, channel: int, host_time: float, data: bytes) -> None:
         log_time = self._log_time(host_time)
@@ -219,24 +216,3 @@ def _about(skin: Skin, epoch: float) -> dict[str, str]:
         "skin_identity": skin.identity,
         "electrodes": str(skin.n_electrodes),
     }
-
-
-def _plain(item: Any) -> dict[str, Any]:
-    if isinstance(item, Mapping):
-        return dict(item)
-    found: dict[str, Any] = msgspec.to_builtins(item, enc_hook=_number)
-    return found
-
-
-def _number(item: Any) -> Any:
-    if isinstance(item, np.generic | np.ndarray):
-        return item.tolist()
-    raise NotImplementedError(f"expected plain values, got {type(item).__name__}")
-
-
-def _touch(touch: Touch) -> dict[str, Any]:
-    r = touch.reading
-    return {
-        "id": touch.id, "kind": touch.kind, "since": touch.since,
-        "x": r.x, "y": r.y, "sd_x": r.sd_x, "sd_y": r.sd_y, "area": r.area, "peak": r.peak,
-    }  # fmt: skip

@@ -1,0 +1,86 @@
+"""What a sink is, and what it is given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from tomoskin.core import Event, FloatArray, Image, PixelMap, Touch
+from tomoskin.pattern import Pattern
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stream:
+    """What will be published, said once.
+
+    Attributes
+    ----------
+    skin, source
+        Name of the skin, and the source in words.
+    pattern
+        What the voltages are rows of.
+    pixels
+        A raster for images; None where the skin has none (a curved sheet).
+    epoch
+        What is added to a host time to give seconds since 1970.
+    """
+
+    skin: str
+    source: str
+    pattern: Pattern
+    pixels: PixelMap | None
+    epoch: float
+
+    def log_time(self, host_time: float) -> int:
+        """Ns since 1970 of ``host_time``."""
+        return round(1e9 * (host_time + self.epoch))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moment:
+    """One frame, all the way to touches.
+
+    Attributes
+    ----------
+    sequence, host_time
+        As in the frame that it was made from.
+    ready
+        Whether a reference stands; until then there are neither touches nor an image.
+    voltages, reference
+        (n_meas,) V.
+    touches
+        Tracked touches.
+    image
+        Change of conductivity; None where a newer frame waits, or one was sent a moment ago.
+    """
+
+    sequence: int
+    host_time: float
+    ready: bool
+    voltages: FloatArray
+    reference: FloatArray
+    touches: tuple[Touch, ...]
+    image: Image | None
+
+
+Item = Moment | Event
+
+
+class Sink(Protocol):
+    """Takes results elsewhere; all calls come from one thread of its own, which they may hold up.
+
+    Any exception means that the sink is away: it is closed, and opened again after a pause.
+    """
+
+    @property
+    def name(self) -> str:
+        """What a person calls it; without passwords."""
+
+    def open(self, stream: Stream) -> None:
+        """Get ready to publish; again after :meth:`close`."""
+
+    def publish(self, item: Item) -> None:
+        """Send one frame's results, or an event."""
+
+    def close(self) -> None:
+        """Let go of everything; also after an :meth:`open` that failed half-way."""

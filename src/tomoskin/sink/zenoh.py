@@ -1,0 +1,107 @@
+"""The sink ``zenoh``: ROS 2 messages in CDR over Zenoh, with no ROS 2 on this machine."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from typing import Any
+
+from tomoskin.core import SinkError
+from tomoskin.sink.registry import needed
+from tomoskin.sink.ros import TOPICS, RosMessage, RosView
+from tomoskin.sink.ros_types import encode_cdr, type_hash
+from tomoskin.sink.sink import Item, Stream
+
+_WHERE = "sink zenoh"
+
+
+class ZenohSink:
+    """Puts messages of :data:`~tomoskin.sink.ros.TOPICS`.
+
+    Parameters
+    ----------
+    endpoint
+        A router or peer to connect to, such as ``tcp/192.168.1.5:7447``; nobody is searched for
+        then. "" for any peer that Zenoh finds by itself.
+    domain
+        ROS domain: keys and attachments are then those of ``rmw_zenoh``; None for plain keys,
+        as subscribers of Zenoh and ``zenoh-bridge-ros2dds`` have them.
+    """
+
+    def __init__(self, endpoint: str, domain: int | None) -> None:
+        self.name = f"zenoh {endpoint or 'peers'}"
+        self._endpoint, self._domain = endpoint, domain
+        self._zenoh = needed("zenoh", "zenoh")
+        self._ext = needed("zenoh.ext", "zenoh")
+        self._keys = {topic: _key(topic, domain) for topic in TOPICS}
+        self._identity = list(os.urandom(16))
+        self._session: Any = None
+
+    def open(self, stream: Stream) -> None:
+        """Join; SinkError when the endpoint does not answer."""
+        config = self._zenoh.Config()
+        if self._endpoint:
+            config.insert_json5("connect/endpoints", f'["{self._endpoint}"]')
+            config.insert_json5("connect/exit_on_failure", "true")
+            config.insert_json5("connect/timeout_ms", "5000")
+            config.insert_json5("scouting/multicast/enabled", "false")
+            config.insert_json5("listen/endpoints", "[]")
+        try:
+            self._session = self._zenoh.open(config)
+        except self._zenoh.ZError as error:
+            raise SinkError(f"cannot be joined: {error}", where=self.name) from error
+        self._view = RosView(stream)
+        self._sent: Counter[str] = Counter()
+
+    def publish(self, item: Item) -> None:
+        """Put the messages of ``item``."""
+        for message in self._view.of(item):
+            data = encode_cdr(TOPICS[message.topic], message.value)
+            key = self._keys[message.topic]
+            if self._domain is None:
+                self._session.put(key, data)
+            else:
+                self._session.put(key, data, attachment=self._attachment(message))
+
+    def close(self) -> None:
+        """Leave."""
+        session, self._session = self._session, None
+        if session is not None:
+            session.close()
+
+    def _attachment(self, message: RosMessage) -> Any:
+        """Number, time and origin, without which ``rmw_zenoh`` takes no message."""
+        self._sent[message.topic] += 1
+        ext = self._ext
+        number, stamp = ext.Int64(self._sent[message.topic]), ext.Int64(message.stamp)
+        origin = [ext.UInt8(byte) for byte in self._identity]
+        named = ("sequence_number", number, "source_timestamp", stamp, "source_gid", origin)
+        return ext.z_serialize(named)
+
+
+def open_zenoh(argument: str) -> ZenohSink:
+    """``zenoh``, ``zenoh:tcp/HOST:7447``, and for ``rmw_zenoh`` ``domain=N`` after a comma."""
+    parts = [part for part in argument.split(",") if part]
+    domain, endpoint = None, ""
+    for part in parts:
+        key, equals, value = part.partition("=")
+        if equals and key == "domain" and value.isascii() and value.isdigit():
+            domain = int(value)
+        elif not equals and "/" in part and '"' not in part and not endpoint:
+            endpoint = part
+        else:
+            raise SinkError(
+                f'expected an endpoint, then perhaps domain=N, got "{part}"',
+                where=_WHERE,
+                hint="for example zenoh:tcp/192.168.1.5:7447,domain=0",
+            )
+    return ZenohSink(endpoint, domain)
+
+
+def _key(topic: str, domain: int | None) -> str:
+    """As the bridge has it, or as ``rmw_zenoh`` does: domain, topic, type and its hash."""
+    if domain is None:
+        return topic
+    kind = TOPICS[topic]
+    package, _, name = kind.rpartition("/")
+    return f"{domain}/{topic}/{package.replace('/', '::')}::dds_::{name}_/{type_hash(kind)}"
