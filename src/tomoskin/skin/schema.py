@@ -343,8 +343,16 @@ SECTIONS: tuple[Section, ...] = (
     ),
     Section(
         "touch",
-        "How a picture becomes touches.",
+        "How data become touches.",
         (
+            Key(
+                "method",
+                Choice(("image", "fit")),
+                "image: regions of the picture, by gamma1 to position. fit: place, size and "
+                "strength of up to five touches, fitted to the voltages; truer, with honest "
+                "deviations.",
+                default="image",
+            ),
             Key(
                 "gamma1",
                 Number(0.1, 0.99),

@@ -55,7 +55,8 @@ class TwinChoice:
 
 @dataclass(frozen=True, slots=True)
 class TouchSettings:
-    """Thresholds and filters that turn a picture into touches; ``smoothing`` in m."""
+    """The method, "image" or "fit"; what counts as a touch; of "image", the thresholds and filters
+    that turn a picture into touches, ``smoothing`` in m."""
 
     gamma1: float
     gamma2: float
@@ -64,3 +65,4 @@ class TouchSettings:
     snr: float
     position: str
     max_touches: int
+    method: str = "image"
