@@ -28,7 +28,8 @@ def push(prepared):
         n = next(number)
         noise = rng.integers(-1, 2, len(samples))
         noisy = np.where((samples == 0) | (samples > 65000), samples, samples + noise)
-        return pipeline.push(Frame(n, 0, 0.01 * n, 1, 0, 0, noisy.astype(np.uint16)))
+        ticks = round(0.01 * n * pipeline.tick_rate)
+        return pipeline.push(Frame(n, ticks, 0.01 * n, 1, 0, 0, noisy.astype(np.uint16)))
 
     push.pipeline = pipeline
     return push

@@ -10,7 +10,7 @@ import pytest
 from numpy.random import Generator
 
 from shapes import disc
-from tomoskin.core import DataError, FloatArray, Image
+from tomoskin.core import DataError, FloatArray, Image, Reading
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import OneStep
 from tomoskin.pattern import Pattern
@@ -33,6 +33,10 @@ class Chain:
     def segmenter(self, snr: float, sign: str = "decrease") -> Segmenter:
         settings = TouchSettings(0.65, 0.9, 0.005, sign, snr, "centroid", 8)
         return Segmenter(self.operator.model.mesh, settings)
+
+    def begun(self, segmenter: Segmenter, image: Image) -> list[Reading]:
+        """What may begin a touch."""
+        return [reading for reading in segmenter(image, self.floor) if not reading.weak]
 
     def image(self, dv: FloatArray, rng: Generator) -> Image:
         return self.operator(dv + self.noise * rng.standard_normal(len(self.noise)))
@@ -75,7 +79,7 @@ def test_floor_is_the_spread_of_noise_images() -> None:
 def test_few_false_alarms() -> None:
     rng, n = np.random.default_rng(2), 2000
     segmenter = chain().segmenter(snr=5.0)
-    alarms = [segmenter(chain().image(np.zeros(40), rng), chain().floor) for _ in range(n)]
+    alarms = [chain().begun(segmenter, chain().image(np.zeros(40), rng)) for _ in range(n)]
     assert sum(map(bool, alarms)) == 0
 
 
@@ -84,7 +88,7 @@ def test_alarms_come_only_where_the_ratio_is_exceeded() -> None:
     found = 0
     for _ in range(300):
         image = chain().image(np.zeros(40), rng)
-        readings = segmenter(image, chain().floor)
+        readings = chain().begun(segmenter, image)
         found += bool(readings)
         for reading in readings:
             ratio = -image.values[reading.cells] / chain().floor.sd[reading.cells]
@@ -108,7 +112,23 @@ def test_a_press_at_fifteen_times_the_noise_is_found(place: tuple[float, float])
 def test_a_press_below_the_ratio_is_no_touch() -> None:
     rng, segmenter = np.random.default_rng(5), chain().segmenter(snr=5.0)
     dv = chain().press(0.0, 0.0, ratio=1.0)
-    assert not any(segmenter(chain().image(dv, rng), chain().floor) for _ in range(200))
+    assert not any(chain().begun(segmenter, chain().image(dv, rng)) for _ in range(200))
+
+
+def test_between_release_and_onset_ratio_a_reading_is_weak() -> None:
+    image = chain().operator(chain().press(0.0, 0.0, ratio=4.0))
+    (reading,) = chain().segmenter(snr=5.0)(image, chain().floor)
+    assert reading.weak
+    assert reading.snr == pytest.approx(4.0, rel=0.05)
+    assert chain().segmenter(snr=7.0)(image, chain().floor) == []
+
+
+def test_a_press_that_another_outshines_is_weak() -> None:
+    """Half as strong: below the threshold of the extreme, and no ghost beside the two."""
+    strong, faint = (fine().press(x, 0.0, ratio=60.0) for x in (-0.06, 0.06))
+    one, other = fine().segmenter(snr=5.0)(fine().operator(strong + 0.5 * faint), fine().floor)
+    assert (one.weak, other.weak) == (False, True)
+    assert np.hypot(other.x - 0.06, other.y) < 0.01
 
 
 def test_without_a_floor_no_deviation_is_claimed() -> None:

@@ -164,6 +164,8 @@ class Reading:
         How many times its noise the reading stands out; NaN where the noise is not known.
     close
         Whether it may be several touches, too close to separate.
+    weak
+        Whether it is too weak beside others to be a touch by itself: it may carry one on.
     """
 
     x: float
@@ -176,6 +178,7 @@ class Reading:
     cov_xy: float = 0.0
     snr: float = math.nan
     close: bool = False
+    weak: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ from tomoskin.live.imaging import Pictured, imaging
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.tune import tuned, tuned_by_rule
 from tomoskin.session import Recording
-from tomoskin.touch import Tracker
+from tomoskin.touch import STILL, Tracker
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ def reconstruct(
     if prepared.modes is not None:
         _check_times(time, idle, recording.source)
     pictured = _pictured(prepared, changes, time)
-    tracker = Tracker(patience=0, debounce=1)
+    tracker = Tracker(replace(STILL, snr=prepared.skin.touch.snr))
     return Reconstruction(
         frames=changes.frames,
         rows_missing=changes.missing.sum(axis=1),
@@ -95,7 +95,7 @@ def reconstruct(
         images=np.stack([image.values for image, _ in pictured]),
         unit=prepared.operator.unit,
         touches=tuple(
-            tracker.update(prepared.segmenter(image, floor), float(now))
+            tracker.update(prepared.segmenter(image, floor), float(now), float(now))
             for (image, floor), now in zip(pictured, time, strict=True)
         ),
         agreement=changes.agreement,

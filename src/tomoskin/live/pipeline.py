@@ -7,7 +7,7 @@ from collections.abc import Generator
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, Frame, Image, Touch, Voltages
+from tomoskin.core import FloatArray, Frame, Image, Reading, Touch, Voltages
 from tomoskin.inverse import MOST_LEFT_OUT, AlphaChoice
 from tomoskin.live.collector import Collector
 from tomoskin.live.imaging import Alone, Filtered, imaging
@@ -15,7 +15,7 @@ from tomoskin.live.prepare import Prepared
 from tomoskin.live.result import ReferenceState, Result
 from tomoskin.live.tune import tune
 from tomoskin.signal import Reference, difference
-from tomoskin.touch import Tracker
+from tomoskin.touch import Tracker, TrackSettings
 
 REFERENCE_FRAMES = 20
 """Frames of the untouched skin that make a reference."""
@@ -36,7 +36,7 @@ class Pipeline:
     def __init__(self, prepared: Prepared, *, reference_frames: int = REFERENCE_FRAMES) -> None:
         self._prepared = prepared
         self._needed = reference_frames
-        self._tracker = Tracker()
+        self._tracker = Tracker(TrackSettings(snr=prepared.skin.touch.snr))
         self._image = _none(prepared)
         self._reference: Reference | None = None
         self._imaging: Alone | Filtered = Alone(prepared, None)
@@ -115,15 +115,18 @@ class Pipeline:
     ) -> Result:
         p = self._prepared
         if np.count_nonzero(unusable) > MOST_LEFT_OUT * len(unusable):
-            touches = self._tracker.update([], voltages.host_time)
+            touches = self._track([], voltages)
             return self._result(voltages, self._image, touches, unusable, pictured=False)
         values = np.where(unusable, reference.mean, voltages.values)
         dv = difference(values, reference.mean, p.skin.inverse.difference)
         filled = p.operator.filled(dv, unusable)
         image, floor = self._imaging.push(filled, self._time(voltages))
         readings = p.segmenter(image, floor)
-        touches = self._tracker.update(readings, voltages.host_time)
+        touches = self._track(readings, voltages)
         return self._result(voltages, image, touches, unusable, pictured=True)
+
+    def _track(self, readings: list[Reading], voltages: Voltages) -> tuple[Touch, ...]:
+        return self._tracker.update(readings, self._time(voltages), voltages.host_time)
 
     def _result(
         self,
@@ -143,6 +146,7 @@ class Pipeline:
             voltages=voltages.values,
             reference=self._expected(),
             touches=touches,
+            events=self._tracker.events,
             left_out=int(np.count_nonzero(unusable)),
         )
 

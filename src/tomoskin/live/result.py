@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tomoskin.core import FloatArray, Image, Touch
+from tomoskin.touch import TouchEvent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,6 +28,8 @@ class Result:
         Tracked touches.
     left_out
         Number of rows that were at a rail or not finite and were left out of the picture.
+    events
+        What happened to the touches in this frame.
     """
 
     sequence: int
@@ -38,6 +41,7 @@ class Result:
     reference: FloatArray
     touches: tuple[Touch, ...]
     left_out: int
+    events: tuple[TouchEvent, ...] = ()
 
     @property
     def problem(self) -> str | None:

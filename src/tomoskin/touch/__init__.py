@@ -4,9 +4,10 @@ from tomoskin.touch.floor import NoiseFloor
 from tomoskin.touch.locator import Locator, Presses, Region
 from tomoskin.touch.segment import Segmenter
 from tomoskin.touch.states import Answers, Codes, Examples, StateClassifier, against_rest
-from tomoskin.touch.track import Tracker
+from tomoskin.touch.tracking import STILL, TouchEvent, Tracker, TrackSettings
 
 __all__ = [
+    "STILL",
     "Answers",
     "Codes",
     "Examples",
@@ -16,6 +17,8 @@ __all__ = [
     "Region",
     "Segmenter",
     "StateClassifier",
+    "TouchEvent",
+    "TrackSettings",
     "Tracker",
     "against_rest",
 ]

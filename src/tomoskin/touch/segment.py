@@ -6,6 +6,8 @@ weighted centroid of each region, or its local maxima.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
@@ -17,6 +19,7 @@ from tomoskin.skin import TouchSettings
 from tomoskin.touch.centroid import centroid, centroid_sd
 from tomoskin.touch.connect import connected, neighbour_table
 from tomoskin.touch.floor import NoiseFloor
+from tomoskin.touch.tracking import HELD
 
 _REACH = 2.0
 """The Gaussian filter is cut off at this many standard deviations."""
@@ -46,7 +49,9 @@ class Segmenter:
     def __call__(self, picture: Image, floor: NoiseFloor | None = None) -> list[Reading]:
         """Regions of ``picture``, strongest first.
 
-        With a ``floor``, a region counts only where the image exceeds ``snr`` times its noise.
+        With a ``floor``, a region counts where the image exceeds ``snr`` times its noise. Down to
+        :data:`HELD` of that it is said to be weak, as is what others outshine: enough for a touch
+        to go on, if not to begin.
 
         Raises
         ------
@@ -63,17 +68,46 @@ class Segmenter:
             return []
         filtered = self._filter @ np.where(strength >= limit, image, 0.0).astype(np.float32)
         kept = np.flatnonzero(np.abs(filtered) >= self.settings.gamma2 * limit)
-        significant = _significant(kept, strength, floor, self.settings.snr)
+        significant = _significant(kept, strength, floor, HELD * self.settings.snr)
         if not significant.any():
             return []
         label = connected(kept, filtered > 0, self._neighbours)
         regions = [kept[label == number] for number in np.unique(label[significant])]
         if self.settings.position == "peak":
-            found = [r for cells in regions for r in self._extremes(cells, image, filtered)]
+            found = [r for cells in regions for r in self._extremes(cells, image, filtered, floor)]
         else:
             found = [self._centroid(cells, image, floor) for cells in regions]
         found.sort(key=lambda reading: -abs(reading.peak))
-        return found[: self.settings.max_touches]
+        found = found[: self.settings.max_touches]
+        if floor is None or self.settings.position == "peak":
+            return found
+        return [*found, *self._weaker(regions, image, floor)][: self.settings.max_touches]
+
+    def _weaker(
+        self, regions: list[IntArray], image: FloatArray, floor: NoiseFloor
+    ) -> list[Reading]:
+        """Maxima of the filtered image outside all regions, down to HELD · Γ1 of the extreme.
+
+        A touch that another one outshines is not lost by that: these may carry it on.
+        """
+        height = np.append(np.abs(self._filter @ image.astype(np.float32)), -1.0)
+        free = height >= HELD * self.settings.gamma1 * height.max()
+        free[:-1] &= height[:-1] >= HELD * self.settings.snr * floor.sd
+        for cells in regions:
+            free[cells] = False
+            free[self._neighbours[cells]] = False
+        tops = np.flatnonzero(free)
+        tops = tops[height[tops] > height[self._neighbours[tops]].max(axis=1)]
+        return [
+            replace(self._centroid(self._around(top, height), image, floor), weak=True)
+            for top in tops[np.argsort(-height[tops])]
+        ]
+
+    def _around(self, top: int, height: FloatArray) -> IntArray:
+        """Cells near a maximum that are nearly as high."""
+        away = self.mesh.centroids - self.mesh.centroids[top]
+        near = np.flatnonzero((away**2).sum(axis=1) <= (_REACH * self.settings.smoothing) ** 2)
+        return np.asarray(near[height[near] >= self.settings.gamma2 * height[top]])
 
     def _accept(self, what: str, mesh_id: str) -> None:
         if mesh_id != self.mesh.identity:
@@ -83,7 +117,7 @@ class Segmenter:
             )
 
     def _centroid(self, cells: IntArray, image: FloatArray, floor: NoiseFloor | None) -> Reading:
-        weights = image[cells]
+        weights, snr = image[cells], _snr(cells, image, floor)
         centre = centroid(self.mesh, cells, np.abs(image))
         sd = np.full(2, np.nan)
         if floor is not None:
@@ -97,9 +131,13 @@ class Segmenter:
             area=float(self.mesh.volumes[cells].sum()),
             peak=float(weights[np.argmax(np.abs(weights))]),
             cells=cells,
+            snr=snr,
+            weak=snr < self.settings.snr,
         )
 
-    def _extremes(self, cells: IntArray, image: FloatArray, filtered: FloatArray) -> list[Reading]:
+    def _extremes(
+        self, cells: IntArray, image: FloatArray, filtered: FloatArray, floor: NoiseFloor | None
+    ) -> list[Reading]:
         """One reading at each cell where the filtered image exceeds all its neighbours'.
 
         A level region has no such cell; its first highest one stands for it.
@@ -107,7 +145,7 @@ class Segmenter:
         height = np.append(np.abs(filtered), -1.0)  # the last stands for "no neighbour"
         above = height[cells] > height[self._neighbours[cells]].max(axis=1)
         above[np.argmax(height[cells])] = True
-        area = float(self.mesh.volumes[cells].sum())
+        area, snr = float(self.mesh.volumes[cells].sum()), _snr(cells, image, floor)
         return [
             Reading(
                 x=float(self.mesh.centroids[top, 0]),
@@ -117,6 +155,8 @@ class Segmenter:
                 area=area,
                 peak=float(image[top]),
                 cells=cells,
+                snr=snr,
+                weak=snr < self.settings.snr,
             )
             for top in cells[above]
         ]
@@ -136,6 +176,14 @@ def _significant(
     if floor is None:
         return np.ones(len(kept), dtype=bool)
     return np.asarray(strength[kept] >= snr * floor.sd[kept])
+
+
+def _snr(cells: IntArray, image: FloatArray, floor: NoiseFloor | None) -> float:
+    """How many times its noise the image of ``cells`` is at most; NaN without a floor."""
+    if floor is None:
+        return float("nan")
+    with np.errstate(divide="ignore"):
+        return float((np.abs(image[cells]) / floor.sd[cells]).max())
 
 
 def _gaussian_filter(mesh: Mesh, width: float) -> csr_array:

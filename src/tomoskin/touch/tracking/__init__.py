@@ -1,0 +1,7 @@
+"""Readings of successive frames → touches that keep their identity, and what happens to them."""
+
+from tomoskin.touch.tracking.settings import HELD, STILL, TrackSettings
+from tomoskin.touch.tracking.tracker import Tracker
+from tomoskin.touch.tracking.words import TouchEvent
+
+__all__ = ["HELD", "STILL", "TouchEvent", "TrackSettings", "Tracker"]

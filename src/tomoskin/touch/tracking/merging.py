@@ -1,0 +1,130 @@
+"""Touches that come too close to separate, and come apart again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from tomoskin.core import FloatArray
+from tomoskin.touch.tracking.assign import region_radius
+from tomoskin.touch.tracking.trace import Apart, Trace, content
+
+_REACH = 2.0
+"""A touch merges into a region, and comes out of it, within so many of its radii."""
+
+_CLOSE = 0.005
+_CHANGED = 0.25
+"""By so much a region that takes up another has grown, in parts of its content, and moved to where
+that was, in parts of the way. Chosen on two presses that slide together (twin, seeds 1 to 3)."""
+
+
+_PASSING = 1.2
+"""Touches that have been one for longer than this many times as long as it takes to pass each other
+have stopped, and come out where they went in."""
+
+
+def taken_up_by(lost: Trace, traces: Sequence[Trace]) -> Trace | None:
+    """The touch in whose region the ``lost`` one has been since it went missing, or None.
+
+    A touch that is lifted leaves its neighbour as it was; one that has merged makes the
+    neighbour's region larger and draws it over.
+    """
+    near = [t for t in traces if t is not lost and t.missing is None and _holds(t, lost)]
+    return min(near, key=lambda t: _between(t, lost), default=None)
+
+
+def _holds(trace: Trace, lost: Trace) -> bool:
+    before = lost.beside.get(trace.number)
+    if before is None or trace.sign != lost.sign:
+        return False
+    if _between(trace, lost) > _REACH * region_radius(trace.reading):
+        return False
+    return trace.reading.close or _change(trace, before, lost) > _CHANGED
+
+
+def _change(trace: Trace, before: Apart, lost: Trace) -> float:
+    start = before.states.mean[0, :2]
+    way = np.array([lost.reading.x, lost.reading.y]) - start
+    moved = np.array([trace.reading.x, trace.reading.y]) - start
+    was = content(before.reading)
+    grown = content(trace.reading) / was - 1 if was > 0 else 0.0
+    return float(grown + moved @ way / max(float(way @ way), _CLOSE**2))
+
+
+def _between(trace: Trace, lost: Trace) -> float:
+    r, (x, y) = trace.reading, lost.place.tolist()
+    return min(math.hypot(r.x - x, r.y - y), math.hypot(r.x - lost.reading.x, r.y - lost.reading.y))
+
+
+def merge(carrier: Trace, lost: Trace) -> None:
+    """Let ``carrier`` stand for the ``lost`` touch too; both keep what they were alone."""
+    if carrier.alone is None:
+        carrier.alone = lost.beside[carrier.number]
+    if lost.alone is None:
+        lost.alone = lost.beside[lost.number]
+    carrier.others += [lost, *lost.others]
+    lost.others = []
+
+
+def left_by(branch: Trace, traces: Sequence[Trace]) -> Trace | None:
+    """The merged touch that a new one has come out of, or None."""
+    for trace in traces:
+        if trace.others and trace.sign == branch.sign:
+            away = (trace.reading.x - branch.reading.x, trace.reading.y - branch.reading.y)
+            if np.hypot(*away) <= max(_REACH * region_radius(trace.reading), _spread(trace)):
+                return trace
+    return None
+
+
+def _spread(carrier: Trace) -> float:
+    """Twice the largest distance between the merged touches when they last were apart."""
+    seen = [member.alone.reading for member in carrier.whole if member.alone]
+    places = np.array([(reading.x, reading.y) for reading in seen])
+    return 2 * float(np.linalg.norm(places[:, None] - places, axis=2).max(initial=0.0))
+
+
+def split(carrier: Trace, branch: Trace, time: float) -> tuple[Trace, Trace]:
+    """The two touches that ``carrier`` and the new ``branch`` are now.
+
+    Each branch takes the identity that is expected nearest to it, about their common middle.
+    """
+    members = [carrier, *carrier.others]
+    carrier.others = []
+    seen = np.array([(t.reading.x, t.reading.y) for t in (carrier, branch)])
+    seen -= seen.mean(axis=0)
+    cost = min((_costs(expected, seen) for expected in _expected(members, time)), key=_least)
+    owners, branches = linear_sum_assignment(cost)
+    sides = [replace(t) for t in (carrier, branch)]
+    chosen = {int(b): members[m] for m, b in zip(owners, branches, strict=True)}
+    for side, trace in chosen.items():
+        trace.become(sides[side])
+    for number, member in enumerate(members):
+        if number not in owners:
+            chosen[int(cost[number].argmin())].others.append(member)
+    for trace in chosen.values():
+        trace.alone = trace.alone if trace.others else None
+    return chosen[0], chosen[1]
+
+
+def _costs(expected: FloatArray, seen: FloatArray) -> FloatArray:
+    return np.asarray(((expected[:, None] - seen) ** 2).sum(axis=2))
+
+
+def _least(cost: FloatArray) -> float:
+    return float(cost[linear_sum_assignment(cost)].sum())
+
+
+def _expected(members: Sequence[Trace], time: float) -> Iterator[FloatArray]:
+    """(n, 2) m about their middle: where they went in, and where their course would be by now."""
+    known = [member.alone for member in members if member.alone]
+    means = np.array([alone.states.mean[0] for alone in known])
+    since = time - max(alone.time for alone in known)
+    offset, velocity = (means[:, k : k + 2] - means[:, k : k + 2].mean(axis=0) for k in (0, 2))
+    yield offset
+    passing = 2 * np.linalg.norm(offset) / max(float(np.linalg.norm(velocity)), 1e-9)
+    if since < _PASSING * passing:
+        yield offset + velocity * since

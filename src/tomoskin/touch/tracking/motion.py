@@ -1,0 +1,97 @@
+"""How a finger moves: an integrated Ornstein–Uhlenbeck process, followed by a Kalman filter.
+
+Its velocity has the standard deviation ``speed`` and is forgotten over the time ``turning``
+(Uhlenbeck & Ornstein 1930; Johnson et al. 2008, Ecology 89, 1208, for tracks), so that it is a
+constant velocity from frame to frame and a bounded walk over a gap, whatever the frame rate.
+Updates are Kalman's (1960); a state is x, y, vx, vy.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tomoskin.core import FloatArray, Reading
+from tomoskin.touch.tracking.settings import TrackSettings
+
+GATE = 16.0
+"""Squared Mahalanobis distance beyond which a reading is of another touch: one in 3,000."""
+
+_UNKNOWN = 0.004
+"""Deviation of a reading whose noise is not known, m."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class States:
+    """``mean`` (n, 4) m and m/s, ``covariance`` (n, 4, 4)."""
+
+    mean: FloatArray
+    covariance: FloatArray
+
+
+def predicted(states: States, seconds: float, settings: TrackSettings) -> States:
+    """States after some seconds without a reading."""
+    if not seconds > 0:
+        return states
+    step, noise = _step(seconds, settings)
+    return States(states.mean @ step.T, step @ states.covariance @ step.T + noise)
+
+
+def begun(reading: FloatArray, spread: FloatArray, settings: TrackSettings) -> States:
+    """State of a touch that is seen for the first time: ``reading`` (2,), ``spread`` (2, 2)."""
+    covariance = np.zeros((1, 4, 4))
+    covariance[0, :2, :2] = spread
+    covariance[0, (2, 3), (2, 3)] = settings.speed**2
+    return States(np.concatenate([reading, [0.0, 0.0]])[None], covariance)
+
+
+def updated(states: States, places: FloatArray, spreads: FloatArray) -> States:
+    """States after one reading each: ``places`` (n, 2) with covariances (n, 2, 2)."""
+    cross = states.covariance[:, :, :2]
+    gain = cross @ np.linalg.inv(cross[:, :2] + spreads)
+    away = (places - states.mean[:, :2])[:, :, None]
+    mean = states.mean + (gain @ away)[:, :, 0]
+    covariance = states.covariance - gain @ cross.transpose(0, 2, 1)
+    return States(mean, 0.5 * (covariance + covariance.transpose(0, 2, 1)))
+
+
+def distances(states: States, places: FloatArray, spreads: FloatArray) -> FloatArray:
+    """(n, m) squared Mahalanobis distances of m readings from n states."""
+    away = places - states.mean[:, None, :2]
+    both = states.covariance[:, None, :2, :2] + spreads
+    xx, xy, yy = both[..., 0, 0], both[..., 0, 1], both[..., 1, 1]
+    dx, dy = away[..., 0], away[..., 1]
+    return np.asarray((yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
+
+
+def observed(readings: Sequence[Reading], settings: TrackSettings) -> tuple[FloatArray, FloatArray]:
+    """Places (m, 2) of readings and their covariances (m, 2, 2), wandering included."""
+    places = np.array([(r.x, r.y) for r in readings]).reshape(-1, 2)
+    spreads = np.array([_spread(r, settings) for r in readings]).reshape(-1, 2, 2)
+    return places, spreads
+
+
+def _spread(reading: Reading, settings: TrackSettings) -> tuple[float, float, float, float]:
+    more, unknown = settings.wander**2, _UNKNOWN**2
+    xx, yy, xy = reading.sd_x**2, reading.sd_y**2, reading.cov_xy
+    if not (math.isfinite(xx + yy + xy) and xx * yy > xy * xy):
+        xx, yy, xy = unknown, unknown, 0.0
+    return xx + more, xy, xy, yy + more
+
+
+def _step(seconds: float, settings: TrackSettings) -> tuple[FloatArray, FloatArray]:
+    """Transition and noise (4, 4) each over some ``seconds``."""
+    tau, power = settings.turning, settings.speed**2
+    u = seconds / tau
+    a = math.exp(-u)
+    there = power * tau**2 * (2 * u - 3 + 4 * a - a * a)
+    cross, moving = power * tau * (1 - a) ** 2, power * (1 - a * a)
+    step, noise = np.zeros((4, 4)), np.zeros((4, 4))
+    for axis in (0, 1):
+        step[axis, axis], step[axis, axis + 2], step[axis + 2, axis + 2] = 1.0, tau * (1 - a), a
+        noise[axis, axis], noise[axis + 2, axis + 2] = there, moving
+        noise[axis, axis + 2] = noise[axis + 2, axis] = cross
+    return step, noise

@@ -1,0 +1,121 @@
+"""What a press leaves behind: told from a touch by place, sign, size and by not growing.
+
+Textiles, foams and gels do not come back at once, and some not before the next press (play,
+Prandtl 1928). What is left is of the press's sign, a fraction of its size, and it fades.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tomoskin.core import Reading
+from tomoskin.touch.tracking.assign import region_radius
+from tomoskin.touch.tracking.trace import Trace, sign_of
+
+_PART = 0.25
+"""A remainder is at most this part of its press."""
+
+_FALL = 1.0
+"""A press that is lifted falls from half its size to that part within so many seconds."""
+
+_GROWTH = 1.3
+"""What grows by this factor, and by two deviations of its noise, is a new press."""
+
+_NOISE = 2.0
+_CREEP = 10.0
+"""A level that rises slower than over so many seconds is the sheet's drift."""
+
+_BESIDE = 1.25
+"""A remainder lies within this many radii of its region, or of its press's."""
+
+_MOST = 64
+
+
+@dataclass(slots=True, eq=False)
+class Scar:
+    """A place where something was: sign and size of the press, its radius, what is left of it.
+
+    ``unseen`` says that nothing was left above the noise since it was last looked for.
+    """
+
+    x: float
+    y: float
+    sign: float
+    press: float
+    radius: float
+    level: float
+    time: float
+    unseen: bool = False
+
+    def is_under(self, reading: Reading) -> bool:
+        """Whether the reading lies here, with this sign, and no larger than a remainder."""
+        reach = _BESIDE * max(self.radius, region_radius(reading))
+        near = (reading.x - self.x) ** 2 + (reading.y - self.y) ** 2 <= reach**2
+        return near and sign_of(reading) == self.sign and abs(reading.peak) <= _PART * self.press
+
+    def explains(self, reading: Reading, time: float, least_snr: float) -> bool:
+        """Whether the reading has not grown; follow its level."""
+        size = abs(reading.peak)
+        noise = size / reading.snr if reading.snr > 0 else 0.0
+        if self.unseen:
+            self.level, self.unseen = min(self.level, least_snr * noise), False
+        grown = size > _GROWTH * self.level + _NOISE * noise
+        if size > self.level and not grown:
+            self.level += (size - self.level) * -np.expm1((self.time - time) / _CREEP)
+        self.level, self.time = min(self.level, size), time
+        return not grown
+
+
+class Remainders:
+    """Memory of where touches were.
+
+    Parameters
+    ----------
+    least_snr
+        Signal-to-noise ratio below which there is no reading.
+    """
+
+    def __init__(self, least_snr: float) -> None:
+        self._least_snr = least_snr
+        self._scars: list[Scar] = []
+
+    def forget(self) -> None:
+        """Begin anew, as with a new reference."""
+        self._scars = []
+
+    def leave(self, trace: Trace, time: float) -> None:
+        """Remember where a touch was that has ended."""
+        radius = region_radius(trace.reading)
+        for foot in trace.footprints:
+            self._scars.append(
+                Scar(foot.x, foot.y, trace.sign, foot.top, radius, _PART * foot.top, time)
+            )
+        del self._scars[:-_MOST]
+
+    def nothing_seen(self) -> None:
+        """No reading at all in this frame: what is left is below the noise."""
+        for scar in self._scars:
+            scar.unseen = True
+
+    def explain(self, reading: Reading, time: float) -> bool:
+        """Whether the reading is what an earlier touch has left."""
+        under = [scar for scar in self._scars if scar.is_under(reading)]
+        told = [scar.explains(reading, time, self._least_snr) for scar in under]
+        return any(told)  # each of them follows the level
+
+
+def has_become_one(trace: Trace, time: float, lasting: float) -> bool:
+    """Whether a touch has ended and only its remainder is seen, for ``lasting`` s.
+
+    It must have fallen fast and not grown since.
+    """
+    size, top = abs(trace.reading.peak), trace.footprints[-1].top
+    if size > _PART * top or (trace.low is None and time - trace.strong > _FALL):
+        trace.low = None
+        return False
+    if trace.low is None or size > _GROWTH * trace.least:
+        trace.low, trace.least = time, size
+    trace.least = min(trace.least, size)
+    return time - trace.low >= lasting and time > trace.low

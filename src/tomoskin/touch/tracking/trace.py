@@ -1,0 +1,145 @@
+"""One touch in the tracker's memory, from its first reading to its release."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from tomoskin.core import FloatArray, Reading, Touch
+from tomoskin.touch.tracking.motion import States
+
+_STEP = 0.012
+"""A touch that slides leaves a footprint every so many metres."""
+
+_MOST_FOOTPRINTS = 40
+_STRONG = 0.5
+
+
+@dataclass(slots=True)
+class Footprint:
+    """Where a touch was, m, and how strong at most."""
+
+    x: float
+    y: float
+    top: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Apart:
+    """A touch as it was last seen by itself, and expected in the frame thereafter, device s."""
+
+    reading: Reading
+    states: States
+    time: float
+
+
+@dataclass(eq=False)
+class Trace:
+    """What is known of one touch, or of what may become one.
+
+    Attributes
+    ----------
+    reading, states
+        Newest reading; place and velocity, one row.
+    since, host_since
+        Device and host time of its first frame, s.
+    number
+        Its identity; 0 until it is reported.
+    frames
+        Readings so far.
+    missing
+        Device time of the first frame without a reading since the last one, or None.
+    strong, low, least
+        Device times at which it was last strong for its place, and since which it has been so
+        weak that it may be a remainder, or None; least size of its peak since then.
+    footprints
+        Where it has been, the newest last.
+    alone
+        As it was before it merged with others, or None.
+    others
+        Touches that it stands for beside itself.
+    beside
+        The other touches as they were when this one went missing, by number.
+    said_at
+        (2,) m where the last event put it.
+    """
+
+    reading: Reading
+    states: States
+    since: float
+    host_since: float
+    number: int = 0
+    frames: int = 1
+    missing: float | None = None
+    strong: float = 0.0
+    low: float | None = None
+    least: float = 0.0
+    footprints: list[Footprint] = field(default_factory=list)
+    alone: Apart | None = None
+    others: list[Trace] = field(default_factory=list)
+    beside: Mapping[int, Apart] = field(default_factory=dict)
+    said_at: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Leave the first footprint."""
+        self.strong = self.since
+        self._step()
+
+    @property
+    def place(self) -> FloatArray:
+        """(2,) m where it is expected."""
+        expected: FloatArray = self.states.mean[0, :2]
+        return expected
+
+    @property
+    def sign(self) -> float:
+        """Of its peak."""
+        return sign_of(self.reading)
+
+    @property
+    def whole(self) -> tuple[Trace, ...]:
+        """Itself and those that it stands for, in the order of their numbers."""
+        return tuple(sorted((self, *self.others), key=lambda trace: trace.number))
+
+    @property
+    def touch(self) -> Touch:
+        """As it is reported: a merged one by the oldest of its numbers."""
+        first = self.whole[0]
+        merged = tuple(t.number for t in self.whole) if self.others else ()
+        kind = "decrease" if self.sign < 0 else "increase"
+        return Touch(first.number, kind, first.host_since, self.reading, merged)
+
+    def see(self, reading: Reading, time: float) -> None:
+        """Take the reading of this frame."""
+        self.reading = reading
+        self.frames += 1
+        self.missing = None
+        self._step()
+        if abs(reading.peak) >= _STRONG * self.footprints[-1].top:
+            self.strong = time
+
+    def become(self, other: Trace) -> None:
+        """Go on from where ``other`` is."""
+        self.reading, self.states, self.strong = other.reading, other.states, other.strong
+        self.missing, self.low = other.missing, None
+        self._step()
+
+    def _step(self) -> None:
+        x, y, size = self.reading.x, self.reading.y, abs(self.reading.peak)
+        if self.footprints:
+            last = self.footprints[-1]
+            if (x - last.x) ** 2 + (y - last.y) ** 2 < _STEP**2:
+                last.top = max(last.top, size)
+                return
+        self.footprints.append(Footprint(x, y, size))
+        del self.footprints[:-_MOST_FOOTPRINTS]
+
+
+def content(reading: Reading) -> float:
+    """Size of the peak times the region's area: two regions that become one add them up."""
+    return abs(reading.peak) * reading.area
+
+
+def sign_of(reading: Reading) -> float:
+    """1 or −1."""
+    return -1.0 if reading.peak < 0 else 1.0

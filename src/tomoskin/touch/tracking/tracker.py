@@ -1,0 +1,211 @@
+"""Readings of successive frames → touches that keep their identity."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import count
+
+import numpy as np
+
+from tomoskin.core import FloatArray, Reading, Touch
+from tomoskin.touch.tracking import motion
+from tomoskin.touch.tracking.assign import assigned
+from tomoskin.touch.tracking.merging import left_by, merge, split, taken_up_by
+from tomoskin.touch.tracking.remainder import Remainders, has_become_one
+from tomoskin.touch.tracking.settings import TrackSettings
+from tomoskin.touch.tracking.trace import Apart, Trace
+from tomoskin.touch.tracking.words import Happening, TouchEvent
+
+_ROUNDING = 1e-9
+_MOVED, _BY_DEVIATIONS = 0.003, 3.0
+"""A touch is said to move when it is so many metres, and deviations, from where it was said."""
+
+
+class Tracker:
+    """Joins readings to touches; remembers what can come back.
+
+    Attributes
+    ----------
+    events
+        What happened in the newest frame.
+    """
+
+    def __init__(self, settings: TrackSettings | None = None) -> None:
+        self.settings = settings or TrackSettings()
+        self.events: tuple[TouchEvent, ...] = ()
+        self._traces: list[Trace] = []
+        self._remainders = Remainders(self.settings.least_snr)
+        self._numbers = count(1)
+        self._last: float | None = None
+        self._now = 0.0
+        self._host = 0.0
+        self._happened: list[TouchEvent] = []
+
+    def update(
+        self, readings: Sequence[Reading], time: float, host_time: float
+    ) -> tuple[Touch, ...]:
+        """Touches of this frame, in order of their identity.
+
+        ``time`` is the device's, s; where it does not go on, as when a board starts again, the
+        host's counts. ``host_time`` is what touches and events tell.
+        """
+        elapsed = self._elapse(time, host_time)
+        self._host, self._happened = host_time, []
+        if readings or self._traces:
+            self._follow(list(readings), elapsed)
+        if not readings:
+            self._remainders.nothing_seen()
+        self.events = tuple(self._happened)
+        shown = [trace.touch for trace in self._traces if trace.number]
+        return tuple(sorted(shown, key=lambda touch: touch.id))
+
+    def reset(self) -> None:
+        """Release every touch and forget what they left; identities go on counting."""
+        self._traces = []
+        self._remainders.forget()
+        self.events = ()
+
+    def _elapse(self, time: float, host_time: float) -> float:
+        elapsed = 0.0
+        if self._last is not None:
+            elapsed = time - self._last if time > self._last else max(host_time - self._host, 0.0)
+        self._last = time
+        self._now += elapsed
+        return elapsed
+
+    def _follow(self, readings: list[Reading], elapsed: float) -> None:
+        traces, settings = self._traces, self.settings
+        seen = motion.observed(readings, settings)
+        states = _stacked(traces)
+        pairs: dict[int, int] = {}
+        if traces:
+            states = motion.predicted(states, elapsed, settings)
+            for trace, state in zip(traces, _rows(states), strict=True):
+                trace.states = state
+        if traces and readings:
+            signs = np.array([trace.sign for trace in traces])
+            behind = np.array([not t.number or t.missing is not None for t in traces], float)
+            pairs, far = assigned(states, signs, behind, readings, seen)
+            self._note_missing(set(pairs.values()))
+            self._see(readings, pairs, seen, far)
+        else:
+            self._note_missing(set())
+        for index, reading in enumerate(readings):
+            if index not in pairs and self._begins(reading):
+                state = motion.begun(seen[0][index], seen[1][index], settings)
+                traces.append(Trace(reading, state, self._now, self._host))
+        self._settle()
+
+    def _note_missing(self, found: set[int]) -> None:
+        lost = [trace for k, trace in enumerate(self._traces) if k not in found]
+        going = [trace for trace in lost if trace.missing is None]
+        if going:
+            known = [trace for trace in self._traces if trace.number]
+            now = {t.number: Apart(t.reading, t.states, self._now) for t in known}
+            for trace in going:
+                trace.missing, trace.beside = self._now, now
+
+    def _see(
+        self,
+        readings: list[Reading],
+        pairs: dict[int, int],
+        seen: tuple[FloatArray, FloatArray],
+        far: FloatArray,
+    ) -> None:
+        if not pairs:
+            return
+        own, which = list(pairs.values()), list(pairs)
+        places, spreads = seen[0][which], seen[1][which]
+        states = motion.updated(_stacked([self._traces[k] for k in own]), places, spreads)
+        for row, (trace, index) in enumerate(zip(own, which, strict=True)):
+            known = self._traces[trace]
+            known.see(readings[index], self._now)
+            known.states = motion.States(states.mean[[row]], states.covariance[[row]])
+            if far[trace, index] > motion.GATE:  # its region has changed: it has not moved
+                known.states = motion.begun(places[row], spreads[row], self.settings)
+
+    def _begins(self, reading: Reading) -> bool:
+        if reading.weak or reading.snr < self.settings.snr:
+            return False
+        return not self._remainders.explain(reading, self._now)
+
+    def _settle(self) -> None:
+        """Report what has stood long enough, end what has been gone long enough."""
+        for trace in list(self._traces):
+            if not trace.number:
+                self._consider(trace)
+        for trace in [t for t in self._traces if t.number]:
+            if trace.missing is not None and self._lasts(trace.missing, self.settings.release):
+                self._lose(trace)
+            elif trace.missing is None and has_become_one(trace, self._now, self.settings.release):
+                self._end(trace)
+        for trace in self._traces:
+            if trace.number and self._has_moved(trace):
+                self._say("move", trace)
+
+    def _consider(self, trace: Trace) -> None:
+        """Report a newcomer that has stood, forget one that has not."""
+        if trace.missing is not None:
+            self._traces.remove(trace)
+            return
+        if not self._lasts(trace.since, self.settings.onset):
+            return
+        origin = left_by(trace, self._traces)
+        if origin is None:
+            trace.number = next(self._numbers)
+            self._say("onset", trace)
+            return
+        if origin.missing is not None:  # its region is gone, and this is one of those it was
+            self._traces.remove(trace)
+            origin.become(trace)
+            return
+        both = split(origin, trace, self._now)
+        self._traces.remove(trace)
+        self._traces.remove(origin)
+        self._traces += both
+        for one in both:
+            self._say("split", one)
+
+    def _lasts(self, since: float, seconds: float) -> bool:
+        """Whether ``seconds`` have gone by, and a frame at least."""
+        return not seconds or (self._now > since and self._now - since >= seconds - _ROUNDING)
+
+    def _lose(self, trace: Trace) -> None:
+        carrier = taken_up_by(trace, self._traces)
+        if carrier is None:
+            self._end(trace)
+            return
+        self._traces.remove(trace)
+        merge(carrier, trace)
+        self._say("merge", carrier)
+
+    def _end(self, trace: Trace) -> None:
+        self._traces.remove(trace)
+        for member in trace.whole:
+            self._remainders.leave(member, self._now)
+            ended = replace(trace.touch, id=member.number, since=member.host_since, merged=())
+            self._happened.append(TouchEvent("release", ended, self._host))
+
+    def _has_moved(self, trace: Trace) -> bool:
+        r = trace.reading
+        (x, y), sd = trace.said_at, math.hypot(r.sd_x, r.sd_y)
+        far = math.hypot(r.x - x, r.y - y)
+        return far > _MOVED and not far < _BY_DEVIATIONS * sd
+
+    def _say(self, kind: Happening, trace: Trace) -> None:
+        trace.said_at = (trace.reading.x, trace.reading.y)
+        self._happened.append(TouchEvent(kind, trace.touch, self._host))
+
+
+def _stacked(traces: Sequence[Trace]) -> motion.States:
+    if not traces:
+        return motion.States(np.empty((0, 4)), np.empty((0, 4, 4)))
+    mean = np.concatenate([trace.states.mean for trace in traces])
+    return motion.States(mean, np.concatenate([trace.states.covariance for trace in traces]))
+
+
+def _rows(states: motion.States) -> Iterator[motion.States]:
+    for k in range(len(states.mean)):
+        yield motion.States(states.mean[k : k + 1], states.covariance[k : k + 1])
