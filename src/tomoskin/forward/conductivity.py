@@ -23,7 +23,7 @@ def checked_conductivity(value: ArrayLike, mesh: Mesh) -> NDArray[Any]:
     ModelError
         For another shape, or naming the first cell whose conductivity is not positive, not
         finite or (a tensor) not symmetric. On a curved sheet a tensor acts in the sheet only, and
-        must be positive there.
+        must be positive there; with a metric it is in each cell's frame (``Mesh.corners``).
     """
     raw = numbers(value, "conductivity")
     n, d = len(mesh.cells), mesh.points.shape[1]
@@ -81,7 +81,7 @@ def _checked_tensor(sigma: NDArray[Any], mesh: Mesh) -> NDArray[Any]:
 
 def _in_sheet(sigma: NDArray[Any], mesh: Mesh) -> NDArray[Any]:
     """Each tensor in an orthonormal basis of its cell."""
-    corner = mesh.points[mesh.cells]
+    corner = mesh.corners
     basis, _ = np.linalg.qr((corner[:, 1:] - corner[:, :1]).swapaxes(1, 2))
     return np.asarray(basis.swapaxes(1, 2) @ sigma @ basis)
 

@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray, IntArray, ModelError
-from tomoskin.mesh import Mesh, simplex_measure
+from tomoskin.mesh import Mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Element:
             cells=cells,
             gradients=_gradients(mesh, order),
             facets=facets,
-            facet_sizes=tuple(simplex_measure(mesh.points, e) for e in mesh.electrodes),
+            facet_sizes=tuple(mesh.facet_sizes(e) for e in mesh.electrodes),
             facet_mass=mass,
             facet_load=load,
         )
@@ -94,12 +94,11 @@ class _Edges:
         return np.hstack(numbers)
 
 
-def barycentric_gradients(points: FloatArray, simplices: IntArray) -> FloatArray:
-    """(n, k, n_coordinates) gradient of each corner's linear function, 1/m.
+def barycentric_gradients(corner: FloatArray) -> FloatArray:
+    """(n, k, n_coordinates) gradient of each corner's linear function, 1/m; ``corner`` (n, k, …) m.
 
     On a curved sheet, or on facets, they lie in the plane of the simplex.
     """
-    corner = points[simplices]
     edges = corner[:, 1:] - corner[:, :1]
     gram = edges @ edges.transpose(0, 2, 1)
     inner = np.linalg.solve(gram, edges)
@@ -107,7 +106,7 @@ def barycentric_gradients(points: FloatArray, simplices: IntArray) -> FloatArray
 
 
 def _gradients(mesh: Mesh, order: int) -> FloatArray:
-    linear = barycentric_gradients(mesh.points, mesh.cells)
+    linear = barycentric_gradients(mesh.corners)
     if order == 1:
         return (linear * np.sqrt(mesh.volumes)[:, None, None])[:, None]
     points = _quadrature(mesh.dimension)

@@ -25,6 +25,8 @@ def by_movement(state: State) -> NDArray[Any]:
     model, mesh = state.model, state.model.mesh
     if model.order != 1 or state.conductivity.ndim > 1:
         raise ModelError("movement needs elements of order 1 and a scalar conductivity")
+    if mesh.metric is not None:
+        raise ModelError("movement needs the sheet's true shape, not a metric")
     d = mesh.points.shape[1]
     out = np.empty((model.pattern.n_meas, len(mesh.electrodes), d), state.gradient.dtype)
     for number, facets in enumerate(mesh.electrodes):
@@ -69,4 +71,4 @@ def _in_contacts(state: State, moved: NDArray[np.bool_]) -> NDArray[Any]:
 
 def _slope(points: FloatArray, simplices: IntArray, moved: NDArray[np.bool_]) -> FloatArray:
     """(n, d) 1/m: gradient of the function that is one at ``moved`` corners and zero elsewhere."""
-    return np.asarray(np.einsum("nk,nkd->nd", moved, barycentric_gradients(points, simplices)))
+    return np.asarray(np.einsum("nk,nkd->nd", moved, barycentric_gradients(points[simplices])))

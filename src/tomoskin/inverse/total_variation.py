@@ -16,7 +16,7 @@ from scipy.sparse import coo_array, csr_array
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.inverse.penalty import Diagonal, Penalty, sparse_penalty
-from tomoskin.mesh import Mesh, simplex_measure
+from tomoskin.mesh import Mesh
 
 
 class SharpPrior(Protocol):
@@ -114,7 +114,7 @@ def _edges(mesh: Mesh) -> FloatArray:
     """(n_pairs,) size of the facet that two neighbours share, over that of the whole domain."""
     shared = _shared_facets(mesh)
     d = mesh.dimension
-    return np.asarray(simplex_measure(mesh.points, shared) / mesh.volumes.sum() ** ((d - 1) / d))
+    return np.asarray(mesh.facet_sizes(shared) / mesh.volumes.sum() ** ((d - 1) / d))
 
 
 def _shared_facets(mesh: Mesh) -> NDArray[np.int64]:

@@ -4,6 +4,8 @@ from tomoskin.mesh.arcs import ElectrodeArc, check_arcs
 from tomoskin.mesh.box import BoxPatch, box
 from tomoskin.mesh.choose import Places
 from tomoskin.mesh.cylinder import cylinder
+from tomoskin.mesh.domed import Cap, Saddle
+from tomoskin.mesh.draped import Draped
 from tomoskin.mesh.extrude import extrude, extrude_mesh
 from tomoskin.mesh.files import MeshFile, read_mesh
 from tomoskin.mesh.mesh import Mesh
@@ -11,12 +13,18 @@ from tomoskin.mesh.outline import Disc, Ellipse, Outline
 from tomoskin.mesh.patch import FacePatch, Patch, WallPatch, ring
 from tomoskin.mesh.polygon import Polygon, Rectangle
 from tomoskin.mesh.quality import Quality, quality
+from tomoskin.mesh.surface import Plane, Surface, laid_on
 from tomoskin.mesh.topology import simplex_measure
 from tomoskin.mesh.triangulate import triangulate
+from tomoskin.mesh.wrapped import Arm, Cylinder
 
 __all__ = [
+    "Arm",
     "BoxPatch",
+    "Cap",
+    "Cylinder",
     "Disc",
+    "Draped",
     "ElectrodeArc",
     "Ellipse",
     "FacePatch",
@@ -25,15 +33,19 @@ __all__ = [
     "Outline",
     "Patch",
     "Places",
+    "Plane",
     "Polygon",
     "Quality",
     "Rectangle",
+    "Saddle",
+    "Surface",
     "WallPatch",
     "box",
     "check_arcs",
     "cylinder",
     "extrude",
     "extrude_mesh",
+    "laid_on",
     "quality",
     "read_mesh",
     "ring",

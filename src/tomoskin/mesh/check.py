@@ -15,13 +15,22 @@ _FLAT = 1e-12
 
 def check_mesh(points: FloatArray, cells: IntArray, electrodes: tuple[IntArray, ...]) -> None:
     """Raise GeometryError that names the first point, cell or electrode that is wrong."""
+    boundary = check_cells(points, cells, electrodes)
+    _check_electrodes(cells.shape[1] - 1, boundary, electrodes)
+
+
+def check_cells(
+    points: FloatArray, cells: IntArray, electrodes: tuple[IntArray, ...] = ()
+) -> IntArray:
+    """The boundary's facets. Raises GeometryError that names the first point or cell that is wrong,
+    or the first electrode that has points which do not exist."""
     _check_shapes(points, cells)
     _check_indices(points, cells, electrodes)
     _check_volumes(points, cells)
     pairs, boundary = paired_facets(cells)
     _check_facets(cells, pairs, boundary)
     _check_connected(len(cells), pairs)
-    _check_electrodes(cells.shape[1] - 1, boundary, electrodes)
+    return boundary
 
 
 def _check_shapes(points: FloatArray, cells: IntArray) -> None:
@@ -116,3 +125,28 @@ def _check_electrodes(
                     f"shares facet {list(facet)} with electrode {owner[facet]}", where=where
                 )
             owner[facet] = number
+
+
+def checked_metric(metric: FloatArray, points: FloatArray, cells: IntArray) -> FloatArray:
+    """(n_cells, 2, 2) symmetric and positive definite, frozen; GeometryError names the first cell
+    where it is not."""
+    if points.shape[1] != 2 or cells.shape[1] != 3:
+        raise GeometryError("only a flat sheet of triangles has a metric", where="metric")
+    found = np.array(metric, dtype=np.float64)
+    if found.shape != (len(cells), 2, 2):
+        raise GeometryError(
+            f"expected shape ({len(cells)}, 2, 2), got {found.shape}", where="metric"
+        )
+    with np.errstate(invalid="ignore", over="ignore"):
+        skew = np.abs(found[:, 0, 1] - found[:, 1, 0])
+        size = found[:, 0, 0] + found[:, 1, 1]
+        definite = np.linalg.det(found) > _FLAT * size**2
+    good = np.isfinite(found).all(axis=(1, 2)) & definite & (size > 0) & (skew <= _FLAT * size)
+    if not good.all():
+        cell = int(np.argmin(good))
+        raise GeometryError(
+            f"expected a symmetric positive definite metric, got {found[cell].tolist()}",
+            where=f"cell {cell}",
+        )
+    found.flags.writeable = False
+    return found

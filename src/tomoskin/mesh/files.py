@@ -1,4 +1,4 @@
-"""Meshes from files: .msh, .vtu, .stl, .obj, by meshio (extra ``mesh``)."""
+"""Meshes from files: .msh, .vtu, .stl, .obj, .ply, by meshio (extra ``mesh``)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tomoskin.mesh.choose import Electrodes, choose
 from tomoskin.mesh.content import cells_of, groups_of, points_of
 from tomoskin.mesh.mesh import Mesh
 
-READERS = {".msh": "gmsh", ".vtu": "vtu", ".stl": "stl", ".obj": "obj"}
+READERS = {".msh": "gmsh", ".vtu": "vtu", ".stl": "stl", ".obj": "obj", ".ply": "ply"}
 """meshio's reader for each ending."""
 
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap
-from tomoskin.mesh.check import check_mesh
+from tomoskin.mesh.check import check_mesh, checked_metric
 from tomoskin.mesh.pixels import pixel_map, step_for
-from tomoskin.mesh.topology import boundary_facets, neighbour_pairs, simplex_measure
+from tomoskin.mesh.topology import boundary_facets, neighbour_pairs, owners, simplex_measure
 
 if TYPE_CHECKING:
     from tomoskin.mesh.choose import Electrodes
@@ -32,18 +32,22 @@ class Mesh:
         (n_cells, k) point indices: 3 a triangle, 4 a tetrahedron; orientation is free.
     electrodes
         One (n_facets, k − 1) array of point indices per electrode.
+    metric
+        (n_cells, 2, 2) of a flat sheet that is laid on a surface or stretched: a step dx in the
+        points' plane is sqrt(dx·G·dx) m long on the sheet. None: as long as it looks.
 
     Raises
     ------
     GeometryError
         For tables that are no numbers, indices that do not exist, a degenerate cell, a facet in
         more than two cells, an electrode without a facet, an electrode's facet that is not on
-        the boundary or belongs to another one too, or a mesh in pieces.
+        the boundary or belongs to another one too, a mesh in pieces, or a metric that is none.
     """
 
     points: FloatArray
     cells: IntArray
     electrodes: tuple[IntArray, ...]
+    metric: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check them."""
@@ -54,6 +58,8 @@ class Mesh:
         )
         object.__setattr__(self, "electrodes", facets)
         check_mesh(self.points, self.cells, self.electrodes)
+        if self.metric is not None:
+            object.__setattr__(self, "metric", checked_metric(self.metric, self.points, self.cells))
 
     @classmethod
     def read(cls, path: str | Path, electrodes: Electrodes = None, *, scale: float = 1.0) -> Mesh:
@@ -70,7 +76,27 @@ class Mesh:
     @cached_property
     def volumes(self) -> FloatArray:
         """(n_cells,) area of each triangle, m², or volume of each tetrahedron, m³."""
-        return simplex_measure(self.points, self.cells)
+        flat = simplex_measure(self.points, self.cells)
+        return flat if self.metric is None else flat * np.sqrt(np.linalg.det(self.metric))
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """(n_cells, k, d) m: each cell's corners with its true lengths and angles.
+
+        With a metric, in a frame of the cell's own, whose first axis is the direction of x.
+        """
+        corner = self.points[self.cells]
+        if self.metric is None:
+            return np.asarray(corner)
+        return np.asarray((corner - corner[:, :1]) @ np.linalg.cholesky(self.metric))
+
+    def facet_sizes(self, facets: IntArray) -> FloatArray:
+        """(n,) length, m, or area, m², of facets (n, k − 1) on the boundary."""
+        if self.metric is None:
+            return simplex_measure(self.points, facets)
+        along = self.points[facets[:, 1]] - self.points[facets[:, 0]]
+        squared = np.einsum("ni,nij,nj->n", along, self.metric[owners(self.cells, facets)], along)
+        return np.asarray(np.sqrt(squared))
 
     @cached_property
     def centroids(self) -> FloatArray:
@@ -91,7 +117,8 @@ class Mesh:
     def identity(self) -> str:
         """Short hash of points, cells and electrodes: images and operators are matched by it."""
         digest = hashlib.sha256()
-        for array in (self.points, self.cells, *self.electrodes):
+        stretched = () if self.metric is None else (self.metric,)
+        for array in (self.points, self.cells, *self.electrodes, *stretched):
             digest.update(str(array.shape).encode())
             digest.update(np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()[:16]

@@ -1,0 +1,87 @@
+"""Whether a triangulated surface runs through itself."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tomoskin.core import FloatArray, GeometryError, IntArray
+
+_EDGES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+"""Ends of each edge, and the corner opposite to it."""
+
+_CLEAR = 1e-9
+"""An edge that ends this near to a triangle, as a part of its length, only touches it."""
+
+_BLOCK = 200_000
+
+
+def check_crossings(points: FloatArray, cells: IntArray) -> None:
+    """Raise GeometryError naming two triangles that cut through each other.
+
+    Neighbours may meet at what they share; two triangles in one plane are not told apart.
+    """
+    for pairs in _near(points, cells):
+        for one, other in ((0, 1), (1, 0)):
+            cut = _cuts(points, cells[pairs[:, one]], cells[pairs[:, other]])
+            if cut.any():
+                a, b = pairs[int(np.argmax(cut))]
+                place = ", ".join(f"{1e3 * x:.4g}" for x in points[cells[a]].mean(axis=0))
+                raise GeometryError(
+                    f"the surface runs through itself near ({place}) mm",
+                    where=f"cells {min(a, b)} and {max(a, b)}",
+                    hint="mend it in a mesh program: remove self-intersections",
+                )
+
+
+def _near(points: FloatArray, cells: IntArray) -> list[IntArray]:
+    """Pairs (n, 2) of cells whose boxes overlap, in blocks."""
+    corner = points[cells]
+    middle = corner.mean(axis=1)
+    reach = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
+    tree = cKDTree(middle)
+    low, high = corner.min(axis=1), corner.max(axis=1)
+    blocks = []
+    # small ones look for large ones nowhere: each looks as far as itself and its equals reach
+    order = np.argsort(reach)
+    for part in np.array_split(order, max(1, len(order) // 4096)):
+        found = tree.query_ball_point(middle[part], 2 * reach[part])
+        first = np.repeat(part, [len(f) for f in found])
+        second = np.concatenate([np.asarray(f, dtype=np.int64) for f in found])
+        smaller = (reach[second] < reach[first]) | (
+            (reach[second] == reach[first]) & (second < first)
+        )
+        first, second = first[smaller], second[smaller]
+        boxed = ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
+        pairs = np.column_stack([first[boxed], second[boxed]])
+        blocks += [pairs[k : k + _BLOCK] for k in range(0, len(pairs), _BLOCK)]
+    return blocks
+
+
+def _cuts(points: FloatArray, one: IntArray, other: IntArray) -> NDArray[np.bool_]:
+    """(n,) whether an edge of triangle ``one`` passes through the inside of ``other``."""
+    cut = np.zeros(len(one), dtype=bool)
+    for a, b, _ in _EDGES:
+        ends = one[:, [a, b]]
+        apart = (ends[:, :, None] != other[:, None, :]).all(axis=(1, 2))
+        cut[apart] |= _pierces(points[ends[apart]], points[other[apart]])
+    return cut
+
+
+def _pierces(edge: FloatArray, triangle: FloatArray) -> NDArray[np.bool_]:
+    """Möller & Trumbore, Journal of Graphics Tools 2 (1997) 21-28."""
+    start, along = edge[:, 0], edge[:, 1] - edge[:, 0]
+    u, v = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
+    across = np.cross(along, v)
+    scale = (u * across).sum(axis=1)
+    size = np.linalg.norm(along, axis=1) * np.linalg.norm(np.cross(u, v), axis=1)
+    steep = np.abs(scale) > _CLEAR * size
+    inverse = 1.0 / np.where(steep, scale, 1.0)
+    away = start - triangle[:, 0]
+    p = (away * across).sum(axis=1) * inverse
+    turned = np.cross(away, u)
+    q = (along * turned).sum(axis=1) * inverse
+    t = (v * turned).sum(axis=1) * inverse
+    inside = np.minimum.reduce([p, q, 1.0 - p - q, t, 1.0 - t]) > _CLEAR
+    return np.asarray(steep & inside)
