@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, GeometryError, Reading
 from tomoskin.forward import ForwardModel
@@ -27,7 +26,7 @@ _MOST = 5
 """Touches at once: more have more parameters than 8 or 16 electrodes tell apart."""
 
 _MASKS = 8
-"""Sets of rows that are left out whose whitening is kept."""
+"""Sets of blind directions whose whitening is kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,26 +91,35 @@ class SpotFinder:
         self, model: SpotModel, skin: Skin, mesh: Mesh, noise: FloatArray, gain: float = 1.0
     ) -> None:
         self._model, self._settings, self._mesh = model, skin.touch, mesh
-        self._noise, self._gain = noise, gain
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
-        self._matched: OrderedDict[bytes, tuple[Whitener, Matched]] = OrderedDict()
         self._before = np.zeros((0, N_PARAMETERS))
+        self.renew(noise, gain)
+
+    def renew(self, noise: FloatArray, gain: float = 1.0) -> None:
+        """Go on with other noise, or another gain."""
+        self._scale = self._model.scale * gain
+        self._whiten = Whitener.of(noise / self._scale[:, None] / self._scale)
+        self._matched: OrderedDict[bytes, tuple[Whitener, Matched]] = OrderedDict()
 
     def reset(self) -> None:
         """Forget the last frame."""
         self._before = self._before[:0]
 
-    def push(self, dv: FloatArray, unusable: NDArray[np.bool_]) -> list[Reading]:
-        """Touches of ``dv`` (n_meas,), strongest first; rows that are ``unusable`` do not count."""
-        whiten, matched = self._whitened(unusable)
+    def push(self, dv: FloatArray, blind: FloatArray) -> list[Reading]:
+        """Touches of ``dv`` (n_meas,), strongest first.
+
+        ``blind`` (n_meas, k) are directions along which the data say nothing: columns of one row
+        each where rows are left out. There must be more rows than that.
+        """
+        whiten, matched = self._whitened(blind)
         problem = Problem(
             response=self._model.response,
             whiten=whiten,
             prior=self._model.prior,
             sheet=self._model.sheet,
             sign=self._settings.sign,
-            data=whiten(np.where(unusable, 0.0, dv) / self._model.scale / self._gain),
+            data=whiten(dv / self._scale),
         )
         found = Search(problem, matched, self._settings.snr, self._most)(self._before)
         self._before = found.fit.spots
@@ -119,11 +127,10 @@ class SpotFinder:
         readings.sort(key=lambda reading: -abs(reading.peak))
         return readings
 
-    def _whitened(self, unusable: NDArray[np.bool_]) -> tuple[Whitener, Matched]:
-        key = unusable.tobytes()
+    def _whitened(self, blind: FloatArray) -> tuple[Whitener, Matched]:
+        key = blind.tobytes()
         if key not in self._matched:
-            scale = self._model.scale * self._gain
-            whiten = Whitener.of_some(self._noise / scale[:, None] / scale, ~unusable)
+            whiten = self._whiten.without(blind / self._scale[:, None])
             self._matched[key] = whiten, self._model.candidates.matched(whiten)
             if len(self._matched) > _MASKS:
                 self._matched.popitem(last=False)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.pattern import Scan
@@ -47,13 +46,16 @@ class Whitener:
         kept = variance > _LEAST * variance[-1]
         return cls((direction[:, kept] / np.sqrt(variance[kept])).T / scale)
 
-    @classmethod
-    def of_some(cls, noise: FloatArray, used: NDArray[np.bool_]) -> Self:
-        """From the covariance (n_meas, n_meas) V² of rows of which only ``used`` ones count."""
-        whiten = cls.of(noise[np.ix_(used, used)])
-        matrix = np.zeros((len(whiten.matrix), len(used)))
-        matrix[:, used] = whiten.matrix
-        return cls(matrix)
+    def without(self, directions: FloatArray) -> Whitener:
+        """The same where data along ``directions`` (n_meas, k) say nothing: endless noise there.
+
+        A row that is left out is a direction with a single one in it.
+        """
+        if not directions.shape[1]:
+            return self
+        basis, singular, _ = np.linalg.svd(self.matrix @ directions)
+        rank = int(np.count_nonzero(singular > _LEAST * singular[0]))
+        return Whitener(basis[:, rank:].T @ self.matrix)
 
     def __call__(self, rows: FloatArray) -> FloatArray:
         """(…, r) of rows (…, n_meas)."""
