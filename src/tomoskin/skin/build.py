@@ -8,11 +8,13 @@ from contextlib import contextmanager
 import numpy as np
 
 from tomoskin.core import FloatArray, GeometryError, PatternError, SkinError
-from tomoskin.mesh import ElectrodeArc, Outline, check_arcs
+from tomoskin.mesh import ElectrodeArc, Outline, Surface, check_arcs
 from tomoskin.pattern import Pattern, named
-from tomoskin.skin.place import arcs_of, outline_of
+from tomoskin.skin.place import arcs_of, outline_of, surface_of
 from tomoskin.skin.read import Document
 from tomoskin.skin.settings import ReadoutSettings
+
+_RIM_POINTS = 240
 
 _SAMPLE_BITS = 16
 """A frame carries each sample, the sum over the oversampling, in so many bits."""
@@ -36,6 +38,14 @@ def placed(value: Document, source: str) -> tuple[Outline, tuple[ElectrodeArc, .
         arcs = arcs_of(outline, value["electrodes"])
         check_arcs(outline, arcs)
     return outline, arcs
+
+
+def laid(value: Document, outline: Outline, source: str) -> Surface:
+    """What the sheet lies on, which must have room for it."""
+    with located(f"{source}: [surface]"):
+        surface = surface_of(value["surface"])
+        surface.check(outline.polyline(outline.length / _RIM_POINTS))
+    return surface
 
 
 def impedances(value: Document, n_electrodes: int, source: str) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Values of a skin file → outline and electrodes."""
+"""Values of a skin file → outline, surface and electrodes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,20 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import FloatArray, GeometryError
-from tomoskin.mesh import Disc, ElectrodeArc, Ellipse, Outline, Polygon, Rectangle
+from tomoskin.mesh import (
+    Arm,
+    Cap,
+    Cylinder,
+    Disc,
+    ElectrodeArc,
+    Ellipse,
+    Outline,
+    Plane,
+    Polygon,
+    Rectangle,
+    Saddle,
+    Surface,
+)
 
 OFF_RIM = 0.01
 """A position may miss the rim by half an electrode, and by this part of the rim's length."""
@@ -25,6 +38,21 @@ def outline_of(values: Mapping[str, Any]) -> Outline:
             return Rectangle(values["width"], values["height"])
         case _:
             return Polygon(np.array(values["vertices"]))
+
+
+def surface_of(values: Mapping[str, Any]) -> Surface:
+    """What the section ``[surface]`` says that the sheet lies on."""
+    match values["shape"]:
+        case "cylinder":
+            return Cylinder(values["radius"], values["axis"])
+        case "cap":
+            return Cap(values["radius"])
+        case "saddle":
+            return Saddle(values["radius_x"], values["radius_y"])
+        case "arm":
+            return Arm(values["radius"], values["bend"], values["joint"])
+        case _:
+            return Plane()
 
 
 def arcs_of(outline: Outline, values: Mapping[str, Any]) -> tuple[ElectrodeArc, ...]:

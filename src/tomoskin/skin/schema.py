@@ -127,6 +127,63 @@ SECTIONS: tuple[Section, ...] = (
         ),
     ),
     Section(
+        "surface",
+        "What the sheet lies on. Outline, electrodes, mesh and touches stay in the sheet's own "
+        "coordinates, as if it were laid flat; its middle lies on top, x runs around or to the "
+        "right, y along or up. The sheet is taken as made for the surface: it is not strained.",
+        (
+            Key(
+                "shape",
+                Choice(("flat", "cylinder", "cap", "saddle", "arm")),
+                "flat; wrapped on a cylinder; drawn over a sphere; hung over a saddle, as a "
+                "chair's back; wrapped around a limb with a joint.",
+                default="flat",
+            ),
+            Key(
+                "radius",
+                _SIZE,
+                "Of cylinder, sphere or limb.",
+                required=True,
+                when=("shape", ("cylinder", "cap", "arm")),
+            ),
+            Key(
+                "axis",
+                Quantity("angle", "deg", -360, 360),
+                "Direction of the cylinder's axis in the sheet, counter-clockwise from +x.",
+                default="90 deg",
+                when=("shape", ("cylinder",)),
+            ),
+            Key(
+                "radius_x",
+                _SIZE,
+                "How a saddle bends away to the sides.",
+                required=True,
+                when=("shape", ("saddle",)),
+            ),
+            Key(
+                "radius_y",
+                _SIZE,
+                "How a saddle bends forward along y.",
+                required=True,
+                when=("shape", ("saddle",)),
+            ),
+            Key(
+                "bend",
+                Quantity("angle", "deg", -170, 170),
+                "Angle of the limb's joint; positive stretches the sheet at x = 0.",
+                default="0 deg",
+                when=("shape", ("arm",)),
+            ),
+            Key(
+                "joint",
+                _SIZE,
+                "Length over which the limb's middle line bends, about y = 0.",
+                required=True,
+                when=("shape", ("arm",)),
+            ),
+        ),
+    ),
+    Section(
         "electrodes",
         "Electrodes on the rim: either evenly spaced (count, first, order) or one by one "
         "(positions).",

@@ -13,9 +13,9 @@ from typing import Any, Self
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.mesh import ElectrodeArc, Mesh, Outline, triangulate
+from tomoskin.mesh import ElectrodeArc, Mesh, Outline, Surface, laid_on, triangulate
 from tomoskin.pattern import Pattern
-from tomoskin.skin.build import impedances, located, pattern_of, placed, readout_of
+from tomoskin.skin.build import impedances, laid, located, pattern_of, placed, readout_of
 from tomoskin.skin.find import built_in_names, skin_text
 from tomoskin.skin.read import Document, complete, parse, values
 from tomoskin.skin.settings import (
@@ -42,6 +42,8 @@ class Skin:
         For people.
     outline, arcs
         Rim of the sheet, and the stretch of it that each electrode covers.
+    surface
+        What the sheet lies on.
     conductivity
         Sheet conductance of the unloaded sheet, S.
     contact_impedance
@@ -60,6 +62,7 @@ class Skin:
     description: str
     outline: Outline
     arcs: tuple[ElectrodeArc, ...]
+    surface: Surface
     conductivity: float
     contact_impedance: FloatArray
     current: float
@@ -128,7 +131,8 @@ class Skin:
         return self._pattern
 
     def mesh(self) -> Mesh:
-        """Mesh of the sheet; made once.
+        """Mesh of the sheet in its own coordinates, with the lengths it has on its surface; made
+        once.
 
         Raises SkinError when the electrodes cannot be resolved with so few cells.
         """
@@ -141,7 +145,9 @@ class Skin:
     @cached_property
     def _mesh(self) -> Mesh:
         with located(f"{self.source}: [mesh] cells"):
-            return triangulate(self.outline, self.arcs, self.mesh_cells)
+            flat = triangulate(self.outline, self.arcs, self.mesh_cells)
+        with located(f"{self.source}: [surface]"):
+            return laid_on(flat, self.surface)
 
     @classmethod
     def _of(cls, document: Document, source: str) -> Self:
@@ -154,6 +160,7 @@ class Skin:
             description=value["skin"]["description"],
             outline=outline,
             arcs=arcs,
+            surface=laid(value, outline, source),
             conductivity=1.0 / value["material"]["sheet_resistance"],
             contact_impedance=impedances(value, len(arcs), source),
             current=value["drive"]["current"],
