@@ -18,12 +18,14 @@ live: $(VENV)/.installed page  ## the live page of a simulated skin
 test: lint native  ## lint, page tests and the test suite, without what is slow
 	@$(PY) scripts/page.py run test
 	@sh scripts/chromium.sh
+	@sh scripts/mosquitto.sh
 	@sh scripts/firmware.sh
 	@$(PY) -m pytest $(ARGS)
 
 test-all: lint native  ## the same, with what is slow
 	@$(PY) scripts/page.py run test
 	@sh scripts/chromium.sh
+	@sh scripts/mosquitto.sh
 	@sh scripts/firmware.sh
 	@$(PY) -m pytest -m "" $(ARGS)
 
@@ -97,7 +99,7 @@ lock-uv:
 lock-runtime:
 	@$(COMPILE) pyproject.toml requirements/build.in -o requirements/runtime.txt
 lock-dev:
-	@$(COMPILE) pyproject.toml --extra mesh --extra plot --extra parquet --extra hdf5 --extra foxglove --extra mqtt --extra lsl --extra zenoh requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
+	@$(COMPILE) pyproject.toml --extra mesh --extra plot --extra parquet --extra hdf5 --extra foxglove --extra mqtt --extra lsl --extra zenoh --extra cluster requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
 lock-bench:
 	@$(COMPILE) pyproject.toml --extra bench -c requirements/dev.txt -o requirements/bench.txt
 lock-node:

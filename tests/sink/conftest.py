@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 from dataclasses import replace
 
@@ -26,6 +27,11 @@ def moment_at(host_time, *touches, sequence=0):
     rows = np.arange(PATTERN.n_meas, dtype=float)
     image = Image(VALUES, "S", MESH.identity)
     return Moment(sequence, host_time, True, rows + 0.25, rows, touches, image)
+
+
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return listener.getsockname()[1]
 
 
 def touch_of(number):

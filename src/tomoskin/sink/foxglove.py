@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tomoskin.core import Event
+from tomoskin.core import Event, SinkError
 from tomoskin.session import (
     encode_json,
     grid_message,
@@ -32,20 +32,25 @@ class FoxgloveSink:
         self._address = {"host": host, "port": port}
         self._sdk = needed("foxglove", "foxglove")
         self._server: Any = None
+        self._context: Any = None
         self._channels: dict[str, Any] = {}
 
     def open(self, stream: Stream) -> None:
         """Begin to serve."""
-        sdk, context = self._sdk, self._sdk.Context()
+        sdk = self._sdk
+        # kept: with its last reference the SDK lets go of the channels too
+        self._context = context = sdk.Context()
         for topic in _TOPICS:
             found = schema_of(topic)
             schema = sdk.Schema(name=found.name, encoding=found.encoding, data=found.text.encode())
             self._channels[topic] = sdk.Channel(
                 topic, schema=schema, message_encoding="json", context=context
             )
-        self._server = sdk.start_server(
-            name=f"tomoskin, {stream.source}", context=context, **self._address
-        )
+        name = f"tomoskin, {stream.source}"
+        try:
+            self._server = sdk.start_server(name=name, context=context, **self._address)
+        except RuntimeError as error:
+            raise SinkError(str(error), where=self.name, hint="choose another port") from error
         self._stream, self._pace = stream, TouchPace()
 
     def publish(self, item: Item) -> None:
@@ -72,7 +77,7 @@ class FoxgloveSink:
         server, self._server = self._server, None
         for channel in self._channels.values():
             channel.close()
-        self._channels = {}
+        self._channels, self._context = {}, None
         if server is not None:
             server.stop()
 

@@ -107,7 +107,7 @@ def open_mqtt(argument: str) -> MqttSink:
         port = url.port or DEFAULT_PORT
     except ValueError as error:
         raise SinkError(str(error), where=where) from None
-    if not url.hostname or url.query or url.fragment or set(url.path) & set("+#"):
+    if not url.hostname or "?" in argument or "#" in argument or "+" in url.path:
         raise SinkError(
             f'expected mqtt://HOST:PORT/TOPIC, got "mqtt:{argument.rpartition("@")[2]}"',
             where=where,

@@ -13,6 +13,8 @@ from tomoskin.sink.ros_types import encode_cdr, type_hash
 from tomoskin.sink.sink import Item, Stream
 
 _WHERE = "sink zenoh"
+_PATIENCE = 5000
+"""Ms in which an endpoint must answer."""
 
 
 class ZenohSink:
@@ -43,7 +45,7 @@ class ZenohSink:
         if self._endpoint:
             config.insert_json5("connect/endpoints", f'["{self._endpoint}"]')
             config.insert_json5("connect/exit_on_failure", "true")
-            config.insert_json5("connect/timeout_ms", "5000")
+            config.insert_json5("connect/timeout_ms", str(_PATIENCE))
             config.insert_json5("scouting/multicast/enabled", "false")
             config.insert_json5("listen/endpoints", "[]")
         try:
