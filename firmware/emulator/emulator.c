@@ -1,8 +1,8 @@
 /* tomoskin-emulator [-s SKIN_MEMORY] [-c MICROAMPERES] [-l LINK] [-w WATCH] [-f] [-r] [-d] ELF:
    the firmware on a simulated ATmega2560. Its switches and converter inputs are as in avr/pins.h;
-   what they must never do is said on stderr. -f: as fast as it goes, not in real time. -r: opening
-   the port resets the board, and for a second its bootloader swallows what is said to it. -d: end
-   when stdin does. */
+   what they must never do is said on stderr. -f: while it scans, as fast as it goes and not in real
+   time. -r: opening the port resets the board, and for a second its bootloader swallows what is
+   said to it. -d: end when stdin does. */
 #include "skin.h"
 #include "watch.h"
 
@@ -30,6 +30,7 @@
 #define SLICE 16000ull /* cycles between two looks at line and clock: 1 ms */
 #define LEAST_DEAD_CYCLES 16ull
 #define OFF 0xFFu
+#define SCANS_CYCLES (CLOCK / 5u) /* after the last drive it no longer scans */
 #define BOOTLOADER_CYCLES CLOCK /* a second, as on a Mega 2560 */
 
 /* Places in data space. */
@@ -78,6 +79,9 @@ static void connect(unsigned new_source, unsigned new_sink) {
     sink = new_sink;
     if (was_on && !is_on) {
         opened = avr->cycle;
+    }
+    if (watch != NULL && is_on && !was_on && opened != 0 && avr->cycle - opened < watch->shortest_off) {
+        watch->shortest_off = avr->cycle - opened;
     }
     if (watch == NULL || was_on == is_on) {
         return;
@@ -194,6 +198,10 @@ static uint64_t now_ns(void) {
 static void keep_pace(void) {
     static uint64_t start;
     static avr_cycle_count_t from;
+    if (fast && avr->cycle - opened < SCANS_CYCLES) {
+        start = 0;
+        return;
+    }
     uint64_t now = now_ns();
     uint64_t due = start + (avr->cycle - from) * 125u / 2u;
     if (start == 0 || now > due + 50000000u) {
@@ -386,9 +394,7 @@ int main(int count, char **arguments) {
             if (abandoned()) {
                 return 0;
             }
-            if (!fast) {
-                keep_pace();
-            }
+            keep_pace();
         }
     }
 }

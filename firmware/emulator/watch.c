@@ -17,6 +17,6 @@ struct watch *watch_make(const char *path) {
         exit(1);
     }
     (void)close(file);
-    seen->lowest_stack = UINT64_MAX;
+    seen->lowest_stack = seen->shortest_off = UINT64_MAX;
     return seen;
 }

@@ -12,6 +12,7 @@ struct watch {
     uint64_t connected;    /* 1: a source or a sink is */
     uint64_t since;        /* cycle of the last change of that */
     uint64_t longest_on;   /* cycles that a drive was on, at most */
+    uint64_t shortest_off; /* and cycles between two drives, at least */
     uint64_t resets;       /* after power-on */
     uint64_t lowest_stack; /* address that the stack pointer has come down to */
     uint64_t spent[WATCH_WORDS]; /* cycles in the instruction at each word */

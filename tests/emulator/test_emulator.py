@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import time
 from pathlib import Path
 
@@ -10,8 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from firmware.boards import FIRMWARE, SCAN, SETTINGS, built
-from firmware.conftest import need
+from firmware.boards import FIRMWARE, SCAN, SETTINGS
 from tomoskin.cli.app import app
 from tomoskin.core import Frame, SourceError
 from tomoskin.emulator import EmulatorTransport, Programs, SkinMemory, emulate_board
@@ -23,13 +21,6 @@ from tomoskin.source import Link, ScanSettings, SerialTransport
 from tomoskin.twin import Press, TwinSettings, TwinSkin
 
 PATIENCE = 30.0
-MOST_FLASH, MOST_RAM = 16 * 1024, 4 * 1024
-
-
-@pytest.fixture(scope="session")
-def programs(pytestconfig: pytest.Config) -> Programs:
-    need(pytestconfig, ["make", "cc", "avr-gcc", "simavr"], "gcc-avr avr-libc simavr libsimavr-dev")
-    return Programs(built("avr", "tomoskin-16.elf"), built("emulator", "tomoskin-emulator"))
 
 
 @pytest.fixture(scope="module")
@@ -74,9 +65,13 @@ def test_frames_are_what_the_sheet_says_and_follow_a_press(
             assert frame.samples.tolist() == wanted.tolist()
         transport.set_presses((Press(0.01, 0.0, 5.0, 0.01),))
         frames_of(link, 20)
-        pressed = frames_of(link, 1)[0].samples
+        end = time.monotonic() + PATIENCE
+        while True:  # the sheet goes on yielding, and frames of earlier are still on the way
+            pressed = frames_of(link, 1)[0].samples
+            if pressed.tolist() == expected(sheet, front, SETTINGS.oversampling).tolist():
+                break
+            assert time.monotonic() < end
         assert np.abs(pressed.astype(int) - wanted).max() >= 10
-        assert pressed.tolist() == expected(sheet, front, SETTINGS.oversampling).tolist()
         assert link.counters.corrupt == 0
         assert link.frames.lost == 0
         assert transport.complaints == ""
@@ -128,13 +123,6 @@ def test_the_memory_is_the_c_structs(tmp_path: Path) -> None:
     assert f"0x{int.from_bytes(data[:8], 'little'):X}" in header
     assert int.from_bytes(data[8:12], "little") % 2 == 0
     assert np.frombuffer(data, "<f8", 11, 16).tolist() == [1, 2, 3, 4, 5, 6, 7, 1, 0, 0, 1]
-
-
-def test_the_firmware_is_small(programs: Programs) -> None:
-    lines = subprocess.run(["avr-size", programs.elf], capture_output=True, text=True, check=True)
-    text, data, bss = map(int, lines.stdout.splitlines()[1].split()[:3])
-    assert text + data < MOST_FLASH
-    assert data + bss < MOST_RAM
 
 
 def test_a_board_for_another_host(programs: Programs, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from emulator.test_emulator import frames_of
-from firmware.boards import built, running
-from firmware.conftest import need
+from firmware.boards import running
+from tomoskin.emulator import Programs
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.source import Link, ScanSettings, SerialTransport
 
@@ -20,14 +20,12 @@ PROMISED = [(8, 2e-3, 40), (8, 200e-6, 180), (16, 2e-3, 17), (16, 200e-6, 55)]
 
 @pytest.mark.parametrize(("electrodes", "settling", "least"), PROMISED)
 def test_frames_per_second_and_every_value(
-    pytestconfig: pytest.Config, tmp_path: Path, electrodes: int, settling: float, least: float
+    programs: Programs, tmp_path: Path, electrodes: int, settling: float, least: float
 ) -> None:
-    need(pytestconfig, ["make", "cc", "avr-gcc", "simavr"], "gcc-avr avr-libc simavr libsimavr-dev")
-    elf, program = built("avr", "tomoskin-16.elf"), built("emulator", "tomoskin-emulator")
     scan = Scan.of(Pattern.adjacent(electrodes))
     settings = ScanSettings(1, settling, current_limit=0.1, adc_bits=10, prescaler=64)
     with (
-        running(program, tmp_path / "port", str(elf)) as board,
+        running(programs.emulator, tmp_path / "port", str(programs.elf)) as board,
         Link(SerialTransport(board.path), scan, settings, clock=time.monotonic) as link,
     ):
         frames = frames_of(link, 30)

@@ -21,6 +21,7 @@ class Watch:
     connected: bool
     since: int
     longest_on: int
+    shortest_off: int
     resets: int
     lowest_stack: int
     spent: np.ndarray
@@ -28,8 +29,13 @@ class Watch:
     @classmethod
     def read(cls, path: Path) -> Watch:
         words = np.fromfile(path, "<u8")
-        cycle, connected, since, longest_on, resets, lowest_stack = words[:6].tolist()
-        return cls(cycle, bool(connected), since, longest_on, resets, lowest_stack, words[6:])
+        cycle, connected, since, *others = words[:7].tolist()
+        return cls(cycle, bool(connected), since, *others, words[7:])
+
+    @property
+    def on(self) -> int:
+        """Cycles that a drive has been on, at most; one that still is counts too."""
+        return max(self.longest_on, self.cycle - self.since if self.connected else 0)
 
     @property
     def stack(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import time
 from collections.abc import Iterator
@@ -20,14 +21,20 @@ PATIENCE = 20.0
 """Seconds until a test gives up; a board answers within milliseconds."""
 
 
-def built(target: str, product: str) -> Path:
-    """Make ``target`` in firmware/; the file that it makes."""
-    made = subprocess.run(
-        ["make", "--silent", "-C", str(FIRMWARE), target],
+def make(*arguments: str, folder: Path = FIRMWARE) -> subprocess.CompletedProcess[str]:
+    """Run make there, as if nobody had run make around it."""
+    return subprocess.run(
+        ["make", "--silent", "-C", str(folder), *arguments],
         capture_output=True,
         text=True,
         check=False,
+        env={**os.environ, "MAKEFLAGS": ""},
     )
+
+
+def built(target: str, product: str) -> Path:
+    """Make ``target`` in firmware/; the file that it makes."""
+    made = make(target)
     assert made.returncode == 0, made.stderr
     return ROOT / "build" / "firmware" / product
 
@@ -48,14 +55,19 @@ class Process:
         self._process.kill()
         self._process.wait()
 
-    def end(self) -> None:
-        """Unplug it, unless it has ended by itself: then say why."""
-        ended = self._process.poll()
-        self.kill()
+    def said(self) -> str:
+        """What a killed one has said on stderr."""
         said = self._process.stderr.read().decode() if self._process.stderr else ""
         for stream in (self._process.stdout, self._process.stderr):
             assert stream is not None
             stream.close()
+        return said
+
+    def end(self) -> None:
+        """Unplug it, unless it has ended by itself: then say why."""
+        ended = self._process.poll()
+        self.kill()
+        said = self.said()
         assert ended in (None, -9), said
         assert not said, said
 
@@ -77,6 +89,7 @@ class Talk:
         self.transport = transport
         self._decoder = Decoder()
         self._waiting: list[Message] = []
+        self.seen: list[Message] = []
 
     def say(self, message: Message) -> None:
         self.transport.write(encode(message))
@@ -90,7 +103,8 @@ class Talk:
                 if isinstance(message, kind):
                     return message
             data = self.transport.read(0.1)
-            self._waiting += self._decoder.feed(data, time.monotonic())
+            self._waiting += (found := self._decoder.feed(data, time.monotonic()))
+            self.seen += found
         raise AssertionError(f"no {kind.__name__} within {timeout} s")
 
     def ask(self, message: Message, kind: type):

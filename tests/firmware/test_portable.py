@@ -9,7 +9,7 @@ import subprocess
 
 import pytest
 
-from firmware.boards import FIRMWARE, ROOT
+from firmware.boards import FIRMWARE, ROOT, make
 from firmware.conftest import need
 
 BUILD = ROOT / "build" / "firmware"
@@ -93,16 +93,6 @@ MUTANTS = {
         "scan.settling_ticks = ticks_of(config.settling / 2u)",
     ),
 }
-
-
-def make(*arguments):
-    return subprocess.run(
-        ["make", "--silent", "-C", str(FIRMWARE), *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "MAKEFLAGS": ""},
-    )
 
 
 @pytest.fixture(scope="session")

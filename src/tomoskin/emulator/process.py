@@ -13,11 +13,20 @@ from tomoskin.emulator.program import Programs
 class BoardProcess:
     """An emulated board; ``port`` is its serial port."""
 
-    def __init__(self, programs: Programs, memory: Path, current: float) -> None:
-        """Power on. ``memory``: of the skin; ``current`` A: what its limiter is set to."""
+    def __init__(
+        self, programs: Programs, memory: Path, current: float, *options: str | Path
+    ) -> None:
+        """Power on. ``memory``: of the skin; ``current`` A: what its limiter is set to.
+
+        ``options``: further ones of the emulator, see ``firmware/emulator/emulator.c``.
+        """
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
         self._process = subprocess.Popen(
-            [programs.emulator, "-d", "-s", memory, "-c", str(round(current * 1e6)), programs.elf],
+            [
+                *(programs.emulator, "-d", "-s", memory, "-c", str(round(current * 1e6))),
+                *options,
+                programs.elf,
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._said,
