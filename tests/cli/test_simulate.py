@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import signal
 
 import numpy as np
 import pytest
 
+import tomoskin.cli.simulate as tomoskin_simulate
+from tomoskin.cli.progress import Bar
 from tomoskin.session import SessionReader, read_recording
 from tomoskin.twin.labelled import SHARD_FRAMES
 from tomoskin.twin.script_page import EXAMPLE, PRESSES_EXAMPLE
@@ -93,6 +96,41 @@ def test_bad_scripts_leave_no_file(tomoskin, script, tmp_path, text, message):
     assert code == 1
     assert message in error
     assert not (tmp_path / "x.mcap").exists()
+
+
+class Stop(Bar):
+    """Ctrl-C as soon as something is done."""
+
+    def __call__(self, done, total):
+        super().__call__(done, total)
+        if done > 0:
+            signal.raise_signal(signal.SIGINT)
+
+
+def test_ctrl_c(tomoskin, script, tmp_path, monkeypatch):
+    out, folder = tmp_path / "a.mcap", tmp_path / "set"
+    drawn = ("simulate", "--presses", 3, "--processes", 1, "--out", folder)
+    with monkeypatch.context() as patch:
+        patch.setattr(tomoskin_simulate, "Bar", Stop)
+        code, _, error = tomoskin("simulate", "--script", script, "--out", out)
+        assert (code, error) == (
+            1,
+            f"tomoskin: stopped; {out} holds what was simulated until then, and says so\n",
+        )
+        code, _, error = tomoskin(*drawn)
+        assert code == 1
+        assert "the same command goes on where this one was stopped" in error
+    with SessionReader(out) as session:
+        assert [note.text for note in session.notes()][-1].startswith("stopped after")
+    assert tomoskin(*drawn)[0] == 0
+
+
+def test_a_cluster_that_is_not_there(tomoskin, tmp_path):
+    drawn = ("simulate", "--presses", 3, "--out", tmp_path / "set")
+    code, _, error = tomoskin(*drawn, "--cluster", "nonsense://")
+    assert code == 1
+    assert error.startswith("tomoskin: nonsense://: ")
+    assert tomoskin(*drawn, "--cluster", "tcp://127.0.0.1:1", "--processes", 2)[0] == 2
 
 
 def test_wrong_usage(tomoskin, script, tmp_path):

@@ -2,38 +2,18 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tomoskin.live import Prepared, reconstruct, simulate
+from live.scripted import FRAME, PRESS, fault, run
+from tomoskin.core import DataError
+from tomoskin.live import Prepared, reconstruct
 from tomoskin.session import Mark, Recording, SessionReader, read_session
-from tomoskin.skin import Skin
-from tomoskin.twin import Script
 
-PRESS = """[[press]]
-id = "a"
-radius = "15 mm"
-at = ["20 mm", "-30 mm"]
-start = "200 ms"
-force = "3 N"
-hold = "300 ms"
-"""
-CUT = """[[fault]]
-kind = "cut"
-electrode = 2
-start = "{start}"
-end = "900 ms"
-"""
-
-
-def run(out: Path, lead_in: str, *happens: str) -> Path:
-    """A second of a skin; a frame of it takes 56 ms."""
-    head = f'format = 1\n[script]\nduration = "1 s"\nlead_in = "{lead_in}"\n'
-    script = Script.from_toml(head + "".join(happens))
-    simulate(script, Skin.load("textile-disc-8"), out, advance=lambda _, __: None)
-    return out
+CUT = fault("cut", "{start}", "900 ms", electrode=2)
 
 
 def touched_frames(prepared: Prepared, recording: Recording, n_idle: int) -> list[int]:
@@ -55,7 +35,8 @@ def touched_frames(prepared: Prepared, recording: Recording, n_idle: int) -> lis
 def test_the_reference_ends_before_anything_presses_or_breaks(
     tmp_path: Path, lead_in: str, happens: tuple[str, ...], expected: int
 ) -> None:
-    out = run(tmp_path / "a.mcap", lead_in, *happens)
+    out = tmp_path / "a.mcap"
+    run(out, lead_in, *happens)
     with SessionReader(out) as session:
         marks = [item.mark for item in session.frames()]
     assert marks[0] == Mark.REFERENCE
@@ -67,10 +48,44 @@ def test_the_reference_ends_before_anything_presses_or_breaks(
 
 
 def test_no_touch_is_seen_before_the_press(tmp_path: Path, prepared: Prepared) -> None:
-    recording = read_session(run(tmp_path / "a.mcap", "1 s", PRESS))
+    run(tmp_path / "a.mcap", "1 s", PRESS)
+    recording = read_session(tmp_path / "a.mcap")
     assert recording.labels is not None
     first = int(np.flatnonzero(np.isfinite(recording.labels[:, 0]))[0])
     touched = touched_frames(prepared, recording, recording.idle)
     assert touched
     assert min(touched) >= first
     assert min(touched_frames(prepared, recording, 1)) < first  # what a single frame would do
+
+
+def test_ctrl_c_leaves_a_file_that_says_it_is_a_part(tmp_path: Path) -> None:
+    def interrupt(gone: float, whole: float) -> None:
+        assert whole == 2.0
+        if gone > 1.3:
+            signal.raise_signal(signal.SIGINT)
+
+    out = tmp_path / "a.mcap"
+    with pytest.raises(KeyboardInterrupt):
+        run(out, "1 s", PRESS, advance=interrupt)
+    with SessionReader(out) as session:
+        *_, last = session.notes()
+        frames = list(session.frames())
+    assert last.text.startswith("stopped after 1.4 of 2 s: interrupted")
+    assert len(frames) == pytest.approx(1.35 / FRAME, abs=1.5)
+    whole = tmp_path / "b.mcap"
+    run(whole, "1 s", PRESS)
+    recording = read_session(whole).voltages
+    assert (read_session(out).voltages == recording[: len(frames)]).all()
+
+
+def test_what_else_ends_it_is_said_too(tmp_path: Path) -> None:
+    def full(gone: float, _: float) -> None:
+        if gone > 1.3:
+            raise DataError("the disk is full", where="a.mcap")
+
+    with pytest.raises(DataError):
+        run(tmp_path / "a.mcap", "1 s", advance=full)
+    with SessionReader(tmp_path / "a.mcap") as session:
+        assert [note.text for note in session.notes()] == [
+            "stopped after 1.4 of 2 s: a.mcap: the disk is full"
+        ]

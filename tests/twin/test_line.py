@@ -54,6 +54,14 @@ def test_what_is_held_back_comes_with_the_next():
     assert SENT.startswith(b"".join(arrived))
 
 
+@pytest.mark.parametrize("later", [b"", SENT[100:200]])
+def test_what_is_held_back_comes_when_the_line_is_mended(later):
+    line = Line(LineSettings(hold=0.999), 3)
+    assert line.carry(SENT[:100]) == b""
+    line.settings = LineSettings()
+    assert line.carry(later) == SENT[:100] + later
+
+
 def test_the_seed_decides():
     settings = LineSettings(loss=0.1, corruption=0.1)
     one, same, other = (Line(settings, seed).carry(SENT) for seed in (1, 1, 2))

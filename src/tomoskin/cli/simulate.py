@@ -68,7 +68,7 @@ def _timeline(skin: Skin, script: Path, out: Path, seed: int | None, *, json: bo
         with Bar("simulating") as bar:
             found = run(read, skin, out, seed=seed, advance=bar)
     except KeyboardInterrupt:
-        typer.echo(f"tomoskin: stopped; {out} holds what was simulated until then", err=True)
+        typer.echo(f"tomoskin: stopped; {out} holds what was simulated until then, and says so", err=True)
         raise typer.Exit(1) from None
     took = time.monotonic() - begun
     if json:

@@ -18,6 +18,9 @@ from tomoskin.core import DataError, SourceError
 from tomoskin.session import is_done, join_shards, shard_path, write_whole
 from tomoskin.twin import SetPlan, make_shard
 
+_PATIENCE = 10.0
+"""Seconds for a scheduler to answer."""
+
 Made = Iterator[tuple[int, dict[str, Any]]]
 """Shards with their numbers, in whatever order they are finished."""
 
@@ -105,13 +108,13 @@ def on_cluster(address: str) -> Workers:
 
     def run(plan: SetPlan, shards: Sequence[int]) -> Made:
         try:
-            from dask import distributed  # type: ignore[import-not-found] # noqa: PLC0415
+            from dask import distributed  # noqa: PLC0415
         except ImportError as error:
             raise SourceError(
                 "needs Dask's distributed", where=address, hint="pip install 'tomoskin[cluster]'"
             ) from error
         try:
-            client = distributed.Client(address, timeout=10)
+            client = distributed.Client(address, timeout=_PATIENCE)
         except (OSError, TimeoutError, ValueError) as error:
             raise SourceError(f"no scheduler answers: {error}", where=address) from error
         with client:

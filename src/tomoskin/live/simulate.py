@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from tomoskin.core import Event, Frame
+from tomoskin.core import DataError, Event, Frame
 from tomoskin.live.pipeline import REFERENCE_FRAMES
 from tomoskin.pattern import Scan
 from tomoskin.session import Mark, SessionWriter
@@ -55,7 +56,7 @@ def simulate(
 
     The file says that its first reference is made of the frames before anything presses or
     breaks. The same script, skin and seed give the same bytes. Whatever ends it, the file is
-    readable up to there.
+    readable up to there, and a note at its end says that it is only a part, and why.
 
     Parameters
     ----------
@@ -132,13 +133,25 @@ class _Run:
             idle = _idle_frames(script, self._frame_time)
             self._writer.settings(clock.now(), _described(script, self._settings, idle))
             self._writer.truth(clock.now(), ())
-            begin, last = clock.now() + script.lead_in, -script.lead_in
-            while (time := clock.now() - begin) < script.duration:
-                self._set(begin, last, time)
-                self._take(link)
-                advance(time + script.lead_in, script.duration + script.lead_in)
-                last = time
+            try:
+                self._follow(link, advance)
+            except BaseException as error:  # Ctrl-C too
+                gone, whole = clock.now(), script.lead_in + script.duration
+                with contextlib.suppress(DataError):  # of a disk that is full, say
+                    self._writer.note(
+                        gone, f"stopped after {gone:.1f} of {whole:g} s: {_why(error)}"
+                    )
+                raise
             return Simulated(self._frames, link.frames.lost, script.duration + script.lead_in)
+
+    def _follow(self, link: Link, advance: Callable[[float, float], None]) -> None:
+        script, clock = self._script, self._clock
+        begin, last = clock.now() + script.lead_in, -script.lead_in
+        while (time := clock.now() - begin) < script.duration:
+            self._set(begin, last, time)
+            self._take(link)
+            advance(time + script.lead_in, script.duration + script.lead_in)
+            last = time
 
     def _set(self, begin: float, last: float, time: float) -> None:
         """Bring about what the script says of ``time``, for the scan that begins now.
@@ -182,6 +195,10 @@ def _idle_frames(script: Script, frame_time: float) -> int:
     starts = [press.start for press in script.presses] + [fault.start for fault in script.faults]
     quiet = script.lead_in + min(starts, default=script.duration)
     return max(1, min(REFERENCE_FRAMES, int(quiet / frame_time)))
+
+
+def _why(error: BaseException) -> str:
+    return "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
 
 
 def _described(script: Script, settings: TwinSettings, idle: int) -> dict[str, object]:

@@ -48,11 +48,9 @@ class Line:
 
     def carry(self, data: bytes) -> bytes:
         """What arrives when the board sends ``data``."""
-        if self.settings.perfect or not data:
-            return data
-        arrived = self._held + self._spoiled(data)
+        arrived = self._held + (data if self.settings.perfect else self._spoiled(data))
         self._held = b""
-        if self._random.random() < self.settings.hold:
+        if arrived and self.settings.hold and self._random.random() < self.settings.hold:
             self._held, arrived = arrived, b""
         return arrived
 

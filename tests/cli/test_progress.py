@@ -1,0 +1,58 @@
+"""The bar of a long job: on a terminal only, and not for what is over at once."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from tomoskin.cli.progress import Bar
+
+
+class Terminal(io.StringIO):
+    """What a person would see."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch):
+    """Set the time that the bar goes by."""
+    now = [100.0]
+    monkeypatch.setattr("tomoskin.cli.progress.time.monotonic", lambda: now[0])
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    return now
+
+
+def job(clock: list[float], seconds: float, fail_at: int = 99) -> None:
+    """Ten steps, that long together."""
+    with Bar("simulating") as bar:
+        for step in range(1, 11):
+            clock[0] += seconds / 10
+            bar(step, 10)
+            1 / (fail_at - step)
+
+
+@pytest.mark.parametrize(("seconds", "shown"), [(1.9, False), (3.0, True)])
+def test_a_terminal_sees_a_bar_after_two_seconds(clock, monkeypatch, seconds, shown):
+    monkeypatch.setattr("sys.stderr", terminal := Terminal())
+    job(clock, seconds)
+    assert ("simulating" in terminal.getvalue()) == shown
+    assert ("%" in terminal.getvalue()) == shown
+
+
+def test_a_file_or_a_pipe_sees_none(clock, monkeypatch):
+    monkeypatch.setattr("sys.stderr", pipe := io.StringIO())
+    job(clock, 60.0)
+    assert pipe.getvalue() == ""
+
+
+def test_it_goes_when_the_job_fails(clock, monkeypatch):
+    monkeypatch.setattr("sys.stderr", terminal := Terminal())
+    with pytest.raises(ZeroDivisionError):
+        job(clock, 40.0, fail_at=6)
+    shown = terminal.getvalue()
+    assert "60 %" in shown
+    assert shown.endswith("\x1b[2K") or "\x1b[?25h" in shown  # the line taken away, the cursor back
