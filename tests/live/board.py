@@ -27,12 +27,15 @@ from tomoskin.wire import (
     type_byte,
 )
 
+AS_TAKEN = {"baseline": "hold", "common_modes": "kept"}
+"""[signal] of a skin whose pictures are those of its operator alone."""
+
 
 class Board:
     """Transport whose other end is here.
 
     With ``free`` samples it scans by itself, a frame every ``period`` s at most. Its clock goes
-    on by ``tick`` with each frame.
+    on by ``tick`` with each frame, 10 ms as a rule.
     """
 
     def __init__(self, free=None, period=0.002):
@@ -41,7 +44,7 @@ class Board:
         self.presses = ()
         self.commands = []
         self.lost = False
-        self.tick = 0
+        self.tick = 160_000
         self.closed = False
         self.scanning = threading.Event()
         self._period = period

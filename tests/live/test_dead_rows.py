@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from golden import mismatch
+from live.board import AS_TAKEN
 from tomoskin.core import DataError
 from tomoskin.inverse import Evidence, Spectrum, choose
 from tomoskin.live import Prepared, prepare, reconstruct
@@ -17,7 +18,9 @@ from tomoskin.signal import Reference
 from tomoskin.skin import Skin
 
 SKINS = {
-    kind: Skin.load("textile-disc-8").altered({"inverse": {"alpha": 0.1, "difference": kind}})
+    kind: Skin.load("textile-disc-8").altered(
+        {"inverse": {"alpha": 0.1, "difference": kind}, "signal": AS_TAKEN}
+    )
     for kind in ("plain", "normalised")
 }
 ROWS = [3, 17, 30]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golden import mismatch
-from live.board import pressed, samples_of
+from live.board import AS_TAKEN, pressed, samples_of
 from live.test_replay import Recorded, recorded_touches, same, touches_of
 from tomoskin.core import FloatArray, Frame
 from tomoskin.inverse import Temporal
@@ -32,7 +32,9 @@ TICKS = round(INTERVAL * RATE)
 @cache
 def filtered(alpha: float | str = 0.05, tau: str = f"{TAU} s") -> Prepared:
     return prepare(
-        Skin.load("textile-disc-8").altered({"inverse": {"alpha": alpha, "time_constant": tau}})
+        Skin.load("textile-disc-8").altered(
+            {"inverse": {"alpha": alpha, "time_constant": tau}, "signal": AS_TAKEN}
+        )
     )
 
 

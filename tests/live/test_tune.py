@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from golden import mismatch
-from live.board import pressed, samples_of
+from live.board import AS_TAKEN, pressed, samples_of
 from tomoskin.core import Frame, ModelError
 from tomoskin.inverse import Evidence
 from tomoskin.live import Pipeline, prepare
@@ -22,7 +22,7 @@ LOUD = 5.0
 
 
 def skin(alpha):
-    return Skin.load("textile-disc-8").altered({"inverse": {"alpha": alpha}})
+    return Skin.load("textile-disc-8").altered({"inverse": {"alpha": alpha}, "signal": AS_TAKEN})
 
 
 @pytest.fixture(scope="module")

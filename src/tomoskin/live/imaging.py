@@ -10,7 +10,7 @@ import numpy as np
 from tomoskin.core import FloatArray, Image
 from tomoskin.inverse import Modes, Temporal
 from tomoskin.live.prepare import Prepared
-from tomoskin.signal import Reference
+from tomoskin.signal import Blind, Reference
 from tomoskin.touch import NoiseFloor
 
 Pictured = tuple[Image, NoiseFloor | None]
@@ -26,9 +26,16 @@ _GAP = 2.5
 class Alone:
     """Each image from its own frame."""
 
-    def __init__(self, prepared: Prepared, reference: Reference | None) -> None:
+    def __init__(
+        self, prepared: Prepared, reference: Reference | None, blind: Blind | None = None
+    ) -> None:
         self._operator = prepared.operator
-        self._floor = None if reference is None else prepared.noise_floor(reference)
+        self._floor = None if reference is None else prepared.noise_floor(reference, blind)
+
+    def renew(self, prepared: Prepared, reference: Reference, blind: Blind) -> None:
+        """Another operator or noise, or other directions of the data that say nothing."""
+        self._operator = prepared.operator
+        self._floor = prepared.noise_floor(reference, blind)
 
     def push(self, dv: FloatArray, time: float) -> Pictured:
         """Image of ``dv`` (n_meas,), measured at ``time`` s. Raises DataError for other data."""
@@ -49,16 +56,30 @@ class Filtered:
     """
 
     def __init__(
-        self, prepared: Prepared, modes: Modes, reference: Reference | None, interval: float
+        self,
+        prepared: Prepared,
+        modes: Modes,
+        reference: Reference | None,
+        interval: float,
+        blind: Blind | None = None,
     ) -> None:
         self._temporal = Temporal(modes, prepared.skin.inverse.time_constant)
         self._interval = interval
         self._settled = np.inf
         self._noise: FloatArray | None = None
         self._alone: NoiseFloor | None = None
-        if reference is not None and reference.noise_is_known:
-            self._noise = prepared.difference_noise(reference)
-            self._alone = prepared.noise_floor(reference)
+        if reference is not None:
+            self.renew(prepared, reference, blind)
+
+    def renew(self, prepared: Prepared, reference: Reference, blind: Blind | None) -> None:
+        """As :meth:`Alone.renew`, but for the operator: the modes stay."""
+        if not reference.noise_is_known:
+            return
+        noise = prepared.difference_noise(reference)
+        self._noise = noise if blind is None else blind.seen_by(np.eye(len(noise))) * noise
+        self._alone = prepared.noise_floor(reference, blind)
+        for name in ("_steady", "_settling"):
+            self.__dict__.pop(name, None)
 
     def push(self, dv: FloatArray, time: float) -> Pictured:
         """As :meth:`Alone.push`."""
@@ -92,8 +113,13 @@ class Filtered:
         return replace(self._alone, sd=np.maximum(self._alone.sd, self._steady.sd))
 
 
-def imaging(prepared: Prepared, reference: Reference | None, interval: float) -> Alone | Filtered:
-    """What makes the images of ``prepared``: filtered where its skin has a time constant."""
+def imaging(
+    prepared: Prepared, reference: Reference | None, interval: float, blind: Blind | None = None
+) -> Alone | Filtered:
+    """What makes the images of ``prepared``: filtered where its skin has a time constant.
+
+    ``blind``: what the data do not tell, for the noise floor; the data come without it.
+    """
     if prepared.modes is None:
-        return Alone(prepared, reference)
-    return Filtered(prepared, prepared.modes, reference, interval)
+        return Alone(prepared, reference, blind)
+    return Filtered(prepared, prepared.modes, reference, interval, blind)

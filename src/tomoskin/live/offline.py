@@ -5,14 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray, Touch
 from tomoskin.inverse import AlphaChoice
 from tomoskin.live.changes import Changes, Idle, changes_of
-from tomoskin.live.imaging import Pictured, imaging
+from tomoskin.live.finding import View, finding, rows_of
+from tomoskin.live.imaging import imaging
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.tune import tuned, tuned_by_rule
+from tomoskin.live.watch import Watch
 from tomoskin.session import Recording
+from tomoskin.signal import undone
 from tomoskin.touch import STILL, Tracker
 
 
@@ -86,18 +90,21 @@ def reconstruct(
     time = recording.time[changes.frames]
     if prepared.modes is not None:
         _check_times(time, idle, recording.source)
-    pictured = _pictured(prepared, changes, time)
     tracker = Tracker(replace(STILL, snr=prepared.skin.touch.snr))
+    stage = _Stage(prepared, changes, time)
+    images, touches = [], []
+    for number, now in enumerate(time.tolist()):
+        view = stage.push(number, now)
+        images.append(view.image)
+        touches.append(tracker.update(stage.finder.push(view), now, now))
+        stage.learn(now, touched=bool(touches[-1]))
     return Reconstruction(
         frames=changes.frames,
         rows_missing=changes.missing.sum(axis=1),
         left_out=changes.left_out,
-        images=np.stack([image.values for image, _ in pictured]),
+        images=np.stack([image.values for image in images]),
         unit=prepared.operator.unit,
-        touches=tuple(
-            tracker.update(prepared.segmenter(image, floor), float(now), float(now))
-            for (image, floor), now in zip(pictured, time, strict=True)
-        ),
+        touches=tuple(touches),
         agreement=changes.agreement,
         choice=prepared.choice,
         rows_left_out=changes.rows_left_out,
@@ -112,13 +119,42 @@ def _tuned(changes: Changes, rule: str | None) -> Prepared:
     return tuned(changes.prepared, changes.reference)
 
 
-def _pictured(prepared: Prepared, changes: Changes, time: FloatArray) -> list[Pictured]:
-    interval = float(np.median(np.diff(time))) if len(time) > 1 else np.nan
-    stage, fill = imaging(prepared, changes.reference, interval), prepared.operator.filled
-    return [
-        stage.push(fill(dv, missing), float(now))
-        for dv, missing, now in zip(changes.values, changes.missing, time, strict=True)
-    ]
+class _Stage:
+    """Frame by frame as the pipeline does it live, where there is a reference to follow."""
+
+    def __init__(self, prepared: Prepared, changes: Changes, time: FloatArray) -> None:
+        self._prepared, self._changes = prepared, changes
+        interval = float(np.median(np.diff(time))) if len(time) > 1 else np.nan
+        self._watch: Watch | None = None
+        blind = None
+        if changes.reference is not None:
+            none = np.zeros(prepared.pattern.n_meas, bool)
+            self._watch = Watch(prepared, changes.reference, none, None)
+            blind = self._watch.steady()
+        self._imaging = imaging(prepared, changes.reference, interval, blind)
+        self.finder = finding(prepared, changes.reference)
+
+    def push(self, number: int, now: float) -> View:
+        """What that frame of the changes shows."""
+        dv, missing = self._changes.values[number], self._changes.missing[number]
+        if self._watch is None or self._changes.reference is None:
+            return self._filled(dv, missing, now)
+        values = undone(dv, self._changes.reference.mean, self._prepared.operator.difference)
+        seen = self._watch.look(values, missing, now)
+        if seen.dv is None:  # the frames' own limit is narrower, but electrodes add to it
+            return self._filled(dv, missing, now)
+        return View(*self._imaging.push(seen.dv, now), seen.dv, seen.blind.directions)
+
+    def _filled(self, dv: FloatArray, missing: NDArray[np.bool_], now: float) -> View:
+        filled = self._prepared.operator.filled(dv, missing)
+        return View(*self._imaging.push(filled, now), filled, rows_of(missing))
+
+    def learn(self, now: float, *, touched: bool) -> None:
+        """What the frame tells of the reference."""
+        watch = self._watch
+        if watch is not None and watch.learn(now, touched=touched):
+            self._imaging.renew(watch.prepared, watch.baseline.reference, watch.steady())
+            self.finder.renew(watch.prepared, watch.baseline.reference)
 
 
 def _check_times(time: FloatArray, idle: Idle, source: str) -> None:

@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, Frame, Image, Reading, Touch, Voltages
-from tomoskin.inverse import MOST_LEFT_OUT, AlphaChoice
+from tomoskin.inverse import AlphaChoice
 from tomoskin.live.collector import Collector
+from tomoskin.live.finding import Finder, View, finding
 from tomoskin.live.imaging import Alone, Filtered, imaging
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.result import ReferenceState, Result
 from tomoskin.live.tune import tune
-from tomoskin.signal import Reference, difference
+from tomoskin.live.watch import Watch
+from tomoskin.signal import Health, Reference
 from tomoskin.touch import Tracker, TrackSettings
 
 REFERENCE_FRAMES = 20
@@ -39,7 +41,9 @@ class Pipeline:
         self._tracker = Tracker(TrackSettings(snr=prepared.skin.touch.snr))
         self._image = _none(prepared)
         self._reference: Reference | None = None
+        self._watch: Watch | None = None
         self._imaging: Alone | Filtered = Alone(prepared, None)
+        self._finder: Finder = finding(prepared, None)
         self._times: list[float] = []
         self._tuning: Generator[None, None, Prepared] | None = None
         self._since = 0.0
@@ -52,7 +56,7 @@ class Pipeline:
 
     def take_reference(self) -> None:
         """Forget the reference; the next frames make a new one."""
-        self._reference = None
+        self._reference = self._watch = None
         self._tuning = None
         self._tracker.reset()
         self._times = []
@@ -64,7 +68,8 @@ class Pipeline:
         if self._reference is None:
             return ReferenceState(self._collector.taken, self._needed)
         noise = float(np.sqrt(np.mean(self._reference.noise**2)))
-        return ReferenceState(self._needed, self._needed, self._since, noise)
+        baseline = self._watch.baseline.state if self._watch else None
+        return ReferenceState(self._needed, self._needed, self._since, noise, baseline)
 
     @property
     def choice(self) -> AlphaChoice:
@@ -80,20 +85,25 @@ class Pipeline:
             return None
         voltages = self._prepared.readout(frame)
         unusable = voltages.railed | ~np.isfinite(voltages.values)
-        if self._reference is None:
+        if self._watch is None or self._reference is None:
             return self._collect(voltages, unusable)
         self._tune(self._reference)
-        return self._picture(voltages, unusable | self._collector.unusable, self._reference)
+        return self._picture(voltages, unusable, frame.samples, self._watch)
 
     def _collect(self, voltages: Voltages, unusable: NDArray[np.bool_]) -> Result:
         self._collector.add(voltages.values, unusable)
         self._times.append(self._time(voltages))
         if self._collector.done:
             self._settle(self._collector.reference(), voltages.host_time)
-        return self._result(voltages, self._image, (), unusable, pictured=True)
+        left_out = int(np.count_nonzero(unusable))
+        return self._result(voltages, self._image, (), left_out, pictured=True)
 
     def _settle(self, reference: Reference, host_time: float) -> None:
-        self._imaging = imaging(self._prepared, reference, self._interval())
+        self._watch = Watch(
+            self._prepared, reference, self._collector.unusable, self._prepared.scan
+        )
+        self._imaging = imaging(self._prepared, reference, self._interval(), self._watch.steady())
+        self._finder = finding(self._prepared, reference)
         self._tuning = tune(self._prepared, reference)
         self._reference = reference
         self._since = host_time
@@ -108,22 +118,40 @@ class Pipeline:
             self._tuning = None
             if end.value is not self._prepared:
                 self._prepared = end.value
-                self._imaging = imaging(self._prepared, reference, self._interval())
+                self._retake(reference)
+
+    def _retake(self, reference: Reference) -> None:
+        blind, prepared = None, self._prepared
+        if self._watch is not None:
+            self._watch.take(self._prepared)
+            reference, blind = self._watch.baseline.reference, self._watch.steady()
+            prepared = self._watch.prepared
+        self._imaging = imaging(prepared, reference, self._interval(), blind)
+        self._finder.renew(prepared, reference)
 
     def _picture(
-        self, voltages: Voltages, unusable: NDArray[np.bool_], reference: Reference
+        self,
+        voltages: Voltages,
+        unusable: NDArray[np.bool_],
+        samples: NDArray[np.uint16],
+        watch: Watch,
     ) -> Result:
-        p = self._prepared
-        if np.count_nonzero(unusable) > MOST_LEFT_OUT * len(unusable):
+        now = self._time(voltages)
+        seen = watch.look(voltages.values, unusable, now, samples)
+        if seen.dv is None:
             touches = self._track([], voltages)
-            return self._result(voltages, self._image, touches, unusable, pictured=False)
-        values = np.where(unusable, reference.mean, voltages.values)
-        dv = difference(values, reference.mean, p.skin.inverse.difference)
-        filled = p.operator.filled(dv, unusable)
-        image, floor = self._imaging.push(filled, self._time(voltages))
-        readings = p.segmenter(image, floor)
+            return self._result(
+                voltages, self._image, touches, seen.left_out, health=seen.health, pictured=False
+            )
+        image, floor = self._imaging.push(seen.dv, now)
+        readings = self._finder.push(View(image, floor, seen.dv, seen.blind.directions))
         touches = self._track(readings, voltages)
-        return self._result(voltages, image, touches, unusable, pictured=True)
+        if watch.learn(now, touched=bool(touches)):
+            self._imaging.renew(watch.prepared, watch.baseline.reference, watch.steady())
+            self._finder.renew(watch.prepared, watch.baseline.reference)
+        return self._result(
+            voltages, image, touches, seen.left_out, health=seen.health, pictured=True
+        )
 
     def _track(self, readings: list[Reading], voltages: Voltages) -> tuple[Touch, ...]:
         return self._tracker.update(readings, self._time(voltages), voltages.host_time)
@@ -133,9 +161,10 @@ class Pipeline:
         voltages: Voltages,
         image: Image,
         touches: tuple[Touch, ...],
-        unusable: NDArray[np.bool_],
+        left_out: int,
         *,
         pictured: bool,
+        health: Health | None = None,
     ) -> Result:
         return Result(
             sequence=voltages.sequence,
@@ -147,7 +176,9 @@ class Pipeline:
             reference=self._expected(),
             touches=touches,
             events=self._tracker.events,
-            left_out=int(np.count_nonzero(unusable)),
+            left_out=left_out,
+            health=health,
+            baseline=self._watch.baseline.state if self._watch else None,
         )
 
     def _time(self, voltages: Voltages) -> float:
@@ -159,7 +190,7 @@ class Pipeline:
         return float(np.median(np.diff(self._times))) if len(self._times) > 1 else np.nan
 
     def _expected(self) -> FloatArray:
-        return self._reference.mean if self._reference else self._prepared.operator.reference
+        return self._watch.baseline.mean if self._watch else self._prepared.operator.reference
 
 
 def _none(prepared: Prepared) -> Image:

@@ -15,14 +15,16 @@ from tomoskin.inverse import (
     LinearProblem,
     Modes,
     Operator,
+    Prior,
     Spectrum,
     named_prior,
 )
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern, Scan
-from tomoskin.signal import Readout, Reference, difference_noise
+from tomoskin.signal import Blind, Readout, Reference, difference_noise
 from tomoskin.skin import Skin
 from tomoskin.touch import NoiseFloor, Segmenter
+from tomoskin.touch.fit import SpotModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,8 @@ class Prepared:
         The operator's alpha, and what chose it.
     light_touch
         Chooses alpha again when the noise has been measured; None where it was set by hand.
+    spots
+        What touches are fitted with; None where they are found in the image.
     """
 
     skin: Skin
@@ -53,6 +57,7 @@ class Prepared:
     readout: Readout
     choice: AlphaChoice
     light_touch: LightTouch | None
+    spots: SpotModel | None
 
     def __post_init__(self) -> None:
         """Refuse stages of different meshes or patterns."""
@@ -78,11 +83,30 @@ class Prepared:
         """
         return _prepared(self.skin, self.problem.without(rows)) if len(rows) else self
 
-    def noise_floor(self, reference: Reference) -> NoiseFloor | None:
-        """What the noise of a reference does to the picture; None where it is not known."""
+    def blind_to(self, directions: FloatArray) -> Prepared:
+        """The skin whose prior knows that data along ``directions`` (n_meas, k) say nothing.
+
+        A prior that weighs by sensitivity then holds changes beside a lost electrode for as
+        likely as elsewhere. Trained operators, and those with a filter over frames, stay.
+        """
+        if self.skin.inverse.method != "one-step" or self.modes is not None:
+            return self
+        basis = np.linalg.qr(directions)[0]
+        jacobian = self.problem.jacobian
+        left = jacobian - basis @ (basis.T @ jacobian)
+        prior = _prior(self.skin).penalty(self.mesh, left)
+        operator = replace(self.problem, prior=prior).operator(self.choice.alpha)
+        return replace(self, operator=operator)
+
+    def noise_floor(self, reference: Reference, blind: Blind | None = None) -> NoiseFloor | None:
+        """What the noise of a reference does to the picture; None where it is not known.
+
+        ``blind``: what the data do not tell.
+        """
         if not reference.noise_is_known:
             return None
-        spread = self.operator.matrix * self.difference_noise(reference)
+        matrix = self.operator.matrix if blind is None else blind.seen_by(self.operator.matrix)
+        spread = matrix * self.difference_noise(reference)
         return NoiseFloor.of(spread, self.mesh.identity)
 
     def difference_noise(self, reference: Reference) -> FloatArray:
@@ -111,18 +135,22 @@ def prepare(skin: Skin) -> Prepared:
         When the skin cannot be meshed, modelled or inverted; the message says which.
     """
     model = ForwardModel(skin.mesh(), skin.pattern(), skin.contact_impedance, skin.current)
-    settings = skin.inverse
     problem = LinearProblem.of(
         model,
-        named_prior(
-            settings.prior,
-            exponent=settings.exponent,
-            correlation_length=settings.correlation_length,
-        ),
+        _prior(skin),
         conductivity=skin.conductivity,
-        difference=settings.difference,
+        difference=skin.inverse.difference,
     )
     return _prepared(skin, problem)
+
+
+def _prior(skin: Skin) -> Prior:
+    settings = skin.inverse
+    return named_prior(
+        settings.prior,
+        exponent=settings.exponent,
+        correlation_length=settings.correlation_length,
+    )
 
 
 def _prepared(skin: Skin, problem: LinearProblem) -> Prepared:
@@ -143,6 +171,7 @@ def _prepared(skin: Skin, problem: LinearProblem) -> Prepared:
         readout=readout,
         choice=choice,
         light_touch=light_touch,
+        spots=SpotModel.of(skin, model) if skin.touch.method == "fit" else None,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tomoskin.core import FloatArray, Image, Touch
+from tomoskin.signal import BaselineState, Health
 from tomoskin.touch import TouchEvent
 
 
@@ -30,6 +31,9 @@ class Result:
         Number of rows that were at a rail or not finite and were left out of the picture.
     events
         What happened to the touches in this frame.
+    health, baseline
+        Of the electrodes, and of the reference that the frame was held against; None until
+        that stands.
     """
 
     sequence: int
@@ -42,12 +46,16 @@ class Result:
     touches: tuple[Touch, ...]
     left_out: int
     events: tuple[TouchEvent, ...] = ()
+    health: Health | None = None
+    baseline: BaselineState | None = None
 
     @property
     def problem(self) -> str | None:
         """What is wrong with the picture, in a sentence, or None."""
+        if self.health is not None and self.health.sick:
+            return self._sick(self.health)
         if not self.left_out:
-            return None
+            return self.baseline.stale if self.baseline else None
         rows = f"{self.left_out} of {len(self.voltages)} rows"
         if not self.pictured:
             return (
@@ -59,15 +67,23 @@ class Result:
             "made without them"
         )
 
+    def _sick(self, health: Health) -> str:
+        """Which electrodes, why, and what becomes of the picture."""
+        if not self.pictured:
+            return f"{health.text}; too little is left for a picture: look at the electrodes"
+        return f"{health.text}; the picture is made without {self.left_out} rows"
+
 
 @dataclass(frozen=True, slots=True)
 class ReferenceState:
-    """How far the reference is: frames taken of those needed, when it was done, its noise in V."""
+    """How far the reference is: frames taken of those needed, when it was done, its noise in V,
+    and what has become of it since."""
 
     frames: int
     needed: int
     since: float | None = None
     noise: float | None = None
+    baseline: BaselineState | None = None
 
     @property
     def ready(self) -> bool:

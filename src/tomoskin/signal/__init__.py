@@ -3,10 +3,10 @@
 from tomoskin.signal.baseline import Baseline, BaselineState
 from tomoskin.signal.blind import Blind
 from tomoskin.signal.consecutive import Consecutive, at_one_time
-from tomoskin.signal.difference import DIFFERENCES, difference, difference_noise
+from tomoskin.signal.difference import DIFFERENCES, difference, difference_noise, undone
 from tomoskin.signal.health import ElectrodeHealth, Health
 from tomoskin.signal.idle import Idle
-from tomoskin.signal.monitor import Monitor, sick_text
+from tomoskin.signal.monitor import Monitor
 from tomoskin.signal.phase import in_phase
 from tomoskin.signal.readout import Readout
 from tomoskin.signal.reference import Reference
@@ -30,5 +30,5 @@ __all__ = [
     "difference_noise",
     "in_phase",
     "lost_directions",
-    "sick_text",
+    "undone",
 ]

@@ -81,7 +81,7 @@ class Baseline:
     def __init__(self, reference: Reference, *, follows: bool = True) -> None:
         self._start = reference.mean
         self._size = float(np.sqrt(np.mean(reference.mean**2)))
-        self._known = reference.noise_is_known
+        self._known = reference.noise_is_known and bool(reference.noise.all())
         noise = reference.noise if self._known else np.full_like(reference.mean, np.nan)
         self._follows = follows and self._known
         self.mean = reference.mean

@@ -42,6 +42,11 @@ def difference(values: FloatArray, reference: FloatArray, kind: str) -> FloatArr
     return np.asarray(change / np.abs(reference))
 
 
+def undone(change: FloatArray, reference: FloatArray, kind: str) -> FloatArray:
+    """(…, n_meas) V: the voltages of which ``change`` is the :func:`difference`."""
+    return np.asarray(reference + (change if kind == "plain" else change * np.abs(reference)))
+
+
 def difference_noise(noise: FloatArray, reference: FloatArray, kind: str) -> FloatArray:
     """Standard deviation of difference data, (n_meas,), where that of the voltages is ``noise``.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -88,7 +88,7 @@ class Monitor:
         self._deviation = self._reciprocity.deviation(noise)
         self._rest = self._reciprocity.error(reference.mean)
         usable_pairs = usable[self._reciprocity.first] & usable[self._reciprocity.second]
-        self._paired = usable_pairs & reference.noise_is_known
+        self._paired = usable_pairs & np.isfinite(self._deviation)
         self._squared = np.ones(len(self._rest))
         self._shift = np.zeros(len(self._rest))
         self._members = _averages(scan, n)
@@ -220,11 +220,6 @@ class Monitor:
         }
 
 
-def sick_text(electrodes: Iterable[ElectrodeHealth]) -> str:
-    """Several electrodes in words: "E3 open, E7 noisy"."""
-    return ", ".join(f"E{e.electrode + 1} {e.state}" for e in electrodes)
-
-
 def _masks(
     pattern: Pattern, roles: Roles, bad: Mask, states: Mapping[int, str], unusable: Mask
 ) -> tuple[Mask, Mask]:
@@ -253,11 +248,10 @@ def _short_text(other: int) -> str:
 
 
 def _known(reference: Reference, model: FloatArray) -> FloatArray:
-    """(n_meas,) V of noise, above zero; a small part of the voltages where it is not known."""
-    least = 1e-6 * float(np.sqrt(np.mean(model**2)))
-    if not reference.noise_is_known:
-        return np.full(len(model), max(1e-3 * float(np.sqrt(np.mean(model**2))), least))
-    return np.maximum(reference.noise, least)
+    """(n_meas,) V of noise, above zero; endless where it is not known, which blames nobody."""
+    if not (reference.noise_is_known and reference.noise.all()):
+        return np.full(len(model), np.inf)
+    return np.maximum(reference.noise, 1e-6 * float(np.sqrt(np.mean(model**2))))
 
 
 def _silent(

@@ -1,0 +1,195 @@
+"""Between voltages and picture: electrode health, the baseline, and what the data cannot tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.live.prepare import Prepared
+from tomoskin.pattern import Scan
+from tomoskin.signal import (
+    Baseline,
+    Blind,
+    Health,
+    Monitor,
+    Reference,
+    difference,
+    lost_directions,
+)
+
+MOST_BLIND = 0.5
+"""No picture is made when more than this part of the data says nothing."""
+
+_NEW_FLOOR = 0.1
+"""Noise that has changed by more than this part makes a new floor."""
+
+_KEPT = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """One frame: difference data ``dv`` (n_meas,) without what says nothing, None where too
+    little is left; ``blind`` what was taken out; ``health``; how many rows are ``left_out`` or
+    count in a sum only."""
+
+    dv: FloatArray | None
+    blind: Blind
+    health: Health
+    left_out: int
+
+
+class Watch:
+    """What follows a skin from its reference on.
+
+    Parameters
+    ----------
+    prepared
+        The skin.
+    reference
+        What it read while nothing touched.
+    unusable
+        (n_meas,) bool: rows without a reference.
+    scan
+        What samples are, where frames bring them; None where there are voltages only.
+    """
+
+    def __init__(
+        self,
+        prepared: Prepared,
+        reference: Reference,
+        unusable: NDArray[np.bool_],
+        scan: Scan | None,
+    ) -> None:
+        model = prepared.operator.reference
+        self._monitor = Monitor(
+            prepared.pattern,
+            reference,
+            model,
+            unusable=unusable,
+            scan=scan,
+            rank=_rank(prepared),
+        )
+        settings = prepared.skin.signal
+        self._projects = settings.common_modes == "projected"
+        self._baseline = Baseline(reference, follows=settings.baseline == "follow")
+        self._scale = _scale(prepared, reference)
+        self._common = self._gain(reference) if self._projects else np.zeros((len(model), 0))
+        self._kept: dict[bytes, Blind] = {}
+        self._health: Health | None = None
+        self._floor_for: tuple[object, float] = (None, np.nan)
+        self._values, self._lost = reference.mean, unusable
+        self.take(prepared)
+
+    def take(self, prepared: Prepared) -> None:
+        """Go on with another operator of the same skin."""
+        self._whole = self._prepared = prepared
+        self._kept.clear()
+        if self._health is not None and self._health.sick:
+            lost = lost_directions(prepared.pattern, self._health.lost, self._health.floating)
+            self._prepared = prepared.blind_to(lost / self._scale[:, None])
+
+    @property
+    def prepared(self) -> Prepared:
+        """The skin with the operator for the electrodes that are well."""
+        return self._prepared
+
+    @property
+    def baseline(self) -> Baseline:
+        """The reference as it is now."""
+        return self._baseline
+
+    def look(
+        self,
+        values: FloatArray,
+        railed: NDArray[np.bool_],
+        time: float,
+        samples: NDArray[np.uint16] | None = None,
+    ) -> Seen:
+        """Difference data of the frame with ``values`` (n_meas,) V at ``time`` s.
+
+        ``railed`` (n_meas,) bool: rows that stand at a rail or are not finite.
+        """
+        finite = np.isfinite(values)
+        if not finite.all():
+            values = np.where(finite, values, self._baseline.mean)
+        health = self._monitor.push(values, railed, time, samples)
+        self._values, self._health = values, health
+        blind = self._blind(health)
+        self._lost = health.lost
+        if health.floating.any():
+            self._lost = health.lost | health.floating[self._prepared.pattern.measure].any(axis=1)
+        left_out = int(np.count_nonzero(self._lost))
+        if blind.count > MOST_BLIND * len(values):
+            return Seen(None, blind, health, left_out)
+        if left_out:
+            values = np.where(health.lost, self._baseline.mean, values)
+        dv = difference(values, self._baseline.mean, self._prepared.operator.difference)
+        return Seen(blind(dv), blind, health, left_out)
+
+    def learn(self, time: float, *, touched: bool) -> bool:
+        """Take the frame that was looked at last for the baseline; True where floors change."""
+        health = self._health
+        if health is None:
+            return False
+        ended = self._baseline.push(self._values, self._lost, time, touched=touched)
+        if ended and self._projects:
+            self._learn_modes()
+        noise = self._baseline.idle.noise
+        level = float(noise @ noise)
+        sick = tuple((e.electrode, e.state) for e in health.sick)
+        states = (sick, self._common.tobytes())
+        before, then = self._floor_for
+        changed = then > 0 and abs(np.log(level / then)) > 2.0 * _NEW_FLOOR
+        if states == before and not changed:
+            return False
+        self._floor_for = (states, level)
+        if before is not None and states != before:
+            self.take(self._whole)
+        return before is not None
+
+    def steady(self) -> Blind:
+        """What no frame of late has told."""
+        return self._blind(self._health)
+
+    def _learn_modes(self) -> None:
+        """Directions of drift beside the gain, at the end of an idle block."""
+        signatures = self._prepared.problem.jacobian * self._scale[:, None]
+        found = self._baseline.idle.modes(signatures.real)
+        gain = self._common[:, :1]
+        if found.shape[1] or self._common.shape[1] > 1:
+            self._common = np.hstack([gain, found])
+            self._kept.clear()
+
+    def _gain(self, reference: Reference) -> FloatArray:
+        """(n_meas, 1): all voltages in proportion, as conductivity does that changes alike."""
+        return reference.mean[:, None]
+
+    def _blind(self, health: Health | None) -> Blind:
+        lost = None if health is None else health.lost
+        key = b"" if health is None else health.lost.tobytes() + health.floating.tobytes()
+        if key not in self._kept:
+            if len(self._kept) >= _KEPT:
+                self._kept.pop(next(iter(self._kept)))
+            parts = [self._common]
+            if health is not None and lost is not None:
+                parts.append(lost_directions(self._prepared.pattern, lost, health.floating))
+            directions = np.hstack(parts) / self._scale[:, None]
+            self._kept[key] = Blind.of(directions, self._prepared.operator.precision)
+        return self._kept[key]
+
+
+def _scale(prepared: Prepared, reference: Reference) -> FloatArray:
+    """(n_meas,) V per unit of difference data."""
+    if prepared.operator.difference == "plain":
+        return np.ones_like(reference.mean)
+    return np.abs(reference.mean)
+
+
+def _rank(prepared: Prepared) -> IntArray:
+    """(n_electrodes,) place of each electrode along the rim."""
+    length = prepared.skin.outline.length
+    start = [arc.start % length for arc in prepared.skin.arcs]
+    return np.argsort(np.argsort(start))
