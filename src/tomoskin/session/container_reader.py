@@ -25,6 +25,8 @@ from tomoskin.session.parts import (
     parse_metadata,
 )
 
+_BLOCK = 1 << 20
+
 LARGEST = 64 << 20
 """A longer record is no record of a session."""
 
@@ -120,6 +122,34 @@ class ContainerReader:
                 for message in messages_in(chunk, self.where):
                     if message.channel in wanted and message.log_time >= since:
                         yield message
+
+    def rare(self, channel: int) -> Iterator[Message]:
+        """Messages of a channel, in file order; of a whole file only the chunks that hold some."""
+        if not self.whole:
+            yield from self.messages(frozenset({channel}))
+            return
+        for offset, held in self._chunk_index():
+            if channel in held:
+                for message in messages_in(self._chunk(offset), self.where):
+                    if message.channel == channel:
+                        yield message
+
+    def _chunk_index(self) -> Iterator[tuple[int, tuple[int, ...]]]:
+        """(offset, channels) of every chunk; the index is read a block at a time."""
+        place, length = self._groups.get(mcap.CHUNK_INDEX, (0, 0))
+        end, rest = place + length, b""
+        while place < end:
+            block = self._read(place, min(_BLOCK, end - place))
+            if not block:
+                raise self._damaged(place, "the index of the chunks is cut")
+            place += len(block)
+            begun = place - len(rest) - len(block)
+            with self._understood(begun):
+                used, found = mcap.parse_chunk_indexes(rest + block)
+            yield from found
+            rest = (rest + block)[used:]
+        if rest:
+            raise self._damaged(end, "the index of the chunks is cut")
 
     def _start(self) -> None:
         if self._read(0, len(mcap.MAGIC)) != mcap.MAGIC:

@@ -35,6 +35,7 @@ FOOTER_SIZE = PREFIX.size + FOOTER_BODY.size + len(MAGIC)
 _MESSAGE = struct.Struct("<BQHIQQ")
 _ENTRY = struct.Struct("<QQ")
 _COUNT = struct.Struct("<HQ")
+_INDEX_HEAD = struct.Struct("<QQQQI")
 
 
 @dataclass(frozen=True)
@@ -123,8 +124,28 @@ def chunk_index(
     of the chunk's records.
     """
     offsets = b"".join(_COUNT.pack(*item) for item in indexes.items())
-    body = struct.pack("<QQQQI", *times, *place, len(offsets)) + offsets
+    body = _INDEX_HEAD.pack(*times, *place, len(offsets)) + offsets
     return record(CHUNK_INDEX, body + struct.pack("<QIQQ", size[0], 0, size[1], size[1]))
+
+
+def parse_chunk_indexes(data: bytes) -> tuple[int, list[tuple[int, tuple[int, ...]]]]:
+    """Whole records of chunk indexes at the start of ``data``: their bytes; offset and channels.
+
+    Raises ValueError when a record is of another kind, or its channels are longer than it.
+    """
+    place, found = 0, []
+    head = PREFIX.size + _INDEX_HEAD.size
+    while place + head <= len(data):
+        opcode, length = PREFIX.unpack_from(data, place)
+        _, _, offset, _, size = _INDEX_HEAD.unpack_from(data, place + PREFIX.size)
+        if opcode != CHUNK_INDEX or _INDEX_HEAD.size + size > length or size % _COUNT.size:
+            raise ValueError("a record among the indexes of the chunks does not add up")
+        if place + PREFIX.size + length > len(data):
+            break
+        pairs = _COUNT.iter_unpack(data[place + head : place + head + size])
+        found.append((offset, tuple(channel for channel, _ in pairs)))
+        place += PREFIX.size + length
+    return place, found
 
 
 def attachment(log_time: int, name: str, media_type: str, data: bytes) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -215,21 +215,24 @@ class SessionReader:
         return self._file.messages(frozenset({channel}), start)
 
     def _documents(self, channel: int) -> Iterator[dict[str, Any]]:
+        return map(self._document, self._rare(channel))
+
+    def _rare(self, channel: int) -> Iterator[Message]:
         if self.totals and not self.totals.counts.get(channel):
-            return
-        for message in self._messages(channel):
-            try:
-                yield msgspec.json.decode(message.data, type=dict[str, Any])
-            except (msgspec.DecodeError, UnicodeDecodeError) as error:
-                topic = channels.TOPICS[channel]
-                raise DataError(f"a message of {topic} is not understood: {error}",
-                                where=self._place(message)) from error  # fmt: skip
+            return iter(())
+        return self._file.rare(channel)
+
+    def _document(self, message: Message) -> dict[str, Any]:
+        try:
+            return msgspec.json.decode(message.data, type=dict[str, Any])
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            topic = channels.TOPICS[message.channel]
+            raise DataError(f"a message of {topic} is not understood: {error}",
+                            where=self._place(message)) from error  # fmt: skip
 
     def _last(self, channel: int) -> dict[str, Any]:
-        last: dict[str, Any] = {}
-        for item in self._documents(channel):
-            last = item
-        return last
+        last = deque(self._rare(channel), maxlen=1)
+        return self._document(last[0]) if last else {}
 
     def _place(self, message: Message) -> str:
         return f"{self.path}, chunk at byte {message.chunk}"
@@ -248,7 +251,7 @@ def _event(item: dict[str, Any]) -> Event:
 
 def _touch(item: dict[str, Any]) -> Touch:
     sd_x, sd_y = (float("nan") if item[k] is None else item[k] for k in ("sd_x", "sd_y"))
-    reading = Reading(
-        item["x"], item["y"], sd_x, sd_y, item["area"], item["peak"], _NO_CELLS
-    )  # fmt: skip
-    return Touch(item["id"], item["kind"], item["since"], reading)
+    place = item["x"], item["y"], sd_x, sd_y, item["area"], item["peak"], _NO_CELLS
+    cov_xy, close, merged = (item.get(k) for k in ("cov_xy", "close", "merged"))  # format 1.0: none
+    reading = Reading(*place, cov_xy=cov_xy or 0.0, close=bool(close))
+    return Touch(item["id"], item["kind"], item["since"], reading, tuple(merged or ()))
