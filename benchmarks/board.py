@@ -27,12 +27,22 @@ def run(data: Path | None) -> tuple[Report, ...]:
     return (
         Report(
             f"{FRAMES:,} frames of the ELF under simavr",
-            ("electrodes", "oversampling", "frames", "wrong", "lost", "corrupt", "times real"),
+            (
+                "electrodes",
+                "oversampling",
+                "frames",
+                "wrong",
+                "lost",
+                "corrupt",
+                "resets",
+                "times real",
+            ),
             tuple(_ran(*case) for case in CASES),
             (
                 f"settling {SETTLING * 1e6:g} us, prescaler 64, 1 Mbaud, adjacent; a star of "
                 "resistors, so that each sample is known to the last bit",
-                "wrong: frames with any sample, flag or configuration other than expected",
+                "wrong: frames with any sample or flag other than expected; resets: the host was "
+                "too slow for the heartbeat of a board several times faster than real time",
             ),
         ),
     )
@@ -50,25 +60,27 @@ def _ran(electrodes: int, oversampling: int) -> tuple[object, ...]:
         board = BoardProcess(build_programs(), memory.path, _STAR.current, "-f")
         began = time.monotonic()
         # emulated time runs faster than the host's: so must the heartbeat
-        with Link(SerialTransport(board.port), scan, settings, timing=Timing(ping=0.1)) as link:
-            seen, wrong, ticks = _watched(link, wanted)
+        with Link(SerialTransport(board.port), scan, settings, timing=Timing(ping=0.02)) as link:
+            seen, wrong, resets, ticks = _watched(link, wanted)
             lost, corrupt = link.frames.lost, link.counters.corrupt
         took = time.monotonic() - began
         board.close()
         memory.close()
     assert not board.last_words, board.last_words
     speed = f"{ticks / 250e3 / took:.1f}"
-    return electrodes, oversampling, f"{seen:,}", wrong, lost, corrupt, speed
+    return electrodes, oversampling, f"{seen:,}", wrong, lost, corrupt, resets, speed
 
 
-def _watched(link: Link, wanted: np.ndarray) -> tuple[int, int, int]:
-    """Frames seen, those that are wrong, and the ticks between the first and the last."""
-    seen = wrong = first = last = 0
+def _watched(link: Link, wanted: np.ndarray) -> tuple[int, int, int, int]:
+    """Frames seen, those that are wrong, fresh starts of the board, ticks from first to last."""
+    seen = wrong = resets = first = last = 0
     while seen < FRAMES:
-        for frame in link.poll(0.05):
-            if isinstance(frame, Frame):
-                right = np.array_equal(frame.samples, wanted)
-                wrong += not (right and frame.flags == (seen == 0) and frame.sequence == seen)
-                first, last = (first if seen else frame.ticks), frame.ticks
+        for item in link.poll(0.05):
+            if isinstance(item, Frame):
+                right = np.array_equal(item.samples, wanted)
+                wrong += not (right and item.flags == (item.sequence == 0))
+                first, last = (first if seen else item.ticks), item.ticks
                 seen += 1
-    return seen, wrong, last - first
+            else:
+                resets += item.kind == "reset"
+    return seen, wrong, resets, last - first
