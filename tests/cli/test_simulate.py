@@ -11,6 +11,7 @@ import pytest
 import tomoskin.cli.simulate as tomoskin_simulate
 from tomoskin.cli.progress import Bar
 from tomoskin.session import SessionReader, read_recording
+from tomoskin.skin import Skin
 from tomoskin.twin.labelled import SHARD_FRAMES
 from tomoskin.twin.script_page import EXAMPLE, PRESSES_EXAMPLE
 
@@ -123,6 +124,18 @@ def test_ctrl_c(tomoskin, script, tmp_path, monkeypatch):
     with SessionReader(out) as session:
         assert [note.text for note in session.notes()][-1].startswith("stopped after")
     assert tomoskin(*drawn)[0] == 0
+
+
+@pytest.mark.parametrize("how", ["--script", "--presses"])
+def test_a_skin_whose_board_does_not_settle(tomoskin, script, tmp_path, how):
+    skin = tmp_path / "fast.toml"
+    text = Skin.load("textile-disc-8").to_toml()
+    skin.write_text(text.replace('settling = "2 ms"', 'settling = "10 us"'), encoding="utf-8")
+    what = script if how == "--script" else 3
+    code, _, error = tomoskin("simulate", "--skin", skin, how, what, "--out", tmp_path / "out")
+    assert code == 1
+    assert f"{skin}: [readout] settling: expected at least 138 us, got 10 us" in error
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_cluster_that_is_not_there(tomoskin, tmp_path):

@@ -117,7 +117,12 @@ def test_a_script_of_nothing_is_an_idle_skin() -> None:
         ('hold = "2 s"', 'hold = "20 s"', '[[press]] 1 "a" hold', "lasts until 21.4 s"),
         ('hold = "2 s"', 'hold = "5 ms"', '[[press]] 1 "a" hold', "5 ms is shorter than a frame"),
         ('hold = "2 s"', 'hold = "2 s"\nrise = "0 s"', '[[press]] 1 "a" hold', "0 ms is shorter"),
-        ('["10 mm", "-20 mm"]', '["90 mm", "60 mm"]', '1 "a" at', "(90.0 mm, 60.0 mm) is off"),
+        (
+            '["10 mm", "-20 mm"]',
+            '["90 mm", "60 mm"]',
+            '1 "a" at',
+            "got (90.0 mm, 60.0 mm), which is off",
+        ),
         ('["10 mm", "-20 mm"]', '["90 mm"]', '1 "a" at', 'got ["90 mm"]'),
         ('["10 mm", "-20 mm"]', '["90 mm", 60]', '1 "a" at', "y: expected a length"),
         ('radius = "15 mm"', 'side = "15 mm"', '1 "a" radius', "is missing"),
@@ -197,3 +202,90 @@ def test_a_script_that_cannot_be_meant(text: str, where: str, what: str) -> None
     assert message.startswith("my.toml")
     assert where in message
     assert what in message
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (
+            changed('["10 mm", "-20 mm"]', '["90 mm", "60 mm"]'),
+            (
+                '[[press]] 1 "a" at: expected a place on the skin (x from -100 to 100 mm, y',
+                "got (90.0 mm, 60.0 mm)",
+                "(the middle of a probe must stand inside the outline)",
+            ),
+        ),
+        (
+            changed('force = "3 N"', 'force = "-3 N"'),
+            ('[[press]] 1 "a" force: expected a force from 0 to 1000 N, got "-3 N"',),
+        ),
+        (
+            changed('force = "3 N"', 'farce = "3 N"'),
+            ('"a": unknown key "farce" (did you mean "fo',),
+        ),
+        (
+            PRESS + changed('start = "1 s"', 'start = "3.3 s"'),
+            ('2 "a" id: "a" already', "1 s to 3.4 s", "(two presses at once need different ids)"),
+        ),
+        (
+            changed('hold = "2 s"', 'hold = "5 ms"'),
+            (
+                "hold: a stage of 5 ms",
+                "a frame of this skin, 56 ms",
+                "make it longer, or [readout]",
+            ),
+        ),
+    ],
+)
+def test_an_error_says_where_what_was_expected_and_found_and_what_to_do(
+    text: str, parts: tuple[str, ...]
+) -> None:
+    message = failure(text)
+    assert message.startswith("my.toml: [[press]] ")
+    for part in parts:
+        assert part in message
+
+
+@pytest.mark.parametrize(
+    ("keys", "where", "what"),
+    [
+        ('kind = "cut"\nend = "1.01 s"\nelectrode = 2', "end", "10 ms, shorter than a frame"),
+        ('kind = "cut"\nend = "1.4 s"\nelectrode = 8', "electrode", "from 0 to 7, got 8 (a script"),
+        ('kind = "rail"\nend = "0.4 s"\nelectrode = 2', "end", "after start, 1 s, got 0.4 s"),
+        (
+            'kind = "short"\nend = "2 s"\nelectrode = 2\nother = 2',
+            "other",
+            "expected an electrode other than 2, got 2",
+        ),
+        ('kind = "los"', "kind", 'or "temperature", got "los"'),
+        ('kind = "reboot"\nend = "2 s"', "end", "goes with kind"),
+        ('kind = "loss"\nend = "2 s"\nprobability = 1.5', "probability", "0 to 0.999, got 1.5"),
+        ('kind = "noise"\nend = "2 s"', "lsb", "is missing"),
+        ('kind = "temperature"\nkelvin = "warm"', "kelvin", "expected a number"),
+    ],
+)
+def test_a_fault_that_cannot_be_meant(keys: str, where: str, what: str) -> None:
+    message = failure(f'[[fault]]\nstart = "1 s"\n{keys}\n')
+    assert message.startswith(f"my.toml: [[fault]] 1 {where}: ")
+    assert what in message
+
+
+def test_a_board_that_reads_before_it_has_settled() -> None:
+    """The textile's board settles with 30 us: 4.6 of these leave a hundredth of a step."""
+    enough, short = (SKIN.altered({"readout": {"settling": s}}) for s in ("140 us", "60 us"))
+    check_script(script(), enough)
+    with pytest.raises(ScriptError) as caught:
+        check_script(script(), short)
+    assert str(caught.value) == (
+        f"{short.source}: [readout] settling: expected at least 138 us, got 60 us: the textile "
+        "board settles with a time constant of 30 us, and 14 % of each sample would be the drive "
+        "before (make it longer, or choose another preset)"
+    )
+    check_script(script(head=HEAD + 'preset = "ideal"\n'), short)
+
+
+def test_frames_that_take_longer_than_a_stage() -> None:
+    """A settling time of 100 ms: a scan of eight drives takes 0.8 s."""
+    slow = SKIN.altered({"readout": {"settling": "100 ms"}})
+    with pytest.raises(ScriptError, match=r'1 "a" hold: a stage of 200 ms .* this skin, 840 ms'):
+        check_script(script(), slow)

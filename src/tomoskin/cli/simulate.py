@@ -68,7 +68,9 @@ def _timeline(skin: Skin, script: Path, out: Path, seed: int | None, *, json: bo
         with Bar("simulating") as bar:
             found = run(read, skin, out, seed=seed, advance=bar)
     except KeyboardInterrupt:
-        typer.echo(f"tomoskin: stopped; {out} holds what was simulated until then, and says so", err=True)
+        typer.echo(
+            f"tomoskin: stopped; {out} holds what was simulated until then, and says so", err=True
+        )
         raise typer.Exit(1) from None
     took = time.monotonic() - begun
     if json:
@@ -93,12 +95,13 @@ def _labelled(
     json: bool,
 ) -> None:
     from tomoskin.live import make_set
-    from tomoskin.twin import COMMON_PRESSES, Population, SetPlan
+    from tomoskin.twin import COMMON_PRESSES, Population, SetPlan, check_settling
 
     population = COMMON_PRESSES
     if script is not None:
         population = Population.from_toml(_text(script), source=str(script))
     preset = population.preset or skin.twin.preset
+    check_settling(skin, preset)
     plan = SetPlan(skin.to_toml(), population, preset, seed, n)
     begun = time.monotonic()
     try:

@@ -16,7 +16,7 @@ from tomoskin.twin.probe import Contact, Press, Probe
 from tomoskin.twin.readout import ElectronicsSettings, TwinElectronics, convert
 from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, sample_table
 from tomoskin.twin.script import Script
-from tomoskin.twin.script_check import check_script
+from tomoskin.twin.script_check import check_script, check_settling
 from tomoskin.twin.script_page import script_page
 from tomoskin.twin.settings import PRESETS, TwinSettings
 from tomoskin.twin.shape import Circle, Face, Finger, Shape, Square
@@ -67,6 +67,7 @@ __all__ = [
     "WallClock",
     "advance",
     "check_script",
+    "check_settling",
     "conductivity",
     "convert",
     "disturbed",

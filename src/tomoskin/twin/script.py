@@ -116,7 +116,9 @@ def _press(value: Mapping[str, Any], where: str) -> ScriptedPress:
         force, key = _course((0.0, 0.0), value["profile"], f"{where} profile"), "profile"
         if force[-1][1] != 0.0:
             raise ScriptError(
-                f"expected 0 N last, got {force[-1][1]:g} N", where=f"{where} profile"
+                f"expected 0 N last, got {force[-1][1]:g} N",
+                where=f"{where} profile",
+                hint="add a row with the time at which the probe has left the sheet",
             )
     else:
         force, key = _ramps(value), "hold"
@@ -152,11 +154,17 @@ def _fault(value: Mapping[str, Any], where: str) -> ScriptedFault:
     start, end = value["start"], value.get("end", value["start"])
     if "end" in value and not end > start:
         raise ScriptError(
-            f"expected a time after start, {start:g} s, got {end:g} s", where=f"{where} end"
+            f"expected a time after start, {start:g} s, got {end:g} s",
+            where=f"{where} end",
+            hint="times count from the end of the lead-in, not from start",
         )
     electrode, other = value.get("electrode", -1), value.get("other", -1)
     if other >= 0 and other == electrode:
-        raise ScriptError(f"is the electrode itself, {other}", where=f"{where} other")
+        raise ScriptError(
+            f"expected an electrode other than {electrode}, got {other}",
+            where=f"{where} other",
+            hint="an electrode always touches itself",
+        )
     amount = next((value[key] for key in ("lsb", "probability", "kelvin") if key in value), 0.0)
     return ScriptedFault(value["kind"], start, end, electrode, other, amount, where)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import combinations
 
 from tomoskin.core import ScriptError
@@ -9,7 +10,12 @@ from tomoskin.pattern import Scan
 from tomoskin.skin import Skin
 from tomoskin.source import Configuration, ScanSettings
 from tomoskin.twin.script import Script
-from tomoskin.twin.timeline import ScriptedPress, check_stages
+from tomoskin.twin.settings import TwinSettings
+from tomoskin.twin.timeline import NO_FRAME, ScriptedPress, check_stages
+
+_LEFT = 0.01
+"""Part of a step that may be left when the first sample is read: as much as the sheet's own
+spread and the mesh leave unknown."""
 
 _ROUNDING = 1e-9
 """Times that differ by less, s, are the same."""
@@ -19,8 +25,9 @@ def check_script(script: Script, skin: Skin) -> None:
     """Raise ScriptError for a script that cannot be run on ``skin``.
 
     Two presses of one id at once, something after the end, a probe off the skin, an electrode that
-    is not there, a stage that no frame would show.
+    is not there, a stage that no frame would show, a board that reads before it has settled.
     """
+    check_settling(skin, script.preset or skin.twin.preset)
     _check_ids(script.presses)
     _check_ends(script)
     scan = Configuration.of(Scan.of(skin.pattern()), ScanSettings.of(skin))
@@ -29,11 +36,32 @@ def check_script(script: Script, skin: Skin) -> None:
             f"expected at least one frame of this skin, {1e3 * scan.scan_time:.3g} ms, "
             f"got {1e3 * script.duration:g} ms",
             where=f"{script.source}: [script] duration",
+            hint="make it longer, or [readout] settling of the skin shorter",
         )
     check_stages(script.presses, scan.scan_time)
     _check_faults(script, skin, scan.scan_time)
     for press in script.presses:
         press.check_on(skin.outline)
+
+
+def check_settling(skin: Skin, preset: str) -> None:
+    """Raise ScriptError where the board of ``preset`` reads a skin before it has settled.
+
+    A drive's potentials are reached exponentially, with the board's time constant; what is left
+    of the step from the drive before is exp(−settling/τ).
+    """
+    tau = TwinSettings.preset(preset).electronics.time_constant
+    waits = ScanSettings.of(skin).settling
+    least = -tau * math.log(_LEFT)
+    if waits < least:
+        left = math.exp(-waits / tau)
+        raise ScriptError(
+            f"expected at least {1e6 * least:.0f} us, got {1e6 * waits:.0f} us: the {preset} "
+            f"board settles with a time constant of {1e6 * tau:.0f} us, and {100 * left:.0f} % of "
+            "each sample would be the drive before",
+            where=f"{skin.source}: [readout] settling",
+            hint="make it longer, or choose another preset",
+        )
 
 
 def _check_faults(script: Script, skin: Skin, frame_time: float) -> None:
@@ -43,12 +71,14 @@ def _check_faults(script: Script, skin: Skin, frame_time: float) -> None:
                 f"it lasts {1e3 * (fault.end - fault.start):g} ms, shorter than a frame of this "
                 f"skin, {1e3 * frame_time:.3g} ms",
                 where=f"{fault.where} end",
+                hint=NO_FRAME,
             )
         for key, electrode in (("electrode", fault.electrode), ("other", fault.other)):
             if electrode >= skin.n_electrodes:
                 raise ScriptError(
                     f"expected an electrode from 0 to {skin.n_electrodes - 1}, got {electrode}",
                     where=f"{fault.where} {key}",
+                    hint="a script counts electrodes from 0: E1 is 0",
                 )
 
 

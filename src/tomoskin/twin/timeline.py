@@ -19,6 +19,9 @@ Rows = tuple[tuple[float, ...], ...]
 Friction = Mapping[str, float]
 """Coefficient of friction of a probe that slides, and of one that rolls."""
 
+NO_FRAME = "no frame would show it: make it longer, or [readout] settling of the skin shorter"
+"""What to do about a stage that is shorter than a frame."""
+
 _ON_PATH = 200
 """A path is looked at in so many places when it is checked to lie on the skin."""
 
@@ -95,9 +98,13 @@ class ScriptedPress:
         if not inside.all():
             first = int(np.argmin(inside))
             x, y = 1e3 * places[first]
+            corners = 1e3 * outline.polyline(outline.length / 64)
+            (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
             raise ScriptError(
-                f"({x:.1f} mm, {y:.1f} mm) is off the skin",
+                f"expected a place on the skin (x from {left:.0f} to {right:.0f} mm, y from "
+                f"{low:.0f} to {high:.0f} mm), got ({x:.1f} mm, {y:.1f} mm), which is off the skin",
                 where=f"{self.where} {'path' if times[first] else 'at'}",
+                hint="the middle of a probe must stand inside the outline",
             )
 
     @cached_property
@@ -123,7 +130,7 @@ def check_stages(presses: Iterable[ScriptedPress], frame_time: float) -> None:
                     f"a stage of {1e3 * length:g} ms is shorter than a frame of this skin, "
                     f"{1e3 * frame_time:.3g} ms",
                     where=f"{press.where} {key}",
-                    hint="no frame would show it: make it longer, or [readout] settling shorter",
+                    hint=NO_FRAME,
                 )
 
 
