@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, Image, Reading
 from tomoskin.live.prepare import Prepared
@@ -88,7 +89,7 @@ def finding(prepared: Prepared, reference: Reference | None) -> Finder:
     return InData(prepared.spots, prepared, reference)
 
 
-def rows_of(missing: FloatArray) -> FloatArray:
+def rows_of(missing: NDArray[np.bool_]) -> FloatArray:
     """(n_meas, k) blind directions of rows that are ``missing`` (n_meas,) bool."""
     return np.eye(len(missing))[:, missing]
 
@@ -99,13 +100,14 @@ def _noise(prepared: Prepared, reference: Reference | None, gain: float) -> Floa
     sd, frames = np.full(prepared.pattern.n_meas, np.nan), 1
     if reference is not None:
         sd, frames = reference.noise, reference.n_frames
-    step = readout.volts_per_count * prepared.skin.readout.oversampling
+    oversampling = prepared.skin.readout.oversampling
     volts = measured_covariance(
         scan,
         sd,
         frames,
         predicted=abs(gain) * readout.noise,
-        least=abs(gain) * step * np.sqrt(2 / 12),
+        step=abs(gain) * readout.volts_per_count * oversampling,
+        oversampling=oversampling,
     )
     if prepared.operator.difference == "plain":
         return volts

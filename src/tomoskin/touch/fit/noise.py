@@ -77,13 +77,13 @@ def row_covariance(scan: Scan, sample_sd: FloatArray | float) -> FloatArray:
 
 
 def measured_covariance(
-    scan: Scan, sd: FloatArray, n_frames: int, predicted: float, least: float
+    scan: Scan, sd: FloatArray, n_frames: int, *, predicted: float, step: float, oversampling: int
 ) -> FloatArray:
     """(n_meas, n_meas) V²: of one frame less a mean of ``n_frames`` idle ones.
 
     How rows are correlated follows from the samples that they share; how much each wavers was
     measured, but on few frames: its variance is mixed with that of all rows, which counts as much
-    as ``_FRAMES`` frames.
+    as ``_FRAMES`` frames. What rounding adds is not seen in idle frames.
 
     Parameters
     ----------
@@ -93,14 +93,25 @@ def measured_covariance(
         (n_meas,) V, standard deviation of each row over the idle frames; NaN where not known.
     predicted
         Standard deviation of a row by the read-out alone, V: counts where nothing was measured.
-    least
-        Standard deviation of a row that rounding causes however quiet the rest is, V.
+    step
+        Of the converter, V, of which so many readings (``oversampling``) make a sample.
     """
     if np.isfinite(sd).all():
         pooled = np.median(sd**2)
         variance = (n_frames * sd**2 + _FRAMES * pooled) / (n_frames + _FRAMES)
     else:
         variance = np.full(len(scan.plus), predicted**2)
-    size = np.sqrt(np.maximum(variance, least**2) * (1 + 1 / max(n_frames, 1)))
+    variance = variance + 2 * _rounding(variance * oversampling / 2 / step**2) * step**2
+    size = np.sqrt(variance * (1 + 1 / max(n_frames, 1)))
     shared = row_covariance(scan, np.sqrt(0.5))
     return np.asarray(shared * size[:, None] * size)
+
+
+def _rounding(variance: FloatArray) -> FloatArray:
+    """Square of what rounding leaves in the mean of readings that waver by ``variance``; steps².
+
+    The first harmonic of the staircase, which Gaussian noise s evens out to exp(−2π²s²)/π
+    (Widrow & Kollár 2008, section 4.3); 1/12 of ``variance`` is rounding's own.
+    """
+    own = np.maximum(variance - 1 / 12, 0.0)
+    return np.asarray(np.exp(-4 * np.pi**2 * own) / (2 * np.pi**2))
