@@ -1,7 +1,7 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help live test test-all firmware-test bench bench-docs lint lock native wheel clean page dev
+.PHONY: help live test test-all firmware-test fuzz bench bench-docs lint lock native wheel clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -31,7 +31,11 @@ test-all: lint native  ## the same, with what is slow
 
 firmware-test: dev  ## the firmware alone: GoogleTest, mutants, host build, emulator
 	@sh scripts/firmware.sh
-	@$(PY) -m pytest tests/firmware tests/emulator $(ARGS)
+	@$(PY) -m pytest tests/firmware tests/emulator tests/wire/test_fuzz.py $(ARGS)
+
+fuzz: dev  ## ten million mutated streams through the parsers of board and host; ten minutes
+	@sh scripts/firmware.sh
+	@sh scripts/fuzz.sh $(PY) $(ARGS)
 
 bench: native  ## time from bytes to touches
 	@$(VENV)/bin/tomoskin bench frame $(ARGS)
