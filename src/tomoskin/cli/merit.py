@@ -87,7 +87,9 @@ def _finer(prepared: Prepared) -> ForwardModel:
 
     skin = prepared.skin
     mesh = skin.altered({"mesh": {"cells": _FINER * len(prepared.mesh.cells)}}).mesh()
-    return ForwardModel(mesh, prepared.pattern, skin.contact_impedance, skin.current)
+    return ForwardModel(
+        mesh, prepared.pattern, skin.contact_impedance, skin.polarity * skin.current
+    )
 
 
 def _writer(out: Path | None) -> Any:

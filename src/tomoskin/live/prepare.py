@@ -134,7 +134,9 @@ def prepare(skin: Skin) -> Prepared:
     TomoskinError
         When the skin cannot be meshed, modelled or inverted; the message says which.
     """
-    model = ForwardModel(skin.mesh(), skin.pattern(), skin.contact_impedance, skin.current)
+    model = ForwardModel(
+        skin.mesh(), skin.pattern(), skin.contact_impedance, skin.polarity * skin.current
+    )
     problem = LinearProblem.of(
         model,
         _prior(skin),

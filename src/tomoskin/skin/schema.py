@@ -270,6 +270,12 @@ SECTIONS: tuple[Section, ...] = (
                 "Driven current.",
                 required=True,
             ),
+            Key(
+                "polarity",
+                Choice(("normal", "reversed")),
+                "reversed: voltages come with the opposite sign, as from swapped amplifier inputs; "
+                "`tomoskin calibrate wiring` finds it.",
+            ),
         ),
     ),
     Section(

@@ -113,6 +113,11 @@ class Skin:
         """Number of electrodes."""
         return len(self.arcs)
 
+    @property
+    def polarity(self) -> float:
+        """Sign of the measured voltages: −1 where they come reversed."""
+        return -1.0 if self.document["drive"].get("polarity") == "reversed" else 1.0
+
     @cached_property
     def electrode_centres(self) -> FloatArray:
         """(n, 2) middle of each electrode on the rim, m."""

@@ -5,6 +5,7 @@ from tomoskin.touch.locator import Locator, Presses, Region
 from tomoskin.touch.segment import Segmenter
 from tomoskin.touch.states import Answers, Codes, Examples, StateClassifier, against_rest
 from tomoskin.touch.tracking import STILL, TouchEvent, Tracker, TrackSettings
+from tomoskin.touch.wiring import Wiring, WiringAnswer, ring_of, solve_wiring
 
 __all__ = [
     "STILL",
@@ -20,5 +21,9 @@ __all__ = [
     "TouchEvent",
     "TrackSettings",
     "Tracker",
+    "Wiring",
+    "WiringAnswer",
     "against_rest",
+    "ring_of",
+    "solve_wiring",
 ]
