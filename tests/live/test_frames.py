@@ -2,6 +2,7 @@
 
 import math
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,3 +102,12 @@ def test_numbers_that_do_not_fit_are_held_at_their_ends():
     assert found["sequence"] == 5
     assert found["latency_us"] == 2**32 - 1
     assert decode(encode_result(make(), [], -1.0))["latency_us"] == 0
+
+
+def test_a_touch_says_how_many_it_stands_for():
+    alone, several = touch(1, [0]), touch(2, [1])
+    several = replace(several, reading=replace(several.reading, close=True))
+    merged = replace(touch(3, [2]), merged=(3, 5, 8))
+    data = encode_result(make(5, (alone, several, merged)), [], 0.0)
+    at = len(data) - 8 - 3 * 40
+    assert [data[at + 40 * k + 5] for k in range(3)] == [0, 1, 3]

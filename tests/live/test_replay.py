@@ -84,7 +84,20 @@ def run(prepared, tmp_path_factory):
 def touches_of(result):
     """Everything but the cells of the touches of a result, or of a row of the file."""
     return [
-        (t.id, t.kind, t.since, r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak)
+        (
+            t.id,
+            t.kind,
+            t.since,
+            t.merged,
+            r.x,
+            r.y,
+            r.sd_x,
+            r.sd_y,
+            r.cov_xy,
+            r.area,
+            r.peak,
+            r.close,
+        )
         for t in result.touches
         for r in [t.reading]
     ]
@@ -93,6 +106,20 @@ def touches_of(result):
 def recorded_touches(path):
     with SessionReader(path) as session:
         return {item.sequence: touches_of(item) for item in session.touches()}
+
+
+def test_what_happens_to_touches_is_recorded_and_happens_again(run, prepared):
+    with SessionReader(run) as session:
+        told = [(e.host_time, e.kind, e.text) for e in session.events() if "touch-" in e.kind]
+        again = [
+            (e.host_time, f"touch-{e.kind}", e.text)
+            for result in replayed(prepared, session)
+            for e in result.events
+        ]
+    assert [kind for _, kind, _ in told if kind != "touch-move"][:3] == [
+        *("touch-onset", "touch-release", "touch-onset")
+    ]
+    assert told == again
 
 
 def same(a, b):
@@ -270,7 +297,7 @@ def test_a_recording_begun_later_has_the_reference(prepared, tmp_path):
     whole = recorded_touches(tmp_path / "whole.mcap")
     assert not whole  # that recording had ended when the touch came
     positions = {
-        n: [(x, y) for _, _, _, x, y, *_ in rows] for n, rows in recorded_touches(path).items()
+        n: [(x, y) for _, _, _, _, x, y, *_ in rows] for n, rows in recorded_touches(path).items()
     }
     got = {r.sequence: [(t.reading.x, t.reading.y) for t in r.touches] for r in results}
     assert positions

@@ -6,6 +6,15 @@ import threading
 from collections import deque
 
 from tomoskin.core import Event
+from tomoskin.touch import TouchEvent
+
+
+def told(happened: TouchEvent) -> Event:
+    """What happened to a touch as an event: "touch-onset", "touch-move", "touch-release" and so on.
+
+    They go into a recording and not into an :class:`EventLog`: pages see the touches themselves.
+    """
+    return Event(happened.host_time, f"touch-{happened.kind}", happened.text)
 
 
 class EventLog:

@@ -5,8 +5,9 @@ header, 40 bytes      ``TSK1``, sequence u32, host_time f64, n_cells u32, n_meas
                       n_touches u16, n_truth u16, flags u32, latency_us u32, reserved u32
 image                 f32 [n_cells], change of conductivity in the scene's unit
 voltages, reference   f32 [n_meas] each, V
-touches, 40 bytes     id u32, kind u8 (0 decrease, 1 increase), 3 pad, x, y, sd_x, sd_y
-each                  (NaN unknown), area, peak, since (s ago) f32, reserved u32
+touches, 40 bytes     id u32, kind u8 (0 decrease, 1 increase), apart u8 (0 yes, 1 may be
+each                  several, n > 1: n that have merged), 2 pad, x, y, sd_x, sd_y (NaN unknown),
+                      area, peak, since (s ago) f32, reserved u32
 truth, 16 bytes each  x, y (m), force (N), radius (m) f32: the presses on the twin
 labels                u8 [n_cells], 0 none, k = cells of the k-th touch; padded to 4 bytes
 ====================  ======================================================================
@@ -46,7 +47,8 @@ _TOUCH = np.dtype(
     [
         ("id", "<u4"),
         ("kind", "u1"),
-        ("pad", "u1", 3),
+        ("apart", "u1"),
+        ("pad", "u1", 2),
         *((name, "<f4") for name in ("x", "y", "sd_x", "sd_y", "area", "peak", "since")),
         ("reserved", "<u4"),
     ]
@@ -104,7 +106,8 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
         (
             t.id % 2**32,
             t.kind == "increase",
-            (0, 0, 0),
+            min(len(t.merged), _MOST) or t.reading.close,
+            (0, 0),
             t.reading.x,
             t.reading.y,
             t.reading.sd_x,

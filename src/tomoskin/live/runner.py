@@ -13,7 +13,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from tomoskin.core import DataError, Event, Frame, TomoskinError
-from tomoskin.live.events import EventLog
+from tomoskin.live.events import EventLog, told
 from tomoskin.live.meter import Meter
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.prepare import Prepared
@@ -308,6 +308,8 @@ class Runner:
         self._meter.took(latency)
         self.newest = Snapshot(result, self._truth, latency)
         self._tape.result(result)
+        for happened in result.events:
+            self._tape.event(told(happened))
         if self._outlets:
             self._outlets.put(moment_of(result))
         with self._watching:

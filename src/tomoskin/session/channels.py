@@ -57,6 +57,9 @@ _TOUCH = _object(
     sd_y=_MAYBE,
     area=_NUMBER,
     peak=_NUMBER,
+    cov_xy=_MAYBE,
+    close={"type": "boolean"},
+    merged=_list(_INTEGER),
 )
 _PRESS = _object(x=_NUMBER, y=_NUMBER, force=_NUMBER, radius=_NUMBER)
 _LOG = _object(

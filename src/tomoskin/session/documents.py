@@ -41,4 +41,5 @@ def _row(touch: Touch) -> dict[str, Any]:
     return {
         "id": touch.id, "kind": touch.kind, "since": touch.since,
         "x": r.x, "y": r.y, "sd_x": r.sd_x, "sd_y": r.sd_y, "area": r.area, "peak": r.peak,
+        "cov_xy": r.cov_xy, "close": r.close, "merged": touch.merged,
     }  # fmt: skip

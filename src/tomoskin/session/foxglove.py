@@ -15,7 +15,10 @@ import numpy as np
 from tomoskin.core import Event, Image, PixelMap, Touch
 
 _INFO, _WARNING = 2, 3
-_QUIET = frozenset({"connected", "resumed", "note", "recording", "recorded"})
+_QUIET = frozenset(
+    {"connected", "resumed", "note", "recording", "recorded"}
+    | {f"touch-{kind}" for kind in ("onset", "move", "release", "merge", "split")}
+)
 """Kinds of events that no one has to act on."""
 
 _FLOAT32 = 7

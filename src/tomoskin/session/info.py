@@ -112,7 +112,8 @@ def session_info(path: Path, advance: Advance = lambda _done, _total: None) -> S
             clock.add(item.frame.ticks, item.frame.host_time)
             if number % _OFTEN == 0:
                 advance(number, max(total, number + 1))
-        touches = {touch.id for item in session.touches() for touch in item.touches}
+        seen = (touch for item in session.touches() for touch in item.touches)
+        touches = {number for touch in seen for number in (touch.id, *touch.merged)}
         events: dict[str, int] = {}
         for event in session.events():
             events[event.kind] = events.get(event.kind, 0) + 1

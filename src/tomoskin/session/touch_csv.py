@@ -18,7 +18,7 @@ HEADER = (
 def write_touches(path: Path, frames: Iterable[tuple[int, float, tuple[Touch, ...]]]) -> int:
     """Write touches of (frame, time, touches); return the number of rows.
 
-    A standard deviation that is not known is an empty field.
+    A standard deviation that is not known is an empty field; the kind is :attr:`Touch.said`.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def write_touches(path: Path, frames: Iterable[tuple[int, float, tuple[Touch, ..
 def _row(frame: int, time: float, touch: Touch) -> tuple[object, ...]:
     r = touch.reading
     place = (_number(r.x), _number(r.y), _number(r.sd_x), _number(r.sd_y))
-    return (frame, f"{time:.6f}", touch.id, *place, _number(r.area), _number(r.peak), touch.kind)
+    return (frame, f"{time:.6f}", touch.id, *place, _number(r.area), _number(r.peak), touch.said)
 
 
 def _number(value: float) -> str:

@@ -146,6 +146,7 @@ def test_reset_releases_all_and_counts_on() -> None:
     run.tracker.reset()
     assert run([[]]).shown == [[]]
     assert run([[reading(0)]] * 3).shown[-1] == [2]
+    assert run.happened == [("onset", 1), ("release", 1), ("onset", 2)]
 
 
 def test_a_clock_that_begins_again_keeps_the_touches() -> None:

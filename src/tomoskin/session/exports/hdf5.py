@@ -15,7 +15,7 @@ from tomoskin.session.writer import said_of
 
 _FRAMES = ("number", "time", "sequence", "ticks", "mark", "samples", "voltages")
 _TOUCH = np.dtype(
-    [("time", "f8"), ("sequence", "i8"), ("id", "i8"), ("kind", "S8"), ("since", "f8")]
+    [("time", "f8"), ("sequence", "i8"), ("id", "i8"), ("kind", "S32"), ("since", "f8")]
     + [(name, "f8") for name in ("x", "y", "sd_x", "sd_y", "area", "peak")]
 )
 
@@ -68,7 +68,7 @@ def _append(group: Any, block: Block) -> None:
 
 def _touches(session: SessionReader) -> Any:
     table = [
-        (item.host_time, item.sequence, t.id, t.kind.encode(), t.since,
+        (item.host_time, item.sequence, t.id, t.said.encode(), t.since,
          r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak)
         for item in session.touches()
         for t in item.touches

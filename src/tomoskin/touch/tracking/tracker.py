@@ -52,17 +52,22 @@ class Tracker:
         host's counts. ``host_time`` is what touches and events tell.
         """
         elapsed = self._elapse(time, host_time)
-        self._host, self._happened = host_time, []
+        self._host = host_time
         if readings or self._traces:
             self._follow(list(readings), elapsed)
         if not readings:
             self._remainders.nothing_seen()
-        self.events = tuple(self._happened)
+        self.events, self._happened = tuple(self._happened), []
         shown = [trace.touch for trace in self._traces if trace.number]
         return tuple(sorted(shown, key=lambda touch: touch.id))
 
     def reset(self) -> None:
-        """Release every touch and forget what they left; identities go on counting."""
+        """Release every touch and forget what they left; identities go on counting.
+
+        The next frame tells that they were released.
+        """
+        for trace in [trace for trace in self._traces if trace.number]:
+            self._end(trace)
         self._traces = []
         self._remainders.forget()
         self.events = ()
@@ -147,7 +152,7 @@ class Tracker:
 
     def _consider(self, trace: Trace) -> None:
         """Report a newcomer that has stood, forget one that has not."""
-        if trace.missing is not None:
+        if trace.missing is not None or trace.reading.snr < self.settings.snr:
             self._traces.remove(trace)
             return
         if not self._lasts(trace.since, self.settings.onset):

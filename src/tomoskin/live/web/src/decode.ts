@@ -21,6 +21,8 @@ export interface Touch {
   readonly peak: number;
   /** Seconds since the touch began. */
   readonly since: number;
+  /** How many it stands for: 0 one, 1 perhaps several, n > 1 that have come too close. */
+  readonly several: number;
 }
 
 export interface Truth {
@@ -58,6 +60,7 @@ function touchAt(data: DataView, at: number): Touch {
     area: data.getFloat32(at + 24, true),
     peak: data.getFloat32(at + 28, true),
     since: data.getFloat32(at + 32, true),
+    several: data.getUint8(at + 5),
   };
 }
 

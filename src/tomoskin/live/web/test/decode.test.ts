@@ -18,6 +18,7 @@ function sample(): ArrayBuffer {
   const touch = 84;
   data.setUint32(touch, 9, true);
   data.setUint8(touch + 4, 1);
+  data.setUint8(touch + 5, 2);
   [0.01, -0.02, Number.NaN, Number.NaN, 3e-4, 0.5, 1.5].forEach((v, k) =>
     data.setFloat32(touch + 8 + 4 * k, v, true),
   );
@@ -35,7 +36,7 @@ describe("decodeFrame", () => {
     expect([...frame.voltages]).toEqual([1.25, 1.5, 1.75]);
     expect([...frame.reference]).toEqual([2, 2.25, 2.5]);
     expect([...frame.labels]).toEqual([0, 1, 1, 0, 0]);
-    expect(frame.touches[0]).toMatchObject({ id: 9, kind: "increase", peak: 0.5, since: 1.5 });
+    expect(frame.touches[0]).toMatchObject({ id: 9, kind: "increase", peak: 0.5, since: 1.5, several: 2 });
     expect(frame.touches[0].x).toBeCloseTo(0.01);
     expect(frame.touches[0].sdX).toBeNaN();
     expect(frame.truths[0].radius).toBeCloseTo(0.008);

@@ -13,11 +13,20 @@ function uncertainty(touch: Touch): string {
   return Number.isFinite(sd) ? millimetres(sd) : "";
 }
 
+/** What cannot be told apart, in words; nothing where there is one touch. */
+function tooClose(touch: Touch): string | undefined {
+  if (touch.several > 1) return `${touch.several} touches, too close to separate`;
+  return touch.several ? "may be several touches, too close to separate" : undefined;
+}
+
 function Row({ touch, scale }: { touch: Touch; scale: Scale }) {
   return (
     <tr data-testid="touch-row" data-id={touch.id}>
       <th scope="row">
-        <span class="chip">{touch.id}</span>
+        <span class="chip" title={tooClose(touch)}>
+          {touch.id}
+          {touch.several > 0 && "+"}
+        </span>
       </th>
       <td class="large">{millimetres(touch.x)}</td>
       <td class="large">{millimetres(touch.y)}</td>
@@ -64,7 +73,9 @@ function Announcer() {
     const timer = window.setTimeout(() => {
       const touches = shown.peek()?.touches ?? [];
       const places = touches.map(
-        ({ id, x, y }) => `touch ${id} at ${millimetres(x, 0)}, ${millimetres(y, 0)} millimetres`,
+        (touch) =>
+          `touch ${touch.id} at ${millimetres(touch.x, 0)}, ${millimetres(touch.y, 0)} ` +
+          ["millimetres", tooClose(touch)].filter(Boolean).join(", "),
       );
       words.value = places.length ? places.join("; ") : "No touch";
     }, 700);
