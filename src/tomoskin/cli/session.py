@@ -133,7 +133,11 @@ def _lines(found: SessionInfo) -> list[tuple[str, str]]:
         lines.append(("board", f"{board}, firmware {firmware}"))
     if found.clock:
         rate, residual = found.clock.tick_rate, 1e3 * found.clock.residual
-        lines.append(("clock", f"{rate:.1f} ticks/s by this host, jitter {residual:.3f} ms"))
+        nominal = found.device.get("tick_rate")
+        drift = f", {1e6 * found.clock.drift(nominal):+.1f} ppm" if nominal else ""
+        lines.append(
+            ("clock", f"{rate:.1f} ticks/s by this host{drift}; frames come {residual:.3f} ms late")
+        )
     if found.events:
         counted = ", ".join(f"{kind} {count}" for kind, count in sorted(found.events.items()))
         lines.append(("events", counted))

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 _FEWEST = 20
 """Fewer frames say more of the line's jitter than of the clock."""
 
+_MOST_CORNERS = 256
+
 
 @dataclass(frozen=True, slots=True)
 class ClockFit:
-    """ticks = tick_rate · (host time − offset), by least squares over ``frames`` frames.
+    """ticks = tick_rate · (host time − offset), over ``frames`` frames.
 
-    ``tick_rate`` Hz by the host's clock; ``offset`` host time of tick 0, s; ``residual`` root mean
-    square of what a host time differs from it, s.
+    ``tick_rate`` Hz by the host's clock; ``offset`` host time of tick 0, s, as early as any frame
+    came; ``residual`` root mean square of what host times are later, s.
     """
 
     tick_rate: float
@@ -22,42 +24,94 @@ class ClockFit:
     residual: float
     frames: int
 
+    def drift(self, nominal: float) -> float:
+        """By how much the device's clock is fast, as a fraction of its ``nominal`` rate in Hz."""
+        return self.tick_rate / nominal - 1.0
+
+
+@dataclass(slots=True)
+class _Sums:
+    """Of x (ticks since the first) and y (host time since the first, s)."""
+
+    n: int = 0
+    x: float = 0.0
+    y: float = 0.0
+    xx: float = 0.0
+    xy: float = 0.0
+    yy: float = 0.0
+
+    def add(self, x: float, y: float) -> None:
+        self.n += 1
+        self.x, self.y = self.x + x, self.y + y
+        self.xx, self.xy, self.yy = self.xx + x * x, self.xy + x * y, self.yy + y * y
+
+    def misfit(self, a: float, b: float) -> float:
+        """Root mean square of y − a − b x."""
+        square = self.yy - 2 * (a * self.y + b * self.xy) + b * (2 * a * self.x + b * self.xx)
+        return math.sqrt(max(square / self.n + a * a, 0.0))
+
+
+@dataclass(slots=True)
+class _Run:
+    """Frames between two starts of the device."""
+
+    first: int
+    first_time: float
+    last: int
+    sums: _Sums = field(default_factory=_Sums)
+    corners: list[tuple[float, float]] = field(default_factory=list)
+
 
 class ClockFitter:
-    """Takes ticks and host times of frames one by one; begins anew when the device does."""
+    """Takes ticks and host times of frames one by one; begins anew when the device does.
+
+    A frame is never early, and late by whatever line, USB and scheduler like: in batches, by
+    chance, now and then for long. So the line runs below all frames, as close to them as it can:
+    along the edge of their lower convex hull over their mean tick (Zhang, Liu and Xia 2002,
+    "Clock synchronization algorithms for network measurements", section IV).
+    """
 
     def __init__(self) -> None:
-        self._n = self._first = self._last = 0
-        self._first_time = 0.0
-        self._x = self._y = self._xx = self._xy = self._yy = 0.0
+        self._run: _Run | None = None
 
     def add(self, ticks: int, host_time: float) -> None:
         """Take one frame."""
-        if not self._n or ticks < self._last:
-            self._begin(ticks, host_time)
-        self._last = ticks
-        x, y = host_time - self._first_time, float(ticks - self._first)
-        self._n += 1
-        self._x, self._y = self._x + x, self._y + y
-        self._xx, self._xy, self._yy = self._xx + x * x, self._xy + x * y, self._yy + y * y
+        run = self._run
+        if run is None or ticks < run.last:
+            run = self._run = _Run(ticks, host_time, ticks)
+        run.last = ticks
+        x, y = float(ticks - run.first), host_time - run.first_time
+        run.sums.add(x, y)
+        _extend(run.corners, (x, y))
 
     @property
     def fit(self) -> ClockFit | None:
         """The fit so far; None before there are enough frames."""
-        n = self._n
-        if n < _FEWEST:
+        run = self._run
+        if run is None or run.sums.n < _FEWEST or len(run.corners) < 2:
             return None
-        sxx = self._xx - self._x**2 / n
-        sxy = self._xy - self._x * self._y / n
-        syy = self._yy - self._y**2 / n
-        if not (sxx > 0 and sxy > 0):
+        mean = run.sums.x / run.sums.n
+        right = next(n for n, (x, _) in enumerate(run.corners) if n and x >= mean)
+        (x0, y0), (x1, y1) = run.corners[right - 1], run.corners[right]
+        b = (y1 - y0) / (x1 - x0)
+        a = y0 - b * x0
+        if not b > 0:
             return None
-        rate = sxy / sxx
-        late = (self._x - self._y / rate) / n
-        residual = math.sqrt(max(syy - rate * sxy, 0.0) / n) / rate
-        return ClockFit(rate, self._first_time + late - self._first / rate, residual, n)
+        late = run.sums.misfit(a, b)
+        return ClockFit(1 / b, run.first_time + a - b * run.first, late, run.sums.n)
 
-    def _begin(self, ticks: int, host_time: float) -> None:
-        self._first, self._first_time, self._last = ticks, host_time, ticks
-        self._n = 0
-        self._x = self._y = self._xx = self._xy = self._yy = 0.0
+
+def _extend(corners: list[tuple[float, float]], point: tuple[float, float]) -> None:
+    """The lower convex hull with a point further right (Andrew 1979); amortised O(1)."""
+    if corners and point[0] <= corners[-1][0]:
+        return  # the same tick again
+    while len(corners) > 1 and _above(corners[-2], corners[-1], point):
+        corners.pop()
+    corners.append(point)
+    if len(corners) > _MOST_CORNERS:
+        del corners[1:-1:2]
+
+
+def _above(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
+    """Whether b is on or above the line from a to c."""
+    return (b[1] - a[1]) * (c[0] - a[0]) >= (c[1] - a[1]) * (b[0] - a[0])
