@@ -11,6 +11,7 @@ import numpy as np
 import typer
 
 from tomoskin.cli.calibrate_states import calibrate_states
+from tomoskin.cli.calibrate_wiring import calibrate_wiring
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
@@ -30,6 +31,7 @@ _DRIFTED = 2.0
 
 
 app.command("states")(calibrate_states)
+app.command("wiring")(calibrate_wiring)
 
 
 @app.command("touch")

@@ -77,7 +77,7 @@ class WiringAnswer:
     @property
     def sure(self) -> bool:
         """Whether the presses tell."""
-        return self.probability >= SURE
+        return bool(self.probability >= SURE)
 
 
 def solve_wiring(
@@ -175,7 +175,8 @@ def _weighed(
         second, odds = wiring, mine / max(weight, 1e-300)
         place = there.places[int(np.argmin(same))]
         break
-    return WiringAnswer(best, mine / total, second, odds, float(nothing / total), told, place, ())
+    unexplained, sure = float(nothing / total), float(mine / total)
+    return WiringAnswer(best, sure, second, odds, unexplained, told, place, ())
 
 
 def _faint(answers: FloatArray) -> float:

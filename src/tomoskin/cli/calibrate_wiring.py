@@ -1,0 +1,143 @@
+"""``tomoskin calibrate wiring``: which wire ends at which electrode."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.progress import Bar
+from tomoskin.cli.recording import ReferenceOption, idle_frames, say_notes
+from tomoskin.cli.skin_choice import SkinOption, skin_for_file
+from tomoskin.core import DataError
+
+if TYPE_CHECKING:
+    from tomoskin.core import FloatArray
+    from tomoskin.pattern import Pattern
+    from tomoskin.session import Recording
+    from tomoskin.skin import Skin
+    from tomoskin.touch import WiringAnswer
+
+
+def calibrate_wiring(
+    recording: Annotated[
+        Path, typer.Argument(metavar="INPUT", help="Frames with labels: one touch each.")
+    ],
+    out: Annotated[
+        Path, typer.Option(metavar="WIRED.toml", help="Where the skin file as it is wired goes.")
+    ],
+    skin: SkinOption = None,
+    reference: ReferenceOption = None,
+    json: JsonFlag = False,
+) -> None:
+    """Find rotation, mirroring, swapped wires and polarity from a handful of presses.
+
+    The result is a skin file whose electrodes are where the wires end: give it as --skin to any
+    other command.
+    """
+    from tomoskin.cli.labelled import changes, labels
+    from tomoskin.session import read_recording
+    from tomoskin.touch import solve_wiring
+
+    whole = read_recording(recording)
+    say_notes(whole)
+    drawn = skin_for_file(skin, recording)
+    pattern = drawn.pattern()
+    whole = whole.in_order_of(pattern)
+    xy, dv = labels(whole), changes(whole, reference, pattern)
+    frames = np.flatnonzero(np.isfinite(xy).all(axis=1))
+    rest, noise = _at_rest(whole, reference, pattern)
+    with Bar("weighing wirings") as bar:
+        answer = solve_wiring(
+            dv[frames], xy[frames], drawn, reference=rest, noise=noise, progress=bar
+        )
+    found = _findings(answer, drawn, frames.tolist())
+    if answer.sure:
+        _write(out, answer.wiring.applied(drawn))
+    if json:
+        emit(found)
+    else:
+        _say(found)
+    if not answer.sure:
+        raise DataError(_why(answer), where=str(recording), hint=_next(found))
+
+
+def _at_rest(
+    whole: Recording, reference: str | None, pattern: Pattern
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """Mean and noise (n_meas,) V of the untouched skin, as far as they are known."""
+    from tomoskin.signal import Reference
+
+    idle = idle_frames(whole, reference, pattern)
+    if idle is None or isinstance(idle, str):
+        return None, None
+    known = Reference.of(np.asarray(idle.real, dtype=np.float64))
+    usable = known.noise_is_known and (known.noise > 0).all()
+    return known.mean, known.noise if usable else None
+
+
+def _findings(answer: WiringAnswer, skin: Skin, frames: list[int]) -> dict[str, Any]:
+    from tomoskin.touch import ring_of
+
+    ring = ring_of(skin)
+    return {
+        "presses": len(frames),
+        "sure": answer.sure,
+        "wiring": answer.wiring.text(ring),
+        "places": list(answer.wiring.places),
+        "polarity": _polarity(answer),
+        "probability": answer.probability,
+        "runner_up": answer.runner_up.text(ring),
+        "odds": min(answer.odds, 1e300),
+        "unexplained": answer.unexplained,
+        "next_press_mm": (1e3 * answer.next_place).tolist(),
+        "remarks": [
+            {"frame": frames[row], "looks_like_mm": [1e3 * x, 1e3 * y]}
+            for row, x, y in answer.contradicted
+        ],
+    }
+
+
+def _polarity(answer: WiringAnswer) -> str:
+    if not answer.polarity_known:
+        return "not known"
+    return "reversed" if answer.wiring.reversed else "normal"
+
+
+def _say(found: dict[str, Any]) -> None:
+    typer.echo(f"{found['presses']} presses: {found['wiring']}")
+    typer.echo(
+        f"probability {found['probability']:.3f}; {min(found['odds'], 1e6):.3g} times as likely as "
+        f"the next: {found['runner_up']}"
+    )
+    if found["polarity"] == "not known":
+        typer.echo(
+            "the polarity cannot be told: give untouched frames, or [touch] sign in the skin file"
+        )
+    for remark in found["remarks"]:
+        x, y = remark["looks_like_mm"]
+        typer.echo(
+            f"frame {remark['frame']:>4}  doubtful: looks like a press at x {x:+.0f} mm, "
+            f"y {y:+.0f} mm"
+        )
+
+
+def _why(answer: WiringAnswer) -> str:
+    if answer.unexplained > 1 - answer.probability - answer.unexplained:
+        return "no wiring explains these presses well enough to be sure"
+    return f"these presses cannot tell: the likeliest wiring has {answer.probability:.2f}"
+
+
+def _next(found: dict[str, Any]) -> str:
+    x, y = found["next_press_mm"]
+    return f"a further press tells most at x {x:+.0f} mm, y {y:+.0f} mm"
+
+
+def _write(path: Path, wired: Skin) -> None:
+    try:
+        path.write_text(wired.to_toml(), encoding="utf-8")
+    except OSError as error:
+        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
