@@ -1,7 +1,7 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help live test test-all firmware-test fuzz bench bench-docs lint lock native wheel clean page dev
+.PHONY: help live test test-all firmware-test fuzz bench bench-docs docs lint lock native wheel clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -15,7 +15,7 @@ help:  ## this list
 live: $(VENV)/.installed page  ## the live page of a simulated skin
 	@$(VENV)/bin/tomoskin live $(ARGS)
 
-test: lint native  ## lint, page tests and the test suite, without what is slow
+test: lint native  ## lint, documentation, page tests and the test suite, without what is slow
 	@$(PY) scripts/page.py run test
 	@sh scripts/chromium.sh
 	@sh scripts/mosquitto.sh
@@ -44,6 +44,9 @@ bench-docs: native  ## measure the forward engine anew into docs/benchmarks.md; 
 	@$(PIP) install --require-hashes --requirement requirements/bench.txt  # pyEIT has no wheel
 	@$(VENV)/bin/tomoskin bench forward --into docs/benchmarks.md
 	@$(VENV)/bin/tomoskin bench forward_large --into docs/benchmarks.md
+
+docs: dev $(VENV)/.docs  ## the documentation, in build/docs; a warning is an error
+	@$(PY) -m sphinx --quiet --fail-on-warning --keep-going docs build/docs
 
 lint: dev page  ## ruff, mypy, the page's types, and the native engine's where Rust is installed
 	@$(PY) -m ruff check .
@@ -81,6 +84,11 @@ $(VENV)/.dev: requirements/dev.txt $(VENV)/.runtime
 	@sh $(PINNED) $<
 	@touch $@
 
+$(VENV)/.docs: requirements/docs.txt $(VENV)/.dev
+	@echo "set-up: Python packages for the documentation"
+	@sh $(PINNED) $<
+	@touch $@
+
 # Without build isolation: the backend is among the pinned packages, and nothing is downloaded.
 $(VENV)/.installed: pyproject.toml hatch_build.py $(VENV)/.runtime | page
 	@$(PIP) install --no-build-isolation --no-deps --no-index --editable .
@@ -96,7 +104,7 @@ page: $(VENV)/.runtime
 
 COMPILE := $(PY) -m uv --quiet pip compile --upgrade --universal --python-version 3.11 \
 	--generate-hashes --no-emit-index-url --custom-compile-command "make lock"
-LOCKS := uv runtime dev bench node
+LOCKS := uv runtime dev docs bench node
 .PHONY: $(LOCKS:%=lock-%)
 lock-uv:
 	@$(COMPILE) requirements/uv.in -o requirements/uv.txt
@@ -104,6 +112,8 @@ lock-runtime:
 	@$(COMPILE) pyproject.toml requirements/build.in -o requirements/runtime.txt
 lock-dev:
 	@$(COMPILE) pyproject.toml --extra mesh --extra plot --extra parquet --extra hdf5 --extra foxglove --extra mqtt --extra lsl --extra zenoh --extra cluster requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
+lock-docs:
+	@$(COMPILE) requirements/docs.in -c requirements/dev.txt -o requirements/docs.txt
 lock-bench:
 	@$(COMPILE) pyproject.toml --extra bench -c requirements/dev.txt -o requirements/bench.txt
 lock-node:
