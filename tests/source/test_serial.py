@@ -7,6 +7,7 @@ import threading
 import time
 
 import pytest
+from serial.tools.list_ports_common import ListPortInfo
 
 from source.boards import BOARD, SCAN, SETTINGS, Counting, frames, poll_until
 from tomoskin.core import SourceError
@@ -125,3 +126,41 @@ def test_other_refusals(monkeypatch, number, said):
     monkeypatch.setattr(serial, "Serial", refuse)
     with pytest.raises(SourceError, match=said):
         port.SerialTransport("/dev/some")
+
+
+MEGA, CLONE, PLAIN = (0x2341, 0x0042), (0x1A86, 0x7523), (None, None)
+
+
+@pytest.mark.parametrize(
+    ("there", "said"),
+    [
+        ({}, "expected one board, found 0 .*no serial port"),
+        ({"/dev/ttyS0": PLAIN}, "found 0 .*ports here: /dev/ttyS0"),
+        ({"/dev/ttyACM1": MEGA, "/dev/ttyACM0": MEGA}, r"found 2 .*ACM0 \(Arduino Mega 2560\), "),
+        ({"/dev/ttyUSB0": CLONE, "/dev/ttyUSB1": CLONE}, r"found 2 .*USB0 \(CH340"),
+    ],
+)
+def test_which_port_is_not_guessed(monkeypatch, there, said):
+    connect(monkeypatch, there)
+    with pytest.raises(SourceError, match=said):
+        port.open_serial("auto", None)
+
+
+@pytest.mark.parametrize(
+    ("there", "opened"),
+    [
+        ({"/dev/ttyUSB0": CLONE, "/dev/ttyS0": PLAIN}, "/dev/ttyUSB0"),
+        ({"/dev/ttyUSB0": CLONE, "/dev/ttyACM0": MEGA}, "/dev/ttyACM0"),
+    ],
+)
+def test_the_only_board_is_found(monkeypatch, there, opened):
+    connect(monkeypatch, there)
+    monkeypatch.setattr(port, "SerialTransport", lambda *given: given)
+    assert port.open_serial("auto,baud=500000", None) == (opened, 500_000)
+
+
+def connect(monkeypatch, there):
+    found = [ListPortInfo(device) for device in there]
+    for info, (info.vid, info.pid) in zip(found, there.values(), strict=True):
+        assert info.device in there
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: found)

@@ -59,13 +59,11 @@ def _page() -> Iterator[Finding]:
 
 
 def _sources() -> Iterator[Finding]:
-    from serial.tools.list_ports import comports
-
-    from tomoskin.source import source_names
+    from tomoskin.source import list_ports, source_names
 
     known = ", ".join(source_names())
     yield Finding("sources", bool(known), known or "none; install tomoskin again (make live)")
-    ports = ", ".join(port.device for port in comports())
+    ports = ", ".join(map(str, list_ports()))
     yield Finding("serial", True, ports or "no serial port is connected")
 
 

@@ -4,6 +4,7 @@ from tomoskin.source.configuration import Configuration
 from tomoskin.source.conversation import Conversation, Stage
 from tomoskin.source.gate import FrameCounters, FrameGate
 from tomoskin.source.link import Link
+from tomoskin.source.ports import Port, list_ports
 from tomoskin.source.registry import GROUP, open_source, read_options, source_names
 from tomoskin.source.serial import SerialTransport
 from tomoskin.source.settings import (
@@ -24,12 +25,14 @@ __all__ = [
     "FrameGate",
     "Link",
     "Played",
+    "Port",
     "ScanSettings",
     "SerialTransport",
     "Stage",
     "Timing",
     "Transport",
     "conversion_time",
+    "list_ports",
     "open_source",
     "read_options",
     "scan_time",

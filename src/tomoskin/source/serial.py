@@ -6,6 +6,7 @@ import errno
 from typing import TYPE_CHECKING
 
 from tomoskin.core import SourceError
+from tomoskin.source.ports import AUTO, only_board, say_ports
 from tomoskin.source.registry import read_options
 
 if TYPE_CHECKING:
@@ -68,11 +69,14 @@ class SerialTransport:
 
 
 def open_serial(argument: str, skin: Skin) -> SerialTransport:  # noqa: ARG001 - a source's signature
-    """The source ``serial:PORT`` or ``serial:PORT,baud=RATE``."""
+    """The source ``serial:PORT``, ``serial:auto`` or ``serial:PORT,baud=RATE``."""
     port, _, rest = argument.partition(",")
+    port = only_board() if port == AUTO else port
     if not port:
         raise SourceError(
-            "expected a port, such as serial:/dev/ttyACM0", where="serial", hint=_ports()
+            "expected a port, such as serial:/dev/ttyACM0, or serial:auto",
+            where="serial",
+            hint=say_ports(),
         )
     text = read_options(rest, ("baud",), f"serial:{port}").get("baud", str(BAUD))
     if not text.isdigit() or not 300 <= int(text) <= 4_000_000:
@@ -86,7 +90,7 @@ def _refusal(port: str, error: Exception) -> SourceError:
     where = f"serial:{port}"
     number = getattr(error, "errno", None)
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        return SourceError("there is no such port", where=where, hint=_ports())
+        return SourceError("there is no such port", where=where, hint=say_ports())
     if number == errno.EACCES:
         return SourceError(
             "no permission to use the port",
@@ -96,10 +100,3 @@ def _refusal(port: str, error: Exception) -> SourceError:
     if number in (errno.EBUSY, errno.EAGAIN):
         return SourceError("another program is using the port", where=where, hint="close it first")
     return SourceError(f"the port cannot be opened: {error}", where=where)
-
-
-def _ports() -> str:
-    from serial.tools.list_ports import comports  # noqa: PLC0415
-
-    found = ", ".join(sorted(port.device for port in comports()))
-    return f"ports here: {found}" if found else "no serial port is connected"
