@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -38,6 +38,8 @@ class Fit:
         (4k, 4k) inverse of the covariance: JᵀJ and the prior.
     cost
         Half the squares of residual and prior.
+    settled
+        Whether the steps towards it came to an end.
     """
 
     spots: FloatArray
@@ -45,6 +47,7 @@ class Fit:
     jacobian: FloatArray
     normal: FloatArray
     cost: float
+    settled: bool = True
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -114,15 +117,15 @@ class Problem:
             gradient = self._gradient(best)
             step = _solved(best.normal, gradient, damping)
             if gradient @ step < _SETTLED:
-                break
+                return best
             tried = self.at(self._allowed(best.spots + step.reshape(-1, N_PARAMETERS)))
             if tried.cost < best.cost:
                 best, damping = tried, max(damping / 10, _LEAST_DAMPING)
             elif damping > 1e3:
-                break
+                return best
             else:
                 damping = max(damping * 30, 1e-2)
-        return best
+        return replace(best, settled=False)
 
     def _gradient(self, fit: Fit) -> FloatArray:
         pull = self.prior.away(fit.spots) * self.prior.weights

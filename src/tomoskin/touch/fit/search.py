@@ -21,7 +21,7 @@ _DOUBTFUL = 0.8
 _MISSHAPEN = 0.02
 """A wrong profile leaves up to this part of what a touch changes: no evidence of another one."""
 
-_SHAPE_DOUBT = 0.3
+_SHAPE_DOUBT = 0.5
 """How far a true profile is from ours, of the way to a bell: a standard deviation."""
 
 _COLD, _WARM = 15, 6
@@ -78,7 +78,7 @@ class Search:
         has more evidence counts.
         """
         warm = self._more(self._pruned(self._started(before)))
-        if len(before) and len(warm.spots) != len(before):
+        if len(before) and (len(warm.spots) != len(before) or not warm.settled):
             warm = max(self._more(self.problem.nothing()), warm, key=self._evidence)
         return self._judged(warm)
 
