@@ -72,7 +72,7 @@ def _row(name: str, preset: str, triangles: int) -> tuple[object, ...]:
     settings = TwinSettings.preset(preset, SEED)
     cells = round(triangles / settings.mesh_ratio)
     skin = Skin.load(name).altered({"mesh": {"cells": cells}})
-    board, table = make_electronics(skin, settings), _table(skin)
+    board, table = make_electronics(skin, settings), table_of(skin)
     sheet = board.sheet
     for number in range(10):
         _frame(board, table, number, skin)
@@ -120,7 +120,8 @@ def _presses(number: int, skin: Skin) -> tuple[Press, ...]:
     return tuple(Press(x, y, 3.0, 0.012) for x, y in places.tolist())
 
 
-def _table(skin: Skin) -> SampleTable:
+def table_of(skin: Skin) -> SampleTable:
+    """The samples of a skin's scan, and when they are taken."""
     scan, asked = Scan.of(skin.pattern()), ScanSettings.of(skin)
     drives = [
         Drive(source, sink, mask)
