@@ -27,6 +27,10 @@ _NEW_FLOOR = 0.1
 """Noise that has changed by more than this part makes a new floor."""
 
 _KEPT = 8
+"""Sets of lost rows whose directions are remembered."""
+
+_LEARN = 8
+"""Idle blocks after which directions of drift are looked for anew."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,6 +82,8 @@ class Watch:
         self._scale = _scale(prepared, reference)
         self._common = self._gain(reference) if self._projects else np.zeros((len(model), 0))
         self._kept: dict[bytes, Blind] = {}
+        self._newest: tuple[Health, Blind] | None = None
+        self._learnt = 0
         self._health: Health | None = None
         self._floor_for: tuple[object, float] = (None, np.nan)
         self._values, self._lost = reference.mean, unusable
@@ -86,7 +92,7 @@ class Watch:
     def take(self, prepared: Prepared) -> None:
         """Go on with another operator of the same skin."""
         self._whole = self._prepared = prepared
-        self._kept.clear()
+        self._forget()
         if self._health is not None and self._health.sick:
             lost = lost_directions(prepared.pattern, self._health.lost, self._health.floating)
             self._prepared = prepared.blind_to(lost / self._scale[:, None])
@@ -112,9 +118,8 @@ class Watch:
 
         ``railed`` (n_meas,) bool: rows that stand at a rail or are not finite.
         """
-        finite = np.isfinite(values)
-        if not finite.all():
-            values = np.where(finite, values, self._baseline.mean)
+        if railed.any():
+            values = np.where(np.isfinite(values), values, self._baseline.mean)
         health = self._monitor.push(values, railed, time, samples)
         self._values, self._health = values, health
         blind = self._blind(health)
@@ -135,12 +140,12 @@ class Watch:
         if health is None:
             return False
         ended = self._baseline.push(self._values, self._lost, time, touched=touched)
-        if ended and self._projects:
+        if ended and self._projects and self._baseline.idle.blocks % _LEARN == 0:
             self._learn_modes()
         noise = self._baseline.idle.noise
         level = float(noise @ noise)
         sick = tuple((e.electrode, e.state) for e in health.sick)
-        states = (sick, self._common.tobytes())
+        states = (sick, self._learnt)
         before, then = self._floor_for
         changed = then > 0 and abs(np.log(level / then)) > 2.0 * _NEW_FLOOR
         if states == before and not changed:
@@ -161,24 +166,36 @@ class Watch:
         gain = self._common[:, :1]
         if found.shape[1] or self._common.shape[1] > 1:
             self._common = np.hstack([gain, found])
-            self._kept.clear()
+            self._learnt += 1
+            self._forget()
 
     def _gain(self, reference: Reference) -> FloatArray:
         """(n_meas, 1): all voltages in proportion, as conductivity does that changes alike."""
         return reference.mean[:, None]
 
+    def _forget(self) -> None:
+        self._kept.clear()
+        self._newest = None
+
     def _blind(self, health: Health | None) -> Blind:
-        lost = None if health is None else health.lost
+        """What that frame does not tell; a monitor gives the same record while all is well."""
+        if self._newest is not None and health is self._newest[0]:
+            return self._newest[1]
         key = b"" if health is None else health.lost.tobytes() + health.floating.tobytes()
         if key not in self._kept:
             if len(self._kept) >= _KEPT:
                 self._kept.pop(next(iter(self._kept)))
-            parts = [self._common]
-            if health is not None and lost is not None:
-                parts.append(lost_directions(self._prepared.pattern, lost, health.floating))
-            directions = np.hstack(parts) / self._scale[:, None]
-            self._kept[key] = Blind.of(directions, self._prepared.operator.precision)
+            self._kept[key] = self._made(health)
+        if health is not None:
+            self._newest = health, self._kept[key]
         return self._kept[key]
+
+    def _made(self, health: Health | None) -> Blind:
+        parts = [self._common]
+        if health is not None:
+            parts.append(lost_directions(self._prepared.pattern, health.lost, health.floating))
+        directions = np.hstack(parts) / self._scale[:, None]
+        return Blind.of(directions, self._prepared.operator.precision)
 
 
 def _scale(prepared: Prepared, reference: Reference) -> FloatArray:

@@ -31,6 +31,9 @@ _LEAK = 0.03
 _MONOTONE = 2.0 * SIGMAS
 """Rows with less than so many deviations of voltage have no sign to lose."""
 
+_GAIN = 0.03
+"""Part by which channels may differ in gain: of a change, so much may stand between reciprocals."""
+
 _MOST = 25.0
 """Squared deviations are cut off here: one wild value must not blame an electrode."""
 
@@ -140,15 +143,19 @@ class Reciprocity:
         """(k,) V of the error, for independent ``noise`` (n_meas,) V."""
         return np.asarray(np.hypot(noise[self.first], noise[self.second]))
 
-    def squared(self, error: FloatArray, deviation: FloatArray, moved: FloatArray) -> FloatArray:
+    def squared(
+        self, error: FloatArray, deviation: FloatArray, moved: FloatArray, changed: FloatArray
+    ) -> FloatArray:
         """(k,) squared deviations of the ``error``, cut off.
 
-        ``moved`` (n_meas,) V is what each row has changed since the last frame: the two rows are
+        ``moved`` (n_meas,) V is what each row has changed since the last look: the two rows are
         read at different times of a scan, so beyond its noise it may stand in the error.
+        ``changed`` (n_meas,) V, since the reference: channels differ in gain, and show that.
         """
-        change = np.maximum(np.abs(moved[self.first]), np.abs(moved[self.second]))
-        allowed = np.maximum(change - 4.0 * deviation, 0.0)
-        return np.asarray(np.minimum(error**2 / (deviation**2 + allowed**2), _MOST))
+        motion = np.maximum(np.abs(moved[self.first]), np.abs(moved[self.second]))
+        allowed = np.maximum(motion - 4.0 * deviation, 0.0)
+        gain = _GAIN * np.maximum(np.abs(changed[self.first]), np.abs(changed[self.second]))
+        return np.asarray(np.minimum(error**2 / (deviation**2 + allowed**2 + gain**2), _MOST))
 
     def excess(self, squared: FloatArray) -> FloatArray:
         """(n_electrodes,) variance that each electrode adds, in units of the noise.

@@ -61,6 +61,7 @@ class Idle:
         self.blocks = 0
         self._levels: list[tuple[int, FloatArray]] = []
         self._stretch, self._stride, self._since = 0, 1, 0
+        self.drift = self._drift()
         self._begin_anew()
 
     def interrupt(self) -> None:
@@ -78,9 +79,7 @@ class Idle:
         self._lost: Mask | None = None
         self._begin = 0.0
 
-    @property
-    def drift(self) -> FloatArray:
-        """See the class."""
+    def _drift(self) -> FloatArray:
         least = self.noise**2 * max(self.interval, 1e-3) / self._slowest**2
         if self._steps is None or not self._span > 0:
             return np.asarray(least)
@@ -116,6 +115,7 @@ class Idle:
         self.interval = max(time - self._begin, 0.0) / (BLOCK - 1)
         if self._last_mean is not None:
             self._learn_drift(np.where(lost, 0.0, mean - self._last_mean))
+        self.drift = self._drift()
         self._keep(mean)
         self.blocks += 1
         self._count = 0

@@ -21,9 +21,9 @@ ENTER = 2
 LEAVE = 20
 """Frames in a row that must clear it before it is used again."""
 
-_WINDOW = 30
-"""Frames over which reciprocity is averaged. The mean over an electrode's 26 pairs then has a
-deviation of √(2/780) = 0.05 of the noise's variance."""
+_EVERY, _WINDOW = 3, 16
+"""Reciprocity is looked at every so many frames, and averaged over so many looks. The mean over an
+electrode's 26 pairs then has a deviation of √(2/26/31) = 0.05 of the noise's variance."""
 
 _LOUD = 3.0
 """Variance beyond the noise's, in units of it, at which an electrode is sick: its deviation is
@@ -34,14 +34,18 @@ _STEADY = 0.5
 """Part of an excess that comes from the mean of the errors, above which it is inconsistent
 rather than noisy."""
 
+_BIASED = 9.0
+"""The same for an error that stands still: three times the noise. Channels differ by that much
+where the noise is low, and less harms a picture no more than noise."""
+
 _FROZEN = 1e-9
 """Chance under which samples that do not change are called stuck, given how many others do."""
 
 _FLOATING = ("open", "railed", "stuck")
 """States in which a reading is an unknown number, the same for all rows of its drive."""
 
-_OFFSET = 500
-"""Frames over which the reciprocity error at rest is followed."""
+_OFFSET = 170
+"""Looks over which the reciprocity error at rest is followed."""
 
 
 class Monitor:
@@ -84,6 +88,7 @@ class Monitor:
         self._sign, limit = sign_limit(pattern, reference.mean, noise, order)
         self._limit = np.where(usable, limit, np.inf)
         self._inverse = 1.0 / noise
+        self._start = reference.mean
         self._reciprocity = Reciprocity.of(pattern)
         self._deviation = self._reciprocity.deviation(noise)
         self._rest = self._reciprocity.error(reference.mean)
@@ -92,6 +97,8 @@ class Monitor:
         self._squared = np.ones(len(self._rest))
         self._shift = np.zeros(len(self._rest))
         self._members = _averages(scan, n)
+        self._pairs_left = bool(self._paired.any())
+        self._looks, self._wavers = 0, dict[int, ElectrodeHealth]()
         self._still = np.zeros(n)
         self._last: FloatArray | None = None
         self._last_samples: NDArray[np.uint16] | None = None
@@ -171,12 +178,15 @@ class Monitor:
 
     def _loud(self, values: FloatArray, bad: Mask) -> dict[int, ElectrodeHealth]:
         """Electrodes whose reciprocity wavers by more than the noise."""
+        self._looks += 1
+        if self._looks % _EVERY or not self._pairs_left:
+            return self._wavers
         last, self._last = self._last, values
-        if last is None or not self._paired.any():
+        if last is None:
             return {}
         pairs = self._reciprocity
         error = pairs.error(values) - self._rest
-        squared = pairs.squared(error, self._deviation, values - last)
+        squared = pairs.squared(error, self._deviation, values - last, values - self._start)
         use = self._paired
         if self._sick or bad.any():
             use = use & ~(bad[pairs.first] | bad[pairs.second])
@@ -186,19 +196,24 @@ class Monitor:
         self._shift += (error / self._deviation - self._shift) / _WINDOW
         self._rest += np.clip(error, -self._deviation, self._deviation) / _OFFSET
         if (pairs.mean @ self._squared).max() < 1.0 + _LOUD / 2:
+            self._wavers = {}
             return {}
         excess = pairs.excess(self._squared)
         limit = max(_LOUD, 4.0 * float(np.median(excess)))
-        return {e: self._wavering(e, excess[e]) for e in np.flatnonzero(excess > limit).tolist()}
+        loud = [(e, float(excess[e])) for e in np.flatnonzero(excess > limit).tolist()]
+        self._wavers = {e: h for e, much in loud if (h := self._wavering(e, much))}
+        return self._wavers
 
-    def _wavering(self, electrode: int, excess: float) -> ElectrodeHealth:
+    def _wavering(self, electrode: int, excess: float) -> ElectrodeHealth | None:
         steady = float(self._reciprocity.mean[electrode] @ np.minimum(self._shift**2, 25.0))
         times = f"{np.sqrt(1 + excess):.1f} times the noise"
-        if steady > _STEADY * excess:
-            return ElectrodeHealth(
-                electrode, "inconsistent", f"driving and reading it disagree by {times} at rest"
-            )
-        return ElectrodeHealth(electrode, "noisy", f"it wavers by {times} at rest")
+        if steady <= _STEADY * excess:
+            return ElectrodeHealth(electrode, "noisy", f"it wavers by {times} at rest")
+        if excess <= _BIASED:
+            return None
+        return ElectrodeHealth(
+            electrode, "inconsistent", f"driving and reading it disagree by {times} at rest"
+        )
 
     def _stuck(self, samples: NDArray[np.uint16] | None) -> dict[int, ElectrodeHealth]:
         """Electrodes whose samples stand still while the others' go on."""
