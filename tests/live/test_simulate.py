@@ -58,6 +58,18 @@ def test_no_touch_is_seen_before_the_press(tmp_path: Path, prepared: Prepared) -
     assert min(touched_frames(prepared, recording, 1)) < first  # what a single frame would do
 
 
+def test_the_truth_of_a_sliding_press_is_that_of_the_middle_of_the_scan(tmp_path: Path) -> None:
+    path = 'path = [["500 ms", "-30 mm", "-30 mm"]]\n'
+    run(tmp_path / "a.mcap", "1 s", PRESS.replace('"20 mm", "-30 mm"', '"40 mm", "-30 mm"') + path)
+    with SessionReader(tmp_path / "a.mcap") as session:
+        truth = {item.host_time - 1.0: item.presses[0] for item in session.truth() if item.presses}
+    speed = -0.07 / 0.5
+    for time, press in truth.items():
+        gone = min(max(time - 0.2, 0.0), 0.5)
+        assert press["x"] == pytest.approx(0.04 + speed * gone, abs=2e-3 * abs(speed))
+    assert len(truth) > 8
+
+
 def test_ctrl_c_leaves_a_file_that_says_it_is_a_part(tmp_path: Path) -> None:
     def interrupt(gone: float, whole: float) -> None:
         assert whole == 2.0

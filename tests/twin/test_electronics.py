@@ -13,12 +13,15 @@ from tomoskin.source import ScanSettings
 from tomoskin.twin import (
     ElectronicsSettings,
     Faults,
+    Press,
     ScanClock,
     TwinElectronics,
     TwinSettings,
+    TwinSkin,
     convert,
     sample_table,
 )
+from tomoskin.twin.settings import BOARD
 from tomoskin.wire import Drive
 
 QUIET = ElectronicsSettings(noise=0.0)
@@ -66,6 +69,60 @@ def test_too_short_a_wait_is_seen_and_a_long_one_is_not(sheet, skin, table):
     missing = slow[0] - ideal[0]  # the very first scan starts from nothing
     assert missing == pytest.approx(-ideal[0] * math.exp(-2.0), abs=LSB)
     assert np.abs(slow - ideal).max() > 100 * LSB
+
+
+def test_a_press_that_moves_during_a_scan_is_where_it_is_at_each_drive(sheet, skin, table):
+    electronics = TwinElectronics(sheet, FINE, skin.current, QUIET, 0)
+
+    def sliding(since):
+        return (Press(-0.03 + 1.5 * since, 0.02, 3.0, 0.012),)
+
+    electronics.follow(sliding)
+    moving = electronics.sample(table, 0.0)
+    middles = table.middles
+    assert np.diff(middles) == pytest.approx(table.seconds / 8)
+    assert middles[0] == pytest.approx(2e-6 + table.length[0] / 2)
+    electronics.follow(None)
+    stills = []
+    for since in middles:
+        sheet.set_presses(sliding(since))
+        stills.append(electronics.sample(table, 1.0))
+    assert (moving == np.array(stills)[table.drive, np.arange(len(moving))]).all()
+    assert (moving != stills[0]).sum() > 20
+
+
+def test_a_press_that_stands_still_costs_one_solution(skin, table):
+    def counts(follows):
+        sheet = TwinSkin.of(skin, TwinSettings.preset("textile", 3))
+        electronics = TwinElectronics(sheet, FINE, skin.current, BOARD, 3)
+        press = (Press(0.01, 0.02, 3.0, 0.012),)
+        if follows:
+            electronics.follow(lambda _: press)
+        else:
+            sheet.set_presses(press)
+        return [electronics.sample(table, 0.1 * k).tolist() for k in range(3)], sheet.solves
+
+    assert counts(True) == counts(False)
+
+
+def test_time_goes_on_by_as_much_whether_presses_move_or_not(skin, table):
+    """A sheet that only creeps: what was pressed for so long has crept for so long."""
+
+    def crept(moves):
+        textile = TwinSettings.preset("textile").material
+        settings = replace(textile, temperature_sd=0.0, play=(), play_widths=())
+        chosen = replace(TwinSettings(), material=settings)
+        sheet = TwinSkin.of(skin, chosen)
+        electronics = TwinElectronics(sheet, FINE, skin.current, QUIET, 0)
+        still = Press(0.01, 0.02, 3.0, 0.012)
+        electronics.follow(lambda since: (replace(still, x=0.01 + 1e-9 * since * moves),))
+        for k in range(4):
+            electronics.sample(table, 0.5 * k)
+        electronics.follow(lambda _: (still,))
+        electronics.sample(table, 2.0)
+        return sheet.conductivity()
+
+    assert crept(1) == pytest.approx(crept(0), rel=1e-5)
 
 
 def test_mains_are_at_the_time_of_each_sample(sheet, skin, table):

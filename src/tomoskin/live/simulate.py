@@ -156,19 +156,24 @@ class _Run:
     def _set(self, begin: float, last: float, time: float) -> None:
         """Bring about what the script says of ``time``, for the scan that begins now.
 
-        It is noted at the middle of the scan: the frame before has the same time as its start.
+        Presses may move during the scan. The truth is that of its middle and is noted there: the
+        frame before has the same time as its start.
         """
-        middle = begin + time + self._frame_time / 2
-        presses = pressed(self._script.presses, time, self._friction)
+        half = self._frame_time / 2
+        middle = begin + time + half
+        self._twin.electronics.follow(lambda since: self._pressed(time + since))
+        presses = self._pressed(time + half)
         if presses != self._presses:
             self._presses = presses
-            self._twin.set_presses(presses)
             self._writer.truth(middle, [_described_probe(probe) for probe in presses])
         self._disturb(disturbed(self._script.faults, time))
         if reboots(self._script.faults, last, time):
             self._twin.reboot()
         while self._marks and begin + self._marks[0].at < middle:
             self._writer.note(middle, self._marks.pop(0).text)
+
+    def _pressed(self, time: float) -> tuple[Probe, ...]:
+        return pressed(self._script.presses, time, self._friction)
 
     def _disturb(self, now: Disturbance) -> None:
         before, self._disturbance = self._disturbance, now

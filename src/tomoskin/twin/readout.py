@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -10,15 +11,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, IntArray
 from tomoskin.twin.circuit import Lines, line_potentials, settling
 from tomoskin.twin.faults import Faults, check_electrodes
 from tomoskin.twin.parameters import check_numbers, parameter
+from tomoskin.twin.probe import Contact
 from tomoskin.twin.scanning import SampleTable
 from tomoskin.twin.sheet import TwinSkin
 
 if TYPE_CHECKING:
     from tomoskin.skin import ReadoutSettings
+
+Course = Callable[[float], tuple[Contact, ...]]
+"""What presses so many seconds after the start of a scan."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +124,8 @@ class TwinElectronics:
         self._faults = Faults()
         self._contact = electronics.contact_sd * self._contacts.standard_normal(n)
         self._time: float | None = None
+        self._aged = 0.0
+        self._course: Course | None = None
         self._before = np.zeros(n)
         self._known: tuple[object, ...] = ()
         self._lines = Lines(np.zeros((0, n)), np.zeros((0, n), dtype=bool))
@@ -133,6 +140,13 @@ class TwinElectronics:
         check_electrodes(faults, self.sheet.n_electrodes)
         self._faults = faults
 
+    def follow(self, course: Course | None) -> None:
+        """Take the presses of each drive from ``course``: they may move during a scan.
+
+        None: those that the sheet has at its start.
+        """
+        self._course = course
+
     def renew(self, chance: np.random.SeedSequence) -> None:
         """Begin anew at no time, with noise and contacts from ``chance``; the channels stay."""
         noise, contacts = chance.spawn(2)
@@ -146,18 +160,43 @@ class TwinElectronics:
         """Counts of a scan begun at ``time`` s of the sheet as it is pressed then.
 
         The sheet and its contacts go on from the scan before to this time, and then stand still
-        until the scan is over.
+        until the scan is over; where presses move during the scan (:meth:`follow`), each drive
+        sees the sheet as it is in its middle.
         """
-        dt = 0.0 if self._time is None else max(0.0, time - self._time)
+        first = self._time is None or time < self._time
+        self._age_contacts(0.0 if self._time is None else max(0.0, time - self._time))
+        self._aged = time if first else self._aged
         self._time = time
-        self.sheet.advance(dt)
-        self._age_contacts(dt)
-        volts = self._volts(table, time)
+        volts = self._volts(table, time, self._scanned(table, time))
         return convert(volts, self._readout, table.oversampling, self.settings, self._random)
 
-    def _volts(self, table: SampleTable, time: float) -> FloatArray:
+    def _scanned(self, table: SampleTable, time: float) -> Lines:
+        """What the channels stand at under each drive, as the presses stand or move."""
+        middles = table.middles
+        moves = [self._course(since) for since in middles.tolist()] if self._course else []
+        if moves and all(presses == moves[0] for presses in moves):
+            self.sheet.set_presses(moves[0])
+            moves = []
+        if not moves:
+            self._let_go_by(time)
+            return self._potentials(table)
+        lines = []
+        for number, presses in enumerate(moves):
+            self.sheet.set_presses(presses)
+            self._let_go_by(time + float(middles[number]))
+            lines.append(self._under(table.drives[number : number + 1], self.sheet.resistance()))
+        return Lines(
+            read=np.concatenate([line.read for line in lines]),
+            stuck=np.concatenate([line.stuck for line in lines]),
+        )
+
+    def _let_go_by(self, time: float) -> None:
+        """Let the sheet go on to ``time`` s."""
+        self.sheet.advance(max(0.0, time - self._aged))
+        self._aged = max(self._aged, time)
+
+    def _volts(self, table: SampleTable, time: float, lines: Lines) -> FloatArray:
         """(n_samples,) or (oversampling, n_samples) V at the amplifiers' inputs."""
-        lines = self._potentials(table)
         settings, drive, channel = self.settings, table.drive, table.channel
         volts = lines.read[drive, channel]
         if settings.time_constant > 0:
@@ -184,16 +223,19 @@ class TwinElectronics:
         if len(self._known) != len(key) or any(
             a is not b for a, b in zip(self._known, key, strict=True)
         ):
-            self._lines = line_potentials(
-                resistance,
-                table.drives,
-                self._current,
-                contact=self._contact,
-                faults=faults,
-                settings=self.settings,
-            )
+            self._lines = self._under(table.drives, resistance)
             self._known = key
         return self._lines
+
+    def _under(self, drives: IntArray, resistance: FloatArray) -> Lines:
+        return line_potentials(
+            resistance,
+            drives,
+            self._current,
+            contact=self._contact,
+            faults=self._faults,
+            settings=self.settings,
+        )
 
     def _age_contacts(self, dt: float) -> None:
         """Ornstein–Uhlenbeck, exact for any step (Gillespie 1996, eq. 2.47)."""

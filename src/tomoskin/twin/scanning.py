@@ -64,6 +64,12 @@ class SampleTable:
         return np.asarray(self.drives[self.drive, 1])
 
     @property
+    def middles(self) -> FloatArray:
+        """(n_drives,) s from the start of the scan to the middle of each drive."""
+        dead = self._dead / max(len(self.drives), 1)
+        return np.asarray(np.cumsum(self.length + dead) - self.length / 2)
+
+    @property
     def seconds(self) -> float:
         """How long one scan takes."""
         return float(self.length.sum()) + self._dead
