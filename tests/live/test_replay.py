@@ -206,10 +206,14 @@ def test_seek_begins_with_the_first_frame_there(run, open_at):
     with SessionReader(run) as session:
         times = [item.frame.host_time for item in session.frames()]
     transport, link = open_at("@max")
+    new = REFERENCE_FRAMES + 5 + 8  # the second reference begins here
     for number in (40, 3, 17):
         transport.seek(times[number])
-        first = frames_of(link, 1)[0]
-        assert (first.sequence, first.host_time) == (number, times[number])
+        first = new if number > new else 0
+        found = frames_of(link, number - first + 1)
+        assert [frame.sequence for frame in found] == list(range(first, number + 1))
+        assert [frame.host_time for frame in found] == times[first : number + 1]
+        assert transport.now() >= times[number]
     assert link.frames.lost == 0
     assert link.counters.corrupt == 0
 

@@ -6,10 +6,15 @@ import pytest
 
 from tomoskin.core import WireError
 from tomoskin.live.requests import (
+    Note,
     PressRequest,
+    Seek,
+    SetLoop,
     SetPause,
     SetPresses,
     SetRecording,
+    SetSpeed,
+    Step,
     TakeReference,
     decode_request,
 )
@@ -21,6 +26,11 @@ def test_requests():
     assert decode_request('{"type":"reference"}') == TakeReference()
     assert decode_request('{"type":"pause","on":true}') == SetPause(True)
     assert decode_request('{"type":"record","on":false}') == SetRecording(False)
+    assert decode_request('{"type":"note","text":"wet"}') == Note("wet")
+    assert decode_request('{"type":"seek","at_s":1.5}') == Seek(1.5)
+    assert decode_request('{"type":"step"}') == Step()
+    assert decode_request('{"type":"speed","speed":null}') == SetSpeed(None)
+    assert decode_request('{"type":"loop","on":true}') == SetLoop(True)
     asked = decode_request(json.dumps({"type": "presses", "presses": [PRESS]}))
     assert asked == SetPresses((PressRequest(**PRESS),))
 
@@ -40,6 +50,12 @@ def test_requests():
         '{"type":"pause"}',
         '{"type":"record","on":true,"path":"x.mcap"}',
         '{"type":"pause","on":"yes"}',
+        '{"type":"seek","at_s":-1}',
+        '{"type":"seek","at_s":1e999}',
+        '{"type":"speed","speed":0}',
+        '{"type":"speed","speed":1e9}',
+        '{"type":"note","text":""}',
+        json.dumps({"type": "note", "text": "x" * 501}),
         '{"type":"presses","presses":[{}]}',
         '{"type":"presses","presses":[' + ",".join([json.dumps(PRESS)] * 9) + "]}",
         json.dumps({"type": "presses", "presses": [PRESS | {"force": -1}]}),

@@ -6,17 +6,27 @@ import asyncio
 import contextlib
 import time
 from collections import deque
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Coroutine
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
-from tomoskin.core import DataError
+from tomoskin.core import DataError, TomoskinError, WireError
 from tomoskin.live import messages
 from tomoskin.live.frames import encode_result
-from tomoskin.live.requests import Request, SetPause, SetPresses, SetRecording
+from tomoskin.live.play import play
+from tomoskin.live.requests import (
+    Note,
+    ReplayRequest,
+    Request,
+    SetPause,
+    SetPresses,
+    SetRecording,
+    TakeReference,
+)
 from tomoskin.live.runner import Runner, Snapshot
+from tomoskin.session import read_timeline
 from tomoskin.twin import Press
 
 MAX_PAGES = 16
@@ -58,6 +68,8 @@ class Hub:
         self._wake_is_due = False
         self._encoded: tuple[Snapshot, bytes] | None = None
         self._told = 0
+        self._timeline = ""
+        self._tasks: set[asyncio.Task[None]] = set()
         self._past: deque[str] = deque(maxlen=_FIRST_EVENTS)
         self._scene = messages.scene(
             runner.prepared, runner.source, limit=limit, pressable=runner.pressable
@@ -74,6 +86,8 @@ class Hub:
                 loop.call_soon_threadsafe(self._wake)
 
         ticker = asyncio.create_task(self._tick())
+        if self.runner.replay is not None:
+            self._keep(self._tell_timeline(self.runner.replay.path))
         with self.runner.watched_by(announce):
             yield
         ticker.cancel()
@@ -88,7 +102,8 @@ class Hub:
     def join(self, page: Listener) -> None:
         """Serve ``page`` from now on."""
         self._pages.add(page)
-        for text in (self._scene, messages.state(self.runner.status()), *self._past):
+        timeline = [self._timeline] if self._timeline else []
+        for text in (self._scene, messages.state(self.runner.status()), *timeline, *self._past):
             page.post(text)
 
     def leave(self, page: Listener, why: str = "") -> None:
@@ -116,8 +131,49 @@ class Hub:
             self.runner.pause(request.on)
         elif isinstance(request, SetRecording):
             asyncio.get_running_loop().run_in_executor(None, self._record, request.on)
-        else:
+        elif isinstance(request, TakeReference):
             self.runner.take_reference()
+        elif isinstance(request, Note):
+            self.runner.note(request.text)
+        else:
+            self._play(page, request)
+
+    def _play(self, page: Listener, request: ReplayRequest) -> None:
+        """Do something to a replay; in a thread, since a jump may have to search the file.
+
+        Raises WireError where the source is no replay.
+        """
+        replay = self.runner.replay
+        if replay is None:
+            raise WireError(f"{self.runner.source} is no replay")
+
+        def run() -> str | None:
+            try:
+                play(replay, request)
+            except TomoskinError as error:
+                return messages.error(str(error))
+            return None
+
+        async def answer() -> None:
+            if (text := await asyncio.to_thread(run)) is not None:
+                page.post(text)
+
+        self._keep(answer())
+
+    def _keep(self, work: Coroutine[None, None, None]) -> None:
+        """Let ``work`` run until it is done; the loop itself would forget it."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _tell_timeline(self, path: Path) -> None:
+        try:
+            found = await asyncio.to_thread(read_timeline, path)
+        except DataError as error:
+            self.runner.say("no-timeline", f"what happened in the recording is not known: {error}")
+            return
+        self._timeline = messages.timeline(found)
+        self._post([self._timeline])
 
     def _record(self, on: bool) -> None:
         """Begin or end a recording; in a thread, since a disk may take its time."""

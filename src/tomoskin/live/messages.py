@@ -14,6 +14,8 @@ from tomoskin.core import Event, FloatArray, IntArray
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.requests import MAX_FORCE
 from tomoskin.live.status import Status
+from tomoskin.signal import BaselineState, ElectrodeHealth
+from tomoskin.session import Timeline
 
 PROBE_RADIUS = 0.015
 """Radius of a press from the page unless it says otherwise, m: the source's usual probe."""
@@ -75,20 +77,60 @@ def state(status: Status) -> str:
             "age_s": status.reference_age,
             "ready": reference.ready,
         },
+        baseline=_baseline(reference.baseline),
+        sick=[_sick(electrode) for electrode in status.electrodes],
         noise_v=_known(reference.noise),
         alpha=status.choice.alpha,
         rule=status.choice.rule,
         left_out=status.left_out,
         recording=status.recording and status.recording.name,
         sinks=status.sinks,
+        replay=status.replay,
         problem=status.problem,
         text=status.text,
     )
 
 
+def _baseline(now: BaselineState | None) -> dict[str, Any] | None:
+    """Drift since the reference as a part of it, how long it is held, and whether it is stale."""
+    if now is None:
+        return None
+    return {
+        "drift": _known(now.drift),
+        "held_s": now.held,
+        "noise_v": _known(now.noise),
+        "stale": now.stale,
+    }
+
+
+def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
+    return {
+        "electrode": electrode.electrode,
+        "state": electrode.state,
+        "reason": electrode.reason,
+        "since_s": electrode.since,
+    }
+
+
 def event(happened: Event) -> str:
     """Something that a person should know."""
     return _text(type="event", time_s=happened.host_time, kind=happened.kind, text=happened.text)
+
+
+def timeline(found: Timeline) -> str:
+    """What happened in the recording that is played; times in s from its first frame."""
+    return _text(
+        type="timeline",
+        end_s=found.end,
+        notes=[{"time_s": time, "text": event.text} for time, event in found.notes],
+        events=[
+            {"time_s": time, "kind": event.kind, "text": event.text} for time, event in found.events
+        ],
+        touches=[
+            {"id": span.id, "kind": span.kind, "begin_s": span.begin, "end_s": span.end}
+            for span in found.touches
+        ],
+    )
 
 
 def error(message: str) -> str:

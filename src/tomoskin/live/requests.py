@@ -15,6 +15,9 @@ MAX_REQUEST = 4096
 MAX_PRESSES = 8
 """Most presses that one page may hold."""
 
+MAX_NOTE = 500
+"""Longest note, characters."""
+
 MAX_FORCE = 10.0
 """Hardest press from a page, N."""
 
@@ -52,7 +55,38 @@ class SetRecording(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag=
     on: bool
 
 
-Request = SetPresses | TakeReference | SetPause | SetRecording
+class Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="note"):
+    """A remark on the picture of this moment."""
+
+    text: Annotated[str, Meta(min_length=1, max_length=MAX_NOTE)]
+
+
+class Seek(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="seek"):
+    """Play the recording from so many seconds after its first frame on."""
+
+    at_s: Annotated[float, Meta(ge=0, le=1e9)]
+
+
+class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="step"):
+    """Play one read of the recording and stand still."""
+
+
+class SetSpeed(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="speed"):
+    """Recorded seconds per second; null for as fast as the pictures are made."""
+
+    speed: Annotated[float, Meta(gt=0, le=1000)] | None
+
+
+class SetLoop(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="loop"):
+    """Begin the recording again at its end, or not."""
+
+    on: bool
+
+
+ReplayRequest = Seek | Step | SetSpeed | SetLoop
+"""What only a replay can do."""
+
+Request = SetPresses | TakeReference | SetPause | SetRecording | Note | ReplayRequest
 
 _DECODER: msgspec.json.Decoder[Request] = msgspec.json.Decoder(Request)
 

@@ -16,6 +16,7 @@ from tomoskin.core import DataError, Event, Frame, TomoskinError
 from tomoskin.live.events import EventLog, told
 from tomoskin.live.meter import Meter
 from tomoskin.live.pipeline import Pipeline
+from tomoskin.live.play import where_is
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.presses import Pressable, PressBoard
 from tomoskin.live.published import moment_of, stream_of
@@ -24,7 +25,7 @@ from tomoskin.live.result import Result
 from tomoskin.live.status import Status
 from tomoskin.live.tally import Tally
 from tomoskin.live.tape import Tape
-from tomoskin.live.wishes import Wishes
+from tomoskin.live.wishes import Replayed, Wishes
 from tomoskin.session import Mark
 from tomoskin.sink import Outlets, Sink
 from tomoskin.source import Link, ScanSettings, Transport
@@ -123,6 +124,7 @@ class Runner:
         """
         transport = self._open()
         self.pressable = isinstance(transport, Pressable)
+        self._wishes.opened(transport)
         skin = self.prepared.skin.name
         name = transport.name
         self.source = f"{name} of {skin}" if self.pressable else f"{skin} on {name}"
@@ -163,6 +165,19 @@ class Runner:
         """Hold the picture, or let it go on; frames are read and left out meanwhile."""
         self._wishes.hold(on)
 
+    @property
+    def replay(self) -> Replayed | None:
+        """The recording that is being played; None where the source is another."""
+        return self._wishes.replay
+
+    def note(self, text: str) -> None:
+        """A person's remark on the picture of this moment; goes into the recording as well."""
+        newest = self.newest
+        event = Event(newest.result.host_time if newest else self._clock(), "note", text)
+        self.events.add(event)
+        self._tape.note(event)
+        self._outlets.put(event)
+
     def set_presses(self, owner: object, presses: tuple[Press, ...]) -> None:
         """All presses that ``owner`` holds now; an empty tuple lifts them."""
         self._presses.put(owner, presses)
@@ -198,6 +213,7 @@ class Runner:
             paused=self._wishes.held,
             recording=self._tape.path,
             sinks=self._outlets.reports(),
+            replay=where_is(self.replay) if self.replay else None,
             frames=self._meter.frames,
             fps=self._meter.rate(now),
             dropped=total.dropped + self._skipped + self._pipeline.refused,
@@ -209,6 +225,7 @@ class Runner:
             reference_age=None if reference.since is None else now - reference.since,
             choice=self._pipeline.choice,
             left_out=result.left_out if result else 0,
+            electrodes=result.health.sick if result and result.health else (),
             problem=self._trouble or self._standstill or (result.problem if result else None),
         )
 

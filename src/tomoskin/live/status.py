@@ -7,7 +7,19 @@ from pathlib import Path
 
 from tomoskin.inverse import AlphaChoice
 from tomoskin.live.result import ReferenceState
+from tomoskin.signal import ElectrodeHealth
 from tomoskin.sink import SinkReport
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayStatus:
+    """Where a replay is: s from its first frame; ``speed`` None for as fast as it goes."""
+
+    now_s: float
+    end_s: float
+    speed: float | None
+    loop: bool
+    ended: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +58,10 @@ class Status:
         Rows that the newest picture does without.
     sinks
         How each sink is doing.
+    replay
+        Where a replay is; None where the source is another.
+    electrodes
+        Those that are not good.
     problem
         What someone should see to, in one sentence, or None.
     """
@@ -67,6 +83,8 @@ class Status:
     problem: str | None
     recording: Path | None = None
     sinks: tuple[SinkReport, ...] = ()
+    electrodes: tuple[ElectrodeHealth, ...] = ()
+    replay: ReplayStatus | None = None
 
     @property
     def text(self) -> str:
@@ -78,7 +96,8 @@ class Status:
         if not self.reference.ready:
             taken, needed = self.reference.frames, self.reference.needed
             return f"{self.source}: taking the reference, {taken} of {needed} frames; do not touch"
+        drift = self.reference.baseline.drift if self.reference.baseline else 0.0
         return (
             f"{self.source}: {self.fps:.0f} frames/s, {self.dropped} dropped, "
-            f"p99 {1e3 * self.p99:.1f} ms"
+            f"p99 {1e3 * self.p99:.1f} ms, drift {100 * drift:.1f} %"
         )

@@ -126,6 +126,12 @@ class Tape:
         if self._recorder:
             self._recorder.event(event)
 
+    def note(self, event: Event) -> None:
+        """A person's remark; from any thread."""
+        recorder = self._recorder
+        if recorder:
+            recorder.note(event.host_time, event.text)
+
     def truth(self, presses: tuple[Press, ...]) -> None:
         """What presses on the twin from now on."""
         self._truth = presses

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from tomoskin.core import Frame
@@ -13,9 +14,36 @@ from tomoskin.source import Transport
 class Replayed(Protocol):
     """A source that plays a recording and knows what became of each of its frames."""
 
+    path: Path
+    """The recording."""
+
+    start: float
+    """Host time of its first frame."""
+
+    end: float
+    """Host time of its last message."""
+
+    speed: float
+    """Recorded seconds per second; inf for as fast as it is read."""
+
+    loop: bool
+    """Whether it begins again at the end."""
+
+    ended: bool
+    """Whether nothing is left to play."""
+
     @property
     def paused(self) -> bool:
         """Whether it stands still."""
+
+    def now(self) -> float:
+        """The time in the recording, host monotonic s."""
+
+    def seek(self, host_time: float) -> None:
+        """Go on from the first frame at ``host_time``."""
+
+    def step(self) -> None:
+        """Play one read and stand still."""
 
     def mark(self, sequence: int) -> Mark | None:
         """What became of a frame that was just read; None: it never reached the pipeline."""
@@ -33,6 +61,11 @@ class Wishes:
         self._held = False
         self._opened = False
         self._replayed: Replayed | None = None
+
+    @property
+    def replay(self) -> Replayed | None:
+        """The recording that is being played, or None."""
+        return self._replayed
 
     @property
     def held(self) -> bool:

@@ -30,6 +30,7 @@ from tomoskin.session.session_reader import (
     Truth,
 )
 from tomoskin.session.states_file import StatesCalibration, read_states, write_states
+from tomoskin.session.timeline import Span, Timeline, read_timeline
 from tomoskin.session.touch_csv import write_touches
 from tomoskin.session.vtu import write_vtu
 from tomoskin.session.whole import read_session, recording_of
@@ -53,7 +54,9 @@ __all__ = [
     "SessionInfo",
     "SessionReader",
     "SessionWriter",
+    "Span",
     "StatesCalibration",
+    "Timeline",
     "Truth",
     "all_blocks",
     "circular_average",
@@ -71,6 +74,7 @@ __all__ = [
     "read_recording",
     "read_session",
     "read_states",
+    "read_timeline",
     "recording_of",
     "rendered",
     "repair",

@@ -6,6 +6,7 @@ import math
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from tomoskin.core import SourceError
 from tomoskin.pattern import Scan
 from tomoskin.session.layout import Mark, MarkedFrame
 from tomoskin.session.playback import Item, Piece, marks, pieces
+from tomoskin.session.references import References
 from tomoskin.session.replay_board import ReplayBoard
 from tomoskin.session.session_reader import SessionReader
 from tomoskin.source import Configuration, ScanSettings
@@ -69,6 +71,8 @@ class ReplayTransport:
         self._held = self._closed = self._jumped = self.ended = False
         self._steps = 0
         self._marks: dict[int, Mark] = {}
+        _ = session.totals  # read now, by one thread
+        self._references = References(session.path, session.settings())
         self._go(float("-inf"))
         if self._next is None:
             raise SourceError("holds no frame", where=self.name)
@@ -78,6 +82,11 @@ class ReplayTransport:
     def paused(self) -> bool:
         """Whether it stands still."""
         return self._held
+
+    @property
+    def path(self) -> Path:
+        """The session."""
+        return self._session.path
 
     @property
     def end(self) -> float:
@@ -104,6 +113,31 @@ class ReplayTransport:
             self._anchor(self._now)
             self._condition.notify()
 
+    @property
+    def speed(self) -> float:
+        """Recorded seconds per second; inf for as fast as it is read."""
+        return self._speed
+
+    @speed.setter
+    def speed(self, speed: float) -> None:
+        with self._condition:
+            self._anchor(self._now)
+            self._speed = speed
+            self._condition.notify()
+
+    @property
+    def loop(self) -> bool:
+        """Whether it begins again at the end."""
+        return self._loop
+
+    @loop.setter
+    def loop(self, on: bool) -> None:
+        with self._condition:
+            self._loop = on
+            if on and self._next is None:
+                self._go(float("-inf"))
+            self._condition.notify()
+
     def step(self) -> None:
         """Play one read and stand still."""
         with self._condition:
@@ -112,9 +146,16 @@ class ReplayTransport:
             self._condition.notify()
 
     def seek(self, host_time: float) -> None:
-        """Go on from the first frame at ``host_time``; beyond the last: to the end."""
+        """Go on from the first frame at ``host_time``; beyond the last: to the end.
+
+        The frames that made the reference of that moment come first, at once and marked as from
+        earlier, so that the pictures are those of the run. A replay that stands still plays the
+        frame there.
+        """
+        made_of = self._references.before(host_time)
         with self._condition:
-            self._go(host_time)
+            self._go(host_time, made_of)
+            self._steps = int(self._held)
             self._condition.notify()
 
     def read(self, timeout: float) -> bytes:
@@ -149,8 +190,11 @@ class ReplayTransport:
             self._session.close()
             self._condition.notify()
 
-    def _go(self, host_time: float) -> None:
-        self._pieces = pieces(self._items(host_time - _BEFORE), host_time)
+    def _go(self, host_time: float, earlier: tuple[MarkedFrame, ...] = ()) -> None:
+        there = pieces(self._items(host_time - _BEFORE), host_time)
+        first = tuple(islice(there, 1))
+        before = pieces(map(self._stamped, earlier if first else ()))
+        self._pieces = chain(before, first, there)
         self._next = next(self._pieces, None)
         self.ended = self._next is None
         if self._next is not None:
@@ -159,11 +203,12 @@ class ReplayTransport:
     def _items(self, since: float) -> Iterator[Item]:
         if self._restamped is None:
             return self._session.reads(since)
-        configuration = self._restamped
-        return (
-            MarkedFrame(replace(item.frame, configuration=configuration), item.mark)
-            for item in self._session.frames(since)
-        )
+        return map(self._stamped, self._session.frames(since))
+
+    def _stamped(self, item: MarkedFrame) -> MarkedFrame:
+        if self._restamped is None:
+            return item
+        return MarkedFrame(replace(item.frame, configuration=self._restamped), item.mark)
 
     def _anchor(self, host_time: float) -> None:
         self._anchored = (self._clock.now(), host_time)
@@ -172,9 +217,11 @@ class ReplayTransport:
         """When the next piece is to be read, by the clock; inf: not before something changes."""
         if self._next is None or not self._board.scanning:
             return math.inf
+        if self._is_earlier(self._next):
+            return -math.inf
         if self._held:
             return -math.inf if self._steps else math.inf
-        if math.isinf(self._speed) or self._is_earlier(self._next):
+        if math.isinf(self._speed):
             return -math.inf
         wall, host = self._anchored
         return wall + (self._next.host_time - host) / self._speed
@@ -185,7 +232,8 @@ class ReplayTransport:
     def _play(self) -> bytes:
         piece = self._next
         assert piece is not None
-        self._steps = max(self._steps - 1, 0)
+        if not self._is_earlier(piece):
+            self._steps = max(self._steps - 1, 0)
         self._now, self._jumped, self._marks = piece.host_time, not piece.follows, marks(piece)
         self._next = next(self._pieces, None)
         if self._next is None and self._loop:
