@@ -11,6 +11,7 @@ from tomoskin.inverse import AlphaChoice
 from tomoskin.live import colour_limit, messages
 from tomoskin.live.result import ReferenceState
 from tomoskin.live.status import Status
+from tomoskin.signal import BaselineState, ElectrodeHealth
 
 
 def make_status(**changes):
@@ -76,6 +77,25 @@ def test_state():
     assert state["problem"] is None
     assert state["recording"] is None
     assert "50 frames/s" in state["text"]
+
+
+def test_sick_electrodes_and_the_drift_of_the_reference_are_told():
+    baseline = BaselineState(drift=0.012, held=30.0, doubt=4.0, noise=1e-4)
+    reference = ReferenceState(20, 20, 5.0, 1e-4, baseline)
+    sick = ElectrodeHealth(4, "open", "no current", 3.5)
+    status = make_status(reference=reference, electrodes=(sick,))
+    state = json.loads(messages.state(status))
+    assert state["baseline"] == {
+        "drift": 0.012,
+        "held_s": 30.0,
+        "noise_v": 1e-4,
+        "stale": baseline.stale,
+    }
+    assert "30 s" in state["baseline"]["stale"]
+    assert state["sick"] == [
+        {"electrode": 4, "state": "open", "reason": "no current", "since_s": 3.5}
+    ]
+    assert "drift 1.2 %" in status.text
 
 
 def test_of_a_recording_only_the_files_name_is_told():

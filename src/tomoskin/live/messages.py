@@ -14,9 +14,8 @@ from tomoskin.core import Event, FloatArray, IntArray
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.requests import MAX_FORCE
 from tomoskin.live.status import Status
-from tomoskin.signal import BaselineState, ElectrodeHealth
-from tomoskin.signal import BaselineState, ElectrodeHealth
 from tomoskin.session import Timeline
+from tomoskin.signal import BaselineState, ElectrodeHealth
 
 PROBE_RADIUS = 0.015
 """Radius of a press from the page unless it says otherwise, m: the source's usual probe."""
@@ -80,8 +79,6 @@ def state(status: Status) -> str:
         },
         baseline=_baseline(reference.baseline),
         sick=[_sick(electrode) for electrode in status.electrodes],
-        baseline=_baseline(reference.baseline),
-        sick=[_sick(electrode) for electrode in status.electrodes],
         noise_v=_known(reference.noise),
         alpha=status.choice.alpha,
         rule=status.choice.rule,
@@ -92,27 +89,6 @@ def state(status: Status) -> str:
         problem=status.problem,
         text=status.text,
     )
-
-
-def _baseline(now: BaselineState | None) -> dict[str, Any] | None:
-    """Drift since the reference as a part of it, how long it is held, and whether it is stale."""
-    if now is None:
-        return None
-    return {
-        "drift": _known(now.drift),
-        "held_s": now.held,
-        "noise_v": _known(now.noise),
-        "stale": now.stale,
-    }
-
-
-def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
-    return {
-        "electrode": electrode.electrode,
-        "state": electrode.state,
-        "reason": electrode.reason,
-        "since_s": electrode.since,
-    }
 
 
 def _baseline(now: BaselineState | None) -> dict[str, Any] | None:

@@ -226,7 +226,6 @@ class Runner:
             choice=self._pipeline.choice,
             left_out=result.left_out if result else 0,
             electrodes=result.health.sick if result and result.health else (),
-            electrodes=result.health.sick if result and result.health else (),
             problem=self._trouble or self._standstill or (result.problem if result else None),
         )
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from tomoskin.inverse import AlphaChoice
 from tomoskin.live.result import ReferenceState
 from tomoskin.signal import ElectrodeHealth
-from tomoskin.signal import ElectrodeHealth
 from tomoskin.sink import SinkReport
 
 
@@ -63,8 +62,6 @@ class Status:
         Where a replay is; None where the source is another.
     electrodes
         Those that are not good.
-    electrodes
-        Those that are not good.
     problem
         What someone should see to, in one sentence, or None.
     """
@@ -87,7 +84,6 @@ class Status:
     recording: Path | None = None
     sinks: tuple[SinkReport, ...] = ()
     electrodes: tuple[ElectrodeHealth, ...] = ()
-    electrodes: tuple[ElectrodeHealth, ...] = ()
     replay: ReplayStatus | None = None
 
     @property
@@ -100,7 +96,6 @@ class Status:
         if not self.reference.ready:
             taken, needed = self.reference.frames, self.reference.needed
             return f"{self.source}: taking the reference, {taken} of {needed} frames; do not touch"
-        drift = self.reference.baseline.drift if self.reference.baseline else 0.0
         drift = self.reference.baseline.drift if self.reference.baseline else 0.0
         return (
             f"{self.source}: {self.fps:.0f} frames/s, {self.dropped} dropped, "
