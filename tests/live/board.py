@@ -10,8 +10,8 @@ import numpy as np
 
 from tomoskin.core import Frame, SourceError
 from tomoskin.wire import (
+    OLDER,
     SCHEMA,
-    SCHEMA_HASH,
     Ack,
     Deframer,
     GetInfo,
@@ -26,6 +26,9 @@ from tomoskin.wire import (
     encode,
     type_byte,
 )
+
+((VERSION, HASH),) = OLDER.items()
+"""Of the first protocol: then nothing is read back that it would have to hold."""
 
 AS_TAKEN = {"baseline": "hold", "common_modes": "kept"}
 """[signal] of a skin whose pictures are those of its operator alone."""
@@ -50,7 +53,7 @@ class Board:
         self._period = period
         self._configuration = 0
         self._sequence = count()
-        self._out = deque([encode(Hello(SCHEMA.major, SCHEMA.minor, SCHEMA_HASH))])
+        self._out = deque([encode(Hello(*VERSION, HASH))])
         self._news = threading.Condition()
         self._deframer = Deframer(SCHEMA.to_device_bytes)
 
@@ -109,9 +112,9 @@ class Board:
             return encode(
                 Info(
                     request=command.request,
-                    major=SCHEMA.major,
-                    minor=SCHEMA.minor,
-                    schema_hash=SCHEMA_HASH,
+                    major=VERSION[0],
+                    minor=VERSION[1],
+                    schema_hash=HASH,
                     firmware=bytes((1, 2, 3)),
                     reset=Reset.POWER,
                     channels=16,

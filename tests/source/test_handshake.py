@@ -206,6 +206,13 @@ def test_a_board_that_holds_something_else_is_refused(clock, kind, change, said)
     assert "Start" not in board.names
 
 
+def test_an_ack_is_no_answer_to_a_question(clock):
+    board = ScriptedBoard(clock)
+    board.held = lambda command: Ack(command.request, type_byte(type(command)), Result.OK, 0)
+    with pytest.raises(SourceError, match="no answer to GetScan"):
+        linked(board, clock).connect()
+
+
 def test_a_board_of_the_first_version_is_set_up_in_its_own_words(clock):
     old = {"minor": 0, "schema_hash": OLDER[1, 0]}
     board = ScriptedBoard(clock, hello=replace(HELLO, **old))

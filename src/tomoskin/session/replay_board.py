@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from tomoskin.skin import Skin
 
 
-(_VERSION, _HASH) = next(iter(OLDER.items()))
+((_VERSION, _HASH),) = OLDER.items()
 """It speaks the oldest protocol: what it cannot be asked need not be made up."""
 
 

@@ -240,6 +240,8 @@ class Conversation:
             return []
         if ack.command != type_byte(type(pending.command)):
             return []
+        if ack.result is Result.OK and isinstance(pending.command, GetScan | GetPattern):
+            return []  # no answer to a question
         if ack.result is not Result.OK:
             sentence = SCHEMA.enums["result"].sentence(ack.result)
             raise SourceError(
