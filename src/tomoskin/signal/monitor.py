@@ -21,13 +21,13 @@ ENTER = 2
 LEAVE = 20
 """Frames in a row that must clear it before it is used again."""
 
-_EVERY, _WINDOW = 3, 16
+_EVERY, _WINDOW = 3, 8
 """Reciprocity is looked at every so many frames, and averaged over so many looks. The mean over an
-electrode's 26 pairs then has a deviation of √(2/26/31) = 0.05 of the noise's variance."""
+electrode's 26 pairs then has a deviation of √(2/26/15) = 0.07 of the noise's variance."""
 
 _LOUD = 3.0
 """Variance beyond the noise's, in units of it, at which an electrode is sick: its deviation is
-twice the usual one. 60 deviations of the average, so the rate of false alarms is that of other
+twice the usual one. 40 deviations of the average, so the rate of false alarms is that of other
 causes; and four times the median electrode's, so that what all have in common blames none."""
 
 _STEADY = 0.5
@@ -88,7 +88,7 @@ class Monitor:
         self._sign, limit = sign_limit(pattern, reference.mean, noise, order)
         self._limit = np.where(usable, limit, np.inf)
         self._inverse = 1.0 / noise
-        self._start = reference.mean
+        self._start, self._silent = reference.mean, self._unusable
         self._reciprocity = Reciprocity.of(pattern)
         self._deviation = self._reciprocity.deviation(noise)
         self._rest = self._reciprocity.error(reference.mean)
@@ -119,20 +119,22 @@ class Monitor:
         samples: NDArray[np.uint16] | None = None,
     ) -> Health:
         """Health of the frame with ``values`` (n_meas,) V, ``railed`` rows and ``samples``."""
-        bad = railed | self._unusable
-        np.logical_or(bad, self._sign * values < -self._limit, out=bad)
+        off = railed | self._unusable
+        bad = off | (self._sign * values < -self._limit)
         dead = self._groups.dead((values * self._inverse) ** 2)
-        loud = self._loud(values, bad)
+        loud = self._loud(values, off)
         stuck = self._stuck(samples)
         if not (self._sick or loud or stuck or bad.any() or dead.any()):
             self._blamed[:] = 0
+            self._silent = self._unusable
             return self._well
         return self._judged(bad, railed, dead, loud | stuck, time)
 
     def _judged(
         self, bad: Mask, railed: Mask, dead: Mask, more: dict[int, ElectrodeHealth], time: float
     ) -> Health:
-        bad |= dead[: self._groups.n_drives][self._pattern.drive_index]
+        self._silent = dead[: self._groups.n_drives][self._pattern.drive_index]
+        bad |= self._silent
         key = (bad.tobytes(), dead.tobytes())
         if key != self._seen:
             self._seen, self._explained = key, self._explain(bad, railed, dead)
@@ -176,7 +178,7 @@ class Monitor:
             return at_rail
         return f"no current in any of its {int(drives.sum())} driven rows, and {at_rail}"
 
-    def _loud(self, values: FloatArray, bad: Mask) -> dict[int, ElectrodeHealth]:
+    def _loud(self, values: FloatArray, off: Mask) -> dict[int, ElectrodeHealth]:
         """Electrodes whose reciprocity wavers by more than the noise."""
         self._looks += 1
         if self._looks % _EVERY or not self._pairs_left:
@@ -188,8 +190,9 @@ class Monitor:
         error = pairs.error(values) - self._rest
         squared = pairs.squared(error, self._deviation, values - last, values - self._start)
         use = self._paired
-        if self._sick or bad.any():
-            use = use & ~(bad[pairs.first] | bad[pairs.second])
+        if self._silent.any() or off.any():
+            off = off | self._silent
+            use = use & ~(off[pairs.first] | off[pairs.second])
         np.copyto(squared, self._squared, where=~use)
         np.copyto(error, 0.0, where=~use)
         self._squared += (squared - self._squared) / _WINDOW
@@ -221,7 +224,7 @@ class Monitor:
         if samples is None or last is None or self._members is None:
             return {}
         share = unchanged(samples, last, self._members)
-        alone = share[:-1] >= 1.0
+        alone = share[:-1] > 1.0 - 1e-9
         self._still = np.where(alone, self._still + 1, 0.0)
         if not alone.any() or share[-1] > 0.5:
             if share[-1] > 0.5:
