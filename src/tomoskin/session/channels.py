@@ -84,6 +84,9 @@ _GRID = _object(
     host_time=_NUMBER,
     unit=_STRING,
 )
+UNUSED = ("arrows", "cubes", "cylinders", "lines", "triangles", "models")
+"""Kinds of primitives that an entity of a scene must have a list of, and ours leave empty."""
+
 _SCENE_UPDATE = _object(
     deletions=_list(_object(timestamp=_TIME, type=_INTEGER, id=_STRING)),
     entities=_list(
@@ -93,6 +96,8 @@ _SCENE_UPDATE = _object(
             id=_STRING,
             lifetime=_TIME,
             frame_locked={"type": "boolean"},
+            metadata=_list(_object(key=_STRING, value=_STRING)),
+            **dict.fromkeys(UNUSED, _list({"type": "object"})),
             spheres=_list(_object(pose=_POSE, size=_XYZ, color=_COLOUR)),
             texts=_list(
                 _object(

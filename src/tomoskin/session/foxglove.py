@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import Event, Image, PixelMap, Touch
+from tomoskin.session.channels import UNUSED
 
 _INFO, _WARNING = 2, 3
 _QUIET = frozenset(
@@ -92,6 +93,10 @@ def _entity(touch: Touch, now: dict[str, int]) -> Message:
         "id": f"touch-{touch.id}",
         "lifetime": {"sec": 0, "nsec": 0},
         "frame_locked": True,
+        "metadata": [
+            {"key": "kind", "value": touch.kind}, {"key": "peak", "value": f"{reading.peak:.4g}"},
+        ],
+        **{kind: [] for kind in UNUSED},
         "spheres": [
             {"pose": pose, "size": {"x": width, "y": width, "z": 0.2 * width},
              "color": _AREA_COLOUR}
