@@ -5,23 +5,28 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from report import Report
+from tomoskin.live import in_processes, in_this_process, make_set
 from tomoskin.pattern import Scan
 from tomoskin.skin import Skin
 from tomoskin.source import ScanSettings
 from tomoskin.twin import (
+    COMMON_PRESSES,
     Press,
     SampleTable,
     ScanClock,
+    SetPlan,
     TwinElectronics,
     TwinSettings,
     TwinSkin,
     make_electronics,
     sample_table,
 )
+from tomoskin.twin.dent import solved_dent
 from tomoskin.wire import Drive
 
 CASES = (
@@ -34,6 +39,7 @@ CASES = (
 FRAMES, ROUND = 300, 100
 PROMISED = 500
 SEED = 1
+SET, SET_SKIN, SET_ROUNDS, PROCESSES = 5000, "textile-disc-8", 2, (1, 2)
 
 
 def run(data: Path | None) -> tuple[Report, ...]:
@@ -65,7 +71,47 @@ def run(data: Path | None) -> tuple[Report, ...]:
             "creep, play, temperature, all vices of the board",
         ),
     )
-    return (report,)
+    return report, _labelled()
+
+
+def _labelled() -> Report:
+    """Labelled frames by one process and by two, starts and writing included."""
+    took: dict[int, list[float]] = {n: [] for n in PROCESSES}
+    for round_ in range(SET_ROUNDS):
+        for n in PROCESSES:
+            plan = SetPlan(Skin.load(SET_SKIN).to_toml(), COMMON_PRESSES, "textile", round_, SET)
+            with TemporaryDirectory() as folder:
+                took[n].append(_set_seconds(plan, Path(folder) / "set", n))
+    alone = min(took[1])
+    return Report(
+        "twin: labelled frames, over processes",
+        ("skin", "frames", "processes", "s, least", "s, most", "frames /s", "× one process"),
+        tuple(
+            (
+                SET_SKIN,
+                SET,
+                n,
+                round(min(times), 1),
+                round(max(times), 1),
+                round(SET / min(times)),
+                round(alone / min(times), 2),
+            )
+            for n, times in took.items()
+        ),
+        (
+            f"one round press each, preset textile; {SET_ROUNDS} rounds in turn, seeds from 0",
+            "from the plan to files; in two processes, with their start",
+            "each process first solves the dents of 25 faces, about 2.5 s of processor time",
+        ),
+    )
+
+
+def _set_seconds(plan: SetPlan, out: Path, processes: int) -> float:
+    solved_dent.cache_clear()
+    start = time.perf_counter()
+    workers = in_this_process if processes == 1 else in_processes(processes)
+    make_set(plan, out, workers, lambda _, __: None)
+    return time.perf_counter() - start
 
 
 def _row(name: str, preset: str, triangles: int) -> tuple[object, ...]:

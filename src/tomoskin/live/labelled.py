@@ -12,8 +12,6 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from threadpoolctl import threadpool_limits
-
 from tomoskin.core import DataError, SourceError
 from tomoskin.session import is_done, join_shards, shard_path, write_whole
 from tomoskin.twin import SetPlan, make_shard
@@ -86,16 +84,21 @@ def shard_identity(plan: SetPlan, shard: int) -> str:
 def in_this_process(plan: SetPlan, shards: Sequence[int]) -> Made:
     """One shard after the other."""
     for shard in shards:
-        yield shard, _made(plan, shard)
+        yield shard, make_shard(plan, shard)
 
 
 def in_processes(n: int) -> Workers:
-    """Workers that are ``n`` processes of this machine."""
+    """Workers that are ``n`` processes of this machine.
+
+    They import the twin alone. Ctrl-C reaches every process of a terminal: they leave it to this
+    one, which ends them.
+    """
+    calm = (signal.SIGINT, signal.SIG_IGN)
 
     def run(plan: SetPlan, shards: Sequence[int]) -> Made:
         count = min(n, len(shards) or 1)
-        with ProcessPoolExecutor(count, get_context("spawn"), _leave_signals_alone) as pool:
-            futures = {pool.submit(_made, plan, shard): shard for shard in shards}
+        with ProcessPoolExecutor(count, get_context("spawn"), signal.signal, calm) as pool:
+            futures = {pool.submit(make_shard, plan, shard): shard for shard in shards}
             with _cancelled(list(futures)):
                 for future in as_completed(futures):
                     yield futures[future], future.result()
@@ -118,7 +121,7 @@ def on_cluster(address: str) -> Workers:
         except (OSError, TimeoutError, ValueError) as error:
             raise SourceError(f"no scheduler answers: {error}", where=address) from error
         with client:
-            futures = client.map(_made, [plan] * len(shards), list(shards), pure=False)
+            futures = client.map(make_shard, [plan] * len(shards), list(shards), pure=False)
             number = dict(zip((future.key for future in futures), shards, strict=True))
             for future, arrays in distributed.as_completed(futures, with_results=True):
                 yield number[future.key], arrays
@@ -131,17 +134,6 @@ def processors() -> int:
     with contextlib.suppress(AttributeError):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def _made(plan: SetPlan, shard: int) -> dict[str, Any]:
-    """One thread a process: a frame's products are small, and sums keep their order."""
-    with threadpool_limits(1):
-        return make_shard(plan, shard)
-
-
-def _leave_signals_alone() -> None:
-    """Ctrl-C reaches every process of a terminal; the first one ends the others."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextlib.contextmanager

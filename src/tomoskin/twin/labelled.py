@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from tomoskin import __version__
 from tomoskin.core import FloatArray, Frame, ScriptError
@@ -93,11 +94,12 @@ def make_shard(plan: SetPlan, shard: int) -> Arrays:
     ScriptError
         When there is no room on the skin for what is to be drawn.
     """
-    lab = _lab(plan)
     draws, noise = np.random.SeedSequence(plan.seed, spawn_key=(shard + 1,)).spawn(2)
     random = np.random.default_rng(draws)
-    presses = [plan.population.draw(lab.skin.outline, random) for _ in range(plan.size(shard))]
-    voltages = lab.read(presses, plan.population.hold, noise)
+    with threadpool_limits(1):  # a frame's products are small, and sums keep their order
+        lab = _lab(plan)
+        presses = [plan.population.draw(lab.skin.outline, random) for _ in range(plan.size(shard))]
+        voltages = lab.read(presses, plan.population.hold, noise)
     table = lab.skin.pattern()
     return {
         "voltages": voltages,
