@@ -128,6 +128,52 @@ def test_flipped_bits_never_give_a_wrong_frame(small, tmp_path, part):
     assert refused > len(places) // 2
 
 
+@pytest.mark.parametrize("step", [101, pytest.param(1, marks=pytest.mark.slow)])
+def test_flipped_bits_anywhere_are_refused_or_change_nothing(tmp_path, step):
+    """Everything but frames, in a file that holds some of each."""
+    path = tmp_path / "flipped.mcap"
+    data = write_all(tmp_path / "all.mcap").read_bytes()
+    expected, _ = everything_in(tmp_path / "all.mcap")
+    refused = 0
+    for place in range(0, len(data), step):
+        flipped = bytearray(data)
+        flipped[place] ^= 1 << (place % 8)
+        path.write_bytes(flipped)
+        found, error = everything_in(path)
+        if error is not None:
+            assert str(path) in str(error)
+            refused += 1
+            continue
+        assert {topic: found[topic] for topic in found if found[topic] != expected[topic]} in (
+            {},
+            {"epoch": found["epoch"]},  # a named string has no CRC of its own
+        )
+    assert refused > len(data) // step // 2
+
+
+def everything_in(path):
+    """What a session holds beside its frames, or why it cannot be read."""
+    try:
+        return told_by(path), None
+    except DataError as error:
+        return {}, error
+
+
+def told_by(path):
+    with SessionReader(path) as session:
+        return {
+            "epoch": session.epoch,
+            "skin": session.skin.identity,
+            "device": session.device(),
+            "clock": session.clock(),
+            "settings": session.settings(),
+            "events": list(session.events()),
+            "notes": list(session.notes()),
+            "touches": repr(list(session.touches())),
+            "truth": list(session.truth()),
+        }
+
+
 def test_damage_is_located(small, tmp_path):
     data = bytearray(small.read_bytes())
     end, _ = chunk_ends(bytes(data))[1]
