@@ -17,6 +17,7 @@ from tomoskin import __version__
 from tomoskin.cli import (
     bench,
     calibrate,
+    design,
     doctor,
     firmware,
     image,
@@ -47,6 +48,7 @@ app.command("image")(image.image)
 app.add_typer(calibrate.app, name="calibrate")
 app.command("locate")(locate.locate)
 app.command("states")(states.states)
+app.command("design")(design.design)
 app.command("simulate")(simulate.simulate)
 app.command("bench")(bench.bench)
 app.add_typer(session.app, name="session")

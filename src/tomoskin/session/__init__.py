@@ -5,6 +5,7 @@ from tomoskin.session.archive import load_arrays
 from tomoskin.session.blocks import Rows, all_blocks
 from tomoskin.session.calibration import Calibration, read_calibration, write_calibration
 from tomoskin.session.channels import schema_of
+from tomoskin.session.design_picture import write_promise
 from tomoskin.session.display import Display, circular_average
 from tomoskin.session.documents import encode_json, touches_message
 from tomoskin.session.exports.hdf5 import write_hdf5
@@ -93,6 +94,7 @@ __all__ = [
     "write_merit_table",
     "write_parquet",
     "write_picture",
+    "write_promise",
     "write_series",
     "write_states",
     "write_touches",

@@ -1,5 +1,6 @@
 """Image → readings → touches with an identity; labelled presses → places."""
 
+from tomoskin.touch.design import Demand, Promise, Variant, promise, variants
 from tomoskin.touch.floor import NoiseFloor
 from tomoskin.touch.locator import Locator, Presses, Region
 from tomoskin.touch.segment import Segmenter
@@ -11,19 +12,24 @@ __all__ = [
     "STILL",
     "Answers",
     "Codes",
+    "Demand",
     "Examples",
     "Locator",
     "NoiseFloor",
     "Presses",
+    "Promise",
     "Region",
     "Segmenter",
     "StateClassifier",
     "TouchEvent",
     "TrackSettings",
     "Tracker",
+    "Variant",
     "Wiring",
     "WiringAnswer",
     "against_rest",
+    "promise",
     "ring_of",
     "solve_wiring",
+    "variants",
 ]

@@ -1,0 +1,173 @@
+"""``tomoskin design``: what a skin can resolve before it is built."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.progress import Bar
+from tomoskin.cli.skin_choice import DEFAULT_SKIN
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tomoskin.skin import Skin
+    from tomoskin.touch import Demand, Promise
+
+_ELECTRODES = "8,16,32"
+_PATTERNS = "adjacent,skip:2,opposite"
+_COARSE = 120
+"""Places of each variant in the comparison; the skin's own map has more."""
+
+_PLACES = 500
+
+
+def design(
+    skin: Annotated[str, typer.Option(help="Built-in name or path.")] = DEFAULT_SKIN,
+    out: Annotated[
+        Path | None, typer.Option(metavar="MAP.png", help="Where the map of the skin goes.")
+    ] = None,
+    radius: Annotated[
+        str | None,
+        typer.Option(metavar='"15 mm"', help="Of the press; without it, 7.5 % of the sheet."),
+    ] = None,
+    depth: Annotated[
+        float, typer.Option(help="Part of the conductivity that the press takes.")
+    ] = 0.25,
+    false_alarm: Annotated[
+        float, typer.Option(help="Chance of a false alarm at a place, in a frame.")
+    ] = 1e-4,
+    found: Annotated[float, typer.Option(help="Chance that a press is found in a frame.")] = 0.95,
+    electrodes: Annotated[
+        str, typer.Option(metavar="N,N", help='To compare; none: "".')
+    ] = _ELECTRODES,
+    patterns: Annotated[
+        str, typer.Option(metavar="NAME,NAME", help="To compare, as in a skin file.")
+    ] = _PATTERNS,
+    json: JsonFlag = False,
+) -> None:
+    """Bound the error of a press's place, and the faintest press, by the skin's own read-out.
+
+    No method can do better without more knowledge (Cramér–Rao); a good one comes near.
+    """
+    from tomoskin.core import parse_quantity
+    from tomoskin.skin import Skin
+    from tomoskin.touch import Demand, promise
+
+    counts = _counts(electrodes)
+    chosen = Skin.load(skin)
+    try:
+        size = parse_quantity(radius, "length") if radius else None
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--radius") from None
+    demand = Demand(size, depth, false_alarm, found)
+    with Bar("bounding") as bar:
+        jobs = 1 + len(counts) * len(patterns.split(","))
+        own = promise(chosen, demand, _PLACES, _part(bar, 0, jobs))
+        rows = _compared(chosen, demand, counts, patterns.split(","), bar)
+    radius_m = demand.on(chosen.mesh())
+    if out is not None:
+        _write(out, chosen, own, demand, radius_m)
+    document = {
+        "skin": chosen.name,
+        "press": {"radius_m": radius_m, "depth": depth},
+        "false_alarm": false_alarm,
+        "found": found,
+        **own.figures(),
+        "compared": rows,
+    }
+    if json:
+        emit(document)
+    else:
+        _say(document)
+
+
+def _counts(text: str) -> list[int]:
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    if not all(part.isdigit() for part in parts):
+        raise typer.BadParameter(f'expected numbers such as 8,16, got "{text}"')
+    return [int(part) for part in parts]
+
+
+def _part(bar: Bar, number: int, jobs: int) -> Callable[[float, float], None]:
+    """Progress of one job of several."""
+    return lambda done, total: bar(number + done / total, jobs)
+
+
+def _compared(
+    skin: Skin, demand: Demand, counts: list[int], patterns: list[str], bar: Bar
+) -> list[dict[str, Any]]:
+    from tomoskin.core import TomoskinError
+    from tomoskin.pattern import Scan
+    from tomoskin.touch import promise, variants
+
+    rows: list[dict[str, Any]] = []
+    jobs = 1 + len(counts) * len(patterns)
+    for number, variant in enumerate(variants(skin, counts, patterns), start=1):
+        row = {"electrodes": variant.electrodes, "pattern": variant.pattern}
+        if variant.skin is None:
+            rows.append(row | {"fault": variant.fault})
+            continue
+        try:
+            found = promise(variant.skin, demand, _COARSE, _part(bar, number, jobs))
+        except TomoskinError as error:
+            rows.append(row | {"fault": error.message})
+            continue
+        pattern = variant.skin.pattern()
+        samples = Scan.of(pattern).n_samples
+        rows.append(row | {"rows": pattern.n_meas, "samples": samples} | found.figures())
+    return rows
+
+
+def _write(out: Path, skin: Skin, own: Promise, demand: Demand, radius: float) -> None:
+    from tomoskin.session import write_promise
+
+    title = (
+        f"{skin.name}: one frame, press of radius {1e3 * radius:.0f} mm taking "
+        f"{100 * demand.depth:.0f} %; noticed: {100 * demand.found:g} % found, "
+        f"{demand.false_alarm:g} false alarms"
+    )
+    write_promise(out, skin, own, title)
+
+
+def _say(document: dict[str, Any]) -> None:
+    from rich.console import Console
+
+    from tomoskin.cli.bench_table import tables
+
+    press = document["press"]
+    typer.echo(
+        f"{document['skin']}: a press of radius {1e3 * press['radius_m']:.0f} mm that takes "
+        f"{100 * press['depth']:.0f} % of the conductivity, one frame, within 85 % of the way out:"
+    )
+    typer.echo(
+        f"its place is missed by {1e3 * document['least_m']:.2g} mm at best, "
+        f"{1e3 * document['median_m']:.2g} mm in the median, "
+        f"{1e3 * document['p95_m']:.2g} mm at the 95th percentile"
+    )
+    typer.echo(
+        f"noticed (found {100 * document['found']:g} % of the time, "
+        f"{document['false_alarm']:g} false alarms) from {100 * document['faintest_median']:.2g} % "
+        f"on in the median, {100 * document['faintest_p95']:.2g} % at the 95th percentile"
+    )
+    good = [row for row in document["compared"] if "fault" not in row]
+    headings = ("pattern", "electrodes", "rows", "samples", "best mm", "median mm", "p95 mm")
+    shown = [
+        (
+            *(row["pattern"], row["electrodes"], row["rows"], row["samples"]),
+            *(f"{1e3 * row[key]:.2g}" for key in ("least_m", "median_m", "p95_m")),
+            f"{100 * row['faintest_p95']:.2g}",
+        )
+        for row in good
+    ]
+    console = Console()
+    if shown:
+        title = "the same sheet otherwise"
+        for table in tables(title, (*headings, "faintest % p95"), shown, console.width):
+            console.print(table, crop=False)
+    for row in document["compared"]:
+        if "fault" in row:
+            typer.echo(f"{row['electrodes']} electrodes, {row['pattern']}: {row['fault']}")

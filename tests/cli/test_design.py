@@ -1,0 +1,55 @@
+"""``tomoskin design``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tomoskin.cli import design
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(design, "_PLACES", 30)
+    monkeypatch.setattr(design, "_COARSE", 30)
+
+
+def test_a_map_and_a_comparison(tomoskin: Run, tmp_path: Path) -> None:
+    picture = tmp_path / "map.png"
+    code, out, err = tomoskin(
+        "design", "--out", picture, "--electrodes", "8", "--patterns", "adjacent,skip:3"
+    )
+    assert (code, err) == (0, "")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert "textile-disc-8: a press of radius 15 mm" in out
+    assert "the same sheet otherwise" in out
+    assert "8 electrodes, skip:3: " in out
+
+
+def test_for_programs(tomoskin: Run) -> None:
+    options = ("--electrodes", "8,16", "--patterns", "adjacent", "--radius", "20 mm", "--json")
+    code, out, err = tomoskin("design", *options)
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert found["press"] == {"radius_m": 0.02, "depth": 0.25}
+    eight, sixteen = found["compared"]
+    assert (eight["rows"], sixteen["rows"]) == (40, 208)
+    assert sixteen["median_m"] < eight["median_m"]
+    assert eight["median_m"] == pytest.approx(found["median_m"], rel=0.2)
+
+
+def test_wrong_options_are_said(tomoskin: Run, tmp_path: Path) -> None:
+    assert tomoskin("design", "--electrodes", "many")[0] == 2
+    assert tomoskin("design", "--radius", "15 kg", "--electrodes", "")[0] == 2
+    code, _, err = tomoskin("design", "--depth", "2", "--electrodes", "")
+    assert code == 1
+    assert "depth between 0 and 1" in err
+    folder = tmp_path / "none" / "map.png"
+    code, _, err = tomoskin("design", "--out", folder, "--electrodes", "")
+    assert code == 1
+    assert "cannot be written" in err
