@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.alpha import alpha
+from tomoskin.cli.lay import lay
 from tomoskin.cli.merit import merit
 from tomoskin.cli.output import JsonFlag, emit
 
@@ -14,9 +15,10 @@ if TYPE_CHECKING:
     from tomoskin.mesh import Quality
     from tomoskin.skin import Skin
 
-app = typer.Typer(help="List, show and check skins.", no_args_is_help=True)
+app = typer.Typer(help="List, show, check and lay skins.", no_args_is_help=True)
 app.command("alpha")(alpha)
 app.command("merit")(merit)
+app.command("lay")(lay)
 
 _Name = Annotated[str, typer.Argument(metavar="SKIN", help="Built-in name or path.")]
 

@@ -50,7 +50,7 @@ def points_of(raw: Any, cells: IntArray, scale: float) -> FloatArray:
     if extent.max() > TOO_LARGE:
         raise GeometryError(
             f"extends over {extent.max():.4g} m",
-            hint="if the file is in millimetres, pass scale=1e-3",
+            hint='if the file is in millimetres, say so: unit "mm", or scale=1e-3',
         )
     flat = cells.shape[1] == 3 and points.shape[1] == 3 and extent[2] == 0
     return points[:, :2] if flat else points

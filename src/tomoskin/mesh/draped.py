@@ -102,13 +102,13 @@ class Draped(Surface):
         """(n, 3, 2), the same all over a triangle."""
         return np.asarray(self._slopes[self._within(rows_of(uv))[0]])
 
-    def place(self, xyz: ArrayLike) -> FloatArray:
+    def place(self, xyz: ArrayLike, name: str = "place") -> FloatArray:
         """(n, 2) m: flat coordinates of the surface's points nearest to ``xyz`` (n, 3) m.
 
         Raises
         ------
         GeometryError
-            Naming the first that does not lie on the surface.
+            Naming the first ``name`` that does not lie on the surface.
         """
         wanted = np.atleast_2d(np.asarray(xyz, dtype=np.float64))
         if wanted.shape[1] != 3:
@@ -119,8 +119,8 @@ class Draped(Surface):
             first = int(np.argmax(gap > reach))
             raise GeometryError(
                 f"lies {1e3 * gap[first]:.4g} mm off the surface",
-                where=f"place {first}",
-                hint="places are in the file's own coordinates, in m",
+                where=f"{name} {first}",
+                hint="places are in the file's own coordinates and unit",
             )
         return flat
 

@@ -4,6 +4,7 @@ What reads it (:class:`Section`, :class:`Key`, kinds of values) also reads other
 """
 
 from tomoskin.skin.kinds import Choice, Kind, Number, Quantity, Text, Whole, read_entry, show
+from tomoskin.skin.lay import lay
 from tomoskin.skin.page import section_text, skin_file_page
 from tomoskin.skin.read import check_names, read_section, toml_tables
 from tomoskin.skin.schema import Key, Section
@@ -32,6 +33,7 @@ __all__ = [
     "TwinChoice",
     "Whole",
     "check_names",
+    "lay",
     "read_entry",
     "read_section",
     "section_text",

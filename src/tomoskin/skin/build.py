@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 
@@ -43,7 +44,7 @@ def placed(value: Document, source: str) -> tuple[Outline, tuple[ElectrodeArc, .
 def laid(value: Document, outline: Outline, source: str) -> Surface:
     """What the sheet lies on, which must have room for it."""
     with located(f"{source}: [surface]"):
-        surface = surface_of(value["surface"])
+        surface = surface_of(value["surface"], Path(source).parent)
         surface.check(outline.polyline(outline.length / _RIM_POINTS))
     return surface
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tomoskin.core import FloatArray, GeometryError
+from tomoskin.core import DIMENSIONS, FloatArray, GeometryError
 from tomoskin.mesh import (
     Arm,
     Cap,
     Cylinder,
     Disc,
+    Draped,
     ElectrodeArc,
     Ellipse,
     Outline,
@@ -40,8 +42,8 @@ def outline_of(values: Mapping[str, Any]) -> Outline:
             return Polygon(np.array(values["vertices"]))
 
 
-def surface_of(values: Mapping[str, Any]) -> Surface:
-    """What the section ``[surface]`` says that the sheet lies on."""
+def surface_of(values: Mapping[str, Any], folder: Path) -> Surface:
+    """What the section ``[surface]`` says that the sheet lies on; files are in ``folder``."""
     match values["shape"]:
         case "cylinder":
             return Cylinder(values["radius"], values["axis"])
@@ -51,6 +53,9 @@ def surface_of(values: Mapping[str, Any]) -> Surface:
             return Saddle(values["radius_x"], values["radius_y"])
         case "arm":
             return Arm(values["radius"], values["bend"], values["joint"])
+        case "file":
+            scale = DIMENSIONS["length"][values["unit"]]
+            return Draped.read(folder / values["file"], scale=scale)
         case _:
             return Plane()
 

@@ -134,9 +134,10 @@ SECTIONS: tuple[Section, ...] = (
         (
             Key(
                 "shape",
-                Choice(("flat", "cylinder", "cap", "saddle", "arm")),
+                Choice(("flat", "cylinder", "cap", "saddle", "arm", "file")),
                 "flat; wrapped on a cylinder; drawn over a sphere; hung over a saddle, as a "
-                "chair's back; wrapped around a limb with a joint.",
+                "chair's back; wrapped around a limb with a joint; on the surface of a file, for "
+                "which `tomoskin skin lay` writes the skin.",
                 default="flat",
             ),
             Key(
@@ -180,6 +181,20 @@ SECTIONS: tuple[Section, ...] = (
                 "Length over which the limb's middle line bends, about y = 0.",
                 required=True,
                 when=("shape", ("arm",)),
+            ),
+            Key(
+                "file",
+                Text(),
+                "A .stl, .obj or .ply file, beside the skin file unless the path is absolute.",
+                required=True,
+                when=("shape", ("file",)),
+            ),
+            Key(
+                "unit",
+                Choice(("mm", "cm", "m")),
+                "Of the file's coordinates.",
+                default="mm",
+                when=("shape", ("file",)),
             ),
         ),
     ),

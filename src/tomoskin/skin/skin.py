@@ -97,16 +97,17 @@ class Skin:
         """Names of the built-in skins."""
         return built_in_names()
 
-    def altered(self, changes: Mapping[str, Mapping[str, Any]]) -> Self:
+    def altered(self, changes: Mapping[str, Mapping[str, Any]], *, source: str = "") -> Self:
         """This skin with other values, as a file would write them: ``{"mesh": {"cells": 300}}``.
 
-        A value of None takes the key out.
+        A value of None takes the key out. ``source`` is the file that it will be, if another.
         """
+        source = source or self.source
         raw: dict[str, dict[str, Any]] = {s: dict(keys) for s, keys in self.document.items()}
         for section, keys in changes.items():
             merged = raw.get(section, {}) | dict(keys)
             raw[section] = {key: value for key, value in merged.items() if value is not None}
-        return self._of(complete(raw, self.source), self.source)
+        return self._of(complete(raw, source), source)
 
     @property
     def n_electrodes(self) -> int:
