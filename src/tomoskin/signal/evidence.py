@@ -21,9 +21,12 @@ SIGMAS = 6.0
 """A Gaussian value goes beyond so many deviations once in 10⁹ (one side): with 208 rows at 20
 frames/s once in three days, and then in one row, which no electrode is blamed for."""
 
-_SIGNAL = 4.0
-"""A group of rows is looked at when its power at rest is so many times the limit under which it
-would be called dead."""
+_DEAD_DRIVE, _DEAD_PAIR = 0.45, 0.05
+"""A drive or a pair is dead when fewer of its rows live. A floating electrode makes two rows of a
+silent drive live, of 13 or of 5; nothing that is pressed makes half of them silent."""
+
+_FEWEST = 3
+"""Rows that a group must have to be told dead."""
 
 _LEAK = 0.03
 """Part of its voltage at rest that a dead group may still show: an amplifier's common mode."""
@@ -42,36 +45,44 @@ _MOST = 25.0
 class Groups:
     """Rows that live and die together: those of a drive, and those of a measuring pair.
 
-    ``members`` (n_groups, n_meas) 0 or 1, drives first; ``limit`` (n_groups,) the sum of squared
-    deviations under which a group is dead, 0 where that cannot be told.
+    Attributes
+    ----------
+    shares
+        (n_groups, n_meas): averages over the rows of a group that live at rest; drives first.
+    dead_below
+        (n_groups,) part of these that must live; 0 where a group cannot be told.
+    limit
+        (n_meas,) V under which a row does not live: noise, or what leaks.
+    n_drives, pairs
+        How many groups are drives, and the (n_pairs, 2) electrodes of the others.
     """
 
-    members: FloatArray
+    shares: FloatArray
+    dead_below: FloatArray
     limit: FloatArray
     n_drives: int
     pairs: IntArray
 
     @classmethod
     def of(cls, pattern: Pattern, rest: FloatArray, noise: FloatArray, usable: Mask) -> Groups:
-        """Groups of a skin that reads ``rest`` V with ``noise`` V while untouched.
-
-        A dead group's sum is chi-squared with as many degrees as rows, plus what leaks: its
-        limit is the mean and :data:`SIGMAS` deviations, in the normal limit.
-        """
+        """Groups of a skin that reads ``rest`` V with ``noise`` V while untouched."""
         drives = pattern.drive_index == np.arange(pattern.n_drive)[:, None]
-        ends = np.sort(pattern.measure, axis=1)
-        pairs, which = np.unique(ends, axis=0, return_inverse=True)
+        pairs, which = np.unique(np.sort(pattern.measure, axis=1), axis=0, return_inverse=True)
         reads = which.reshape(-1) == np.arange(len(pairs))[:, None]
-        members = np.concatenate([drives, reads]) & usable
+        power = (drives @ rest**2) / np.maximum(drives.sum(axis=1), 1)
+        limit = np.hypot(SIGMAS * noise, _LEAK * np.sqrt(power)[pattern.drive_index])
+        lives = usable & (np.abs(rest) > 2.0 * limit)
+        members = np.concatenate([drives, reads]) & lives
         count = members.sum(axis=1)
-        power = members @ (rest / noise) ** 2
-        limit = count + SIGMAS * np.sqrt(2.0 * count) + _LEAK**2 * power
-        limit[(power < _SIGNAL * limit) | (count < 3)] = 0.0
-        return cls(members.astype(float), limit, pattern.n_drive, pairs)
+        dead_below = np.repeat([_DEAD_DRIVE, _DEAD_PAIR], [len(drives), len(reads)])
+        dead_below[count < _FEWEST] = 0.0
+        shares = members / np.maximum(count, 1)[:, None]
+        return cls(shares, dead_below, limit, pattern.n_drive, pairs)
 
-    def dead(self, squared: FloatArray) -> Mask:
-        """(n_groups,) from (n_meas,) squared deviations of the voltages from zero."""
-        return np.asarray(self.members @ squared < self.limit)
+    def dead(self, values: FloatArray, railed: Mask) -> Mask:
+        """(n_groups,) from (n_meas,) V; a row at a rail is not silent."""
+        lives = (np.abs(values) > self.limit) | railed
+        return np.asarray(self.shares @ lives.astype(float) < self.dead_below)
 
 
 def sign_limit(

@@ -87,7 +87,6 @@ class Monitor:
         order = np.arange(n) if rank is None else rank
         self._sign, limit = sign_limit(pattern, reference.mean, noise, order)
         self._limit = np.where(usable, limit, np.inf)
-        self._inverse = 1.0 / noise
         self._start, self._silent = reference.mean, self._unusable
         self._reciprocity = Reciprocity.of(pattern)
         self._deviation = self._reciprocity.deviation(noise)
@@ -121,7 +120,7 @@ class Monitor:
         """Health of the frame with ``values`` (n_meas,) V, ``railed`` rows and ``samples``."""
         off = railed | self._unusable
         bad = off | (self._sign * values < -self._limit)
-        dead = self._groups.dead((values * self._inverse) ** 2)
+        dead = self._groups.dead(values, off)
         loud = self._loud(values, off)
         stuck = self._stuck(samples)
         if not (self._sick or loud or stuck or bad.any() or dead.any()):
@@ -281,7 +280,7 @@ def _silent(
         return np.zeros(len(model), bool)
     scale = float(np.median(np.abs(rest[usable] / model[usable])))
     groups = Groups.of(pattern, scale * model, noise, usable)
-    dead = groups.dead((rest / noise) ** 2)[: groups.n_drives]
+    dead = groups.dead(rest, unusable)[: groups.n_drives]
     return np.asarray(dead[pattern.drive_index])
 
 

@@ -15,10 +15,6 @@ _ALL = 0.9
 """An electrode explains bad rows when at least this part of its own are bad: the rest may look
 well by chance."""
 
-_SOME = 0.35
-"""Part of its readings that must be bad before an electrode that does not drive is called open:
-a floating input lies between its neighbours' potentials once in a while."""
-
 Mask = NDArray[np.bool_]
 
 
@@ -67,10 +63,8 @@ class Roles:
         driven, read = _share(self.drives, bad), _share(self.reads, bad)
         offers = {}
         for electrode in np.flatnonzero((driven >= _ALL) | (read >= _ALL)).tolist():
-            if driven[electrode] >= _ALL and (read[electrode] >= _SOME):
-                offers[electrode] = ("open", self.rows(electrode, "open"))
-            elif read[electrode] >= _ALL:
-                offers[electrode] = ("railed", self.rows(electrode, "railed"))
+            state = "open" if driven[electrode] >= _ALL else "railed"
+            offers[electrode] = (state, self.rows(electrode, state))
         return offers
 
 
