@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -22,6 +23,35 @@ _SETTLED = 0.02
 _LEAST_DAMPING = 1e-6
 
 
+_DIRECTED = 0.7
+"""Standard deviation of a spot's direction (:meth:`Spots.directed`) about none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Weigh:
+    """Unknown amplitudes along some directions D, left out by integration.
+
+    Data then have the covariance 1 + DDᵀ; the inverse of its root is 1 − U(1 − 1/√(1 + s²))Uᵀ
+    with the singular vectors U and values s of D.
+    """
+
+    vectors: FloatArray
+    less: FloatArray
+    log_size: float
+
+    @classmethod
+    def of(cls, directions: FloatArray) -> Self:
+        """Of (r, k) directions, each as long as its amplitude's deviation."""
+        vectors, sizes, _ = np.linalg.svd(directions, full_matrices=False)
+        return cls(vectors, 1 - 1 / np.sqrt(1 + sizes**2), float(np.log1p(sizes**2).sum() / 2))
+
+    def __call__(self, whitened: FloatArray) -> FloatArray:
+        """(r, …) data, weighed."""
+        part = self.vectors.T @ whitened
+        part = self.less * part if part.ndim == 1 else self.less[:, None] * part
+        return np.asarray(whitened - self.vectors @ part)
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Spots that explain a frame.
@@ -30,10 +60,14 @@ class Fit:
     ----------
     spots
         (k, 4), see :mod:`tomoskin.touch.fit.spot`.
+    seen
+        (r,) what the spots do to the whitened data.
     residual
-        (r,) whitened data less the model.
+        (r,) whitened data less that, weighed for directions that are not known.
     jacobian
-        (r, 4k) of the whitened model.
+        (r, 4k) of the whitened model, weighed alike.
+    weigh
+        What does that.
     normal
         (4k, 4k) inverse of the covariance: JᵀJ and the prior.
     cost
@@ -43,8 +77,10 @@ class Fit:
     """
 
     spots: FloatArray
+    seen: FloatArray
     residual: FloatArray
     jacobian: FloatArray
+    weigh: Weigh
     normal: FloatArray
     cost: float
     settled: bool = True
@@ -74,7 +110,8 @@ class Fit:
         n = len(self.normal)
         sign, log_det = np.linalg.slogdet(self.normal) if n else (1.0, 0.0)
         volume = (n * math.log(2 * math.pi) - log_det) / 2 if sign > 0 else -np.inf
-        return -self.misfit / 2 + prior.log_density(self.spots) + volume
+        known = -self.misfit / 2 - self.weigh.log_size
+        return known + prior.log_density(self.spots) + volume
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,18 +131,20 @@ class Problem:
     def nothing(self) -> Fit:
         """The frame with no spot at all."""
         none = np.zeros((0, N_PARAMETERS))
+        slopes = np.zeros((len(self.data), 0))
         cost = float(self.data @ self.data) / 2
-        return Fit(none, self.data, np.zeros((len(self.data), 0)), np.zeros((0, 0)), cost)
+        weigh = Weigh.of(slopes)
+        return Fit(none, 0 * self.data, self.data, slopes, weigh, np.zeros((0, 0)), cost)
 
     def at(self, spots: FloatArray) -> Fit:
         """The frame with these spots, as they are."""
-        change, jacobian = self.response.jacobian(spots)
-        residual = self.data - self.whiten(change)
-        slope = self.whiten(jacobian.T).T
+        change, jacobian, directed = self.response.expanded(spots)
+        seen, weigh = self.whiten(change), Weigh.of(_DIRECTED * self.whiten(directed.T).T)
+        residual, slope = weigh(self.data - seen), weigh(self.whiten(jacobian.T).T)
         away, weights = self.prior.away(spots), np.tile(self.prior.weights, len(spots))
         normal = slope.T @ slope + np.diag(weights**2)
         cost = (residual @ residual + float((away**2).sum())) / 2
-        return Fit(spots, residual, slope, normal, float(cost))
+        return Fit(spots, seen, residual, slope, weigh, normal, float(cost))
 
     def refined(self, spots: FloatArray, most: int) -> Fit:
         """The minimum of the cost near ``spots`` (k, 4), after at most so many steps.

@@ -117,8 +117,8 @@ class Search:
 
     def _threshold(self, fit: Fit, part: float) -> float:
         """What a wrong profile may leave adds to the noise."""
-        seen = np.linalg.norm(self.problem.data - fit.residual) if len(fit.spots) else 0.0
-        return part * self.least * float(np.hypot(1.0, _MISSHAPEN * seen / self.least))
+        left = _MISSHAPEN * float(np.linalg.norm(fit.seen))
+        return part * self.least * float(np.hypot(1.0, left / self.least))
 
     def _standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
         return self.matched.ratios(fit.residual, fit.jacobian, self.problem.sign)
@@ -143,11 +143,10 @@ class Search:
     def _ratios(self, fit: Fit) -> FloatArray:
         """(k,) size of what each spot changes that the others could not take up."""
         k = len(fit.spots)
-        whole = self.problem.data - fit.residual
         if k == 1:
-            return np.array([np.linalg.norm(whole)])
+            return np.array([np.linalg.norm(fit.seen)])
         others = [np.delete(fit.spots, number, axis=0) for number in range(k)]
-        alone = whole - self.problem.whiten(self.problem.response.changes(others))
+        alone = fit.seen - self.problem.whiten(self.problem.response.changes(others))
         for number in range(k):
             slope = np.delete(fit.jacobian, np.s_[4 * number : 4 * number + 4], axis=1)
             basis, _ = np.linalg.qr(slope)
@@ -169,9 +168,9 @@ class Search:
         that is not fitted but considered (Schmidt 1966).
         """
         problem, scatter = self.problem, max(1.0, fit.misfit / fit.degrees)
-        seen = problem.data - fit.residual
         other = problem.whiten(problem.response.changes([fit.spots], bell)[0])
-        moved = _SHAPE_DOUBT * (fit.covariance @ (fit.jacobian.T @ (other - seen)))
+        wrong = fit.weigh(other - fit.seen)
+        moved = _SHAPE_DOUBT * (fit.covariance @ (fit.jacobian.T @ wrong))
         return np.asarray(scatter * fit.covariance + np.outer(moved, moved))
 
     def _close(self, fit: Fit) -> NDArray[np.bool_]:

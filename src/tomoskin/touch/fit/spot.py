@@ -144,6 +144,21 @@ class Spots:
         more = mean * (REACH**2 / FILLING / reach**2)
         return depth * mean, np.stack([*towards, wider, more])
 
+    def directed(self, spot: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Cells (c,) of one spot, and (3, c) xx, xy, yy of a part of log σ that has a direction.
+
+        A stretched sheet conducts otherwise along the stretch than across. Round a press that is
+        depth · r|dg/dr|/2 · (r̂r̂ᵀ − 1/2): none in the middle, most on the flank.
+        """
+        cells = self._near(spot)
+        square, offset = self._squares(spot, cells)
+        _, fall = _with_steepness(square)
+        weight = -float(depth_of(spot)) * square * fall
+        away = np.maximum(np.einsum("cqd,cqd->cq", offset, offset), 1e-30)
+        x, y = offset[..., 0], offset[..., 1]
+        xx, xy = (weight * (x * x / away - 0.5)).mean(axis=1), (weight * x * y / away).mean(axis=1)
+        return cells, np.stack([xx, xy, -xx])
+
     def _squares(self, spot: FloatArray, cells: IntArray) -> tuple[FloatArray, FloatArray]:
         """(c, q) squared distances in reaches of the points of cells, and (c, q, 2) offsets, m."""
         offset = self._points[cells] - spot[:2]
@@ -191,13 +206,37 @@ class Response:
 
         The fields of the pressed sheet give both, by reciprocity, whatever the number of spots.
         """
+        pressed, slopes = self._pressed_state(spots)
+        return pressed.voltages - self.reference, slopes
+
+    def expanded(self, spots: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """As :meth:`jacobian`, and (n_meas, k) V: derivatives by a direction of each spot.
+
+        See :meth:`Spots.directed`.
+        """
+        pressed, slopes = self._pressed_state(spots)
+        towards = np.stack([self._directed(pressed, spot) for spot in spots], axis=1)
+        return pressed.voltages - self.reference, slopes, towards
+
+    def _pressed_state(self, spots: FloatArray) -> tuple[State, FloatArray]:
+        """The sheet under spots, and (n_meas, 4k) derivatives."""
         cells, change, slopes = self.spots.slopes(spots)
         _, sigma = self._pressed(cells, change)
         whole = self.state.conductivity.copy()
         whole[cells] = sigma
         pressed = self.state.model.at(whole)
         by_cell = pressed.jacobian.take(cells, axis=1)
-        return pressed.voltages - self.reference, by_cell @ (slopes * sigma).T
+        return pressed, by_cell @ (slopes * sigma).T
+
+    def _directed(self, pressed: State, spot: FloatArray) -> FloatArray:
+        """(n_meas,) V: −∫ ∇u · δσ ∇w for a change δσ that has a direction."""
+        cells, (xx, xy, yy) = self.spots.directed(spot)
+        field = pressed.gradient[:, :, cells]
+        sigma = pressed.conductivity[cells]
+        x, y = field[:, 0] * sigma, field[:, 1] * sigma
+        flow = np.concatenate([x * xx + y * xy, x * xy + y * yy], axis=1)
+        moved = flow @ field.reshape(len(field), -1).T
+        return np.asarray(-pressed.model.voltages(moved))
 
     def each(self, spots: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
         """:meth:`jacobian` of each of ``spots`` (n, 4), alone on the sheet."""
