@@ -33,9 +33,12 @@ def locate(
         str | None, typer.Option(help="Built-in name or path: refused unless calibrated on it.")
     ] = None,
     reference: ReferenceOption = None,
+    several: Annotated[
+        bool, typer.Option("--several", help="Two touches where the frame shows them; slower.")
+    ] = False,
     json: JsonFlag = False,
 ) -> None:
-    """Locate the one touch in every frame by a calibration."""
+    """Locate the one touch in every frame by a calibration, or with --several up to two."""
     from tomoskin.cli.labelled import changes
     from tomoskin.session import read_calibration, read_recording, write_touches
 
@@ -53,10 +56,10 @@ def locate(
             "and were left out",
             err=True,
         )
-    found = list(_touches(known, dv[frames]))
+    found = list((_several if several else _single)(known, dv[frames]))
     if touches is not None:
         rows = zip(frames.tolist(), found, strict=True)
-        write_touches(touches, ((k, float(whole.time[k]), (t,)) for k, t in rows))
+        write_touches(touches, ((k, float(whole.time[k]), t) for k, t in rows))
     _report(whole, frames.tolist(), found, json=json)
 
 
@@ -68,7 +71,19 @@ def _check_skin(known: Calibration, name: str | None, path: Path) -> None:
         known.locator.check(skin=skin_for_file(name, path))
 
 
-def _touches(known: Calibration, dv: FloatArray) -> Iterator[Touch]:
+def _several(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
+    from tomoskin.core import Touch
+    from tomoskin.touch import Several
+
+    both = Several.of(known.locator)
+    with Bar("locating") as bar:
+        for number, frame in enumerate(dv):
+            bar(number, len(dv))
+            (readings,) = both(frame)
+            yield tuple(Touch(k, "touch", 0.0, reading) for k, reading in enumerate(readings, 1))
+
+
+def _single(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
     from tomoskin.core import Reading, Touch
 
     locator = known.locator
@@ -81,10 +96,13 @@ def _touches(known: Calibration, dv: FloatArray) -> Iterator[Touch]:
             (x, y), (sd_x, sd_y) = place.tolist(), sd.tolist()
             nothing = np.empty(0, dtype=np.int64)
             reading = Reading(x, y, sd_x, sd_y, area=np.nan, peak=float(peak), cells=nothing)
-            yield Touch(id=1, kind="touch", since=0.0, reading=reading)
+            yield (Touch(id=1, kind="touch", since=0.0, reading=reading),)
 
 
-def _report(whole: Recording, frames: list[int], found: list[Touch], *, json: bool) -> None:
+def _report(
+    whole: Recording, frames: list[int], found: list[tuple[Touch, ...]], *, json: bool
+) -> None:
+    rows = [(frame, touch) for frame, some in zip(frames, found, strict=True) for touch in some]
     if json:
         emit(
             [
@@ -96,16 +114,18 @@ def _report(whole: Recording, frames: list[int], found: list[Touch], *, json: bo
                     "sd_x_m": touch.reading.sd_x,
                     "sd_y_m": touch.reading.sd_y,
                     "strength": touch.reading.peak,
+                    "kind": touch.said,
                 }
-                for frame, touch in zip(frames, found, strict=True)
+                for frame, touch in rows
             ]
         )
         return
-    for frame, touch in list(zip(frames, found, strict=True))[:_SHOWN]:
+    for frame, touch in rows[:_SHOWN]:
         r = touch.reading
+        close = "" if touch.said == touch.kind else f"  {touch.said}"
         typer.echo(
             f"frame {frame:>4}  x {1e3 * r.x:+7.1f} ± {1e3 * r.sd_x:4.1f} mm  "
-            f"y {1e3 * r.y:+7.1f} ± {1e3 * r.sd_y:4.1f} mm  strength {r.peak:.2f}"
+            f"y {1e3 * r.y:+7.1f} ± {1e3 * r.sd_y:4.1f} mm  strength {r.peak:.2f}{close}"
         )
-    if len(found) > _SHOWN:
-        typer.echo(f"… and {len(found) - _SHOWN} frames more: --touches writes them all")
+    if len(rows) > _SHOWN:
+        typer.echo(f"… and {len(rows) - _SHOWN} more: --touches writes them all")

@@ -5,6 +5,7 @@ from tomoskin.touch.floor import NoiseFloor
 from tomoskin.touch.locator import Locator, Presses, Region
 from tomoskin.touch.segment import Segmenter
 from tomoskin.touch.states import Answers, Codes, Examples, StateClassifier, against_rest
+from tomoskin.touch.several import Several
 from tomoskin.touch.tracking import STILL, TouchEvent, Tracker, TrackSettings
 from tomoskin.touch.wiring import Wiring, WiringAnswer, ring_of, solve_wiring
 
@@ -20,6 +21,7 @@ __all__ = [
     "Promise",
     "Region",
     "Segmenter",
+    "Several",
     "StateClassifier",
     "TouchEvent",
     "TrackSettings",
