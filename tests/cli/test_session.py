@@ -124,3 +124,23 @@ def test_import_keeps_what_is_whole_and_lists_the_rest(tomoskin, data_dir, tmp_p
     assert "lines left out, parts of torn frames" in errors
     assert len(read_recording(tmp_path / "log.npz")) == 145
     assert tomoskin("session", "import", log, tmp_path / "log.doc")[0] == 2
+
+
+def test_recording_a_replay_ends_with_it(tomoskin, recorded, tmp_path):
+    copy = tmp_path / "copy.mcap"
+    code, out, err = tomoskin("record", copy, "--source", f"replay:{recorded}@max", "--json")
+    assert code == 0, err
+    code, told, _ = tomoskin("session", "info", recorded, "--json")
+    assert json.loads(out)["frames"] == json.loads(told)["frames"]
+    assert "Ctrl-C" not in err
+
+
+def test_what_is_written_is_said(tomoskin, recorded, tmp_path):
+    table = tmp_path / "x.csv"
+    code, out, _ = tomoskin("session", "export", recorded, table)
+    assert code == 0
+    assert out.startswith(f"{table}: ")
+    code, _, err = tomoskin("session", "info", table)
+    assert (code, "session import" in err) == (1, True)
+    code, _, err = tomoskin("session", "export", recorded, tmp_path / "none" / "x.csv")
+    assert (code, "make the folder first" in err) == (1, True)

@@ -18,7 +18,7 @@ from tomoskin.cli.skin_choice import SkinOption, skin_for_source
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from tomoskin.live import Runner
+    from tomoskin.live import Runner, Status
 
 _OFTEN = 0.1
 
@@ -28,7 +28,8 @@ def record(
     skin: SkinOption = None,
     source: Annotated[str, typer.Option(help="twin, serial:PORT, replay:FILE, …")] = "twin",
     seconds: Annotated[
-        float | None, typer.Option(min=0.0, help="How long; without it until Ctrl-C.")
+        float | None,
+        typer.Option(min=0.0, help="How long; else until Ctrl-C or a replay's end."),
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="How many frames.")] = None,
     sink: SinkOption = None,
@@ -42,6 +43,8 @@ def record(
     chosen = skin_for_source(skin, source)
     runner = room.Runner(room.prepare(chosen), lambda: open_source(source, chosen), sinks=sinks)
     with ended_by_signals(), recording_to(runner, file):
+        if seconds is None and frames is None and not json:
+            typer.echo(f"{runner.source} is recorded to {file} until Ctrl-C", err=True)
         _wait(runner, seconds, frames)
         if (problem := _problem(runner)) is not None:
             raise DataError(problem)
@@ -67,13 +70,12 @@ def recording_to(runner: Runner, file: Path | None) -> Iterator[None]:
 
 
 def _wait(runner: Runner, seconds: float | None, frames: int | None) -> None:
-    """Until there is enough, the recording has ended by itself, or a signal comes."""
+    """Until there is enough, a replay or the recording has ended by itself, or a signal comes."""
     nothing = threading.Event()
     elapsed = 0.0
     with Bar("recording") as bar:
-        while runner.status().recording is not None:
-            done = runner.status().frames
-            shares = [(elapsed, seconds), (done, frames)]
+        while (status := runner.status()).recording is not None:
+            shares = [(elapsed, seconds), (status.frames, frames), *_played(status)]
             known = [(part, whole) for part, whole in shares if whole is not None]
             for part, whole in known:
                 if part >= whole:
@@ -82,6 +84,15 @@ def _wait(runner: Runner, seconds: float | None, frames: int | None) -> None:
                 bar(part, whole)
             nothing.wait(_OFTEN if seconds is None else min(_OFTEN, seconds - elapsed))
             elapsed += _OFTEN
+
+
+def _played(status: Status) -> list[tuple[float, float | None]]:
+    """How far a replay is; one that begins again at its end has none."""
+    replay = status.replay
+    if replay is None or replay.loop:
+        return []
+    reached = replay.end_s if replay.ended else min(replay.now_s, 0.99 * replay.end_s)
+    return [(reached, replay.end_s)]
 
 
 def _problem(runner: Runner) -> str | None:

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="Inspect, mend and convert recorded sessions.", no_args_is_help=True)
 
+_A_YEAR = 3.15e7
+"""Log times of less are seconds of a clock that began with the machine, not of the day."""
+
 _File = Annotated[Path, typer.Argument(metavar="FILE", help="A session, such as run.mcap.")]
 
 
@@ -96,6 +99,9 @@ def export(
             write_touches(touches, ((t.sequence, t.host_time, t.touches) for t in found))
         if session.torn:
             typer.echo(f"tomoskin: {file}: {session.torn}", err=True)
+    for path in filter(None, (out, touches)):
+        if path.is_file():
+            typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
 
 
 @app.command("import")
@@ -152,6 +158,14 @@ def _losses(found: Repaired) -> list[str]:
 
 def _loss(lost: Lost) -> str:
     size = lost.stop - lost.start
-    when = f"after {lost.after / 1e9:.3f} s" if lost.after else "at the beginning"
-    until = f", before {lost.before / 1e9:.3f} s" if lost.before is not None else ""
-    return f"lost: {size} bytes from byte {lost.start} on, {when}{until} of the log"
+    when = f"after {_moment(lost.after)}" if lost.after else "at the beginning"
+    until = f", before {_moment(lost.before)}" if lost.before is not None else ""
+    return f"lost: {size} bytes from byte {lost.start} on, {when}{until}"
+
+
+def _moment(log_time: int) -> str:
+    """Time of day, or s where the file does not know the day."""
+    seconds = log_time / 1e9
+    if seconds < _A_YEAR:
+        return f"{seconds:.3f} s"
+    return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%d %H:%M:%S.%f}"[:-3] + " UTC"

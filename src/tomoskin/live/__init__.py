@@ -29,6 +29,7 @@ from tomoskin.live.server import (
     listen,
 )
 from tomoskin.live.simulate import Simulated, simulate
+from tomoskin.live.status import Status
 
 __all__ = [
     "DEFAULT_PORT",
@@ -48,6 +49,7 @@ __all__ = [
     "SetMade",
     "Simulated",
     "Snapshot",
+    "Status",
     "Workers",
     "advance",
     "application",

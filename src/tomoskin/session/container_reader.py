@@ -153,7 +153,11 @@ class ContainerReader:
 
     def _start(self) -> None:
         if self._read(0, len(mcap.MAGIC)) != mcap.MAGIC:
-            raise DataError("is not an MCAP file", where=self.where)
+            raise DataError(
+                "is not an MCAP file",
+                where=self.where,
+                hint="recordings of other programs: tomoskin session import",
+            )
         self._groups: dict[int, tuple[int, int]] = {}
         self._summary_start = 0
         self._end = self.size

@@ -204,7 +204,9 @@ def said_of(path: Path) -> Iterator[None]:
         raise DataError(
             f"cannot be read or written: {error.strerror or error}",
             where=str(path),
-            hint="look at the disk",
+            hint="make the folder first"
+            if isinstance(error, FileNotFoundError)
+            else "look at the disk",
         ) from error
 
 
