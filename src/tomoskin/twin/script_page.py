@@ -14,8 +14,8 @@ pressed where and how hard. `tomoskin image my.mcap` reconstructs it, `tomoskin 
 replay:my.mcap` plays it. The same script, skin and `--seed` give the same bytes. Ctrl-C leaves a
 file that is readable up to there, with a note at its end that says so.
 
-What presses moves during a scan too, as on a bench: each drive sees the sheet as it is in the middle of
-that drive. The truth of a frame is that of the middle of its scan.
+What presses moves during a scan too, as on a bench: each drive sees the sheet as it is in the
+middle of that drive. The truth of a frame is that of the middle of its scan.
 
 The reference is what comes before the first press or fault, 20 frames of it at most: the file says
 so. With a shorter lead-in there are fewer, and each picture bears more of their noise. A replay
@@ -100,11 +100,12 @@ Shards are spread over the machine's processors (`--processes N`), or over machi
 Each shard has a seed of its own, so that the data do not depend on the number of workers. A command
 that was stopped goes on where it was when it is given again; a folder of another set is refused.
 
-Each process first imports the twin and solves the dents of the faces that it draws: 25 for the usual
-presses, 2.5 s of processor time. Then 500 frames of `textile-disc-8` take 0.8 s. So a second process
-pays from some ten thousand frames on: 4,000 took 8.6 s of processor time in one process, and 8.0 s in
-each of two (seed 1; a machine of two cores that others kept busy, where by the clock 5,000 frames took
-44 s in one and 63 s in two: there was no second core to have). `tomoskin bench twin` measures both.
+Each process first imports the twin and solves the dents of the faces that it draws: 25 for the
+usual presses, 2.5 s of processor time. Then 500 frames of `textile-disc-8` take 0.8 s. 4,000 took
+8.6 s of processor time in one process, and 8.0 s in each of two (seed 1): a second one saves little
+below some ten thousand frames. By the clock, on two cores that others kept busy (load 10), 5,000
+took 44 s in one process and 63 s in two (the least of two runs each); a quiet machine was not to be
+had. `tomoskin bench twin` measures both.
 
 """
 
