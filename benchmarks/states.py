@@ -51,11 +51,9 @@ def readings(folder: Path, number: int, *, smooth: bool) -> Batch:
     instead of the one just before.
     """
     with np.load(folder / f"batch{number}.npz") as kept:
-        pairs = np.sort(np.stack([np.sort(kept["inj"]), np.sort(kept["meas"])], axis=1), axis=2)
-        code = pairs @ [8, 1]
-        _, group = np.unique(np.sort(code, axis=1), axis=0, return_inverse=True)
-        mean = np.zeros((len(group), group.max() + 1))
-        mean[np.arange(len(group)), group.ravel()] = 1 / np.bincount(group.ravel())[group.ravel()]
+        pairs = np.sort(np.stack([kept["inj"], kept["meas"]], axis=1), axis=2) @ [8, 1]
+        _, reading = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
+        mean = np.eye(reading.max() + 1)[reading.ravel()] / 8
         before, after = (kept[key].astype(float) @ mean for key in ("rms_before", "rms_after"))
         change = against_rest(after, before) if smooth else after - before
         return change, kept["pressed"].astype(float)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -192,3 +193,26 @@ def test_what_does_not_belong_together_is_refused() -> None:
     fitted.check(pattern.identity, "mine")
     with pytest.raises(DataError, match="of skin mine"):
         fitted.check(skin_id="another")
+
+
+@pytest.mark.data
+@pytest.mark.parametrize(("old", "new"), [(1, 2), (2, 1)])
+def test_six_points_on_another_day(data_dir: Path, old: int, new: int) -> None:
+    """All six flags of a public membrane, another day and depth, without a label of that day."""
+    (learnt, flags), (asked, truth) = (six_points(data_dir, number) for number in (old, new))
+    known = StateClassifier.fit(learnt, flags)
+    assert hit(known.predict(asked).flags, truth) < 0.6
+    answers = known.in_session(asked).predict(asked)
+    assert hit(answers.flags, truth) > 0.85
+    assert abs(answers.probability.mean() - hit(answers.flags, truth)) < 0.06
+    assert answers.rejected.mean() < 0.03
+
+
+def six_points(data_dir: Path, number: int) -> tuple[FloatArray, FloatArray]:
+    """Changes (n, 210): the eight rows that a reading stands in are averaged."""
+    with np.load(data_dir / "eskin_membrane8_sixpoint" / f"batch{number}.npz") as kept:
+        pairs = np.sort(np.stack([kept["inj"], kept["meas"]], axis=1), axis=2) @ [8, 1]
+        _, reading = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
+        mean = np.eye(reading.max() + 1)[reading.ravel()] / 8
+        before, after = (kept[key].astype(float) @ mean for key in ("rms_before", "rms_after"))
+        return against_rest(after, before), kept["pressed"].astype(float)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tomoskin.core import DataError, FloatArray
+from tomoskin.pattern import match_rows
 from tomoskin.skin import Skin
 from tomoskin.touch import Wiring, ring_of, solve_wiring
 from tomoskin.twin import COMMON_PRESSES, SetPlan, make_shard
@@ -150,3 +152,33 @@ def test_what_cannot_be_is_refused() -> None:
         solve_wiring(np.zeros((3, 40)), xy, SKIN)
     with pytest.raises(DataError, match="xy of shape"):
         solve_wiring(dv, xy[:2], SKIN)
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("steps", [0, 5])
+def test_a_public_skin_is_oriented(data_dir: Path, steps: int) -> None:
+    """Within one electrode of what the set's notes state, which is fitted to a few degrees."""
+    place = {"count": 16, "first": "-99 deg", "order": "counter-clockwise", "width": "5 mm"}
+    skin = Skin.load("tank-16").altered(
+        {
+            "outline": {"shape": "disc", "diameter": "170 mm"},
+            "electrodes": place | {"positions": None},
+            "drive": {"pattern": "opposite"},
+            "mesh": {"cells": 1000},
+            "touch": {"sign": "both"},
+        }
+    )
+    with np.load(data_dir / "eskin_hydrogel_round" / "round16_single550.npz") as kept:
+        half = len(kept["inj"]) // 2  # each drive stands twice
+        match = match_rows(skin.pattern(), kept["inj"][:half], kept["meas"][:half])
+        dv = match.apply((kept["v_down"].astype(float) - kept["v_up"])[:, :half])
+        xy = 1e-3 * kept["xy_mm"].astype(float)
+    chosen = np.random.default_rng(0).permutation(len(dv))[:15]
+    turned = Wiring.as_drawn(16).turned(ring_of(skin), steps, mirrored=True).applied(skin)
+    found = solve_wiring(dv[chosen], xy[chosen], turned)
+    assert found.sure
+    centres = found.wiring.applied(turned).electrode_centres
+    apart = np.linalg.norm(centres - skin.electrode_centres, axis=1)
+    assert (
+        apart < 1.1 * np.linalg.norm(skin.electrode_centres[0] - skin.electrode_centres[1])
+    ).all()

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from tomoskin.skin import Skin
     from tomoskin.touch import Examples
 
+_HARDLY = 0.5
+
 
 def calibrate_states(
     recording: Annotated[
@@ -114,5 +116,7 @@ def _report(made: StatesCalibration, n_frames: int, fitted: bool, *, json: bool)
     typer.echo(f"{len(codes.names)} {kind}: {', '.join(codes.names)}")
     told = f"{100 * classifier.right:.0f} % of the labelled frames"
     typer.echo(f"{known} of {n_frames} frames labelled; left out of the learning, {told} are right")
+    if classifier.right < _HARDLY:
+        typer.echo("the labels hardly follow from the data: are they of these frames?")
     if fitted and known < n_frames:
         typer.echo(f"fitted to this session by {n_frames - known} frames without a label")
