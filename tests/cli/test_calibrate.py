@@ -57,7 +57,7 @@ def test_what_is_learnt_is_used(tomoskin, tmp_path, presses, touched):
         "locate", path, "--calibration", calibration, "--touches", table, "--skin", SKIN
     )
     assert (code, err) == (0, "")
-    assert "10 frames more" in out
+    assert "10 touches more" in out
     with table.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     told = np.array([[float(row["x_m"]), float(row["y_m"])] for row in rows])

@@ -128,4 +128,4 @@ def _report(
             f"y {1e3 * r.y:+7.1f} ± {1e3 * r.sd_y:4.1f} mm  strength {r.peak:.2f}{close}"
         )
     if len(rows) > _SHOWN:
-        typer.echo(f"… and {len(rows) - _SHOWN} more: --touches writes them all")
+        typer.echo(f"… and {len(rows) - _SHOWN} touches more: --touches writes them all")

@@ -175,7 +175,7 @@ class Several:
     def _stronger(self) -> NDArray[np.float32]:
         """(g · gains, k) changes of touches of every strength."""
         rows = self.changes[:, None] * _GAINS[:, None]
-        return rows.reshape(-1, self.changes.shape[1]).astype(np.float32)
+        return np.asarray(rows.reshape(-1, self.changes.shape[1]), dtype=np.float32)
 
     @cached_property
     def _alone(self) -> NDArray[np.float32]:
