@@ -115,3 +115,15 @@ def test_complex_values_keep_their_phase() -> None:
     pattern = Pattern.adjacent(4)
     match = match_rows(pattern, pattern.drive[:, ::-1], pattern.measure)
     assert match.apply(np.full(4, 1j)).tolist() == [-1j] * 4
+
+
+def test_rows_that_drive_a_pair_from_both_ends_stay_themselves() -> None:
+    """Their data need not be each other's negative: an instrument may read the signs unlike."""
+    drive, measure = np.array([[0, 2], [2, 0]]), np.array([[1, 3], [1, 3]])
+    both = Pattern.from_tables(drive, measure)
+    match = match_rows(both, drive[::-1], measure)
+    np.testing.assert_array_equal(match.apply(np.array([5.0, 7.0])), [7.0, 5.0])
+    once = Pattern.from_tables(drive[:1], measure[:1, ::-1])
+    np.testing.assert_array_equal(
+        match_rows(once, drive, measure).apply(np.array([5.0, 7.0])), [-5.0]
+    )

@@ -193,9 +193,9 @@ def test_refused_rows_are_named(change: dict[str, Any], where: str, message: str
     assert caught.value.where == where
 
 
-@pytest.mark.parametrize("flip", [(1, 1), (-1, 1), (1, -1), (-1, -1)])
-def test_a_row_that_stands_twice_is_named(flip: tuple[int, int]) -> None:
-    drive, measure = [[1, 0], [2, 1], [1, 0][:: flip[0]]], [[2, 3], [3, 0], [2, 3][:: flip[1]]]
+@pytest.mark.parametrize("flip", [1, -1])
+def test_a_row_that_stands_twice_is_named(flip: int) -> None:
+    drive, measure = [[1, 0], [2, 1], [1, 0]], [[2, 3], [3, 0], [2, 3][::flip]]
     with pytest.raises(PatternError, match="rows 0 and 2 measure the same pair"):
         Pattern.from_tables(drive, measure)
 

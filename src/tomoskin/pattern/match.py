@@ -36,7 +36,7 @@ def match_rows(pattern: Pattern, drive: ArrayLike, measure: ArrayLike) -> RowMat
 
     A row is found as it stands, with a pair reversed (sign changes), or as its reciprocal,
     drive and measuring pair exchanged (Geselowitz 1971). A row that stands as itself wins over
-    its reciprocal.
+    one that is reversed, and that over its reciprocal; of rows that are alike the first is taken.
 
     Raises
     ------
@@ -47,7 +47,8 @@ def match_rows(pattern: Pattern, drive: ArrayLike, measure: ArrayLike) -> RowMat
     table: dict[tuple[int, ...], tuple[int, float]] = {}
     for row, (d, m) in enumerate(_rows(foreign)):
         key, sign = _canonical(d, m)
-        table[key] = (row, sign)
+        table.setdefault(key, (row, sign))
+        table.setdefault(_as_it_stands(d, m), (row, 1.0))
     found = [_find(table, d, m) for d, m in _rows(pattern)]
     missing = [row for row, hit in enumerate(found) if hit is None]
     if missing:
@@ -67,9 +68,16 @@ def _canonical(d: list[int], m: list[int]) -> tuple[tuple[int, ...], float]:
     return (min(d), max(d), min(m), max(m)), sign
 
 
+def _as_it_stands(d: list[int], m: list[int]) -> tuple[int, ...]:
+    return (-1, *d, *m)
+
+
 def _find(
     table: dict[tuple[int, ...], tuple[int, float]], d: list[int], m: list[int]
 ) -> tuple[int, float] | None:
+    itself = table.get(_as_it_stands(d, m))
+    if itself is not None:
+        return itself
     key, sign = _canonical(d, m)
     hit = table.get(key) or table.get(key[2:] + key[:2])
     return None if hit is None else (hit[0], hit[1] * sign)

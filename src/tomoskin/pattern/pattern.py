@@ -250,7 +250,8 @@ def _undirected(drive: IntArray, measure: IntArray) -> IntArray:
 
 
 def _check_unique(pattern: Pattern) -> None:
-    rows = _undirected(pattern.drive, pattern.measure)
+    # Driven from its other end, a pair is another drive: instruments read the signs unlike.
+    rows = np.hstack([pattern.drive, np.sort(pattern.measure, axis=1)])
     _, inverse, counts = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
     if counts.max() > 1:
         twice = np.flatnonzero(inverse.reshape(-1) == np.argmax(counts))[:2].tolist()

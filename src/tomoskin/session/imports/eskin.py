@@ -7,6 +7,9 @@ Values are in the instrument's units.
 
 The current enters at the second of ``inj``: so the untouched frames of the hydrogel and gelatine
 sets have the signs of a uniform disc (correlation 0.55 to 0.65), and the reverse otherwise.
+
+Every row is kept: those that drive a pair from its other end are no copies (their changes correlate
+by 0.1 to 0.2), since the instrument does not read both signs alike.
 """
 
 from __future__ import annotations
@@ -15,7 +18,6 @@ import numpy as np
 
 from tomoskin.core import DataError, FloatArray
 from tomoskin.session.archive import Arrays
-from tomoskin.session.imports.tables import without_repeats
 from tomoskin.session.interchange import electrode_table, real_numbers
 from tomoskin.session.recording import Recording, frame_times
 
@@ -46,17 +48,15 @@ def parse(arrays: Arrays, source: str) -> Recording:
     else:
         values = _frames(arrays, kind, n_rows, source)
     n = len(values)
-    return without_repeats(
-        Recording(
-            voltages=values,
-            drive=electrode_table(arrays, "inj", source)[:, ::-1],
-            measure=electrode_table(arrays, "meas", source),
-            time=real_numbers(arrays, "t_s", source) if "t_s" in arrays else frame_times(n),
-            reference=None,
-            labels=_labels(arrays, n, source),
-            is_change=kind != "v",
-            source=source,
-        )
+    return Recording(
+        voltages=values,
+        drive=electrode_table(arrays, "inj", source)[:, ::-1],
+        measure=electrode_table(arrays, "meas", source),
+        time=real_numbers(arrays, "t_s", source) if "t_s" in arrays else frame_times(n),
+        reference=None,
+        labels=_labels(arrays, n, source),
+        is_change=kind != "v",
+        source=source,
     )
 
 
