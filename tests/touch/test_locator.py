@@ -12,7 +12,7 @@ from tomoskin import Locator, Pattern, Skin
 from tomoskin.core import DataError
 from tomoskin.touch.locator.kernel import Basis, Likeness
 from tomoskin.touch.locator.maps import ResponseMaps
-from tomoskin.touch.locator.posterior import GridLikelihood, moments, tempered
+from tomoskin.touch.locator.posterior import GridLikelihood, moments, pooled
 
 RADIUS = 0.1
 ROWS = 40
@@ -80,7 +80,7 @@ def test_the_posterior_of_maps_of_known_noise_holds_what_it_says() -> None:
     grid = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     grid = grid[np.linalg.norm(grid, axis=1) < 1.0]
     log_likelihood = GridLikelihood.of(maps, grid)(features[300:])
-    mean, covariance = moments(tempered(log_likelihood, 1.0), grid)
+    mean, covariance = moments(pooled([log_likelihood], np.ones(1)), grid)
     assert held(mean - xy[300:], covariance) > 0.8
 
 

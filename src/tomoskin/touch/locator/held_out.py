@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -10,47 +11,75 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.locator.kernel import Likeness
+from tomoskin.touch.locator.lone import LoneLikelihood, LoneMaps
 from tomoskin.touch.locator.maps import ResponseMaps
-from tomoskin.touch.locator.posterior import GridLikelihood, moments, temperature_of, tempered
+from tomoskin.touch.locator.posterior import GridLikelihood, moments, pooled, powers_of
 
 _LENGTHS = (0.16, 0.22, 0.32, 0.45, 0.65)
 """Length scales of a response that are tried, in radii of the region."""
 
-_FOLDS = 5
+_FEW = 80
+"""So few presses are asked row by row too; with more, all rows together know better."""
+
+_FOLDS = (8, 5)
+"""In which presses are left out, when they are few and when they are many."""
+
+Likelihood = Callable[[FloatArray], FloatArray]
+"""Features (n, k) → log-likelihood (n, g) of the grid's places."""
 
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
     """Posterior mean and covariance of a place.
 
+    ``powers`` weigh the log-likelihoods of ``likelihood``, and of ``lone`` where there is one.
     ``left_out`` (n, 2) and ``left_out_spread`` (n, 2, 2) are those of the presses themselves,
-    each from maps learnt without its fifth of them.
+    each from maps learnt without it and some others.
     """
 
     grid: FloatArray
     likelihood: GridLikelihood
-    temperature: float
+    lone: LoneLikelihood | None
+    powers: FloatArray
     left_out: FloatArray
     left_out_spread: FloatArray
 
     @classmethod
     def of(cls, features: FloatArray, places: FloatArray, grid: FloatArray) -> Self:
-        """Learn the maps; the length scale by evidence, the temperature by left-out presses."""
-        tried = [ResponseMaps.of(Likeness(x), places, features) for x in _LENGTHS]
-        maps = max(tried, key=lambda m: m.evidence)
-        log_likelihood = np.empty((len(places), len(grid)))
-        fold = np.arange(len(places)) % _FOLDS
-        for k in range(_FOLDS):
-            out = fold == k
-            others = ResponseMaps.of(maps.basis.likeness, places[~out], features[~out])
-            log_likelihood[out] = GridLikelihood.of(others, grid)(features[out])
-        temperature = temperature_of(log_likelihood, grid, places)
-        left_out = moments(tempered(log_likelihood, temperature), grid)
-        return cls(grid, GridLikelihood.of(maps, grid), temperature, *left_out)
+        """Learn the maps; length scales by evidence, powers by left-out presses."""
+        maps = max(
+            (ResponseMaps.of(Likeness(x), places, features) for x in _LENGTHS),
+            key=lambda m: m.evidence,
+        )
+        together = maps.basis.likeness
+
+        def joint(some: FloatArray, theirs: FloatArray) -> GridLikelihood:
+            return GridLikelihood.of(ResponseMaps.of(together, some, theirs), grid)
+
+        parts = [_left_out(joint, places, features)]
+        alone = None
+        if len(places) < _FEW:
+            alone = max(
+                (LoneMaps.of(Likeness(x), places, features) for x in _LENGTHS),
+                key=lambda m: m.evidence,
+            )
+            apart = alone.likeness
+
+            def single(some: FloatArray, theirs: FloatArray) -> LoneLikelihood:
+                return LoneLikelihood.of(LoneMaps.of(apart, some, theirs), grid)
+
+            parts.append(_left_out(single, places, features))
+        powers = powers_of(parts, grid, places)
+        left_out = moments(pooled(parts, powers), grid)
+        lone = LoneLikelihood.of(alone, grid) if alone and powers[1] else None
+        return cls(grid, GridLikelihood.of(maps, grid), lone, powers, *left_out)
 
     def __call__(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean (n, 2) and covariance (n, 2, 2) for frames (n, k)."""
-        return moments(tempered(self.likelihood(features), self.temperature), self.grid)
+        parts = [self.likelihood(features)]
+        if self.lone is not None:
+            parts.append(self.lone(features))
+        return moments(pooled(parts, self.powers), self.grid)
 
     @cached_property
     def least_known(self) -> FloatArray:
@@ -60,3 +89,15 @@ class Estimates:
         ½ Σ log(1 + signal / noise) (MacKay 1992).
         """
         return np.asarray(self.grid[int(self.likelihood.volume.argmax())])
+
+
+def _left_out(
+    learn: Callable[[FloatArray, FloatArray], Likelihood], places: FloatArray, features: FloatArray
+) -> FloatArray:
+    """(n, g) log-likelihood of each press, from what was learnt without its fold."""
+    n = len(places)
+    folds = min(_FOLDS[n >= _FEW], n)
+    parts = [np.arange(n) % folds == k for k in range(folds)]
+    found = [learn(places[~out], features[~out])(features[out]) for out in parts]
+    order = np.argsort(np.concatenate([np.flatnonzero(out) for out in parts]))
+    return np.asarray(np.concatenate(found)[order])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Self
 
 import numpy as np
@@ -11,8 +13,8 @@ from tomoskin.core import FloatArray
 from tomoskin.touch.locator.kernel import squared_distances
 from tomoskin.touch.locator.maps import ResponseMaps
 
-TEMPERATURES = np.array([1, 1.5, 2, 3, 4, 6, 9, 14, 20, 30, 45, 70])
-"""By which a log-likelihood may be divided: rows err together in ways that maps do not know."""
+POWERS = 1 / np.array([1, 1.5, 2, 3, 4, 6, 9, 14, 20, 30, 45, 70])
+"""To which a likelihood may be raised: rows err together in ways that maps do not know."""
 
 _LEAST = 1e-6
 
@@ -51,24 +53,33 @@ class GridLikelihood:
         return np.asarray(-k * np.log1p(np.maximum(misfit, 0.0) / k) - self.volume)
 
 
-def tempered(log_likelihood: FloatArray, temperature: float) -> FloatArray:
-    """(n, g) probabilities of the grid's places."""
-    scaled = log_likelihood / temperature
+def pooled(log_likelihoods: Sequence[FloatArray], powers: FloatArray) -> FloatArray:
+    """(n, g) probabilities of the grid's places: the product of powers of each likelihood.
+
+    A logarithmic opinion pool (Genest & Zidek 1986); a single one is tempered by its power.
+    """
+    scaled = powers[0] * log_likelihoods[0]
+    for power, part in zip(powers[1:], log_likelihoods[1:], strict=False):
+        scaled += power * part
     weight = np.exp(scaled - scaled.max(axis=1, keepdims=True))
     return np.asarray(weight / weight.sum(axis=1, keepdims=True))
 
 
-def temperature_of(log_likelihood: FloatArray, grid: FloatArray, xy: FloatArray) -> float:
-    """The temperature at which held-out presses at ``xy`` are likeliest.
+def powers_of(
+    log_likelihoods: Sequence[FloatArray], grid: FloatArray, xy: FloatArray
+) -> FloatArray:
+    """The power of each likelihood at which held-out presses at ``xy`` are likeliest.
 
-    ``log_likelihood`` (n, g) of presses that the maps have not seen.
+    ``log_likelihoods`` (n, g) each, of presses that the maps have not seen.
     """
     nearest = squared_distances(xy, grid).argmin(axis=1)
     rows = np.arange(len(xy))
+    tried = POWERS if len(log_likelihoods) == 1 else np.append(0.0, POWERS)
+    choices = [np.array(powers) for powers in product(tried, repeat=len(log_likelihoods))]
     score = [
-        np.log(tempered(log_likelihood, t)[rows, nearest] + _LEAST).sum() for t in TEMPERATURES
+        np.log(pooled(log_likelihoods, powers)[rows, nearest] + _LEAST).sum() for powers in choices
     ]
-    return float(TEMPERATURES[int(np.argmax(score))])
+    return choices[int(np.argmax(score))]
 
 
 def moments(probability: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:
