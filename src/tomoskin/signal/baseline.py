@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +30,14 @@ _CUT = 4.0
 _DOUBT = 3.0
 """Deviations of a frame's noise that a held baseline may have drifted before it is called stale."""
 
+_DELAY = 3
+"""Frames after which a frame is learnt: a touch is known only when it has stood for some."""
+
 _LONGEST_STEP = 60.0
+_ROUNDING = 1e-9
+
+_TREND = 30.0
+"""Seconds that the skin must have been followed before a trend is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +89,9 @@ class Baseline:
     def __init__(self, reference: Reference, *, follows: bool = True) -> None:
         self._start = reference.mean
         self._size = float(np.sqrt(np.mean(reference.mean**2)))
-        self._known = reference.noise_is_known and bool(reference.noise.all())
+        # frames that are all the same have no noise but for rounding
+        least = _ROUNDING * self._size
+        self._known = reference.noise_is_known and bool((reference.noise > least).all())
         noise = reference.noise if self._known else np.full_like(reference.mean, np.nan)
         self._follows = follows and self._known
         self.mean = reference.mean
@@ -92,6 +102,8 @@ class Baseline:
         self._held = 0.0
         self._linger = 0
         self._fading = 0.0
+        self._followed = 0.0
+        self._waiting: deque[tuple[FloatArray, Mask, float, float]] = deque()
 
     def push(self, values: FloatArray, lost: Mask, time: float, *, touched: bool) -> bool:
         """Take a frame, (n_meas,) V at ``time`` s; True where it ended a block of idle frames.
@@ -111,11 +123,19 @@ class Baseline:
             self._linger -= 1
             return self._interrupted()
         self._held = 0.0
+        self._followed += step
+        self._waiting.append((values, lost, time, step))
+        if len(self._waiting) <= _DELAY:
+            return False
+        return self._learn(*self._waiting.popleft())
+
+    def _learn(self, values: FloatArray, lost: Mask, time: float, step: float) -> bool:
         if self._follows:
             self._follow(values, lost, step)
         if self._fading > 0:
             self._fading -= step
-            return self._interrupted()
+            self.idle.interrupt()
+            return False
         return self.idle.push(values, time, lost)
 
     def _follow(self, values: FloatArray, lost: Mask, step: float) -> None:
@@ -130,6 +150,7 @@ class Baseline:
         self._variance = (1.0 - gain) * self._variance
 
     def _interrupted(self) -> bool:
+        self._waiting.clear()
         self.idle.interrupt()
         return False
 
@@ -146,10 +167,21 @@ class Baseline:
         """How it is now."""
         moved = float(np.sqrt(np.mean((self.mean - self._start) ** 2)))
         noise = self.idle.noise
-        doubt = float(np.median(np.sqrt(self._variance) / noise)) if self._held else 0.0
+        doubt = self._doubt() if self._held else 0.0
         return BaselineState(
             drift=moved / self._size if self._size else 0.0,
             held=self._held,
             doubt=doubt,
             noise=float(np.sqrt(np.mean(noise**2))),
         )
+
+    def _doubt(self) -> float:
+        """What a held baseline may be off by, in deviations of a frame: as a random walk, and as
+        much as the skin has gone one way until now, which a random walk does not foresee."""
+        noise = self.idle.noise
+        walked = self._variance / noise**2
+        if self._followed < _TREND:
+            return float(np.sqrt(np.median(walked)))
+        moved = np.mean(((self.mean - self._start) / noise) ** 2) - 1.0 / self._n_frames
+        trend = np.sqrt(max(float(moved - walked.mean()), 0.0)) * self._held / self._followed
+        return float(np.hypot(np.sqrt(np.median(walked)), trend))
