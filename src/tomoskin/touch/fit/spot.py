@@ -103,8 +103,11 @@ class Spots:
     """
 
     def __init__(self, mesh: Mesh) -> None:
-        if mesh.dimension != 2 or mesh.points.shape[1] != 2:
-            raise ModelError("expected a flat sheet: touches are fitted in the plane")
+        if mesh.dimension != 2 or mesh.points.shape[1] != 2 or mesh.metric is not None:
+            raise ModelError(
+                "expected a flat sheet: touches are fitted in the plane",
+                hint='set method = "image" in [touch]',
+            )
         corners = mesh.points[mesh.cells]
         self.mesh = mesh
         self._points = np.einsum("qk,ckd->cqd", _sub_centroids(_SPLIT), corners)
