@@ -8,6 +8,7 @@ import shutil
 import socket
 import subprocess
 import time
+from dataclasses import replace
 
 import pytest
 from paho.mqtt import client as paho
@@ -18,6 +19,7 @@ from sink.conftest import EVENT, PATIENCE, free_port, moment_at, touch_of
 from tomoskin.core import SinkError
 from tomoskin.sink import make_sink
 from tomoskin.sink.mqtt import PERIOD
+from tomoskin.touch import TouchEvent
 
 BROKERS = "/usr/sbin:/usr/local/sbin:/opt/homebrew/sbin"
 
@@ -94,6 +96,13 @@ def test_touches_events_and_status(broker, heard, stream):
     told = json.loads(text)
     assert (told["sequence"], told["touches"][0]["x"]) == (3, TOUCH.reading.x)
     assert told["touches"][0]["sd_y"] is None
+    begun = TouchEvent("onset", TOUCH, 1.1)
+    sink.publish(replace(moment_at(1.1, TOUCH, sequence=4), happened=(begun,)))
+    topic, text = heard()
+    assert topic == "robot/skin/touch"
+    told = json.loads(text)
+    assert (told["event"], told["id"], told["time_s"]) == ("onset", TOUCH.id, 1.1)
+    assert heard()[0] == "robot/skin/touches"
     sink.publish(EVENT)
     assert heard() == (
         "robot/skin/events", '{"time_s":0.5,"kind":"connected","text":"board 01"}',

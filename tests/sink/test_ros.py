@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 import sys
+from dataclasses import replace
 from types import ModuleType, SimpleNamespace
 
 import msgspec
@@ -16,7 +17,7 @@ import pytest
 
 from session.runs import TOUCH
 from sink.conftest import EPOCH, EVENT, VALUES, moment_at, touch_of
-from tomoskin.core import SinkError
+from tomoskin.core import Event, SinkError
 from tomoskin.sink import make_sink
 from tomoskin.sink.ros import IMAGE, POSE, TEXT, RosView
 from tomoskin.sink.ros_types import TYPES, encode_cdr, type_hash
@@ -99,6 +100,10 @@ def test_a_touch_is_a_pose_with_covariance(stream):
     assert covariance[0, 0] == TOUCH.reading.sd_x**2
     assert (np.diag(covariance)[1:] == 1e6).all()  # its sd_y is not known
     assert (covariance == np.diag(np.diag(covariance))).all()
+    reading = replace(TOUCH.reading, sd_y=2e-3, cov_xy=5e-7)
+    moment = moment_at(0.25, replace(TOUCH, reading=reading))
+    value = messages_of(stream, moment)["tomoskin/touch"]
+    assert value["pose"]["covariance"][[1, 6]].tolist() == [5e-7, 5e-7]
 
 
 def test_an_image_is_of_floats_with_the_top_row_first(stream):
@@ -120,6 +125,8 @@ def test_texts_are_json(stream):
     after = [m.topic for m in view.of(moment_at(0.1))]
     assert after == ["tomoskin/touches", "tomoskin/image"]
     assert [m.topic for m in view.of(moment_at(0.2))] == ["tomoskin/image"]
+    ended = replace(moment_at(0.3), told=(Event(0.3, "touch-release", "touch 4 ends"),))
+    assert [m.topic for m in view.of(ended)] == ["tomoskin/events", "tomoskin/image"]
     (event,) = view.of(EVENT)
     cdr = Cdr(encode_cdr(TEXT, event.value))
     assert msgspec.json.decode(cdr.text()) == {

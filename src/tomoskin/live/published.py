@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 from tomoskin.core import GeometryError, PixelMap
+from tomoskin.live.events import told
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.result import Result
 from tomoskin.sink import Moment, Stream
@@ -34,6 +35,8 @@ def moment_of(result: Result) -> Moment:
         reference=result.reference,
         touches=result.touches,
         image=result.image if result.ready and result.pictured else None,
+        happened=result.events,
+        told=tuple(map(told, result.events)),
     )
 
 

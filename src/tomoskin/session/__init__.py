@@ -7,7 +7,7 @@ from tomoskin.session.calibration import Calibration, read_calibration, write_ca
 from tomoskin.session.channels import schema_of
 from tomoskin.session.design_picture import write_promise
 from tomoskin.session.display import Display, circular_average
-from tomoskin.session.documents import encode_json, touches_message
+from tomoskin.session.documents import encode_json, touch_row, touches_message
 from tomoskin.session.exports.hdf5 import write_hdf5
 from tomoskin.session.exports.matlab import write_matlab
 from tomoskin.session.exports.movie import WRITERS as FILMS
@@ -83,6 +83,7 @@ __all__ = [
     "schema_of",
     "session_info",
     "shard_path",
+    "touch_row",
     "touches_message",
     "write_calibration",
     "write_choices",

@@ -13,7 +13,7 @@ from tomoskin.core import Touch
 
 def touches_message(host_time: float, sequence: int, touches: Sequence[Touch]) -> dict[str, Any]:
     """A ``tomoskin.Touches``: those of the frame ``sequence``; m, m², the image's unit."""
-    rows = [_row(touch) for touch in touches]
+    rows = [touch_row(touch) for touch in touches]
     return {"host_time": host_time, "sequence": sequence, "touches": rows}
 
 
@@ -36,7 +36,8 @@ def _number(item: Any) -> Any:
     raise NotImplementedError(f"expected plain values, got {type(item).__name__}")
 
 
-def _row(touch: Touch) -> dict[str, Any]:
+def touch_row(touch: Touch) -> dict[str, Any]:
+    """One touch as plain values by name."""
     r = touch.reading
     return {
         "id": touch.id, "kind": touch.kind, "since": touch.since,

@@ -56,8 +56,9 @@ class FoxgloveSink:
     def publish(self, item: Item) -> None:
         """Send the messages of ``item``."""
         now = self._stream.log_time(item.host_time)
+        for event in (item,) if isinstance(item, Event) else item.told:
+            self._send("/events", log_message(event, now), now)
         if isinstance(item, Event):
-            self._send("/events", log_message(item, now), now)
             return
         if self._pace.is_due(item):
             content = touches_message(item.host_time, item.sequence, item.touches)

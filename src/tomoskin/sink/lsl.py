@@ -50,9 +50,10 @@ class LslSink:
 
     def publish(self, item: Item) -> None:
         """Push the samples of ``item``."""
-        if isinstance(item, Event):
-            text = msgspec.json.encode({"kind": item.kind, "text": item.text}).decode()
+        for event in (item,) if isinstance(item, Event) else item.told:
+            text = msgspec.json.encode({"kind": event.kind, "text": event.text}).decode()
             self._push("events", [text], item)
+        if isinstance(item, Event):
             return
         self._push("voltages", item.voltages, item)
         if item.ready:

@@ -7,7 +7,7 @@ from typing import Any
 from urllib.parse import SplitResult, unquote, urlsplit
 
 from tomoskin.core import Event, SinkError
-from tomoskin.session import encode_json, touches_message
+from tomoskin.session import encode_json, touch_row, touches_message
 from tomoskin.sink.pace import TouchPace
 from tomoskin.sink.registry import needed
 from tomoskin.sink.sink import Item, Stream
@@ -22,9 +22,10 @@ _KEEPALIVE = 10
 
 
 class MqttSink:
-    """Publishes below one topic: ``touches``, ``events``, and ``status``, online or offline.
+    """Publishes below one topic: ``touch``, ``touches``, ``events``, and ``status``.
 
-    ``status`` is kept by the broker, which turns it to offline by itself when we vanish.
+    ``touch`` is what happens to one: onset, move, release. ``status``, online or offline, is kept
+    by the broker, which turns it to offline by itself when we vanish.
     """
 
     def __init__(self, url: SplitResult, port: int) -> None:
@@ -58,7 +59,11 @@ class MqttSink:
         if isinstance(item, Event):
             content = {"time_s": item.host_time, "kind": item.kind, "text": item.text}
             self._put("events", encode_json(content))
-        elif self._pace.is_due(item):
+            return
+        for event in item.happened:
+            content = {"time_s": event.host_time, "event": event.kind} | touch_row(event.touch)
+            self._put("touch", encode_json(content))
+        if self._pace.is_due(item):
             content = touches_message(item.host_time, item.sequence, item.touches)
             self._put("touches", encode_json(content))
 

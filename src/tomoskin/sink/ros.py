@@ -54,9 +54,10 @@ class RosView:
     def of(self, item: Item) -> Iterator[RosMessage]:
         """Messages of one frame, or of an event."""
         stamp = self._stream.log_time(item.host_time)
-        if isinstance(item, Event):
-            content = {"time_s": item.host_time, "kind": item.kind, "text": item.text}
+        for event in (item,) if isinstance(item, Event) else item.told:
+            content = {"time_s": event.host_time, "kind": event.kind, "text": event.text}
             yield RosMessage("tomoskin/events", _json(content), stamp)
+        if isinstance(item, Event):
             return
         if self._pace.is_due(item):
             for touch in item.touches:
@@ -85,12 +86,14 @@ def _pose(touch: Touch, stamp: int) -> Value:
     """Place in the sheet's plane; what an image does not say has a vast variance."""
     reading = touch.reading
     variance = np.array([reading.sd_x**2, reading.sd_y**2, *[_UNKNOWN] * 4])
-    covariance = np.diag(np.where(np.isfinite(variance), variance, _UNKNOWN)).ravel()
+    covariance = np.diag(np.where(np.isfinite(variance), variance, _UNKNOWN))
+    if np.isfinite(variance).all():
+        covariance[[0, 1], [1, 0]] = reading.cov_xy
     pose = {
         "position": {"x": reading.x, "y": reading.y, "z": 0.0},
         "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
     }
-    return {"header": _header(stamp), "pose": {"pose": pose, "covariance": covariance}}
+    return {"header": _header(stamp), "pose": {"pose": pose, "covariance": covariance.ravel()}}
 
 
 def _image(image: Image, pixels: PixelMap, stamp: int) -> Value:

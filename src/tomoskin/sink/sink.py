@@ -7,6 +7,7 @@ from typing import Protocol
 
 from tomoskin.core import Event, FloatArray, Image, PixelMap, Touch
 from tomoskin.pattern import Pattern
+from tomoskin.touch import TouchEvent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +51,10 @@ class Moment:
         (n_meas,) V.
     touches
         Tracked touches.
+    happened
+        What happened to touches in this frame: onset, move, release, merge, split.
+    told
+        The same in words.
     image
         Change of conductivity; None where a newer frame waits, or one was sent a moment ago.
     """
@@ -61,6 +66,8 @@ class Moment:
     reference: FloatArray
     touches: tuple[Touch, ...]
     image: Image | None
+    happened: tuple[TouchEvent, ...] = ()
+    told: tuple[Event, ...] = ()
 
 
 Item = Moment | Event
