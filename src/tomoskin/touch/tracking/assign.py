@@ -15,6 +15,9 @@ _BEHIND = 4.0
 """Added to the cost of what is not yet a touch, or was not seen last: one that was comes first."""
 
 
+_LEAST = 1e-9
+
+
 def region_radius(reading: Reading) -> float:
     """Radius of the disc of the reading's area, m; 0 where it has none."""
     return math.sqrt(reading.area / math.pi) if reading.area > 0 else 0.0
@@ -36,9 +39,9 @@ def assigned(
     """
     places, spreads = seen
     far = distances(states, places, spreads)
-    radii = np.array([region_radius(r) for r in readings])
-    away = states.mean[:, None, :2] - places
-    share = (away * away).sum(axis=2) / np.maximum(radii, 1e-9) ** 2
+    radii = np.array([max(region_radius(r), _LEAST) for r in readings])
+    away = (states.mean[:, None, :2] - places) / radii[:, None]
+    share = away[..., 0] ** 2 + away[..., 1] ** 2
     cost = np.minimum(far, np.where(share < 1, GATE * (0.5 + 0.5 * share), np.inf))
     cost[signs[:, None] != np.sign([r.peak for r in readings])] = np.inf
     allowed = cost <= GATE

@@ -94,7 +94,7 @@ class Tracker:
             behind = np.array([not t.number or t.missing is not None for t in traces], float)
             pairs, far = assigned(states, signs, behind, readings, seen)
             self._note_missing(set(pairs.values()))
-            self._see(readings, pairs, seen, far)
+            self._see(readings, pairs, seen, states, far)
         else:
             self._note_missing(set())
         for index, reading in enumerate(readings):
@@ -117,18 +117,21 @@ class Tracker:
         readings: list[Reading],
         pairs: dict[int, int],
         seen: tuple[FloatArray, FloatArray],
+        states: motion.States,
         far: FloatArray,
     ) -> None:
         if not pairs:
             return
         own, which = list(pairs.values()), list(pairs)
         places, spreads = seen[0][which], seen[1][which]
-        states = motion.updated(_stacked([self._traces[k] for k in own]), places, spreads)
-        for row, (trace, index) in enumerate(zip(own, which, strict=True)):
+        before = motion.States(states.mean[own], states.covariance[own])
+        after = _rows(motion.updated(before, places, spreads))
+        jumped = far[own, which] > motion.GATE
+        for row, (trace, index, state) in enumerate(zip(own, which, after, strict=True)):
             known = self._traces[trace]
             known.see(readings[index], self._now)
-            known.states = motion.States(states.mean[[row]], states.covariance[[row]])
-            if far[trace, index] > motion.GATE:  # its region has changed: it has not moved
+            known.states = state
+            if jumped[row]:  # its region has changed: it has not moved
                 known.states = motion.begun(places[row], spreads[row], self.settings)
 
     def _begins(self, reading: Reading) -> bool:
