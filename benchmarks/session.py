@@ -35,12 +35,12 @@ def run(data: Path | None) -> tuple[Report, ...]:
     """Time every case; ``data`` is not needed."""
     del data
     skin = Skin.load(SKIN)
-    frames = _frames(skin)
+    frames = frames_of(skin)
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         rows = (
-            _recorded(place / "long.mcap", skin, frames, LONG, paced=False),
-            _recorded(place / "paced.mcap", skin, frames, PACED, paced=True),
+            recorded(place / "long.mcap", skin, frames, LONG, paced=False),
+            recorded(place / "paced.mcap", skin, frames, PACED, paced=True),
         )
         (place / "long.mcap").unlink()
         hour = _hour(place / "hour.mcap", skin, frames)
@@ -67,7 +67,7 @@ def run(data: Path | None) -> tuple[Report, ...]:
     )
 
 
-def _frames(skin: Skin) -> list[Frame]:
+def frames_of(skin: Skin) -> list[Frame]:
     rng = np.random.default_rng(SEED)
     n = Scan.of(skin.pattern()).n_samples
     samples = rng.integers(200, 3000, (_KINDS, n)).astype("<u2")
@@ -81,7 +81,7 @@ def _at(frames: list[Frame], number: int, rate: float) -> Frame:
     )
 
 
-def _recorded(
+def recorded(
     path: Path, skin: Skin, frames: list[Frame], seconds: int, *, paced: bool
 ) -> tuple[object, ...]:
     raw = [encode(frame) for frame in frames]

@@ -132,7 +132,7 @@ def test_a_slow_sink_loses_results_which_are_counted_and_said(running, news):
 
 def test_a_sink_that_raises_is_closed_and_opened_again(running, news, monkeypatch, caplog):
     monkeypatch.setattr("tomoskin.sink.outlet._FIRST_DELAY", 0.001)
-    faults = deque([ConnectionResetError("peer is gone"), None])
+    faults = deque([ConnectionResetError(104, "peer is gone"), None])
 
     def fail():
         if faults and (error := faults.popleft()):
@@ -146,7 +146,7 @@ def test_a_sink_that_raises_is_closed_and_opened_again(running, news, monkeypatc
     news.until(lambda: sink.items)
     assert sink.calls == ["open", "close", "open"]
     away = next(text for kind, text in news.said if kind == "sink-away")
-    assert away == "shelf is away: ConnectionResetError: peer is gone"
+    assert away == "shelf is away: peer is gone"
     assert away in caplog.text
 
 
@@ -166,9 +166,15 @@ def test_a_sink_that_cannot_be_opened_is_said_once_and_tried_again(running, news
 
 def test_while_it_is_away_that_is_its_state(running, news, monkeypatch):
     monkeypatch.setattr("tomoskin.sink.outlet._FIRST_DELAY", PATIENCE)
-    outlet = running(Shelf(news, opens=[SinkError("no broker there")]))
+    outlet = running(
+        Shelf(news, opens=[SinkError("no broker there", where="shelf", hint="start it")])
+    )
     report = outlet.report()
-    assert (report.well, report.text) == (False, "is away: no broker there")
+    assert (report.well, report.text) == (False, "is away: no broker there (start it)")
+    for number in range(MOST_WAITING + 3):
+        outlet.put(moment_at(number))
+    assert outlet.report().text == "is away: no broker there (start it), 3 left out"
+    assert news.kinds() == ["sink-away"]
 
 
 def test_what_waits_is_sent_before_the_end(news, stream):

@@ -85,7 +85,7 @@ class Outlet:
                 self._waiting.popleft()
                 self._behind += 1
                 self.left_out += 1
-            first = full and self._behind == 1
+            first = full and self._behind == 1 and not self._away
             self._news.notify()
         if first:
             self._tell("sink-behind", "does not keep up, and results are left out")
@@ -190,9 +190,7 @@ class Outlet:
             self._tell("sink-gap", f"{count} results were left out")
 
     def _failed(self, error: Exception) -> None:
-        known = isinstance(error, TomoskinError)
-        why = error if known else f"{type(error).__name__}: {error}"
-        before, self._away = self._away, f"is away: {why}"
+        before, self._away = self._away, f"is away: {_why(error)}"
         if self._away != before:
             self._tell("sink-away", self._away)
 
@@ -200,6 +198,15 @@ class Outlet:
         level = logging.INFO if kind == "sink-open" else logging.WARNING
         _log.log(level, "%s %s", self.sink.name, text)
         self._say(kind, f"{self.sink.name} {text}")
+
+
+def _why(error: Exception) -> str:
+    """In words; the sink's name stands before them already."""
+    if isinstance(error, TomoskinError):
+        return f"{error.message} ({error.hint})" if error.hint else error.message
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return f"{type(error).__name__}: {error}"
 
 
 class Outlets:

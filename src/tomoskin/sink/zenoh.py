@@ -51,7 +51,8 @@ class ZenohSink:
         try:
             self._session = self._zenoh.open(config)
         except self._zenoh.ZError as error:
-            raise SinkError(f"cannot be joined: {error}", where=self.name) from error
+            reason = str(error).partition(" at /")[0]  # where in its own sources
+            raise SinkError(f"cannot be joined: {reason}", where=self.name) from error
         self._view = RosView(stream)
         self._sent: Counter[str] = Counter()
 
