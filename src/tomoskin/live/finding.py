@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, Image, Reading
 from tomoskin.live.prepare import Prepared
 from tomoskin.signal import Reference
-from tomoskin.touch import NoiseFloor
-from tomoskin.touch.fit import SpotFinder, SpotModel, measured_covariance
+from tomoskin.touch import NoiseFloor, SpotFinder, SpotModel, measured_covariance
 
 
 @dataclass(frozen=True, slots=True, eq=False)

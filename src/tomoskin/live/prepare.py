@@ -23,8 +23,7 @@ from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.signal import Blind, Readout, Reference, difference_noise
 from tomoskin.skin import Skin
-from tomoskin.touch import NoiseFloor, Segmenter
-from tomoskin.touch.fit import SpotModel
+from tomoskin.touch import NoiseFloor, Segmenter, SpotModel
 
 
 @dataclass(frozen=True, eq=False)

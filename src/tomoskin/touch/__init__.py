@@ -1,11 +1,12 @@
 """Image → readings → touches with an identity; labelled presses → places."""
 
 from tomoskin.touch.design import Demand, Promise, Variant, promise, variants
+from tomoskin.touch.fit import SpotFinder, SpotModel, measured_covariance
 from tomoskin.touch.floor import NoiseFloor
 from tomoskin.touch.locator import Locator, Presses, Region
 from tomoskin.touch.segment import Segmenter
-from tomoskin.touch.states import Answers, Codes, Examples, StateClassifier, against_rest
 from tomoskin.touch.several import Several
+from tomoskin.touch.states import Answers, Codes, Examples, StateClassifier, against_rest
 from tomoskin.touch.tracking import STILL, TouchEvent, Tracker, TrackSettings
 from tomoskin.touch.wiring import Wiring, WiringAnswer, ring_of, solve_wiring
 
@@ -22,6 +23,8 @@ __all__ = [
     "Region",
     "Segmenter",
     "Several",
+    "SpotFinder",
+    "SpotModel",
     "StateClassifier",
     "TouchEvent",
     "TrackSettings",
@@ -30,6 +33,7 @@ __all__ = [
     "Wiring",
     "WiringAnswer",
     "against_rest",
+    "measured_covariance",
     "promise",
     "ring_of",
     "solve_wiring",
