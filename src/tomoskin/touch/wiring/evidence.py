@@ -162,7 +162,7 @@ def _loud(rows: FloatArray) -> FloatArray:
     return np.asarray(size - size.mean(axis=-1, keepdims=True))
 
 
-def likelihood(cosine: FloatArray, worth: float) -> FloatArray:
+def likelihood(cosine: FloatArray | float, worth: float) -> FloatArray:
     """−(m/2) log(1 − ρ²): of a signal of unknown strength in noise of unknown size.
 
     ``worth`` is the number m of independent readings. A signal of the wrong sign says nothing.

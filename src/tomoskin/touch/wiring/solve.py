@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from tomoskin.core import DataError, FloatArray
 from tomoskin.skin import Skin
 from tomoskin.touch.locator import Presses, Region
-from tomoskin.touch.wiring.evidence import Evidence, Sheet, agreement, quiet_noise
+from tomoskin.touch.wiring.evidence import Evidence, Sheet, agreement, likelihood, quiet_noise
 from tomoskin.touch.wiring.wiring import Wiring, ring_of, swaps, turns
 
 Advance = Callable[[float, float], None]
@@ -112,12 +112,7 @@ def solve_wiring(
         For arrays that do not belong together, labels outside the skin, data that never change.
     """
     region = Region.of(skin)
-    presses = Presses.of_more(dv, xy).within(region)
-    if presses.dv.shape[1] != skin.pattern().n_meas:
-        raise DataError(f"expected {skin.pattern().n_meas} rows of dv, got {presses.dv.shape[1]}")
-    if not np.nansum(np.abs(presses.dv), axis=1).all():
-        rows = np.flatnonzero(np.nansum(np.abs(presses.dv), axis=1) == 0)
-        raise DataError("expected presses that change something", where=f"press {rows[0]}")
+    presses = _checked(Presses.of_more(dv, xy).within(region), skin)
     grid = region.metres(region.grid * 0.95)
     grid = grid[:: max(len(grid) // _ASKED, 1)]
     progress(0, 3)
@@ -136,6 +131,15 @@ def solve_wiring(
     contradicted = _contradicted(evidence, there, answer.wiring)
     progress(3, 3)
     return replace(answer, contradicted=contradicted)
+
+
+def _checked(presses: Presses, skin: Skin) -> Presses:
+    if presses.dv.shape[1] != skin.pattern().n_meas:
+        raise DataError(f"expected {skin.pattern().n_meas} rows of dv, got {presses.dv.shape[1]}")
+    silent = np.flatnonzero(np.nansum(np.abs(presses.dv), axis=1) == 0)
+    if len(silent):
+        raise DataError("expected presses that change something", where=f"press {silent[0]}")
+    return presses
 
 
 def _searched(evidence: Evidence, ring: tuple[int, ...], told: bool) -> dict[Wiring, float]:
@@ -158,16 +162,18 @@ def _searched(evidence: Evidence, ring: tuple[int, ...], told: bool) -> dict[Wir
 def _weighed(
     found: dict[Wiring, float], there: Sheet, noise: FloatArray, told: bool
 ) -> WiringAnswer:
+    """The likeliest, with those that no press at all could tell from it."""
     ranked = sorted(found, key=lambda w: -found[w])
     weights = np.exp(np.array([found[w] for w in ranked]) - found[ranked[0]])
     nothing = np.exp(np.log(_NOTHING) - found[ranked[0]])
     total = weights.sum() + nothing
     best, mine = ranked[0], float(weights[0])
     answers = there.rows([best], there.changes[0])[0]
+    faint = 0.02 * float(np.median(np.abs(answers))) * noise / np.median(noise)
     second, place, odds = ranked[1], there.places[0], float("inf")
     for wiring, weight in zip(ranked[1:], weights[1:].tolist(), strict=True):
         others = there.rows([wiring], there.changes[0])[0]
-        same = agreement(answers, others, noise / np.median(noise) * _faint(answers))
+        same = agreement(answers, others, faint)
         same = same * (1 if wiring.reversed == best.reversed else -1)
         if same.min() > _ALIKE:
             mine += weight
@@ -179,10 +185,6 @@ def _weighed(
     return WiringAnswer(best, sure, second, odds, unexplained, told, place, ())
 
 
-def _faint(answers: FloatArray) -> float:
-    return 0.02 * float(np.median(np.abs(answers)))
-
-
 def _contradicted(
     evidence: Evidence, there: Sheet, wiring: Wiring
 ) -> tuple[tuple[int, float, float], ...]:
@@ -190,18 +192,13 @@ def _contradicted(
     extent = float(np.ptp(there.places, axis=0).max())
     labelled = evidence.sheet.rows([wiring], evidence.sheet.changes)[0]
     elsewhere = there.rows([wiring], there.changes)[0]
+    fits = np.array(evidence.signs)[:, None] * (-1.0 if wiring.reversed else 1.0)
     remarks = []
-    way = -1.0 if wiring.reversed else 1.0
     for row, dv in enumerate(evidence.dv):
-        fits = np.array([[way * sign] for sign in evidence.signs])
         mine = (fits * agreement(dv, labelled[:, row], evidence.noise)).max()
-        other = (fits[:, None] * agreement(dv, elsewhere, evidence.noise)).max(axis=(0, 1))
+        other = (fits[..., None] * agreement(dv, elsewhere, evidence.noise)).max(axis=(0, 1))
         best = int(np.argmax(other))
-        gain = (
-            -0.5
-            * evidence.worth
-            * np.log((1 - min(other[best], 0.999) ** 2) / (1 - max(mine, 0) ** 2))
-        )
+        gain = likelihood(other[best], evidence.worth) - likelihood(mine, evidence.worth)
         gap = np.linalg.norm(there.places[best] - evidence.sheet.places[row])
         if gain > _ELSEWHERE and gap > _FAR * extent:
             remarks.append((row, *there.places[best].tolist()))
