@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable
 
 import pytest
 
@@ -11,7 +12,7 @@ from firmware.boards import PATIENCE
 from tomoskin.core import Touch
 from tomoskin.emulator import Programs
 from tomoskin.emulator.source import open_emulator
-from tomoskin.live import Runner, prepare
+from tomoskin.live import Result, Runner, prepare
 from tomoskin.skin import Skin
 from tomoskin.twin import Press
 
@@ -39,11 +40,10 @@ def test_a_press_is_found_where_it_is(
     with runner.watched_by(came.set):
         runner.start()
         try:
-            _wait(runner, came, lambda: runner.newest.result.ready)
-            assert runner.newest is not None
-            assert runner.newest.result.touches == ()
+            before = _wait(runner, came, lambda result: result.ready)
+            assert before.touches == ()
             runner.set_presses(object(), (Press(*place, FORCE, RADIUS),))
-            _wait(runner, came, lambda: len(runner.newest.result.touches) == 1)
+            _wait(runner, came, lambda result: len(result.touches) == 1)
             touch = _after(runner, came, 15)
         finally:
             runner.stop()
@@ -51,13 +51,13 @@ def test_a_press_is_found_where_it_is(
     assert math.hypot(reading.x - place[0], reading.y - place[1]) < most
 
 
-def _wait(runner: Runner, came: threading.Event, enough) -> None:  # type: ignore[no-untyped-def]
-    """Until ``enough()``, looked at with each result."""
+def _wait(runner: Runner, came: threading.Event, enough: Callable[[Result], bool]) -> Result:
+    """The first result that is ``enough``."""
     for _ in range(MOST_FRAMES):
         assert came.wait(PATIENCE), runner.status().problem
         came.clear()
-        if runner.newest is not None and enough():
-            return
+        if runner.newest is not None and enough(runner.newest.result):
+            return runner.newest.result
     raise AssertionError(f"not within {MOST_FRAMES} frames: {runner.status()}")
 
 

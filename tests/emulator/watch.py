@@ -29,8 +29,8 @@ class Watch:
     @classmethod
     def read(cls, path: Path) -> Watch:
         words = np.fromfile(path, "<u8")
-        cycle, connected, since, *others = words[:7].tolist()
-        return cls(cycle, bool(connected), since, *others, words[7:])
+        cycle, connected, since, on, off, resets, stack = words[:7].tolist()
+        return cls(cycle, bool(connected), since, on, off, resets, stack, words[7:])
 
     @property
     def on(self) -> int:
