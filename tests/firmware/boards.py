@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.source import ScanSettings
 from tomoskin.wire import Decoder, Message, encode
@@ -19,6 +21,14 @@ SCAN = Scan.of(Pattern.adjacent(8))
 SETTINGS = ScanSettings(oversampling=4, settling=200e-6, current_limit=0.1, adc_bits=10)
 PATIENCE = 20.0
 """Seconds until a test gives up; a board answers within milliseconds."""
+
+
+def star_counts(oversampling: int, scan: Scan = SCAN) -> list[int]:
+    """What a board reads of its star of 1 + e ohm: V = I (1 + sink), source I (sum)."""
+    source, sink = scan.drives[scan.sample_drive].T
+    volts = 0.1 * (1 + sink + (scan.sample_electrode == source) * (1 + source))
+    counts: list[int] = (oversampling * np.floor(volts * 1024 / 5).astype(int)).tolist()
+    return counts
 
 
 def make(*arguments: str, folder: Path = FIRMWARE) -> subprocess.CompletedProcess[str]:

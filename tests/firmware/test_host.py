@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from firmware.boards import PATIENCE, SCAN, SETTINGS, Talk, running
+from firmware.boards import PATIENCE, SCAN, SETTINGS, Talk, running, star_counts
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.source import Link
 from tomoskin.source import serial as port
@@ -54,13 +54,6 @@ def frames_of(link, count):
     return frames, events
 
 
-def star_counts(oversampling):
-    """What the process reads of its star of 1 + e ohm: V = I (1 + sink), source I (sum)."""
-    source, sink = SCAN.drives[SCAN.sample_drive].T
-    volts = 0.1 * (1 + sink + (SCAN.sample_electrode == source) * (1 + source))
-    return oversampling * np.floor(volts * 1024 / 5).astype(int)
-
-
 def test_handshake_scan_and_values(board):
     transport = port.open_serial(board.path, None)
     with Link(transport, SCAN, SETTINGS) as link:
@@ -74,7 +67,7 @@ def test_handshake_scan_and_values(board):
     assert [frame.sequence for frame in frames][:3] == [0, 1, 2]
     assert [frame.flags for frame in frames[:2]] == [1, 0]
     for frame in frames:
-        assert frame.samples.tolist() == star_counts(4).tolist()
+        assert frame.samples.tolist() == star_counts(4)
     # 8 drives of 202 us and 6 x 4 conversions of 52 us: 2900 ticks of 4 us
     periods = np.diff([frame.ticks for frame in frames])
     assert np.median(periods) == pytest.approx(2900, rel=0.02)
