@@ -22,13 +22,18 @@ _KINDS = 9
 
 @dataclass
 class Tally:
-    """``corrupt``: blocks whose checksum was looked at and wrong; ``wrong``: frames that were not
-    sent and yet accepted; ``late``: streams of which the second frame behind the mutated one was
-    missing."""
+    """What became of the streams.
+
+    ``corrupt``: blocks whose checksum was looked at and wrong; ``wrong``: frames that were not sent
+    and yet accepted; ``short``: frames of another number of samples, which the link refuses (a
+    checksum that ends in 0x00 does not notice when a line loses just that); ``late``: streams of
+    which the second frame behind the mutated one was missing.
+    """
 
     streams: int = 0
     corrupt: int = 0
     wrong: int = 0
+    short: int = 0
     late: int = 0
 
     @property
@@ -56,7 +61,9 @@ def _run_batch(tally: Tally, random: np.random.Generator, count: int) -> None:
         got = decoder.feed(line + behind, 0.0)
         frames = [(m.sequence, m.samples.tobytes()) for m in got if isinstance(m, Frame)]
         tally.wrong += len(got) - len(frames)
-        tally.wrong += sum(known.get(sequence) != samples for sequence, samples in frames)
+        whole = [item for item in frames if len(item[1]) == 2 * _SAMPLES]
+        tally.short += len(frames) - len(whole)
+        tally.wrong += sum(known.get(sequence) != samples for sequence, samples in whole)
         tally.late += not frames or frames[-1] != (2, known[2])
     tally.streams += count
     tally.corrupt += decoder.counters.checksum
@@ -107,7 +114,8 @@ def main() -> None:
     sys.stdout.write(
         f"host parser: {tally.streams:,} mutated streams in {took:.0f} s (seed {seed}), "
         f"{tally.corrupt:,} wrong checksums, {tally.wrong} wrong frames accepted "
-        f"({tally.expected:.1f} expected), {tally.late} resynchronised late\n"
+        f"({tally.expected:.1f} expected), {tally.short} of another length refused, "
+        f"{tally.late} resynchronised late\n"
     )
     sys.exit(bool(tally.late))
 
