@@ -21,9 +21,11 @@ SURE = 0.95
 """Probability from which an answer is taken for sure."""
 
 _WORTH = 10.0
-"""Independent readings of a press. Set on public skins, so that sure answers are right there."""
+"""Independent readings of a press: few, as what the model misses is alike in many rows."""
 
-_BEAM = 6
+_TRIED = 1000
+"""Exchanges that are tried at a time: all of those of so many of the best wirings, at least 6."""
+
 _MOST_SWAPS = 3
 _SWAPPED = 0.1
 """Probability beforehand that two wires are exchanged, given all the others."""
@@ -40,6 +42,10 @@ _ALIKE = 0.999
 _ELSEWHERE = 8.0
 """Log-likelihood by which a press must fit better at another place to be remarked on."""
 
+_DOUBTFUL = 0.25
+"""Part of the presses that may be remarked on, where the answer is still sure: beyond that it is
+the wiring that is wrong."""
+
 _FAR = 0.2
 """How far that place must be from the label, in parts of the sheet's extent."""
 
@@ -50,6 +56,8 @@ class WiringAnswer:
 
     Attributes
     ----------
+    presses
+        How many there were.
     wiring, probability
         The likeliest, with all that no press could tell from it.
     runner_up, odds
@@ -65,6 +73,7 @@ class WiringAnswer:
         Presses whose data look like a press elsewhere, and that place: (row, x, y) m.
     """
 
+    presses: int
     wiring: Wiring
     probability: float
     runner_up: Wiring
@@ -76,8 +85,9 @@ class WiringAnswer:
 
     @property
     def sure(self) -> bool:
-        """Whether the presses tell."""
-        return bool(self.probability >= SURE)
+        """Whether the presses tell: the probability is high, and most of them fit their labels."""
+        doubtful = len(self.contradicted) > _DOUBTFUL * self.presses
+        return bool(self.probability >= SURE and not doubtful)
 
 
 def solve_wiring(
@@ -127,7 +137,7 @@ def solve_wiring(
     told = len(sign) == 1 or reference is not None
     found = _searched(evidence, ring_of(skin), told)
     progress(2, 3)
-    answer = _weighed(found, there, known, told)
+    answer = _weighed(found, there, known, told, n)
     contradicted = _contradicted(evidence, there, answer.wiring)
     progress(3, 3)
     return replace(answer, contradicted=contradicted)
@@ -153,14 +163,14 @@ def _searched(evidence: Evidence, ring: tuple[int, ...], told: bool) -> dict[Wir
         fresh = [w for w in dict.fromkeys(frontier) if w not in found]
         scores = (each + evidence(fresh)).tolist() if fresh else []
         found.update(zip(fresh, scores, strict=True))
-        best = sorted(fresh, key=lambda w: -found[w])[:_BEAM]
+        best = sorted(fresh, key=lambda w: -found[w])[: max(int(_TRIED / pairs), 6)]
         frontier = list(chain.from_iterable(swaps(w) for w in best))
         each += np.log(_SWAPPED / pairs)
     return found
 
 
 def _weighed(
-    found: dict[Wiring, float], there: Sheet, noise: FloatArray, told: bool
+    found: dict[Wiring, float], there: Sheet, noise: FloatArray, told: bool, presses: int
 ) -> WiringAnswer:
     """The likeliest, with those that no press at all could tell from it."""
     ranked = sorted(found, key=lambda w: -found[w])
@@ -182,7 +192,7 @@ def _weighed(
         place = there.places[int(np.argmin(same))]
         break
     unexplained, sure = float(nothing / total), float(mine / total)
-    return WiringAnswer(best, sure, second, odds, unexplained, told, place, ())
+    return WiringAnswer(presses, best, sure, second, odds, unexplained, told, place, ())
 
 
 def _contradicted(
