@@ -122,11 +122,26 @@ def test_a_row_that_rails_now_and_then_does_little_harm() -> None:
 
 def test_added_presses_are_as_good_as_those_of_the_first_hour() -> None:
     dv, xy = presses(110, 0)
-    first = Locator.fit(dv[:80], xy[:80])
-    grown, batch = first.updated(dv[80:], xy[80:]), Locator.fit(dv, xy)
-    frames = presses(20, 5)[0]
-    np.testing.assert_array_equal(grown.predict(frames)[0], batch.predict(frames)[0])
-    np.testing.assert_array_equal(grown.predict(frames)[1], batch.predict(frames)[1])
+    first, batch = Locator.fit(dv[:90], xy[:90]), Locator.fit(dv, xy)
+    grown = first.updated(dv[90:], xy[90:])
+    frames, where = presses(200, 5)
+    before, after, anew = (
+        np.linalg.norm(known.predict(frames)[0] - where, axis=1).mean()
+        for known in (first, grown, batch)
+    )
+    assert anew < before
+    assert after < 1.03 * anew
+    assert (grown.settled, len(grown.presses), batch.settled) == (90, 110, 110)
+    again = grown.settled_anew()
+    np.testing.assert_array_equal(again.predict(frames)[1], batch.predict(frames)[1])
+    assert again.settled_anew() is again
+
+
+def test_settings_are_learnt_anew_when_presses_have_grown_by_a_quarter() -> None:
+    dv, xy = presses(40, 0)
+    first = Locator.fit(dv[:20], xy[:20])
+    assert first.updated(dv[20:25], xy[20:25]).settled == 20
+    assert first.updated(dv[20:], xy[20:]).settled == 40
 
 
 def test_contradicting_labels_are_named() -> None:
@@ -251,3 +266,18 @@ def test_a_few_presses_align_an_old_calibration_to_another_session(data_dir: Pat
 def _differences(path: Path) -> tuple[Floats, Floats]:
     with np.load(path) as kept:
         return kept["v_down"].astype(float) - kept["v_up"], 1e-3 * kept["xy_mm"].astype(float)
+
+
+def test_presses_in_an_order_are_left_out_here_and_there() -> None:
+    """Row by row over the skin, a stretch of presses is a part of the skin that no other knows."""
+    dv, xy = presses(120, 0)
+    order = np.lexsort((xy[:, 0], np.round(xy[:, 1] / 0.02)))
+    in_rows, at_random = Locator.fit(dv[order], xy[order]), Locator.fit(dv, xy)
+    assert in_rows.errors.mean() < 1.3 * at_random.errors.mean()
+
+
+def test_settings_are_learnt_anew_on_a_skin_that_has_changed() -> None:
+    dv, xy = presses(90, 0)
+    first = Locator.fit(dv[:80], xy[:80])
+    assert first.updated(dv[80:], xy[80:]).settled == 80
+    assert first.updated(dv[80:, ::-1], xy[80:]).settled == 90

@@ -98,7 +98,8 @@ def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern
         old.locator.check(skin=skin_for_file(name, recording))
 
     def learn(dv: FloatArray, xy: FloatArray) -> Calibration:
-        return replace(old, locator=old.locator.updated(dv, xy))
+        with Bar("learning") as bar:
+            return replace(old, locator=old.locator.updated(dv, xy).settled_anew(bar))
 
     return learn, old.pattern
 

@@ -24,6 +24,9 @@ _FEW = 80
 _FOLDS = (8, 5)
 """In which presses are left out, when they are few and when they are many."""
 
+_NEAR = 0.5
+"""Mean squared step, in parts of that between any two presses, below which they are in an order."""
+
 Likelihood = Callable[[FloatArray], FloatArray]
 """Features (n, k) → log-likelihood (n, g) of the grid's places."""
 
@@ -45,16 +48,27 @@ class Estimates:
     left_out_spread: FloatArray
 
     @classmethod
-    def of(cls, features: FloatArray, places: FloatArray, grid: FloatArray) -> Self:
-        """Learn the maps; length scales by evidence, powers by left-out presses."""
+    def of(
+        cls,
+        features: FloatArray,
+        places: FloatArray,
+        grid: FloatArray,
+        like: ResponseMaps | None = None,
+    ) -> Self:
+        """Learn the maps; length scales by evidence, powers by left-out presses.
+
+        Maps that are ``like`` others have their length scale and coregionalisation.
+        """
+        known = like.coregion if like else None
+        lengths = [like.basis.likeness] if like else map(Likeness, _LENGTHS)
         maps = max(
-            (ResponseMaps.of(Likeness(x), places, features) for x in _LENGTHS),
+            (ResponseMaps.of(x, places, features, known) for x in lengths),
             key=lambda m: m.evidence,
         )
         together = maps.basis.likeness
 
         def joint(some: FloatArray, theirs: FloatArray) -> GridLikelihood:
-            return GridLikelihood.of(ResponseMaps.of(together, some, theirs), grid)
+            return GridLikelihood.of(ResponseMaps.of(together, some, theirs, known), grid)
 
         parts = [_left_out(joint, places, features)]
         alone = None
@@ -94,10 +108,22 @@ class Estimates:
 def _left_out(
     learn: Callable[[FloatArray, FloatArray], Likelihood], places: FloatArray, features: FloatArray
 ) -> FloatArray:
-    """(n, g) log-likelihood of each press, from what was learnt without its fold."""
+    """(n, g) log-likelihood of each press, from what was learnt without its fold.
+
+    Folds are stretches of time, so that they are as strange to each other as presses to come; but
+    where presses follow each other over the skin, a stretch of time is a part of the skin.
+    """
     n = len(places)
     folds = min(_FOLDS[n >= _FEW], n)
-    parts = [np.arange(n) % folds == k for k in range(folds)]
+    order = np.arange(n)
+    fold = order * folds // n if _in_any_order(places) else order % folds
+    parts = [fold == k for k in range(folds)]
     found = [learn(places[~out], features[~out])(features[out]) for out in parts]
     order = np.argsort(np.concatenate([np.flatnonzero(out) for out in parts]))
     return np.asarray(np.concatenate(found)[order])
+
+
+def _in_any_order(places: FloatArray) -> bool:
+    """Whether presses that follow each other are about as far apart as any two."""
+    step = float((np.diff(places, axis=0) ** 2).sum(axis=1).mean())
+    return step > _NEAR * 2 * float(places.var(axis=0).sum())

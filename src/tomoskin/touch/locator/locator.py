@@ -27,6 +27,12 @@ Advance = Callable[[float, float], None]
 
 _STEPS = 4
 
+_GROWN = 1.25
+"""Growth up to which settings are kept when presses are added."""
+
+_CHANGED = 2.5
+"""How many times as far as usual new presses are missed on a skin that has changed (medians)."""
+
 
 def _silent(_done: float, _total: float) -> None:
     pass
@@ -48,6 +54,8 @@ class Locator:
         Part of the presses that lie in their own 90 % ellipse when they are left out.
     remarks
         Labels that the other presses contradict.
+    settled
+        Presses that the settings were learnt from; see :meth:`updated`.
     """
 
     presses: Presses
@@ -61,6 +69,7 @@ class Locator:
     power: Strength
     held: float
     remarks: tuple[Remark, ...]
+    settled: int
 
     @classmethod
     def fit(
@@ -116,15 +125,21 @@ class Locator:
 
     @classmethod
     def _learnt(
-        cls, presses: Presses, region: Region, identities: tuple[str, str], progress: Advance
+        cls,
+        presses: Presses,
+        region: Region,
+        identities: tuple[str, str],
+        progress: Advance,
+        like: Locator | None = None,
     ) -> Self:
         places = region.scaled(presses.xy)
-        features = Features.of(presses.dv)
+        features = like.features if like else Features.of(presses.dv)
         data = features(presses.dv)
         progress(0, _STEPS)
-        estimates = Estimates.of(data, places, region.grid)
+        maps = like.estimates.likelihood.maps if like else None
+        estimates = Estimates.of(data, places, region.grid, maps)
         progress(1, _STEPS)
-        stack = Stack.of(data, estimates.left_out, places)
+        stack = Stack.of(data, estimates.left_out, places, like.stack if like else None)
         progress(2, _STEPS)
         dispute = dispute_of(stack.left_out_told, stack.left_out)
         doubt = Doubt.of(stack.left_out - places, estimates.left_out_spread, dispute)
@@ -137,8 +152,19 @@ class Locator:
         progress(3, _STEPS)
         power = Strength.of(presses, stack.left_out)
         progress(_STEPS, _STEPS)
+        settled = like.settled if like else len(presses)
         return cls(
-            presses, region, *identities, features, estimates, stack, doubt, power, held, remarks
+            presses,
+            region,
+            *identities,
+            features,
+            estimates,
+            stack,
+            doubt,
+            power,
+            held,
+            remarks,
+            settled,
         )
 
     def predict(self, dv: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -165,12 +191,29 @@ class Locator:
         return self.power(data, guess)
 
     def updated(self, dv: ArrayLike, xy: ArrayLike, strength: ArrayLike | None = None) -> Self:
-        """Locator with more presses: the same as one fitted to all of them."""
+        """Locator with more presses, soon: scales, covariances and hyper-parameters are kept.
+
+        Maps, processes, weights and doubt are those of all presses. The settings are learnt anew
+        once there are a quarter more presses than they were learnt from, and where the new ones
+        are missed far: then the skin has changed. See :meth:`settled_anew`.
+        """
         more = Presses.of_more(dv, xy, strength)
         presses = self.presses.and_then(more)
         region = self.region if self.skin_id else Region.around(presses.xy)
+        presses.within(region)
+        missed = np.linalg.norm(self.predict(more.dv)[0] - more.xy, axis=1)
+        changed = np.median(missed) > _CHANGED * np.median(self.errors)
+        keep = len(presses) <= _GROWN * self.settled and not changed
+        like = self if keep else None
         identities = self.pattern_id, self.skin_id
-        return self.learn(presses.within(region), region, identities)
+        with threadpool_limits(1):
+            return self._learnt(presses, region, identities, _silent, like)
+
+    def settled_anew(self, progress: Advance = _silent) -> Self:
+        """Locator with the same presses, every setting learnt from all of them."""
+        if self.settled == len(self.presses):
+            return self
+        return self.learn(self.presses, self.region, (self.pattern_id, self.skin_id), progress)
 
     @property
     def errors(self) -> FloatArray:

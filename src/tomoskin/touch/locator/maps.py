@@ -30,8 +30,17 @@ class ResponseMaps:
     coregion: Coregion
 
     @classmethod
-    def of(cls, likeness: Likeness, places: FloatArray, features: FloatArray) -> Self:
-        """Maps for ``features`` (n, k) of presses at ``places`` (n, 2)."""
+    def of(
+        cls,
+        likeness: Likeness,
+        places: FloatArray,
+        features: FloatArray,
+        coregion: Coregion | None = None,
+    ) -> Self:
+        """Maps for ``features`` (n, k) of presses at ``places`` (n, 2).
+
+        How the rows answer together is learnt, unless ``coregion`` knows it.
+        """
         mean = features.mean(axis=0)
         centred = features - mean
         basis = Basis.of(likeness, places)
@@ -43,7 +52,7 @@ class ResponseMaps:
         n_rest = len(places) - len(weights)
         rest = centred.T @ centred - rows.T @ rows if n_rest else np.zeros(2 * (len(mean),))
         data = Projected(weights, rows, rest, n_rest)
-        return cls(mean, basis, data, axes, Coregion.of(data))
+        return cls(mean, basis, data, axes, coregion or Coregion.of(data))
 
     @property
     def evidence(self) -> float:

@@ -44,11 +44,21 @@ class Process:
     @classmethod
     def of(cls, terms: Sequence[tuple[str, ...]], squares: Distances, targets: FloatArray) -> Self:
         """Fit ``targets`` (n, 2), of order one, from squared distances (n, n) of each block."""
-        terms = tuple(terms)
         n = len(targets)
         chosen = np.unique(np.linspace(0, n - 1, min(n, _LEARNT_ON)).astype(int))
         few = {name: square[np.ix_(chosen, chosen)] for name, square in squares.items()}
-        logs = _learn(terms, few, targets[chosen])
+        return cls.known(tuple(terms), _learn(tuple(terms), few, targets[chosen]), squares, targets)
+
+    @classmethod
+    def known(
+        cls,
+        terms: tuple[tuple[str, ...], ...],
+        logs: FloatArray,
+        squares: Distances,
+        targets: FloatArray,
+    ) -> Self:
+        """The same with hyper-parameters that are known."""
+        n = len(targets)
         kernel = _kernel(terms, logs, squares)
         kernel[np.diag_indices(n)] += _noise(logs)
         factor = cho_factor(kernel, lower=True, overwrite_a=True, check_finite=False)

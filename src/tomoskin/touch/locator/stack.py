@@ -41,12 +41,20 @@ class Expert:
         squares: Distances,
         xy: FloatArray,
         estimate: FloatArray | None,
+        like: Expert | None,
     ) -> Self:
-        """Learn ``xy`` (n, 2), or what is left of it after ``estimate`` (n, 2)."""
+        """Learn ``xy`` (n, 2), or what is left of it after ``estimate`` (n, 2).
+
+        An expert that is ``like`` another has its hyper-parameters.
+        """
         rest = xy if estimate is None else xy - estimate
         centre = rest.mean(axis=0) if estimate is None else np.zeros(2)
         scale = float((rest - centre).std()) or 1.0
-        process = Process.of(terms, squares, (rest - centre) / scale)
+        targets = (rest - centre) / scale
+        if like is None:
+            process = Process.of(terms, squares, targets)
+        else:
+            process = Process.known(terms, like.process.logs, squares, targets)
         return cls(process, estimate is not None, centre, scale)
 
     def left_out(self, estimate: FloatArray) -> FloatArray:
@@ -78,18 +86,28 @@ class Stack:
     left_out_told: FloatArray
 
     @classmethod
-    def of(cls, features: FloatArray, estimates: FloatArray, xy: FloatArray) -> Self:
-        """Learn from ``features`` (n, k), held-out ``estimates`` (n, 2) and places ``xy``."""
+    def of(
+        cls,
+        features: FloatArray,
+        estimates: FloatArray,
+        xy: FloatArray,
+        like: Stack | None = None,
+    ) -> Self:
+        """Learn from ``features`` (n, k), held-out ``estimates`` (n, 2) and places ``xy``.
+
+        A stack that is ``like`` another has its hyper-parameters; weights are always learnt.
+        """
         between = squared_distances(features, features)
-        unit = float(np.median(between[between > 0])) if (between > 0).any() else 1.0
+        unit = like.unit if like else _usual(between)
         squares = {
             "features": between / unit,
             "estimate": squared_distances(estimates, estimates) / _NEAR**2,
         }
+        known = like.experts if like else (None, None, None)
         experts = (
-            Expert.of(_PLAIN, squares, xy, None),
-            Expert.of(_BOTH, squares, xy, None),
-            Expert.of(_BOTH, squares, xy, estimates),
+            Expert.of(_PLAIN, squares, xy, None, known[0]),
+            Expert.of(_BOTH, squares, xy, None, known[1]),
+            Expert.of(_BOTH, squares, xy, estimates, known[2]),
         )
         told = np.stack([estimates, *(e.left_out(estimates) for e in experts)])
         weights = _weights(told, xy)
@@ -111,6 +129,11 @@ class Stack:
     def combined(self, told: FloatArray) -> FloatArray:
         """(m, 2) places from what each says, (experts, m, 2)."""
         return np.asarray(np.tensordot(self.weights, told, 1))
+
+
+def _usual(between: FloatArray) -> float:
+    """The median of squared distances, without those of presses that are alike."""
+    return float(np.median(between[between > 0])) if (between > 0).any() else 1.0
 
 
 def _weights(told: FloatArray, xy: FloatArray) -> FloatArray:
