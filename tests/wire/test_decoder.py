@@ -115,6 +115,17 @@ def test_an_endless_line_is_dropped_in_bounded_memory(chunk):
     assert decoder.counters.bytes_dropped == total + 1
 
 
+def test_a_stream_that_jumps_gives_up_the_message_under_way():
+    decoder = Decoder()
+    decoder.feed(b"\5torn\0" + encode(HELLO)[:4], 0.0)
+    decoder.forget()
+    assert decoder.feed(encode(HELLO), 0.0) == [HELLO]
+    assert decoder.counters.corrupt == 1
+    decoder.feed(b"\x55" * 9000, 0.0)
+    decoder.forget()
+    assert decoder.feed(encode(HELLO), 0.0) == [HELLO]
+
+
 def test_a_long_block_in_one_piece_is_overlong_too():
     decoder = Decoder()
     assert decoder.feed(b"\x55" * 9000 + b"\0" + encode(HELLO), 0.0) == [HELLO]

@@ -127,7 +127,7 @@ class Link:
         if data and self._tap:
             self._tap(now, data)
         if data and self._played and self._played.jumped():
-            self._decoder = Decoder()
+            self._decoder.forget()
             self._talk.gate.expect_any()
         found = []
         for message in self._decoder.feed(data, now):

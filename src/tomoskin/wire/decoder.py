@@ -68,6 +68,10 @@ class Deframer:
         self._keep(rest)
         return payloads
 
+    def forget(self) -> None:
+        """What comes next does not follow what came before: a message under way is given up."""
+        self._partial, self._skipping = b"", False
+
     def drop(self, reason: str, size: int) -> None:
         """Count a block of ``size`` bytes that is not passed on."""
         self.counts[reason] += 1
@@ -125,6 +129,10 @@ class Decoder:
                 messages.append(message)
         self._messages += len(messages)
         return messages
+
+    def forget(self) -> None:
+        """The stream goes on elsewhere: a message under way is given up, the counts stay."""
+        self._deframer.forget()
 
     @property
     def counters(self) -> Counters:
