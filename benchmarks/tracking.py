@@ -297,7 +297,8 @@ def _two(folder: Path) -> Report:
         tuple(rows),
         (
             "eskin_hydrogel_round, 16 electrodes, learnt from single550; the method was shaped "
-            "with these rows in view, so they are no held-out test; rows 4 to 7 of the 108 mm file hold the same numbers as rows 0 to 3",
+            "with these rows in view, so they are no held-out test; "
+            "rows 4 to 7 of the 108 mm file hold the same numbers as rows 0 to 3",
             f"of 200 single presses of another session (single500_ohmc) {wrong} are taken for two",
         ),
     )
