@@ -76,9 +76,9 @@ class Lab:
         return self.prepared.readout(Frame(0, 0, self.time, 1, 0, 0, samples)).values
 
     def view(self, presses: Sequence[Press]) -> View:
-        """What one frame shows."""
+        """What one frame shows; all voltages in proportion say nothing, as they do live."""
         dv = self.volts(presses) - self.reference.mean
-        return View(self.image(dv), self.floor, dv, np.zeros((len(dv), 0)))
+        return View(self.image(dv), self.floor, dv, self.reference.mean[:, None])
 
     def exact(self, press: Press) -> Floats:
         """(n_meas,) V of the sheet without any noise."""
