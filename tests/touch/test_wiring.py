@@ -182,3 +182,11 @@ def test_a_public_skin_is_oriented(data_dir: Path, steps: int) -> None:
     assert (
         apart < 1.1 * np.linalg.norm(skin.electrode_centres[0] - skin.electrode_centres[1])
     ).all()
+
+
+def test_labels_of_other_presses_make_no_sure_answer() -> None:
+    """Each label stands beside the data of another press: no wiring can be right."""
+    dv, xy, reference = pressed(Wiring.as_drawn(N), 7)
+    found = solve_wiring(dv, np.roll(xy, 3, axis=0), SKIN, reference=reference)
+    assert not found.sure
+    assert found.doubtful

@@ -126,9 +126,7 @@ def _say(found: dict[str, Any]) -> None:
 
 
 def _why(answer: WiringAnswer) -> str:
-    from tomoskin.touch.wiring import SURE
-
-    if answer.probability >= SURE:
+    if answer.doubtful:
         return "too many of these presses look as if they were elsewhere: are the labels right?"
     if answer.unexplained > 1 - answer.probability - answer.unexplained:
         return "no wiring explains these presses well enough to be sure"

@@ -86,8 +86,12 @@ class WiringAnswer:
     @property
     def sure(self) -> bool:
         """Whether the presses tell: the probability is high, and most of them fit their labels."""
-        doubtful = len(self.contradicted) > _DOUBTFUL * self.presses
-        return bool(self.probability >= SURE and not doubtful)
+        return bool(self.probability >= SURE and not self.doubtful)
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether too many presses look as if they were elsewhere."""
+        return len(self.contradicted) > _DOUBTFUL * self.presses
 
 
 def solve_wiring(
