@@ -84,6 +84,10 @@ def test_a_page_goes_about_in_a_replay(run, replay):
     page.told("state", lambda s: s["replay"]["speed"] is None and s["replay"]["loop"])
     page.ask("pause", on=False)
     until(lambda: runner.newest.result.sequence == 5)  # past the end and on
+    told = page.told("state", lambda s: s["reference"]["age_s"] is not None)
+    span = all_frames[-1].host_time - start
+    assert 0 <= told["p50_ms"] < 1e3 * PATIENCE  # of this run, not since the recording
+    assert 0 <= told["reference"]["age_s"] <= span
     page.ask("loop", on=False)
     assert page.told("state", lambda s: s["replay"]["ended"])["replay"]["speed"] is None
     page.ask("speed", speed=0.5)

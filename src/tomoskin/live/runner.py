@@ -102,7 +102,7 @@ class Runner:
         self._meter = Meter()
         self._presses = PressBoard()
         self._truth: tuple[Press, ...] = ()
-        self._pressed = 0
+        self._pressed, self._polled = 0, 0.0
         self._wishes = Wishes()
         self._tape = Tape(prepared, self.say, clock)
         self._outlets = Outlets(sinks, self.say)
@@ -222,12 +222,16 @@ class Runner:
             p50=p50,
             p99=p99,
             reference=reference,
-            reference_age=None if reference.since is None else now - reference.since,
+            reference_age=None if reference.since is None else self._here() - reference.since,
             choice=self._pipeline.choice,
             left_out=result.left_out if result else 0,
             electrodes=result.health.sick if result and result.health else (),
             problem=self._trouble or self._standstill or (result.problem if result else None),
         )
+
+    def _here(self) -> float:
+        """Host time of now, of a replay that of the recording."""
+        return self.replay.now() if self.replay else self._clock()
 
     def _run(self, transport: Transport | None) -> None:
         try:
@@ -251,6 +255,7 @@ class Runner:
                 while not self._stopping.is_set():
                     self._press(transport)
                     found = link.poll(_POLL)
+                    self._polled = self._clock()
                     self._trouble = None if link.running else _WAITING
                     self._tape.linked(link)
                     if link.info is not None and link.info.tick_rate:
@@ -307,12 +312,16 @@ class Runner:
                 self._tape.frame(frame, mark)
                 self._process(frame, mark)
 
+    def _read(self, frame: Frame) -> float:
+        """When its last byte was read, by our clock; the times in a replay are the recording's."""
+        return self._polled if self.replay else frame.host_time
+
     def _process(self, frame: Frame, mark: Mark) -> None:
         if mark & Mark.SKIPPED:
             self._skipped += 1
             return
         self._standstill = None
-        self._meter.arrived(frame.host_time)
+        self._meter.arrived(self._read(frame))
         try:
             result = advance(self._pipeline, frame, mark)
         except DataError as error:
@@ -321,7 +330,7 @@ class Runner:
             return
         if result is None:
             return
-        latency = self._clock() - frame.host_time
+        latency = self._clock() - self._read(frame)
         self._meter.took(latency)
         self.newest = Snapshot(result, self._truth, latency)
         self._tape.result(result)

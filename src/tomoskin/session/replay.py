@@ -19,7 +19,7 @@ from tomoskin.session.replay_board import ReplayBoard
 from tomoskin.session.session_reader import SessionReader
 from tomoskin.source import Configuration, ScanSettings
 from tomoskin.twin import Clock, WallClock
-from tomoskin.wire import SCHEMA
+from tomoskin.wire import OLDER, SCHEMA
 
 if TYPE_CHECKING:
     from tomoskin.skin import Skin
@@ -305,7 +305,7 @@ def _restamped(session: SessionReader, skin: Skin, where: str) -> int | None:
     if first is None:
         raise SourceError("holds no frame", where=where)
     configuration = Configuration.of(Scan.of(skin.pattern()), ScanSettings.of(skin))
-    same_wire = session.device().get("schema_hash", SCHEMA.hash) == SCHEMA.hash
+    same_wire = session.device().get("schema_hash", SCHEMA.hash) in {SCHEMA.hash, *OLDER.values()}
     if first.frame.configuration == configuration.identity and same_wire:
         return None
     same_skin = skin.identity == session.skin.identity
