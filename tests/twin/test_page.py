@@ -4,14 +4,20 @@ from pathlib import Path
 
 import pytest
 
-from tomoskin.twin import ContactSettings, ElectronicsSettings, LineSettings, MaterialSettings
+from tomoskin.twin import (
+    BendSettings,
+    ContactSettings,
+    ElectronicsSettings,
+    LineSettings,
+    MaterialSettings,
+)
 from tomoskin.twin.page import parameter_tables
 from tomoskin.twin.parameters import documented
 from tomoskin.twin.settings import SOURCES
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "twin.md"
 MARK = "<!-- from here on written by tomoskin.twin.page.parameter_tables() -->\n\n"
-RECORDS = (ContactSettings, MaterialSettings, ElectronicsSettings, LineSettings)
+RECORDS = (ContactSettings, MaterialSettings, ElectronicsSettings, LineSettings, BendSettings)
 
 
 def test_the_page_holds_the_records_numbers():

@@ -16,7 +16,7 @@ from tomoskin.mesh.quality import Quality, quality
 from tomoskin.mesh.surface import Plane, Surface, laid_on
 from tomoskin.mesh.topology import simplex_measure
 from tomoskin.mesh.triangulate import triangulate
-from tomoskin.mesh.wrapped import Arm, Cylinder
+from tomoskin.mesh.wrapped import Arm, Cylinder, Hinge
 
 __all__ = [
     "Arm",
@@ -28,6 +28,7 @@ __all__ = [
     "ElectrodeArc",
     "Ellipse",
     "FacePatch",
+    "Hinge",
     "Mesh",
     "MeshFile",
     "Outline",

@@ -1,4 +1,4 @@
-"""Sheets wrapped around round bodies: a cylinder, a limb with a joint."""
+"""Sheets wrapped around round bodies: a cylinder, a limb with a joint, a hinge."""
 
 from __future__ import annotations
 
@@ -37,15 +37,12 @@ class Cylinder(Surface):
         """(n, 3) m."""
         across, along = (rows_of(uv) @ self._frame).T
         angle = across / self.radius
-        height = self.radius * (np.cos(angle) - 1.0)
-        return np.column_stack([self.radius * np.sin(angle), along, height]) @ self._turn
+        x, height = self.radius * np.sin(angle), self.radius * (np.cos(angle) - 1.0)
+        return np.column_stack([x, along, height]) @ _into_space(self._frame)
 
     def jacobian(self, uv: ArrayLike) -> FloatArray:
         """Along the axis as it was, across it around the cylinder."""
-        angle = (rows_of(uv) @ self._frame)[:, 0] / self.radius
-        local = np.zeros((len(angle), 3, 2))
-        local[:, 0, 0], local[:, 2, 0], local[:, 1, 1] = np.cos(angle), -np.sin(angle), 1.0
-        return np.asarray(self._turn.T @ local @ self._frame.T)
+        return _rolled((rows_of(uv) @ self._frame)[:, 0] / self.radius, self._frame)
 
     def check(self, uv: ArrayLike) -> None:
         """The ends must not overlap at the seam."""
@@ -54,16 +51,7 @@ class Cylinder(Surface):
 
     @property
     def _frame(self) -> FloatArray:
-        """(2, 2): columns across and along the axis, so that front stays front."""
-        c, s = math.cos(self.axis), math.sin(self.axis)
-        return np.array([[s, c], [-c, s]])
-
-    @property
-    def _turn(self) -> FloatArray:
-        """(3, 3): from (across, along, height) to x, y, z, for rows."""
-        turn = np.eye(3)
-        turn[:2, :2] = self._frame.T
-        return turn
+        return _across_and_along(self.axis)
 
 
 @dataclass(frozen=True)
@@ -102,7 +90,7 @@ class Arm(Surface):
         """(n, 3) m."""
         u, v = rows_of(uv).T
         around = u / self.radius
-        turn, middle = self._middle_line(v)
+        turn, middle = _middle_line(v, self.angle, self.joint)
         y, z = (middle + self._away(turn) * (self.radius * np.cos(around))[:, None]).T
         return np.column_stack([self.radius * np.sin(around), y, z - self.radius])
 
@@ -110,7 +98,7 @@ class Arm(Surface):
         """Around the limb true to length, along it 1 + κ r cos(u/r)."""
         u, v = rows_of(uv).T
         around = u / self.radius
-        turn, _ = self._middle_line(v)
+        turn, _ = _middle_line(v, self.angle, self.joint)
         stretch = 1.0 + self._curvature(v) * self.radius * np.cos(around)
         out = np.zeros((len(u), 3, 2))
         out[:, 0, 0] = np.cos(around)
@@ -125,21 +113,101 @@ class Arm(Surface):
     def _curvature(self, v: FloatArray) -> FloatArray:
         return np.where(np.abs(v) < self.joint / 2, self.angle / self.joint, 0.0)
 
-    def _middle_line(self, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(n,) direction, rad, 0 in the middle of the joint, and (n, 2) place (y, z), m."""
-        half = self.joint / 2
-        inside = np.clip(v, -half, half)
-        turn = self.angle * inside / self.joint
-        # ∫ (cos, −sin) of the turning direction, by the chord of the arc
-        chord = np.sinc(turn / (2 * np.pi)) * inside
-        place = chord[:, None] * np.column_stack([np.cos(turn / 2), -np.sin(turn / 2)])
-        beyond = (v - inside)[:, None] * np.column_stack([np.cos(turn), -np.sin(turn)])
-        return turn, place + beyond
-
     @staticmethod
     def _away(turn: FloatArray) -> FloatArray:
         """(n, 2) from the middle line towards u = 0, in (y, z)."""
         return np.column_stack([np.sin(turn), np.cos(turn)])
+
+
+@dataclass(frozen=True)
+class Hinge(Surface):
+    """Bent along a strip, flat on both sides of it; not stretched.
+
+    Attributes
+    ----------
+    angle
+        Between the two sides, rad; positive where the front is convex.
+    length
+        Width of the strip across the axis, m; over the whole sheet, take its size.
+    axis
+        Direction of the axis in the sheet, rad from u.
+    at
+        Distance of the strip's middle line from the middle of the sheet, m, to the right as seen
+        along the axis.
+    """
+
+    angle: float
+    length: float
+    axis: float = math.pi / 2
+    at: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse an impossible strip."""
+        positive("length", self.length)
+        if not abs(self.angle) <= 2 * math.pi:
+            raise GeometryError(
+                f"expected an angle of at most 360°, got {math.degrees(self.angle):.4g}°"
+            )
+
+    def point(self, uv: ArrayLike) -> FloatArray:
+        """(n, 3) m."""
+        across, along = (rows_of(uv) @ self._frame).T
+        _, place = _middle_line(across - self.at, self.angle, self.length)
+        x, height = place.T
+        return np.column_stack([x + self.at, along, height]) @ _into_space(self._frame)
+
+    def jacobian(self, uv: ArrayLike) -> FloatArray:
+        """Along the axis as it was, across it along the arc."""
+        across = (rows_of(uv) @ self._frame)[:, 0]
+        turn, _ = _middle_line(across - self.at, self.angle, self.length)
+        return _rolled(turn, self._frame)
+
+    def check(self, uv: ArrayLike) -> None:
+        """The sides must not cross."""
+        across = (rows_of(uv) @ self._frame)[:, 0] - self.at
+        beyond = float(np.abs(across).max()) > self.length / 2 * (1 + _ROUNDING)
+        if beyond and abs(self.angle) > math.pi * (1 + _ROUNDING):
+            raise GeometryError(
+                f"expected at most 180° where the sheet goes on beyond the strip that bends, got "
+                f"{math.degrees(self.angle):.4g}°",
+                hint="bend it over a greater length",
+            )
+
+    @property
+    def _frame(self) -> FloatArray:
+        return _across_and_along(self.axis)
+
+
+def _middle_line(v: FloatArray, angle: float, joint: float) -> tuple[FloatArray, FloatArray]:
+    """(n,) direction, rad, 0 in the middle of the joint, and (n, 2) place (y, z), m."""
+    half = joint / 2
+    inside = np.clip(v, -half, half)
+    turn = angle * inside / joint
+    # ∫ (cos, −sin) of the turning direction, by the chord of the arc
+    chord = np.sinc(turn / (2 * np.pi)) * inside
+    place = chord[:, None] * np.column_stack([np.cos(turn / 2), -np.sin(turn / 2)])
+    beyond = (v - inside)[:, None] * np.column_stack([np.cos(turn), -np.sin(turn)])
+    return turn, place + beyond
+
+
+def _across_and_along(axis: float) -> FloatArray:
+    """(2, 2): columns across and along an axis, so that front stays front."""
+    c, s = math.cos(axis), math.sin(axis)
+    return np.array([[s, c], [-c, s]])
+
+
+def _into_space(frame: FloatArray) -> FloatArray:
+    """(3, 3): from (across, along, height) to x, y, z, for rows."""
+    turn = np.eye(3)
+    turn[:2, :2] = frame.T
+    return turn
+
+
+def _rolled(turn: FloatArray, frame: FloatArray) -> FloatArray:
+    """(n, 3, 2) derivative of a sheet whose direction across the axis has turned by ``turn``."""
+    local = np.zeros((len(turn), 3, 2))
+    local[:, 0, 0], local[:, 2, 0], local[:, 1, 1] = np.cos(turn), -np.sin(turn), 1.0
+    return np.asarray(_into_space(frame).T @ local @ frame.T)
 
 
 def _check_seam(extent: float, radius: float) -> None:

@@ -1,5 +1,6 @@
 """A skin without hardware: probes → dents → conductivity → potentials → counts → bytes."""
 
+from tomoskin.twin.bend import BendSettings, Bent, Deformation, Pose, Stretched, strain_of
 from tomoskin.twin.board import Board
 from tomoskin.twin.circuit import Lines, line_potentials
 from tomoskin.twin.clock import VirtualClock
@@ -29,11 +30,14 @@ __all__ = [
     "COMMON_PRESSES",
     "PRESETS",
     "Analogue",
+    "BendSettings",
+    "Bent",
     "Board",
     "Circle",
     "Clock",
     "Contact",
     "ContactSettings",
+    "Deformation",
     "Dented",
     "Disturbance",
     "ElectronicsSettings",
@@ -50,6 +54,7 @@ __all__ = [
     "MaterialSettings",
     "MaterialState",
     "Population",
+    "Pose",
     "Press",
     "Probe",
     "SampleTable",
@@ -58,6 +63,7 @@ __all__ = [
     "SetPlan",
     "Shape",
     "Square",
+    "Stretched",
     "TwinDevice",
     "TwinElectronics",
     "TwinSettings",
@@ -84,4 +90,5 @@ __all__ = [
     "sample_table",
     "script_page",
     "solve_contact",
+    "strain_of",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from tomoskin.twin.bend import BendSettings
 from tomoskin.twin.contact import ContactSettings
 from tomoskin.twin.line import LineSettings
 from tomoskin.twin.material import MaterialSettings
@@ -15,6 +16,7 @@ _STAGES = (
     ("Contact", ContactSettings, 0),
     ("Material", MaterialSettings, 1),
     ("Electronics", ElectronicsSettings, 2),
+    ("Bending", BendSettings, 3),
 )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
+from tomoskin.twin.bend import Pose
 from tomoskin.twin.circuit import Lines, line_potentials, settling
 from tomoskin.twin.faults import Faults, check_electrodes
 from tomoskin.twin.parameters import check_numbers, parameter
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 
 Course = Callable[[float], tuple[Contact, ...]]
 """What presses so many seconds after the start of a scan."""
+
+Bending = Callable[[float], Pose]
+"""How the sheet is bent then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +130,7 @@ class TwinElectronics:
         self._time: float | None = None
         self._aged = 0.0
         self._course: Course | None = None
+        self._bending: Bending | None = None
         self._before = np.zeros(n)
         self._known: tuple[object, ...] = ()
         self._lines = Lines(np.zeros((0, n)), np.zeros((0, n), dtype=bool))
@@ -140,12 +145,12 @@ class TwinElectronics:
         check_electrodes(faults, self.sheet.n_electrodes)
         self._faults = faults
 
-    def follow(self, course: Course | None) -> None:
-        """Take the presses of each drive from ``course``: they may move during a scan.
+    def follow(self, course: Course | None, bending: Bending | None = None) -> None:
+        """Take the presses of each drive from ``course``, its pose from ``bending``.
 
-        None: those that the sheet has at its start.
+        They may move during a scan. None: those that the sheet has at its start.
         """
-        self._course = course
+        self._course, self._bending = course, bending
 
     def renew(self, chance: np.random.SeedSequence) -> None:
         """Begin anew at no time, with noise and contacts from ``chance``; the channels stay."""
@@ -173,22 +178,36 @@ class TwinElectronics:
     def _scanned(self, table: SampleTable, time: float) -> Lines:
         """What the channels stand at under each drive, as the presses stand or move."""
         middles = table.middles
-        moves = [self._course(since) for since in middles.tolist()] if self._course else []
-        if moves and all(presses == moves[0] for presses in moves):
-            self.sheet.set_presses(moves[0])
+        moves = self._moves(middles.tolist())
+        if moves and all(move == moves[0] for move in moves):
+            self._set(*moves[0])
             moves = []
         if not moves:
             self._let_go_by(time)
             return self._potentials(table)
         lines = []
-        for number, presses in enumerate(moves):
-            self.sheet.set_presses(presses)
+        for number, move in enumerate(moves):
+            self._set(*move)
             self._let_go_by(time + float(middles[number]))
             lines.append(self._under(table.drives[number : number + 1], self.sheet.resistance()))
         return Lines(
             read=np.concatenate([line.read for line in lines]),
             stuck=np.concatenate([line.stuck for line in lines]),
         )
+
+    def _moves(self, times: list[float]) -> list[tuple[tuple[Contact, ...], Pose]]:
+        """What presses, and how the sheet is bent, at each of the ``times``."""
+        course, bending, sheet = self._course, self._bending, self.sheet
+        if course is None and bending is None:
+            return []
+        return [
+            (course(t) if course else sheet.presses, bending(t) if bending else sheet.pose)
+            for t in times
+        ]
+
+    def _set(self, presses: tuple[Contact, ...], pose: Pose) -> None:
+        self.sheet.set_presses(presses)
+        self.sheet.set_pose(pose)
 
     def _let_go_by(self, time: float) -> None:
         """Let the sheet go on to ``time`` s."""

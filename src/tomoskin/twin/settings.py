@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 from tomoskin.core import ModelError
+from tomoskin.twin.bend import BendSettings
 from tomoskin.twin.contact import ContactSettings
 from tomoskin.twin.line import LineSettings
 from tomoskin.twin.material import MaterialSettings
@@ -24,8 +25,8 @@ class TwinSettings:
     mesh_ratio
         Cells of the twin's mesh per cell of the reconstruction's. The twin's mesh is finer and
         from another seed, so that no picture is made with the model that made its data.
-    contact, material, electronics, line
-        The stages.
+    contact, material, electronics, line, bend
+        The stages; and where the layer that conducts lies in what is bent.
     """
 
     seed: int = 0
@@ -34,6 +35,7 @@ class TwinSettings:
     material: MaterialSettings = field(default_factory=MaterialSettings)
     electronics: ElectronicsSettings = field(default_factory=ElectronicsSettings)
     line: LineSettings = field(default_factory=LineSettings)
+    bend: BendSettings = field(default_factory=BendSettings)
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -50,8 +52,10 @@ class TwinSettings:
         """
         if name not in PRESETS:
             raise ModelError(f'expected a twin of {", ".join(PRESETS)}, got "{name}"', where="twin")
-        contact, material, electronics = PRESETS[name]
-        return cls(seed=seed, contact=contact, material=material, electronics=electronics)
+        contact, material, electronics, bend = PRESETS[name]
+        return cls(
+            seed=seed, contact=contact, material=material, electronics=electronics, bend=bend
+        )
 
     def with_noise(self, noise: float) -> Self:
         """These settings with another noise of one conversion, LSB."""
@@ -95,12 +99,14 @@ SOURCES = {
     "modulus": "foam and gel assumed; tank: ρg · thickness (Archimedes)",
     "tension": "sheet assumed; gel: its shear modulus · thickness / 3 (Pasternak)",
     "lock": "textile: chosen so that wider probes change more, as in the source's figure 5.7",
+    "height": "textile: thickness of the foam, glued to what bends; gel: half of it, as all of it "
+    "conducts; a tank does not bend",
     "compression": "gel and tank: −1, the layer that conducts gets thinner",
 }
 """Where the presets' numbers come from; those not named are assumed."""
 
-PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings]] = {
-    "ideal": (ContactSettings(), MaterialSettings(), ElectronicsSettings()),
+PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings, BendSettings]] = {
+    "ideal": (ContactSettings(), MaterialSettings(), ElectronicsSettings(), BendSettings()),
     "textile": (
         ContactSettings(),
         MaterialSettings(
@@ -116,6 +122,7 @@ PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings]
             wear=2e-4,
         ),
         BOARD,
+        BendSettings(),
     ),
     "hydrogel": (
         ContactSettings(
@@ -140,6 +147,7 @@ PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings]
             spread=0.02,
         ),
         replace(BOARD, output_resistance=2.5e6, contact_sd=1.0, time_constant=100e-6),
+        BendSettings(height=2.5e-3),
     ),
     "tank": (
         ContactSettings(
@@ -161,9 +169,10 @@ PRESETS: dict[str, tuple[ContactSettings, MaterialSettings, ElectronicsSettings]
             temperature_sd=0.1,
         ),
         replace(BOARD, output_resistance=2.5e6, contact_sd=0.5, time_constant=100e-6),
+        BendSettings(height=0.0),
     ),
 }
-"""Contact, material and electronics by name.
+"""Contact, material, electronics and bending by name.
 
 ideal: no vices, no memory. textile: silver-plated knit over soft foam. hydrogel: a slab of ionic
 gel on a rigid ground. tank: saline 100 mm deep; a probe is an insulating body that floats, so

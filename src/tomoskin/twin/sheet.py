@@ -10,8 +10,9 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel, State
-from tomoskin.mesh import Outline, triangulate
+from tomoskin.mesh import Outline, Plane, Surface, laid_on, triangulate
 from tomoskin.twin import material
+from tomoskin.twin.bend import BendSettings, Pose, strain_of
 from tomoskin.twin.contact import ContactSettings
 from tomoskin.twin.dent import Load, indent
 from tomoskin.twin.material import MaterialSettings, MaterialState
@@ -46,12 +47,18 @@ class TwinSkin:
         *,
         contact: ContactSettings | None = None,
         settings: MaterialSettings | None = None,
+        bend: BendSettings | None = None,
+        rest: Surface | None = None,
         seed: int = 0,
     ) -> None:
-        """``conductivity`` of the sheet at rest, S; ``model`` on the twin's own mesh."""
+        """``conductivity`` of the sheet at rest, S; ``model`` on the twin's own mesh.
+
+        ``rest`` is what the sheet lies on at rest, and the mesh too.
+        """
         self.model = model
         self.contact = contact or ContactSettings()
         self.material = settings or MaterialSettings()
+        self.bend, self.rest = bend or BendSettings(), rest or Plane()
         self._outline = outline
         self._points = model.mesh.centroids
         self._blur = math.sqrt(float(model.mesh.volumes.mean())) / math.sqrt(12)
@@ -64,8 +71,10 @@ class TwinSkin:
         n = len(self._unloaded)
         self._nothing = self._load = Load.none(n)
         self._presses: tuple[Contact, ...] = ()
-        self._loaded: tuple[Contact, ...] = ()
-        self._stood: tuple[Contact, ...] = ()
+        self._pose: Pose = ()
+        self._loaded: tuple[object, ...] = (self._presses, self._pose)
+        self._stood = self._loaded
+        self._posed: tuple[Pose, FloatArray] = (self._pose, self._nothing.strain)
         self._state = MaterialState.fresh(self.material, n)
         self._conductivity: FloatArray | None = None
         self._solved_for: FloatArray = np.empty(0)
@@ -76,7 +85,8 @@ class TwinSkin:
     def of(cls, skin: Skin, settings: TwinSettings) -> Self:
         """The twin of a skin, on a finer mesh from another seed."""
         cells = round(settings.mesh_ratio * skin.mesh_cells)
-        mesh = triangulate(skin.outline, skin.arcs, cells, seed=_MESH_SEED)
+        flat = triangulate(skin.outline, skin.arcs, cells, seed=_MESH_SEED)
+        mesh = laid_on(flat, skin.surface)
         model = ForwardModel(
             mesh, skin.pattern(), contact_impedance=skin.contact_impedance, current=skin.current
         )
@@ -86,6 +96,8 @@ class TwinSkin:
             skin.conductivity,
             contact=settings.contact,
             settings=settings.material,
+            bend=settings.bend,
+            rest=skin.surface,
             seed=settings.seed,
         )
 
@@ -100,19 +112,30 @@ class TwinSkin:
         return self._presses
 
     @property
+    def pose(self) -> Pose:
+        """How the sheet is bent and stretched now."""
+        return self._pose
+
+    @property
     def state(self) -> MaterialState:
         """What the sheet remembers."""
         return self._state
 
     @property
     def load(self) -> Load:
-        """What the cells feel under the present presses."""
-        presses = self._presses
-        if presses is not self._loaded:
-            probes = probes_of(presses)
-            self._load = indent(probes, self.contact, self._points, self._blur)
-            self._loaded = presses
+        """What the cells feel under the present presses, in the present pose."""
+        presses, pose = self._presses, self._pose
+        if not _same((presses, pose), self._loaded):
+            dented = indent(probes_of(presses), self.contact, self._points, self._blur)
+            self._load = replace(dented, strain=dented.strain + self._strain(pose))
+            self._loaded = (presses, pose)
         return self._load
+
+    def _strain(self, pose: Pose) -> FloatArray:
+        """(n_cells, 3) of the pose alone."""
+        if pose is not self._posed[0]:
+            self._posed = pose, strain_of(pose, self._points, self.rest, self.bend.height)
+        return self._posed[1]
 
     def set_presses(self, presses: tuple[Contact, ...]) -> None:
         """Replace all presses at once, from any thread.
@@ -126,6 +149,19 @@ class TwinSkin:
         if presses != self._presses:
             self._presses = tuple(presses)
 
+    def set_pose(self, pose: Pose) -> None:
+        """Bend and stretch the sheet, from any thread; ``()`` lets it lie as at rest.
+
+        Raises
+        ------
+        GeometryError
+            When it cannot take that shape; then nothing is changed.
+        """
+        if pose != self._pose:
+            taken = tuple(pose)
+            self._posed = taken, strain_of(taken, self._points, self.rest, self.bend.height)
+            self._pose = taken
+
     def advance(self, dt: float) -> None:
         """Let ``dt`` s go by under the present presses; any step is exact.
 
@@ -134,23 +170,25 @@ class TwinSkin:
         ModelError
             When dt is negative or not finite.
         """
-        presses = self._presses
-        settled = presses is self._stood and (self.material.still or dt == 0)
+        now = (self._presses, self._pose)
+        settled = _same(now, self._stood) and (self.material.still or dt == 0)
         if settled and self._conductivity is not None and dt >= 0:
             return
-        self._stood = presses
+        self._stood = now
         chance = self._random.standard_normal() if self.material.temperature_sd > 0 else 0.0
         self._state = material.advance(self._state, self.material, self.load, dt, chance)
         self._conductivity = material.conductivity(self._state, self.material, self._unloaded)
 
     def renew(self, chance: np.random.SeedSequence | None = None) -> None:
-        """Forget all presses and their past: a sheet that nothing has touched.
+        """Forget all presses, bends and their past: a sheet that nothing has touched.
 
         Its spread stays. ``chance``, if given, is where its temperature begins anew.
         """
         if chance is not None:
             self._random = np.random.default_rng(chance)
-        self._presses = self._loaded = self._stood = ()
+        self._presses, self._pose = (), ()
+        nothing: tuple[object, ...] = (self._presses, self._pose)
+        self._loaded = self._stood = nothing
         self._load = self._nothing
         self._state = MaterialState.fresh(self.material, len(self._unloaded))
         self._conductivity = None
@@ -190,3 +228,7 @@ class TwinSkin:
                 return self._base.local.transfer_resistance(changed, sigma[changed])
         # Positive and symmetric as they are made: no need of the model's check.
         return np.asarray(State(self.model, sigma).transfer_resistance)
+
+
+def _same(some: tuple[object, ...], others: tuple[object, ...]) -> bool:
+    return all(a is b for a, b in zip(some, others, strict=True))

@@ -7,6 +7,7 @@ import time
 from typing import Protocol
 
 from tomoskin.core import SourceError
+from tomoskin.twin.bend import Pose
 from tomoskin.twin.device import TwinDevice
 from tomoskin.twin.faults import Faults
 from tomoskin.twin.line import Line, LineSettings
@@ -80,6 +81,16 @@ class TwinTransport:
             When the centre of one is off the skin; then nothing is changed.
         """
         self.sheet.set_presses(presses)
+
+    def set_pose(self, pose: Pose) -> None:
+        """Bend and stretch the twin's sheet; it shows from the next frame on.
+
+        Raises
+        ------
+        GeometryError
+            When the sheet cannot take that shape; then nothing is changed.
+        """
+        self.sheet.set_pose(pose)
 
     def set_faults(self, faults: Faults) -> None:
         """Break and mend; it shows from the next frame on.
