@@ -73,7 +73,7 @@ class TwinSkin:
         self._presses: tuple[Contact, ...] = ()
         self._pose: Pose = ()
         self._loaded: tuple[object, ...] = (self._presses, self._pose)
-        self._stood = self._loaded
+        self._stood: tuple[object, ...] = self._loaded
         self._posed: tuple[Pose, FloatArray] = (self._pose, self._nothing.strain)
         self._state = MaterialState.fresh(self.material, n)
         self._conductivity: FloatArray | None = None
@@ -187,7 +187,7 @@ class TwinSkin:
         if chance is not None:
             self._random = np.random.default_rng(chance)
         self._presses, self._pose = (), ()
-        nothing: tuple[object, ...] = (self._presses, self._pose)
+        nothing = (self._presses, self._pose)
         self._loaded = self._stood = nothing
         self._load = self._nothing
         self._state = MaterialState.fresh(self.material, len(self._unloaded))
