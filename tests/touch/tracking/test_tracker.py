@@ -194,3 +194,12 @@ def test_what_holds_whatever_comes(
         for touch in touches:
             assert not touch.merged or touch.id == min(touch.merged)
             assert (touch.kind == "decrease") == (touch.reading.peak < 0)
+
+
+def test_of_frames_that_do_not_follow_each_other_none_tells_of_another() -> None:
+    """A faint target where a strong one was is a target, a weak one beside a new strong one not."""
+    strong, faint = reading(0, peak=-1.0), reading(0, peak=-0.2)
+    run = Run(settings=STILL)([[strong], [], [faint]])
+    assert [len(ids) for ids in run.shown] == [1, 0, 1]
+    run = Run(settings=STILL)([[strong], [reading(0, weak=True), reading(0.05)]])
+    assert [[touch.reading.x for touch in frame] for frame in run.touches] == [[0], [0.05]]

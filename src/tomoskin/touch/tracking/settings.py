@@ -39,6 +39,11 @@ class TrackSettings:
         """Below which there is no reading."""
         return HELD * self.snr
 
+    @property
+    def still(self) -> bool:
+        """Whether a frame tells nothing of the next one."""
+        return self.onset == 0 and self.release == 0
+
 
 STILL = TrackSettings(onset=0.0, release=0.0)
 """For frames that do not follow each other in time: each shows what it holds."""

@@ -53,6 +53,9 @@ class Tracker:
         """
         elapsed = self._elapse(time, host_time)
         self._host = host_time
+        if self.settings.still:  # what stood there before says nothing of this frame
+            readings = [reading for reading in readings if not reading.weak]
+            self._remainders.forget()
         if readings or self._traces:
             self._follow(list(readings), elapsed)
         if not readings:
