@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from tomoskin.cli.calibrate_states import calibrate_states
@@ -55,7 +54,7 @@ def touch(
     json: JsonFlag = False,
 ) -> None:
     """Learn where a touch is from presses at known places."""
-    from tomoskin.cli.labelled import changes, labels
+    from tomoskin.cli.labelled import changes, labelled_frames, labels
     from tomoskin.session import read_recording, write_calibration
 
     whole = read_recording(recording)
@@ -65,7 +64,7 @@ def touch(
     )
     whole = whole.in_order_of(pattern)
     xy, dv = labels(whole), changes(whole, reference, pattern)
-    frames = np.flatnonzero(np.isfinite(xy).all(axis=1))
+    frames = labelled_frames(xy)
     calibration = learn(dv[frames], xy[frames])
     write_calibration(out, calibration)
     found = _findings(calibration, frames.tolist())
@@ -117,6 +116,8 @@ def _what_of(name: str | None, path: Path, whole: Recording) -> tuple[Skin | Non
 
 
 def _findings(calibration: Calibration, frames: list[int]) -> dict[str, Any]:
+    import numpy as np
+
     locator = calibration.locator
     older = len(locator.presses) - len(frames)
     errors = 1e3 * locator.errors

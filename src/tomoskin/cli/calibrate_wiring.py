@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from tomoskin.cli.output import JsonFlag, emit
@@ -38,7 +37,7 @@ def calibrate_wiring(
     The result is a skin file whose electrodes are where the wires end: give it as --skin to any
     other command.
     """
-    from tomoskin.cli.labelled import changes, labels
+    from tomoskin.cli.labelled import changes, labelled_frames, labels
     from tomoskin.session import read_recording
     from tomoskin.touch import solve_wiring
 
@@ -48,7 +47,7 @@ def calibrate_wiring(
     pattern = drawn.pattern()
     whole = whole.in_order_of(pattern)
     xy, dv = labels(whole), changes(whole, reference, pattern)
-    frames = np.flatnonzero(np.isfinite(xy).all(axis=1))
+    frames = labelled_frames(xy)
     rest, noise = _at_rest(whole, reference, pattern)
     with Bar("weighing wirings") as bar:
         answer = solve_wiring(
@@ -74,7 +73,7 @@ def _at_rest(
     idle = idle_frames(whole, reference, pattern)
     if idle is None or isinstance(idle, str):
         return None, None
-    known = Reference.of(np.asarray(idle.real, dtype=np.float64))
+    known = Reference.of(idle.real.astype(float))
     usable = known.noise_is_known and (known.noise > 0).all()
     return known.mean, known.noise if usable else None
 

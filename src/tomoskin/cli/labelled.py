@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tomoskin.cli.recording import idle_frames
-from tomoskin.core import DataError, FloatArray
+from tomoskin.core import DataError, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from tomoskin.pattern import Pattern
@@ -31,6 +31,11 @@ def changes(recording: Recording, reference: str | None, pattern: Pattern) -> Fl
             "holds complex voltages", where=recording.source, hint="calibrate on their magnitudes"
         )
     return np.asarray(values, dtype=np.float64)
+
+
+def labelled_frames(places: FloatArray) -> IntArray:
+    """(k,) frames of ``places`` (n, 2) that have a label."""
+    return np.flatnonzero(np.isfinite(places).all(axis=1))
 
 
 def labels(recording: Recording) -> FloatArray:

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from tomoskin.cli.output import JsonFlag, emit
@@ -39,6 +38,8 @@ def locate(
     json: JsonFlag = False,
 ) -> None:
     """Locate the one touch in every frame by a calibration, or with --several up to two."""
+    import numpy as np
+
     from tomoskin.cli.labelled import changes
     from tomoskin.session import read_calibration, read_recording, write_touches
 
@@ -84,6 +85,8 @@ def _several(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
 
 
 def _single(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
+    import numpy as np
+
     from tomoskin.core import Reading, Touch
 
     locator = known.locator
