@@ -6,9 +6,9 @@ import asyncio
 import contextlib
 import time
 from collections import deque
-from collections.abc import AsyncIterator, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -48,6 +48,17 @@ class Listener(Protocol):
         """Send ``text`` soon."""
 
 
+class Desk(Protocol):
+    """What answers some of the requests, beside the hub itself."""
+
+    @property
+    def handlers(self) -> Mapping[type, Callable[[Listener, Any], None]]:
+        """What to call with a page and its request, by the request's type; WireError refuses."""
+
+    def greeting(self) -> Sequence[str]:
+        """Messages that a new page is told."""
+
+
 class Hub:
     """The pages of one runner; lives in the event loop.
 
@@ -70,6 +81,7 @@ class Hub:
         self._told = 0
         self._timeline = ""
         self._tasks: set[asyncio.Task[None]] = set()
+        self._desks: list[Desk] = []
         self._past: deque[str] = deque(maxlen=_FIRST_EVENTS)
         self._scene = messages.scene(
             runner.prepared, runner.source, limit=limit, pressable=runner.pressable
@@ -87,7 +99,7 @@ class Hub:
 
         ticker = asyncio.create_task(self._tick())
         if self.runner.replay is not None:
-            self._keep(self._tell_timeline(self.runner.replay.path))
+            self.keep(self._tell_timeline(self.runner.replay.path))
         with self.runner.watched_by(announce):
             yield
         ticker.cancel()
@@ -103,7 +115,9 @@ class Hub:
         """Serve ``page`` from now on."""
         self._pages.add(page)
         timeline = [self._timeline] if self._timeline else []
-        for text in (self._scene, messages.state(self.runner.status()), *timeline, *self._past):
+        greetings = [text for desk in self._desks for text in desk.greeting()]
+        now = messages.state(self.runner.status())
+        for text in (self._scene, now, *timeline, *greetings, *self._past):
             page.post(text)
 
     def leave(self, page: Listener, why: str = "") -> None:
@@ -123,8 +137,16 @@ class Hub:
             self._encoded = (newest, data)
         return self._encoded[1]
 
+    def take(self, desk: Desk) -> None:
+        """Let ``desk`` answer requests of its types, before the first page comes."""
+        self._desks.append(desk)
+
     def obey(self, page: Listener, request: Request) -> None:
         """Do what a page asks."""
+        for desk in self._desks:
+            if type(request) in desk.handlers:
+                desk.handlers[type(request)](page, request)
+                return
         if isinstance(request, SetPresses):
             self.runner.set_presses(page, self._on_skin(request))
         elif isinstance(request, SetPause):
@@ -158,9 +180,9 @@ class Hub:
             if (text := await asyncio.to_thread(run)) is not None:
                 page.post(text)
 
-        self._keep(answer())
+        self.keep(answer())
 
-    def _keep(self, work: Coroutine[None, None, None]) -> None:
+    def keep(self, work: Coroutine[None, None, None]) -> None:
         """Let ``work`` run until it is done; the loop itself would forget it."""
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
@@ -173,7 +195,7 @@ class Hub:
             self.runner.say("no-timeline", f"what happened in the recording is not known: {error}")
             return
         self._timeline = messages.timeline(found)
-        self._post([self._timeline])
+        self.tell([self._timeline])
 
     def _record(self, on: bool) -> None:
         """Begin or end a recording; in a thread, since a disk may take its time."""
@@ -206,10 +228,11 @@ class Hub:
             self._told, happened = self.runner.events.since(self._told)
             news = [messages.event(e) for e in happened]
             self._past.extend(news)
-            self._post([*news, messages.state(self.runner.status())])
+            self.tell([*news, messages.state(self.runner.status())])
             await asyncio.sleep(_STATE_PERIOD)
 
-    def _post(self, texts: list[str]) -> None:
+    def tell(self, texts: Sequence[str]) -> None:
+        """Send ``texts`` to every page."""
         for page in self._pages:
             for text in texts:
                 page.post(text)

@@ -1,11 +1,9 @@
-/** The page: a line of state, the sheet, its panels, the commands. */
+/** The page: a line of state, the sheet, its panels and drawers, the commands. */
 
 import { Controls } from "./panels/Controls";
 import { Legend } from "./panels/Legend";
-import { Strength } from "./panels/Strength";
+import { Side } from "./panels/Side";
 import { TopLine } from "./panels/TopLine";
-import { Touches } from "./panels/Touches";
-import { Voltages } from "./panels/Voltages";
 import { Sheet } from "./sheet/Sheet";
 
 export function App() {
@@ -15,11 +13,7 @@ export function App() {
       <main>
         <Sheet />
         <Legend />
-        <div class="panels">
-          <Touches />
-          <Voltages />
-          <Strength />
-        </div>
+        <Side />
       </main>
       <Controls />
     </>

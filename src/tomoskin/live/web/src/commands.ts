@@ -1,6 +1,7 @@
 /** What a person can ask for, each with its key and its words: buttons and keyboard share them. */
 
-import { computed } from "@preact/signals";
+import { computed, signal } from "@preact/signals";
+import { drawers, toggleDrawer } from "./drawers";
 import { niceAbove } from "./format";
 import { adjustForce, liftAll } from "./presses";
 import * as state from "./state";
@@ -114,6 +115,24 @@ export const autoOnce: Command = {
   run: () => (state.ownLimit.value = autoLimit() ?? state.ownLimit.value),
 };
 
+const more = signal<readonly Command[]>([]);
+
+/** Offer a command by its key beside those of the page itself. */
+export function addCommand(command: Command): void {
+  more.value = [...more.value.filter(({ id }) => id !== command.id), command];
+}
+
+const drawerCommands = computed(() =>
+  drawers.value.map(({ id, label, key, title }) => ({
+    id,
+    label,
+    key,
+    title,
+    code: key.toLowerCase(),
+    run: () => toggleDrawer(id),
+  })),
+);
+
 /** The ones that a press needs are there only where the source can be pressed. */
 export const available = computed<readonly Command[]>(() => [
   takeReference,
@@ -122,6 +141,8 @@ export const available = computed<readonly Command[]>(() => [
   ...(state.scene.value?.pressable ? [lift, keep, softer, harder, truth] : []),
   flat,
   autoOnce,
+  ...more.value,
+  ...drawerCommands.value,
 ]);
 
 /** After a click a button does not keep the focus, so that Space still means pause. */

@@ -4,6 +4,7 @@ import "./styles/tokens.css";
 import "./styles/page.css";
 import "./styles/sheet.css";
 import "./styles/panels.css";
+import "./styles/drawers.css";
 import "./styles/narrow.css";
 import { effect } from "@preact/signals";
 import { render } from "preact";

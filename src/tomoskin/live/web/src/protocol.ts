@@ -42,6 +42,24 @@ export interface Scene {
   readonly version: string;
 }
 
+export interface Sick {
+  readonly electrode: number;
+  readonly state: string;
+  /** In words, for people. */
+  readonly reason: string;
+  readonly since_s: number;
+}
+
+/** Where a replay is, s from its first frame. */
+export interface Replay {
+  readonly now_s: number;
+  readonly end_s: number;
+  /** Null: as fast as it goes. */
+  readonly speed: number | null;
+  readonly loop: boolean;
+  readonly ended: boolean;
+}
+
 export interface Status {
   readonly type: "state";
   readonly running: boolean;
@@ -58,6 +76,16 @@ export interface Status {
     readonly age_s: number | null;
     readonly ready: boolean;
   };
+  /** What has become of the reference since it stands; null before. */
+  readonly baseline: {
+    readonly drift: number | null;
+    readonly held_s: number;
+    readonly noise_v: number | null;
+    readonly stale: string | null;
+  } | null;
+  /** Electrodes that are not good, counted from 0. */
+  readonly sick: readonly Sick[];
+  readonly replay: Replay | null;
   readonly noise_v: number | null;
   /** Weight of the prior in the pictures, and the rule that chose it ("hand": the skin file). */
   readonly alpha: number;
@@ -83,7 +111,10 @@ export interface Refusal {
   readonly message: string;
 }
 
-export type ServerMessage = Scene | Status | EventNote | Refusal;
+/** Any message of the server; `state.ts` calls who has asked for those of its type. */
+export interface ServerMessage {
+  readonly type: string;
+}
 
 export interface Press {
   readonly x: number;
@@ -93,8 +124,7 @@ export interface Press {
   readonly radius: number;
 }
 
-export type PageMessage =
-  | { readonly type: "presses"; readonly presses: readonly Press[] }
-  | { readonly type: "reference" }
-  | { readonly type: "pause"; readonly on: boolean }
-  | { readonly type: "record"; readonly on: boolean };
+/** Any message to the server, which checks it strictly (live/requests.py). */
+export interface PageMessage {
+  readonly type: string;
+}

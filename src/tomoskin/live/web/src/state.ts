@@ -4,7 +4,7 @@ import { batch, computed, signal } from "@preact/signals";
 import { decodeFrame, type Frame } from "./decode";
 import { History } from "./history";
 import { emptyHand, type Hand } from "./presses";
-import type { PageMessage, Scene, ServerMessage, Status } from "./protocol";
+import type { EventNote, PageMessage, Refusal, Scene, ServerMessage, Status } from "./protocol";
 import { prepareTopology } from "./sheet/topology";
 import { Connection, type LinkState, socketAddress } from "./socket";
 
@@ -48,7 +48,8 @@ export const requestRepaint = (): void => repaint();
 const NOTICE_SECONDS = 6;
 let noticeTimer = 0;
 
-function say(text: string): void {
+/** Show a sentence in the line of state for some seconds. */
+export function say(text: string): void {
   notice.value = text;
   window.clearTimeout(noticeTimer);
   noticeTimer = window.setTimeout(() => (notice.value = null), NOTICE_SECONDS * 1e3);
@@ -70,12 +71,21 @@ function setScene(next: Scene): void {
   });
 }
 
-function receive(message: ServerMessage): void {
-  if (message.type === "scene") setScene(message);
-  else if (message.type === "state") status.value = message;
-  else if (message.type === "event") say(message.text);
-  else if (message.type === "error") say(message.message);
+const receivers = new Map<string, ((message: ServerMessage) => void)[]>();
+
+/** Call back with every message of that type, in the order in which callers asked. */
+export function onMessage<M extends ServerMessage>(type: M["type"], receive: (message: M) => void): void {
+  receivers.set(type, [...(receivers.get(type) ?? []), receive as (message: ServerMessage) => void]);
 }
+
+function receive(message: ServerMessage): void {
+  for (const receiver of receivers.get(message.type) ?? []) receiver(message);
+}
+
+onMessage<Scene>("scene", setScene);
+onMessage<Status>("state", (message) => (status.value = message));
+onMessage<EventNote>("event", ({ text }) => say(text));
+onMessage<Refusal>("error", ({ message }) => say(message));
 
 /** A frame that does not fit the scene (it crossed a change of skin) is not shown. */
 function receiveFrame(bytes: ArrayBuffer): void {
@@ -116,7 +126,8 @@ export const connection = new Connection(socketAddress(window.location), {
   },
 });
 
-export const send = (message: PageMessage): void => connection.send(message);
+/** Send a request to the server. */
+export const send = <M extends PageMessage>(message: M): void => connection.send(message);
 
 const TICK_MS = 100;
 
