@@ -15,14 +15,14 @@ help:  ## this list
 live: $(VENV)/.installed page  ## the live page of a simulated skin
 	@$(VENV)/bin/tomoskin live $(ARGS)
 
-test: lint native  ## lint, documentation, page tests and the test suite, without what is slow
+test: lint native docs  ## lint, documentation, page tests and the test suite, without what is slow
 	@$(PY) scripts/page.py run test
 	@sh scripts/chromium.sh
 	@sh scripts/mosquitto.sh
 	@sh scripts/firmware.sh
 	@$(PY) -m pytest $(ARGS)
 
-test-all: lint native  ## the same, with what is slow
+test-all: lint native docs  ## the same, with what is slow
 	@$(PY) scripts/page.py run test
 	@sh scripts/chromium.sh
 	@sh scripts/mosquitto.sh
