@@ -27,6 +27,7 @@ from tomoskin.wire import (
     Message,
     Ping,
     Result,
+    SetBaud,
     Stop,
     encode,
     type_byte,
@@ -52,7 +53,7 @@ class Conversation:
     """Waits for HELLO, asks for INFO, sets the scan, reads it back, starts it, keeps it alive.
 
     A board that says HELLO again has been reset or has missed the heartbeat: it is set up anew,
-    as is one that answers but has stopped scanning.
+    as is one that answers but has stopped scanning, and one whose line is too fast.
 
     Raises
     ------
@@ -80,6 +81,24 @@ class Conversation:
         self._pending: _Pending | None = None
         self._request = 0
         self._out = bytearray()
+        self._rate: int | None = None
+
+    @property
+    def silent(self) -> bool:
+        """Whether a board that scans has sent no frame for too long."""
+        return self._silent
+
+    def take_rate(self) -> int | None:
+        """The serial rate that the board has just changed to, once."""
+        rate, self._rate = self._rate, None
+        return rate
+
+    def fall_back(self, rate: int, now: float) -> Event:
+        """Set the board up anew at a slower ``rate``, Bd: the line damages what it carries."""
+        self._set_up(now, at=rate)
+        return Event(
+            now, "rate", f"the line damages messages: the board is set up anew at {rate:,} Bd"
+        )
 
     def take(self) -> bytes:
         """Bytes to be sent to the board, once."""
@@ -139,11 +158,12 @@ class Conversation:
         self._send(command, now)
         return command.request
 
-    def _set_up(self, now: float) -> None:
+    def _set_up(self, now: float, at: int | None = None) -> None:
         self.stage = Stage.SETTING_UP
         self.info = None
         self.gate.close()
-        self._queue = deque((GetInfo(0), Stop(0)))
+        change = () if at is None else (Stop(0), SetBaud(0, at))
+        self._queue = deque((*change, GetInfo(0), Stop(0)))
         self._ask(now)
 
     def _ask(self, now: float) -> None:
@@ -159,11 +179,15 @@ class Conversation:
                 where=self._where,
                 hint="is it a tomoskin board, powered, at this rate?",
             )
+        if isinstance(pending.command, SetBaud):  # it may have gone back: do it again
+            pending.command = replace(pending.command, request=self._next_request())
         pending.tries += 1
         pending.sent = now
         self._send(pending.command, now)
 
     def _answered(self, now: float) -> list[Frame | Event]:
+        if self._pending and isinstance(self._pending.command, SetBaud):
+            self._rate = self._pending.command.baud
         self._pending = None
         if self._queue:
             self._ask(now)

@@ -11,6 +11,7 @@ from tomoskin.core import Event, Frame, SourceError
 from tomoskin.pattern import Scan
 from tomoskin.source.conversation import Conversation, Stage
 from tomoskin.source.gate import FrameCounters
+from tomoskin.source.rate import LineQuality, Rated
 from tomoskin.source.settings import ScanSettings, Timing
 from tomoskin.source.transport import Played, Transport
 from tomoskin.wire import Ack, Counters, Decoder, Info
@@ -44,6 +45,8 @@ class Link:
         self._tap = tap
         self._timing = timing or Timing()
         self._decoder = Decoder()
+        self._quality = LineQuality()
+        self._first_rate = transport.rate if isinstance(transport, Rated) else 0
         self._talk = Conversation(scan, settings, self._timing, self._clock(), transport.name)
         self._closed = False
 
@@ -132,8 +135,25 @@ class Link:
         found = []
         for message in self._decoder.feed(data, now):
             found += self._talk.receive(message, now)
+        found += self._mind_the_rate(now)
         self._flush()
         return found
+
+    def _mind_the_rate(self, now: float) -> list[Event]:
+        """Follow the board to another rate; fall back to a slower one on a bad line."""
+        transport = self.transport
+        if not isinstance(transport, Rated):
+            return []
+        rate = self._talk.take_rate()
+        if self._talk.silent and transport.rate != self._first_rate:
+            rate = self._first_rate  # what a board that was reset speaks
+        if rate is not None:
+            transport.use_rate(rate)
+        if not self.running:
+            self._quality.forget(self.counters)
+            return []
+        slower = self._quality.slower(self.counters, transport.rate)
+        return [] if slower is None else [self._talk.fall_back(slower, now)]
 
     def _say_goodbye(self) -> None:
         request = self._talk.stop(self._clock())

@@ -57,6 +57,19 @@ class SerialTransport:
         except (OSError, TypeError) as error:
             raise self._gone(error) from None
 
+    @property
+    def rate(self) -> int:
+        """Bd."""
+        return int(self._serial.baudrate)
+
+    def use_rate(self, rate: int) -> None:
+        """Send and read at ``rate`` Bd from now on."""
+        try:
+            self._serial.flush()
+            self._serial.baudrate = rate
+        except (OSError, ValueError, TypeError) as error:
+            raise self._gone(error) from None
+
     def close(self) -> None:
         """Close the port."""
         if not self._closed:
