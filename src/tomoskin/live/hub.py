@@ -26,6 +26,7 @@ from tomoskin.live.requests import (
     TakeReference,
 )
 from tomoskin.live.runner import Runner, Snapshot
+from tomoskin.live.scale import colour_limit
 from tomoskin.session import read_timeline
 from tomoskin.twin import Press
 
@@ -83,9 +84,7 @@ class Hub:
         self._tasks: set[asyncio.Task[None]] = set()
         self._desks: list[Desk] = []
         self._past: deque[str] = deque(maxlen=_FIRST_EVENTS)
-        self._scene = messages.scene(
-            runner.prepared, runner.source, limit=limit, pressable=runner.pressable
-        )
+        self._scene = self._seen(limit)
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
@@ -119,6 +118,18 @@ class Hub:
         now = messages.state(self.runner.status())
         for text in (self._scene, now, *timeline, *greetings, *self._past):
             page.post(text)
+
+    def show(self) -> None:
+        """Tell every page that the runner has another skin or source."""
+        self._scene = self._seen(colour_limit(self.runner.prepared))
+        self._encoded, self._timeline = None, ""
+        self.tell([self._scene, messages.state(self.runner.status())])
+        if self.runner.replay is not None:
+            self.keep(self._tell_timeline(self.runner.replay.path))
+
+    def _seen(self, limit: float) -> str:
+        now = self.runner
+        return messages.scene(now.prepared, now.source, limit=limit, pressable=now.pressable)
 
     def leave(self, page: Listener, why: str = "") -> None:
         """Serve ``page`` no longer, and lift what it pressed."""

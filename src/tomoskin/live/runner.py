@@ -7,17 +7,17 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from tomoskin.core import DataError, Event, Frame, TomoskinError
+from tomoskin.core import DataError, Event, Frame, SourceError, TomoskinError
 from tomoskin.live.events import EventLog, told
 from tomoskin.live.meter import Meter
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.play import where_is
-from tomoskin.live.prepare import Prepared
+from tomoskin.live.prepare import Prepared, same_body
 from tomoskin.live.presses import Pressable, PressBoard
 from tomoskin.live.published import moment_of, stream_of
 from tomoskin.live.replayed import advance
@@ -27,6 +27,7 @@ from tomoskin.live.tally import Tally
 from tomoskin.live.tape import Tape
 from tomoskin.live.wishes import Replayed, Wishes
 from tomoskin.session import Mark
+from tomoskin.signal import Reference
 from tomoskin.sink import Outlets, Sink
 from tomoskin.source import Link, ScanSettings, Transport
 from tomoskin.twin import Press
@@ -42,6 +43,16 @@ _WAITING = "waiting for the board to answer"
 _FIRST_DELAY, _LONGEST_DELAY = 0.25, 5.0
 
 _log = logging.getLogger(__name__)
+
+
+@dataclass(slots=True, eq=False)
+class _Change:
+    """Another skin or source, wanted by another thread."""
+
+    prepared: Prepared
+    open: Callable[[], Transport]
+    done: threading.Event = field(default_factory=threading.Event)
+    error: TomoskinError | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,6 +116,7 @@ class Runner:
         self._pressed, self._polled = 0, 0.0
         self._wishes = Wishes()
         self._tape = Tape(prepared, self.say, clock)
+        self._sinks = tuple(sinks)
         self._outlets = Outlets(sinks, self.say)
         self._tally, self._earlier, self._skipped = Tally(), Tally(), 0
         self._trouble: str | None = "not started"
@@ -112,6 +124,9 @@ class Runner:
         self._watchers: list[Callable[[], None]] = []
         self._watching = threading.Lock()
         self._stopping = threading.Event()
+        self._nudge = threading.Event()
+        self._change: _Change | None = None
+        self._adopted: Prepared | None = None
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
@@ -123,13 +138,7 @@ class Runner:
             When the source cannot be opened the first time: better said at once than retried.
         """
         transport = self._open()
-        self.pressable = isinstance(transport, Pressable)
-        self._wishes.opened(transport)
-        skin = self.prepared.skin.name
-        name = transport.name
-        self.source = f"{name} of {skin}" if self.pressable else f"{skin} on {name}"
-        self._tape.opened(self.source)
-        self._outlets.start(stream_of(self.prepared, self.source))
+        self._settle(transport)
         self._thread = threading.Thread(
             target=self._run, args=(transport,), name="tomoskin-runner", daemon=True
         )
@@ -138,10 +147,47 @@ class Runner:
     def stop(self) -> None:
         """Stop the device and end; returns when it is done. A second call does nothing."""
         self._stopping.set()
+        self._nudge.set()
         if self._thread is not None:
             self._thread.join()
         self._outlets.stop()
         self._tape.stop()
+
+    def change(self, prepared: Prepared, open_transport: Callable[[], Transport]) -> None:
+        """Go on with another skin or source; returns when it does, from any thread but its own.
+
+        A recording ends, and the reference is taken anew. The old source is closed before the
+        new one is opened, since both may be the same port.
+
+        Raises
+        ------
+        SourceError
+            When the new one cannot be opened (or any error of its kind): the old one goes on.
+        """
+        change = _Change(prepared, open_transport)
+        before, self._change = self._change, change
+        self._nudge.set()
+        if before is not None:
+            before.error = SourceError("something else has been chosen meanwhile")
+            before.done.set()
+        while not change.done.wait(_POLL):
+            if self._thread is None or not self._thread.is_alive():
+                raise SourceError("it is not running")
+        if change.error is not None:
+            raise change.error
+
+    def adopt(self, prepared: Prepared) -> None:
+        """Go on with other settings of the same mesh and scan, from the next read on.
+
+        The reference stands; a recording ends. Nothing is done where the skin has been changed
+        meanwhile (:meth:`change`). From any thread.
+        """
+        self._adopted = prepared
+
+    @property
+    def reference(self) -> Reference | None:
+        """What the untouched skin reads; None until that is known."""
+        return self._pipeline.reference
 
     def record(self, path: Path) -> None:
         """Record from now on, beside the pipeline: raw bytes, frames, touches and the rest.
@@ -239,7 +285,7 @@ class Runner:
             with threadpool_limits(1):
                 while transport is not None:
                     self._follow(transport)
-                    transport = self._reopened()
+                    transport = self._following()
         except Exception as error:
             _log.exception("the live thread ended")
             self._trouble = f"internal error, {type(error).__name__}: {error}; start again"
@@ -252,7 +298,8 @@ class Runner:
         drops = 0
         try:
             with self._link(transport) as link:
-                while not self._stopping.is_set():
+                while not self._stopping.is_set() and self._change is None:
+                    self._take_over()
                     self._press(transport)
                     found = link.poll(_POLL)
                     self._polled = self._clock()
@@ -281,15 +328,68 @@ class Runner:
         self._tape.event(event)
         self._outlets.put(event)
 
-    def _reopened(self) -> Transport | None:
+    def _following(self) -> Transport | None:
+        """What is followed next: what was changed to, else the old one anew; None at the end."""
         delay = _FIRST_DELAY
-        while not self._stopping.wait(delay):
+        while not self._stopping.is_set():
+            if (transport := self._changed()) is not None:
+                return transport
+            if self._nudge.wait(delay):
+                self._nudge.clear()
+                continue
             try:
                 return self._open()
             except TomoskinError as error:
                 self._trouble = str(error)
                 delay = min(2 * delay, _LONGEST_DELAY)
         return None
+
+    def _changed(self) -> Transport | None:
+        """Change to what is wanted, if anything is; None where it cannot be opened."""
+        change, self._change = self._change, None
+        if change is None:
+            return None
+        try:
+            transport = change.open()
+        except TomoskinError as error:
+            change.error = error
+            change.done.set()
+            return None
+        self._become(change.prepared, change.open)
+        self._settle(transport)
+        change.done.set()
+        return transport
+
+    def _become(self, prepared: Prepared, open_transport: Callable[[], Transport]) -> None:
+        """Another skin and source, with nothing left of the ones before but the events."""
+        self._tape.stop()
+        self._outlets.stop()
+        self.prepared, self._open = prepared, open_transport
+        self._settings = ScanSettings.of(prepared.skin)
+        self._pipeline, self._meter, self._wishes = Pipeline(prepared), Meter(), Wishes()
+        self._tally, self._earlier, self._skipped = Tally(), Tally(), 0
+        self._tape = Tape(prepared, self.say, self._clock)
+        self._outlets = Outlets(self._sinks, self.say)
+        self._presses, self._truth = PressBoard(), ()
+        self.newest = None
+
+    def _take_over(self) -> None:
+        """Adopt what has been prepared, if anything has."""
+        prepared, self._adopted = self._adopted, None
+        if prepared is None or not same_body(prepared.skin, self.prepared.skin):
+            return
+        self._tape.adopt(prepared)
+        self.prepared = prepared
+        self._pipeline.adopt(prepared)
+
+    def _settle(self, transport: Transport) -> None:
+        """A source has been opened; say what it is."""
+        self.pressable = isinstance(transport, Pressable)
+        self._wishes.opened(transport)
+        skin, name = self.prepared.skin.name, transport.name
+        self.source = f"{name} of {skin}" if self.pressable else f"{skin} on {name}"
+        self._tape.opened(self.source)
+        self._outlets.start(stream_of(self.prepared, self.source))
 
     def _press(self, transport: Transport) -> None:
         changes, presses = self._presses.all()
