@@ -177,3 +177,13 @@ def test_what_touches_leave_behind_is_no_direction_of_drift():
         fed(idle, skin, 3, lambda _, step=press: 2 * NOISE * step * way)
         idle.interrupt()
     assert idle.modes(np.random.default_rng(2).standard_normal((ROWS, 50))).shape[1] == 0
+
+
+def test_frames_that_are_all_the_same_waver_by_what_rounding_leaves():
+    """However many: noise does not wane to nothing."""
+    reference = Reference.of(np.ones((20, ROWS)), NOISE)
+    baseline = Baseline(reference)
+    for n in range(20 * BLOCK):
+        baseline.push(np.ones(ROWS), np.zeros(ROWS, bool), 0.1 * n, touched=False)
+    np.testing.assert_allclose(baseline.idle.noise, NOISE)
+    np.testing.assert_allclose(reference.noise, NOISE)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tomoskin.core import DataError, Frame
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.signal import Readout
-from tomoskin.skin import ReadoutSettings
+from tomoskin.skin import ReadoutSettings, Skin
 
 SETTINGS = ReadoutSettings(
     adc_bits=10,
@@ -105,3 +105,12 @@ def test_another_number_of_samples(n: int) -> None:
     with pytest.raises(DataError, match=f"expected 48 samples, got {n}") as caught:
         READOUT(frame(np.zeros(n, dtype=np.uint16)))
     assert caught.value.where == "frame 7"
+
+
+def test_what_rounding_leaves() -> None:
+    """Of a board of no noise: rounding is even within a step, 1/√12 of it, in each reading."""
+    skin = Skin.load("textile-disc-8")
+    readout = Readout.of(Scan.of(skin.pattern()), skin.readout)
+    n = skin.readout.oversampling
+    assert readout.rounding == pytest.approx(readout.volts_per_count * np.sqrt(2 * n / 12))
+    assert readout.rounding < readout.noise

@@ -24,6 +24,9 @@ below the first the recording is refused as another skin's, below the second it 
 _MOST_SCALE = 30.0
 """Plain differences are refused where voltages and model differ in size by more than this."""
 
+_STILL = 1e-9
+"""Idle values within this part of their size of each other are the same but for arithmetic."""
+
 Idle = NDArray[Any] | Literal["previous"] | None
 """(n_idle, n_meas) frames of the untouched skin; "previous" for dynamic imaging, each frame
 against the one before it; None where the recording holds differences."""
@@ -100,7 +103,7 @@ def changes_of(prepared: Prepared, recording: Recording, idle: Idle) -> Changes:
         return _against_the_one_before(left)
     quiet = _complete(np.delete(idle, dead, axis=1), recording.source)
     values, quiet, agreement = _in_volts(left, quiet)
-    reference = Reference.of(quiet)
+    reference = Reference.of(quiet, _rounding(left.prepared, quiet))
     dv = difference(values, reference.mean, left.prepared.operator.difference)
     return left.changes(left.missing, dv, reference, agreement)
 
@@ -160,6 +163,17 @@ def _complete(idle: NDArray[Any], source: str) -> NDArray[Any]:
             hint="name other frames with --reference",
         )
     return np.asarray(idle[complete])
+
+
+def _rounding(prepared: Prepared, quiet: FloatArray) -> FloatArray:
+    """(n_meas,) least noise: where idle frames are all the same, what the read-out would round.
+
+    What recorded a row that wavers is not known, and may be finer than the skin's read-out.
+    """
+    model, mean = prepared.operator.reference, quiet.mean(axis=0)
+    scale = float(np.linalg.norm(mean) / np.linalg.norm(model))
+    still = np.ptp(quiet, axis=0) <= _STILL * np.linalg.norm(mean)
+    return np.where(still, scale * prepared.readout.rounding, 0.0)
 
 
 def _in_volts(left: _Left, quiet: NDArray[Any]) -> tuple[FloatArray, FloatArray, float]:

@@ -22,11 +22,13 @@ class Collector:
         Frames that make a reference.
     model
         (n_meas,) V, what the model expects of the untouched skin.
+    least
+        V below which no row's noise is: a converter that does not flicker rounds all the same.
     """
 
-    def __init__(self, needed: int, model: FloatArray) -> None:
+    def __init__(self, needed: int, model: FloatArray, least: float = 0.0) -> None:
         self._rows = np.empty((needed, len(model)))
-        self._model = model
+        self._model, self._least = model, least
         self.taken = 0
         self.unusable: NDArray[np.bool_] = np.zeros(len(model), dtype=bool)
 
@@ -50,4 +52,4 @@ class Collector:
         """Mean and noise of the frames taken."""
         self.unusable |= ~self._rows[: self.taken].any(axis=0)
         self._rows[:, self.unusable] = self._model[self.unusable]
-        return Reference.of(self._rows[: self.taken])
+        return Reference.of(self._rows[: self.taken], self._least)

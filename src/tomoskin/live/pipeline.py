@@ -38,7 +38,7 @@ class Pipeline:
     def __init__(self, prepared: Prepared, *, reference_frames: int = REFERENCE_FRAMES) -> None:
         self._prepared = prepared
         self._needed = reference_frames
-        self._tracker = Tracker(TrackSettings(snr=prepared.skin.touch.snr))
+        self._tracker = _tracker(prepared)
         self._image = _none(prepared)
         self._reference: Reference | None = None
         self._watch: Watch | None = None
@@ -60,7 +60,30 @@ class Pipeline:
         self._tuning = None
         self._tracker.reset()
         self._times = []
-        self._collector = Collector(self._needed, self._prepared.operator.reference)
+        prepared = self._prepared
+        self._collector = Collector(
+            self._needed, prepared.operator.reference, prepared.readout.rounding
+        )
+
+    def adopt(self, prepared: Prepared) -> None:
+        """Go on with other settings of the same mesh and scan; the reference stands, and what
+        has been learnt of it and of the electrodes.
+        """
+        earlier, before, self._prepared = self._prepared, self._watch, prepared
+        if prepared.skin.touch.snr != earlier.skin.touch.snr:
+            self._tracker = _tracker(prepared)
+        self._image, self._tuning = _none(prepared), None
+        if self._reference is None or before is None:
+            return
+        self._watch = before.renewed(prepared, self._reference, self._collector.unusable)
+        known = self._watch.baseline.reference
+        self._see(known)
+        self._tuning = tune(prepared, known)
+
+    @property
+    def reference(self) -> Reference | None:
+        """What the untouched skin reads as far as it is known now; None until it stands."""
+        return None if self._watch is None else self._watch.baseline.reference
 
     @property
     def reference_state(self) -> ReferenceState:
@@ -102,11 +125,17 @@ class Pipeline:
         self._watch = Watch(
             self._prepared, reference, self._collector.unusable, self._prepared.scan
         )
-        self._imaging = imaging(self._prepared, reference, self._interval(), self._watch.steady())
-        self._finder = finding(self._prepared, reference)
+        self._see(reference)
         self._tuning = tune(self._prepared, reference)
         self._reference = reference
         self._since = host_time
+
+    def _see(self, reference: Reference) -> None:
+        """Images and touches from here on."""
+        watch = self._watch
+        prepared, blind = (watch.prepared, watch.steady()) if watch else (self._prepared, None)
+        self._imaging = imaging(prepared, reference, self._interval(), blind)
+        self._finder = finding(prepared, reference)
 
     def _tune(self, reference: Reference) -> None:
         """One step towards the operator for the reference's noise; the old one serves meanwhile."""
@@ -191,6 +220,10 @@ class Pipeline:
 
     def _expected(self) -> FloatArray:
         return self._watch.baseline.mean if self._watch else self._prepared.operator.reference
+
+
+def _tracker(prepared: Prepared) -> Tracker:
+    return Tracker(TrackSettings(snr=prepared.skin.touch.snr))
 
 
 def _none(prepared: Prepared) -> Image:

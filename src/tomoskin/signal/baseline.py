@@ -96,7 +96,8 @@ class Baseline:
         self._follows = follows and self._known
         self.mean = reference.mean
         self._n_frames = reference.n_frames
-        self.idle = Idle(noise, reference.n_frames, SLOWEST)
+        self.idle = Idle(noise, reference.n_frames, SLOWEST, reference.least)
+        self._least = reference.least
         self._variance = noise**2 / reference.n_frames
         self._time: float | None = None
         self._held = 0.0
@@ -158,9 +159,9 @@ class Baseline:
     def reference(self) -> Reference:
         """The reference as it is now: the noise is a frame's together with the baseline's own."""
         if not self._known:
-            return Reference(self.mean, self.idle.noise, self._n_frames)
+            return Reference(self.mean, self.idle.noise, self._n_frames, self._least)
         noise = np.sqrt(self.idle.noise**2 + self._variance)
-        return Reference(self.mean, noise, max(self._n_frames, 2))
+        return Reference(self.mean, noise, max(self._n_frames, 2), self._least)
 
     @property
     def state(self) -> BaselineState:

@@ -49,10 +49,12 @@ class Idle:
         Whole blocks until now.
     """
 
-    def __init__(self, noise: FloatArray, n_frames: int, slowest: float) -> None:
-        """``noise`` V of ``n_frames`` frames; ``slowest`` s: the least drift is the one that is
-        followed with this time constant."""
-        self.noise = noise
+    def __init__(
+        self, noise: FloatArray, n_frames: int, slowest: float, least: FloatArray | float = 0.0
+    ) -> None:
+        """``noise`` V of ``n_frames`` frames, which is ``least`` V at the least; ``slowest`` s:
+        the least drift is the one that is followed with this time constant."""
+        self.noise, self._least = noise, np.square(least)
         self._weight = float(max(n_frames - 1, 1))
         self._slowest = slowest
         self._steps: FloatArray | None = None  # excess of steps between blocks, V² per step
@@ -127,7 +129,7 @@ class Idle:
         known = (self._weight * self.noise**2 + BLOCK * variance) / total
         known = np.where(lost, self.noise**2, known)
         floor = (_QUIET * np.median(np.sqrt(known))) ** 2
-        self.noise = np.sqrt(np.maximum(known, floor))
+        self.noise = np.sqrt(np.maximum(known, np.maximum(floor, self._least)))
         self._weight = min(total, float(_MEMORY))
 
     def _learn_drift(self, step: FloatArray) -> None:

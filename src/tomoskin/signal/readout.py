@@ -30,6 +30,8 @@ class Readout:
         A sample at or beyond these summed counts stood at a rail.
     noise
         Standard deviation of a row that the converter alone causes, V.
+    rounding
+        The part of it that rounding alone causes, V: 1/√12 of a step a reading.
     """
 
     scan: Scan
@@ -37,6 +39,7 @@ class Readout:
     low: int
     high: int
     noise: float
+    rounding: float
 
     @classmethod
     def of(cls, scan: Scan, settings: ReadoutSettings) -> Self:
@@ -44,8 +47,10 @@ class Readout:
         levels = 1 << settings.adc_bits
         n = settings.oversampling
         volts = settings.reference_voltage / (levels * settings.gain * n)
-        noise = volts * np.sqrt(2 * n * (CONVERSION_NOISE**2 + 1 / 12))
-        return cls(scan, volts, low=n, high=(levels - 2) * n, noise=float(noise))
+        noise, rounding = (
+            volts * float(np.sqrt(2 * n * (sd**2 + 1 / 12))) for sd in (CONVERSION_NOISE, 0.0)
+        )
+        return cls(scan, volts, low=n, high=(levels - 2) * n, noise=noise, rounding=rounding)
 
     def __call__(self, frame: Frame) -> Voltages:
         """Voltages of one frame.

@@ -19,15 +19,17 @@ class Reference:
     """Mean and noise of idle frames.
 
     ``mean`` (n_meas,) V; ``noise`` (n_meas,) standard deviation of one frame, V, NaN when there
-    was a single frame; ``n_frames`` how many were averaged.
+    was a single frame; ``n_frames`` how many were averaged; ``least`` V, or (n_meas,) V, below
+    which noise is never taken to be: what rounding leaves though nothing flickers.
     """
 
     mean: FloatArray
     noise: FloatArray
     n_frames: int
+    least: FloatArray | float = 0.0
 
     @classmethod
-    def of(cls, values: FloatArray) -> Self:
+    def of(cls, values: FloatArray, least: FloatArray | float = 0.0) -> Self:
         """Reference from idle frames, (n_frames, n_meas) V.
 
         Raises
@@ -44,7 +46,7 @@ class Reference:
                 f"expected finite voltages, got {values[frame, row]}",
                 where=f"reference frame {frame}, row {row}",
             )
-        return cls(values.mean(axis=0), _noise(values), len(values))
+        return cls(values.mean(axis=0), np.maximum(_noise(values), least), len(values), least)
 
     @property
     def noise_is_known(self) -> bool:
