@@ -6,6 +6,7 @@ import pytest
 
 from tomoskin.core import WireError
 from tomoskin.live.requests import (
+    MAX_REQUEST,
     Note,
     PressRequest,
     Seek,
@@ -65,7 +66,7 @@ def test_requests():
         '{"type":"presses","presses":[{"x":1e999,"y":0,"force":1,"radius":0.01}]}',
         "[" * 3000,
         "\ud800",
-        '{"type":"reference"' + " " * 5000 + "}",
+        '{"type":"reference"' + " " * MAX_REQUEST + "}",
     ],
 )
 def test_malformed(text):

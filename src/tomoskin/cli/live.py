@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import webbrowser
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -53,6 +54,8 @@ def live(
             )
             with recording_to(runner, record):
                 hub = room.Hub(runner, limit=room.colour_limit(runner.prepared))
+                hub.opener = partial(open_source, source)
+                hub.take(room.SettingsDesk(hub))
                 server = room.Server.of(room.application(hub, door))
                 with server.stopped_by_signals():
                     _announce(door, runner, json=json)

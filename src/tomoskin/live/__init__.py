@@ -1,6 +1,7 @@
 """The running pipeline, and the server of its page."""
 
 from tomoskin.live.changes import DOUBTED, Changes, Idle, changes_of
+from tomoskin.live.exports import WRITERS, Export
 from tomoskin.live.hub import Hub
 from tomoskin.live.labelled import (
     SetMade,
@@ -13,8 +14,8 @@ from tomoskin.live.labelled import (
 )
 from tomoskin.live.offline import Reconstruction, reconstruct
 from tomoskin.live.pipeline import Pipeline
-from tomoskin.live.prepare import Prepared, prepare
-from tomoskin.live.replayed import advance, replayed
+from tomoskin.live.prepare import Prepared, prepare, prepare_again
+from tomoskin.live.replayed import advance, as_recorded, replayed
 from tomoskin.live.result import Result
 from tomoskin.live.runner import Runner, Snapshot
 from tomoskin.live.scale import colour_limit
@@ -28,6 +29,7 @@ from tomoskin.live.server import (
     check_page,
     listen,
 )
+from tomoskin.live.settings import SettingsDesk
 from tomoskin.live.simulate import Simulated, simulate
 from tomoskin.live.status import Status
 
@@ -35,8 +37,10 @@ __all__ = [
     "DEFAULT_PORT",
     "DOUBTED",
     "STATIC",
+    "WRITERS",
     "Changes",
     "Door",
+    "Export",
     "Hub",
     "Idle",
     "Pipeline",
@@ -47,12 +51,14 @@ __all__ = [
     "Server",
     "ServerError",
     "SetMade",
+    "SettingsDesk",
     "Simulated",
     "Snapshot",
     "Status",
     "Workers",
     "advance",
     "application",
+    "as_recorded",
     "changes_of",
     "check_page",
     "colour_limit",
@@ -63,6 +69,7 @@ __all__ = [
     "make_set",
     "on_cluster",
     "prepare",
+    "prepare_again",
     "processors",
     "reconstruct",
     "replayed",

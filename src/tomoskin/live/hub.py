@@ -16,6 +16,7 @@ from tomoskin.core import DataError, TomoskinError, WireError
 from tomoskin.live import messages
 from tomoskin.live.frames import encode_result
 from tomoskin.live.play import play
+from tomoskin.live.prepare import Prepared
 from tomoskin.live.requests import (
     Note,
     ReplayRequest,
@@ -28,6 +29,8 @@ from tomoskin.live.requests import (
 from tomoskin.live.runner import Runner, Snapshot
 from tomoskin.live.scale import colour_limit
 from tomoskin.session import read_timeline
+from tomoskin.skin import Skin
+from tomoskin.source import Transport
 from tomoskin.twin import Press
 
 MAX_PAGES = 16
@@ -71,11 +74,17 @@ class Hub:
         End of the colour scale, in the image's unit.
     folder
         Where a page's recordings go, under names of their own.
+
+    Attributes
+    ----------
+    opener
+        Opens the source of the moment for a skin; None: it cannot follow another skin.
     """
 
     def __init__(self, runner: Runner, *, limit: float, folder: Path | None = None) -> None:
         self.runner = runner
-        self._folder = folder or Path()
+        self.folder = folder or Path()
+        self.opener: Callable[[Skin], Transport] | None = None
         self._pages: set[Listener] = set()
         self._wake_is_due = False
         self._encoded: tuple[Snapshot, bytes] | None = None
@@ -84,7 +93,7 @@ class Hub:
         self._tasks: set[asyncio.Task[None]] = set()
         self._desks: list[Desk] = []
         self._past: deque[str] = deque(maxlen=_FIRST_EVENTS)
-        self._scene = self._seen(limit)
+        self._limit, self._scene = limit, ""
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
@@ -116,20 +125,31 @@ class Hub:
         timeline = [self._timeline] if self._timeline else []
         greetings = [text for desk in self._desks for text in desk.greeting()]
         now = messages.state(self.runner.status())
-        for text in (self._scene, now, *timeline, *greetings, *self._past):
+        for text in (self._seen(), now, *timeline, *greetings, *self._past):
             page.post(text)
 
     def show(self) -> None:
         """Tell every page that the runner has another skin or source."""
-        self._scene = self._seen(colour_limit(self.runner.prepared))
+        self._limit, self._scene = colour_limit(self.runner.prepared), ""
         self._encoded, self._timeline = None, ""
-        self.tell([self._scene, messages.state(self.runner.status())])
+        greetings = [text for desk in self._desks for text in desk.greeting()]
+        self.tell([self._seen(), messages.state(self.runner.status()), *greetings])
         if self.runner.replay is not None:
             self.keep(self._tell_timeline(self.runner.replay.path))
 
-    def _seen(self, limit: float) -> str:
-        now = self.runner
-        return messages.scene(now.prepared, now.source, limit=limit, pressable=now.pressable)
+    def rescale(self, prepared: Prepared, limit: float) -> None:
+        """Tell every page that pictures have another scale and unit from now on."""
+        self._limit, self._scene = limit, ""
+        self.tell([messages.scale(prepared, limit)])
+
+    def _seen(self) -> str:
+        """The scene, made when the first page asks for it."""
+        if not self._scene:
+            now = self.runner
+            self._scene = messages.scene(
+                now.prepared, now.source, limit=self._limit, pressable=now.pressable
+            )
+        return self._scene
 
     def leave(self, page: Listener, why: str = "") -> None:
         """Serve ``page`` no longer, and lift what it pressed."""
@@ -168,8 +188,10 @@ class Hub:
             self.runner.take_reference()
         elif isinstance(request, Note):
             self.runner.note(request.text)
-        else:
+        elif isinstance(request, ReplayRequest):
             self._play(page, request)
+        else:
+            raise WireError(f"{type(request).__name__} is not answered here")
 
     def _play(self, page: Listener, request: ReplayRequest) -> None:
         """Do something to a replay; in a thread, since a jump may have to search the file.
@@ -214,7 +236,7 @@ class Hub:
             self.runner.stop_recording()
             return
         try:
-            self.runner.record(self._folder / time.strftime(_FILE_NAME))
+            self.runner.record(self.folder / time.strftime(_FILE_NAME))
         except DataError as error:
             self.runner.say("recording-stopped", f"nothing is recorded: {error}")
 

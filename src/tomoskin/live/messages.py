@@ -57,6 +57,11 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
     )
 
 
+def scale(prepared: Prepared, limit: float) -> str:
+    """The end of the colour scale, and its unit, where nothing else of the scene is new."""
+    return _text(type="scale", limit=limit, unit=prepared.operator.unit)
+
+
 def state(status: Status) -> str:
     """One look at the runner; numbers that are not known yet are null."""
     reference = status.reference

@@ -21,9 +21,13 @@ from tomoskin.inverse import (
 )
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern, Scan
+from tomoskin.session import Calibration
 from tomoskin.signal import Blind, Readout, Reference, difference_noise
 from tomoskin.skin import Skin
-from tomoskin.touch import NoiseFloor, Segmenter, SpotModel
+from tomoskin.touch import Locator, NoiseFloor, Segmenter, SpotModel
+
+BODY = ("outline", "surface", "electrodes", "material", "drive", "readout", "mesh", "twin")
+"""Sections of a skin that sheet, mesh and scan rest on; the others only make pictures of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +46,8 @@ class Prepared:
         Chooses alpha again when the noise has been measured; None where it was set by hand.
     spots
         What touches are fitted with; None where they are found in the image.
+    locator
+        Where labelled presses tell the places of touches.
     """
 
     skin: Skin
@@ -57,6 +63,7 @@ class Prepared:
     choice: AlphaChoice
     light_touch: LightTouch | None
     spots: SpotModel | None
+    locator: Locator | None = None
 
     def __post_init__(self) -> None:
         """Refuse stages of different meshes or patterns."""
@@ -74,6 +81,22 @@ class Prepared:
         if self.skin.inverse.time_constant:
             modes = Modes.of_spectrum(spectrum, choice.alpha, operator)
         return replace(self, operator=operator, modes=modes, choice=choice)
+
+    def located_by(self, locator: Locator | None) -> Prepared:
+        """With places of touches from a calibration, or without.
+
+        Raises DataError where it is of another pattern or skin.
+        """
+        if locator is not None:
+            locator.check(self.pattern, self.skin)
+        return replace(self, locator=locator)
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """The locator as it is written to a file."""
+        if self.locator is None:
+            return None
+        return Calibration(self.locator, self.pattern, self.skin.name)
 
     def without(self, rows: IntArray) -> Prepared:
         """The skin as if its pattern had never had ``rows``; an alpha of "auto" is chosen anew.
@@ -145,6 +168,32 @@ def prepare(skin: Skin) -> Prepared:
     return _prepared(skin, problem)
 
 
+def prepare_again(before: Prepared, skin: Skin) -> Prepared:
+    """:func:`prepare` for a skin with other settings: what they leave as it is serves again.
+
+    Raises as :func:`prepare` does.
+    """
+    if not same_body(before.skin, skin):
+        return prepare(skin)
+    problem, settings, then = before.problem, skin.inverse, before.skin.inverse
+    if settings.difference != then.difference:
+        problem = LinearProblem.of(
+            before.model,
+            _prior(skin),
+            conductivity=skin.conductivity,
+            difference=settings.difference,
+        )
+    elif _prior(skin) != _prior(before.skin):
+        penalty = _prior(skin).penalty(before.mesh, problem.jacobian)
+        problem = replace(problem, prior=penalty)
+    return _prepared(skin, problem, before)
+
+
+def same_body(one: Skin, other: Skin) -> bool:
+    """Whether both have the same sheet, mesh and scan: only pictures and touches may differ."""
+    return all(one.document[name] == other.document[name] for name in BODY)
+
+
 def _prior(skin: Skin) -> Prior:
     settings = skin.inverse
     return named_prior(
@@ -154,11 +203,19 @@ def _prior(skin: Skin) -> Prior:
     )
 
 
-def _prepared(skin: Skin, problem: LinearProblem) -> Prepared:
+def _prepared(skin: Skin, problem: LinearProblem, before: Prepared | None = None) -> Prepared:
+    """``before``: the same skin with other settings, of which what is the same serves again."""
     model = problem.model
     scan = Scan.of(model.pattern)
     readout = Readout.of(scan, skin.readout)
-    light_touch, choice, operator = _chosen(problem, skin, readout)
+    same = before is not None and before.problem is problem
+    light_touch, choice, operator = _chosen(
+        problem, skin, readout, before.light_touch if before and same else None
+    )
+    segmenter = before.segmenter if before and before.skin.touch == skin.touch else None
+    spots = before.spots if before and _same_difference(before.skin, skin) else None
+    if skin.touch.method == "fit" and spots is None:
+        spots = SpotModel.of(skin, model)
     return Prepared(
         skin=skin,
         mesh=model.mesh,
@@ -168,16 +225,21 @@ def _prepared(skin: Skin, problem: LinearProblem) -> Prepared:
         problem=problem,
         operator=operator,
         modes=Modes.of(problem, operator) if skin.inverse.time_constant else None,
-        segmenter=Segmenter(model.mesh, skin.touch),
+        segmenter=segmenter or Segmenter(model.mesh, skin.touch),
         readout=readout,
         choice=choice,
         light_touch=light_touch,
-        spots=SpotModel.of(skin, model) if skin.touch.method == "fit" else None,
+        spots=spots if skin.touch.method == "fit" else None,
+        locator=before.locator if before else None,
     )
 
 
+def _same_difference(one: Skin, other: Skin) -> bool:
+    return one.inverse.difference == other.inverse.difference
+
+
 def _chosen(
-    problem: LinearProblem, skin: Skin, readout: Readout
+    problem: LinearProblem, skin: Skin, readout: Readout, light_touch: LightTouch | None
 ) -> tuple[LightTouch | None, AlphaChoice, Operator]:
     if skin.inverse.method == "greit":
         return None, *_trained(problem.model, skin)
@@ -185,7 +247,7 @@ def _chosen(
     if not isinstance(alpha, str):
         by_hand = AlphaChoice(alpha, "hand", "set by hand")
         return None, by_hand, problem.operator(alpha)
-    light_touch = LightTouch.of(Spectrum.of(problem))
+    light_touch = light_touch or LightTouch.of(Spectrum.of(problem))
     choice = light_touch(_predicted(problem, readout))
     choice = replace(choice, reason=f"{choice.reason}, as its read-out predicts it")
     return light_touch, choice, light_touch.spectrum.operator(choice.alpha)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta
 
 from tomoskin.core import WireError
 
-MAX_REQUEST = 4096
-"""Longest request, bytes."""
+MAX_REQUEST = 32_768
+"""Longest request, bytes: a pattern of some thousand rows, written out."""
 
 MAX_PRESSES = 8
 """Most presses that one page may hold."""
@@ -20,6 +20,9 @@ MAX_NOTE = 500
 
 MAX_FORCE = 10.0
 """Hardest press from a page, N."""
+
+_Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")]
+"""Of a file: no folder, no ending, nothing hidden."""
 
 _Place = Annotated[float, Meta(ge=-10, le=10)]
 
@@ -41,6 +44,44 @@ class SetPresses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="p
 
 class TakeReference(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="reference"):
     """The next frames become the reference."""
+
+
+Value = str | int | float | list[Any] | None
+"""A value as a skin file writes it; null takes the key out."""
+
+
+class SetSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="settings"):
+    """Other values of the skin's keys, by section; the skin's schema says what each may be."""
+
+    changes: dict[str, dict[str, Value]]
+
+
+class UndoSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="undo"):
+    """Take the last change of settings back."""
+
+
+class RedoSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="redo"):
+    """Make it again."""
+
+
+class SaveSkin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="save_skin"):
+    """Write the settings to a skin file of the server's folder."""
+
+    name: _Name
+    replace: bool = False
+
+
+class LoadSkin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="load_skin"):
+    """Take the settings of a skin file of the server's folder, or of a built-in skin."""
+
+    name: _Name
+
+
+class SetTwin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="twin"):
+    """All that is wrong with the twin from now on: electrodes cut, LSB of noise."""
+
+    cut: Annotated[tuple[Annotated[int, Meta(ge=0, le=31)], ...], Meta(max_length=32)]
+    noise: Annotated[float, Meta(ge=0, le=1000)]
 
 
 class SetPause(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="pause"):
@@ -86,7 +127,18 @@ class SetLoop(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="loop
 ReplayRequest = Seek | Step | SetSpeed | SetLoop
 """What only a replay can do."""
 
-Request = SetPresses | TakeReference | SetPause | SetRecording | Note | ReplayRequest
+SettingsRequest = SetSettings | UndoSettings | RedoSettings | SaveSkin | LoadSkin
+
+Request = (
+    SetPresses
+    | TakeReference
+    | SetPause
+    | SetRecording
+    | Note
+    | SetTwin
+    | SettingsRequest
+    | ReplayRequest
+)
 
 _DECODER: msgspec.json.Decoder[Request] = msgspec.json.Decoder(Request)
 

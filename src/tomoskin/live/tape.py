@@ -7,26 +7,22 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tomoskin.core import Event, Frame
+from tomoskin.live.beginning import Beginning, Marked
 from tomoskin.live.pipeline import REFERENCE_FRAMES
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.published import epoch, glance
 from tomoskin.live.result import Result
-from tomoskin.session import Mark, Recorder, SessionWriter
+from tomoskin.session import CALIBRATION_FILE, Mark, Recorder, SessionWriter, pack_calibration
 from tomoskin.source import Link
 from tomoskin.twin import Press
 from tomoskin.wire import Info
 
-_KEPT = 3 * REFERENCE_FRAMES
-"""Frames from a reference's first on that a later recording begins with: those that made it, and
-those during which the operator followed its noise."""
-
-
 class Tape:
     """Passes everything on to the recorder of the moment, and remembers what a new one needs.
 
-    The frames that made the reference are kept, so that a recording that begins later can be
-    replayed with the same reference and operator. :meth:`record` and :meth:`stop` may come from
-    any thread; the rest is the runner's.
+    A recording begins with frames that bring a replay to where the run is; see
+    :class:`Beginning`. :meth:`record` and :meth:`stop` may come from any thread; the rest is the
+    runner's.
 
     Parameters
     ----------
@@ -36,14 +32,24 @@ class Tape:
         Called with the kind and text of what happens to a recording.
     clock
         Host monotonic seconds.
+    numbered
+        The last identity that was given to a touch.
     """
 
     def __init__(
-        self, prepared: Prepared, say: Callable[[str, str], None], clock: Callable[[], float]
+        self,
+        prepared: Prepared,
+        say: Callable[[str, str], None],
+        clock: Callable[[], float],
+        numbered: Callable[[], int],
     ) -> None:
         self._prepared, self._say, self._clock = prepared, say, clock
+        self._numbered = numbered
         self._recorder: Recorder | None = None
-        self._reference: list[tuple[Frame, Mark]] = []
+        self._waiting: Recorder | None = None
+        self._beginning = Beginning()
+        self._again: tuple[Marked, ...] = ()
+        self._touches_before = 0
         self._info: Info | None = None
         self._truth: tuple[Press, ...] = ()
         self._source = ""
@@ -52,11 +58,11 @@ class Tape:
     @property
     def path(self) -> Path | None:
         """The file that is being written, or None."""
-        recorder = self._recorder
+        recorder = self._waiting or self._recorder
         return recorder.path if recorder is not None and recorder.running else None
 
     def record(self, path: Path) -> None:
-        """Begin to record, and end what was being recorded.
+        """Begin to record with the next bytes, and end what was being recorded.
 
         Raises
         ------
@@ -73,24 +79,47 @@ class Tape:
             self._end()
 
     def _begin(self, path: Path) -> None:
+        session = SessionWriter(path, self._prepared.skin, epoch=epoch(), start=self._clock())
+        if (calibration := self._prepared.calibration) is not None:
+            session.attach(CALIBRATION_FILE, "application/zip", pack_calibration(calibration))
+        self._waiting = Recorder(session, glance(self._prepared), self._say)
+
+    def _headed(self) -> None:
+        """The recorder that waits gets what a replay begins with, and then everything."""
+        recorder, self._waiting = self._waiting, None
+        if recorder is None:
+            return
         now = self._clock()
-        session = SessionWriter(path, self._prepared.skin, epoch=epoch(), start=now)
-        recorder = Recorder(session, glance(self._prepared), self._say)
+        frames, self._touches_before, again = self._beginning.begin(self._numbered())
         recorder.settings(now, self._settings())
         recorder.truth(now, self._truth)
-        for frame, mark in tuple(self._reference):
+        for frame, mark in frames:
             recorder.frame(frame, mark | Mark.EARLIER)
         if self._info is not None:
             recorder.device(now, self._info)
+        self._again = frames if again else ()
         self._recorder = recorder
-        self._say("recording", f"recording to {path}")
+        self._say("recording", f"recording to {recorder.path}")
 
     def _end(self) -> None:
+        self._headed()
         recorder, self._recorder = self._recorder, None
         if recorder is not None:
             recorder.stop()
             if recorder.is_whole:
                 self._say("recorded", f"recorded to {recorder.path}")
+
+    def adopt(self, prepared: Prepared) -> None:
+        """Other settings from here on; a recording ends, since it holds those of one skin."""
+        with self._changing:
+            self._end()
+            self._prepared = prepared
+            self._beginning.changed()
+
+    @property
+    def info(self) -> Info | None:
+        """What the board said of itself."""
+        return self._info
 
     def opened(self, source: str) -> None:
         """A source has been opened, and this is what it is called."""
@@ -100,6 +129,9 @@ class Tape:
 
     def read(self, host_time: float, data: bytes) -> None:
         """Bytes from the source."""
+        if self._waiting:
+            with self._changing:
+                self._headed()
         if self._recorder:
             self._recorder.raw(host_time, data)
 
@@ -112,12 +144,18 @@ class Tape:
 
     def frame(self, frame: Frame, mark: Mark) -> None:
         """A frame, and what becomes of it."""
-        self._remember(frame, mark)
+        self._beginning.frame(frame, mark, self._numbered())
         if self._recorder:
             self._recorder.frame(frame, mark)
 
+    def again(self) -> tuple[Marked, ...]:
+        """Frames that the pipeline is to take again before the next, as a replay will."""
+        frames, self._again = self._again, ()
+        return frames
+
     def result(self, result: Result) -> None:
         """What was made of a frame."""
+        self._beginning.result(result)
         if self._recorder and result.ready:
             self._recorder.result(result.host_time, result.sequence, result.image, result.touches)
 
@@ -139,11 +177,8 @@ class Tape:
             self._recorder.truth(self._clock(), presses)
 
     def _settings(self) -> dict[str, object]:
-        return {"source": self._source, "reference_frames": REFERENCE_FRAMES}
-
-    def _remember(self, frame: Frame, mark: Mark) -> None:
-        if mark & Mark.REFERENCE:
-            self._reference = []
-        left_out = mark & (Mark.HELD | Mark.SKIPPED)
-        if not left_out and len(self._reference) < _KEPT:
-            self._reference.append((frame, mark))
+        return {
+            "source": self._source,
+            "reference_frames": REFERENCE_FRAMES,
+            "touches_before": self._touches_before,
+        }

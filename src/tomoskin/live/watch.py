@@ -97,6 +97,21 @@ class Watch:
             lost = lost_directions(prepared.pattern, self._health.lost, self._health.floating)
             self._prepared = prepared.blind_to(lost / self._scale[:, None])
 
+    def renewed(
+        self, prepared: Prepared, reference: Reference, unusable: NDArray[np.bool_]
+    ) -> Watch:
+        """One for other settings of the same skin that goes on where this one is.
+
+        ``reference`` and ``unusable`` are those that this one was made with.
+        """
+        other = Watch(prepared, reference, unusable, prepared.scan)
+        other._monitor, other._health = self._monitor, self._health
+        if prepared.skin.signal == self._whole.skin.signal:
+            other._baseline, other._common = self._baseline, self._common
+            other._learnt = self._learnt
+        other.take(prepared)
+        return other
+
     @property
     def prepared(self) -> Prepared:
         """The skin with the operator for the electrodes that are well."""

@@ -3,11 +3,23 @@
 What reads it (:class:`Section`, :class:`Key`, kinds of values) also reads other TOML files.
 """
 
-from tomoskin.skin.kinds import Choice, Kind, Number, Quantity, Text, Whole, read_entry, show
+from tomoskin.skin.kinds import (
+    Choice,
+    Kind,
+    Number,
+    NumberOrWord,
+    OneOrEach,
+    Quantity,
+    Rows,
+    Text,
+    Whole,
+    read_entry,
+    show,
+)
 from tomoskin.skin.lay import lay
 from tomoskin.skin.page import section_text, skin_file_page
 from tomoskin.skin.read import check_names, read_section, toml_tables
-from tomoskin.skin.schema import Key, Section
+from tomoskin.skin.schema import SECTIONS, Key, Section
 from tomoskin.skin.settings import (
     InverseSettings,
     ReadoutSettings,
@@ -18,13 +30,17 @@ from tomoskin.skin.settings import (
 from tomoskin.skin.skin import Skin
 
 __all__ = [
+    "SECTIONS",
     "Choice",
     "InverseSettings",
     "Key",
     "Kind",
     "Number",
+    "NumberOrWord",
+    "OneOrEach",
     "Quantity",
     "ReadoutSettings",
+    "Rows",
     "Section",
     "SignalSettings",
     "Skin",

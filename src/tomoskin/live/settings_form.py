@@ -1,0 +1,119 @@
+"""The skin's schema and document as messages, from which a page makes its forms."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import msgspec
+
+from tomoskin.core import SkinError, TomoskinError
+from tomoskin.skin import (
+    SECTIONS,
+    Choice,
+    Kind,
+    Number,
+    NumberOrWord,
+    OneOrEach,
+    Quantity,
+    Rows,
+    Skin,
+    Whole,
+)
+
+Changes = Mapping[str, Mapping[str, Any]]
+"""Values by section and key, as a skin file writes them; None takes a key out."""
+
+LOCKED = frozenset({("surface", "file")})
+"""Keys that name files: a page cannot set them."""
+
+_PLACE = re.compile(r"\[(\w+)\](?: (\w+))?$")
+
+
+@cache
+def schema() -> str:
+    """Message with every section and key: kinds, bounds, units, meanings and conditions."""
+    sections = [
+        {
+            "name": section.name,
+            "meaning": section.meaning,
+            "keys": [
+                {
+                    "name": key.name,
+                    "kind": _form(key.kind),
+                    "expected": key.kind.expected,
+                    "meaning": key.meaning,
+                    "required": key.required,
+                    "when": key.when and {"key": key.when[0], "words": key.when[1]},
+                    "unless": key.unless or None,
+                    "locked": (section.name, key.name) in LOCKED,
+                }
+                for key in section.keys
+            ],
+        }
+        for section in SECTIONS
+    ]
+    return msgspec.json.encode({"type": "schema", "sections": sections}).decode()
+
+
+def refusal(error: TomoskinError) -> str:
+    """Message that a setting was refused, with its section and key where the error names them."""
+    found = _PLACE.search(error.where)
+    section, key = found.groups() if found else (None, None)
+    advice = f" ({error.hint})" if error.hint else ""
+    text = error.message + advice if found else str(error)
+    fields = {"type": "settings_error", "section": section, "key": key, "message": text}
+    return msgspec.json.encode(fields).decode()
+
+
+def altered(skin: Skin, changes: Changes) -> Skin:
+    """``skin`` with ``changes``; keys that go with another choice than is made now are left out.
+
+    Raises
+    ------
+    SkinError
+        For an unknown section or key, one that a page cannot set, or an impossible value.
+    """
+    for section, key in ((s, k) for s, keys in changes.items() for k in keys):
+        if (section, key) in LOCKED:
+            raise SkinError("cannot be set from a page", where=f"[{section}] {key}")
+    return skin.altered({name: _tidy(skin, name, keys) for name, keys in changes.items()})
+
+
+def _tidy(skin: Skin, name: str, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """``changes``, and None for every key that cannot stand beside them and is not among them."""
+    section = next((section for section in SECTIONS if section.name == name), None)
+    if section is None:
+        return dict(changes)
+    merged = {**skin.document[name], **changes}
+    barred = {
+        key.name: None
+        for key in section.keys
+        if key.name not in changes
+        and (
+            (key.when and key.when[0] in changes and merged.get(key.when[0]) not in key.when[1])
+            or (key.unless and changes.get(key.unless) is not None)
+        )
+    }
+    return {**barred, **changes}
+
+
+def _form(kind: Kind) -> dict[str, Any]:
+    match kind:
+        case Choice():
+            form: dict[str, Any] = {"form": "choice", "words": kind.words}
+        case Whole() | Number():
+            form = {"form": "number", "low": kind.low, "high": kind.high}
+        case Quantity():
+            form = {"form": "quantity", "unit": kind.unit, "low": kind.low, "high": kind.high}
+        case NumberOrWord():
+            form = {**_form(kind.number), "words": kind.words.words}
+        case OneOrEach():
+            form = _form(kind.inner)
+        case Rows():
+            form = {"form": "rows", "names": kind.names, "inner": _form(kind.inner)}
+        case _:
+            form = {"form": "text"}
+    return form
