@@ -84,8 +84,8 @@ def export(
     ] = 0.1,
 ) -> None:
     """Convert a session: voltages, or the images that they give again."""
-    from tomoskin.cli.session_export import WRITERS, Export
-    from tomoskin.session import SessionReader, write_touches
+    from tomoskin.live import WRITERS, Export
+    from tomoskin.session import SessionReader
 
     write = WRITERS.get(out.suffix.lower())
     if write is None:
@@ -93,10 +93,10 @@ def export(
             f"expected a name that ends in {', '.join(WRITERS)}, got {out}", param_hint="OUT"
         )
     with SessionReader(file) as session, Bar(f"writing {out}") as bar:
-        write(Export(session, every, bar), out)
+        asked = Export(session, every, bar)
+        write(asked, out)
         if touches is not None:
-            found = session.touches()
-            write_touches(touches, ((t.sequence, t.host_time, t.touches) for t in found))
+            asked.touches(touches)
         if session.torn:
             typer.echo(f"tomoskin: {file}: {session.torn}", err=True)
     for path in filter(None, (out, touches)):

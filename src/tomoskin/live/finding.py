@@ -1,8 +1,9 @@
-"""Image and difference data → readings: regions of the picture, or touches fitted to the data."""
+"""Image and difference data → readings: regions of the picture, touches fitted to the data, or
+places that labelled presses tell."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -11,7 +12,10 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, Image, Reading
 from tomoskin.live.prepare import Prepared
 from tomoskin.signal import Reference
-from tomoskin.touch import NoiseFloor, SpotFinder, SpotModel, measured_covariance
+from tomoskin.touch import Locator, NoiseFloor, SpotFinder, SpotModel, measured_covariance
+
+_ALL = 0.999
+"""Part of a row that is taken for all of it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,8 +85,46 @@ class InData:
         return self._spots.push(view.dv, view.blind)
 
 
+class ByCalibration:
+    """The picture tells that there is a touch, labelled presses where: of one touch at a time."""
+
+    def __init__(self, locator: Locator, prepared: Prepared, reference: Reference | None) -> None:
+        self._locator = locator
+        self.renew(prepared, reference)
+
+    def renew(self, prepared: Prepared, reference: Reference | None) -> None:
+        """See :class:`Finder`."""
+        self._image = InImage(prepared)
+        self._difference = prepared.operator.difference
+        self._mean = prepared.operator.reference if reference is None else reference.mean
+
+    def push(self, view: View) -> list[Reading]:
+        """See :class:`Finder`."""
+        found = self._image.push(view)
+        if not found:
+            return []
+        dv = view.dv if self._difference == "plain" else view.dv * np.abs(self._mean)
+        dv = np.where(_lost(view.blind), np.nan, dv)
+        if not np.isfinite(dv).any():
+            return []
+        (place,), (spread,) = self._locator.predict(dv)
+        sd_x, sd_y = np.sqrt(np.diag(spread)).tolist()
+        return [
+            replace(
+                found[0],
+                x=float(place[0]),
+                y=float(place[1]),
+                sd_x=sd_x,
+                sd_y=sd_y,
+                cov_xy=float(spread[0, 1]),
+            )
+        ]
+
+
 def finding(prepared: Prepared, reference: Reference | None) -> Finder:
-    """What finds the touches, by the method that the skin names."""
+    """What finds the touches: a calibration, else the method that the skin names."""
+    if prepared.locator is not None:
+        return ByCalibration(prepared.locator, prepared, reference)
     if prepared.spots is None:
         return InImage(prepared)
     return InData(prepared.spots, prepared, reference)
@@ -91,6 +133,11 @@ def finding(prepared: Prepared, reference: Reference | None) -> Finder:
 def rows_of(missing: NDArray[np.bool_]) -> FloatArray:
     """(n_meas, k) blind directions of rows that are ``missing`` (n_meas,) bool."""
     return np.eye(len(missing))[:, missing]
+
+
+def _lost(blind: FloatArray) -> NDArray[np.bool_]:
+    """(n_meas,) rows of which the blind directions (n_meas, k), orthonormal, leave nothing."""
+    return np.asarray((blind**2).sum(axis=1) > _ALL)
 
 
 def _noise(prepared: Prepared, reference: Reference | None, gain: float) -> FloatArray:

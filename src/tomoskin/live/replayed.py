@@ -6,9 +6,19 @@ from collections.abc import Iterator
 
 from tomoskin.core import DataError, Frame
 from tomoskin.live.pipeline import Pipeline
-from tomoskin.live.prepare import Prepared
+from tomoskin.live.prepare import Prepared, prepare
 from tomoskin.live.result import Result
-from tomoskin.session import Mark, SessionReader
+from tomoskin.session import CALIBRATION_FILE, Mark, SessionReader, unpack_calibration
+
+
+def as_recorded(session: SessionReader) -> Prepared:
+    """The session's own skin, with the calibration of touch that was on. Raises DataError."""
+    prepared = prepare(session.skin)
+    data = session.attachments().get(CALIBRATION_FILE)
+    if data is None:
+        return prepared
+    found = unpack_calibration(data, f"{session.path}, {CALIBRATION_FILE}")
+    return prepared.located_by(found.locator)
 
 
 def advance(pipeline: Pipeline, frame: Frame, mark: Mark) -> Result | None:
@@ -35,6 +45,7 @@ def replayed(prepared: Prepared, session: SessionReader) -> Iterator[Result]:
     """
     pipeline = Pipeline(prepared)
     pipeline.tick_rate = session.tick_rate
+    pipeline.number_after(session.touches_before)
     for item in session.frames():
         try:
             result = advance(pipeline, item.frame, item.mark)

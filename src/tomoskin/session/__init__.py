@@ -3,7 +3,14 @@
 from tomoskin.session.alpha_picture import write_choices
 from tomoskin.session.archive import load_arrays
 from tomoskin.session.blocks import Rows, all_blocks
-from tomoskin.session.calibration import Calibration, read_calibration, write_calibration
+from tomoskin.session.calibration import (
+    CALIBRATION_FILE,
+    Calibration,
+    pack_calibration,
+    read_calibration,
+    unpack_calibration,
+    write_calibration,
+)
 from tomoskin.session.channels import schema_of
 from tomoskin.session.design_picture import write_promise
 from tomoskin.session.display import Display, circular_average
@@ -38,6 +45,7 @@ from tomoskin.session.whole import read_session, recording_of
 from tomoskin.session.writer import SessionWriter
 
 __all__ = [
+    "CALIBRATION_FILE",
     "FILMS",
     "MOST_PANELS",
     "Calibration",
@@ -69,6 +77,7 @@ __all__ = [
     "load_arrays",
     "log_message",
     "open_replay",
+    "pack_calibration",
     "parse_replay",
     "plot",
     "read_calibration",
@@ -85,6 +94,7 @@ __all__ = [
     "shard_path",
     "touch_row",
     "touches_message",
+    "unpack_calibration",
     "write_calibration",
     "write_choices",
     "write_csv",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import tempfile
 import tokenize
@@ -34,17 +35,34 @@ Arrays = dict[str, NDArray[Any]]
 
 
 def load_arrays(path: Path) -> Arrays:
-    """All arrays of a .npz file; never unpickles.
+    """All arrays of a .npz file; never unpickles. Raises as :func:`unpack_arrays` does."""
+    return _arrays(path, str(path))
+
+
+def unpack_arrays(data: bytes, where: str) -> Arrays:
+    """All arrays of the bytes of a .npz file; never unpickles.
 
     Raises
     ------
     DataError
         When the file is missing, no archive, torn, too large when unpacked, or holds objects.
     """
-    where = str(path)
+    return _arrays(io.BytesIO(data), where)
+
+
+def pack_arrays(arrays: Arrays) -> bytes:
+    """The bytes of a .npz file."""
+    file = io.BytesIO()
+    np.savez_compressed(file, allow_pickle=False, **arrays)
+    return file.getvalue()
+
+
+def _arrays(file: Path | io.BytesIO, where: str) -> Arrays:
     try:
-        _check_size(path)
-        with np.load(path, allow_pickle=False) as archive:
+        _check_size(file, where)
+        if isinstance(file, io.BytesIO):
+            file.seek(0)
+        with np.load(file, allow_pickle=False) as archive:
             return {key: np.asarray(archive[key]) for key in archive.files}
     except FileNotFoundError as error:
         raise DataError("there is no such file", where=where) from error
@@ -65,7 +83,7 @@ def save_arrays(path: Path, arrays: Arrays) -> None:
         part = Path(name)
         try:
             with os.fdopen(handle, "wb") as file:
-                np.savez_compressed(file, allow_pickle=False, **arrays)
+                file.write(pack_arrays(arrays))
             part.replace(path)
         finally:
             part.unlink(missing_ok=True)
@@ -73,12 +91,12 @@ def save_arrays(path: Path, arrays: Arrays) -> None:
         raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
 
 
-def _check_size(path: Path) -> None:
-    with zipfile.ZipFile(path) as archive:
+def _check_size(file: Path | io.BytesIO, where: str) -> None:
+    with zipfile.ZipFile(file) as archive:
         size = sum(member.file_size for member in archive.infolist())
     if size > MAX_BYTES:
         raise DataError(
             f"unpacks to {size / 2**30:.1f} GiB, more than {MAX_BYTES / 2**30:.0f}",
-            where=str(path),
+            where=where,
             hint="split it",
         )

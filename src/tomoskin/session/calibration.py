@@ -16,9 +16,12 @@ import numpy as np
 
 from tomoskin.core import DataError, PatternError
 from tomoskin.pattern import Pattern
-from tomoskin.session.archive import Arrays, load_arrays, save_arrays
+from tomoskin.session.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
 from tomoskin.session.interchange import electrode_table, real_numbers, whole_number
 from tomoskin.touch import Locator, Presses, Region
+
+CALIBRATION_FILE = "calibration.npz"
+"""Name of the calibration inside a session."""
 
 _KIND, _VERSION = "tomoskin touch calibration", 1
 _NEEDED = frozenset({"version", "dv", "xy_m", "outline_m", "drive", "measure", "n_electrodes"})
@@ -35,6 +38,15 @@ class Calibration:
 
 def write_calibration(path: Path, calibration: Calibration) -> None:
     """Write the file whole or not at all. Raises DataError when it cannot be written."""
+    save_arrays(path, _arrays(calibration))
+
+
+def pack_calibration(calibration: Calibration) -> bytes:
+    """The same file's bytes, for a session that holds it."""
+    return pack_arrays(_arrays(calibration))
+
+
+def _arrays(calibration: Calibration) -> Arrays:
     locator, pattern = calibration.locator, calibration.pattern
     arrays: Arrays = {
         "kind": np.array(_KIND),
@@ -51,7 +63,7 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
     }
     if locator.presses.strength is not None:
         arrays["strength"] = locator.presses.strength
-    save_arrays(path, arrays)
+    return arrays
 
 
 def read_calibration(
@@ -64,7 +76,15 @@ def read_calibration(
     DataError
         When it is missing, damaged, or no calibration of touch.
     """
-    arrays, where = load_arrays(path), str(path)
+    return _read(load_arrays(path), str(path), progress)
+
+
+def unpack_calibration(data: bytes, where: str) -> Calibration:
+    """:func:`read_calibration` from the file's bytes."""
+    return _read(unpack_arrays(data, where), where, lambda _done, _total: None)
+
+
+def _read(arrays: Arrays, where: str, progress: Callable[[float, float], None]) -> Calibration:
     if str(arrays.get("kind", "")) != _KIND or not set(arrays) >= _NEEDED:
         raise DataError(
             "is not a calibration of touch", where=where, hint="make one: tomoskin calibrate touch"

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tomoskin.core import DataError
-from tomoskin.live import Prepared, colour_limit, prepare, replayed
+from tomoskin.live.prepare import Prepared
+from tomoskin.live.replayed import as_recorded, replayed
+from tomoskin.live.scale import colour_limit
 from tomoskin.session import (
     FILMS,
     MOST_PANELS,
@@ -25,10 +27,11 @@ from tomoskin.session import (
     write_parquet,
     write_picture,
     write_series,
+    write_touches,
 )
 
 if TYPE_CHECKING:
-    from tomoskin.live import Result
+    from tomoskin.live.result import Result
 
 Advance = Callable[[float, float], None]
 
@@ -64,13 +67,13 @@ class Export:
 
     def series(self, path: Path) -> None:
         """Write a series of meshes with their images."""
-        prepared = prepare(self.session.skin)
+        prepared = as_recorded(self.session)
         moments = ((r.host_time, r.image.values) for r in self._images(prepared))
         write_series(path.with_suffix(".pvd"), prepared.mesh, moments)
 
     def film(self, path: Path) -> None:
         """Write a film of the map."""
-        prepared = prepare(self.session.skin)
+        prepared = as_recorded(self.session)
         unit, limit = prepared.operator.unit, colour_limit(prepared)
         pictures = (
             rendered(path, prepared.mesh, panel, unit, limit) for panel in self._panels(prepared)
@@ -79,11 +82,16 @@ class Export:
 
     def picture(self, path: Path) -> None:
         """Write a sheet of maps, evenly spread over the session."""
-        prepared = prepare(self.session.skin)
+        prepared = as_recorded(self.session)
         panels = list(self._panels(prepared))
         chosen = np.linspace(0, len(panels) - 1, min(len(panels), MOST_PANELS)).round()
         some = [panels[int(number)] for number in np.unique(chosen)]
         write_picture(path, prepared.mesh, some, prepared.operator.unit, colour_limit(prepared))
+
+    def touches(self, path: Path) -> None:
+        """Write a table of the recorded touches."""
+        found = self.session.touches()
+        write_touches(path, ((t.sequence, t.host_time, t.touches) for t in found))
 
     def _panels(self, prepared: Prepared) -> Iterator[Panel]:
         first: float | None = None
