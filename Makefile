@@ -1,7 +1,7 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help live test test-all firmware-test fuzz bench bench-docs docs lint lock native wheel clean page dev
+.PHONY: help soak live test test-all firmware-test fuzz bench bench-docs docs lint lock native wheel clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -39,6 +39,9 @@ fuzz: dev  ## ten million mutated streams through the parsers of board and host;
 
 bench: native  ## time from bytes to touches
 	@$(VENV)/bin/tomoskin bench frame $(ARGS)
+
+soak: native  ## an hour of a bad day, compressed: faults, a sleeping page, a hanging sink
+	@$(VENV)/bin/tomoskin bench soak $(ARGS)
 
 bench-docs: native  ## measure the forward engine anew into docs/benchmarks.md; seven minutes
 	@$(PIP) install --require-hashes --requirement requirements/bench.txt  # pyEIT has no wheel
