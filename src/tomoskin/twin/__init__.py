@@ -10,12 +10,13 @@ from tomoskin.twin.device import TwinDevice
 from tomoskin.twin.disturbance import Disturbance, disturbed, reboots
 from tomoskin.twin.faults import FaultEvent, Faults, faults_at
 from tomoskin.twin.labelled import SetPlan, make_shard
+from tomoskin.twin.layered import Inclusion, Layered, Plate
 from tomoskin.twin.line import FaultyLine, Line, LineSettings
 from tomoskin.twin.material import MaterialSettings, MaterialState, advance, conductivity
 from tomoskin.twin.population import COMMON_PRESSES, Population
 from tomoskin.twin.probe import Contact, Press, Probe
 from tomoskin.twin.readout import ElectronicsSettings, TwinElectronics, convert
-from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, sample_table
+from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, sample_table, table_of
 from tomoskin.twin.script import Script
 from tomoskin.twin.script_check import check_script, check_settling
 from tomoskin.twin.script_page import script_page
@@ -47,12 +48,15 @@ __all__ = [
     "FaultyLine",
     "Finger",
     "Grid",
+    "Inclusion",
+    "Layered",
     "Line",
     "LineSettings",
     "Lines",
     "Load",
     "MaterialSettings",
     "MaterialState",
+    "Plate",
     "Population",
     "Pose",
     "Press",
@@ -91,4 +95,5 @@ __all__ = [
     "script_page",
     "solve_contact",
     "strain_of",
+    "table_of",
 ]

@@ -54,6 +54,10 @@ class Deformation(ABC):
         sheet cannot take that shape.
         """
 
+    def depth(self, uv: FloatArray) -> FloatArray:
+        """(n,) m by which the body under the sheet gives way at ``uv``: none, for most."""
+        return np.zeros(len(uv))
+
 
 @dataclass(frozen=True)
 class Bent(Deformation):
@@ -110,6 +114,14 @@ def strain_of(pose: Pose, uv: FloatArray, rest: Surface, height: float) -> Float
     total = np.zeros((len(uv), 3))
     for deformation in pose:
         total += deformation.strain(uv, rest, height)
+    return total
+
+
+def depth_of(pose: Pose, uv: FloatArray) -> FloatArray:
+    """(n,) m of all deformations of a ``pose`` together."""
+    total = np.zeros(len(uv))
+    for deformation in pose:
+        total += deformation.depth(uv)
     return total
 
 

@@ -21,10 +21,9 @@ from tomoskin.source import ScanSettings
 from tomoskin.twin.population import Population
 from tomoskin.twin.probe import Probe
 from tomoskin.twin.readout import TwinElectronics
-from tomoskin.twin.scanning import SampleTable, ScanClock, sample_table
+from tomoskin.twin.scanning import table_of
 from tomoskin.twin.settings import TwinSettings
 from tomoskin.twin.sheet import TwinSkin
-from tomoskin.wire import Drive
 
 REFERENCE_FRAMES = 20
 """Idle frames whose mean is the reference of a set."""
@@ -122,7 +121,7 @@ class _Lab:
         )
         scan = Scan.of(self.skin.pattern())
         self._readout = Readout.of(scan, self.skin.readout)
-        self._table = _table(scan, ScanSettings.of(self.skin))
+        self._table = table_of(scan, ScanSettings.of(self.skin))
         idle = np.random.SeedSequence(plan.seed, spawn_key=(0,))
         self.reference: FloatArray = self.read(
             [()] * REFERENCE_FRAMES, plan.population.hold, idle
@@ -150,15 +149,6 @@ class _Lab:
 @lru_cache(maxsize=2)
 def _lab(plan: SetPlan) -> _Lab:
     return _Lab(plan)
-
-
-def _table(scan: Scan, settings: ScanSettings) -> SampleTable:
-    drives = [
-        Drive(source, sink, mask)
-        for (source, sink), mask in zip(scan.drives.tolist(), scan.masks.tolist(), strict=True)
-    ]
-    clock = ScanClock(settings.dead_time, settings.settling, settings.conversion)
-    return sample_table(drives, settings.oversampling, clock)
 
 
 def _labels(presses: list[tuple[Probe, ...]], most: int) -> Arrays:

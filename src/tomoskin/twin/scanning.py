@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
+from tomoskin.pattern import Scan
+from tomoskin.source import ScanSettings
 from tomoskin.wire import Drive
 
 
@@ -113,3 +115,13 @@ def sample_table(
         length=np.asarray(length),
         conversion=clock.conversion,
     )
+
+
+def table_of(scan: Scan, settings: ScanSettings) -> SampleTable:
+    """The samples of a host's ``scan``, as the board would take them."""
+    drives = [
+        Drive(source, sink, mask)
+        for (source, sink), mask in zip(scan.drives.tolist(), scan.masks.tolist(), strict=True)
+    ]
+    clock = ScanClock(settings.dead_time, settings.settling, settings.conversion)
+    return sample_table(drives, settings.oversampling, clock)

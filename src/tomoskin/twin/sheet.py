@@ -12,7 +12,7 @@ from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel, State
 from tomoskin.mesh import Outline, Plane, Surface, laid_on, triangulate
 from tomoskin.twin import material
-from tomoskin.twin.bend import BendSettings, Pose, strain_of
+from tomoskin.twin.bend import BendSettings, Pose, depth_of, strain_of
 from tomoskin.twin.contact import ContactSettings
 from tomoskin.twin.dent import Load, indent
 from tomoskin.twin.material import MaterialSettings, MaterialState
@@ -127,7 +127,8 @@ class TwinSkin:
         presses, pose = self._presses, self._pose
         if not _same((presses, pose), self._loaded):
             dented = indent(probes_of(presses), self.contact, self._points, self._blur)
-            self._load = replace(dented, strain=dented.strain + self._strain(pose))
+            given = dented.depth + depth_of(pose, self._points)
+            self._load = Load(strain=dented.strain + self._strain(pose), depth=given)
             self._loaded = (presses, pose)
         return self._load
 

@@ -1,0 +1,89 @@
+"""Soft bodies: stiff balls felt through the skin at random places, expressions of a face."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from report import Report
+
+ROOT = Path(__file__).resolve().parents[1]
+SEEDS = (11, 12, 13)
+PLACEMENTS = 100
+EFFECTS = (1.0, 0.5, 0.25)
+REACH, APART = 35e-3, 30e-3
+WITHIN = 8e-3
+
+
+def run(data: Path | None) -> list[Report]:
+    """Both tables; no recording is needed."""
+    del data
+    return [palpation()]
+
+
+def palpation() -> Report:
+    """Two balls of 10 and 8 mm, ``PLACEMENTS`` times over three twins."""
+    example = _example("fig62_palpation")
+    rows = [(effect, *_felt(example, effect)) for effect in EFFECTS]
+    return Report(
+        "two stiff balls under a plate",
+        (
+            "change of conductivity per compression",
+            "placements",
+            "both within 8 mm",
+            "and no third",
+            "10 mm: median, mm",
+            "8 mm: median, mm",
+            "8 mm: p95, mm",
+        ),
+        tuple(rows),
+        (
+            f"places even over ±{1e3 * REACH:g} mm, at least {1e3 * APART:g} mm apart; "
+            f"seeds {', '.join(map(str, SEEDS))} in turn",
+            "10-bit read-out, 64 readings a sample, means of 40 frames; known weight ± 2 %",
+        ),
+    )
+
+
+def _felt(example: ModuleType, effect: float) -> tuple[Any, ...]:
+    beds = [example.Bed(seed, effect) for seed in SEEDS]
+    palpation = example.Palpation(beds[0].skin)
+    away, count = [], []
+    for trial in range(PLACEMENTS):
+        which = trial % len(SEEDS)
+        balls = _placed(example, np.random.default_rng([SEEDS[which], trial]))
+        found = palpation(beds[which].stages(balls, trial))
+        away.append(example.errors(found, balls))
+        count.append(len(found))
+    both = (np.array(away) < WITHIN).all(axis=1)
+    only = both & (np.array(count) == len(balls))
+    large, small = 1e3 * np.array(away).T
+    return (
+        PLACEMENTS,
+        f"{both.mean():.0%}",
+        f"{only.mean():.0%}",
+        round(float(np.median(large)), 1),
+        round(float(np.median(small)), 1),
+        round(float(np.percentile(small, 95)), 1),
+    )
+
+
+def _placed(example: ModuleType, random: np.random.Generator) -> tuple[Any, ...]:
+    """A ball of each size, far enough apart."""
+    while True:
+        one, other = random.uniform(-REACH, REACH, (2, 2))
+        if np.hypot(*(one - other)) >= APART:
+            return example.between(*one, example.LARGE), example.between(*other, example.SMALL)
+
+
+def _example(name: str) -> ModuleType:
+    sys.path.insert(0, str(ROOT / "examples"))
+    try:
+        return importlib.import_module(name)
+    finally:
+        sys.path.remove(str(ROOT / "examples"))
