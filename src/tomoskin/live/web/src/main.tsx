@@ -5,6 +5,7 @@ import "./styles/page.css";
 import "./styles/sheet.css";
 import "./styles/panels.css";
 import "./styles/drawers.css";
+import "./styles/forms.css";
 import "./styles/narrow.css";
 import { effect } from "@preact/signals";
 import { render } from "preact";
@@ -12,6 +13,7 @@ import { App } from "./App";
 import { onClick, onKey } from "./commands";
 import { startHolding } from "./hold";
 import { installHook } from "./hook";
+import "./settings/Settings";
 import { scene, start } from "./state";
 
 const page = document.getElementById("page");

@@ -42,6 +42,13 @@ export interface Scene {
   readonly version: string;
 }
 
+/** Another scale of the same scene. */
+export interface Scale {
+  readonly type: "scale";
+  readonly limit: number;
+  readonly unit: Scene["unit"];
+}
+
 export interface Sick {
   readonly electrode: number;
   readonly state: string;

@@ -4,7 +4,7 @@ import { batch, computed, signal } from "@preact/signals";
 import { decodeFrame, type Frame } from "./decode";
 import { History } from "./history";
 import { emptyHand, type Hand } from "./presses";
-import type { EventNote, PageMessage, Refusal, Scene, ServerMessage, Status } from "./protocol";
+import type { EventNote, PageMessage, Refusal, Scale, Scene, ServerMessage, Status } from "./protocol";
 import { prepareTopology } from "./sheet/topology";
 import { Connection, type LinkState, socketAddress } from "./socket";
 
@@ -23,8 +23,11 @@ export const ownLimit = signal<number | null>(null);
 export const keepPresses = signal(false);
 
 export const limit = computed(() => ownLimit.value ?? scene.value?.limit ?? 1);
+const points = computed(() => scene.value?.points);
+const cells = computed(() => scene.value?.cells);
+/** Made anew for another mesh only. */
 export const topology = computed(() =>
-  scene.value ? prepareTopology(scene.value.points, scene.value.cells) : null,
+  points.value && cells.value ? prepareTopology(points.value, cells.value) : null,
 );
 
 export const hand = signal<Hand>(emptyHand({ radius: 0.01, force: 1, maxForce: 10 }));
@@ -57,7 +60,7 @@ export function say(text: string): void {
 
 function setScene(next: Scene): void {
   const last = scene.value;
-  const changed = next.skin.name !== last?.skin.name || next.cells.length !== last.cells.length;
+  const changed = !last || String(next.cells) !== String(last.cells) || next.source !== last.source;
   const { radius_m: radius, force_n: force, max_force_n: maxForce } = next.probe;
   batch(() => {
     scene.value = next;
@@ -83,6 +86,9 @@ function receive(message: ServerMessage): void {
 }
 
 onMessage<Scene>("scene", setScene);
+onMessage<Scale>("scale", ({ limit, unit }) => {
+  if (scene.value) scene.value = { ...scene.value, limit, unit };
+});
 onMessage<Status>("state", (message) => (status.value = message));
 onMessage<EventNote>("event", ({ text }) => say(text));
 onMessage<Refusal>("error", ({ message }) => say(message));
@@ -97,6 +103,7 @@ function receiveFrame(bytes: ArrayBuffer): void {
     return;
   }
   if (frame.image.length !== topology.peek()?.nCells) return;
+  if (frame.voltages.length !== scene.peek()?.pattern.n_meas) return;
   newest.frame = frame;
   newest.arrived = performance.now() / 1e3;
   newest.count++;

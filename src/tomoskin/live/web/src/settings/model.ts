@@ -1,0 +1,157 @@
+/** The skin's schema and settings as the server tells them, and the changes that a person makes. */
+
+import { computed, signal } from "@preact/signals";
+import { onMessage, scene, say, send } from "../state";
+
+export type Value = string | number | readonly (readonly (string | number)[])[];
+
+export interface KindForm {
+  readonly form: "choice" | "number" | "quantity" | "rows" | "text";
+  readonly words?: readonly string[];
+  readonly low?: number;
+  readonly high?: number;
+  readonly unit?: string;
+}
+
+export interface KeyForm {
+  readonly name: string;
+  readonly kind: KindForm;
+  /** What a value must be, in words. */
+  readonly expected: string;
+  readonly meaning: string;
+  readonly required: boolean;
+  readonly when: { readonly key: string; readonly words: readonly string[] } | null;
+  readonly unless: string | null;
+  readonly locked: boolean;
+}
+
+export interface SectionForm {
+  readonly name: string;
+  readonly meaning: string;
+  readonly keys: readonly KeyForm[];
+}
+
+type Values = Readonly<Record<string, Value | null>>;
+
+export interface Settings {
+  readonly type: "settings";
+  readonly document: Readonly<Record<string, Values>>;
+  readonly n_electrodes: number;
+  readonly automatic_alpha: number | null;
+  readonly alpha: number;
+  readonly undo: number;
+  readonly redo: number;
+  readonly busy: boolean;
+  readonly took_ms: number | null;
+  readonly files: readonly string[];
+  readonly builtin: readonly string[];
+}
+
+export interface Refused {
+  readonly type: "settings_error";
+  readonly section: string | null;
+  readonly key: string | null;
+  readonly message: string;
+}
+
+export const schema = signal<readonly SectionForm[]>([]);
+export const settings = signal<Settings | null>(null);
+export const refused = signal<Refused | null>(null);
+/** What has been typed and is not the skin's yet, by section. */
+const drafts = signal<Readonly<Record<string, Values>>>({});
+
+onMessage<{ readonly type: "schema"; readonly sections: readonly SectionForm[] }>(
+  "schema",
+  ({ sections }) => (schema.value = sections),
+);
+onMessage<Settings>("settings", (message) => {
+  settings.value = message;
+  const open = refused.value?.section;
+  drafts.value = open && drafts.value[open] ? { [open]: drafts.value[open] } : {};
+});
+onMessage<Refused>("settings_error", (message) => {
+  refused.value = message;
+  if (message.section === null) {
+    drafts.value = {};
+    say(message.message);
+  }
+});
+
+/** A section's values with what has been typed. */
+export function valuesOf(section: string): Values {
+  return { ...settings.value?.document[section], ...drafts.value[section] };
+}
+
+/** Whether a key may stand beside the section's other values. */
+export function stands(key: KeyForm, values: Values): boolean {
+  if (key.unless && values[key.unless] != null) return false;
+  return !key.when || key.when.words.includes(String(values[key.when.key]));
+}
+
+/** Ask for a value; null takes the key out. What does not stand beside it any more goes. */
+export function change(section: string, values: Values): void {
+  const draft = { ...drafts.value[section], ...values };
+  drafts.value = { ...drafts.value, [section]: draft };
+  refused.value = null;
+  send({ type: "settings", changes: { [section]: draft } });
+}
+
+/** Forget what has been typed in a section. */
+export function discard(section: string): void {
+  const { [section]: _, ...rest } = drafts.value;
+  drafts.value = rest;
+  refused.value = null;
+}
+
+export const undo = (): void => send({ type: "undo" });
+export const redo = (): void => send({ type: "redo" });
+
+const WAIT_MS = 60;
+let waiting: (() => void) | null = null;
+
+/** Run the newest of many calls, at most so often: a slider moves faster than pictures are made. */
+export function soon(work: () => void): void {
+  const idle = waiting === null;
+  waiting = work;
+  if (!idle) return;
+  window.setTimeout(() => {
+    const run = waiting;
+    waiting = null;
+    run?.();
+  }, WAIT_MS);
+}
+
+/** What a person typed, as the skin file writes it: a bare number gets the unit that was there. */
+export function typed(text: string, kind: KindForm, before: Value | null | undefined): Value {
+  const trimmed = text.trim();
+  if (kind.form === "number" && trimmed !== "" && Number.isFinite(Number(trimmed))) return Number(trimmed);
+  if (kind.form === "quantity" && trimmed !== "" && Number.isFinite(Number(trimmed))) {
+    const unit = typeof before === "string" ? before.trim().split(/\s+/).slice(1).join(" ") : "";
+    return `${trimmed} ${unit || kind.unit}`;
+  }
+  return trimmed;
+}
+
+/** Rows of four numbers, E1 first, as people write them, to the file's tables; null: not so. */
+export function readTable(text: string): { drive: number[][]; measure: number[][] } | null {
+  const rows = text
+    .split("\n")
+    .map((line) => line.replace(/E/gi, "").trim())
+    .filter((line) => line !== "")
+    .map((line) => line.split(/[\s,;]+/).map(Number));
+  if (!rows.length || rows.some((row) => row.length !== 4 || !row.every(Number.isInteger))) return null;
+  return {
+    drive: rows.map(([source, sink]) => [source - 1, sink - 1]),
+    measure: rows.map(([, , plus, minus]) => [plus - 1, minus - 1]),
+  };
+}
+
+/** The present pattern as such rows. */
+export const presentTable = computed(() => {
+  const pattern = scene.value?.pattern;
+  if (!pattern) return "";
+  const { drive, measure } = pattern;
+  return Array.from({ length: pattern.n_meas }, (_, k) =>
+    [drive[2 * k], drive[2 * k + 1], measure[2 * k], measure[2 * k + 1]].map((e) => e + 1).join(" "),
+  ).join("\n");
+});
