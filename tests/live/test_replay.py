@@ -11,7 +11,7 @@ import pytest
 from live.board import Board, pressed, samples_of
 from live.test_runner import PATIENCE, Watch
 from tomoskin.core import DataError, Frame, SourceError
-from tomoskin.live import Pipeline, Runner, advance, replayed
+from tomoskin.live import Pipeline, Runner, advance, prepare, replayed
 from tomoskin.live.pipeline import REFERENCE_FRAMES
 from tomoskin.live.runner import MOST_AT_ONCE
 from tomoskin.session import Mark, SessionReader
@@ -31,7 +31,7 @@ class Recorded:
 
     def __init__(self, prepared, path):
         self.path, self.board = path, Board()
-        self._idle = samples_of(prepared)
+        self._idle, self._drift = samples_of(prepared), 0
         self._places = [samples_of(prepared, pressed(prepared, x, 0.01)) for x in (-0.03, 0.03)]
         self.runner = Runner(prepared, lambda: self.board)
         self.until = Watch(self.runner).until
@@ -52,9 +52,14 @@ class Recorded:
     def touch(self, place, count):
         self._send([self._places[place]] * count)
 
+    def drift(self, counts):
+        """Every other sample reads so much more from here on."""
+        self._drift = counts
+
     def _send(self, frames):
         for samples in frames:
-            self.board.send(noisy(samples, self.sent))
+            drift = self._drift * (np.arange(len(samples)) % 2)
+            self.board.send(noisy(samples + drift, self.sent))
             self.sent += 1
             self.until(
                 lambda: self.runner.status().frames >= self.sent or self.runner.status().paused
@@ -305,6 +310,80 @@ def test_a_recording_begun_later_has_the_reference(prepared, tmp_path):
     got = {r.sequence: [(t.reading.x, t.reading.y) for t in r.touches] for r in results}
     assert positions
     assert all(got[n] == rows for n, rows in positions.items())
+
+
+def late(live, path):
+    """Touches and drift, long after the reference; recorded from ``path`` on, under a touch."""
+    drift = 0
+    for _ in range(3):
+        live.idle(30)
+        drift += 2
+        live.drift(drift)
+        live.idle(30)
+        live.touch(0, 6)
+        live.idle(20)
+    live.touch(1, 4)
+    live.runner.record(path)
+    live.touch(1, 6)
+    live.idle(25)
+    live.drift(drift + 2)
+    live.touch(0, 8)
+    live.idle(25)
+    live.touch(1, 8)
+
+
+@pytest.mark.parametrize("method", ["image", "fit"])
+def test_a_recording_begun_late_is_replayed_to_the_bit(tmp_path, method):
+    """Though the pipeline had long followed the drift, and had seen four touches."""
+    settings = {"touch": {"method": method}, "inverse": {"alpha": "auto"}}
+    prepared = prepare(Skin.load("textile-disc-8").altered(settings))
+    path = tmp_path / "later.mcap"
+    with Recorded(prepared, tmp_path / "whole.mcap") as live:
+        live.idle(REFERENCE_FRAMES)
+        late(live, path)
+    recorded = recorded_touches(path)
+    with SessionReader(path) as session:
+        early = [item for item in session.frames() if item.mark & Mark.EARLIER]
+        results = list(replayed(prepared, session))
+    assert len(early) == 3 * REFERENCE_FRAMES
+    with SessionReader(tmp_path / "whole.mcap") as session:
+        begun = [item.frame.host_time for item in session.frames()][4 * REFERENCE_FRAMES]
+    assert early[0].frame.host_time > begun
+    assert all(result.ready for result in results)
+    got = {r.sequence: touches_of(r) for r in results}
+    assert {n: rows for n, rows in got.items() if rows or n in recorded} == recorded
+    before, after = (
+        {row[0] for rows in touches.values() for row in rows}
+        for touches in (recorded_touches(tmp_path / "whole.mcap"), recorded)
+    )
+    assert len(before) >= 3
+    assert sorted(after) == [max(before) + n for n in (1, 2, 3)]
+    with SessionReader(path) as session:
+        transport = ReplayTransport(session, prepared.skin, speed=math.inf)
+        runner = Runner(prepared, lambda: transport)
+        until = Watch(runner).until
+        runner.record(tmp_path / "again.mcap")
+        runner.start()
+        until(lambda: runner.newest and runner.newest.result.sequence == live.sent - 1)
+        runner.stop()
+    assert recorded_touches(tmp_path / "again.mcap") == recorded
+
+
+def test_two_recordings_begun_late_one_after_the_other(prepared, tmp_path):
+    """Each as the run is then: the second begins under a touch."""
+    first, second = tmp_path / "first.mcap", tmp_path / "second.mcap"
+    with Recorded(prepared, tmp_path / "whole.mcap") as live:
+        live.idle(4 * REFERENCE_FRAMES)
+        live.runner.record(first)
+        live.touch(0, 6)
+        live.runner.record(second)
+        live.touch(0, 6)
+    for path in (first, second):
+        with SessionReader(path) as session:
+            got = {r.sequence: touches_of(r) for r in replayed(prepared, session)}
+        recorded = recorded_touches(path)  # it may end before the last frame's touches are known
+        assert any(recorded.values())
+        assert all(got[n] == rows for n, rows in recorded.items())
 
 
 def test_a_held_picture_is_held_in_the_replay_too(prepared, tmp_path):

@@ -36,7 +36,7 @@ class Pipeline:
     """
 
     def __init__(self, prepared: Prepared, *, reference_frames: int = REFERENCE_FRAMES) -> None:
-        self._prepared = prepared
+        self._given = self._prepared = prepared
         self._needed = reference_frames
         self._tracker = _tracker(prepared)
         self._image = _none(prepared)
@@ -58,6 +58,7 @@ class Pipeline:
         """Forget the reference; the next frames make a new one."""
         self._reference = self._watch = None
         self._tuning = None
+        self._prepared = self._given  # the same frames make the same operator, whatever came before
         self._tracker.reset()
         self._times = []
         prepared = self._prepared
@@ -69,9 +70,12 @@ class Pipeline:
         """Go on with other settings of the same mesh and scan; the reference stands, and what
         has been learnt of it and of the electrodes.
         """
-        earlier, before, self._prepared = self._prepared, self._watch, prepared
+        earlier, before = self._prepared, self._watch
+        self._given = self._prepared = prepared
         if prepared.skin.touch.snr != earlier.skin.touch.snr:
+            numbered = self._tracker.numbered
             self._tracker = _tracker(prepared)
+            self._tracker.numbered = numbered
         self._image, self._tuning = _none(prepared), None
         if self._reference is None or before is None:
             return
@@ -93,6 +97,15 @@ class Pipeline:
         noise = float(np.sqrt(np.mean(self._reference.noise**2)))
         baseline = self._watch.baseline.state if self._watch else None
         return ReferenceState(self._needed, self._needed, self._since, noise, baseline)
+
+    @property
+    def numbered(self) -> int:
+        """The last identity that was given to a touch."""
+        return self._tracker.numbered
+
+    def number_after(self, last: int) -> None:
+        """Give identities after ``last`` from here on."""
+        self._tracker.numbered = last
 
     @property
     def choice(self) -> AlphaChoice:

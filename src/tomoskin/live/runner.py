@@ -31,6 +31,7 @@ from tomoskin.signal import Reference
 from tomoskin.sink import Outlets, Sink
 from tomoskin.source import Link, ScanSettings, Transport
 from tomoskin.twin import Press
+from tomoskin.wire import Info
 
 MOST_AT_ONCE = 16
 """Where more frames than this wait, the oldest are skipped: a late picture helps nobody."""
@@ -115,7 +116,7 @@ class Runner:
         self._truth: tuple[Press, ...] = ()
         self._pressed, self._polled = 0, 0.0
         self._wishes = Wishes()
-        self._tape = Tape(prepared, self.say, clock)
+        self._tape = Tape(prepared, self.say, clock, self._numbered)
         self._sinks = tuple(sinks)
         self._outlets = Outlets(sinks, self.say)
         self._tally, self._earlier, self._skipped = Tally(), Tally(), 0
@@ -215,6 +216,16 @@ class Runner:
     def replay(self) -> Replayed | None:
         """The recording that is being played; None where the source is another."""
         return self._wishes.replay
+
+    @property
+    def board(self) -> Info | None:
+        """What the board said of itself, once it has."""
+        return self._tape.info
+
+    @property
+    def opening(self) -> Callable[[], Transport]:
+        """What opens the source."""
+        return self._open
 
     def note(self, text: str) -> None:
         """A person's remark on the picture of this moment; goes into the recording as well."""
@@ -318,8 +329,13 @@ class Runner:
         finally:
             self._earlier, self._tally = self._earlier + self._tally, Tally()
 
+    def _numbered(self) -> int:
+        return self._pipeline.numbered
+
     def _link(self, transport: Transport) -> Link:
         self._wishes.opened(transport)
+        if self.replay:
+            self._pipeline.number_after(self.replay.touches_before)
         clock, tap = self._clock, self._tape.read
         return Link(transport, self.prepared.scan, self._settings, clock=clock, tap=tap)
 
@@ -368,7 +384,7 @@ class Runner:
         self._settings = ScanSettings.of(prepared.skin)
         self._pipeline, self._meter, self._wishes = Pipeline(prepared), Meter(), Wishes()
         self._tally, self._earlier, self._skipped = Tally(), Tally(), 0
-        self._tape = Tape(prepared, self.say, self._clock)
+        self._tape = Tape(prepared, self.say, self._clock, self._numbered)
         self._outlets = Outlets(self._sinks, self.say)
         self._presses, self._truth = PressBoard(), ()
         self.newest = None
@@ -409,6 +425,8 @@ class Runner:
         for number, frame in enumerate(frames):
             mark = self._wishes.mark(frame, late=number < late)
             if mark is not None:
+                for before in self._tape.again():
+                    advance(self._pipeline, *before)
                 self._tape.frame(frame, mark)
                 self._process(frame, mark)
 

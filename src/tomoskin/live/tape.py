@@ -17,6 +17,7 @@ from tomoskin.source import Link
 from tomoskin.twin import Press
 from tomoskin.wire import Info
 
+
 class Tape:
     """Passes everything on to the recorder of the moment, and remembers what a new one needs.
 

@@ -26,6 +26,9 @@ class Replayed(Protocol):
     speed: float
     """Recorded seconds per second; inf for as fast as it is read."""
 
+    touches_before: int
+    """The last identity that a touch had before it begins."""
+
     loop: bool
     """Whether it begins again at the end."""
 

@@ -68,6 +68,7 @@ class ReplayTransport:
         self._condition = threading.Condition()
         self._board = ReplayBoard(skin, session.device())
         self._restamped = _restamped(session, skin, self.name)
+        self.touches_before = session.touches_before
         self._held = self._closed = self._jumped = self.ended = False
         self._steps = 0
         self._marks: dict[int, Mark] = {}

@@ -169,6 +169,12 @@ class SessionReader:
         return self._last(channels.SETTINGS)
 
     @property
+    def touches_before(self) -> int:
+        """The last identity that a touch had in the run before this recording began."""
+        said = self.settings().get("touches_before", 0)
+        return said if isinstance(said, int) and said >= 0 else 0
+
+    @property
     def n_frames(self) -> int:
         """Number of frames by the index; 0 where there is none."""
         return self.totals.counts.get(channels.FRAMES, 0) if self.totals else 0

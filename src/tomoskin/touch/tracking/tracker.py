@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import count
 
 import numpy as np
 
@@ -30,6 +29,8 @@ class Tracker:
     ----------
     events
         What happened in the newest frame.
+    numbered
+        The last identity that was given.
     """
 
     def __init__(self, settings: TrackSettings | None = None) -> None:
@@ -37,7 +38,7 @@ class Tracker:
         self.events: tuple[TouchEvent, ...] = ()
         self._traces: list[Trace] = []
         self._remainders = Remainders(self.settings.least_snr)
-        self._numbers = count(1)
+        self.numbered = 0
         self._last: float | None = None
         self._now = 0.0
         self._host = 0.0
@@ -65,15 +66,17 @@ class Tracker:
         return tuple(sorted(shown, key=lambda touch: touch.id))
 
     def reset(self) -> None:
-        """Release every touch and forget what they left; identities go on counting.
+        """Release every touch and forget all else; identities go on counting.
 
-        The next frame tells that they were released.
+        The next frame tells that they were released. Time begins anew: what comes is to the bit
+        what a new tracker would make of it.
         """
         for trace in [trace for trace in self._traces if trace.number]:
             self._end(trace)
         self._traces = []
         self._remainders.forget()
         self.events = ()
+        self._last, self._now, self._host = None, 0.0, 0.0
 
     def _elapse(self, time: float, host_time: float) -> float:
         elapsed = 0.0
@@ -165,7 +168,8 @@ class Tracker:
             return
         origin = left_by(trace, self._traces)
         if origin is None:
-            trace.number = next(self._numbers)
+            self.numbered += 1
+            trace.number = self.numbered
             self._say("onset", trace)
             return
         if origin.missing is not None:  # its region is gone, and this is one of those it was
