@@ -1,5 +1,12 @@
 """Image → readings → touches with an identity; labelled presses → places."""
 
+from tomoskin.touch.bending import (
+    BendExamples,
+    BendModel,
+    BendReader,
+    BendReading,
+    JointReference,
+)
 from tomoskin.touch.design import Demand, Promise, Variant, promise, variants
 from tomoskin.touch.fit import SpotFinder, SpotModel, measured_covariance
 from tomoskin.touch.floor import NoiseFloor
@@ -13,9 +20,14 @@ from tomoskin.touch.wiring import Wiring, WiringAnswer, ring_of, solve_wiring
 __all__ = [
     "STILL",
     "Answers",
+    "BendExamples",
+    "BendModel",
+    "BendReader",
+    "BendReading",
     "Codes",
     "Demand",
     "Examples",
+    "JointReference",
     "Locator",
     "NoiseFloor",
     "Presses",
