@@ -55,7 +55,7 @@ def decode(data):
     head["touches"] = []
     for _ in range(head["n_touches"]):
         number, kind = struct.unpack_from("<IB", data, at)
-        head["touches"].append((number, kind, *struct.unpack_from("<7f", data, at + 8)))
+        head["touches"].append((number, kind, *struct.unpack_from("<8f", data, at + 8)))
         at += 40
     head["truth"] = [floats(4) for _ in range(head["n_truth"])]
     head["labels"] = list(data[at : at + head["n_cells"]])
@@ -78,7 +78,7 @@ def test_round_trip(n_cells):
     np.testing.assert_allclose(found["voltages"], [0.1, 0.2, 0.3], rtol=1e-6)
     np.testing.assert_allclose(found["reference"], [0.4, 0.5, 0.6], rtol=1e-6)
     first, second = found["touches"]
-    assert first == pytest.approx((3, 0, 0.01, -0.02, 0.001, 0.001, 2e-4, -0.3, 2.5))
+    assert first == pytest.approx((3, 0, 0.01, -0.02, 0.001, 0.001, 2e-4, -0.3, 2.5, 0))
     assert second[:2] == (300, 1)
     assert math.isnan(second[4])
     assert found["truth"] == [pytest.approx((0.5, -0.25, 3.0, 0.015))]
@@ -111,3 +111,10 @@ def test_a_touch_says_how_many_it_stands_for():
     data = encode_result(make(5, (alone, several, merged)), [], 0.0)
     at = len(data) - 8 - 3 * 40
     assert [data[at + 40 * k + 5] for k in range(3)] == [0, 1, 3]
+
+
+def test_a_touch_carries_its_whole_covariance():
+    first = touch(1, [0])
+    first = replace(first, reading=replace(first.reading, cov_xy=-2e-6))
+    found = decode(encode_result(make(touches=(first,)), [], 0.0))
+    assert found["touches"][0][-1] == pytest.approx(-2e-6)

@@ -8,7 +8,7 @@ import pytest
 
 from tomoskin.core import Event
 from tomoskin.inverse import AlphaChoice
-from tomoskin.live import colour_limit, messages
+from tomoskin.live import colour_limit, messages, prepare
 from tomoskin.live.result import ReferenceState
 from tomoskin.live.status import Status
 from tomoskin.signal import BaselineState, ElectrodeHealth
@@ -48,6 +48,22 @@ def test_scene(prepared):
     assert scene["pattern"]["n_meas"] == 40
     assert len(scene["pattern"]["drive"]) == len(scene["pattern"]["measure"]) == 80
     assert scene["skin"]["name"] == "textile-disc-8"
+    assert scene["solid"] is None
+
+
+def test_a_sheet_on_a_surface_is_told_in_space(prepared):
+    skin = prepared.skin.altered(
+        {"surface": {"shape": "cylinder", "radius": "60 mm"}, "mesh": {"cells": 300}}
+    )
+    scene = json.loads(messages.scene(prepare(skin), "twin", limit=0.1, pressable=True))
+    solid = np.reshape(scene["solid"], (-1, 3))
+    flat = np.reshape(scene["points"], (-1, 2))
+    assert len(solid) == len(flat)
+    edge = np.linalg.norm(solid[scene["cells"][0]] - solid[scene["cells"][1]])
+    assert edge == pytest.approx(
+        np.linalg.norm(flat[scene["cells"][0]] - flat[scene["cells"][1]]), rel=1e-2
+    )
+    assert np.ptp(solid, axis=0).max() < np.ptp(flat, axis=0).max() + 1e-9
     assert scene["probe"]["radius_m"] == 0.015
 
 

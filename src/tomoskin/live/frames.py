@@ -7,7 +7,7 @@ image                 f32 [n_cells], change of conductivity in the scene's unit
 voltages, reference   f32 [n_meas] each, V
 touches, 40 bytes     id u32, kind u8 (0 decrease, 1 increase), apart u8 (0 yes, 1 may be
 each                  several, n > 1: n that have merged), 2 pad, x, y, sd_x, sd_y (NaN unknown),
-                      area, peak, since (s ago) f32, reserved u32
+                      area, peak, since (s ago), cov_xy (m²) f32
 truth, 16 bytes each  x, y (m), force (N), radius (m) f32: the presses on the twin
 labels                u8 [n_cells], 0 none, k = cells of the k-th touch; padded to 4 bytes
 ====================  ======================================================================
@@ -43,14 +43,14 @@ _HEADER = np.dtype(
         ("reserved", "<u4"),
     ]
 )
+_MEASURES = ("x", "y", "sd_x", "sd_y", "area", "peak", "since", "cov_xy")
 _TOUCH = np.dtype(
     [
         ("id", "<u4"),
         ("kind", "u1"),
         ("apart", "u1"),
         ("pad", "u1", 2),
-        *((name, "<f4") for name in ("x", "y", "sd_x", "sd_y", "area", "peak", "since")),
-        ("reserved", "<u4"),
+        *((name, "<f4") for name in _MEASURES),
     ]
 )
 _MOST = 255
@@ -115,7 +115,7 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
             t.reading.area,
             t.reading.peak,
             now - t.since,
-            0,
+            t.reading.cov_xy,
         )
         for t in touches
     ]

@@ -31,7 +31,7 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
 
     ``limit`` is the end of the fixed symmetric colour scale, in the image's unit; lengths are m,
     coordinates lie flat as x0, y0, x1, y1, …; electrodes and points are counted from 0, labels
-    from E1.
+    from E1. ``solid``: where the points lie in space, x0, y0, z0, …, of a sheet on a surface.
     """
     skin, mesh, pattern = prepared.skin, prepared.mesh, prepared.pattern
     return _text(
@@ -40,6 +40,7 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
         unit=prepared.operator.unit,
         limit=limit,
         points=_flat(mesh.points),
+        solid=None if skin.is_flat else _flat(skin.surface.point(mesh.points)),
         cells=_flat(mesh.cells),
         outline=_flat(skin.outline.polyline(skin.outline.length / _OUTLINE_POINTS)),
         electrodes=_electrodes(prepared),

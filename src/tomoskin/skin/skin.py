@@ -119,6 +119,11 @@ class Skin:
         """Sign of the measured voltages: −1 where they come reversed."""
         return -1.0 if self.document["drive"].get("polarity") == "reversed" else 1.0
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether the sheet lies flat, on no surface."""
+        return bool(self.document["surface"]["shape"] == "flat")
+
     @cached_property
     def electrode_centres(self) -> FloatArray:
         """(n, 2) middle of each electrode on the rim, m."""

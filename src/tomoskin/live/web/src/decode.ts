@@ -16,6 +16,8 @@ export interface Touch {
   readonly sdX: number;
   readonly sdY: number;
   /** m². */
+  readonly covXy: number;
+  /** m². */
   readonly area: number;
   /** Signed change of conductivity at the peak, in the scene's unit. */
   readonly peak: number;
@@ -57,6 +59,7 @@ function touchAt(data: DataView, at: number): Touch {
     y: data.getFloat32(at + 12, true),
     sdX: data.getFloat32(at + 16, true),
     sdY: data.getFloat32(at + 20, true),
+    covXy: data.getFloat32(at + 36, true),
     area: data.getFloat32(at + 24, true),
     peak: data.getFloat32(at + 28, true),
     since: data.getFloat32(at + 32, true),

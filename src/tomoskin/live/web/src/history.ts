@@ -1,9 +1,12 @@
-/** The strength of each touch over the last seconds: a few fixed slots, one touch in each. */
+/** The strength and way of each touch over the last seconds: a few fixed slots, one touch in each. */
 
 import type { Touch } from "./decode";
 
 export const SPAN = 10;
 export const SLOTS = 8;
+
+/** Seconds of a touch's way that are shown on the sheet. */
+const TRAIL = 2;
 
 interface Slot {
   id: number | null;
@@ -13,6 +16,9 @@ interface Slot {
 export class History {
   readonly times: number[] = [];
   readonly columns: (number | null)[][] = Array.from({ length: SLOTS }, () => []);
+  /** x and y of each slot's touch, m. */
+  readonly xs: (number | null)[][] = Array.from({ length: SLOTS }, () => []);
+  readonly ys: (number | null)[][] = Array.from({ length: SLOTS }, () => []);
   private readonly slots: Slot[] = Array.from({ length: SLOTS }, () => ({ id: null, seen: 0 }));
 
   /** Add one frame's touches at a time in seconds; time running backwards starts afresh. */
@@ -20,18 +26,39 @@ export class History {
     const last = this.times[this.times.length - 1];
     if (last !== undefined && time < last) this.clear();
     this.times.push(time);
-    for (const column of this.columns) column.push(null);
+    for (const column of this.all()) column.push(null);
     for (const touch of touches) {
       const slot = this.slotOf(touch.id, time);
       if (slot < 0) continue;
       this.slots[slot].seen = time;
-      this.columns[slot][this.times.length - 1] = Math.abs(touch.peak);
+      const at = this.times.length - 1;
+      this.columns[slot][at] = Math.abs(touch.peak);
+      this.xs[slot][at] = touch.x;
+      this.ys[slot][at] = touch.y;
     }
   }
 
   /** The touch last drawn in a slot. */
   idOf(slot: number): number | null {
     return this.slots[slot].id;
+  }
+
+  /** Where a touch was of late, oldest first, m. */
+  trailOf(id: number): (readonly [number, number])[] {
+    const slot = this.slots.findIndex((each) => each.id === id);
+    const trail: (readonly [number, number])[] = [];
+    if (slot < 0) return trail;
+    const last = this.times.length - 1;
+    for (let k = last; k >= 0 && this.times[k] > this.times[last] - TRAIL; k--) {
+      const [x, y] = [this.xs[slot][k], this.ys[slot][k]];
+      if (x == null || y == null) break;
+      trail.push([x, y]);
+    }
+    return trail.reverse();
+  }
+
+  private all(): (number | null)[][] {
+    return [...this.columns, ...this.xs, ...this.ys];
   }
 
   /** Drop what is older than the span; call now and then, not per frame. */
@@ -41,12 +68,12 @@ export class History {
     while (old < this.times.length && this.times[old] < now - SPAN) old++;
     if (old === 0) return;
     this.times.splice(0, old);
-    for (const column of this.columns) column.splice(0, old);
+    for (const column of this.all()) column.splice(0, old);
   }
 
   clear(): void {
     this.times.length = 0;
-    for (const column of this.columns) column.length = 0;
+    for (const column of this.all()) column.length = 0;
     for (const slot of this.slots) slot.id = null;
   }
 

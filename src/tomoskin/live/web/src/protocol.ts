@@ -26,6 +26,8 @@ export interface Scene {
   readonly limit: number;
   /** x, y of each mesh point, flat. */
   readonly points: readonly number[];
+  /** x, y, z of each mesh point, flat; null: the sheet lies flat. */
+  readonly solid: readonly number[] | null;
   /** Three mesh points of each cell, flat. */
   readonly cells: readonly number[];
   /** x, y along the closed outline, flat. */

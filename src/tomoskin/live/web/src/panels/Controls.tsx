@@ -3,6 +3,7 @@
 import * as commands from "../commands";
 import type { Command } from "../commands";
 import { fixed } from "../format";
+import { inSpace, space } from "../sheet/space";
 import { hand, keepPresses, link, scene, showTruth, smoothed, status } from "../state";
 
 interface ButtonProps {
@@ -76,6 +77,7 @@ export function Controls() {
         </div>
       )}
       <div role="group" aria-label="View" class="views">
+        <Button command={space} pressed={inSpace.value} />
         <Button command={commands.flat} label={smoothed.value ? "Show cells" : "Smooth"} />
         {pressable && <Button command={commands.truth} pressed={showTruth.value} />}
       </div>

@@ -53,6 +53,9 @@ export function Legend() {
           Reset
         </button>
       )}
+      <p class="ring" title="The ellipse around a touch: where it is with 90 % of certainty, by the noise">
+        ◯ 90 %
+      </p>
     </aside>
   );
 }

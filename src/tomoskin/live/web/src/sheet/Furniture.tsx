@@ -1,6 +1,6 @@
 /** What stands still around the image: the outline, the electrodes, the scale bar. */
 
-import type { Scene } from "../protocol";
+import type { Electrode, Scene, Sick } from "../protocol";
 import { barLength, boxOf, outward, toPixels, type View } from "./view";
 
 const DOT = 15;
@@ -40,24 +40,71 @@ function ScaleBar({ view, length }: { view: View; length: number }) {
   );
 }
 
-export function Furniture({ scene, view }: { scene: Scene; view: View }) {
+/** Out of the sheet at an electrode, in pixels right and up. */
+function pixelsOut(scene: Scene, view: View, electrode: Electrode): readonly [number, number] {
+  const [dx, dy] = outward(scene.outline, scene.points, electrode);
+  const inside = 2e-3;
+  const [x, y] = toPixels(view, electrode.x, electrode.y);
+  const [x0, y0] = toPixels(view, electrode.x - inside * dx, electrode.y - inside * dy);
+  const length = Math.hypot(x - x0, y - y0) || 1;
+  return [(x - x0) / length, (y0 - y) / length];
+}
+
+/** A dot where it is well; a square on its corner, with a cross, where it is not. */
+function Dot({ x, y, sick }: { x: number; y: number; sick: Sick | undefined }) {
+  if (!sick) return <circle cx={x} cy={y} r={5} />;
+  const arm = `M${x - 4} ${y - 4}L${x + 4} ${y + 4}M${x - 4} ${y + 4}L${x + 4} ${y - 4}`;
+  return (
+    <>
+      <rect x={x - 9} y={y - 9} width={18} height={18} transform={`rotate(45 ${x} ${y})`} />
+      <path class="cross" d={arm} />
+    </>
+  );
+}
+
+export interface FurnitureProps {
+  readonly scene: Scene;
+  readonly view: View;
+  readonly sick: readonly Sick[];
+  /** Source and sink of the drive that is looked at, counted from 0. */
+  readonly drive: readonly [number, number] | null;
+}
+
+export function Furniture({ scene, view, sick, drive }: FurnitureProps) {
   const { outline, points } = scene;
   return (
-    <svg class="furniture" width={view.width} height={view.height} aria-hidden="true">
+    <svg class="furniture" width={view.width} height={view.height} role="group" aria-label="Electrodes">
       <path class="outline" d={`${pathOf(view, outline)}Z`} />
-      {scene.electrodes.map((electrode) => {
-        const [dx, dy] = outward(outline, points, electrode);
+      {scene.electrodes.map((electrode, number) => {
+        const [dx, dy] = pixelsOut(scene, view, electrode);
         const [x, y] = toPixels(view, electrode.x, electrode.y);
         const arc = electrode.points.flatMap((p) => [points[2 * p], points[2 * p + 1]]);
+        const ill = sick.find((one) => one.electrode === number);
+        const reason = ill ? `${electrode.label}: ${ill.reason}` : `${electrode.label}: good`;
+        const role = drive?.indexOf(number) ?? -1;
         return (
-          <g key={electrode.label} class="electrode">
-            {arc.length > 2 && <path d={pathOf(view, arc)} />}
-            <circle cx={x + DOT * dx} cy={y - DOT * dy} r={5} />
-            <Label text={electrode.label} x={x} y={y} dx={dx} dy={dy} />
+          <g
+            key={electrode.label}
+            class={`electrode${ill ? " ill" : ""}${role >= 0 ? " driven" : ""}`}
+            data-testid={`electrode-${number + 1}`}
+            role="img"
+            aria-label={reason}
+            {...(ill ? { tabIndex: 0 } : {})}
+          >
+            <title>{reason}</title>
+            {arc.length > 2 && <path class="arc" d={pathOf(view, arc)} />}
+            <Dot x={x + DOT * dx} y={y - DOT * dy} sick={ill} />
+            <Label
+              text={electrode.label + (role < 0 ? "" : role === 0 ? " +" : " \u2212")}
+              x={x}
+              y={y}
+              dx={dx}
+              dy={dy}
+            />
           </g>
         );
       })}
-      <ScaleBar view={view} length={barLength(boxOf(outline))} />
+      {!view.seen && <ScaleBar view={view} length={barLength(boxOf(outline))} />}
     </svg>
   );
 }

@@ -2,15 +2,30 @@
 
 import { effect, signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { hand, limit, link, newest, onRepaint, scene, shown, showTruth, smoothed, topology } from "../state";
+import { inScale, millimetres, scaleFor } from "../format";
+import {
+  hand,
+  limit,
+  link,
+  newest,
+  onRepaint,
+  scene,
+  shown,
+  showTruth,
+  smoothed,
+  status,
+  topology,
+} from "../state";
 import { theme } from "../theme";
+import { Target } from "../flows/Target";
 import { Furniture } from "./Furniture";
 import { Painter } from "./painter";
 import { cursor, listen } from "./pointer";
-import { boxOf, fit, type View } from "./view";
+import { hovered, locator, seen, shownDrive } from "./space";
+import { around, boxOf, fit, type View } from "./view";
 
 /** Room for the electrodes' labels all round and for the legend at the left. */
-const MARGIN = { left: 140, right: 64, top: 52, bottom: 52 };
+const MARGIN = { left: 186, right: 64, top: 52, bottom: 80 };
 const NOWHERE: View = { scale: 1, originX: 0, originY: 0, width: 0, height: 0 };
 
 export const view = signal<View>(NOWHERE);
@@ -20,6 +35,21 @@ const element: { sheet: HTMLElement | null } = { sheet: null };
 
 /** Where the sheet is on the page, for tests that press at a place in metres. */
 export const sheetElement = (): HTMLElement | null => element.sheet;
+
+/** The value under the pointer, in words, always at the same place. */
+function Reading() {
+  const place = hovered.value;
+  const frame = shown.value;
+  const found = place && locator.value?.find(...place);
+  if (!scene.value || !frame || !place || !found) return null;
+  const scale = scaleFor(limit.value, scene.value.unit);
+  return (
+    <p class="reading" data-testid="reading">
+      {millimetres(place[0], 0)}, {millimetres(place[1], 0)} mm{" "}
+      <strong>{inScale(frame.image[found.cell], scale)}</strong> {scale.unit}
+    </p>
+  );
+}
 
 export function Sheet() {
   const sheet = useRef<HTMLDivElement>(null);
@@ -36,11 +66,15 @@ export function Sheet() {
       listen(sheet.current, () => view.peek()),
       effect(() => {
         const [width, height] = size.value;
-        if (scene.value && width > 0) view.value = fit(boxOf(scene.value.outline), width, height, MARGIN);
+        if (scene.value && width > 0) {
+          view.value = seen.value
+            ? around(seen.value, width, height, MARGIN)
+            : fit(boxOf(scene.value.outline), width, height, MARGIN);
+        }
         painter.resize(width, height);
       }),
       effect(() => {
-        void [theme.value, topology.value, limit.value, smoothed.value, showTruth.value, hand.value, cursor.value];
+        void [view.value, theme.value, topology.value, limit.value, smoothed.value, showTruth.value, hand.value, cursor.value];
         painter.request();
       }),
       () => painter.stop(),
@@ -73,7 +107,15 @@ export function Sheet() {
     >
       <canvas ref={image} />
       <canvas ref={marks} />
-      {scene.value && view.value.width > 0 && <Furniture scene={scene.value} view={view.value} />}
+      {scene.value && view.value.width > 0 && (
+        <Furniture
+          scene={scene.value}
+          view={view.value}
+          sick={status.value?.sick ?? []}
+          drive={shownDrive.value}
+        />
+      )}
+      <Reading />
       {!accelerated.value && (
         <p class="remark">WebGL 2 is missing in this browser: the sheet is drawn flat and more slowly.</p>
       )}

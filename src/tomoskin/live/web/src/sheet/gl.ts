@@ -2,12 +2,14 @@
 
 import { MAP_SIZE } from "../colours";
 import type { Look, Picture } from "./picture";
+import type { Seen } from "./solid";
 import { toNodes, type Topology } from "./topology";
 
 const VERTEX = `#version 300 es
-layout(location = 0) in vec2 place;
+layout(location = 0) in vec3 place;
 layout(location = 1) in float node;
 uniform vec4 view;
+uniform float depth;
 uniform highp sampler2D values;
 uniform int row;
 uniform bool smoothed;
@@ -18,7 +20,7 @@ void main() {
   value = texelFetch(values, ivec2(index % row, index / row), 0).r;
   int k = gl_VertexID % 3;
   corner = vec3(k == 0, k == 1, k == 2);
-  gl_Position = vec4(place * view.xy + view.zw, 0.0, 1.0);
+  gl_Position = vec4(place.xy * view.xy + view.zw, -place.z * depth, 1.0);
 }`;
 
 const FRAGMENT = `#version 300 es
@@ -72,11 +74,16 @@ function makeTexture(gl: WebGL2RenderingContext, unit: number, filter: number): 
   return texture;
 }
 
-/** Three corners a cell: x, y, node. */
-function cornerData(topology: Topology): Float32Array {
-  const { cells, points } = topology;
-  const corners = new Float32Array(3 * cells.length);
-  cells.forEach((node, k) => corners.set([points[2 * node], points[2 * node + 1], node], 3 * k));
+/** Three corners a cell: x, y, z, node; of the flat sheet, or of the sheet as it is seen. */
+function cornerData({ cells, points }: Topology, seen: Seen | undefined): Float32Array {
+  const corners = new Float32Array(4 * cells.length);
+  cells.forEach((node, k) => {
+    const at = 4 * k;
+    corners[at] = seen ? seen.places[3 * node] : points[2 * node];
+    corners[at + 1] = seen ? seen.places[3 * node + 1] : points[2 * node + 1];
+    corners[at + 2] = seen ? seen.places[3 * node + 2] : 0;
+    corners[at + 3] = node;
+  });
   return corners;
 }
 
@@ -91,6 +98,7 @@ export class GlPicture implements Picture {
   private topology: Topology | null = null;
   private values = new Float32Array(ROW);
   private map: Uint8Array | null = null;
+  private seen: Seen | undefined;
 
   constructor(private readonly gl: WebGL2RenderingContext) {
     const program = compile(gl);
@@ -103,13 +111,14 @@ export class GlPicture implements Picture {
     gl.uniform1i(at("row"), ROW);
     gl.uniform1f(at("size"), MAP_SIZE);
     this.uniforms = Object.fromEntries(
-      ["view", "limit", "mesh", "smoothed"].map((name) => [name, at(name)]),
+      ["view", "depth", "limit", "mesh", "smoothed"].map((name) => [name, at(name)]),
     );
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
     gl.enableVertexAttribArray(0);
-    gl.vertexAttribPointer(0, 2, gl.FLOAT, false, 12, 0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 16, 0);
     gl.enableVertexAttribArray(1);
-    gl.vertexAttribPointer(1, 1, gl.FLOAT, false, 12, 8);
+    gl.vertexAttribPointer(1, 1, gl.FLOAT, false, 16, 12);
+    gl.enable(gl.DEPTH_TEST);
   }
 
   setTopology(topology: Topology): void {
@@ -119,13 +128,22 @@ export class GlPicture implements Picture {
     this.values = new Float32Array(rows * ROW);
     gl.activeTexture(gl.TEXTURE0);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, ROW, rows, 0, gl.RED, gl.FLOAT, this.values);
-    gl.bufferData(gl.ARRAY_BUFFER, cornerData(topology), gl.STATIC_DRAW);
+    this.placeCorners(topology, undefined);
+  }
+
+  /** The corners of another mesh, or of the sheet seen from elsewhere. */
+  private placeCorners(topology: Topology, seen: Seen | undefined): void {
+    const { gl } = this;
+    this.seen = seen;
+    gl.bufferData(gl.ARRAY_BUFFER, cornerData(topology, seen), gl.STATIC_DRAW);
   }
 
   paint(image: Float32Array, look: Look): void {
     const { gl, topology, uniforms } = this;
     if (!topology) return;
-    const { scale, originX, originY, width, height } = look.view;
+    const { scale, originX, originY, width, height, seen } = look.view;
+    if (seen !== this.seen) this.placeCorners(topology, seen);
+    gl.uniform1f(uniforms.depth, seen ? 0.9 / seen.radius : 0);
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     gl.uniform4f(
       uniforms.view,
@@ -140,7 +158,7 @@ export class GlPicture implements Picture {
     gl.uniform4f(uniforms.mesh, red, green, blue, look.smoothed ? 0 : strength);
     this.uploadMap(look.map);
     this.uploadValues(topology, image, look.smoothed);
-    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.drawArrays(gl.TRIANGLES, 0, 3 * topology.nCells);
   }
 

@@ -6,8 +6,12 @@ import type { Theme } from "../theme";
 import { contours, type Topology } from "./topology";
 import { toPixels, type View } from "./view";
 
+type Place = readonly [number, number];
+
 export interface Marks {
   readonly touches: readonly Touch[];
+  /** Where each has been, oldest first. */
+  readonly trails: readonly (readonly Place[])[];
   readonly labels: Uint8Array;
   /** Null: the truth is not asked for. */
   readonly truths: readonly Truth[] | null;
@@ -18,7 +22,6 @@ export interface Marks {
 }
 
 type Pen = CanvasRenderingContext2D;
-type Place = readonly [number, number];
 
 /** A line that reads on any colour: a wide halo under it. */
 function haloed(pen: Pen, theme: Theme, path: Path2D, colour: string, width: number): void {
@@ -65,6 +68,42 @@ function loopPath(loop: number[], topology: Topology, view: View, smoothed: bool
   return path;
 }
 
+/** χ² of two degrees of freedom that holds 90 %. */
+const NINETY = 4.605;
+const CORNERS = 40;
+
+/** The ellipse that holds a touch with 90 % of certainty, in metres around it; null: unknown. */
+export function ellipse(touch: Touch): readonly Place[] | null {
+  const { sdX, sdY, covXy } = touch;
+  const [a, b, c] = [sdX * sdX, covXy, sdY * sdY];
+  const middle = (a + c) / 2;
+  const spread = Math.hypot((a - c) / 2, b);
+  if (!Number.isFinite(middle)) return null;
+  const [long, short] = [middle + spread, Math.max(0, middle - spread)].map((v) => Math.sqrt(NINETY * v));
+  const angle = Math.atan2(2 * b, a - c) / 2;
+  const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
+  return Array.from({ length: CORNERS }, (_, k) => {
+    const phase = (2 * Math.PI * k) / CORNERS;
+    const [p, q] = [long * Math.cos(phase), short * Math.sin(phase)];
+    return [touch.x + p * cos - q * sin, touch.y + p * sin + q * cos] as const;
+  });
+}
+
+/** Where a touch has been, the older the fainter. */
+function drawTrail(pen: Pen, theme: Theme, view: View, trail: readonly Place[]): void {
+  pen.strokeStyle = theme.accent;
+  pen.lineWidth = 2;
+  pen.setLineDash([]);
+  for (let k = 1; k < trail.length; k++) {
+    pen.globalAlpha = (0.6 * k) / trail.length;
+    pen.beginPath();
+    pen.moveTo(...toPixels(view, ...trail[k - 1]));
+    pen.lineTo(...toPixels(view, ...trail[k]));
+    pen.stroke();
+  }
+  pen.globalAlpha = 1;
+}
+
 function drawTouch(pen: Pen, theme: Theme, view: View, touch: Touch): void {
   const [x, y] = toPixels(view, touch.x, touch.y);
   const path = new Path2D();
@@ -73,12 +112,11 @@ function drawTouch(pen: Pen, theme: Theme, view: View, touch: Touch): void {
   path.lineTo(x + arm, y);
   path.moveTo(x, y - arm);
   path.lineTo(x, y + arm);
-  // Two standard deviations: where the touch is with 86 % of certainty. Not drawn where it is
-  // unknown, nor where the cross would hide it.
-  const [rx, ry] = [2 * touch.sdX * view.scale, 2 * touch.sdY * view.scale];
-  if (Math.max(rx, ry) > 3) {
-    path.moveTo(x + rx, y);
-    path.ellipse(x, y, rx, ry, 0, 0, 2 * Math.PI);
+  // Not drawn where the cross would hide it.
+  const around = ellipse(touch)?.map((place) => toPixels(view, ...place));
+  if (around?.some(([px, py]) => Math.hypot(px - x, py - y) > 3)) {
+    around.forEach(([px, py], k) => (k ? path.lineTo(px, py) : path.moveTo(px, py)));
+    path.closePath();
   }
   haloed(pen, theme, path, theme.accent, 2);
 }
@@ -98,6 +136,16 @@ function drawNumber(pen: Pen, theme: Theme, view: View, touch: Touch): void {
   pen.fill();
   pen.fillStyle = theme.halo;
   pen.fillText(text, cx, cy + 1);
+  if (!touch.several) return;
+  const remark = touch.several > 1 ? `${touch.several} too close` : "too close?";
+  pen.font = `500 13px ${theme.font}`;
+  pen.textAlign = "left";
+  pen.strokeStyle = theme.halo;
+  pen.lineWidth = 4;
+  pen.lineJoin = "round";
+  pen.strokeText(remark, cx + half + 5, cy + 1);
+  pen.fillStyle = theme.accent;
+  pen.fillText(remark, cx + half + 5, cy + 1);
 }
 
 function drawTruth(pen: Pen, theme: Theme, view: View, truth: Truth): void {
@@ -165,6 +213,7 @@ export function drawMarks(
       }
     }
   }
+  for (const trail of marks.trails) drawTrail(pen, theme, view, trail);
   for (const truth of marks.truths ?? []) drawTruth(pen, theme, view, truth);
   for (const held of marks.held) drawHeld(pen, theme, view, held, maxForce);
   for (const touch of marks.touches) drawTouch(pen, theme, view, touch);

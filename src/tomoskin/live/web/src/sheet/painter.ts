@@ -1,6 +1,6 @@
 /** Paints the newest frame on the sheet's two canvases, once per displayed frame at most. */
 
-import { hand, limit, newest, scene, showTruth, smoothed, timed, topology } from "../state";
+import { hand, history, limit, newest, scene, showTruth, smoothed, timed, topology } from "../state";
 import { theme } from "../theme";
 import { GlPicture, openGl } from "./gl";
 import { drawMarks } from "./overlay";
@@ -82,6 +82,7 @@ export class Painter {
     if (!this.pen) return;
     const marks = {
       touches: frame?.touches ?? [],
+      trails: frame?.touches.map((touch) => history.trailOf(touch.id)) ?? [],
       labels: frame?.labels ?? new Uint8Array(),
       truths: showTruth.peek() ? (frame?.truths ?? []) : null,
       held: hand.peek().held,

@@ -3,6 +3,7 @@
 import { signal } from "@preact/signals";
 import { adjustForce, liftAll, press, release, slide } from "../presses";
 import { hand, keepPresses, requestRepaint, scene } from "../state";
+import { hovered, inSpace, turn } from "./space";
 import { contains, toSheet, type View } from "./view";
 
 /** Where the keyboard would press, m; null while the keyboard is elsewhere. */
@@ -13,6 +14,8 @@ const KEYBOARD = -1;
 const STEP = 5e-3;
 const FINE_STEP = 1e-3;
 const WHEEL_STEP = 40;
+/** Of the sheet's turn, per pixel. */
+const RADIANS = 8e-3;
 
 const ARROWS: Readonly<Record<string, readonly [number, number]>> = {
   ArrowLeft: [-1, 0],
@@ -49,6 +52,7 @@ export function listen(element: HTMLElement, view: () => View): () => void {
   const quit = new AbortController();
   const { signal } = quit;
   let turned = 0;
+  let turning: number | null = null;
 
   const placeOf = (event: PointerEvent): readonly [number, number] => {
     const box = element.getBoundingClientRect();
@@ -60,6 +64,11 @@ export function listen(element: HTMLElement, view: () => View): () => void {
     "pointerdown",
     (event) => {
       const [x, y] = placeOf(event);
+      if (inSpace.value && (event.button === 2 || !onSheet(x, y))) {
+        turning = event.pointerId;
+        element.setPointerCapture(event.pointerId);
+        return;
+      }
       if (event.button !== 0 || !pressable() || !onSheet(x, y)) return;
       element.setPointerCapture(event.pointerId);
       const keeping = event.shiftKey || keepPresses.value;
@@ -70,8 +79,13 @@ export function listen(element: HTMLElement, view: () => View): () => void {
   element.addEventListener(
     "pointermove",
     (event) => {
-      if (!element.hasPointerCapture(event.pointerId)) return;
+      if (event.pointerId === turning) {
+        turn(event.movementX * RADIANS, event.movementY * RADIANS);
+        return;
+      }
       const [x, y] = placeOf(event);
+      hovered.value = onSheet(x, y) ? [x, y] : null;
+      if (!element.hasPointerCapture(event.pointerId)) return;
       if (onSheet(x, y)) hand.value = slide(hand.value, event.pointerId, x, y);
     },
     { signal },
@@ -79,10 +93,15 @@ export function listen(element: HTMLElement, view: () => View): () => void {
   for (const kind of ["pointerup", "pointercancel", "lostpointercapture"] as const) {
     element.addEventListener(
       kind,
-      (event) => (hand.value = release(hand.value, event.pointerId)),
+      (event) => {
+        if (event.pointerId === turning) turning = null;
+        hand.value = release(hand.value, event.pointerId);
+      },
       { signal },
     );
   }
+  element.addEventListener("pointerleave", () => (hovered.value = null), { signal });
+  element.addEventListener("contextmenu", (event) => inSpace.value && event.preventDefault(), { signal });
   element.addEventListener(
     "wheel",
     (event) => {

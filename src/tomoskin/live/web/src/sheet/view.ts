@@ -1,5 +1,7 @@
 /** Metres on the sheet to pixels on the page and back, true to scale; y points up on the sheet. */
 
+import type { Seen } from "./solid";
+
 export interface Box {
   readonly left: number;
   readonly right: number;
@@ -15,6 +17,8 @@ export interface View {
   readonly originY: number;
   readonly width: number;
   readonly height: number;
+  /** The sheet in space; without it the sheet lies flat. */
+  readonly seen?: Seen;
 }
 
 export interface Margin {
@@ -55,15 +59,24 @@ export function fit(box: Box, width: number, height: number, margin: Margin): Vi
   };
 }
 
-export const toPixels = (view: View, x: number, y: number): readonly [number, number] => [
-  view.originX + x * view.scale,
-  view.originY - y * view.scale,
-];
+/** A view of a sheet in space in which it stays when it is turned. */
+export function around(seen: Seen, width: number, height: number, margin: Margin): View {
+  const { radius } = seen;
+  const box = { left: -radius, right: radius, bottom: -radius, top: radius };
+  return { ...fit(box, width, height, margin), seen };
+}
 
-export const toSheet = (view: View, px: number, py: number): readonly [number, number] => [
-  (px - view.originX) / view.scale,
-  (view.originY - py) / view.scale,
-];
+export function toPixels(view: View, x: number, y: number): readonly [number, number] {
+  const [right, up] = view.seen ? view.seen.at(x, y) : [x, y];
+  return [view.originX + right * view.scale, view.originY - up * view.scale];
+}
+
+/** The place under a pixel; NaN beside a sheet in space. */
+export function toSheet(view: View, px: number, py: number): readonly [number, number] {
+  const [right, up] = [(px - view.originX) / view.scale, (view.originY - py) / view.scale];
+  if (!view.seen) return [right, up];
+  return view.seen.pick(right, up) ?? [Number.NaN, Number.NaN];
+}
 
 /** Whether a point lies inside a closed outline of flat x, y pairs (even-odd rule). */
 export function contains(outline: readonly number[], x: number, y: number): boolean {
