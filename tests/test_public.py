@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -37,3 +38,8 @@ def test_the_flow_in_a_few_lines() -> None:
     image = operator(0.01 * model.solve(sigma).voltages)
     assert image.values.shape == (len(skin.mesh().cells),)
     assert image.values.mean() < 0  # higher voltages, lower conductivity
+
+
+def test_the_citation_names_this_version() -> None:
+    root = Path(__file__).resolve().parent.parent
+    assert f"\nversion: {tomoskin.__version__}\n" in (root / "CITATION.cff").read_text()

@@ -1,0 +1,48 @@
+"""The Python of the documentation's pages is run as it stands."""
+
+from __future__ import annotations
+
+import math
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+RUN = ("python.md", "equivalents.md")
+BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize("page", RUN)
+def test_what_a_page_shows_works(page: str) -> None:
+    blocks = BLOCK.findall((DOCS / page).read_text(encoding="utf-8"))
+    assert blocks
+    names: dict[str, object] = {}
+    for block in blocks:
+        exec(compile(block, page, "exec"), names)
+
+
+def test_the_first_steps_give_a_touch(tmp_path: Path) -> None:
+    """The script on the page of the first steps: simulated, and the press found in it."""
+    page = (DOCS / "start.md").read_text(encoding="utf-8")
+    script = re.search(r"^```toml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    assert script
+    (tmp_path / "press.toml").write_text(script[1])
+    steps = [
+        line.split()[1:]
+        for line in page.splitlines()
+        if line.startswith(("tomoskin simulate", "tomoskin session", "tomoskin image"))
+    ]
+    assert [step[0] for step in steps] == ["simulate", "session", "image"]
+    for step in steps:
+        done = subprocess.run(
+            [sys.executable, "-c", "from tomoskin.cli import main; main()", *step],
+            cwd=tmp_path, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+    rows = (tmp_path / "touches.csv").read_text().splitlines()[1:]
+    places = [tuple(map(float, row.split(",")[3:5])) for row in rows]
+    assert len(places) > 10
+    assert min(math.dist(place, (0.03, 0.02)) for place in places) < 0.005
