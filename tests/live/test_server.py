@@ -5,6 +5,7 @@ import os
 import signal
 import socket
 import threading
+import time
 from contextlib import ExitStack
 
 import pytest
@@ -45,7 +46,8 @@ def site(runner, static):
 
 def first(socket, wanted):
     """First text message of a type, or the first frame for which ``wanted`` holds."""
-    while True:
+    end = time.monotonic() + 3 * PATIENCE
+    while time.monotonic() < end:
         message = socket.recv(PATIENCE)
         if isinstance(message, str):
             found = json.loads(message)
@@ -53,6 +55,7 @@ def first(socket, wanted):
                 return found
         elif callable(wanted) and wanted(decode(message)):
             return decode(message)
+    raise AssertionError(f"nothing came that is {wanted}")
 
 
 def ask(socket, **request):
