@@ -25,6 +25,8 @@ from tomoskin.twin import (
     TwinSettings,
     TwinTransport,
     VirtualClock,
+    bent,
+    bent_truth,
     check_script,
     disturbed,
     make_twin,
@@ -119,7 +121,7 @@ class _Run:
         self._frame_time = Configuration.of(self._scan, self._asked).scan_time
         contact = settings.contact
         self._friction = {"slide": contact.friction, "roll": contact.rolling_friction}
-        self._presses: tuple[Contact, ...] = ()
+        self._truth: tuple[tuple[Contact, ...], list[dict[str, float | str]]] = ((), [])
         self._disturbance = Disturbance()
         self._marks = sorted(script.marks, key=lambda mark: mark.at)
         self._frames = 0
@@ -161,11 +163,15 @@ class _Run:
         """
         half = self._frame_time / 2
         middle = begin + time + half
-        self._twin.electronics.follow(lambda since: self._pressed(time + since))
-        presses = self._pressed(time + half)
-        if presses != self._presses:
-            self._presses = presses
-            self._writer.truth(middle, [_described_probe(probe) for probe in presses])
+        bends = self._script.bends
+        self._twin.electronics.follow(
+            lambda since: self._pressed(time + since),
+            (lambda since: bent(bends, time + since)) if bends else None,
+        )
+        truth = self._pressed(time + half), bent_truth(bends, time + half)
+        if truth != self._truth:
+            self._truth = truth
+            self._writer.truth(middle, [_described_probe(probe) for probe in truth[0]], truth[1])
         self._disturb(disturbed(self._script.faults, time))
         if reboots(self._script.faults, last, time):
             self._twin.reboot()
@@ -198,6 +204,7 @@ class _Run:
 def _idle_frames(script: Script, frame_time: float) -> int:
     """Whole frames before anything presses or breaks, of at most what a live reference takes."""
     starts = [press.start for press in script.presses] + [fault.start for fault in script.faults]
+    starts += [bend.start for bend in script.bends]
     quiet = script.lead_in + min(starts, default=script.duration)
     return max(1, min(REFERENCE_FRAMES, int(quiet / frame_time)))
 

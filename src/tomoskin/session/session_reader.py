@@ -26,10 +26,11 @@ _NO_CELLS = np.empty(0, dtype=np.int64)
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What pressed on the twin from ``host_time`` on: each press with its fields by name."""
+    """What pressed on the twin from ``host_time`` on, and how it was bent: fields by name."""
 
     host_time: float
     presses: tuple[dict[str, Any], ...]
+    bends: tuple[dict[str, Any], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,9 +137,9 @@ class SessionReader:
             yield RecordedTouches(item["host_time"], item["sequence"], touches)
 
     def truth(self) -> Iterator[Truth]:
-        """The twin's presses, each time that they changed."""
+        """The twin's presses and bends, each time that they changed."""
         for item in self._documents(channels.TRUTH):
-            yield Truth(item["host_time"], tuple(item["presses"]))
+            yield Truth(item["host_time"], tuple(item["presses"]), tuple(item.get("bends", ())))
 
     def events(self) -> Iterator[Event]:
         """What happened."""

@@ -98,14 +98,17 @@ class SessionWriter:
         self._say(channels.IMAGE, host_time, grid_message(image, pixels, host_time, log_time))
         self._say(channels.SCENE, host_time, scene_message(touches, log_time))
 
-    def truth(self, host_time: float, presses: Sequence[Any]) -> None:
-        """What presses on the twin from ``host_time`` on.
+    def truth(self, host_time: float, presses: Sequence[Any], bends: Sequence[Any] = ()) -> None:
+        """What presses on the twin, and how it is bent, from ``host_time`` on.
 
         Each press is a mapping or a record with ``x``, ``y``, ``force``, ``radius`` (SI) and
-        whatever else describes it.
+        whatever else describes it; each bend one with ``kind``, ``axis`` (rad) and ``angle``
+        (rad) or ``strain``.
         """
-        rows = [plain(press) for press in presses]
-        self._say(channels.TRUTH, host_time, {"host_time": host_time, "presses": rows})
+        content = {"host_time": host_time, "presses": [plain(press) for press in presses]}
+        if bends:
+            content["bends"] = [plain(bend) for bend in bends]
+        self._say(channels.TRUTH, host_time, content)
 
     def event(self, event: Event) -> None:
         """Something that happened."""

@@ -18,6 +18,7 @@ from tomoskin.twin.probe import Contact, Press, Probe
 from tomoskin.twin.readout import ElectronicsSettings, TwinElectronics, convert
 from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, sample_table, table_of
 from tomoskin.twin.script import Script
+from tomoskin.twin.script_bend import ScriptedBend, bent, bent_truth
 from tomoskin.twin.script_check import check_script, check_settling
 from tomoskin.twin.script_page import script_page
 from tomoskin.twin.settings import PRESETS, TwinSettings
@@ -64,6 +65,7 @@ __all__ = [
     "SampleTable",
     "ScanClock",
     "Script",
+    "ScriptedBend",
     "SetPlan",
     "Shape",
     "Square",
@@ -76,6 +78,8 @@ __all__ = [
     "VirtualClock",
     "WallClock",
     "advance",
+    "bent",
+    "bent_truth",
     "check_script",
     "check_settling",
     "conductivity",

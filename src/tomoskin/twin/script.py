@@ -11,7 +11,18 @@ from typing import Any, Self
 from tomoskin.core import GeometryError, ScriptError, SkinError
 from tomoskin.skin import check_names, read_section, show, toml_tables
 from tomoskin.twin.disturbance import ScriptedFault
-from tomoskin.twin.script_schema import FAULT, FORMAT, MARK, PRESS, PRESSES, SCRIPT, SECTIONS
+from tomoskin.twin.script_bend import ScriptedBend
+from tomoskin.twin.script_schema import (
+    BEND,
+    FAULT,
+    FORMAT,
+    MARK,
+    PRESS,
+    PRESSES,
+    SCRIPT,
+    SECTIONS,
+    STRETCH,
+)
 from tomoskin.twin.shape import Circle, Face, Finger, Shape, Square
 from tomoskin.twin.timeline import Mark, Rows, ScriptedPress
 
@@ -32,7 +43,7 @@ class Script:
         s; all times count from the end of the lead-in.
     seed
         Of all noise.
-    presses, faults, marks
+    presses, faults, marks, bends
         In the file's order.
     preset
         Name of the twin's settings; None for the skin's own.
@@ -47,6 +58,7 @@ class Script:
     faults: tuple[ScriptedFault, ...]
     marks: tuple[Mark, ...]
     preset: str | None = None
+    bends: tuple[ScriptedBend, ...] = ()
 
     @classmethod
     def from_toml(cls, text: str, *, source: str = _DEFAULT_SOURCE) -> Self:
@@ -70,7 +82,17 @@ class Script:
             presses = tuple(_press(v, w) for v, w in _each(tables, PRESS.name, source))
             faults = tuple(_fault(v, w) for v, w in _each(tables, FAULT.name, source))
             marks = tuple(Mark(v["at"], v["text"], w) for v, w in _each(tables, MARK.name, source))
-        return cls(source=source, presses=presses, faults=faults, marks=marks, **head)
+            bends = [
+                ScriptedBend.of(v["kind"], "angle", v, w)
+                for v, w in _each(tables, BEND.name, source)
+            ]
+            bends += [
+                ScriptedBend.of("stretch", "strain", v, w)
+                for v, w in _each(tables, STRETCH.name, source)
+            ]
+        return cls(
+            source=source, presses=presses, faults=faults, marks=marks, bends=tuple(bends), **head
+        )
 
 
 _MANY = {section.name: section for section in SECTIONS if section.many}

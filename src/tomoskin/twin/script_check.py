@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from itertools import combinations
 
-from tomoskin.core import ScriptError
+import numpy as np
+
+from tomoskin.core import GeometryError, ScriptError
 from tomoskin.pattern import Scan
 from tomoskin.skin import Skin
 from tomoskin.source import Configuration, ScanSettings
+from tomoskin.twin.bend import strain_of
 from tomoskin.twin.script import Script
 from tomoskin.twin.settings import TwinSettings
 from tomoskin.twin.timeline import NO_FRAME, ScriptedPress, check_stages
@@ -42,6 +45,21 @@ def check_script(script: Script, skin: Skin) -> None:
     _check_faults(script, skin, scan.scan_time)
     for press in script.presses:
         press.check_on(skin.outline)
+    _check_bends(script, skin)
+
+
+def _check_bends(script: Script, skin: Skin) -> None:
+    """Each by itself, as far as it goes, at points all over the skin."""
+    height = TwinSettings.preset(script.preset or skin.twin.preset).bend.height
+    rim = skin.outline.polyline(skin.outline.length / 64)
+    middle = skin.outline.centre
+    points = np.concatenate([middle + part * (rim - middle) for part in (0.0, 0.5, 1.0)])
+    for bend in script.bends:
+        try:
+            for _, amount in bend.course:
+                strain_of((bend.shape(amount),), points, skin.surface, height)
+        except GeometryError as error:
+            raise ScriptError(error.message, where=bend.where, hint=error.hint) from None
 
 
 def check_settling(skin: Skin, preset: str) -> None:
@@ -101,7 +119,11 @@ def _check_ends(script: Script) -> None:
                 where=f"{press.where} {press.force_key}",
                 hint="raise [script] duration",
             )
-    last = [(f.end, f"{f.where} {'end' if f.end > f.start else 'start'}") for f in script.faults]
+    last = [
+        (bend.end, f"{bend.where} {'profile' if 'profile' in bend.values else 'hold'}")
+        for bend in script.bends
+    ]
+    last += [(f.end, f"{f.where} {'end' if f.end > f.start else 'start'}") for f in script.faults]
     last += [(mark.at, f"{mark.where} at") for mark in script.marks]
     for time, where in last:
         if time > script.duration + _ROUNDING:

@@ -10,16 +10,16 @@ _HEAD = """\
 
 `tomoskin simulate --skin textile-disc-8 --script my.toml --out my.mcap` lets the twin of a skin
 follow a script, faster than real time, into a session file: raw bytes, frames, and the truth, what
-pressed where and how hard. `tomoskin image my.mcap` reconstructs it, `tomoskin live --source
-replay:my.mcap` plays it. The same script, skin and `--seed` give the same bytes. Ctrl-C leaves a
-file that is readable up to there, with a note at its end that says so.
+pressed where and how hard, and how the sheet was bent. `tomoskin image my.mcap` reconstructs it,
+`tomoskin live --source replay:my.mcap` plays it. The same script, skin and `--seed` give the same
+bytes. Ctrl-C leaves a file that is readable up to there, with a note at its end that says so.
 
-What presses moves during a scan too, as on a bench: each drive sees the sheet as it is in the
-middle of that drive. The truth of a frame is that of the middle of its scan.
+What presses moves during a scan too, and so does what bends, as on a bench: each drive sees the
+sheet as it is in the middle of that drive. The truth of a frame is that of the middle of its scan.
 
-The reference is what comes before the first press or fault, 20 frames of it at most: the file says
-so. With a shorter lead-in there are fewer, and each picture bears more of their noise. A replay
-always takes 20: leave it that many (on `textile-disc-8`, 1.2 s).
+The reference is what comes before the first press, bend or fault, 20 frames of it at most: the file
+says so. With a shorter lead-in there are fewer, and each picture bears more of their noise. A
+replay always takes 20: leave it that many (on `textile-disc-8`, 1.2 s).
 
 A script is TOML, strict as the skin file is: unknown keys, wrong units, ids that overlap, probes
 off the skin, stages too short for a frame to show and boards that read before they have settled are

@@ -204,5 +204,92 @@ PRESSES = Section(
     ),
 )
 
-SECTIONS = (SCRIPT, PRESS, FAULT, MARK, PRESSES)
+BENDS = ("hinge", "joint")
+"""Ways in which a sheet is bent."""
+
+_COURSE = (
+    Key("start", _TIME, "When it begins.", required=True),
+    Key("rise", _LASTS, "Until all of it is reached, evenly.", default="1 s", unless="profile"),
+    Key("hold", _LASTS, "For which it stays.", required=True, unless="profile"),
+    Key("fall", _LASTS, "Until none is left, evenly.", default="1 s", unless="profile"),
+)
+
+BEND = Section(
+    "bend",
+    "The sheet is bent, and is straight again at the end. Several at once add up.",
+    (
+        Key(
+            "kind",
+            Choice(BENDS),
+            "hinge: along a strip, flat on both sides. joint: around a limb with a joint, as "
+            "[surface] of a skin does.",
+            default="hinge",
+        ),
+        Key(
+            "length",
+            Quantity("length", "mm", 1, 10_000),
+            "Width of the strip, or length of the limb's middle line over which it bends.",
+            required=True,
+        ),
+        Key(
+            "axis",
+            _ANGLE,
+            "Direction of the strip, from x counter-clockwise.",
+            default="90 deg",
+            when=("kind", ("hinge",)),
+        ),
+        Key(
+            "offset",
+            _LENGTH,
+            "Of the strip's middle line from the middle of the sheet, to the right as seen along "
+            "the axis.",
+            default="0 mm",
+            when=("kind", ("hinge",)),
+        ),
+        Key(
+            "radius",
+            Quantity("length", "mm", 1, 10_000),
+            "Of the limb.",
+            required=True,
+            when=("kind", ("joint",)),
+        ),
+        Key(
+            "angle",
+            _ANGLE,
+            "How far; positive where the front becomes convex.",
+            required=True,
+            unless="profile",
+        ),
+        *_COURSE,
+        Key(
+            "profile",
+            Course(Row(("time", "angle"), (_TIME, _ANGLE))),
+            "Instead of these: angle at times since `start`, from 0 to 0 deg in straight lines.",
+        ),
+    ),
+    many=True,
+)
+
+_STRAIN = Number(-0.5, 1.0)
+
+STRETCH = Section(
+    "stretch",
+    "The sheet is stretched evenly, and is as long as it was at the end.",
+    (
+        Key(
+            "strain", _STRAIN, "Relative elongation: 0.05 is 5 %.", required=True, unless="profile"
+        ),
+        Key("across", Number(-1, 1), "Elongation across the axis, per that along it.", default=0),
+        Key("axis", _ANGLE, "Direction, from x counter-clockwise.", default="0 deg"),
+        *_COURSE,
+        Key(
+            "profile",
+            Course(Row(("time", "strain"), (_TIME, _STRAIN))),
+            "Instead of these: elongation at times since `start`, from 0 to 0 in straight lines.",
+        ),
+    ),
+    many=True,
+)
+
+SECTIONS = (SCRIPT, PRESS, BEND, STRETCH, FAULT, MARK, PRESSES)
 """Every section and key, in the order of the documentation."""

@@ -75,10 +75,10 @@ class ScriptedPress:
     def at(self, time: float, friction: Friction) -> Probe | None:
         """The probe at ``time`` s, None where there is no force."""
         since = time - self.start
-        force = float(_along(self._force, since)[0])
+        force = float(along(self._force, since)[0])
         if not (0 <= since <= self.force[-1][0] and force > 0):
             return None
-        x, y = _along(self._path, since).tolist()
+        x, y = along(self._path, since).tolist()
         probe = Probe(self.shape, x, y, force, self.angle)
         return probe.moving(*_speed(self._path, since), friction[self.motion])
 
@@ -93,7 +93,7 @@ class ScriptedPress:
         times = np.union1d(
             self._path[:, 0], np.linspace(0.0, self.path[-1][0], _ON_PATH if self.path[1:] else 1)
         )
-        places = np.array([_along(self._path, time) for time in times])
+        places = np.array([along(self._path, time) for time in times])
         inside = outline.contains(places)
         if not inside.all():
             first = int(np.argmin(inside))
@@ -134,8 +134,8 @@ def check_stages(presses: Iterable[ScriptedPress], frame_time: float) -> None:
                 )
 
 
-def _along(rows: FloatArray, time: float) -> FloatArray:
-    """Values of a course at ``time``; before and after it, those of its ends."""
+def along(rows: FloatArray, time: float) -> FloatArray:
+    """(n,) values of a course at ``time``; before and after it, those of its ends."""
     columns = rows[:, 1:].T
     return np.array([np.interp(time, rows[:, 0], values) for values in columns])
 
