@@ -140,14 +140,16 @@ def _lost(blind: FloatArray) -> NDArray[np.bool_]:
     return np.asarray((blind**2).sum(axis=1) > _ALL)
 
 
-def _noise(prepared: Prepared, reference: Reference | None, gain: float) -> FloatArray:
-    """(n_meas, n_meas) covariance of difference data: one frame less the reference."""
+def voltage_covariance(
+    prepared: Prepared, reference: Reference | None, gain: float = 1.0
+) -> FloatArray:
+    """(n_meas, n_meas) V² of one frame less the reference; ``gain`` of what is predicted."""
     readout, scan = prepared.readout, prepared.scan
     sd, frames = np.full(prepared.pattern.n_meas, np.nan), 1
     if reference is not None:
         sd, frames = reference.noise, reference.n_frames
     oversampling = prepared.skin.readout.oversampling
-    volts = measured_covariance(
+    return measured_covariance(
         scan,
         sd,
         frames,
@@ -155,6 +157,11 @@ def _noise(prepared: Prepared, reference: Reference | None, gain: float) -> Floa
         step=abs(gain) * readout.volts_per_count * oversampling,
         oversampling=oversampling,
     )
+
+
+def _noise(prepared: Prepared, reference: Reference | None, gain: float) -> FloatArray:
+    """(n_meas, n_meas) covariance of difference data: one frame less the reference."""
+    volts = voltage_covariance(prepared, reference, gain)
     if prepared.operator.difference == "plain":
         return volts
     size = np.abs(prepared.operator.reference if reference is None else reference.mean)

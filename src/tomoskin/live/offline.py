@@ -7,17 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, IntArray, Touch
+from tomoskin.core import DataError, FloatArray, IntArray, Reading, Touch
 from tomoskin.inverse import AlphaChoice
+from tomoskin.live.bending import bends_of
 from tomoskin.live.changes import Changes, Idle, changes_of
 from tomoskin.live.finding import View, finding, rows_of
 from tomoskin.live.imaging import imaging
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.tune import tuned, tuned_by_rule
-from tomoskin.live.watch import Watch
+from tomoskin.live.watch import Seen, Watch
 from tomoskin.session import Recording
 from tomoskin.signal import undone
-from tomoskin.touch import STILL, Tracker
+from tomoskin.touch import STILL, BendReading, Tracker
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,8 @@ class Reconstruction:
         The alpha of the images, and what chose it.
     rows_left_out
         (r,) rows of the pattern that hold no finite values, left out of every image.
+    bends
+        How the sheet was bent in each frame; empty where its bends were not learnt.
     """
 
     frames: IntArray
@@ -54,6 +57,7 @@ class Reconstruction:
     agreement: float
     choice: AlphaChoice
     rows_left_out: IntArray
+    bends: tuple[BendReading, ...] = ()
 
     def numbered_from(self, first: int) -> Reconstruction:
         """Frames counted from ``first``, for a part of a longer recording."""
@@ -92,11 +96,13 @@ def reconstruct(
         _check_times(time, idle, recording.source)
     tracker = Tracker(replace(STILL, snr=prepared.skin.touch.snr))
     stage = _Stage(prepared, changes, time)
-    images, touches = [], []
+    images, touches, bends = [], [], []
     for number, now in enumerate(time.tolist()):
         view = stage.push(number, now)
         images.append(view.image)
-        touches.append(tracker.update(stage.finder.push(view), now, now))
+        readings = stage.finder.push(view)
+        touches.append(tracker.update(readings, now, now))
+        bends += stage.bent(view, readings, now)
         stage.learn(now, touched=bool(touches[-1]))
     return Reconstruction(
         frames=changes.frames,
@@ -108,6 +114,7 @@ def reconstruct(
         agreement=changes.agreement,
         choice=prepared.choice,
         rows_left_out=changes.rows_left_out,
+        bends=tuple(bends),
     )
 
 
@@ -133,6 +140,8 @@ class _Stage:
             blind = self._watch.steady()
         self._imaging = imaging(prepared, changes.reference, interval, blind)
         self.finder = finding(prepared, changes.reference)
+        self._bends = bends_of(prepared, changes.reference) if changes.reference else None
+        self._seen: Seen | None = None
 
     def push(self, number: int, now: float) -> View:
         """What that frame of the changes shows."""
@@ -140,10 +149,17 @@ class _Stage:
         if self._watch is None or self._changes.reference is None:
             return self._filled(dv, missing, now)
         values = undone(dv, self._changes.reference.mean, self._prepared.operator.difference)
-        seen = self._watch.look(values, missing, now)
+        seen = self._seen = self._watch.look(values, missing, now)
         if seen.dv is None:  # the frames' own limit is narrower, but electrodes add to it
             return self._filled(dv, missing, now)
         return View(*self._imaging.push(seen.dv, now), seen.dv, seen.blind.directions)
+
+    def bent(self, view: View, readings: list[Reading], now: float) -> list[BendReading]:
+        """How the sheet was bent in the frame that was pushed last, where that is known."""
+        if self._bends is None or self._watch is None or self._seen is None:
+            return []
+        found = self._bends.push(self._watch, self._seen, view, readings, now)
+        return [] if found is None else [found]
 
     def _filled(self, dv: FloatArray, missing: NDArray[np.bool_], now: float) -> View:
         filled = self._prepared.operator.filled(dv, missing)

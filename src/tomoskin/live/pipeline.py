@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, Frame, Image, Reading, Touch, Voltages
 from tomoskin.inverse import AlphaChoice
+from tomoskin.live.bending import Bends, bends_of
 from tomoskin.live.collector import Collector
 from tomoskin.live.finding import Finder, View, finding
 from tomoskin.live.imaging import Alone, Filtered, imaging
@@ -17,7 +18,7 @@ from tomoskin.live.result import ReferenceState, Result
 from tomoskin.live.tune import tune
 from tomoskin.live.watch import Watch
 from tomoskin.signal import Health, Reference
-from tomoskin.touch import Tracker, TrackSettings
+from tomoskin.touch import BendReading, Tracker, TrackSettings
 
 REFERENCE_FRAMES = 20
 """Frames of the untouched skin that make a reference."""
@@ -44,6 +45,7 @@ class Pipeline:
         self._watch: Watch | None = None
         self._imaging: Alone | Filtered = Alone(prepared, None)
         self._finder: Finder = finding(prepared, None)
+        self._bends: Bends | None = None
         self._times: list[float] = []
         self._tuning: Generator[None, None, Prepared] | None = None
         self._since = 0.0
@@ -149,6 +151,7 @@ class Pipeline:
         prepared, blind = (watch.prepared, watch.steady()) if watch else (self._prepared, None)
         self._imaging = imaging(prepared, reference, self._interval(), blind)
         self._finder = finding(prepared, reference)
+        self._bends = bends_of(prepared, reference)
 
     def _tune(self, reference: Reference) -> None:
         """One step towards the operator for the reference's noise; the old one serves meanwhile."""
@@ -186,13 +189,15 @@ class Pipeline:
                 voltages, self._image, touches, seen.left_out, health=seen.health, pictured=False
             )
         image, floor = self._imaging.push(seen.dv, now)
-        readings = self._finder.push(View(image, floor, seen.dv, seen.blind.directions))
+        view = View(image, floor, seen.dv, seen.blind.directions)
+        readings = self._finder.push(view)
         touches = self._track(readings, voltages)
+        bend = self._bends.push(watch, seen, view, readings, now) if self._bends else None
         if watch.learn(now, touched=bool(touches)):
             self._imaging.renew(watch.prepared, watch.baseline.reference, watch.steady())
             self._finder.renew(watch.prepared, watch.baseline.reference)
         return self._result(
-            voltages, image, touches, seen.left_out, health=seen.health, pictured=True
+            voltages, image, touches, seen.left_out, health=seen.health, bend=bend, pictured=True
         )
 
     def _track(self, readings: list[Reading], voltages: Voltages) -> tuple[Touch, ...]:
@@ -207,6 +212,7 @@ class Pipeline:
         *,
         pictured: bool,
         health: Health | None = None,
+        bend: BendReading | None = None,
     ) -> Result:
         return Result(
             sequence=voltages.sequence,
@@ -221,6 +227,7 @@ class Pipeline:
             left_out=left_out,
             health=health,
             baseline=self._watch.baseline.state if self._watch else None,
+            bend=bend,
         )
 
     def _time(self, voltages: Voltages) -> float:

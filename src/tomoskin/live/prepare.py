@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tomoskin.core import FloatArray, Image, IntArray, ModelError
+from tomoskin.core import DataError, FloatArray, Image, IntArray, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import (
     AlphaChoice,
@@ -24,10 +24,13 @@ from tomoskin.pattern import Pattern, Scan
 from tomoskin.session import Calibration
 from tomoskin.signal import Blind, Readout, Reference, difference_noise
 from tomoskin.skin import Skin
-from tomoskin.touch import Locator, NoiseFloor, Segmenter, SpotModel
+from tomoskin.touch import BendModel, Locator, NoiseFloor, Region, Segmenter, SpotModel
 
 BODY = ("outline", "surface", "electrodes", "material", "drive", "readout", "mesh", "twin")
 """Sections of a skin that sheet, mesh and scan rest on; the others only make pictures of it."""
+
+_SAME_SHAPE = 1e-4
+"""Outlines within so many metres of each other are one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +51,8 @@ class Prepared:
         What touches are fitted with; None where they are found in the image.
     locator
         Where labelled presses tell the places of touches.
+    bending
+        What bends of the skin do to the data; None where that was not learnt.
     """
 
     skin: Skin
@@ -64,6 +69,7 @@ class Prepared:
     light_touch: LightTouch | None
     spots: SpotModel | None
     locator: Locator | None = None
+    bending: BendModel | None = None
 
     def __post_init__(self) -> None:
         """Refuse stages of different meshes or patterns."""
@@ -82,13 +88,28 @@ class Prepared:
             modes = Modes.of_spectrum(spectrum, choice.alpha, operator)
         return replace(self, operator=operator, modes=modes, choice=choice)
 
+    def that_bends(self, bending: BendModel) -> Prepared:
+        """With what was learnt of the skin's bends. Raises DataError for those of other rows."""
+        if len(bending.directions) != self.pattern.n_meas:
+            raise DataError(
+                f"expected bends of {self.pattern.n_meas} rows, got {len(bending.directions)}"
+            )
+        return replace(self, bending=bending)
+
     def located_by(self, locator: Locator | None) -> Prepared:
         """With places of touches from a calibration, or without.
 
-        Raises DataError where it is of another pattern or skin.
+        It rests on rows and places alone, so that other settings of the picture do not matter.
+        Raises DataError where it is of another pattern or a sheet of another shape.
         """
         if locator is not None:
-            locator.check(self.pattern, self.skin)
+            locator.check(self.pattern)
+            outline = Region.of(self.skin).outline
+            known = locator.region.outline
+            if locator.skin_id and not (
+                outline.shape == known.shape and np.allclose(outline, known, atol=_SAME_SHAPE)
+            ):
+                raise DataError("the calibration is of a sheet of another shape")
         return replace(self, locator=locator)
 
     @property

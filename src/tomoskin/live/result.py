@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from tomoskin.core import FloatArray, Image, Touch
 from tomoskin.signal import BaselineState, Health
-from tomoskin.touch import TouchEvent
+from tomoskin.touch import BendReading, TouchEvent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +34,8 @@ class Result:
     health, baseline
         Of the electrodes, and of the reference that the frame was held against; None until
         that stands.
+    bend
+        How the sheet is bent; None where its bends were not learnt.
     """
 
     sequence: int
@@ -48,6 +50,7 @@ class Result:
     events: tuple[TouchEvent, ...] = ()
     health: Health | None = None
     baseline: BaselineState | None = None
+    bend: BendReading | None = None
 
     @property
     def problem(self) -> str | None:

@@ -37,12 +37,13 @@ _LEARN = 8
 class Seen:
     """One frame: difference data ``dv`` (n_meas,) without what says nothing, None where too
     little is left; ``blind`` what was taken out; ``health``; how many rows are ``left_out`` or
-    count in a sum only."""
+    count in a sum only; ``whole`` (n_meas,) V, what the frame differs by with all that is in it."""
 
     dv: FloatArray | None
     blind: Blind
     health: Health
     left_out: int
+    whole: FloatArray | None = None
 
 
 class Watch:
@@ -81,6 +82,8 @@ class Watch:
         self._baseline = Baseline(reference, follows=settings.baseline == "follow")
         self._scale = _scale(prepared, reference)
         self._common = self._gain(reference) if self._projects else np.zeros((len(model), 0))
+        self._bends = _of_bends(prepared)
+        self._bent = np.zeros(len(model))
         self._kept: dict[bytes, Blind] = {}
         self._newest: tuple[Health, Blind] | None = None
         self._learnt = 0
@@ -147,14 +150,23 @@ class Watch:
         if left_out:
             values = np.where(health.lost, self._baseline.mean, values)
         dv = difference(values, self._baseline.mean, self._prepared.operator.difference)
-        return Seen(blind(dv), blind, health, left_out)
+        return Seen(blind(dv), blind, health, left_out, values - self._baseline.mean)
+
+    @property
+    def common(self) -> FloatArray:
+        """(n_meas, k) V: what the skin does by itself, but for bends."""
+        return self._common
+
+    def bent(self, moved: FloatArray) -> None:
+        """Say what of the frame that was looked at last, (n_meas,) V, is a bend's."""
+        self._bent = moved
 
     def learn(self, time: float, *, touched: bool) -> bool:
         """Take the frame that was looked at last for the baseline; True where floors change."""
         health = self._health
         if health is None:
             return False
-        ended = self._baseline.push(self._values, self._lost, time, touched=touched)
+        ended = self._baseline.push(self._values - self._bent, self._lost, time, touched=touched)
         if ended and self._projects and self._baseline.idle.blocks % _LEARN == 0:
             self._learn_modes()
         noise = self._baseline.idle.noise
@@ -206,11 +218,18 @@ class Watch:
         return self._kept[key]
 
     def _made(self, health: Health | None) -> Blind:
-        parts = [self._common]
+        parts = [self._common, self._bends]
         if health is not None:
             parts.append(lost_directions(self._prepared.pattern, health.lost, health.floating))
         directions = np.hstack(parts) / self._scale[:, None]
         return Blind.of(directions, self._prepared.operator.precision)
+
+
+def _of_bends(prepared: Prepared) -> FloatArray:
+    """(n_meas, k) V along which bends move the data."""
+    if prepared.bending is None:
+        return np.zeros((prepared.pattern.n_meas, 0))
+    return prepared.bending.directions
 
 
 def _scale(prepared: Prepared, reference: Reference) -> FloatArray:

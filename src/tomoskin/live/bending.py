@@ -1,0 +1,43 @@
+"""Bends of a skin that is watched: how far, and what of each frame is theirs."""
+
+from __future__ import annotations
+
+from tomoskin.core import Reading
+from tomoskin.live.finding import InData, View
+from tomoskin.live.prepare import Prepared
+from tomoskin.live.watch import Seen, Watch
+from tomoskin.signal import Reference
+from tomoskin.touch import BendReader, BendReading, SpotModel
+
+
+class Bends:
+    """Reads how the sheet is bent, beside the touches of each frame.
+
+    Where the skin finds its touches in the picture, they are fitted to the data here as well: an
+    angle is told beside a touch only where what the touch changes is known.
+    """
+
+    def __init__(self, prepared: Prepared, reference: Reference) -> None:
+        if prepared.bending is None:
+            raise AssertionError("made for skins whose bends were learnt")
+        spots = prepared.spots or SpotModel.of(prepared.skin, prepared.model)
+        told = spots.response.reference
+        gain = float(reference.mean @ told / (told @ told))
+        self._own = None if prepared.spots else InData(spots, prepared, reference)
+        self._reader = BendReader(prepared.bending, spots.response, gain)
+
+    def push(
+        self, watch: Watch, seen: Seen, view: View, found: list[Reading], time: float
+    ) -> BendReading | None:
+        """How the sheet is bent at ``time`` s; ``found`` are the frame's touches."""
+        if seen.whole is None:
+            return None
+        touches = found if self._own is None else self._own.push(view)
+        reading = self._reader.push(seen.whole, touches, watch.common, time)
+        watch.bent(reading.moved)
+        return reading
+
+
+def bends_of(prepared: Prepared, reference: Reference) -> Bends | None:
+    """What reads the bends, where they have been learnt."""
+    return None if prepared.bending is None else Bends(prepared, reference)
