@@ -20,6 +20,7 @@ test: lint native docs  ## lint, documentation, page tests and the test suite, w
 	@sh scripts/chromium.sh
 	@sh scripts/mosquitto.sh
 	@sh scripts/firmware.sh
+	@sh scripts/ngspice.sh
 	@$(PY) -m pytest $(ARGS)
 
 test-all: lint native docs  ## the same, with what is slow
@@ -27,6 +28,7 @@ test-all: lint native docs  ## the same, with what is slow
 	@sh scripts/chromium.sh
 	@sh scripts/mosquitto.sh
 	@sh scripts/firmware.sh
+	@sh scripts/ngspice.sh
 	@$(PY) -m pytest -m "" $(ARGS)
 
 firmware-test: dev  ## the firmware alone: GoogleTest, mutants, host build, emulator

@@ -271,14 +271,14 @@ def test_a_fault_that_cannot_be_meant(keys: str, where: str, what: str) -> None:
 
 
 def test_a_board_that_reads_before_it_has_settled() -> None:
-    """The textile's board settles with 30 us: 4.6 of these leave a hundredth of a step."""
-    enough, short = (SKIN.altered({"readout": {"settling": s}}) for s in ("140 us", "60 us"))
+    """The textile's board settles with 11 us: 4.6 of these leave a hundredth of a step."""
+    enough, short = (SKIN.altered({"readout": {"settling": s}}) for s in ("60 us", "22 us"))
     check_script(script(), enough)
     with pytest.raises(ScriptError) as caught:
         check_script(script(), short)
     assert str(caught.value) == (
-        f"{short.source}: [readout] settling: expected at least 138 us, got 60 us: the textile "
-        "board settles with a time constant of 30 us, and 14 % of each sample would be the drive "
+        f"{short.source}: [readout] settling: expected at least 51 us, got 22 us: the textile "
+        "board settles with a time constant of 11 us, and 14 % of each sample would be the drive "
         "before (make it longer, or choose another preset)"
     )
     check_script(script(head=HEAD + 'preset = "ideal"\n'), short)

@@ -2,6 +2,7 @@
 
 from tomoskin.signal.baseline import Baseline, BaselineState
 from tomoskin.signal.blind import Blind
+from tomoskin.signal.board import FIGURES, BoardFigures
 from tomoskin.signal.consecutive import Consecutive, at_one_time
 from tomoskin.signal.difference import DIFFERENCES, difference, difference_noise, undone
 from tomoskin.signal.health import ElectrodeHealth, Health
@@ -14,9 +15,11 @@ from tomoskin.signal.roles import Roles, lost_directions
 
 __all__ = [
     "DIFFERENCES",
+    "FIGURES",
     "Baseline",
     "BaselineState",
     "Blind",
+    "BoardFigures",
     "Consecutive",
     "ElectrodeHealth",
     "Health",

@@ -9,10 +9,11 @@ import numpy as np
 
 from tomoskin.core import DataError, Frame, Voltages
 from tomoskin.pattern import Scan
+from tomoskin.signal.board import FIGURES
 from tomoskin.skin import ReadoutSettings
 
-CONVERSION_NOISE = 0.7
-"""Standard deviation of one conversion before it is rounded, in LSB, of a usual small board;
+CONVERSION_NOISE = FIGURES.noise
+"""Standard deviation of one conversion before it is rounded, in LSB, of the simulated board;
 rounding adds 1/√12 LSB, and a row is the difference of two samples."""
 
 

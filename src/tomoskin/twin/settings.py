@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 from tomoskin.core import ModelError
+from tomoskin.signal import FIGURES
 from tomoskin.twin.bend import BendSettings
 from tomoskin.twin.contact import ContactSettings
 from tomoskin.twin.line import LineSettings
@@ -63,32 +64,35 @@ class TwinSettings:
 
 
 BOARD = ElectronicsSettings(
-    compliance=7.75,
-    output_resistance=25e3,
-    switch_resistance=0.07,
+    noise=FIGURES.noise,
+    compliance=FIGURES.compliance,
+    output_resistance=FIGURES.output_resistance,
+    switch_resistance=FIGURES.switch_resistance,
     contact_sd=2e-3,
     contact_time=10.0,
     rejection=90.0,
     gain_sd=0.002,
     offset_sd=50e-6,
-    low_rail=0.0,
-    high_rail=5.0,
-    time_constant=30e-6,
+    low_rail=FIGURES.low_rail,
+    high_rail=FIGURES.high_rail,
+    time_constant=FIGURES.time_constant,
     crosstalk=1e-5,
     hum=20e-6,
     hum_frequency=50.0,
     nonlinearity=0.5,
 )
-"""The source's board: LM317, IRLML6344 and IRLML9301, INA118, an ATmega2560's converter."""
+"""The board of docs/hardware.md: IRLML6344 and IRLML9301, INA118, an ATmega2560's converter."""
 
 SOURCES = {
-    "compliance": "12 V less the LM317's 3 V drop-out and 1.25 V reference",
-    "output_resistance": "LM317 datasheet: line regulation of at most 0.04 %/V, at 100 and 1 mA",
-    "switch_resistance": "assumed, of the size of the IRLML9301's and IRLML6344's",
+    "noise": "converter assumed; the amplifier's (ngspice deck noise) is a fortieth of it",
+    "compliance": "ngspice deck compliance",
+    "output_resistance": "ngspice deck compliance: at least; hydrogel, tank: at 1 mA, assumed",
+    "switch_resistance": "ngspice deck compliance: mean of high and low side",
+    "time_constant": "ngspice deck switching; hydrogel, tank: assumed",
     "rejection": "assumed; INA118 datasheet: at least 110 dB at a gain of 1000, less at lower ones",
     "offset_sd": "INA118 datasheet: at most 50 µV",
-    "low_rail": "supply of the converter's board",
-    "high_rail": "supply of the converter's board",
+    "low_rail": "ngspice deck contacts",
+    "high_rail": "ngspice deck contacts",
     "nonlinearity": "assumed, of the size of the ATmega2560's",
     "gauge": "assumed; published for knitted sensors: up to 1.2 (Bozali et al. 2022, Sensors 22, "
     "7688), 2.4 (others)",

@@ -1,0 +1,14 @@
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from conftest import missing
+
+
+@pytest.fixture(scope="session")
+def decks(pytestconfig):
+    """Skip what runs decks where there is no ngspice (under CI=true: fail)."""
+    if shutil.which("ngspice") is None:
+        missing(pytestconfig, "the board's circuit: no ngspice (Debian: apt-get install ngspice)")

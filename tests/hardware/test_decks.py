@@ -1,0 +1,122 @@
+"""The board's circuit under ngspice: ours keeps its promises, the source's shows what was wrong."""
+
+import pytest
+
+import figures
+from spice import DeckError, run
+from tomoskin.skin import Skin
+
+pytestmark = pytest.mark.usefixtures("decks")
+OFF, ON, SOUND, BROKEN = 0, 5, "1g", "50m"
+
+
+def test_the_current_holds_to_a_percent_and_says_where_it_ends():
+    rest = figures.compliance("mended")
+    assert rest["current_error"] < 0.01 - 0.002  # less reference and sense resistor, 0.1 % each
+    assert rest["compliance"] > 10
+    assert figures.compliance("source")["compliance"] < 9.5
+
+
+def test_an_lm317_cannot_make_a_milliampere():
+    loads = "0.5 20 1000 2000"
+    wrong = run("compliance", variant="source", loads=loads, amps=1e-3)["amperes"]
+    right = run("compliance", variant="mended", loads=loads, amps=1e-3)["amperes"]
+    assert min(wrong) > 3e-3
+    assert right == pytest.approx([1e-3] * 4, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("contact", "ring", "gain"), [(0.05, 1, 35), (0.05, 0.3, 35), (0.05, 5, 7), (20, 1, 35)]
+)
+def test_nothing_spikes_and_all_settles(contact, ring, gain):
+    step = figures.switching("mended", contact=contact, ring=ring, gain=gain)
+    assert step["peak"] < 1.3
+    assert step["settling"] < 200e-6
+    assert step["settling"] < Skin.load("textile-disc-8").readout.settling
+
+
+@pytest.mark.parametrize("dead", ["1u", "10u", "100u"])
+def test_the_dead_time_does_not_matter(dead):
+    assert figures.switching("mended", dead=dead)["peak"] < 1.3
+
+
+def test_without_a_dump_the_bus_charges_and_spikes_into_the_skin():
+    peaks = [figures.switching("source", dead=dead)["peak"] for dead in ("0.2u", "2u", "10u")]
+    assert peaks == sorted(peaks)
+    assert peaks[1] > 4
+    assert peaks[2] > 8
+
+
+def test_a_demultiplexer_of_5_v_does_not_switch_a_high_side_off():
+    wrong, right = (figures.switching(one, dead="100u") for one in ("source", "mended"))
+    assert wrong["bus"] > 10
+    assert wrong["idle_peak"] > 0.5
+    assert right["idle_peak"] < 0.15
+
+
+def test_after_a_cut_electrode_ten_microseconds_are_needed():
+    assert figures.switching("mended", cut="1g", dead="10u")["peak"] < 1.3
+    assert 1.3 < figures.switching("mended", cut="1g", dead="2u")["peak"] < 2
+    assert figures.switching("source", cut="1g", dead="10u")["peak"] > 8
+
+
+@pytest.mark.parametrize(("contact", "amperes"), [(1, 0.1), (20, 0.1), (20, 0.01), (100, 0.01)])
+def test_resistive_contacts_clip_what_reads_against_the_sink_line(contact, amperes):
+    wrong = figures.clipping("source", contact, amperes)
+    right = figures.clipping("mended", contact, amperes)
+    assert wrong["read"] < 0.5 * wrong["truth"]
+    assert right["read"] == pytest.approx(right["truth"], rel=1e-3)
+    assert right["pin"] < 4
+
+
+def test_noise_is_the_converters():
+    quiet, loud = figures.noise(0), figures.noise(1 / figures.GAIN)
+    assert quiet["pin"] < loud["pin"] < 0.1 * figures.CONVERTER_NOISE * figures.LSB
+    assert quiet["gain"] == pytest.approx(figures.GAIN, rel=1e-3)
+
+
+@pytest.mark.parametrize("five", [OFF, ON])
+def test_floating_pins_drive_nothing(five):
+    safe = run("powerup", variant="mended", pull="10k", five=five)
+    assert safe["person"][0] < 1e-9
+    assert safe["skin"][0] < 1e-9
+    wrong = run("powerup", variant="source", pull="1g", five=five)
+    assert wrong["skin"][0] > 5e-3
+
+
+@pytest.mark.parametrize(("high", "low"), [(BROKEN, SOUND), (SOUND, BROKEN)])
+def test_one_stuck_transistor_drives_nothing_while_all_is_off(high, low):
+    assert run("stuck", variant="mended", on=OFF, high=high, low=low)["skin"][0] < 1e-7
+    driven = run("stuck", variant="mended", on=ON, high=high, low=low)["skin"][0]
+    assert driven == pytest.approx(figures.AMPERES, rel=0.01)
+
+
+def test_in_the_sources_circuit_a_stuck_low_side_keeps_the_current_on():
+    said = run("stuck", variant="source", on=OFF, high=SOUND, low=BROKEN)
+    assert said["skin"][0] == pytest.approx(figures.AMPERES, rel=0.01)
+
+
+@pytest.mark.parametrize("body", ["100", "1k"])
+def test_the_option_for_the_body_stays_within_the_standard(body):
+    said = run("body", driven=1, fault_volts=0, fault_resistance="1g", body=body)
+    assert said["rms"][0] == pytest.approx(1e-3, rel=0.01)
+    assert said["weighted"][0] < 100e-6  # type BF, normal condition, alternating
+    assert said["direct"][0] < 10e-6  # and direct
+
+
+@pytest.mark.parametrize("volts", ["5", "pulse(-5 5 0 10n 10n 10u 20u)"])
+def test_one_fault_in_it_too(volts):
+    said = run("body", driven=0, fault_volts=volts, fault_resistance=1, body="1k")
+    assert said["weighted"][0] < 500e-6
+    assert said["direct"][0] < 50e-6
+
+
+def test_the_twins_figures_are_those_of_the_decks():
+    assert figures.FILE.read_text(encoding="utf-8") == figures.written(figures.measured())
+
+
+def test_a_deck_without_its_values_is_refused():
+    with pytest.raises(DeckError, match="expected values for"):
+        run("compliance", variant="mended")
+    with pytest.raises(DeckError, match="compliance"):
+        run("compliance", variant="nobody", loads="1", amps=0.1)
