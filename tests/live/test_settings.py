@@ -122,7 +122,7 @@ def test_undo_and_redo(office):
         ({"inverse": {"alpha": "much"}}, "inverse", "alpha", 'got "much"'),
         ({"outline": {"shape": "rectangle"}}, "outline", "width", "is missing"),
         ({"surface": {"file": "/etc/passwd"}}, "surface", "file", "cannot be set from a page"),
-        ({"drive": {"pattern": "skip:99"}}, "drive", None, "skip"),
+        ({"drive": {"pattern": "skip:99"}}, "drive", None, "expected k from 0 to 6"),
         ({"mesh": {"cells": 600}}, None, None, "cannot be set to another sheet"),
         ({"colour": {"hue": 1}}, None, None, "unknown section"),
     ],

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from tomoskin.twin import Press
+from tomoskin.twin import Faults, Press
 
 
 @runtime_checkable
@@ -14,6 +15,30 @@ class Pressable(Protocol):
 
     def set_presses(self, presses: tuple[Press, ...]) -> None:
         """All presses from now on."""
+
+
+@runtime_checkable
+class Breakable(Protocol):
+    """A source that can be broken and mended, as the twin can."""
+
+    def set_faults(self, faults: Faults) -> None:
+        """All that is broken from now on."""
+
+    def set_noise(self, noise: float | None) -> None:
+        """Standard deviation of one conversion, LSB; None: the source's own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Harm:
+    """What is wrong with a source: ``faults``, and its ``noise`` in LSB where that is not its own."""
+
+    faults: Faults = Faults()
+    noise: float | None = None
+
+    def do(self, source: Breakable) -> None:
+        """Break and mend; ModelError for an electrode that is not there."""
+        source.set_faults(self.faults)
+        source.set_noise(self.noise)
 
 
 class PressBoard:

@@ -8,6 +8,7 @@ import msgspec
 from msgspec import Meta
 
 from tomoskin.core import WireError
+from tomoskin.live.flow_requests import FlowRequest
 
 MAX_REQUEST = 32_768
 """Longest request, bytes: a pattern of some thousand rows, written out."""
@@ -78,10 +79,10 @@ class LoadSkin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="loa
 
 
 class SetTwin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="twin"):
-    """All that is wrong with the twin from now on: electrodes cut, LSB of noise."""
+    """All that is wrong with the twin from now on: electrodes cut, LSB of noise (null: its own)."""
 
     cut: Annotated[tuple[Annotated[int, Meta(ge=0, le=31)], ...], Meta(max_length=32)]
-    noise: Annotated[float, Meta(ge=0, le=1000)]
+    noise: Annotated[float, Meta(ge=0, le=1000)] | None
 
 
 class SetPause(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="pause"):
@@ -138,6 +139,7 @@ Request = (
     | SetTwin
     | SettingsRequest
     | ReplayRequest
+    | FlowRequest
 )
 
 _DECODER: msgspec.json.Decoder[Request] = msgspec.json.Decoder(Request)

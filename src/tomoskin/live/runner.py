@@ -18,7 +18,7 @@ from tomoskin.live.meter import Meter
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.play import where_is
 from tomoskin.live.prepare import Prepared, same_body
-from tomoskin.live.presses import Pressable, PressBoard
+from tomoskin.live.presses import Breakable, Harm, Pressable, PressBoard
 from tomoskin.live.published import moment_of, stream_of
 from tomoskin.live.replayed import advance
 from tomoskin.live.result import Result
@@ -41,6 +41,7 @@ _STANDSTILL = frozenset({"silent", "fault", "reset"})
 """Events after which no frame comes until the board is well again."""
 
 _WAITING = "waiting for the board to answer"
+_ADOPTION = 1.0
 _FIRST_DELAY, _LONGEST_DELAY = 0.25, 5.0
 
 _log = logging.getLogger(__name__)
@@ -92,6 +93,8 @@ class Runner:
         Source and skin in words, once it has been opened.
     pressable
         Whether the source can be pressed from a page, as the twin can.
+    harmed
+        What is wrong with the source by our doing.
     """
 
     def __init__(
@@ -127,7 +130,9 @@ class Runner:
         self._stopping = threading.Event()
         self._nudge = threading.Event()
         self._change: _Change | None = None
-        self._adopted: Prepared | None = None
+        self._adopted: tuple[Prepared, threading.Event] | None = None
+        self._broken: Breakable | None = None
+        self.harmed = Harm()
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
@@ -181,9 +186,23 @@ class Runner:
         """Go on with other settings of the same mesh and scan, from the next read on.
 
         The reference stands; a recording ends. Nothing is done where the skin has been changed
-        meanwhile (:meth:`change`). From any thread.
+        meanwhile (:meth:`change`). Returns when it is done, or a second later where no source
+        is there to go on with; from any thread but its own.
         """
-        self._adopted = prepared
+        done = threading.Event()
+        self._adopted = prepared, done
+        done.wait(_ADOPTION)
+
+    @property
+    def breakable(self) -> bool:
+        """Whether the source can be broken and mended, as the twin can."""
+        return self._broken is not None
+
+    def harm(self, harm: Harm) -> None:
+        """Break and mend the source, from any thread; ModelError for what it does not have."""
+        if self._broken is not None:
+            harm.do(self._broken)
+            self.harmed = harm
 
     @property
     def reference(self) -> Reference | None:
@@ -333,6 +352,8 @@ class Runner:
         return self._pipeline.numbered
 
     def _link(self, transport: Transport) -> Link:
+        self._broken = transport if isinstance(transport, Breakable) else None
+        self.harm(self.harmed)
         self._wishes.opened(transport)
         if self.replay:
             self._pipeline.number_after(self.replay.touches_before)
@@ -386,17 +407,20 @@ class Runner:
         self._tally, self._earlier, self._skipped = Tally(), Tally(), 0
         self._tape = Tape(prepared, self.say, self._clock, self._numbered)
         self._outlets = Outlets(self._sinks, self.say)
-        self._presses, self._truth = PressBoard(), ()
+        self._presses, self._truth, self.harmed = PressBoard(), (), Harm()
         self.newest = None
 
     def _take_over(self) -> None:
         """Adopt what has been prepared, if anything has."""
-        prepared, self._adopted = self._adopted, None
-        if prepared is None or not same_body(prepared.skin, self.prepared.skin):
+        adopted, self._adopted = self._adopted, None
+        if adopted is None:
             return
-        self._tape.adopt(prepared)
-        self.prepared = prepared
-        self._pipeline.adopt(prepared)
+        prepared, done = adopted
+        if same_body(prepared.skin, self.prepared.skin):
+            self._tape.adopt(prepared)
+            self.prepared = prepared
+            self._pipeline.adopt(prepared)
+        done.set()
 
     def _settle(self, transport: Transport) -> None:
         """A source has been opened; say what it is."""

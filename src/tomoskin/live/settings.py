@@ -164,14 +164,14 @@ class SettingsDesk:
             if runner.reference is not None:
                 prepared = tuned(prepared, runner.reference)
             scaled = prepared, colour_limit(prepared)
+            self._took = time.monotonic() - start
             runner.adopt(prepared)
-        elif opener is None:
+            return scaled
+        if opener is None:
             raise SourceError("the source cannot be set to another sheet or scan while it runs")
-        else:
-            runner.change(prepared, partial(opener, skin))
-            scaled = None
+        runner.change(prepared, partial(opener, skin))
         self._took = time.monotonic() - start
-        return scaled
+        return None
 
     def _remember(self, prepared: Prepared) -> None:
         """What would choose alpha, for the mark on the slider."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 from typing import Protocol
 
 from tomoskin.core import SourceError
@@ -56,6 +57,7 @@ class TwinTransport:
         self.name = "twin"
         self.device = device
         self.electronics = electronics
+        self._noise = electronics.settings.noise
         self._clock = clock
         self._condition = threading.Condition()
         self._inbox = bytearray()
@@ -101,6 +103,12 @@ class TwinTransport:
             For an electrode that the skin does not have; then nothing is changed.
         """
         self.electronics.set_faults(faults)
+
+    def set_noise(self, noise: float | None) -> None:
+        """Noise of one conversion, LSB, from the next frame on; None: that of its settings."""
+        electronics = self.electronics
+        value = self._noise if noise is None else noise
+        electronics.settings = replace(electronics.settings, noise=value)
 
     def reboot(self) -> None:
         """Cut the board's power for a moment: it forgets everything and says HELLO."""
