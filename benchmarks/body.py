@@ -18,12 +18,13 @@ PLACEMENTS = 100
 EFFECTS = (1.0, 0.5, 0.25)
 REACH, APART = 35e-3, 30e-3
 WITHIN = 8e-3
+POLARISED = (0.0, 0.5e-3, 1e-3, 2e-3, 4e-3)
 
 
 def run(data: Path | None) -> list[Report]:
     """Both tables; no recording is needed."""
     del data
-    return [palpation()]
+    return [palpation(), face()]
 
 
 def palpation() -> Report:
@@ -79,6 +80,33 @@ def _placed(example: ModuleType, random: np.random.Generator) -> tuple[Any, ...]
         one, other = random.uniform(-REACH, REACH, (2, 2))
         if np.hypot(*(one - other)) >= APART:
             return example.between(*one, example.LARGE), example.between(*other, example.SMALL)
+
+
+def face() -> Report:
+    """Runs through six expressions, by what direct current suffers from its electrodes."""
+    example = _example("fig64_face")
+    all_sessions = [(seed, example.sessions_of(seed)) for seed in SEEDS]
+    rows = []
+    for polarised in POLARISED:
+        example.POLARISED = polarised
+        name = f"direct, {1e3 * polarised:g} mV on each reading"
+        rows.append((name, *_told(example, all_sessions, direct=True)))
+    rows.append(("complex", *_told(example, all_sessions, direct=False)))
+    return Report(
+        "six expressions of a face",
+        ("data", "runs", "right", "runs with 5 of 6", *example.NAMES),
+        tuple(rows),
+        (
+            f"seeds {', '.join(map(str, SEEDS))}: {example.LEARNT} sessions learnt, "
+            f"{example.ASKED} asked, {example.RUNS} runs each; electrodes put on anew each time",
+        ),
+    )
+
+
+def _told(example: ModuleType, all_sessions: list[Any], *, direct: bool) -> tuple[Any, ...]:
+    right = np.concatenate([example.told(s, seed, direct=direct) for seed, s in all_sessions])
+    each = (f"{part:.0%}" for part in right.mean(axis=0))
+    return len(right), f"{right.mean():.1%}", f"{example.whole_runs(right):.0%}", *each
 
 
 def _example(name: str) -> ModuleType:
