@@ -93,3 +93,13 @@ def test_a_reset_forgets_what_was_left() -> None:
     run.tracker.reset()
     run([[sized(LEFT)]] * 4)
     assert run.happened[-1] == ("onset", 2)
+
+
+def test_what_a_press_leaves_while_it_still_slides_is_no_touch() -> None:
+    """As a fit sees it: its depth is anyone's guess, how far it stands out is not."""
+    way = np.linspace(0, 0.1, 80)
+    trail = reading(0.0, peak=-0.8, snr=8.0)
+    run = Run(40)([[sized(1, x), trail] if x > 0.04 else [sized(1, x)] for x in way])
+    assert run.happened == [("onset", 1)]
+    run([[sized(1, 0.1), reading(0.0, peak=-0.3, snr=40.0)]] * 8)
+    assert run.happened == [("onset", 1), ("onset", 2)]

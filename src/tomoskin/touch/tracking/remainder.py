@@ -6,13 +6,14 @@ Prandtl 1928). What is left is of the press's sign, a fraction of its size, and 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from tomoskin.core import Reading
 from tomoskin.touch.tracking.assign import region_radius
-from tomoskin.touch.tracking.trace import Trace, sign_of
+from tomoskin.touch.tracking.trace import Footprint, Trace, sign_of, size_of
 
 _PART = 0.25
 """A remainder is at most this part of its press."""
@@ -51,13 +52,13 @@ class Scar:
 
     def is_under(self, reading: Reading) -> bool:
         """Whether the reading lies here, with this sign, and no larger than a remainder."""
-        reach = _BESIDE * max(self.radius, region_radius(reading))
-        near = (reading.x - self.x) ** 2 + (reading.y - self.y) ** 2 <= reach**2
-        return near and sign_of(reading) == self.sign and abs(reading.peak) <= _PART * self.press
+        return sign_of(reading) == self.sign and _may_be_left(
+            reading, Footprint(self.x, self.y, self.press), self.radius
+        )
 
     def explains(self, reading: Reading, time: float, least_snr: float) -> bool:
         """Whether the reading has not grown; follow its level."""
-        size = abs(reading.peak)
+        size = size_of(reading)
         noise = size / reading.snr if reading.snr > 0 else 0.0
         if self.unseen:
             self.level, self.unseen = min(self.level, least_snr * noise), False
@@ -99,11 +100,28 @@ class Remainders:
         for scar in self._scars:
             scar.unseen = True
 
-    def explain(self, reading: Reading, time: float) -> bool:
-        """Whether the reading is what an earlier touch has left."""
+    def explain(self, reading: Reading, time: float, traces: Iterable[Trace]) -> bool:
+        """Whether the reading is what an earlier touch has left, or one of ``traces`` leaves
+        behind or beside it while it still stands."""
+        if any(_is_on_trail(reading, trace) for trace in traces):
+            return True
         under = [scar for scar in self._scars if scar.is_under(reading)]
         told = [scar.explains(reading, time, self._least_snr) for scar in under]
         return any(told)  # each of them follows the level
+
+
+def _is_on_trail(reading: Reading, trace: Trace) -> bool:
+    if not trace.number or sign_of(reading) != trace.sign:
+        return False
+    radius = region_radius(trace.reading)
+    return any(_may_be_left(reading, foot, radius) for foot in trace.footprints)
+
+
+def _may_be_left(reading: Reading, foot: Footprint, radius: float) -> bool:
+    """Whether it lies where something was, and is no larger than a remainder of that."""
+    reach = _BESIDE * max(radius, region_radius(reading))
+    near = (reading.x - foot.x) ** 2 + (reading.y - foot.y) ** 2 <= reach**2
+    return near and size_of(reading) <= _PART * foot.top
 
 
 def has_become_one(trace: Trace, time: float, lasting: float) -> bool:
@@ -111,7 +129,7 @@ def has_become_one(trace: Trace, time: float, lasting: float) -> bool:
 
     It must have fallen fast and not grown since.
     """
-    size, top = abs(trace.reading.peak), trace.footprints[-1].top
+    size, top = size_of(trace.reading), trace.footprints[-1].top
     if size > _PART * top or (trace.low is None and time - trace.strong > _FALL):
         trace.low = None
         return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -17,7 +18,7 @@ _STRONG = 0.5
 
 @dataclass(slots=True)
 class Footprint:
-    """Where a touch was, m, and how strong at most."""
+    """Where a touch was, m, and how large at most."""
 
     x: float
     y: float
@@ -115,7 +116,7 @@ class Trace:
         self.frames += 1
         self.missing = None
         self._step()
-        if abs(reading.peak) >= _STRONG * self.footprints[-1].top:
+        if size_of(reading) >= _STRONG * self.footprints[-1].top:
             self.strong = time
 
     def become(self, other: Trace) -> None:
@@ -125,7 +126,7 @@ class Trace:
         self._step()
 
     def _step(self) -> None:
-        x, y, size = self.reading.x, self.reading.y, abs(self.reading.peak)
+        x, y, size = self.reading.x, self.reading.y, size_of(self.reading)
         if self.footprints:
             last = self.footprints[-1]
             if (x - last.x) ** 2 + (y - last.y) ** 2 < _STEP**2:
@@ -133,6 +134,12 @@ class Trace:
                 return
         self.footprints.append(Footprint(x, y, size))
         del self.footprints[:-_MOST_FOOTPRINTS]
+
+
+def size_of(reading: Reading) -> float:
+    """By how many deviations it stands out, or its peak where that is not known: a fit knows the
+    depth of a faint touch badly, but well what it does to the voltages."""
+    return reading.snr if 0 < reading.snr < math.inf else abs(reading.peak)
 
 
 def content(reading: Reading) -> float:

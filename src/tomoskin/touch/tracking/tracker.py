@@ -143,7 +143,7 @@ class Tracker:
     def _begins(self, reading: Reading) -> bool:
         if reading.weak or reading.snr < self.settings.snr:
             return False
-        return not self._remainders.explain(reading, self._now)
+        return not self._remainders.explain(reading, self._now, self._traces)
 
     def _settle(self) -> None:
         """Report what has stood long enough, end what has been gone long enough."""
