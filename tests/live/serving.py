@@ -15,15 +15,15 @@ PATIENCE = 20
 class Site:
     """A running server; the runner is the test's own and already started."""
 
-    def __init__(self, runner, static=STATIC):
+    def __init__(self, runner, static=STATIC, folder=None, take=lambda _hub: None):
         self.runner = runner
         self._listener = listen("127.0.0.1", 0)
         self.port = self._listener.getsockname()[1]
         self.door = Door(self.port)
         self.origin = f"http://127.0.0.1:{self.port}"
-        self._server = Server.of(
-            application(Hub(runner, limit=colour_limit(runner.prepared)), self.door, static)
-        )
+        hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
+        take(hub)
+        self._server = Server.of(application(hub, self.door, static))
         self._thread = threading.Thread(target=self._server.run_on, args=(self._listener,))
         self._thread.start()
 

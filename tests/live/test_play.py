@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from contextlib import contextmanager
 
 import pytest
@@ -26,17 +27,21 @@ class Page:
     def __init__(self, socket):
         self._socket = socket
 
-    def ask(self, kind, **fields):
+    def ask(self, kind, /, **fields):
         self._socket.send(json.dumps({"type": kind} | fields))
 
     def told(self, kind, true=lambda _: True):
         """The next message of that kind for which ``true`` holds."""
-        while True:
+        end = time.monotonic() + PATIENCE
+        seen = None
+        while time.monotonic() < end:
             message = self._socket.recv(PATIENCE)
             if isinstance(message, str):
                 found = json.loads(message)
                 if found["type"] == kind and true(found):
                     return found
+                seen = found if found["type"] in (kind, "error") else seen
+        raise AssertionError(f"no such {kind}; the last: {seen}")
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from tomoskin.live.changes import DOUBTED, Changes, Idle, changes_of
 from tomoskin.live.exports import WRITERS, Export
+from tomoskin.live.flows import take_flows
 from tomoskin.live.hub import Hub
 from tomoskin.live.labelled import (
     SetMade,
@@ -32,6 +33,8 @@ from tomoskin.live.server import (
 from tomoskin.live.settings import SettingsDesk
 from tomoskin.live.simulate import Simulated, simulate
 from tomoskin.live.status import Status
+from tomoskin.live.token import kept_token
+from tomoskin.live.twin_desk import TwinDesk
 
 __all__ = [
     "DEFAULT_PORT",
@@ -55,6 +58,7 @@ __all__ = [
     "Simulated",
     "Snapshot",
     "Status",
+    "TwinDesk",
     "Workers",
     "advance",
     "application",
@@ -65,6 +69,7 @@ __all__ = [
     "in_processes",
     "in_this_process",
     "is_loopback",
+    "kept_token",
     "listen",
     "make_set",
     "on_cluster",
@@ -74,4 +79,5 @@ __all__ = [
     "reconstruct",
     "replayed",
     "simulate",
+    "take_flows",
 ]

@@ -13,14 +13,15 @@ from pathlib import Path
 import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
-from tomoskin.core import TomoskinError
+from tomoskin.core import DataError, TomoskinError
 from tomoskin.live import messages
+from tomoskin.live.folder import Folder
 from tomoskin.live.guard import Guard
 from tomoskin.live.hub import Hub
 from tomoskin.live.page import PATIENCE, Page
@@ -78,7 +79,8 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def application(hub: Hub, door: Door, static: Path = STATIC) -> ASGIApp:
-    """ASGI application: the built page, ``/ws`` for each open page, ``/status`` for programs."""
+    """ASGI application: the built page, ``/ws`` for each open page, ``/status`` for programs,
+    ``/files/NAME`` for what is in the session folder."""
 
     async def stream(websocket: WebSocket) -> None:
         await Page(websocket, hub).run()
@@ -89,6 +91,14 @@ def application(hub: Hub, door: Door, static: Path = STATIC) -> ASGIApp:
     async def status(_: Request) -> Response:
         return Response(messages.state(hub.runner.status()), media_type="application/json")
 
+    async def download(request: Request) -> Response:
+        name = request.path_params["name"]
+        try:
+            path = Folder(hub.folder).existing(name)
+        except DataError as error:
+            return PlainTextResponse(f"{error}\n", 404)
+        return FileResponse(path, media_type="application/octet-stream", filename=name)
+
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         async with hub.running():
@@ -98,6 +108,7 @@ def application(hub: Hub, door: Door, static: Path = STATIC) -> ASGIApp:
         WebSocketRoute("/ws", stream),
         Route("/favicon.ico", no_icon),
         Route("/status", status),
+        Route("/files/{name}", download),
         Mount("/", StaticFiles(directory=static, html=True)),
     ]
     return Guard(Starlette(routes=routes, lifespan=lifespan), door)

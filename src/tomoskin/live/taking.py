@@ -18,14 +18,15 @@ _REST = 10
 _LAG = 4
 """The newest frames, which are not taken for untouched: a press may have begun in them."""
 
-_STEADY = 6
+_STEADY = 8
 """Frames that a press must stand still for."""
 
-_PRESENT = 6.0
+_PRESENT = 2.5
 """Noises by which a frame must differ from the untouched skin to be a press."""
 
-_STILL = 0.06
-"""How far a steady press may waver, as a part of itself."""
+_STILL, _WAVERS = 0.06, 1.5
+"""How far a steady press may move from its first half to its second, as a part of itself, and in
+noises, where these are larger."""
 
 _RELEASED = 0.4
 """A press is over when this part of it is left."""
@@ -89,7 +90,8 @@ class Taker:
             return
         quiet = np.array(self._rest)[:_REST]
         self._mean = quiet.mean(axis=0)
-        self._noise = np.maximum(quiet.std(axis=0, ddof=1), self._least)
+        own = quiet.var(axis=0, ddof=1)  # of few frames: drawn halfway to that of all rows
+        self._noise = np.maximum(np.sqrt((own + np.nanmean(own)) / 2), self._least)
         self.phase = "press"
 
     def _steady(self) -> FloatArray | None:
@@ -99,8 +101,9 @@ class Taker:
         mean = frames.mean(axis=0)
         change = mean - self._mean
         size = self._size(change)
-        wavers = max(self._size(frame - mean) for frame in frames)
-        if wavers > max(_STILL * size, 0.5 * _PRESENT):
+        half = _STEADY // 2
+        moved = self._size(frames[half:].mean(axis=0) - frames[:half].mean(axis=0))
+        if moved > max(_STILL * size, _WAVERS):
             return None
         self.phase, self._taken = "release", size
         self._pressed.clear()
