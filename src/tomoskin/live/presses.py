@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 from tomoskin.twin import Faults, Press
@@ -30,9 +30,9 @@ class Breakable(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Harm:
-    """What is wrong with a source: ``faults``, and its ``noise`` in LSB where that is not its own."""
+    """What is wrong with a source: ``faults``, and ``noise`` in LSB where that is not its own."""
 
-    faults: Faults = Faults()
+    faults: Faults = field(default_factory=Faults)
     noise: float | None = None
 
     def do(self, source: Breakable) -> None:

@@ -93,6 +93,11 @@ onMessage<Status>("state", (message) => (status.value = message));
 onMessage<EventNote>("event", ({ text }) => say(text));
 onMessage<Refusal>("error", ({ message }) => say(message));
 
+const frameReceivers: ((frame: Frame) => void)[] = [];
+
+/** Call back with every frame, at the wire's pace: little work only. */
+export const onFrame = (receive: (frame: Frame) => void): void => void frameReceivers.push(receive);
+
 /** A frame that does not fit the scene (it crossed a change of skin) is not shown. */
 function receiveFrame(bytes: ArrayBuffer): void {
   let frame: Frame;
@@ -108,6 +113,7 @@ function receiveFrame(bytes: ArrayBuffer): void {
   newest.arrived = performance.now() / 1e3;
   newest.count++;
   history.add(frame.hostTime, frame.touches);
+  for (const receive of frameReceivers) receive(frame);
   repaint();
 }
 
