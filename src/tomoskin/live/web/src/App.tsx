@@ -1,5 +1,6 @@
 /** The page: a line of state, the sheet, its panels and drawers, the commands. */
 
+import { TimeLine } from "./flows/TimeLine";
 import { Controls } from "./panels/Controls";
 import { Legend } from "./panels/Legend";
 import { Side } from "./panels/Side";
@@ -15,6 +16,7 @@ export function App() {
         <Legend />
         <Side />
       </main>
+      <TimeLine />
       <Controls />
     </>
   );

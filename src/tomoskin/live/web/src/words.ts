@@ -20,7 +20,7 @@ const act = (text: string, brief = text): Sentence => ({ text, brief, act: true 
 
 function lostSentence(link: LinkState & { phase: "lost" }, now: number, age: number | null): Sentence {
   if (link.refused) {
-    return act("This page is no longer known to the server: open the address that tomoskin printed");
+    return act("tomoskin was started again and does not know this page: open the address that it printed");
   }
   const wait = Math.max(0, link.retryAt / 1e3 - now);
   const retry = wait < 0.5 ? "trying again" : `trying again in ${duration(Math.ceil(wait))}`;

@@ -115,6 +115,7 @@ export function Sheet() {
           drive={shownDrive.value}
         />
       )}
+      {view.value.width > 0 && <Target view={view.value} />}
       <Reading />
       {!accelerated.value && (
         <p class="remark">WebGL 2 is missing in this browser: the sheet is drawn flat and more slowly.</p>

@@ -1,0 +1,199 @@
+/** What the server says of files, sources, guided presses and the line of time. */
+
+import { computed, effect, signal } from "@preact/signals";
+import type { EventNote, Scene } from "../protocol";
+import { now, onMessage, say, scene, send, shown, status } from "../state";
+
+export interface FoundFile {
+  readonly name: string;
+  readonly kind: string;
+  /** Bytes. */
+  readonly size: number;
+  /** Seconds since 1970. */
+  readonly written: number;
+}
+
+interface Files {
+  readonly type: "files";
+  readonly files: readonly FoundFile[];
+  readonly recording: string | null;
+  readonly playing: string | null;
+  readonly exporting: string | null;
+  /** 0…1 of the export. */
+  readonly share: number;
+}
+
+interface Sources {
+  readonly type: "sources";
+  readonly sources: readonly { readonly id: string; readonly text: string }[];
+  readonly current: string;
+  readonly host_protocol: string;
+  readonly board: {
+    readonly firmware: string;
+    readonly protocol: string;
+    readonly channels: number;
+    readonly adc_bits: number;
+    readonly current_ma: number;
+    readonly unique_id: string;
+  } | null;
+  readonly problem: string | null;
+}
+
+export type FlowKind = "touch" | "wiring";
+export type Phase = "rest" | "press" | "hold" | "release";
+
+export interface Flow {
+  readonly type: "flow";
+  readonly kind: FlowKind | null;
+  readonly phase?: Phase;
+  readonly dot?: readonly [number, number];
+  readonly presses?: readonly (readonly [number, number])[];
+  readonly thinking?: boolean;
+  readonly text?: string;
+  readonly ready?: boolean;
+  readonly figures?: {
+    readonly errors_mm?: readonly number[];
+    readonly median_mm?: number;
+    readonly doubtful?: readonly number[];
+    readonly probability?: number;
+    readonly wiring?: string;
+  };
+  /** Where places of touches come from: a file, "" where its name is not known; null: the picture. */
+  readonly calibration: string | null;
+}
+
+export interface Timeline {
+  readonly type: "timeline";
+  readonly end_s: number;
+  readonly notes: readonly { readonly time_s: number; readonly text: string }[];
+  readonly events: readonly { readonly time_s: number; readonly kind: string; readonly text: string }[];
+  readonly touches: readonly Span[];
+}
+
+export interface Span {
+  readonly id: number;
+  readonly kind: string;
+  readonly begin_s: number;
+  readonly end_s: number;
+}
+
+export interface Tick {
+  readonly time_s: number;
+  readonly text: string;
+}
+
+export const files = signal<Files | null>(null);
+export const sources = signal<Sources | null>(null);
+export const flow = signal<Flow>({ type: "flow", kind: null, calibration: null });
+export const timeline = signal<Timeline | null>(null);
+/** Notes and gaps since the recording began or the replay was opened, and its touches. */
+export const marks = signal<readonly Tick[]>([]);
+export const gaps = signal<readonly Tick[]>([]);
+export const spans = signal<readonly Span[]>([]);
+/** The last file that an export wrote. */
+export const exported = signal<string | null>(null);
+
+onMessage<Files>("files", (message) => (files.value = message));
+onMessage<Sources>("sources", (message) => (sources.value = message));
+onMessage<Flow>("flow", (message) => (flow.value = message));
+onMessage<Timeline>("timeline", (message) => (timeline.value = message));
+onMessage<{ readonly type: "exported"; readonly name: string }>("exported", ({ name }) => {
+  exported.value = name;
+  say(`Exported to ${name}`);
+});
+
+/** A page of an older tomoskin would not understand a newer server. */
+let version: string | null = null;
+onMessage<Scene>("scene", (message) => {
+  if (version !== null && version !== message.version) window.location.reload();
+  version = message.version;
+  timeline.value = null;
+  restart();
+});
+
+/** Page time, s, at which the recording began; null where nothing is recorded. */
+const began = signal<number | null>(null);
+
+/** Page time, s, at which the newest state came. */
+let told = 0;
+effect(() => {
+  void status.value;
+  told = now.peek();
+});
+
+function restart(): void {
+  marks.value = gaps.value = spans.value = [];
+}
+
+const recording = computed(() => status.value?.recording ?? null);
+effect(() => {
+  began.value = recording.value === null ? null : now.peek();
+  if (recording.value !== null) restart();
+});
+
+/** What the line of time is of. */
+export const lineOf = computed<"replay" | "recording" | null>(() => {
+  if (status.value?.replay) return "replay";
+  return began.value === null ? null : "recording";
+});
+
+/** Seconds from the first frame of the replay, or since the recording began. */
+export const position = computed(() => {
+  const replay = status.value?.replay;
+  if (replay) {
+    const moving = !status.value?.paused && !replay.ended && replay.speed !== null;
+    const since = moving ? Math.max(0, now.value - told) * (replay.speed ?? 0) : 0;
+    return Math.min(replay.end_s, replay.now_s + since);
+  }
+  return began.value === null ? 0 : now.value - began.value;
+});
+
+/** How long it is: of a recording, as long as it has become, from a minute on. */
+export const duration = computed(() => {
+  const replay = status.value?.replay;
+  return replay ? Math.max(replay.end_s, 0.001) : Math.max(60, 1.25 * position.value);
+});
+
+const GAP = /gap|lost|drop|behind|silent/;
+
+onMessage<EventNote>("event", ({ kind, text }) => {
+  if (lineOf.peek() === null) return;
+  const tick = { time_s: position.peek(), text };
+  if (kind === "note") marks.value = [...marks.value, tick];
+  else if (lineOf.peek() === "recording" && GAP.test(kind)) gaps.value = [...gaps.value, tick];
+});
+
+const MOST_SPANS = 500;
+
+/** Touches of a recording, as they come. */
+effect(() => {
+  const frame = shown.value;
+  if (!frame || lineOf.peek() !== "recording") return;
+  const at = position.peek();
+  const before = spans.peek();
+  const next = new Map(before.map((span) => [span.id, span]));
+  for (const { id, kind } of frame.touches) {
+    next.set(id, { id, kind, begin_s: next.get(id)?.begin_s ?? at, end_s: at });
+  }
+  if (frame.touches.length) spans.value = [...next.values()].slice(-MOST_SPANS);
+});
+
+export const allMarks = computed<readonly Tick[]>(() => [
+  ...(lineOf.value === "replay" ? (timeline.value?.notes ?? []) : []),
+  ...marks.value,
+]);
+export const allGaps = computed<readonly Tick[]>(() => [
+  ...(lineOf.value === "replay"
+    ? (timeline.value?.events ?? []).filter(({ kind }) => GAP.test(kind))
+    : []),
+  ...gaps.value,
+]);
+export const allSpans = computed(() =>
+  lineOf.value === "replay" ? (timeline.value?.touches ?? []) : spans.value,
+);
+
+export const askFiles = (): void => send({ type: "files" });
+export const askSources = (): void => send({ type: "sources" });
+
+/** The dot of the flow, where there is one. */
+export const dot = computed(() => (scene.value && flow.value.kind ? (flow.value.dot ?? null) : null));
