@@ -8,7 +8,9 @@ import struct
 import numpy as np
 import pytest
 
-BODIES = ["fig62_palpation", "fig64_face"]
+from tomoskin.mesh import simplex_measure
+
+BODIES = ["fig62_palpation", "fig64_face", "soft_volume"]
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -79,3 +81,21 @@ def test_a_run_counts_with_five_of_six(imported):
     right = np.ones((4, 6), bool)
     right[0, 0] = right[1, :2] = False
     assert imported("fig64_face").whole_runs(right) == 0.75
+
+
+def test_a_dent_in_the_block_keeps_its_volume(imported):
+    example = imported("soft_volume")
+    mesh = example.body(300, 6, seed=3)
+    pressed = simplex_measure(example.indented(mesh.points, example.TOUCH), mesh.cells)
+    assert pressed.sum() == pytest.approx(mesh.volumes.sum(), rel=0.01)
+    below = np.linalg.norm(mesh.centroids[:, :2] - example.TOUCH, axis=1).argmin()
+    assert pressed[below] == pytest.approx(mesh.volumes[below], rel=0.1)
+    still = mesh.points[:, 2] == 0
+    assert example.indented(mesh.points, example.TOUCH)[still, 2] == pytest.approx(0.0)
+
+
+def test_the_centre_is_that_of_what_is_low(imported):
+    example = imported("soft_volume")
+    mesh = example.body(300, 6, seed=3)
+    found = example.centre(mesh, example.with_ball(mesh) - example.SILICONE)
+    assert np.linalg.norm(found - example.BALL) < 3e-3
