@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import Reading, Touch
+from tomoskin.mesh import Cylinder, Plane
 from tomoskin.session import SessionReader, SessionWriter, session_info, write_touches
 from tomoskin.skin import Skin
 
@@ -50,3 +52,16 @@ def test_the_table_says_what_is_too_close(tmp_path: Path) -> None:
     rows = (tmp_path / "x.csv").read_text().splitlines()
     assert rows[0].split(",")[-1] == "kind"
     assert [row.split(",")[-1] for row in rows[1:]] == ["merged 1+3", "too close", "increase"]
+
+
+def test_on_a_surface_the_table_says_where_in_space(tmp_path: Path) -> None:
+    around = Cylinder(35e-3)
+    write_touches(tmp_path / "x.csv", [(0, 0.0, TOUCHES)], around)
+    with (tmp_path / "x.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    place = np.array([[float(row[f"space_{c}_m"]) for c in "xyz"] for row in rows])
+    sheet = np.array([[float(row["x_m"]), float(row["y_m"])] for row in rows])
+    assert place == pytest.approx(around.point(sheet), abs=1e-6)
+    assert np.hypot(place[:, 0], place[:, 2] + 35e-3) == pytest.approx(35e-3, rel=1e-4)
+    write_touches(tmp_path / "flat.csv", [(0, 0.0, TOUCHES)], Plane())
+    assert "space" not in (tmp_path / "flat.csv").read_text()

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from tomoskin.live import Prepared, Reconstruction
     from tomoskin.pattern import Pattern
     from tomoskin.session import Recording
+    from tomoskin.skin import Skin
 
 
 def image(
@@ -62,7 +63,7 @@ def image(
     found = reconstruct(prepared, whole.part(start, stop), idle, rule=rule)
     found = found.numbered_from(start)
     if touches is not None:
-        _write_touches(touches, whole, found)
+        _write_touches(touches, whole, found, prepared.skin)
     if out is not None:
         write(out, prepared, found, display)
     _report(recording, found, prepared, json=json)
@@ -80,11 +81,11 @@ def _writer(out: Path | None) -> Any:
     return image_files.WRITERS.get(suffix)
 
 
-def _write_touches(path: Path, recording: Recording, found: Reconstruction) -> None:
+def _write_touches(path: Path, recording: Recording, found: Reconstruction, skin: Skin) -> None:
     from tomoskin.session import write_touches
 
     rows = zip(found.frames.tolist(), found.touches, strict=True)
-    write_touches(path, ((f, float(recording.time[f]), t) for f, t in rows))
+    write_touches(path, ((f, float(recording.time[f]), t) for f, t in rows), skin.surface)
 
 
 def _report(source: Path, found: Reconstruction, prepared: Prepared, *, json: bool) -> None:

@@ -91,7 +91,8 @@ class Export:
     def touches(self, path: Path) -> None:
         """Write a table of the recorded touches."""
         found = self.session.touches()
-        write_touches(path, ((t.sequence, t.host_time, t.touches) for t in found))
+        rows = ((t.sequence, t.host_time, t.touches) for t in found)
+        write_touches(path, rows, self.session.skin.surface)
 
     def _panels(self, prepared: Prepared) -> Iterator[Panel]:
         first: float | None = None
