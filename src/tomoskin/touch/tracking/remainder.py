@@ -129,7 +129,7 @@ def has_become_one(trace: Trace, time: float, lasting: float) -> bool:
 
     It must have fallen fast and not grown since.
     """
-    size, top = size_of(trace.reading), trace.footprints[-1].top
+    size, top = size_of(trace.reading), trace.top
     if size > _PART * top or (trace.low is None and time - trace.strong > _FALL):
         trace.low = None
         return False

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from tomoskin.core import FloatArray, Reading, Touch
+from tomoskin.touch.tracking.assign import region_radius
 from tomoskin.touch.tracking.motion import States
 
 _STEP = 0.012
@@ -93,6 +94,14 @@ class Trace:
         return expected
 
     @property
+    def top(self) -> float:
+        """How large it has been where its reading is now: what is left of a press that slid is
+        found anywhere along its way."""
+        x, y, reach = self.reading.x, self.reading.y, max(region_radius(self.reading), _STEP)
+        near = [f for f in self.footprints if math.hypot(f.x - x, f.y - y) <= reach]
+        return max((foot.top for foot in near), default=self.footprints[-1].top)
+
+    @property
     def sign(self) -> float:
         """Of its peak."""
         return sign_of(self.reading)
@@ -116,7 +125,7 @@ class Trace:
         self.frames += 1
         self.missing = None
         self._step()
-        if size_of(reading) >= _STRONG * self.footprints[-1].top:
+        if size_of(reading) >= _STRONG * self.top:
             self.strong = time
 
     def become(self, other: Trace) -> None:
