@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tomoskin.cli.calibrate_bend import calibrate_bend
 from tomoskin.cli.calibrate_states import calibrate_states
 from tomoskin.cli.calibrate_wiring import calibrate_wiring
 from tomoskin.cli.output import JsonFlag, emit
@@ -29,6 +30,7 @@ _SHOWN = 10
 _DRIFTED = 2.0
 
 
+app.command("bend")(calibrate_bend)
 app.command("states")(calibrate_states)
 app.command("wiring")(calibrate_wiring)
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tomoskin.cli.alpha_option import AlphaOption, said, with_alpha
+from tomoskin.cli.bend_option import BendOption, with_bends
 from tomoskin.cli.display_option import LimitOption, PercentFlag, SmoothOption, display_of
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.recording import (
@@ -36,6 +38,7 @@ def image(
     frames: FramesOption = None,
     alpha: AlphaOption = None,
     time_constant: TimeConstantOption = None,
+    bend: BendOption = None,
     out: Annotated[
         Path | None, typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go.")
     ] = None,
@@ -55,7 +58,7 @@ def image(
     chosen, rule = with_alpha(skin_for_file(skin, recording), alpha)
     chosen = with_time_constant(chosen, time_constant)
     display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
-    prepared = prepare(chosen)
+    prepared = with_bends(prepare(chosen), bend)
     whole = read_recording(recording).in_order_of(prepared.pattern)
     say_notes(whole)
     idle = idle_frames(whole, reference, prepared.pattern)
@@ -97,6 +100,9 @@ def _report(source: Path, found: Reconstruction, prepared: Prepared, *, json: bo
     typer.echo(said(found.choice))
     if prepared.modes is not None:
         typer.echo(filter_said(prepared.skin))
+    if found.bends:
+        states = Counter(reading.state for reading in found.bends)
+        typer.echo(", ".join(f"{state}: {count} frames" for state, count in states.items()))
     for frame, touches in list(zip(found.frames.tolist(), found.touches, strict=True))[:_SHOWN]:
         for t in touches:
             r = t.reading
@@ -156,6 +162,10 @@ def _document(found: Reconstruction, prepared: Prepared) -> dict[str, Any]:
         "alpha": found.choice.alpha,
         "rule": found.choice.rule,
         "time_constant_s": prepared.skin.inverse.time_constant,
+        "bends": [
+            {"frame": f, "angle_rad": b.angle, "sd_rad": b.sd, "axis_rad": b.axis, "state": b.state}
+            for f, b in zip(found.frames.tolist(), found.bends, strict=False)
+        ],
         "touches": [
             {"frame": f, "id": t.id, "x_m": t.reading.x, "y_m": t.reading.y, "peak": t.reading.peak}
             for f, touches in zip(found.frames.tolist(), found.touches, strict=True)

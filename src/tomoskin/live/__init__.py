@@ -2,6 +2,7 @@
 
 from tomoskin.live.changes import DOUBTED, Changes, Idle, changes_of
 from tomoskin.live.exports import WRITERS, Export
+from tomoskin.live.finding import voltage_covariance
 from tomoskin.live.flows import take_flows
 from tomoskin.live.hub import Hub
 from tomoskin.live.labelled import (
@@ -80,4 +81,5 @@ __all__ = [
     "replayed",
     "simulate",
     "take_flows",
+    "voltage_covariance",
 ]

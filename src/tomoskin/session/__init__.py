@@ -2,6 +2,7 @@
 
 from tomoskin.session.alpha_picture import write_choices
 from tomoskin.session.archive import load_arrays
+from tomoskin.session.bends_file import BendCalibration, read_bends, write_bends
 from tomoskin.session.blocks import Rows, all_blocks
 from tomoskin.session.calibration import (
     CALIBRATION_FILE,
@@ -48,6 +49,7 @@ __all__ = [
     "CALIBRATION_FILE",
     "FILMS",
     "MOST_PANELS",
+    "BendCalibration",
     "Calibration",
     "Display",
     "Lost",
@@ -80,6 +82,7 @@ __all__ = [
     "pack_calibration",
     "parse_replay",
     "plot",
+    "read_bends",
     "read_calibration",
     "read_recording",
     "read_session",
@@ -95,6 +98,7 @@ __all__ = [
     "touch_row",
     "touches_message",
     "unpack_calibration",
+    "write_bends",
     "write_calibration",
     "write_choices",
     "write_csv",

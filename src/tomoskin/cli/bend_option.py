@@ -1,0 +1,29 @@
+"""The option that names a calibration of bends."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from tomoskin.live import Prepared
+
+BendOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="C.npz", help="From tomoskin calibrate bend: bends are taken out, and read."
+    ),
+]
+
+
+def with_bends(prepared: Prepared, path: Path | None) -> Prepared:
+    """The skin with its bends, where a calibration is named. Raises DataError for others."""
+    from tomoskin.session import read_bends
+
+    if path is None:
+        return prepared
+    known = read_bends(path)
+    known.check(prepared.pattern)
+    return prepared.that_bends(known.model)

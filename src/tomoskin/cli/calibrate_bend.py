@@ -1,0 +1,128 @@
+"""``tomoskin calibrate bend``: learn what bends of a skin do, from a few known ones."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.recording import ReferenceOption, idle_frames, say_notes
+from tomoskin.core import DataError
+
+if TYPE_CHECKING:
+    from tomoskin.core import FloatArray
+    from tomoskin.session import Recording
+
+_ALONG_Y = 90.0
+
+
+def calibrate_bend(
+    recording: Annotated[
+        Path, typer.Argument(metavar="INPUT", help="Frames of known bends, nothing touching.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="C.npz", help="Where the calibration goes.")],
+    skin: Annotated[
+        str | None, typer.Option(help="Built-in name or path; without it that of the session.")
+    ] = None,
+    bend: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="DEG[@AXIS]=A:B",
+            help="Frames A to B-1 are bent so far, about an axis in this direction from x "
+            f"({_ALONG_Y:.0f} where it is left out); once for each. Without it the session's "
+            "own truth.",
+        ),
+    ] = None,
+    reference: ReferenceOption = None,
+    json: JsonFlag = False,
+) -> None:
+    """Learn the bends of a skin, so that touches are told from them and angles are read."""
+    from tomoskin.cli.skin_choice import skin_for_file
+    from tomoskin.live import prepare, voltage_covariance
+    from tomoskin.session import BendCalibration, read_recording, write_bends
+    from tomoskin.signal import Reference
+    from tomoskin.touch import BendExamples, BendModel
+
+    chosen = skin_for_file(skin, recording)
+    prepared = prepare(chosen)
+    whole = read_recording(recording).in_order_of(prepared.pattern)
+    say_notes(whole)
+    idle = idle_frames(whole, reference, prepared.pattern)
+    if idle is None or isinstance(idle, str):
+        raise DataError("expected voltages and untouched frames", where=str(recording))
+    straight = Reference.of(np.asarray(idle, dtype=np.float64))
+    frames, angle, axis = _said(bend, len(whole)) if bend else _told(recording, whole)
+    examples = BendExamples.of(whole.voltages[frames] - straight.mean, angle, axis,
+                               whole.time[frames])  # fmt: skip
+    model = BendModel.learn(examples, voltage_covariance(prepared, straight))
+    write_bends(out, BendCalibration(model, prepared.pattern, chosen.name))
+    found = {
+        "frames": len(examples.angle),
+        "directions": model.n_modes,
+        "axes_deg": np.degrees(examples.axes).round(1).tolist(),
+        "error_deg": math.degrees(model.error),
+        "remembers": model.remembers,
+    }
+    if json:
+        emit(found)
+        return
+    typer.echo(
+        f"{found['frames']} frames, {found['directions']} directions; left out of the learning, "
+        f"angles are missed by {found['error_deg']:.2f}°"
+    )
+    if model.remembers:
+        typer.echo("what the sheet remembers counts: play frames in their order")
+    if not examples.turns:
+        typer.echo("axes are told from three directions on; here the axis is taken as given")
+
+
+def _said(given: list[str], n: int) -> tuple[list[int], FloatArray, FloatArray]:
+    """Frames, angles and axes, rad, of the options."""
+    rows: dict[int, tuple[float, float]] = {}
+    for text in given:
+        name, _, span = text.partition("=")
+        first, colon, last = span.partition(":")
+        degrees, _, axis = name.partition("@")
+        try:
+            value = float(degrees), float(axis or _ALONG_Y)
+            start, stop = int(first), int(last)
+        except ValueError:
+            raise typer.BadParameter(
+                f'expected DEG=A:B or DEG@AXIS=A:B, got "{text}"', param_hint="--bend"
+            ) from None
+        if not (colon and 0 <= start < stop <= n and all(map(math.isfinite, value))):
+            raise DataError(f"expected frames within 0:{n}, got {span}", where=f"--bend {name}")
+        if any(k in rows for k in range(start, stop)):
+            raise DataError(f"frames of {span} are already bent", where=f"--bend {name}")
+        rows |= dict.fromkeys(range(start, stop), value)
+    frames = sorted(rows)
+    angle, axis_of = np.radians([rows[k] for k in frames]).T
+    return frames, angle, axis_of
+
+
+def _told(path: Path, whole: Recording) -> tuple[list[int], FloatArray, FloatArray]:
+    """The same from a session's truth: frames that nothing presses, with one bend or none."""
+    from tomoskin.session import SessionReader, is_session
+
+    if not is_session(path):
+        raise DataError("says no angles", where=str(path), hint="--bend 0=0:20 --bend 30=40:60")
+    with SessionReader(path) as session:
+        truth = list(session.truth())
+    at = np.searchsorted([item.host_time for item in truth], whole.time, side="right") - 1
+    frames, rows = [], []
+    for frame, number in enumerate(at.tolist()):
+        item = truth[number] if number >= 0 else None
+        if item is None or item.presses or len(item.bends) > 1:
+            continue
+        bend = item.bends[0] if item.bends else {"angle": 0.0, "axis": math.pi / 2}
+        if "angle" in bend:
+            frames.append(frame)
+            rows.append((float(bend["angle"]), float(bend["axis"])))
+    if not frames:
+        raise DataError("holds no truth of bends", where=str(path), hint="--bend 30=40:60")
+    angle, axis = np.array(rows).T
+    return frames, angle, axis
