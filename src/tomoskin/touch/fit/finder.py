@@ -59,7 +59,7 @@ class SpotModel:
         Raises
         ------
         ModelError
-            When the sheet is not flat.
+            When the mesh has no flat coordinates.
         """
         own = ForwardModel(_mesh(skin), model.pattern, model.contact_impedance, model.current)
         response = Response(own.at(skin.conductivity))

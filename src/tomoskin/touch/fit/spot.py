@@ -97,7 +97,10 @@ Shape = Callable[[FloatArray], FloatArray]
 
 
 class Spots:
-    """Spots on the cells of a flat mesh of triangles.
+    """Spots on the cells of a mesh of triangles in the sheet's own flat coordinates.
+
+    On a curved or stretched sheet they are round there, as large as these coordinates say, and the
+    fields that they change are those of the surface: its metric is the forward model's.
 
     A spot of radius a and content m changes log σ by a :func:`profile` that has the second
     moment of an even disc of radius a; m is the integral of that change over the plane, which is
@@ -106,9 +109,9 @@ class Spots:
     """
 
     def __init__(self, mesh: Mesh) -> None:
-        if mesh.dimension != 2 or mesh.points.shape[1] != 2 or mesh.metric is not None:
+        if mesh.dimension != 2 or mesh.points.shape[1] != 2:
             raise ModelError(
-                "expected a flat sheet: touches are fitted in the plane",
+                "expected a sheet with flat coordinates: touches are fitted in the plane",
                 hint='set method = "image" in [touch]',
             )
         corners = mesh.points[mesh.cells]
