@@ -24,6 +24,10 @@ _MISSHAPEN = 0.02
 _SHAPE_DOUBT = 0.5
 """How far a true profile is from ours, of the way to a bell: a standard deviation."""
 
+_UNEVEN = 0.08
+"""Part by which each row answers a touch otherwise than the model's, at the least: a sheet is
+uneven, contacts and gains differ. A standard deviation, chosen on the twin's seeds 1 to 3."""
+
 _COLD, _WARM = 15, 6
 """Steps from a rough start, and from the frame before."""
 
@@ -162,16 +166,29 @@ class Search:
         return Found(fit, self._ratios(fit), covariance, self._close(fit))
 
     def _covariance(self, fit: Fit) -> FloatArray:
-        """Curvature, scaled where the data scatter more than they should; and the profile's part.
+        """Curvature, scaled where the data scatter more than they should; and the model's part.
 
         What a bell instead of our profile would change moves the estimate by ΣJᵀd: a parameter
-        that is not fitted but considered (Schmidt 1966).
+        that is not fitted but considered (Schmidt 1966). So is the part by which each row is off.
         """
         problem, scatter = self.problem, max(1.0, fit.misfit / fit.degrees)
         other = problem.whiten(problem.response.changes([fit.spots], bell)[0])
         wrong = fit.weigh(other - fit.seen)
         moved = _SHAPE_DOUBT * (fit.covariance @ (fit.jacobian.T @ wrong))
-        return np.asarray(scatter * fit.covariance + np.outer(moved, moved))
+        return np.asarray(scatter * fit.covariance + np.outer(moved, moved) + self._uneven(fit))
+
+    def _uneven(self, fit: Fit) -> FloatArray:
+        """What rows that answer more or less than they should add to the covariance.
+
+        By how much is told by what the residual has beyond noise, where that is more than a sheet
+        is uneven as a rule: E[rᵀr] = degrees + u²‖(1 − JΣJᵀ)E‖², E the rows' answers one by one.
+        """
+        answers = self.problem.response.changes([fit.spots])[0]
+        each = fit.weigh(self.problem.whiten.matrix * answers)
+        moved = fit.covariance @ (fit.jacobian.T @ each)
+        left = float(np.sum((each - fit.jacobian @ moved) ** 2))
+        beyond = max(fit.misfit - fit.degrees, 0.0) / left if left else 0.0
+        return np.asarray(max(beyond, _UNEVEN**2) * (moved @ moved.T))
 
     def _close(self, fit: Fit) -> NDArray[np.bool_]:
         """Where a candidate within a radius of a spot stands out nearly enough."""
