@@ -1,0 +1,1 @@
+"""The board's schematic as a program: parts, circuit with its rule check, assemblies, netlist."""
