@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from playwright.sync_api import sync_playwright
 
 from live.board import Board, samples_of
+from live.watching import ARGUMENTS
 from tomoskin.live import Runner, prepare
 from tomoskin.skin import Skin
 
@@ -30,3 +32,12 @@ def runner(prepared, board):
     runner = Runner(prepared, lambda: board)
     yield runner
     runner.stop()
+
+
+@pytest.fixture(scope="session")
+def browser(chromium):
+    """One Chromium for all tests of the page."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
+        yield browser
+        browser.close()

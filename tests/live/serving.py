@@ -7,7 +7,15 @@ from contextlib import contextmanager
 import httpx
 from websockets.sync.client import connect
 
-from tomoskin.live import STATIC, Door, Hub, Server, application, colour_limit, listen
+from tomoskin.live import (
+    STATIC,
+    Door,
+    Hub,
+    Server,
+    application,
+    colour_limit,
+    listen,
+)
 
 PATIENCE = 20
 
@@ -15,11 +23,13 @@ PATIENCE = 20
 class Site:
     """A running server; the runner is the test's own and already started."""
 
-    def __init__(self, runner, static=STATIC, folder=None, take=lambda _hub: None):
+    def __init__(
+        self, runner, static=STATIC, folder=None, take=lambda _hub: None, token=None, port=0
+    ):
         self.runner = runner
-        self._listener = listen("127.0.0.1", 0)
+        self._listener = listen("127.0.0.1", port)
         self.port = self._listener.getsockname()[1]
-        self.door = Door(self.port)
+        self.door = Door(self.port) if token is None else Door(self.port, token=token)
         self.origin = f"http://127.0.0.1:{self.port}"
         hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
         take(hub)

@@ -152,7 +152,7 @@ function View() {
 addDrawer({
   id: "settings",
   label: "Settings",
-  key: "S",
+  key: "E",
   title: "Change the skin's settings while it runs",
   View,
 });

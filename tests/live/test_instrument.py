@@ -1,0 +1,178 @@
+"""The page as an instrument: settings, signals, the broken twin, space, and who can use it."""
+
+import gzip
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from live.serving import Site
+from live.watching import Watched
+from tomoskin.live import STATIC, Runner, SettingsDesk, TwinDesk, prepare
+from tomoskin.skin import Skin
+from tomoskin.source import open_source
+
+pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
+
+AXE = Path(STATIC).parent / "web" / "node_modules" / "axe-core" / "axe.min.js"
+MOST_GZIPPED = 120_000
+DRAWERS = ("twin", "signals", "settings")
+SIZES = ((1280, 720), (1024, 768), (768, 1024))
+OVERLAPS = """() => {
+    const boxes = [...document.querySelectorAll("header.top, .sheet, .side, footer.controls")]
+        .map((element) => element.getBoundingClientRect());
+    const over = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1
+        && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
+    const out = (box) => box.right > innerWidth + 1 || box.bottom > innerHeight + 1;
+    return boxes.some((a, k) => out(a) || boxes.slice(k + 1).some((b) => over(a, b)));
+}"""
+
+
+def take_desks(hub):
+    hub.opener = partial(open_source, "twin")
+    hub.take(SettingsDesk(hub))
+    hub.take(TwinDesk(hub))
+
+
+@pytest.fixture(scope="module")
+def site(prepared, tmp_path_factory):
+    runner = Runner(prepared, lambda: open_source("twin", prepared.skin))
+    runner.start()
+    site = Site(runner, folder=tmp_path_factory.mktemp("session"), take=take_desks)
+    yield site
+    site.stop()
+    runner.stop()
+
+
+@pytest.fixture
+def opened(browser, site, prepared):
+    watched = Watched(browser, site, prepared.mesh)
+    watched.page.set_default_timeout(20_000)
+    watched.open()
+    yield watched
+    watched.context.close()
+    assert watched.wrong == []
+
+
+def test_a_setting_shows_in_the_picture_and_is_taken_back(opened):
+    opened.page.keyboard.press("e")
+    opened.test_id("set-touch-gamma1").wait_for(state="attached")
+    alpha = opened.test_id("alpha")
+    opened.test_id("set-alpha").focus()
+    opened.page.keyboard.press("ArrowRight")
+    alpha.filter(has_text="by hand").wait_for()
+    opened.test_id("undo").click()
+    alpha.filter(has_text="light-touch").wait_for()
+    opened.test_id("set-inverse-exponent").fill("7")
+    opened.page.keyboard.press("Enter")
+    opened.test_id("refused").filter(has_text="expected a number from 0 to 2, got 7").wait_for()
+    assert opened.page.evaluate("window.tomoskin.last.referenceReady")
+
+
+def test_the_drawer_never_covers_the_sheet(opened):
+    sheet = opened.test_id("sheet").bounding_box()
+    for drawer in DRAWERS:
+        opened.test_id(f"open-{drawer}").click()
+        box = opened.test_id(f"drawer-{drawer}").bounding_box()
+        assert box["x"] >= sheet["x"] + sheet["width"]
+        assert opened.test_id("sheet").bounding_box() == sheet
+        opened.page.keyboard.press("Escape")
+        opened.test_id(f"drawer-{drawer}").wait_for(state="detached")
+
+
+def test_another_pattern_reaches_the_twin(opened):
+    before = opened.page.evaluate("window.tomoskin.scene.pattern.n_meas")
+    opened.page.keyboard.press("e")
+    opened.page.get_by_test_id("section-drive").locator("summary").click()
+    opened.test_id("set-pattern").select_option("table")
+    rows = "2 1 4 5\n3 2 5 6\n4 3 6 7\n5 4 7 8\n6 5 8 1\n7 6 1 2\n8 7 2 3\n1 8 3 4"
+    opened.test_id("set-table").fill(rows)
+    opened.test_id("apply-table").click()
+    opened.until("scene.pattern.n_meas === 8")
+    opened.until("last?.voltages.length === 8 && window.tomoskin.last.referenceReady")
+    opened.test_id("undo").click()
+    opened.until(f"scene.pattern.n_meas === {before}")
+    opened.until(f"last?.voltages.length === {before} && window.tomoskin.last.referenceReady")
+
+
+def test_a_cut_electrode_is_said_in_words_and_by_shape(opened):
+    opened.page.keyboard.press("w")
+    opened.test_id("cut-3").click()
+    opened.test_id("state").filter(has_text="E3 is open").wait_for()
+    electrode = opened.test_id("electrode-3")
+    assert electrode.locator("rect").count() == 1
+    assert "no current" in electrode.get_attribute("aria-label")
+    assert opened.test_id("electrode-4").locator("rect").count() == 0
+    opened.test_id("cut-3").click()
+    electrode.locator("circle").wait_for()
+
+
+def test_signals(opened):
+    opened.page.keyboard.press("g")
+    assert "E1 → E2" in opened.test_id("drive").inner_text()
+    assert "E2 +" in opened.test_id("electrode-2").text_content()
+    opened.test_id("signals-noise").click()
+    opened.test_id("signals-sum").filter(has_text="µV").wait_for()
+    opened.test_id("signals-reciprocity").click()
+    opened.test_id("signals-sum").filter(has_text="%").wait_for()
+
+
+def test_the_value_under_the_pointer(opened):
+    opened.move(0.02, -0.03)
+    opened.test_id("reading").filter(has_text="20, −30 mm").wait_for()
+
+
+def test_a_bent_sheet_is_pressed_in_space(browser):
+    changes = {
+        "surface": {"shape": "cylinder", "radius": "90 mm"},
+        "mesh": {"cells": 800},
+    }
+    skin = Skin.load("textile-disc-8").altered(changes)
+    prepared = prepare(skin)
+    runner = Runner(prepared, lambda: open_source("twin", skin))
+    runner.start()
+    site = Site(runner)
+    bent = Watched(browser, site, prepared.mesh)
+    try:
+        bent.open()
+        assert bent.test_id("do-space").get_attribute("aria-pressed") == "true"
+        bent.press(0.02, 0.01)
+        x, y = bent.page.evaluate(
+            "[window.tomoskin.last.truths[0].x, window.tomoskin.last.truths[0].y]"
+        )
+        assert (x, y) == pytest.approx((0.02, 0.01), abs=2e-3)
+        bent.page.mouse.up()
+        assert bent.wrong == []
+    finally:
+        bent.context.close()
+        site.stop()
+        runner.stop()
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_nothing_overlaps_or_is_cut_off(opened, size):
+    opened.page.set_viewport_size({"width": size[0], "height": size[1]})
+    opened.page.evaluate("() => new Promise(requestAnimationFrame)")
+    assert not opened.page.evaluate(OVERLAPS)
+    opened.test_id("open-settings").click()
+    opened.test_id("drawer-settings").wait_for()
+    assert not opened.page.evaluate(OVERLAPS)
+
+
+@pytest.mark.skipif(not AXE.is_file(), reason="the page's packages are not installed")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing(opened, scheme):
+    opened.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+    opened.page.evaluate(AXE.read_text())
+    for drawer in (None, *DRAWERS):
+        if drawer:
+            opened.test_id(f"open-{drawer}").click()
+            opened.test_id(f"drawer-{drawer}").wait_for()
+        found = opened.page.evaluate("axe.run()")["violations"]
+        named = [(v["id"], [n["target"] for n in v["nodes"]][:3]) for v in found]
+        assert named == [], f"{drawer or 'the page'}: {named}"
+
+
+def test_the_bundle_is_small():
+    parts = [path for path in STATIC.rglob("*") if path.suffix in {".js", ".css", ".html", ".svg"}]
+    assert sum(len(gzip.compress(path.read_bytes())) for path in parts) < MOST_GZIPPED
