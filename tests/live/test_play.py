@@ -138,8 +138,8 @@ def test_only_a_replay_can_be_steered(prepared, idle):
     runner = Runner(prepared, lambda: Board(free=idle))
     with page_of(runner) as page:
         assert page.told("state")["replay"] is None
-        for asked in ({"kind": "seek", "at_s": 1}, {"kind": "step"}, {"kind": "loop", "on": True}):
-            page.ask(**asked)
+        for kind, asked in (("seek", {"at_s": 1}), ("step", {}), ("loop", {"on": True})):
+            page.ask(kind, **asked)
             assert "is no replay" in page.told("error")["message"]
 
 

@@ -107,7 +107,7 @@ class Taker:
             return None
         self.phase, self._taken = "release", size
         self._pressed.clear()
-        return change
+        return np.asarray(change)
 
     def _size(self, change: FloatArray) -> float:
         """Root mean square in noises, of the rows that are known."""

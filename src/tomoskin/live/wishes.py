@@ -18,7 +18,7 @@ class Replayed(Protocol):
     """The recording."""
 
     start: float
-    """Host time of its first frame."""
+    """Host time of its first frame, those from before the recording left out."""
 
     end: float
     """Host time of its last message."""

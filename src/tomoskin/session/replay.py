@@ -77,7 +77,9 @@ class ReplayTransport:
         self._go(float("-inf"))
         if self._next is None:
             raise SourceError("holds no frame", where=self.name)
-        self.start = self._now = self._next.host_time
+        self._now = self._next.host_time
+        own = (p for p in pieces(self._items(self._now), self._now) if not self._is_earlier(p))
+        self.start = next(own, self._next).host_time
 
     @property
     def paused(self) -> bool:

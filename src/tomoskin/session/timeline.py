@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tomoskin.core import Event
+from tomoskin.session.layout import Mark
 from tomoskin.session.session_reader import SessionReader
 
 MOST_SPANS = 2000
@@ -42,7 +43,8 @@ def read_timeline(path: Path) -> Timeline:
         When the file cannot be read, is no session, is damaged, or holds no frame.
     """
     with SessionReader(path) as session:
-        start = next((item.frame.host_time for item in session.frames()), 0.0)
+        own = (i.frame.host_time for i in session.frames() if not i.mark & Mark.EARLIER)
+        start = next(own, 0.0)
 
         def timed(events: Iterator[Event]) -> tuple[tuple[float, Event], ...]:
             return tuple((event.host_time - start, event) for event in events)

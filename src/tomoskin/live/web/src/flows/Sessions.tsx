@@ -107,13 +107,13 @@ function View() {
       {sessions.length === 0 && (
         <p class="hint">Nothing has been recorded here yet: press Record below, then touch the skin.</p>
       )}
-      <ul class="files">
+      <ul class="filed">
         {sessions.map((file) => (
           <Session key={file.name} file={file} />
         ))}
       </ul>
       {others.length > 0 && <h3>Other files</h3>}
-      <ul class="files">
+      <ul class="filed">
         {others.map((file) => (
           <Other key={file.name} file={file} />
         ))}

@@ -72,7 +72,7 @@ function Board() {
   return (
     <>
       <p class="hint">Where do the frames come from?</p>
-      <ul class="files" data-testid="sources">
+      <ul class="filed" data-testid="sources">
         {found?.sources.map(({ id, text }) => (
           <li key={id} class={id === found.current ? "current" : ""}>
             <div>

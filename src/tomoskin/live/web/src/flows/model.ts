@@ -143,7 +143,7 @@ export const position = computed(() => {
   if (replay) {
     const moving = !status.value?.paused && !replay.ended && replay.speed !== null;
     const since = moving ? Math.max(0, now.value - told) * (replay.speed ?? 0) : 0;
-    return Math.min(replay.end_s, replay.now_s + since);
+    return Math.max(0, Math.min(replay.end_s, replay.now_s + since));
   }
   return began.value === null ? 0 : now.value - began.value;
 });
