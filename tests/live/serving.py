@@ -24,7 +24,7 @@ class Site:
     """A running server; the runner is the test's own and already started."""
 
     def __init__(
-        self, runner, static=STATIC, folder=None, take=lambda _hub: None, token=None, port=0
+        self, runner, static=STATIC, *, folder=None, take=lambda _hub: None, token=None, port=0
     ):
         self.runner = runner
         self._listener = listen("127.0.0.1", port)

@@ -104,7 +104,11 @@ def test_a_recording_is_marked_listed_exported_played_and_left(opened, folder):
     assert download.value.suggested_filename == f"{path.stem}-touches.csv"
     assert Path(download.value.path()).read_text().startswith("frame,time_s,id,")
     picture(opened, "sessions")
+    _played_and_left(opened, row, path)
 
+
+def _played_and_left(opened, row, path):
+    page = opened.page
     row.get_by_role("button", name="Play").click()
     opened.test_id("play").wait_for()
     opened.until(f"scene.source.endsWith('{path.name}')")
@@ -136,13 +140,13 @@ def test_a_recording_is_marked_listed_exported_played_and_left(opened, folder):
 def test_the_board_says_what_it_is_and_is_connected_anew(opened):
     opened.test_id("open-setup").click()
     opened.test_id("board").filter(has_text="Firmware").wait_for()
-    opened.test_id("reference-words").filter(has_text="Stands since").wait_for()
+    opened.test_id("reference-words").filter(has_text="Stands for").wait_for()
     opened.page.get_by_role("button", name="open it anew").click()
     opened.test_id("reference-words").filter(has_text="keep hands off").wait_for()
-    opened.test_id("reference-words").filter(has_text="Stands since").wait_for()
+    opened.test_id("reference-words").filter(has_text="Stands for").wait_for()
     opened.test_id("take-reference").click()
     opened.test_id("reference-words").filter(has_text="keep hands off").wait_for()
-    opened.test_id("reference-words").filter(has_text="Stands since").wait_for()
+    opened.test_id("reference-words").filter(has_text="Stands for").wait_for()
     picture(opened, "board")
 
 

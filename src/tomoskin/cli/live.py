@@ -17,7 +17,7 @@ from tomoskin.cli.sink_option import SinkOption, chosen_sinks
 from tomoskin.cli.skin_choice import SkinOption, skin_for_source
 
 if TYPE_CHECKING:
-    from tomoskin.live import Door, Runner
+    from tomoskin.live import Door, Prepared, Runner
 
 
 def live(
@@ -26,6 +26,20 @@ def live(
     source: Annotated[str, typer.Option(help="twin, serial:PORT, replay:FILE@SPEED, …")] = "twin",
     record: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Record the session to a new file.")
+    ] = None,
+    calibration: Annotated[
+        Path | None,
+        typer.Option(metavar="C.npz", help="Places of touches by a calibration of touch."),
+    ] = None,
+    folder: Annotated[
+        Path, typer.Option(file_okay=False, help="Where the page's files go and are looked for.")
+    ] = Path(),
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Keeps the token, so that open pages find a server that was started again.",
+        ),
     ] = None,
     sink: SinkOption = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = 8765,
@@ -44,18 +58,20 @@ def live(
 
         room.check_page()
         sinks = chosen_sinks(sink)
-        chosen = skin_for_source(skin, source)
+        prepared = _prepared(skin, source, calibration)
+        chosen = prepared.skin
         with room.listen(host, port) as listener:
             if not room.is_loopback(host):
                 _warn(host)
-            door = room.Door(listener.getsockname()[1], host)
-            runner = room.Runner(
-                room.prepare(chosen), lambda: open_source(source, chosen), sinks=sinks
-            )
+            port = listener.getsockname()[1]
+            door = room.Door(port, host, **_kept(token_file))
+            runner = room.Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
             with recording_to(runner, record):
-                hub = room.Hub(runner, limit=room.colour_limit(runner.prepared))
+                hub = room.Hub(runner, limit=room.colour_limit(runner.prepared), folder=folder)
                 hub.opener = partial(open_source, source)
                 hub.take(room.SettingsDesk(hub))
+                hub.take(room.TwinDesk(hub))
+                room.take_flows(hub, source)
                 server = room.Server.of(room.application(hub, door))
                 with server.stopped_by_signals():
                     _announce(door, runner, json=json)
@@ -63,6 +79,27 @@ def live(
                         webbrowser.open(door.address)
                     server.run_on(listener)
         _farewell(runner, json=json)
+
+
+def _prepared(skin: str | None, source: str, calibration: Path | None) -> Prepared:
+    """The skin with the calibration named; of a recording with those that it holds."""
+    from tomoskin import live as room
+    from tomoskin.session import SessionReader, parse_replay, read_calibration
+
+    name, _, argument = source.partition(":")
+    if skin is None and calibration is None and name == "replay":
+        with SessionReader(parse_replay(argument)[0]) as session:
+            return room.as_recorded(session)
+    prepared = room.prepare(skin_for_source(skin, source))
+    if calibration is None:
+        return prepared
+    return prepared.located_by(read_calibration(calibration).locator)
+
+
+def _kept(token_file: Path | None) -> dict[str, str]:
+    from tomoskin.live import kept_token
+
+    return {} if token_file is None else {"token": kept_token(token_file)}
 
 
 def _warn(host: str) -> None:

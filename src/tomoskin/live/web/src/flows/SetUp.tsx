@@ -3,7 +3,7 @@
 import { signal } from "@preact/signals";
 import { takeReference } from "../commands";
 import { addDrawer, whenOpened } from "../drawers";
-import { duration } from "../format";
+import { duration, millimetres } from "../format";
 import { send, status } from "../state";
 import { askFiles, askSources, files, flow, type FlowKind, type Phase, sources } from "./model";
 
@@ -57,7 +57,7 @@ function Reference() {
           ? `Being taken, ${frames} of ${needed} frames: keep hands off the skin.`
           : stale
             ? `Stale: ${stale}. Take hands off the skin, then take it again.`
-            : `Stands since ${duration(age ?? 0)}. Pictures show what has changed since then.`}
+            : `Stands for ${duration(age ?? 0)}. Pictures show what has changed since then.`}
       </p>
       {!ready && <progress value={frames} max={needed} aria-label="Reference" />}
       <button type="button" disabled={!ready} onClick={takeReference.run} data-testid="take-reference">
@@ -146,7 +146,7 @@ function Going({ kind }: { kind: FlowKind }) {
       <ol class="presses" aria-label="Presses taken">
         {presses.map(([x, y], k) => (
           <li key={k} class={doubtful.includes(k) ? "doubtful" : ""}>
-            x {(1e3 * x).toFixed(0)}, y {(1e3 * y).toFixed(0)} mm
+            x {millimetres(x, 0)}, y {millimetres(y, 0)} mm
             {figures?.errors_mm?.[k] !== undefined && (
               <span class="small"> missed by {figures.errors_mm[k].toFixed(0)} mm</span>
             )}
