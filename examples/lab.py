@@ -25,7 +25,7 @@ from tomoskin.session import SessionReader, SessionWriter
 from tomoskin.signal import Readout
 from tomoskin.skin import Skin
 from tomoskin.source import Link, ScanSettings, Transport, open_source
-from tomoskin.twin import Probe, TwinSettings, TwinTransport, VirtualClock, make_twin
+from tomoskin.twin import Pose, Probe, TwinSettings, TwinTransport, VirtualClock, make_twin
 
 FRAMES = 10
 """Frames of a stage, as many as the source averaged."""
@@ -61,6 +61,7 @@ class LiveBench:
 
     link: Link
     load: Callable[[str, Sequence[Probe]], threading.Event]
+    bend: Callable[[Pose], None] = lambda _: None
 
     def frames(self, stage: str, probes: Sequence[Probe], n: int) -> list[Frame]:
         """The first frames once the load has stood for a while."""
@@ -106,6 +107,11 @@ class Lab:
     def __post_init__(self) -> None:
         """Prepare what turns counts into volts."""
         self._readout = Readout.of(Scan.of(self.skin.pattern()), self.skin.readout)
+
+    def bend(self, pose: Pose) -> None:
+        """Bend the twin from here on; before a board the stage says it, a recording holds it."""
+        if isinstance(self.bench, LiveBench):
+            self.bench.bend(pose)
 
     def measure(self, stage: str, *probes: Probe, n: int = FRAMES) -> FloatArray:
         """(n, n_meas) V while ``probes`` press, in the order of the skin's pattern.
@@ -186,7 +192,7 @@ def _bench(options: argparse.Namespace, skin: Skin) -> Iterator[Bench]:
         clock = VirtualClock()
         twin = make_twin(skin, TwinSettings.preset(skin.twin.preset, options.seed), clock)
         with _link(twin, skin, clock.now) as link:
-            yield LiveBench(link, lambda _, probes: _pressed(twin, probes))
+            yield LiveBench(link, lambda _, probes: _pressed(twin, probes), twin.set_pose)
     else:
         with _link(open_source(options.source, skin), skin, time.monotonic) as link:
             yield LiveBench(link, lambda stage, _: _asked(stage))

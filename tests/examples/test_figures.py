@@ -19,6 +19,8 @@ MEASURED = [
     "fig58_single_press",
     "fig59_four_probes",
     "fig510_three_presses",
+    "fig511_cylinders",
+    "fig512_curved",
     "patterns_and_priors",
 ]
 

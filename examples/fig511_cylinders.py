@@ -1,0 +1,118 @@
+"""Figure 5.11: the flat skin's reference, then the skin on cylinders of 40 and 70 mm.
+
+One step with NOSER's prior on normalised differences against the flat skin; threshold 70 %, the
+twin of ``textile-disc-8``. The source calls 40 and 70 mm diameters and radii by turns: radii here.
+Its foam kept the skin from lying close to the smaller cylinder, and strips held its sides: here it
+follows 50° of the 40 mm and 70° of the 70 mm and hangs straight beyond, both angles assumed.
+
+Source saw: an elongated region along the cylinder instead of an ellipse; its area and its maximum
+grow with the diameter, the maximum slightly.
+Checked: the largest region lies along the axis, at least 1.7 times as long as wide, that of a press
+at most 1.5; area and maximum grow with the radius. Wrapped by the same 60°, the area grows, but the
+maximum falls: strain is height over radius. That it rises rests on the assumed angles.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+import figures
+from fig58_single_press import elongation
+from imaging import NOSER, Imager
+from lab import Lab, open_lab, report
+from tomoskin.core import Image, Reading
+from tomoskin.mesh import Hinge
+from tomoskin.twin import Bent, Circle, Pose, Probe
+
+PART, LONGER, ROUND = 0.7, 1.7, 1.5
+PRESS = Probe(Circle(18e-3), 30e-3, 20e-3, 5.0)
+Shown = tuple[str, Image, Reading]
+
+
+def over(radius: float, degrees: float) -> Pose:
+    """On a cylinder of ``radius`` m along y, close to it over so much of its circumference."""
+    angle = math.radians(degrees)
+    return (Bent(Hinge(angle, angle * radius)),)
+
+
+STAGES: dict[str, tuple[Pose, tuple[Probe, ...]]] = {
+    "40 mm cylinder": (over(0.04, 50), ()),
+    "70 mm cylinder": (over(0.07, 70), ()),
+    "18 mm probe, flat": ((), (PRESS,)),
+    "40 mm cylinder, 60°": (over(0.04, 60), ()),
+    "70 mm cylinder, 60°": (over(0.07, 60), ()),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
+    """Measure, check, draw; the numbers that were checked."""
+    with open_lab(arguments, __doc__, NOSER) as lab:
+        imager = Imager(lab.skin)
+        idle = lab.measure("flat, nothing touches the skin", n=20)
+        shown = []
+        for name, (pose, probes) in STAGES.items():
+            lab.bend(pose)
+            image = imager.picture(idle, lab.measure(name, *probes, n=20))
+            regions = imager.regions(image, PART)
+            assert regions, f"{name}: nothing found"
+            shown.append((name, image, max(regions, key=lambda region: region.area)))
+        found = check(imager, shown)
+        draw(lab, imager, shown[:3])
+    return found
+
+
+def check(imager: Imager, shown: Sequence[Shown]) -> dict[str, float]:
+    """What the source saw, and what the model says of its cause."""
+    long = [elongation(imager.mesh, region) for _, _, region in shown]
+    turn = [axis_of(imager, region) for _, _, region in shown[:2]]
+    assert min(long[:2]) > LONGER, f"{long[0]:.2f} and {long[1]:.2f} times as long as wide"
+    assert max(abs(turn[0]), abs(turn[1])) < 30, f"{turn[0]:.0f}° and {turn[1]:.0f}° off the axis"
+    assert long[2] < ROUND, f"a press {long[2]:.2f} times as long as wide"
+    miss = math.hypot(shown[2][2].x - PRESS.x, shown[2][2].y - PRESS.y)
+    assert miss < 0.015, f"the press is {1e3 * miss:.0f} mm off"
+    areas = [1e6 * region.area for _, _, region in shown]
+    most = [-1e3 * float(image.values.min()) for _, image, _ in shown]
+    assert areas[1] > areas[0], f"areas of {areas[0]:.0f} and {areas[1]:.0f} mm²"
+    assert most[1] > most[0], f"maxima of {most[0]:.0f} and {most[1]:.0f} mS"
+    assert areas[4] > areas[3], f"by the same angle {areas[3]:.0f} and {areas[4]:.0f} mm²"
+    assert most[4] < most[3], f"by the same angle {most[3]:.0f} and {most[4]:.0f} mS"
+    return {
+        "40 mm: length/width": long[0],
+        "70 mm: length/width": long[1],
+        "press: length/width": long[2],
+        "40 mm: area, mm²": areas[0],
+        "70 mm: area, mm²": areas[1],
+        "40 mm: maximum, mS": most[0],
+        "70 mm: maximum, mS": most[1],
+        "by the same angle, 70 over 40 mm: area": areas[4] / areas[3],
+        "by the same angle, 70 over 40 mm: maximum": most[4] / most[3],
+    }
+
+
+def axis_of(imager: Imager, region: Reading) -> float:
+    """Degrees between the length of a region and the cylinder's axis, y."""
+    place, weight = imager.mesh.centroids[region.cells], imager.mesh.volumes[region.cells]
+    offset = place - np.average(place, axis=0, weights=weight)
+    x, y = np.linalg.eigh((offset.T * weight) @ offset)[1][:, 1]
+    return math.degrees(math.atan(x / y))
+
+
+def draw(lab: Lab, imager: Imager, shown: Sequence[Shown]) -> None:
+    """One colour scale; the regions' contours."""
+    made, axes = figures.figure(1, 3, (7.6, 2.9), sharex=True, sharey=True)
+    limit = figures.MS * max(float(np.abs(image.values).max()) for _, image, _ in shown)
+    for ax, (name, image, region) in zip(axes[0], shown, strict=True):
+        drawn = figures.draw_map(ax, imager.mesh, figures.MS * image.values, limit)
+        figures.mark_region(ax, imager.mesh, region)
+        ax.set_title(name)
+    axes[0, 0].set_ylabel("y / mm")
+    figures.letters(axes[0])
+    figures.colour_bar(made, drawn, axes)
+    figures.save(made, lab.out, "fig511_cylinders")
+
+
+if __name__ == "__main__":
+    report(main())
