@@ -134,7 +134,7 @@ def test_a_skin_whose_board_does_not_settle(tomoskin, script, tmp_path, how):
     what = script if how == "--script" else 3
     code, _, error = tomoskin("simulate", "--skin", skin, how, what, "--out", tmp_path / "out")
     assert code == 1
-    assert f"{skin}: [readout] settling: expected at least 138 us, got 10 us" in error
+    assert f"{skin}: [readout] settling: expected at least 51 us, got 10 us" in error
     assert not (tmp_path / "out").exists()
 
 
