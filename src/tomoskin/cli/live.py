@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tomoskin.cli.bend_option import BendOption, with_bends
 from tomoskin.cli.ending import ended_by_signals
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.record import recording_to
@@ -41,6 +42,7 @@ def live(
             help="Keeps the token, so that open pages find a server that was started again.",
         ),
     ] = None,
+    bend: BendOption = None,
     sink: SinkOption = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = 8765,
     host: Annotated[
@@ -58,7 +60,7 @@ def live(
 
         room.check_page()
         sinks = chosen_sinks(sink)
-        prepared = _prepared(skin, source, calibration)
+        prepared = with_bends(_prepared(skin, source, calibration), bend)
         chosen = prepared.skin
         with room.listen(host, port) as listener:
             if not room.is_loopback(host):
