@@ -2,34 +2,32 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from from_examples import load_example
 from report import Report
 
-ROOT = Path(__file__).resolve().parents[1]
 SEEDS = (11, 12, 13)
 PLACEMENTS = 100
-EFFECTS = (1.0, 0.5, 0.25)
+EFFECTS = (1.0, 0.5)
 REACH, APART = 35e-3, 30e-3
 WITHIN = 8e-3
 POLARISED = (0.0, 0.5e-3, 1e-3, 2e-3, 4e-3)
 
 
-def run(data: Path | None) -> list[Report]:
+def run(data: Path | None) -> tuple[Report, ...]:
     """Both tables; no recording is needed."""
     del data
-    return [palpation(), face()]
+    return palpation(), face()
 
 
 def palpation() -> Report:
     """Two balls of 10 and 8 mm, ``PLACEMENTS`` times over three twins."""
-    example = _example("fig62_palpation")
+    example = load_example("fig62_palpation")
     rows = [(effect, *_felt(example, effect)) for effect in EFFECTS]
     return Report(
         "two stiff balls under a plate",
@@ -84,7 +82,7 @@ def _placed(example: ModuleType, random: np.random.Generator) -> tuple[Any, ...]
 
 def face() -> Report:
     """Runs through six expressions, by what direct current suffers from its electrodes."""
-    example = _example("fig64_face")
+    example = load_example("fig64_face")
     all_sessions = [(seed, example.sessions_of(seed)) for seed in SEEDS]
     rows = []
     for polarised in POLARISED:
@@ -107,11 +105,3 @@ def _told(example: ModuleType, all_sessions: list[Any], *, direct: bool) -> tupl
     right = np.concatenate([example.told(s, seed, direct=direct) for seed, s in all_sessions])
     each = (f"{part:.0%}" for part in right.mean(axis=0))
     return len(right), f"{right.mean():.1%}", f"{example.whole_runs(right):.0%}", *each
-
-
-def _example(name: str) -> ModuleType:
-    sys.path.insert(0, str(ROOT / "examples"))
-    try:
-        return importlib.import_module(name)
-    finally:
-        sys.path.remove(str(ROOT / "examples"))

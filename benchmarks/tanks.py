@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from from_examples import load_example
 from report import Report
 from simulated_tanks import simulated
 from tomoskin.core import DataError
@@ -26,7 +25,7 @@ def run(data: Path | None) -> tuple[Report, ...]:
     file = (data or SHARED) / "ktc2023_tank32" / "train.npz"
     if not file.exists():
         raise DataError("expected the challenge's training data", where=str(file), hint="--data")
-    example = _example()
+    example = load_example("ktc2023")
     measured = list(example.samples(file))
     inj, mpat = measured[0].inj, measured[0].mpat
     twins = []
@@ -48,14 +47,6 @@ def run(data: Path | None) -> tuple[Report, ...]:
             ),
         ),
     )
-
-
-def _example() -> Any:
-    sys.path.insert(0, str(ROOT / "examples"))
-    try:
-        return importlib.import_module("ktc2023")
-    finally:
-        sys.path.remove(str(ROOT / "examples"))
 
 
 def _rows(example: Any, name: str, tanks: Iterable[Any]) -> list[tuple[Any, ...]]:
