@@ -252,6 +252,7 @@ def _prepared(skin: Skin, problem: LinearProblem, before: Prepared | None = None
         light_touch=light_touch,
         spots=spots if skin.touch.method == "fit" else None,
         locator=before.locator if before else None,
+        bending=before.bending if before else None,
     )
 
 
