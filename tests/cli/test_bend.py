@@ -1,0 +1,130 @@
+"""tomoskin calibrate bend, and images of a skin that bends."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from tomoskin.cli import main
+from tomoskin.core import DataError
+from tomoskin.live import Pipeline, prepare
+from tomoskin.session import SessionReader, read_bends
+from tomoskin.skin import Skin
+
+SCRIPT = """format = 1
+[script]
+duration = "{duration}"
+lead_in = "1.2 s"
+seed = {seed}
+preset = "ideal"
+[[bend]]
+length = "80 mm"
+start = "0 s"
+profile = {profile}
+"""
+ROUGH = 8
+"""Degrees: learnt from 35 frames of 8 electrodes, all moving, and read beside a touch."""
+
+PRESS = """[[press]]
+id = "a"
+radius = "12 mm"
+at = ["30 mm", "20 mm"]
+start = "500 ms"
+force = "3 N"
+rise = "100 ms"
+fall = "100 ms"
+hold = "500 ms"
+"""
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A session of known bends, and one with a press while it bends; a calibration."""
+    folder = tmp_path_factory.mktemp("bends")
+    skin = ("--skin", "textile-disc-8")
+    known = '[["600 ms", "50 deg"], ["1.2 s", "0 deg"], ["1.6 s", "30 deg"], ["1.9 s", "0 deg"]]'
+    for name, duration, profile, more in (
+        ("known", "2 s", known, ""),
+        ("used", "1.6 s", '[["800 ms", "40 deg"], ["1.5 s", "0 deg"]]', PRESS),
+    ):
+        script = folder / f"{name}.toml"
+        script.write_text(SCRIPT.format(duration=duration, seed=len(name), profile=profile) + more)
+        out = folder / f"{name}.mcap"
+        _done("simulate", *skin, "--script", str(script), "--out", str(out))
+    _done("calibrate", "bend", str(folder / "known.mcap"), "--out", str(folder / "c.npz"))
+    return folder
+
+
+def _done(*arguments):
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    assert not end.value.code
+
+
+def test_angles_and_touches_of_a_session_that_bends(recorded, tomoskin):
+    model = read_bends(recorded / "c.npz").model
+    assert np.degrees(model.error) < 2.0
+    code, out, err = tomoskin(
+        "image", recorded / "used.mcap", "--bend", recorded / "c.npz", "--json"
+    )
+    assert code == 0, err
+    found = json.loads(out)
+    angle = np.degrees([bend["angle_rad"] for bend in found["bends"]])
+    assert angle.max() == pytest.approx(40, abs=ROUGH)
+    states = {bend["state"] for bend in found["bends"]}
+    assert states >= {"idle", "bend", "bend and touch"}
+    places = np.array([(t["x_m"], t["y_m"]) for t in found["touches"]])
+    assert len(places) >= 5
+    assert np.median(np.linalg.norm(places - (0.03, 0.02), axis=1)) < 0.008
+
+
+def test_options_say_the_angles_where_the_file_does_not(recorded, tomoskin):
+    bends = ("--bend", "0=0:18", "--bend", "25@90=24:28", "--bend", "50=31:34")
+    code, out, err = tomoskin(
+        "calibrate", "bend", recorded / "known.mcap", "--out", recorded / "d.npz", *bends
+    )
+    assert code == 0, err
+    assert "25 frames" in out
+
+
+@pytest.mark.parametrize(
+    ("bend", "message"),
+    [("much=0:9", "expected DEG=A:B"), ("30=0:9999", "within 0:"), ("30=0:9", "6 bent frames")],
+)
+def test_angles_that_cannot_be_are_refused(recorded, tomoskin, bend, message):
+    known, out = recorded / "known.mcap", recorded / "e.npz"
+    code, _, err = tomoskin("calibrate", "bend", known, "--out", out, "--bend", bend)
+    assert code in (1, 2)
+    assert message in err
+
+
+@pytest.mark.parametrize("lost", ["kind", "covariance"])
+def test_a_file_that_is_no_calibration_is_refused(recorded, tomoskin, lost):
+    with np.load(recorded / "c.npz") as arrays:
+        cut = {key: arrays[key] for key in arrays.files if key != lost}
+    np.savez(recorded / f"{lost}.npz", **cut)
+    code, _, err = tomoskin("image", recorded / "used.mcap", "--bend", recorded / f"{lost}.npz")
+    assert code == 1
+    assert "is not a calibration of bends" in err
+
+
+def test_a_calibration_of_another_scan_is_refused(recorded):
+    calibration = read_bends(recorded / "c.npz")
+    with pytest.raises(DataError, match="another scan"):
+        calibration.check(Skin.load("textile-disc-16").pattern())
+
+
+def test_the_live_pipeline_reads_the_bend_and_sees_no_touch_in_it(recorded):
+    with SessionReader(recorded / "used.mcap") as session:
+        frames = [item.frame for item in session.frames()]
+        prepared = prepare(session.skin).that_bends(read_bends(recorded / "c.npz").model)
+    pipeline = Pipeline(prepared)
+    results = [result for frame in frames if (result := pipeline.push(frame)) is not None]
+    bends = [result.bend for result in results if result.bend is not None]
+    assert len(bends) >= 20
+    assert np.degrees(max(bend.angle for bend in bends)) == pytest.approx(40, abs=ROUGH)
+    late = results[-4:]
+    assert not any(result.touches for result in late)
+    assert any(result.touches for result in results)
