@@ -57,7 +57,7 @@ class TwinTransport:
         self.name = "twin"
         self.device = device
         self.electronics = electronics
-        self._noise = electronics.settings.noise
+        self._noise: float | None = None
         self._clock = clock
         self._condition = threading.Condition()
         self._inbox = bytearray()
@@ -107,6 +107,8 @@ class TwinTransport:
     def set_noise(self, noise: float | None) -> None:
         """Noise of one conversion, LSB, from the next frame on; None: that of its settings."""
         electronics = self.electronics
+        if self._noise is None:
+            self._noise = electronics.settings.noise
         value = self._noise if noise is None else noise
         electronics.settings = replace(electronics.settings, noise=value)
 
