@@ -6,7 +6,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from tomoskin.cli.output import JsonFlag, emit
@@ -41,6 +40,8 @@ def calibrate_bend(
     json: JsonFlag = False,
 ) -> None:
     """Learn the bends of a skin, so that touches are told from them and angles are read."""
+    import numpy as np
+
     from tomoskin.cli.skin_choice import skin_for_file
     from tomoskin.live import prepare, voltage_covariance
     from tomoskin.session import BendCalibration, read_recording, write_bends
@@ -82,6 +83,8 @@ def calibrate_bend(
 
 def _said(given: list[str], n: int) -> tuple[list[int], FloatArray, FloatArray]:
     """Frames, angles and axes, rad, of the options."""
+    import numpy as np
+
     rows: dict[int, tuple[float, float]] = {}
     for text in given:
         name, _, span = text.partition("=")
@@ -106,6 +109,8 @@ def _said(given: list[str], n: int) -> tuple[list[int], FloatArray, FloatArray]:
 
 def _told(path: Path, whole: Recording) -> tuple[list[int], FloatArray, FloatArray]:
     """The same from a session's truth: frames that nothing presses, with one bend or none."""
+    import numpy as np
+
     from tomoskin.session import SessionReader, is_session
 
     if not is_session(path):
