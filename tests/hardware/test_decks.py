@@ -2,7 +2,7 @@
 
 import pytest
 
-import figures
+import results
 from spice import DeckError, run
 from tomoskin.skin import Skin
 
@@ -11,10 +11,10 @@ OFF, ON, SOUND, BROKEN = 0, 5, "1g", "50m"
 
 
 def test_the_current_holds_to_a_percent_and_says_where_it_ends():
-    rest = figures.compliance("mended")
+    rest = results.compliance("mended")
     assert rest["current_error"] < 0.01 - 0.002  # less reference and sense resistor, 0.1 % each
     assert rest["compliance"] > 10
-    assert figures.compliance("source")["compliance"] < 9.5
+    assert results.compliance("source")["compliance"] < 9.5
 
 
 def test_an_lm317_cannot_make_a_milliampere():
@@ -29,7 +29,7 @@ def test_an_lm317_cannot_make_a_milliampere():
     ("contact", "ring", "gain"), [(0.05, 1, 35), (0.05, 0.3, 35), (0.05, 5, 7), (20, 1, 35)]
 )
 def test_nothing_spikes_and_all_settles(contact, ring, gain):
-    step = figures.switching("mended", contact=contact, ring=ring, gain=gain)
+    step = results.switching("mended", contact=contact, ring=ring, gain=gain)
     assert step["peak"] < 1.3
     assert step["settling"] < 200e-6
     assert step["settling"] < Skin.load("textile-disc-8").readout.settling
@@ -37,42 +37,42 @@ def test_nothing_spikes_and_all_settles(contact, ring, gain):
 
 @pytest.mark.parametrize("dead", ["1u", "10u", "100u"])
 def test_the_dead_time_does_not_matter(dead):
-    assert figures.switching("mended", dead=dead)["peak"] < 1.3
+    assert results.switching("mended", dead=dead)["peak"] < 1.3
 
 
 def test_without_a_dump_the_bus_charges_and_spikes_into_the_skin():
-    peaks = [figures.switching("source", dead=dead)["peak"] for dead in ("0.2u", "2u", "10u")]
+    peaks = [results.switching("source", dead=dead)["peak"] for dead in ("0.2u", "2u", "10u")]
     assert peaks == sorted(peaks)
     assert peaks[1] > 4
     assert peaks[2] > 8
 
 
 def test_a_demultiplexer_of_5_v_does_not_switch_a_high_side_off():
-    wrong, right = (figures.switching(one, dead="100u") for one in ("source", "mended"))
+    wrong, right = (results.switching(one, dead="100u") for one in ("source", "mended"))
     assert wrong["bus"] > 10
     assert wrong["idle_peak"] > 0.5
     assert right["idle_peak"] < 0.15
 
 
 def test_after_a_cut_electrode_ten_microseconds_are_needed():
-    assert figures.switching("mended", cut="1g", dead="10u")["peak"] < 1.3
-    assert 1.3 < figures.switching("mended", cut="1g", dead="2u")["peak"] < 2
-    assert figures.switching("source", cut="1g", dead="10u")["peak"] > 8
+    assert results.switching("mended", cut="1g", dead="10u")["peak"] < 1.3
+    assert 1.3 < results.switching("mended", cut="1g", dead="2u")["peak"] < 2
+    assert results.switching("source", cut="1g", dead="10u")["peak"] > 8
 
 
 @pytest.mark.parametrize(("contact", "amperes"), [(1, 0.1), (20, 0.1), (20, 0.01), (100, 0.01)])
 def test_resistive_contacts_clip_what_reads_against_the_sink_line(contact, amperes):
-    wrong = figures.clipping("source", contact, amperes)
-    right = figures.clipping("mended", contact, amperes)
+    wrong = results.clipping("source", contact, amperes)
+    right = results.clipping("mended", contact, amperes)
     assert wrong["read"] < 0.5 * wrong["truth"]
     assert right["read"] == pytest.approx(right["truth"], rel=1e-3)
     assert right["pin"] < 4
 
 
 def test_noise_is_the_converters():
-    quiet, loud = figures.noise(0), figures.noise(1 / figures.GAIN)
-    assert quiet["pin"] < loud["pin"] < 0.1 * figures.CONVERTER_NOISE * figures.LSB
-    assert quiet["gain"] == pytest.approx(figures.GAIN, rel=1e-3)
+    quiet, loud = results.noise(0), results.noise(1 / results.GAIN)
+    assert quiet["pin"] < loud["pin"] < 0.1 * results.CONVERTER_NOISE * results.LSB
+    assert quiet["gain"] == pytest.approx(results.GAIN, rel=1e-3)
 
 
 @pytest.mark.parametrize("five", [OFF, ON])
@@ -88,12 +88,12 @@ def test_floating_pins_drive_nothing(five):
 def test_one_stuck_transistor_drives_nothing_while_all_is_off(high, low):
     assert run("stuck", variant="mended", on=OFF, high=high, low=low)["skin"][0] < 1e-7
     driven = run("stuck", variant="mended", on=ON, high=high, low=low)["skin"][0]
-    assert driven == pytest.approx(figures.AMPERES, rel=0.01)
+    assert driven == pytest.approx(results.AMPERES, rel=0.01)
 
 
 def test_in_the_sources_circuit_a_stuck_low_side_keeps_the_current_on():
     said = run("stuck", variant="source", on=OFF, high=SOUND, low=BROKEN)
-    assert said["skin"][0] == pytest.approx(figures.AMPERES, rel=0.01)
+    assert said["skin"][0] == pytest.approx(results.AMPERES, rel=0.01)
 
 
 @pytest.mark.parametrize("body", ["100", "1k"])
@@ -112,7 +112,7 @@ def test_one_fault_in_it_too(volts):
 
 
 def test_the_twins_figures_are_those_of_the_decks():
-    assert figures.FILE.read_text(encoding="utf-8") == figures.written(figures.measured())
+    assert results.FILE.read_text(encoding="utf-8") == results.written(results.measured())
 
 
 def test_a_deck_without_its_values_is_refused():

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-import figures
+import results
 from schematic.board import assembly
 from spice import DECKS
 
@@ -53,9 +53,9 @@ def test_a_value_is_the_same_in_both(block, element, nets):
 
 
 def test_what_sets_current_and_gain():
-    assert 1.225 / float(on_board("+12V", "SENSE")) == pytest.approx(figures.AMPERES)
+    assert 1.225 / float(on_board("+12V", "SENSE")) == pytest.approx(results.AMPERES)
     ohms = float(on_board("RA_3", "RB_3").rstrip("k")) * 1e3
-    assert 1 + 50e3 / ohms == pytest.approx(figures.GAIN, rel=0.002)
+    assert 1 + 50e3 / ohms == pytest.approx(results.GAIN, rel=0.002)
     assert on_board("BUS", "DUMP") == "22"
     decks = [file.read_text(encoding="utf-8") for file in DECKS.glob("*.cir")]
     assert {m for text in decks for m in re.findall(r"rdump=(\d+)", text)} == {"22"}

@@ -34,9 +34,9 @@ def runner(prepared, board):
     runner.stop()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # its event loop must not outlive it: others run their own
 def browser(chromium):
-    """One Chromium for all tests of the page."""
+    """One Chromium for all tests of a module."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
         yield browser

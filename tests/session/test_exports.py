@@ -37,7 +37,8 @@ def export(tomoskin, whole, tmp_path):
 
     def export(name, *options):
         code, out, errors = tomoskin("session", "export", whole, tmp_path / name, *options)
-        assert (code, out, errors) == (0, "", "")
+        assert (code, errors) == (0, "")
+        assert f"{tmp_path / name}: " in out
         return tmp_path / name
 
     return export

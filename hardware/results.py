@@ -1,6 +1,6 @@
 """What the decks say of the source's circuit and of ours, and the file that the twin reads it from.
 
-``python hardware/figures.py`` writes the file, ``… --check`` fails when it says something else.
+``python hardware/results.py`` writes the file, ``… --check`` fails when it says something else.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def written(figures: dict[str, Figures]) -> str:
     """The file."""
     lines = [
         "# What ngspice says of the board, for the twin's read-out and the noise of designs: by",
-        "# hardware/figures.py from hardware/decks. SI units; noise in LSB of one conversion, and",
+        "# hardware/results.py from hardware/decks. SI units; noise in LSB of one conversion, and",
         "# the same at the amplifier's input, V; amplifier_noise without the converter's; settling",
         "# to half an LSB; peak into the skin over the nominal current.",
     ]
