@@ -99,7 +99,8 @@ def export(
             asked.touches(touches)
         if session.torn:
             typer.echo(f"tomoskin: {file}: {session.torn}", err=True)
-    for path in filter(None, (out, touches)):
+    series = out.with_suffix(".pvd")  # names the files of a series
+    for path in filter(None, (out, series, touches)):
         if path.is_file():
             typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
 
