@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import sync_playwright
 
 from live.board import Board, samples_of
-from live.watching import ARGUMENTS
+from live.watching import ARGUMENTS, Watched
 from tomoskin.live import Runner, prepare
 from tomoskin.skin import Skin
 
@@ -41,3 +41,14 @@ def browser(chromium):
         browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
         yield browser
         browser.close()
+
+
+@pytest.fixture
+def opened(browser, site, prepared):
+    """A page of the module's ``site``, on which nothing may go wrong."""
+    watched = Watched(browser, site, prepared.mesh)
+    watched.page.set_default_timeout(20_000)
+    watched.open()
+    yield watched
+    watched.context.close()
+    assert watched.wrong == []

@@ -34,16 +34,6 @@ def site(prepared, folder):
     runner.stop()
 
 
-@pytest.fixture
-def opened(browser, site, prepared):
-    watched = Watched(browser, site, prepared.mesh)
-    watched.page.set_default_timeout(20_000)
-    watched.open()
-    yield watched
-    assert watched.wrong == []
-    watched.context.close()
-
-
 def picture(opened, name):
     """What is shown, for a person's eyes, where a folder is named for it."""
     if PICTURES is None:

@@ -44,16 +44,6 @@ def site(prepared, tmp_path_factory):
     runner.stop()
 
 
-@pytest.fixture
-def opened(browser, site, prepared):
-    watched = Watched(browser, site, prepared.mesh)
-    watched.page.set_default_timeout(20_000)
-    watched.open()
-    yield watched
-    watched.context.close()
-    assert watched.wrong == []
-
-
 def test_a_setting_shows_in_the_picture_and_is_taken_back(opened):
     opened.page.keyboard.press("e")
     opened.test_id("set-touch-gamma1").wait_for(state="attached")

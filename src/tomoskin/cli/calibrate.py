@@ -91,12 +91,12 @@ def _anew(skin: Skin | None, pattern: Pattern) -> tuple[Learn, Pattern]:
 
 def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern]:
     """What learns from these presses and those of an older calibration of the same skin."""
-    from tomoskin.cli.skin_choice import skin_for_file
-    from tomoskin.session import is_session, read_calibration
+    from tomoskin.cli.skin_choice import known_skin
+    from tomoskin.session import read_calibration
 
     old = read_calibration(path)
-    if name is not None or is_session(recording):
-        old.locator.check(skin=skin_for_file(name, recording))
+    if (skin := known_skin(name, recording)) is not None:
+        old.locator.check(skin=skin)
 
     def learn(dv: FloatArray, xy: FloatArray) -> Calibration:
         with Bar("learning") as bar:
@@ -107,14 +107,11 @@ def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern
 
 def _what_of(name: str | None, path: Path, whole: Recording) -> tuple[Skin | None, Pattern]:
     """The skin, where there is one, and the table of rows."""
-    from tomoskin.cli.skin_choice import skin_for_file
+    from tomoskin.cli.skin_choice import known_skin
     from tomoskin.pattern import Pattern
-    from tomoskin.session import is_session
 
-    if name is None and not is_session(path):
-        return None, Pattern.from_tables(whole.drive, whole.measure)
-    skin = skin_for_file(name, path)
-    return skin, skin.pattern()
+    skin = known_skin(name, path)
+    return skin, skin.pattern() if skin else Pattern.from_tables(whole.drive, whole.measure)
 
 
 def _findings(calibration: Calibration, frames: list[int]) -> dict[str, Any]:

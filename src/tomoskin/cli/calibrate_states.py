@@ -71,10 +71,9 @@ def _what_of(
     name: str | None, path: Path, old: StatesCalibration | None
 ) -> tuple[Skin | None, Pattern | None]:
     """The skin, where there is one, and the table of rows where it is known beforehand."""
-    from tomoskin.cli.skin_choice import skin_for_file
-    from tomoskin.session import is_session
+    from tomoskin.cli.skin_choice import known_skin
 
-    skin = skin_for_file(name, path) if name is not None or is_session(path) else None
+    skin = known_skin(name, path)
     if old is not None:
         old.classifier.check(skin_id=skin.identity if skin else "")
         return skin, old.pattern

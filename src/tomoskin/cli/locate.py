@@ -65,11 +65,10 @@ def locate(
 
 
 def _check_skin(known: Calibration, name: str | None, path: Path) -> None:
-    from tomoskin.cli.skin_choice import skin_for_file
-    from tomoskin.session import is_session
+    from tomoskin.cli.skin_choice import known_skin
 
-    if name is not None or is_session(path):
-        known.locator.check(skin=skin_for_file(name, path))
+    if (skin := known_skin(name, path)) is not None:
+        known.locator.check(skin=skin)
 
 
 def _several(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:

@@ -32,6 +32,13 @@ def skin_for_source(skin: str | None, source: str) -> Skin:
     return Skin.load(skin or DEFAULT_SKIN)
 
 
+def known_skin(skin: str | None, path: Path) -> Skin | None:
+    """The skin named, or the one in the session ``path``; None where neither says one."""
+    from tomoskin.session import is_session
+
+    return skin_for_file(skin, path) if skin is not None or is_session(path) else None
+
+
 def skin_for_file(skin: str | None, path: Path) -> Skin:
     """The skin named, or the one in the session ``path``, or the default."""
     from tomoskin.session import SessionReader, is_session

@@ -35,14 +35,14 @@ def states(
 ) -> None:
     """Tell the state of each frame, or that it is none of those that were learnt."""
     from tomoskin.cli.labelled import changes
-    from tomoskin.cli.skin_choice import skin_for_file
-    from tomoskin.session import is_session, read_recording, read_states
+    from tomoskin.cli.skin_choice import known_skin
+    from tomoskin.session import read_recording, read_states
 
     known = read_states(calibration)
     whole = read_recording(recording)
     say_notes(whole)
-    if skin is not None or is_session(recording):
-        known.classifier.check(skin_id=skin_for_file(skin, recording).identity)
+    if (chosen := known_skin(skin, recording)) is not None:
+        known.classifier.check(skin_id=chosen.identity)
     whole = whole.in_order_of(known.pattern)
     dv = changes(whole, reference, known.pattern)
     answers = known.classifier.predict(dv)

@@ -10,18 +10,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
-from tomoskin.core import DataError, ModelError, PatternError
+from tomoskin.core import DataError
 from tomoskin.pattern import Pattern
 from tomoskin.session.archive import load_arrays, save_arrays
-from tomoskin.session.interchange import electrode_table, real_numbers, whole_number
+from tomoskin.session.calibration_file import CalibrationFile, located
+from tomoskin.session.interchange import real_numbers
 from tomoskin.touch import BendExamples, BendModel
 
-_KIND, _VERSION = "tomoskin bend calibration", 1
-_NEEDED = frozenset(
-    {"version", "dv", "angle_rad", "axis_rad", "time_s", "covariance"}
-    | {"drive", "measure", "n_electrodes"}
+_FILE = CalibrationFile(
+    "tomoskin bend calibration",
+    1,
+    "bends",
+    "bend",
+    frozenset({"dv", "angle_rad", "axis_rad", "time_s", "covariance"}),
 )
 
 
@@ -47,18 +48,13 @@ def write_bends(path: Path, calibration: BendCalibration) -> None:
     model, pattern = calibration.model, calibration.pattern
     save_arrays(
         path,
-        {
-            "kind": np.array(_KIND),
-            "version": np.array(_VERSION),
+        _FILE.header(pattern, calibration.skin_name)
+        | {
             "dv": model.examples.dv,
             "angle_rad": model.examples.angle,
             "axis_rad": model.examples.axis,
             "time_s": model.examples.time,
             "covariance": model.covariance,
-            "drive": pattern.drive,
-            "measure": pattern.measure,
-            "n_electrodes": np.array(pattern.n_electrodes),
-            "skin_name": np.array(calibration.skin_name),
         },
     )
 
@@ -72,15 +68,8 @@ def read_bends(path: Path) -> BendCalibration:
         When it is missing, damaged, or no calibration of bends.
     """
     arrays, where = load_arrays(path), str(path)
-    if str(arrays.get("kind", "")) != _KIND or not set(arrays) >= _NEEDED:
-        raise DataError(
-            "is not a calibration of bends", where=where, hint="make one: tomoskin calibrate bend"
-        )
-    if whole_number(arrays, "version", where) != _VERSION:
-        raise DataError(f"expected version {_VERSION}, got {arrays['version']}", where=where)
-    drive, measure = (electrode_table(arrays, key, where) for key in ("drive", "measure"))
-    try:
-        pattern = Pattern.from_tables(drive, measure, whole_number(arrays, "n_electrodes", where))
+    pattern = _FILE.pattern(arrays, where)
+    with located(where):
         dv, *labels, covariance = (
             real_numbers(arrays, key, where)
             for key in ("dv", "angle_rad", "axis_rad", "time_s", "covariance")
@@ -88,6 +77,4 @@ def read_bends(path: Path) -> BendCalibration:
         if covariance.shape != (pattern.n_meas,) * 2 or dv.shape[1:] != (pattern.n_meas,):
             raise DataError(f"expected {pattern.n_meas} rows of dv and covariance")
         model = BendModel.learn(BendExamples.of(dv, *labels), covariance)
-    except (DataError, ModelError, PatternError) as error:
-        raise DataError(error.message, where=f"{where}, {error.where}".rstrip(", ")) from error
     return BendCalibration(model, pattern, str(arrays.get("skin_name", "")))

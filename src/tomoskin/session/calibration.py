@@ -14,17 +14,19 @@ from pathlib import Path
 
 import numpy as np
 
-from tomoskin.core import DataError, PatternError
+from tomoskin.core import DataError
 from tomoskin.pattern import Pattern
 from tomoskin.session.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
-from tomoskin.session.interchange import electrode_table, real_numbers, whole_number
+from tomoskin.session.calibration_file import CalibrationFile, located
+from tomoskin.session.interchange import real_numbers
 from tomoskin.touch import Locator, Presses, Region
 
 CALIBRATION_FILE = "calibration.npz"
 """Name of the calibration inside a session."""
 
-_KIND, _VERSION = "tomoskin touch calibration", 1
-_NEEDED = frozenset({"version", "dv", "xy_m", "outline_m", "drive", "measure", "n_electrodes"})
+_FILE = CalibrationFile(
+    "tomoskin touch calibration", 1, "touch", "touch", frozenset({"dv", "xy_m", "outline_m"})
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,18 +50,12 @@ def pack_calibration(calibration: Calibration) -> bytes:
 
 def _arrays(calibration: Calibration) -> Arrays:
     locator, pattern = calibration.locator, calibration.pattern
-    arrays: Arrays = {
-        "kind": np.array(_KIND),
-        "version": np.array(_VERSION),
+    arrays: Arrays = _FILE.header(pattern, calibration.skin_name) | {
         "dv": locator.presses.dv,
         "xy_m": locator.presses.xy,
         "outline_m": locator.region.outline,
-        "drive": pattern.drive,
-        "measure": pattern.measure,
-        "n_electrodes": np.array(pattern.n_electrodes),
         "pattern": np.array(locator.pattern_id),
         "skin": np.array(locator.skin_id),
-        "skin_name": np.array(calibration.skin_name),
     }
     if locator.presses.strength is not None:
         arrays["strength"] = locator.presses.strength
@@ -85,24 +81,15 @@ def unpack_calibration(data: bytes, where: str) -> Calibration:
 
 
 def _read(arrays: Arrays, where: str, progress: Callable[[float, float], None]) -> Calibration:
-    if str(arrays.get("kind", "")) != _KIND or not set(arrays) >= _NEEDED:
-        raise DataError(
-            "is not a calibration of touch", where=where, hint="make one: tomoskin calibrate touch"
-        )
-    if whole_number(arrays, "version", where) != _VERSION:
-        raise DataError(f"expected version {_VERSION}, got {arrays['version']}", where=where)
-    drive, measure = (electrode_table(arrays, key, where) for key in ("drive", "measure"))
+    pattern = _FILE.pattern(arrays, where)
     strength = real_numbers(arrays, "strength", where) if "strength" in arrays else None
-    try:
-        pattern = Pattern.from_tables(drive, measure, whole_number(arrays, "n_electrodes", where))
+    with located(where):
         presses = Presses.of(
             real_numbers(arrays, "dv", where), real_numbers(arrays, "xy_m", where), strength
         )
         region = Region.checked(real_numbers(arrays, "outline_m", where))
         ids = (pattern.identity, str(arrays.get("skin", "")))
         locator = Locator.learn(presses.within(region), region, ids, progress)
-    except (DataError, PatternError) as error:
-        raise DataError(error.message, where=f"{where}, {error.where}".rstrip(", ")) from error
     if presses.dv.shape[1] != pattern.n_meas:
         raise DataError(f"expected {pattern.n_meas} rows of dv", where=where)
     return Calibration(locator, pattern, str(arrays.get("skin_name", "")))

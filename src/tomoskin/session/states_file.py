@@ -13,15 +13,19 @@ from pathlib import Path
 
 import numpy as np
 
-from tomoskin.core import DataError, PatternError
+from tomoskin.core import DataError
 from tomoskin.pattern import Pattern
 from tomoskin.session.archive import Arrays, load_arrays, save_arrays
-from tomoskin.session.interchange import electrode_table, real_numbers, whole_number
+from tomoskin.session.calibration_file import CalibrationFile, located
+from tomoskin.session.interchange import real_numbers, whole_number
 from tomoskin.touch import Codes, Examples, StateClassifier
 
-_KIND, _VERSION = "tomoskin states calibration", 1
-_NEEDED = frozenset(
-    {"version", "dv", "flags", "session", "names", "exclusive", "drive", "measure", "n_electrodes"}
+_FILE = CalibrationFile(
+    "tomoskin states calibration",
+    1,
+    "states",
+    "states",
+    frozenset({"dv", "flags", "session", "names", "exclusive"}),
 )
 
 
@@ -40,19 +44,14 @@ def write_states(path: Path, calibration: StatesCalibration) -> None:
     examples = classifier.examples
     save_arrays(
         path,
-        {
-            "kind": np.array(_KIND),
-            "version": np.array(_VERSION),
+        _FILE.header(pattern, calibration.skin_name)
+        | {
             "dv": examples.dv,
             "flags": examples.flags,
             "session": examples.session,
             "names": np.array(examples.codes.names),
             "exclusive": np.array(int(examples.codes.exclusive)),
-            "drive": pattern.drive,
-            "measure": pattern.measure,
-            "n_electrodes": np.array(pattern.n_electrodes),
             "skin": np.array(classifier.skin_id),
-            "skin_name": np.array(calibration.skin_name),
         },
     )
 
@@ -66,24 +65,13 @@ def read_states(path: Path) -> StatesCalibration:
         When it is missing, damaged, or no calibration of states.
     """
     arrays, where = load_arrays(path), str(path)
-    if str(arrays.get("kind", "")) != _KIND or not set(arrays) >= _NEEDED:
-        raise DataError(
-            "is not a calibration of states",
-            where=where,
-            hint="make one: tomoskin calibrate states",
-        )
-    if whole_number(arrays, "version", where) != _VERSION:
-        raise DataError(f"expected version {_VERSION}, got {arrays['version']}", where=where)
-    drive, measure = (electrode_table(arrays, key, where) for key in ("drive", "measure"))
-    try:
-        pattern = Pattern.from_tables(drive, measure, whole_number(arrays, "n_electrodes", where))
+    pattern = _FILE.pattern(arrays, where)
+    with located(where):
         examples = _examples(arrays, where)
         if examples.dv.shape[1] != pattern.n_meas:
             raise DataError(f"expected {pattern.n_meas} rows of dv")
         identities = (pattern.identity, str(arrays.get("skin", "")))
         classifier = StateClassifier.learn(examples, identities)
-    except (DataError, PatternError) as error:
-        raise DataError(error.message, where=f"{where}, {error.where}".rstrip(", ")) from error
     return StatesCalibration(classifier, pattern, str(arrays.get("skin_name", "")))
 
 
