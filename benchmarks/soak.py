@@ -41,6 +41,9 @@ _PRESS, _REBOOT, _UNPLUG, _CUT = 11.0, 97.0, 211.0, 61.0
 _SETTLED = 0.2
 """Part of the run after which memory must stand still."""
 
+_LOOK, _PATIENCE = 0.2, 60.0
+"""Seconds between two looks, and after which a run in which nothing happens has failed."""
+
 _MB = 2.0**20
 
 
@@ -172,17 +175,18 @@ def soak(minutes: float, folder: Path) -> Outcome:
         prepared, lambda: BadDay(skin, account, minutes, period), sinks=[sink := Hanging()]
     )
     memory, begun, file = [], time.monotonic(), folder / "soak.mcap"
+    runner.record(file)  # from the first byte on
     runner.start()
-    runner.record(file)
-    with sleeping_page(runner):
-        while account.seconds < 60 * minutes:
-            time.sleep(0.2)
-            memory.append((account.seconds, _resident()))
-        _until_idle(runner)
-    status, wall = runner.status(), time.monotonic() - begun
+    try:
+        with sleeping_page(runner):
+            for at in _looks(account, 60 * minutes):
+                memory.append((at, _resident()))
+            _until_idle(runner, account)
+        status, wall = runner.status(), time.monotonic() - begun
+    finally:
+        sink.close()
+        runner.stop()
     left_out = sum(report.left_out for report in status.sinks)
-    sink.close()
-    runner.stop()
     info = session_info(file)
     settled = [mb for at, mb in memory if at > _SETTLED * 60 * minutes]
     return Outcome(
@@ -215,9 +219,11 @@ def sleeping_page(runner: Runner) -> Iterator[None]:
             "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
             "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
         )
-        yield
-    server.stop()
-    thread.join()
+        try:
+            yield
+        finally:
+            server.stop()
+            thread.join()
 
 
 def frame_rate(skin: Skin) -> float:
@@ -257,11 +263,26 @@ def run(data: Path | None) -> tuple[Report, ...]:
     return (Report("soak", columns, (row,), notes),)
 
 
-def _until_idle(runner: Runner) -> None:
-    """Wait until the pipeline has what arrived."""
-    seen = -1
-    while seen != (seen := runner.status().frames):
-        time.sleep(0.3)
+def _looks(account: Account, end: float) -> Iterator[float]:
+    """Now and then the board's time, s, until it is ``end``."""
+    at, moved = -1.0, time.monotonic()
+    while at < end:
+        time.sleep(_LOOK)
+        if at != (at := account.seconds):
+            moved = time.monotonic()
+        elif time.monotonic() - moved > _PATIENCE:
+            raise SourceError(f"nothing has come for {_PATIENCE:g} s", where=f"{at:.0f} s")
+        yield at
+
+
+def _until_idle(runner: Runner, account: Account) -> None:
+    """Wait until it is known of every frame that arrived what became of it, or nothing changes."""
+    known, since = -1, time.monotonic()
+    while known < account.arrived and time.monotonic() - since < _PATIENCE:
+        time.sleep(_LOOK)
+        status = runner.status()
+        if known != (known := status.frames + status.dropped):
+            since = time.monotonic()
 
 
 def _frames(decoder: Decoder, data: bytes) -> int:
