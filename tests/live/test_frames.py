@@ -10,7 +10,8 @@ import pytest
 from tomoskin.core import Image, Reading, Touch
 from tomoskin.live import Result
 from tomoskin.live.frames import encode_result
-from tomoskin.twin import Press
+from tomoskin.touch import BendReading
+from tomoskin.twin import Finger, Press, Probe
 
 HEADER = (
     *("magic", "sequence", "host_time", "n_cells", "n_meas"),
@@ -58,6 +59,9 @@ def decode(data):
         head["touches"].append((number, kind, *struct.unpack_from("<8f", data, at + 8)))
         at += 40
     head["truth"] = [floats(4) for _ in range(head["n_truth"])]
+    if head["flags"] & 8:
+        head["bend"] = struct.unpack_from("<3fI", data, at)
+        at += 16
     head["labels"] = list(data[at : at + head["n_cells"]])
     at += math.ceil(head["n_cells"] / 4) * 4
     assert at == len(data)
@@ -118,3 +122,20 @@ def test_a_touch_carries_its_whole_covariance():
     first = replace(first, reading=replace(first.reading, cov_xy=-2e-6))
     found = decode(encode_result(make(touches=(first,)), [], 0.0))
     assert found["touches"][0][-1] == pytest.approx(-2e-6)
+
+
+@pytest.mark.parametrize(
+    ("state", "number"), [("idle", 0), ("bend", 1), ("bend and touch", 3), ("unknown", 4)]
+)
+def test_a_bend_goes_before_the_labels(state, number):
+    bend = BendReading(0.5, 0.01, 1.25, state, np.zeros(3))
+    found = decode(encode_result(make(5, (touch(1, [4]),), bend=bend), [], 0.0))
+    assert found["flags"] == 0b1001
+    assert found["bend"] == (0.5, pytest.approx(0.01), 1.25, number)
+    assert found["labels"] == [0, 0, 0, 0, 1]
+
+
+def test_a_probe_of_any_face_is_told_by_its_area():
+    probe = Probe(Finger(), 0.5, -0.25, 3.0, angle=1.0)
+    (told,) = decode(encode_result(make(), [probe], 0.0))["truth"]
+    assert told == pytest.approx((0.5, -0.25, 3.0, math.sqrt(22e-3 * 16e-3) / 2))

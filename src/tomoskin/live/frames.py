@@ -9,11 +9,13 @@ touches, 40 bytes     id u32, kind u8 (0 decrease, 1 increase), apart u8 (0 yes,
 each                  several, n > 1: n that have merged), 2 pad, x, y, sd_x, sd_y (NaN unknown),
                       area, peak, since (s ago), cov_xy (m²) f32
 truth, 16 bytes each  x, y (m), force (N), radius (m) f32: the presses on the twin
+bend, 16 bytes        with flag bit 3 only: angle, its deviation, axis (rad) f32, state u32 (a
+                      place in :data:`BEND_STATES`)
 labels                u8 [n_cells], 0 none, k = cells of the k-th touch; padded to 4 bytes
 ====================  ======================================================================
 
 Flags: bit 0 the reference stands; bit 1 too many rows are unusable, there is no picture;
-bit 2 some rows are left out of the picture.
+bit 2 some rows are left out of the picture; bit 3 bends of this skin were learnt.
 """
 
 from __future__ import annotations
@@ -24,10 +26,14 @@ import numpy as np
 
 from tomoskin.core import Touch
 from tomoskin.live.result import Result
-from tomoskin.twin import Press
+from tomoskin.touch import BendReading
+from tomoskin.twin import Contact
 
-READY, NO_PICTURE, ROWS_LEFT_OUT = 1, 2, 4
+READY, NO_PICTURE, ROWS_LEFT_OUT, BEND = 1, 2, 4, 8
 """Bits of the header's flags."""
+
+BEND_STATES = ("idle", "bend", "touch", "bend and touch", "unknown")
+"""States of a :class:`~tomoskin.touch.BendReading`, as they are numbered here."""
 
 _HEADER = np.dtype(
     [
@@ -43,6 +49,7 @@ _HEADER = np.dtype(
         ("reserved", "<u4"),
     ]
 )
+_BEND = np.dtype([("angle", "<f4"), ("sd", "<f4"), ("axis", "<f4"), ("state", "<u4")])
 _MEASURES = ("x", "y", "sd_x", "sd_y", "area", "peak", "since", "cov_xy")
 _TOUCH = np.dtype(
     [
@@ -57,7 +64,7 @@ _MOST = 255
 """Labels are bytes: more touches than that are not sent."""
 
 
-def encode_result(result: Result, truth: Sequence[Press], latency: float) -> bytes:
+def encode_result(result: Result, truth: Sequence[Contact], latency: float) -> bytes:
     """Message of one result.
 
     Parameters
@@ -78,6 +85,7 @@ def encode_result(result: Result, truth: Sequence[Press], latency: float) -> byt
             result.reference.astype("<f4").tobytes(),
             _touches(touches, result.host_time),
             np.array([(p.x, p.y, p.force, p.radius) for p in truth], "<f4").tobytes(),
+            _bend(result.bend),
             _labels(touches, len(result.image.values)),
         ]
     )
@@ -85,7 +93,7 @@ def encode_result(result: Result, truth: Sequence[Press], latency: float) -> byt
 
 def _header(result: Result, n_touches: int, n_truth: int, latency: float) -> bytes:
     flags = READY * result.ready | NO_PICTURE * (not result.pictured)
-    flags |= ROWS_LEFT_OUT * (result.left_out > 0)
+    flags |= ROWS_LEFT_OUT * (result.left_out > 0) | BEND * (result.bend is not None)
     values = (
         b"TSK1",
         result.sequence % 2**32,
@@ -120,6 +128,13 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
         for t in touches
     ]
     return np.array(rows, _TOUCH).tobytes()
+
+
+def _bend(bend: BendReading | None) -> bytes:
+    if bend is None:
+        return b""
+    row = (bend.angle, bend.sd, bend.axis, BEND_STATES.index(bend.state))
+    return np.array(row, _BEND).tobytes()
 
 
 def _labels(touches: Sequence[Touch], n_cells: int) -> bytes:

@@ -4,8 +4,10 @@ const MAGIC = 0x314b5354; // "TSK1"
 const HEADER = 40;
 const TOUCH = 40;
 const TRUTH = 16;
+const BEND = 16;
 const READY = 1;
 const NO_PICTURE = 2;
+const BENT = 8;
 
 export interface Touch {
   readonly id: number;
@@ -34,6 +36,18 @@ export interface Truth {
   readonly radius: number;
 }
 
+const BEND_STATES = ["idle", "bend", "touch", "bend and touch", "unknown"] as const;
+
+/** How the sheet is bent; angles in rad. */
+export interface Bend {
+  readonly angle: number;
+  /** One standard deviation. */
+  readonly sd: number;
+  /** From x, counter-clockwise. */
+  readonly axis: number;
+  readonly state: (typeof BEND_STATES)[number];
+}
+
 export interface Frame {
   readonly sequence: number;
   readonly hostTime: number;
@@ -47,6 +61,8 @@ export interface Frame {
   readonly reference: Float32Array;
   readonly touches: readonly Touch[];
   readonly truths: readonly Truth[];
+  /** Null: the bends of this skin were not learnt. */
+  readonly bend: Bend | null;
   /** 0 none, k: the cell belongs to the k-th touch. */
   readonly labels: Uint8Array;
 }
@@ -76,6 +92,15 @@ function truthAt(data: DataView, at: number): Truth {
   };
 }
 
+function bendAt(data: DataView, at: number): Bend {
+  return {
+    angle: data.getFloat32(at, true),
+    sd: data.getFloat32(at + 4, true),
+    axis: data.getFloat32(at + 8, true),
+    state: BEND_STATES[data.getUint32(at + 12, true)] ?? "unknown",
+  };
+}
+
 /** Decode one frame. Throws RangeError for bytes that are not one. */
 export function decodeFrame(buffer: ArrayBuffer): Frame {
   const data = new DataView(buffer);
@@ -89,7 +114,8 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
   const nTruth = data.getUint16(26, true);
   const touchesAt = HEADER + 4 * (nCells + 2 * nMeas);
   const truthsAt = touchesAt + TOUCH * nTouches;
-  const labelsAt = truthsAt + TRUTH * nTruth;
+  const bendsAt = truthsAt + TRUTH * nTruth;
+  const labelsAt = bendsAt + (flags & BENT ? BEND : 0);
   if (buffer.byteLength < labelsAt + nCells) {
     throw new RangeError(
       `expected ${labelsAt + nCells} bytes for ${nCells} cells, got ${buffer.byteLength}`,
@@ -106,6 +132,7 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
     reference: new Float32Array(buffer, HEADER + 4 * (nCells + nMeas), nMeas),
     touches: Array.from({ length: nTouches }, (_, k) => touchAt(data, touchesAt + TOUCH * k)),
     truths: Array.from({ length: nTruth }, (_, k) => truthAt(data, truthsAt + TRUTH * k)),
+    bend: flags & BENT ? bendAt(data, bendsAt) : null,
     labels: new Uint8Array(buffer, labelsAt, nCells),
   };
 }

@@ -40,6 +40,21 @@ describe("decodeFrame", () => {
     expect(frame.touches[0].x).toBeCloseTo(0.01);
     expect(frame.touches[0].sdX).toBeNaN();
     expect(frame.truths[0].radius).toBeCloseTo(0.008);
+    expect(frame.bend).toBeNull();
+  });
+
+  it("reads how the sheet is bent before the labels", () => {
+    const plain = new Uint8Array(sample());
+    const bytes = new Uint8Array(plain.length + 16);
+    bytes.set(plain.subarray(0, 140));
+    bytes.set(plain.subarray(140), 156);
+    const data = new DataView(bytes.buffer);
+    data.setUint32(28, 9, true);
+    [0.5, 0.01, 1.25].forEach((v, k) => data.setFloat32(140 + 4 * k, v, true));
+    data.setUint32(152, 3, true);
+    const frame = decodeFrame(bytes.buffer);
+    expect(frame.bend).toMatchObject({ angle: 0.5, axis: 1.25, state: "bend and touch" });
+    expect([...frame.labels]).toEqual([0, 1, 1, 0, 0]);
   });
 
   it("refuses foreign, short and empty bytes", () => {
