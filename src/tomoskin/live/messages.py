@@ -12,7 +12,7 @@ import numpy as np
 from tomoskin import __version__
 from tomoskin.core import Event, FloatArray, IntArray
 from tomoskin.live.prepare import Prepared
-from tomoskin.live.requests import MAX_FORCE
+from tomoskin.live.twin_requests import MAX_FORCE
 from tomoskin.live.status import Status
 from tomoskin.session import Timeline
 from tomoskin.signal import BaselineState, ElectrodeHealth

@@ -9,38 +9,16 @@ from msgspec import Meta
 
 from tomoskin.core import WireError
 from tomoskin.live.flow_requests import FlowRequest
+from tomoskin.live.twin_requests import MAX_FORCE, PressRequest, SetPresses, TwinRequest  # noqa: F401
 
 MAX_REQUEST = 32_768
 """Longest request, bytes: a pattern of some thousand rows, written out."""
 
-MAX_PRESSES = 8
-"""Most presses that one page may hold."""
-
 MAX_NOTE = 500
 """Longest note, characters."""
 
-MAX_FORCE = 10.0
-"""Hardest press from a page, N."""
-
 _Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")]
 """Of a file: no folder, no ending, nothing hidden."""
-
-_Place = Annotated[float, Meta(ge=-10, le=10)]
-
-
-class PressRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One press: place m, force N, radius m."""
-
-    x: _Place
-    y: _Place
-    force: Annotated[float, Meta(ge=0, le=MAX_FORCE)]
-    radius: Annotated[float, Meta(gt=0, le=1)]
-
-
-class SetPresses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="presses"):
-    """All presses that this page holds now."""
-
-    presses: Annotated[tuple[PressRequest, ...], Meta(max_length=MAX_PRESSES)]
 
 
 class TakeReference(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="reference"):
@@ -76,13 +54,6 @@ class LoadSkin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="loa
     """Take the settings of a skin file of the server's folder, or of a built-in skin."""
 
     name: _Name
-
-
-class SetTwin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="twin"):
-    """All that is wrong with the twin from now on: electrodes cut, LSB of noise (null: its own)."""
-
-    cut: Annotated[tuple[Annotated[int, Meta(ge=0, le=31)], ...], Meta(max_length=32)]
-    noise: Annotated[float, Meta(ge=0, le=1000)] | None
 
 
 class SetPause(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="pause"):
@@ -131,12 +102,11 @@ ReplayRequest = Seek | Step | SetSpeed | SetLoop
 SettingsRequest = SetSettings | UndoSettings | RedoSettings | SaveSkin | LoadSkin
 
 Request = (
-    SetPresses
-    | TakeReference
+    TakeReference
     | SetPause
     | SetRecording
     | Note
-    | SetTwin
+    | TwinRequest
     | SettingsRequest
     | ReplayRequest
     | FlowRequest

@@ -10,7 +10,7 @@ import msgspec
 from tomoskin.core import ModelError, WireError
 from tomoskin.live.hub import Hub, Listener
 from tomoskin.live.presses import Harm
-from tomoskin.live.requests import SetTwin
+from tomoskin.live.twin_requests import SetTwin
 from tomoskin.twin import Faults
 
 

@@ -22,7 +22,7 @@ from tomoskin.twin.script_bend import ScriptedBend, bent, bent_truth
 from tomoskin.twin.script_check import check_script, check_settling
 from tomoskin.twin.script_page import script_page
 from tomoskin.twin.settings import PRESETS, TwinSettings
-from tomoskin.twin.shape import Circle, Face, Finger, Shape, Square
+from tomoskin.twin.shape import FACES, Circle, Face, Finger, Shape, Square
 from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.source import make_electronics, make_twin, open_twin, read_settings
 from tomoskin.twin.timeline import pressed
@@ -30,6 +30,7 @@ from tomoskin.twin.transport import Clock, TwinTransport, WallClock
 
 __all__ = [
     "COMMON_PRESSES",
+    "FACES",
     "PRESETS",
     "Analogue",
     "BendSettings",

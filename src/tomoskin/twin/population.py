@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
@@ -14,7 +13,7 @@ from tomoskin.skin import read_section
 from tomoskin.twin.probe import Probe
 from tomoskin.twin.script import of_script, tables_of
 from tomoskin.twin.script_schema import PRESSES
-from tomoskin.twin.shape import Circle, Finger, Shape, Square
+from tomoskin.twin.shape import FACES
 
 _STEP = 0.5e-3
 """Half extents are rounded to this, m: the dent of a face is solved once and used again."""
@@ -120,23 +119,9 @@ class Population:
         shape = self.shapes[random.integers(len(self.shapes))]
         size = _STEP * round(random.uniform(*self.size) / _STEP)
         force, angle = random.uniform(*self.force), random.uniform(0, 2 * np.pi)
-        face = _FACES[shape](max(size, _STEP))
+        face = FACES[shape](max(size, _STEP))
         return Probe(face, float(place[0]), float(place[1]), float(force), float(angle))
 
-
-def _finger(half_length: float) -> Finger:
-    """A fingertip in proportion."""
-    usual = Finger()
-    scale = 2 * half_length / usual.length
-    return Finger(*(scale * v for v in (usual.length, usual.width, usual.along, usual.across)))
-
-
-_FACES: dict[str, Callable[[float], Shape]] = {
-    "circle": Circle,
-    "square": lambda half: Square(2 * half),
-    "finger": _finger,
-}
-"""Faces by their name and half of their extent along x, m."""
 
 COMMON_PRESSES = Population(
     count=(1, 1),

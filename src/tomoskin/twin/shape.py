@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -196,6 +197,21 @@ class Face(Shape):
     def gap(self, points: FloatArray) -> FloatArray:
         """(n,) m; inf off the face."""
         return _within(self._polygon.contains(points), (points**2).sum(axis=1) / (2 * self.crown))
+
+
+def _finger(half_length: float) -> Finger:
+    """A fingertip in proportion."""
+    usual = Finger()
+    scale = 2 * half_length / usual.length
+    return Finger(*(scale * v for v in (usual.length, usual.width, usual.along, usual.across)))
+
+
+FACES: dict[str, Callable[[float], Shape]] = {
+    "circle": Circle,
+    "square": lambda half: Square(2 * half),
+    "finger": _finger,
+}
+"""Faces by their name and half of their extent along x, m."""
 
 
 def _within(inside: NDArray[np.bool_], height: FloatArray) -> FloatArray:
