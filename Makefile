@@ -1,7 +1,7 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help soak live test test-all firmware-test fuzz bench bench-docs docs lint lock native wheel clean page dev
+.PHONY: help soak live test test-all firmware-test fuzz bench bench-docs docs gallery lint lock native wheel clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -52,6 +52,9 @@ bench-docs: native  ## measure the forward engine anew into docs/benchmarks.md; 
 
 docs: dev $(VENV)/.docs  ## the documentation, in build/docs; a warning is an error
 	@$(PY) -m sphinx --quiet --fail-on-warning --keep-going docs build/docs
+
+gallery: native  ## run the examples anew into docs/gallery.md; two minutes
+	@$(PY) scripts/gallery.py
 
 lint: dev page  ## ruff, mypy, the page's types, and the native engine's where Rust is installed
 	@$(PY) -m ruff check .

@@ -5,6 +5,8 @@ maximum, 60 % where all three are on. The source shows the places in a photograp
 stand 70 mm from the centre, towards E1, E4 and E7, where the sheet answers each alike (between
 electrodes it answers by a sixth less, and a threshold of 70 % then leaves a few cells in pieces).
 
+Shown: six stages on one scale; contours are the regions that were found, crosses their centres,
+probes dashed.
 Source saw: one, two, three found (the third at 60 % only); a remainder after unloading, hysteresis.
 Checked: as many regions as probes in every loaded stage, each within 15 mm of a probe; after
 unloading a fall of conductivity remains where the probes were, more than four standard deviations

@@ -5,6 +5,7 @@ twin of ``textile-disc-8``. The source calls 40 and 70 mm diameters and radii by
 Its foam kept the skin from lying close to the smaller cylinder, and strips held its sides: here it
 follows 50° of the 40 mm and 70° of the 70 mm and hangs straight beyond, both angles assumed.
 
+Shown: changes against the flat skin on one scale, and a press on the flat skin beside them.
 Source saw: an elongated region along the cylinder instead of an ellipse; its area and its maximum
 grow with the diameter, the maximum slightly.
 Checked: the largest region lies along the axis, at least 1.7 times as long as wide, that of a press

@@ -5,6 +5,8 @@ References are taken after the skin is attached, as in the source. The cylinder 
 radius, and its joint bends over 60 mm, 5 N: assumed. One step with NOSER's prior on normalised
 differences, threshold 70 %, the twin of ``textile-disc-8``.
 
+Shown: the same press on three bodies, and on the arm with its joint at 37° by three references; in
+the last the joint hides the press.
 Source saw: the touch found on all of them; moving the joint needs a new reference, by its encoder.
 Checked: one touch within 15 mm of the probe on each body, and on the arm with its joint at 37° by
 the reference interpolated between 0, 15, 30 and 45° of the encoder, no farther off than 1.2 times

@@ -1,5 +1,10 @@
 """Figure 5.4: the full reference frame, all pairs under all adjacent drives, no load.
 
+Every neighbouring pair is read under every adjacent drive, but pairs that touch a driven electrode:
+forty rows, the mean of 10 frames.
+
+Shown: forty rows in eight groups, one for each grounded electrode; gaps are pairs that are not
+read.
 Source saw: a frame whose extremes stand where the driving pair is near.
 Checked: under each drive the two pairs beside the driving one read most, at least twice as much
 as the pair opposite; exchanging drive and measuring pair changes no value by more than 15 % of

@@ -3,6 +3,7 @@
 3 N each; one step with NOSER's prior on normalised differences. As in the source, the circles are
 named by their radius and the square by its side.
 
+Shown: four pictures on one scale, with the greatest change in each title; probes are dashed.
 Source saw: the size told by the maximum; round and square not told apart.
 Checked: the maximum grows from 15 to 18 to 25 mm, each time by more than 3 standard deviations
 of its noise; the picture of the square has the shape of the circles' (correlation over 0.97, and

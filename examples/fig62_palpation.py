@@ -5,6 +5,8 @@ The square skin lies on two layers of foam of 15 mm, with the balls between them
 weight is known to 2 % only: what it changed when it was put on is a direction that does not count.
 Each stage is the mean of 40 frames of 64 readings, since 10 bits are coarse for so small a change.
 
+Shown: the picture, and the pressure under the plate that made it; balls are dashed, crosses are the
+places that were found.
 Source saw: both balls, at their places; less well with a threshold of 75 %.
 Checked: two are found and no third, each within 8 mm of its place. Their depth is not asked for.
 """
@@ -208,6 +210,7 @@ def draw(
     drawn = figures.draw_map(axes[0, 0], palpation.mesh, picture, np.abs(picture).max())
     made.colorbar(drawn, ax=axes[0, 0], label="change of conductivity / mS", shrink=0.8)
     truth = figures.draw_map(axes[0, 1], palpation.mesh, felt, felt.max())
+    truth.set(cmap="Blues", clim=(0.0, felt.max()))  # a pressure has no sign
     made.colorbar(truth, ax=axes[0, 1], label="pressure of the foam / Pa", shrink=0.8)
     for ax, title in zip(axes[0], ("found", "what the sheet feels"), strict=True):
         for ball in balls:

@@ -87,9 +87,9 @@ def draw_electrodes(ax: Axes, mesh: Mesh) -> None:
     for number, facets in enumerate(mesh.electrodes, start=1):
         middle = MM * mesh.points[np.unique(facets)].mean(axis=0)
         ax.plot(*middle, "s", color="0.2", markersize=3)
-        ax.annotate(f"E{number}", 1.13 * middle, ha="center", va="center", fontsize=7, color="0.3")
+        ax.annotate(f"E{number}", 1.16 * middle, ha="center", va="center", fontsize=7, color="0.3")
     ax.set_aspect("equal")
-    ax.margins(0.13)
+    ax.margins(0.15)
     ax.set_xlabel("x / mm")
 
 

@@ -4,6 +4,7 @@ An 18 mm probe at 5 N at the centre, half-way out and near the rim. One scan rea
 patterns; each pattern then takes its own, so that all see the same presses. One step on normalised
 differences; alpha is chosen for each by the same rule from the noise.
 
+Shown: mean of each metric over the three places; patterns across, priors down.
 Source saw: adjacent driving with a NOSER or Gaussian prior places a press to within centimetres
 (chapter 8); no table.
 Checked: for every pattern and prior the mean ERR75 is below 20 mm, and for adjacent driving with

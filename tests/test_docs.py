@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
 RUN = ("python.md", "equivalents.md")
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
@@ -46,3 +47,25 @@ def test_the_first_steps_give_a_touch(tmp_path: Path) -> None:
     places = [tuple(map(float, row.split(",")[3:5])) for row in rows]
     assert len(places) > 10
     assert min(math.dist(place, (0.03, 0.02)) for place in places) < 0.005
+
+
+def test_the_gallery_says_what_the_examples_say() -> None:
+    checked = subprocess.run(
+        [sys.executable, "scripts/gallery.py", "--check"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert checked.returncode == 0, f"make gallery:\n{checked.stderr}"
+
+
+def test_every_example_is_in_the_gallery() -> None:
+    page = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    scripts = [
+        file.name
+        for file in (ROOT / "examples").glob("*.py")
+        if '__name__ == "__main__"' in file.read_text(encoding="utf-8")
+    ]
+    assert len(scripts) > 10
+    assert [name for name in scripts if f"examples/{name}" not in page] == []
+    figures = list((DOCS / "images" / "gallery").glob("*.webp"))
+    assert [file.name for file in figures if f"gallery/{file.name}" not in page] == []
+    assert [file.name for file in figures if file.stat().st_size > 60_000] == []

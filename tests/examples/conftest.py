@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,7 +13,8 @@ from types import ModuleType
 
 import pytest
 
-FOLDER = Path(__file__).resolve().parents[2] / "examples"
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = ROOT / "examples"
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,14 @@ class Run:
     found: dict[str, float]
     figure: Path
     recording: Path
+
+
+@pytest.fixture(scope="session")
+def gallery() -> dict[str, dict[str, float]]:
+    """Numbers of each example that the gallery shows."""
+    file = ROOT / "docs" / "images" / "gallery" / "numbers.json"
+    shown: dict[str, dict[str, float]] = json.loads(file.read_text(encoding="utf-8"))
+    return shown
 
 
 @pytest.fixture(scope="session")

@@ -14,16 +14,16 @@ BODIES = ["fig62_palpation", "fig64_face", "soft_volume"]
 
 
 @pytest.mark.parametrize("name", BODIES)
-def test_the_figure_is_made_and_the_numbers_hold(imported, name, tmp_path):
+def test_the_figure_is_made_and_the_numbers_hold(imported, gallery, name, tmp_path):
     module = imported(name)
     found = module.main(["--out", str(tmp_path)])
+    assert found.keys() == gallery[name].keys()
     assert all(math.isfinite(value) for value in found.values())
     data = (tmp_path / f"{name}.png").read_bytes()
     width, height = struct.unpack(">II", data[16:24])
     assert width > 400
     assert height > 250
-    assert "Source saw:" in module.__doc__
-    assert "Checked:" in module.__doc__
+    assert all(part in module.__doc__ for part in ("Shown:", "Source saw:", "Checked:"))
 
 
 @pytest.mark.slow
