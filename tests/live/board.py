@@ -50,12 +50,20 @@ class Board:
         self.tick = 160_000
         self.closed = False
         self.scanning = threading.Event()
+        self.sought = threading.Semaphore(0)
         self._period = period
         self._configuration = 0
         self._sequence = count()
         self._out = deque([encode(Hello(*VERSION, HASH))])
         self._news = threading.Condition()
         self._deframer = Deframer(SCHEMA.to_device_bytes)
+
+    def open(self):
+        """Itself, until its cable is pulled: then it is ``sought`` in vain."""
+        if self.lost:
+            self.sought.release()
+            raise SourceError("the port is gone", where="port")
+        return self
 
     def set_presses(self, presses):
         self.presses = presses

@@ -29,7 +29,7 @@ def board(idle):
 
 @pytest.fixture
 def runner(prepared, board):
-    runner = Runner(prepared, lambda: board)
+    runner = Runner(prepared, board.open)
     yield runner
     runner.stop()
 

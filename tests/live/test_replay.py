@@ -12,8 +12,8 @@ from live.board import Board, pressed, samples_of
 from live.test_runner import PATIENCE, Watch
 from tomoskin.core import DataError, Frame, SourceError
 from tomoskin.live import Pipeline, Runner, advance, prepare, replayed
+from tomoskin.live.flow import MOST_AT_ONCE
 from tomoskin.live.pipeline import REFERENCE_FRAMES
-from tomoskin.live.runner import MOST_AT_ONCE
 from tomoskin.session import Mark, SessionReader
 from tomoskin.session.replay import ReplayTransport, open_replay
 from tomoskin.skin import Skin

@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import socket
-import threading
 import time
 from contextlib import ExitStack
 
@@ -260,19 +259,12 @@ def test_a_press_beside_the_sheet_presses_nothing(site):
         assert first(page, lambda frame: frame["n_truth"])["n_truth"] == 1
 
 
-def test_a_lost_source_is_said_on_the_page(site, board, monkeypatch):
-    away = threading.Event()
-
-    def refuse():
-        away.set()
-        raise ServerError("the port is gone")
-
-    monkeypatch.setattr(site.runner, "_open", refuse)
+def test_a_lost_source_is_said_on_the_page(site, board):
     with site.connect() as page:
         first(page, ready)
         board.lose()
         assert first(page, "event")
-        assert away.wait(PATIENCE)
+        assert board.sought.acquire(timeout=PATIENCE)
         while not (problem := first(page, "state")["problem"]):
             pass
         assert "gone" in problem

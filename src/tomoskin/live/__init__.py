@@ -3,6 +3,7 @@
 from tomoskin.live.changes import DOUBTED, Changes, Idle, changes_of
 from tomoskin.live.exports import WRITERS, Export
 from tomoskin.live.finding import voltage_covariance
+from tomoskin.live.flow import Snapshot
 from tomoskin.live.flows import take_flows
 from tomoskin.live.hub import Hub
 from tomoskin.live.labelled import (
@@ -19,7 +20,7 @@ from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.prepare import Prepared, prepare, prepare_again
 from tomoskin.live.replayed import advance, as_recorded, replayed
 from tomoskin.live.result import Result
-from tomoskin.live.runner import Runner, Snapshot
+from tomoskin.live.runner import Runner
 from tomoskin.live.scale import colour_limit
 from tomoskin.live.security import Door, is_loopback
 from tomoskin.live.server import (

@@ -14,6 +14,7 @@ import numpy as np
 
 from tomoskin.core import DataError, TomoskinError, WireError
 from tomoskin.live import messages
+from tomoskin.live.flow import Snapshot
 from tomoskin.live.frames import encode_result
 from tomoskin.live.play import play
 from tomoskin.live.prepare import Prepared
@@ -26,7 +27,7 @@ from tomoskin.live.requests import (
     SetRecording,
     TakeReference,
 )
-from tomoskin.live.runner import Runner, Snapshot
+from tomoskin.live.runner import Runner
 from tomoskin.live.scale import colour_limit
 from tomoskin.session import read_timeline
 from tomoskin.skin import Skin

@@ -61,3 +61,49 @@ class PressBoard:
         """(number that grows with each change, every press)."""
         with self._lock:
             return self._changes, tuple(p for held in self._held.values() for p in held)
+
+
+class Hands:
+    """What is done to the source of the moment: presses by owner, and what is broken.
+
+    Attributes
+    ----------
+    truth
+        The presses that the source feels.
+    harmed
+        What is wrong with it by our doing.
+    """
+
+    def __init__(self) -> None:
+        """Nothing is done."""
+        self.board = PressBoard()
+        self.truth: tuple[Press, ...] = ()
+        self.harmed = Harm()
+        self._pressed = -1
+        self._broken: Breakable | None = None
+
+    def opened(self, source: object) -> None:
+        """A source that has just been opened is to be as the one before was."""
+        self._pressed = -1
+        self._broken = source if isinstance(source, Breakable) else None
+        self.harm(self.harmed)
+
+    @property
+    def breakable(self) -> bool:
+        """Whether the source can be broken and mended."""
+        return self._broken is not None
+
+    def harm(self, harm: Harm) -> None:
+        """Break and mend the source, from any thread; ModelError for what it does not have."""
+        if self._broken is not None:
+            harm.do(self._broken)
+            self.harmed = harm
+
+    def press(self, source: Pressable) -> bool:
+        """Let ``source`` feel what is pressed now; whether that is news."""
+        changes, presses = self.board.all()
+        if changes == self._pressed:
+            return False
+        source.set_presses(presses)
+        self._pressed, self.truth = changes, presses
+        return True
