@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
-RUN = ("python.md", "equivalents.md")
+RUN = ["python.md", "equivalents.md", *sorted(f"theory/{f.name}" for f in DOCS.glob("theory/*.md"))]
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 
