@@ -1,13 +1,15 @@
-"""The drawings of the docs: the whole board, the current source, one channel."""
+"""The drawings of the docs: the whole board, the current source, one channel, a wired skin."""
 
 from __future__ import annotations
 
 from schematic.drawing import Sheet
+from schematic.wiring import wiring
 
 
 def drawings() -> dict[str, str]:
     """The drawings of the docs by their names."""
-    return {"channel": _chain(_bridge()).svg(), "source": _source().svg(), "board": _board().svg()}
+    sheets = {"channel": _chain(_bridge()), "source": _source(), "board": _board()}
+    return {name: sheet.svg() for name, sheet in sheets.items()} | {"skin": wiring()}
 
 
 def _source() -> Sheet:
