@@ -70,19 +70,56 @@ def test_the_drawer_never_covers_the_sheet(opened):
         opened.test_id(f"drawer-{drawer}").wait_for(state="detached")
 
 
+def edit_pattern(opened):
+    """Open the table with the skin's own rows."""
+    opened.page.keyboard.press("e")
+    opened.test_id("section-drive").locator("summary").click()
+    opened.test_id("set-pattern").select_option("table")
+    opened.test_id("pattern-row").first.wait_for()
+
+
+def cell(opened, row, column):
+    return opened.page.get_by_label(f"Row {row}, {column}", exact=True)
+
+
 def test_another_pattern_reaches_the_twin(opened):
     before = opened.page.evaluate("window.tomoskin.scene.pattern.n_meas")
-    opened.page.keyboard.press("e")
-    opened.page.get_by_test_id("section-drive").locator("summary").click()
-    opened.test_id("set-pattern").select_option("table")
-    rows = "2 1 4 5\n3 2 5 6\n4 3 6 7\n5 4 7 8\n6 5 8 1\n7 6 1 2\n8 7 2 3\n1 8 3 4"
-    opened.test_id("set-table").fill(rows)
+    edit_pattern(opened)
+    opened.test_id("pattern-start").select_option("opposite")
+    opened.test_id("pattern-said").filter(has_text="under 4 drives").wait_for()
+    rows = int(opened.test_id("pattern-said").inner_text().split()[0])
+    opened.page.get_by_label("Remove row 2", exact=True).click()
     opened.test_id("apply-table").click()
-    opened.until("scene.pattern.n_meas === 8")
-    opened.until("last?.voltages.length === 8 && window.tomoskin.last.referenceReady")
+    opened.until(f"scene.pattern.n_meas === {rows - 1}")
+    opened.until(f"last?.voltages.length === {rows - 1} && window.tomoskin.last.referenceReady")
     opened.test_id("undo").click()
     opened.until(f"scene.pattern.n_meas === {before}")
     opened.until(f"last?.voltages.length === {before} && window.tomoskin.last.referenceReady")
+
+
+def test_a_pattern_is_edited_by_keys_and_errors_stand_at_their_row(opened):
+    edit_pattern(opened)
+    said = opened.test_id("pattern-said")
+    words = said.inner_text()
+    cell(opened, 1, "source").focus()
+    opened.test_id("electrode-2").filter(has_text="E2 I+").wait_for()
+    opened.test_id("electrode-3").filter(has_text="E3 V+").wait_for()
+    opened.page.keyboard.press("ArrowDown")
+    opened.test_id("electrode-4").filter(has_text="E4 V+").wait_for()
+    cell(opened, 3, "plus").fill("9")
+    said.filter(has_text="Row 3: plus: this skin has E1 to E8, not E9").wait_for()
+    assert cell(opened, 3, "plus").get_attribute("aria-invalid") == "true"
+    assert opened.test_id("apply-table").is_disabled()
+    opened.page.get_by_label("Duplicate row 3").press("Enter")
+    said.filter(has_text="and 1 more").wait_for()
+    opened.page.get_by_label("Remove row 3").press("Enter")
+    opened.page.get_by_label("Remove row 3").press("Enter")
+    opened.test_id("add-row").press("Enter")
+    for column in ("source", "sink", "plus", "minus"):
+        opened.page.keyboard.type({"source": "2", "sink": "E1", "plus": "5", "minus": "6"}[column])
+        opened.page.keyboard.press("Tab")
+    said.filter(has_text="rows under").wait_for()
+    assert said.inner_text() == words
 
 
 def test_a_cut_electrode_is_said_in_words_and_by_shape(opened):

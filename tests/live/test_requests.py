@@ -8,17 +8,16 @@ from tomoskin.core import WireError
 from tomoskin.live.requests import (
     MAX_REQUEST,
     Note,
-    PressRequest,
     Seek,
     SetLoop,
     SetPause,
-    SetPresses,
     SetRecording,
     SetSpeed,
     Step,
     TakeReference,
     decode_request,
 )
+from tomoskin.live.twin_requests import PressRequest, SetPresses
 
 PRESS = {"x": 0.01, "y": -0.02, "force": 3.0, "radius": 0.015}
 

@@ -11,8 +11,11 @@ import pytest
 
 from live.board import Board
 from live.test_runner import Watch
+from tomoskin.core import PatternError
 from tomoskin.live import Hub, Runner, SettingsDesk, colour_limit, prepare, prepare_again, replayed
 from tomoskin.live.requests import decode_request
+from tomoskin.live.settings_form import table_of
+from tomoskin.pattern import named
 from tomoskin.session import SessionReader
 
 CHANGES = {
@@ -199,3 +202,25 @@ class _Stopped:
 
     def close(self):
         self._runner.stop()
+
+
+def test_a_named_pattern_is_told_row_by_row(office):
+    office.ask({"type": "pattern", "name": "adjacent+opposite"})
+    told, pattern = office.page.last("pattern"), named("adjacent+opposite", 8)
+    assert told["drive"] == pattern.drive.tolist()
+    assert told["measure"] == pattern.measure.tolist()
+    assert office.page.last("settings")["undo"] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "says"), [("zigzag", "expected a pattern among"), ("skip:7", "expected k from 0 to 6")]
+)
+def test_a_pattern_that_is_not_there_to_be_edited(office, name, says):
+    office.ask({"type": "pattern", "name": name})
+    assert says in office.page.last("settings_error")["message"]
+    assert office.page.last("pattern") is None
+
+
+def test_a_pattern_too_long_to_be_edited():
+    with pytest.raises(PatternError, match=r"at most 2000 rows to edit, got \d{4}"):
+        table_of("all_pairs", 20)

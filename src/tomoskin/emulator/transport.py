@@ -13,7 +13,7 @@ from tomoskin.emulator.memory import Front, SkinMemory
 from tomoskin.emulator.process import BoardProcess
 from tomoskin.emulator.program import Programs
 from tomoskin.source import SerialTransport
-from tomoskin.twin import Contact, TwinSkin
+from tomoskin.twin import Contact, Pose, TwinSkin
 
 _STEP = 0.01
 """Between two looks at the sheet, s."""
@@ -55,6 +55,10 @@ class EmulatorTransport:
     def set_presses(self, presses: tuple[Contact, ...]) -> None:
         """Replace all presses; GeometryError when one is off the skin."""
         self.sheet.set_presses(presses)
+
+    def set_pose(self, pose: Pose) -> None:
+        """Bend and stretch the sheet; GeometryError for a shape that it cannot take."""
+        self.sheet.set_pose(pose)
 
     def read(self, timeout: float) -> bytes:
         """What has come, waiting at most ``timeout`` s for the first byte."""

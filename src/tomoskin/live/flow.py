@@ -19,7 +19,7 @@ from tomoskin.live.tally import Tally
 from tomoskin.live.wishes import Wishes
 from tomoskin.session import Mark
 from tomoskin.source import Link, ScanSettings, Transport
-from tomoskin.twin import Press
+from tomoskin.twin import Contact
 
 MOST_AT_ONCE = 16
 """Where more frames than this wait, the oldest are skipped: a late picture helps nobody."""
@@ -33,7 +33,7 @@ class Snapshot:
     """A result, the presses on the twin when it was read, and its latency in s."""
 
     result: Result
-    truth: tuple[Press, ...]
+    truth: tuple[Contact, ...]
     latency: float
 
 
@@ -99,7 +99,7 @@ class Flow:
     def press(self, transport: Transport) -> None:
         """Let the source feel what is pressed now."""
         if isinstance(transport, Pressable) and self.hands.press(transport):
-            self.out.tape.truth(self.hands.truth)
+            self.out.tape.truth(self.hands.truth, self.hands.posed.told)
 
     def take(self, link: Link, found: Sequence[object]) -> None:
         """What one read of the link brought: frames and events."""
@@ -181,5 +181,6 @@ class Flow:
             choice=self.pipeline.choice,
             left_out=result.left_out if result else 0,
             electrodes=result.health.sick if result and result.health else (),
+            bend=result.bend if result and result.ready else None,
             problem=trouble or self._standstill or (result.problem if result else None),
         )

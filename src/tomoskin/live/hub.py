@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tomoskin.core import DataError, TomoskinError, WireError
+from tomoskin.core import DataError, GeometryError, TomoskinError, WireError
 from tomoskin.live import messages
 from tomoskin.live.flow import Snapshot
 from tomoskin.live.frames import encode_result
@@ -23,16 +23,16 @@ from tomoskin.live.requests import (
     ReplayRequest,
     Request,
     SetPause,
-    SetPresses,
     SetRecording,
     TakeReference,
 )
 from tomoskin.live.runner import Runner
 from tomoskin.live.scale import colour_limit
+from tomoskin.live.twin_requests import SetPresses
 from tomoskin.session import read_timeline
 from tomoskin.skin import Skin
 from tomoskin.source import Transport
-from tomoskin.twin import Press
+from tomoskin.twin import Contact
 
 MAX_PAGES = 16
 """Pages that are served at once."""
@@ -241,16 +241,17 @@ class Hub:
         except DataError as error:
             self.runner.say("recording-stopped", f"nothing is recorded: {error}")
 
-    def _on_skin(self, request: SetPresses) -> tuple[Press, ...]:
-        """A finger that has slid off the sheet presses nothing."""
+    def _on_skin(self, request: SetPresses) -> tuple[Contact, ...]:
+        """A finger that has slid off the sheet presses nothing; WireError for no face at all."""
         asked = request.presses
         if not asked:
             return ()
         outline = self.runner.prepared.skin.outline
         inside = outline.contains(np.array([(p.x, p.y) for p in asked]))
-        return tuple(
-            Press(p.x, p.y, p.force, p.radius) for p, on in zip(asked, inside, strict=True) if on
-        )
+        try:
+            return tuple(p.contact for p, on in zip(asked, inside, strict=True) if on)
+        except GeometryError as error:
+            raise WireError(str(error)) from None
 
     def _wake(self) -> None:
         self._wake_is_due = False

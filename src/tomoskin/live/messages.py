@@ -12,10 +12,11 @@ import numpy as np
 from tomoskin import __version__
 from tomoskin.core import Event, FloatArray, IntArray
 from tomoskin.live.prepare import Prepared
-from tomoskin.live.twin_requests import MAX_FORCE
 from tomoskin.live.status import Status
+from tomoskin.live.twin_requests import MAX_FORCE
 from tomoskin.session import Timeline
 from tomoskin.signal import BaselineState, ElectrodeHealth
+from tomoskin.touch import BendReading
 
 PROBE_RADIUS = 0.015
 """Radius of a press from the page unless it says otherwise, m: the source's usual probe."""
@@ -92,6 +93,7 @@ def state(status: Status) -> str:
         recording=status.recording and status.recording.name,
         sinks=status.sinks,
         replay=status.replay,
+        bend=_bend(status.bend),
         problem=status.problem,
         text=status.text,
     )
@@ -107,6 +109,13 @@ def _baseline(now: BaselineState | None) -> dict[str, Any] | None:
         "noise_v": _known(now.noise),
         "stale": now.stale,
     }
+
+
+def _bend(now: BendReading | None) -> dict[str, Any] | None:
+    """Angles in rad, as ``tomoskin image --json`` tells them."""
+    if now is None:
+        return None
+    return {"angle_rad": now.angle, "sd_rad": now.sd, "axis_rad": now.axis, "state": now.state}
 
 
 def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from msgspec import Meta
 
 from tomoskin.core import WireError
 from tomoskin.live.flow_requests import FlowRequest
-from tomoskin.live.twin_requests import MAX_FORCE, PressRequest, SetPresses, TwinRequest  # noqa: F401
+from tomoskin.live.twin_requests import TwinRequest
 
 MAX_REQUEST = 32_768
 """Longest request, bytes: a pattern of some thousand rows, written out."""
@@ -56,6 +56,12 @@ class LoadSkin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="loa
     name: _Name
 
 
+class AskPattern(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="pattern"):
+    """The rows of a named pattern on the skin's electrodes, to be edited."""
+
+    name: Annotated[str, Meta(max_length=64)]
+
+
 class SetPause(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="pause"):
     """Hold the picture, or let it go on."""
 
@@ -99,7 +105,7 @@ class SetLoop(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="loop
 ReplayRequest = Seek | Step | SetSpeed | SetLoop
 """What only a replay can do."""
 
-SettingsRequest = SetSettings | UndoSettings | RedoSettings | SaveSkin | LoadSkin
+SettingsRequest = SetSettings | UndoSettings | RedoSettings | SaveSkin | LoadSkin | AskPattern
 
 Request = (
     TakeReference

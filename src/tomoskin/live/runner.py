@@ -11,6 +11,7 @@ from pathlib import Path
 from tomoskin.live.events import EventLog
 from tomoskin.live.flow import Snapshot
 from tomoskin.live.loop import Loop
+from tomoskin.live.posing import Posed
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.presses import Harm
 from tomoskin.live.publisher import Audience
@@ -19,7 +20,7 @@ from tomoskin.live.wanted import Opener, Wanted
 from tomoskin.live.wishes import Replayed
 from tomoskin.signal import Reference
 from tomoskin.sink import Sink
-from tomoskin.twin import Press
+from tomoskin.twin import Contact
 from tomoskin.wire import Info
 
 
@@ -195,7 +196,7 @@ class Runner:
         """Whether the source can be pressed from a page, as the twin can."""
         return self._loop.flow.pressable
 
-    def set_presses(self, owner: object, presses: tuple[Press, ...]) -> None:
+    def set_presses(self, owner: object, presses: tuple[Contact, ...]) -> None:
         """All presses that ``owner`` holds now; an empty tuple lifts them."""
         self._loop.flow.hands.board.put(owner, presses)
 
@@ -212,3 +213,17 @@ class Runner:
     def harm(self, harm: Harm) -> None:
         """Break and mend the source; ModelError for what it does not have."""
         self._loop.flow.hands.harm(harm)
+
+    @property
+    def bendable(self) -> bool:
+        """Whether the source has a sheet that can be bent and stretched."""
+        return self._loop.flow.hands.bendable
+
+    @property
+    def posed(self) -> Posed:
+        """How the source's sheet is bent and stretched by our doing."""
+        return self._loop.flow.hands.posed
+
+    def bend(self, posed: Posed) -> None:
+        """Bend and stretch the source; GeometryError for a shape that it cannot take."""
+        self._loop.flow.hands.bend(posed)

@@ -14,9 +14,16 @@ from tomoskin.core import SkinError, SourceError, TomoskinError
 from tomoskin.inverse import LightTouch, LinearProblem, Spectrum
 from tomoskin.live.hub import Hub, Listener
 from tomoskin.live.prepare import Prepared, prepare_again, same_body
-from tomoskin.live.requests import LoadSkin, RedoSettings, SaveSkin, SetSettings, UndoSettings
+from tomoskin.live.requests import (
+    AskPattern,
+    LoadSkin,
+    RedoSettings,
+    SaveSkin,
+    SetSettings,
+    UndoSettings,
+)
 from tomoskin.live.scale import colour_limit
-from tomoskin.live.settings_form import altered, refusal, schema
+from tomoskin.live.settings_form import altered, refusal, schema, table_of
 from tomoskin.live.tune import tuned
 from tomoskin.skin import Skin
 
@@ -53,6 +60,7 @@ class SettingsDesk:
             RedoSettings: lambda page, _: self._step(page, self._redo, self._undo),
             SaveSkin: self._save,
             LoadSkin: self._load,
+            AskPattern: self._pattern,
         }
 
     def greeting(self) -> Sequence[str]:
@@ -109,6 +117,12 @@ class SettingsDesk:
             return
         self._hub.runner.say("saved", f"settings saved as {name}")
         self._hub.tell([self._told()])
+
+    def _pattern(self, page: Listener, request: AskPattern) -> None:
+        try:
+            page.post(table_of(request.name, self._present().n_electrodes))
+        except TomoskinError as error:
+            page.post(refusal(error))
 
     def _keep(self, skin: Skin) -> None:
         self._undo.append(skin)

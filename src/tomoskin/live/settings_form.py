@@ -9,7 +9,8 @@ from typing import Any
 
 import msgspec
 
-from tomoskin.core import SkinError, TomoskinError
+from tomoskin.core import PatternError, SkinError, TomoskinError
+from tomoskin.pattern import named
 from tomoskin.skin import (
     SECTIONS,
     Choice,
@@ -25,6 +26,9 @@ from tomoskin.skin import (
 
 Changes = Mapping[str, Mapping[str, Any]]
 """Values by section and key, as a skin file writes them; None takes a key out."""
+
+MOST_ROWS = 2000
+"""Rows of a pattern that a page may edit one by one."""
 
 LOCKED = frozenset({("surface", "file")})
 """Keys that name files: a page cannot set them."""
@@ -66,6 +70,24 @@ def refusal(error: TomoskinError) -> str:
     text = error.message + advice if found else str(error)
     fields = {"type": "settings_error", "section": section, "key": key, "message": text}
     return msgspec.json.encode(fields).decode()
+
+
+def table_of(name: str, n_electrodes: int) -> str:
+    """Message with the rows of a named pattern.
+
+    Raises
+    ------
+    PatternError
+        For a name that is not known, and more rows than anyone edits one by one.
+    """
+    pattern = named(name, n_electrodes)
+    if pattern.n_meas > MOST_ROWS:
+        raise PatternError(
+            f"expected a pattern of at most {MOST_ROWS} rows to edit, got {pattern.n_meas}",
+            hint="choose it by its name, or begin with a smaller one",
+        )
+    rows = {"drive": pattern.drive.tolist(), "measure": pattern.measure.tolist()}
+    return msgspec.json.encode({"type": "pattern", "name": name} | rows).decode()
 
 
 def altered(skin: Skin, changes: Changes) -> Skin:

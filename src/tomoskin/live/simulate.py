@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.core import DataError, Event, Frame
 from tomoskin.live.pipeline import REFERENCE_FRAMES
+from tomoskin.live.presses import described
 from tomoskin.pattern import Scan
 from tomoskin.session import Mark, SessionWriter
 from tomoskin.skin import Skin
@@ -171,7 +172,7 @@ class _Run:
         truth = self._pressed(time + half), bent_truth(bends, time + half)
         if truth != self._truth:
             self._truth = truth
-            self._writer.truth(middle, [_described_probe(probe) for probe in truth[0]], truth[1])
+            self._writer.truth(middle, list(map(described, truth[0])), truth[1])
         self._disturb(disturbed(self._script.faults, time))
         if reboots(self._script.faults, last, time):
             self._twin.reboot()
@@ -219,16 +220,4 @@ def _described(script: Script, settings: TwinSettings, idle: int) -> dict[str, o
         "script": script.name,
         "reference_frames": idle,
         "twin": asdict(settings),
-    }
-
-
-def _described_probe(probe: Probe) -> dict[str, object]:
-    """A press as the file tells it: by the circle with the area of its face, and as it is."""
-    return {
-        "x": probe.x,
-        "y": probe.y,
-        "force": probe.force,
-        "radius": probe.radius,
-        "angle": probe.angle,
-        "shape": type(probe.shape).__name__.lower(),
     }

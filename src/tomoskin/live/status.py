@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from tomoskin.inverse import AlphaChoice
 from tomoskin.live.result import ReferenceState
 from tomoskin.signal import ElectrodeHealth
 from tomoskin.sink import SinkReport
+from tomoskin.touch import BendReading
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,8 @@ class Status:
         Where a replay is; None where the source is another.
     electrodes
         Those that are not good.
+    bend
+        How the sheet is bent; None where its bends were not learnt.
     problem
         What someone should see to, in one sentence, or None.
     """
@@ -85,6 +89,7 @@ class Status:
     sinks: tuple[SinkReport, ...] = ()
     electrodes: tuple[ElectrodeHealth, ...] = ()
     replay: ReplayStatus | None = None
+    bend: BendReading | None = None
 
     @property
     def text(self) -> str:
@@ -99,5 +104,11 @@ class Status:
         drift = self.reference.baseline.drift if self.reference.baseline else 0.0
         return (
             f"{self.source}: {self.fps:.0f} frames/s, {self.dropped} dropped, "
-            f"p99 {1e3 * self.p99:.1f} ms, drift {100 * drift:.1f} %"
+            f"p99 {1e3 * self.p99:.1f} ms, drift {100 * drift:.1f} %{self._bent}"
         )
+
+    @property
+    def _bent(self) -> str:
+        if self.bend is None:
+            return ""
+        return f", bend {math.degrees(self.bend.angle):.0f}° ({self.bend.state})"

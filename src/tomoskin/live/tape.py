@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from tomoskin.core import Event, Frame
 from tomoskin.live.beginning import Beginning, Marked
 from tomoskin.live.pipeline import REFERENCE_FRAMES
 from tomoskin.live.prepare import Prepared
+from tomoskin.live.presses import described
 from tomoskin.live.published import epoch, glance
 from tomoskin.live.result import Result
 from tomoskin.session import CALIBRATION_FILE, Mark, Recorder, SessionWriter, pack_calibration
 from tomoskin.source import Link
-from tomoskin.twin import Press
+from tomoskin.twin import Contact
 from tomoskin.wire import Info
 
 
@@ -52,7 +54,7 @@ class Tape:
         self._again: tuple[Marked, ...] = ()
         self._touches_before = 0
         self._info: Info | None = None
-        self._truth: tuple[Press, ...] = ()
+        self._truth: tuple[tuple[Any, ...], tuple[Mapping[str, Any], ...]] = ((), ())
         self._source = ""
         self._changing = threading.Lock()
 
@@ -93,7 +95,7 @@ class Tape:
         now = self._clock()
         frames, self._touches_before, again = self._beginning.begin(self._numbered())
         recorder.settings(now, self._settings())
-        recorder.truth(now, self._truth)
+        recorder.truth(now, *self._truth)
         for frame, mark in frames:
             recorder.frame(frame, mark | Mark.EARLIER)
         if self._info is not None:
@@ -171,11 +173,13 @@ class Tape:
         if recorder:
             recorder.note(event.host_time, event.text)
 
-    def truth(self, presses: tuple[Press, ...]) -> None:
-        """What presses on the twin from now on."""
-        self._truth = presses
+    def truth(
+        self, presses: tuple[Contact, ...], bends: tuple[Mapping[str, Any], ...] = ()
+    ) -> None:
+        """What presses on the twin, and how it is bent, from now on."""
+        self._truth = tuple(map(described, presses)), bends
         if self._recorder:
-            self._recorder.truth(self._clock(), presses)
+            self._recorder.truth(self._clock(), *self._truth)
 
     def _settings(self) -> dict[str, object]:
         return {

@@ -1,38 +1,51 @@
-"""The desk that breaks and mends the twin."""
+"""The desk that bends, breaks and mends the twin."""
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import msgspec
+import numpy as np
 
-from tomoskin.core import ModelError, WireError
+from tomoskin.core import GeometryError, ModelError, WireError
 from tomoskin.live.hub import Hub, Listener
+from tomoskin.live.posing import posed, way_to_bend
 from tomoskin.live.presses import Harm
-from tomoskin.live.twin_requests import SetTwin
+from tomoskin.live.twin_requests import SetPose, SetTwin
 from tomoskin.twin import Faults
 
 
 class TwinDesk:
-    """What is wrong with the twin, the same for all pages."""
+    """What is done to the twin beside pressing it, the same for all pages."""
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
+        self._newest: SetPose | None = None
+        self._posing = asyncio.Lock()
 
     @property
     def handlers(self) -> Mapping[type, Callable[[Listener, Any], None]]:
         """See :class:`~tomoskin.live.hub.Desk`."""
-        return {SetTwin: self._set}
+        return {SetTwin: self._set, SetPose: self._pose}
 
     def greeting(self) -> Sequence[str]:
-        """What is wrong now."""
-        harm, runner = self._hub.runner.harmed, self._hub.runner
+        """What is wrong now, and how the sheet is bent."""
+        runner = self._hub.runner
+        harm, asked = runner.harmed, runner.posed.asked
+        skin = runner.prepared.skin
+        extent = np.ptp(skin.outline.polyline(skin.outline.length / 60), axis=0)
         fields = {
             "type": "twin",
             "breakable": runner.breakable,
             "cut": sorted(harm.faults.cut),
             "noise": harm.noise,
+            "bendable": runner.bendable,
+            "bends": way_to_bend(skin.surface),
+            "bend": asked.bend,
+            "stretch": asked.stretch,
+            "size_m": float(extent.max()),
         }
         return (msgspec.json.encode(fields).decode(),)
 
@@ -46,3 +59,28 @@ class TwinDesk:
         except ModelError as error:
             raise WireError(str(error)) from None
         self._hub.tell(self.greeting())
+
+    def _pose(self, page: Listener, request: SetPose) -> None:
+        """Raise WireError where the source has no sheet to bend."""
+        runner = self._hub.runner
+        if not runner.bendable:
+            raise WireError(f"{runner.source} cannot be bent from here")
+        self._newest = request
+        self._hub.keep(self._bring(page, request))
+
+    async def _bring(self, page: Listener, request: SetPose) -> None:
+        """Bend the sheet unless something newer is asked for already, and say how it lies."""
+        async with self._posing:
+            if request is self._newest:
+                try:
+                    made = posed(request, self._hub.runner.prepared.skin.surface)
+                    await asyncio.to_thread(self._hub.runner.bend, made)
+                except (GeometryError, WireError) as error:
+                    page.post(_refused(error))
+            self._hub.tell(self.greeting())
+
+
+def _refused(error: GeometryError | WireError) -> str:
+    hint = f" ({error.hint})" if error.hint else ""
+    fields = {"type": "twin_refused", "message": error.message + hint}
+    return msgspec.json.encode(fields).decode()

@@ -121,9 +121,10 @@ class Recorder:
         """A person's remark."""
         self._put(len(text), self._session.note, host_time, text)
 
-    def truth(self, host_time: float, presses: Sequence[Any]) -> None:
-        """What presses on the twin from now on."""
-        self._put(100 * len(presses), self._session.truth, host_time, presses)
+    def truth(self, host_time: float, presses: Sequence[Any], bends: Sequence[Any] = ()) -> None:
+        """What presses on the twin, and how it is bent, from now on."""
+        size = 100 * (len(presses) + len(bends))
+        self._put(size, self._session.truth, host_time, presses, bends)
 
     def device(self, host_time: float, info: Any) -> None:
         """What the board is."""

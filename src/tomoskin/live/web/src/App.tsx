@@ -1,6 +1,7 @@
 /** The page: a line of state, the sheet, its panels and drawers, the commands. */
 
 import { TimeLine } from "./flows/TimeLine";
+import { BendPanel } from "./panels/Bend";
 import { Controls } from "./panels/Controls";
 import { Legend } from "./panels/Legend";
 import { Side } from "./panels/Side";
@@ -13,7 +14,10 @@ export function App() {
       <TopLine />
       <main>
         <Sheet />
-        <Legend />
+        <div class="beside">
+          <Legend />
+          <BendPanel />
+        </div>
         <Side />
       </main>
       <TimeLine />

@@ -17,7 +17,7 @@ import "./flows/SetUp";
 import "./flows/Sessions";
 import { startHolding } from "./hold";
 import { installHook } from "./hook";
-import "./panels/Twin";
+import "./twin/Twin";
 import "./signals/Signals";
 import "./settings/Settings";
 import { scene, start } from "./state";

@@ -1,17 +1,27 @@
 /** The presses that this page holds on the twin, as a pure state machine in metres and newtons. */
 
+import { CIRCLE, type Face, told } from "./faces";
 import type { Press } from "./protocol";
 
 export const MAX_PRESSES = 8;
 
-export interface Probe {
+export interface Sizes {
+  /** Half of the face's size, m. */
   readonly radius: number;
   /** Force at the first contact, N. */
   readonly force: number;
   readonly maxForce: number;
 }
 
+export interface Probe extends Sizes {
+  readonly face: Face;
+  /** By which the face is turned, rad. */
+  readonly angle: number;
+}
+
 export interface Held extends Press {
+  readonly face: Face;
+  readonly angle: number;
   /** The pointer that holds it, or null: it stays by itself. */
   readonly pointer: number | null;
   /** Stays when the pointer lets go. */
@@ -30,7 +40,10 @@ const FULL_FORCE_AFTER = 2;
 /** Steps of the wheel (or of the buttons) from nothing to full force. */
 const FORCE_STEPS = 20;
 
-export const emptyHand = (probe: Probe): Hand => ({ probe, held: [] });
+export const emptyHand = (sizes: Sizes): Hand => ({
+  probe: { face: CIRCLE, angle: 0, ...sizes },
+  held: [],
+});
 
 const changed = (hand: Hand, change: (press: Held) => Held): Hand => ({
   ...hand,
@@ -47,11 +60,11 @@ export function keptAt(hand: Hand, x: number, y: number): Held | undefined {
 /** A pointer comes down: takes hold of a kept press (or lifts it, with `keep`), else presses. */
 export function press(hand: Hand, pointer: number, x: number, y: number, keep: boolean): Hand {
   const under = keptAt(hand, x, y);
-  if (under && keep) return { ...hand, held: hand.held.filter((other) => other !== under) };
+  if (under && keep) return lifted(hand, under);
   if (under) return changed(hand, (other) => (other === under ? { ...other, pointer } : other));
   if (hand.held.length >= MAX_PRESSES) return hand;
-  const { force, radius } = hand.probe;
-  const fresh: Held = { x, y, force, radius, pointer, kept: keep, growing: true };
+  const { force, radius, face, angle } = hand.probe;
+  const fresh: Held = { x, y, force, radius, face, angle, pointer, kept: keep, growing: true };
   return { ...hand, held: [...hand.held, fresh] };
 }
 
@@ -106,7 +119,22 @@ export function grow(hand: Hand, seconds: number): Hand {
 
 export const liftAll = (hand: Hand): Hand => (hand.held.length ? { ...hand, held: [] } : hand);
 
+/** Lift one of the presses. */
+export const lifted = (hand: Hand, which: Held): Hand => ({
+  ...hand,
+  held: hand.held.filter((press) => press !== which),
+});
+
+/** One step more or less of the force of one press. */
+export function reforced(hand: Hand, which: Held, steps: number): Hand {
+  const force = stepped(which.force, steps, hand.probe.maxForce);
+  return changed(hand, (press) => (press === which ? { ...press, force, growing: false } : press));
+}
+
 /** What the server is told. */
 export function toMessage(hand: Hand): Press[] {
-  return hand.held.map(({ x, y, force, radius }) => ({ x, y, force, radius }));
+  return hand.held.map(({ x, y, force, radius, face, angle }) => ({
+    ...{ x, y, force, radius },
+    ...told(face, radius, angle),
+  }));
 }

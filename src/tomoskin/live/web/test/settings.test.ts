@@ -2,7 +2,7 @@ import { describe, expect, it, vi } from "vitest";
 
 vi.stubGlobal("window", { location: { href: "http://127.0.0.1/" }, setTimeout, clearTimeout });
 
-const { readTable, stands, typed } = await import("../src/settings/model");
+const { stands, typed } = await import("../src/settings/model");
 
 describe("what a person types", () => {
   it("gets the unit that was there, else the schema's", () => {
@@ -15,25 +15,6 @@ describe("what a person types", () => {
   it("is a number where a number is asked for, and is left to the server where it is none", () => {
     expect(typed("0.7", { form: "number" }, 0.6)).toBe(0.7);
     expect(typed("much", { form: "number" }, 0.6)).toBe("much");
-  });
-});
-
-describe("a table of one's own", () => {
-  it("counts from 1 as people do", () => {
-    expect(readTable("2 1 4 5\nE3, E2, E5, E6\n\n")).toEqual({
-      drive: [
-        [1, 0],
-        [2, 1],
-      ],
-      measure: [
-        [3, 4],
-        [4, 5],
-      ],
-    });
-  });
-
-  it.each(["", "1 2 3", "1 2 3 x", "1 2 3 4.5"])("refuses %j", (text) => {
-    expect(readTable(text)).toBeNull();
   });
 });
 

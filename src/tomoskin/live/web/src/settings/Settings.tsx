@@ -2,6 +2,7 @@
 
 import { useSignal } from "@preact/signals";
 import { addDrawer } from "../drawers";
+import { PatternEditor } from "../pattern/PatternEditor";
 import { say, send } from "../state";
 import { Field, nameOf } from "./Field";
 import {
@@ -15,7 +16,6 @@ import {
   undo,
   valuesOf,
 } from "./model";
-import { PatternEditor } from "./PatternEditor";
 import { Alpha, Threshold } from "./Slider";
 
 /** What is changed most stands first; in words. */

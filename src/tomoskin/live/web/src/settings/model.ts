@@ -1,7 +1,7 @@
 /** The skin's schema and settings as the server tells them, and the changes that a person makes. */
 
-import { computed, signal } from "@preact/signals";
-import { onMessage, scene, say, send } from "../state";
+import { signal } from "@preact/signals";
+import { onMessage, say, send } from "../state";
 
 export type Value = string | number | readonly (readonly (string | number)[])[];
 
@@ -131,27 +131,3 @@ export function typed(text: string, kind: KindForm, before: Value | null | undef
   }
   return trimmed;
 }
-
-/** Rows of four numbers, E1 first, as people write them, to the file's tables; null: not so. */
-export function readTable(text: string): { drive: number[][]; measure: number[][] } | null {
-  const rows = text
-    .split("\n")
-    .map((line) => line.replace(/E/gi, "").trim())
-    .filter((line) => line !== "")
-    .map((line) => line.split(/[\s,;]+/).map(Number));
-  if (!rows.length || rows.some((row) => row.length !== 4 || !row.every(Number.isInteger))) return null;
-  return {
-    drive: rows.map(([source, sink]) => [source - 1, sink - 1]),
-    measure: rows.map(([, , plus, minus]) => [plus - 1, minus - 1]),
-  };
-}
-
-/** The present pattern as such rows. */
-export const presentTable = computed(() => {
-  const pattern = scene.value?.pattern;
-  if (!pattern) return "";
-  const { drive, measure } = pattern;
-  return Array.from({ length: pattern.n_meas }, (_, k) =>
-    [drive[2 * k], drive[2 * k + 1], measure[2 * k], measure[2 * k + 1]].map((e) => e + 1).join(" "),
-  ).join("\n");
-});

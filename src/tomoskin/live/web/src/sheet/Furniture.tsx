@@ -68,9 +68,21 @@ export interface FurnitureProps {
   readonly sick: readonly Sick[];
   /** Source and sink of the drive that is looked at, counted from 0. */
   readonly drive: readonly [number, number] | null;
+  /** Plus and minus of the measurement that is looked at. */
+  readonly pair: readonly [number, number] | null;
 }
 
-export function Furniture({ scene, view, sick, drive }: FurnitureProps) {
+const SIGNS = ["+", "\u2212"];
+
+/** What an electrode does under the drive and measurement that are looked at. */
+function roles(number: number, drive: FurnitureProps["drive"], pair: FurnitureProps["pair"]): string {
+  const [role, read] = [drive?.indexOf(number) ?? -1, pair?.indexOf(number) ?? -1];
+  const driven = role < 0 ? "" : ` ${pair ? "I" : ""}${SIGNS[role]}`;
+  return driven + (read < 0 ? "" : ` V${SIGNS[read]}`);
+}
+
+
+export function Furniture({ scene, view, sick, drive, pair }: FurnitureProps) {
   const { outline, points } = scene;
   return (
     <svg class="furniture" width={view.width} height={view.height} role="group" aria-label="Electrodes">
@@ -81,11 +93,12 @@ export function Furniture({ scene, view, sick, drive }: FurnitureProps) {
         const arc = electrode.points.flatMap((p) => [points[2 * p], points[2 * p + 1]]);
         const ill = sick.find((one) => one.electrode === number);
         const reason = ill ? `${electrode.label}: ${ill.reason}` : `${electrode.label}: good`;
-        const role = drive?.indexOf(number) ?? -1;
+        const driven = drive?.includes(number) ?? false;
+        const read = pair?.includes(number) ?? false;
         return (
           <g
             key={electrode.label}
-            class={`electrode${ill ? " ill" : ""}${role >= 0 ? " driven" : ""}`}
+            class={`electrode${ill ? " ill" : ""}${driven ? " driven" : ""}${read ? " read" : ""}`}
             data-testid={`electrode-${number + 1}`}
             role="img"
             aria-label={reason}
@@ -95,7 +108,7 @@ export function Furniture({ scene, view, sick, drive }: FurnitureProps) {
             {arc.length > 2 && <path class="arc" d={pathOf(view, arc)} />}
             <Dot x={x + DOT * dx} y={y - DOT * dy} sick={ill} />
             <Label
-              text={electrode.label + (role < 0 ? "" : role === 0 ? " +" : " \u2212")}
+              text={electrode.label + roles(number, drive, pair)}
               x={x}
               y={y}
               dx={dx}

@@ -21,7 +21,7 @@ import { Target } from "../flows/Target";
 import { Furniture } from "./Furniture";
 import { Painter } from "./painter";
 import { cursor, listen } from "./pointer";
-import { hovered, locator, seen, shownDrive } from "./space";
+import { hovered, locator, seen, shownDrive, shownPair } from "./space";
 import { around, boxOf, fit, type View } from "./view";
 
 /** Room for the electrodes' labels all round and for the legend at the left. */
@@ -113,6 +113,7 @@ export function Sheet() {
           view={view.value}
           sick={status.value?.sick ?? []}
           drive={shownDrive.value}
+          pair={shownPair.value}
         />
       )}
       {view.value.width > 0 && <Target view={view.value} />}

@@ -1,6 +1,7 @@
 /** What is drawn over the image each frame: contours, touches, the twin's truth, own presses. */
 
 import type { Touch, Truth } from "../decode";
+import { rim } from "../faces";
 import type { Held } from "../presses";
 import type { Theme } from "../theme";
 import { contours, type Topology } from "./topology";
@@ -113,9 +114,9 @@ function drawTouch(pen: Pen, theme: Theme, view: View, touch: Touch): void {
   path.moveTo(x, y - arm);
   path.lineTo(x, y + arm);
   // Not drawn where the cross would hide it.
-  const around = ellipse(touch)?.map((place) => toPixels(view, ...place));
-  if (around?.some(([px, py]) => Math.hypot(px - x, py - y) > 3)) {
-    around.forEach(([px, py], k) => (k ? path.lineTo(px, py) : path.moveTo(px, py)));
+  const ring = ellipse(touch)?.map((place) => toPixels(view, ...place));
+  if (ring?.some(([px, py]) => Math.hypot(px - x, py - y) > 3)) {
+    ring.forEach(([px, py], k) => (k ? path.lineTo(px, py) : path.moveTo(px, py)));
     path.closePath();
   }
   haloed(pen, theme, path, theme.accent, 2);
@@ -163,16 +164,35 @@ function drawTruth(pen: Pen, theme: Theme, view: View, truth: Truth): void {
   pen.setLineDash([]);
 }
 
-/** The hand's own press: its probe, an arc as long as its force, the force in words. */
+/** The first part of a closed line through `corners`, by its length. */
+function around(corners: readonly Place[], part: number): Path2D {
+  const path = new Path2D();
+  const sides = corners.map(([x, y], k) => {
+    const [nextX, nextY] = corners[(k + 1) % corners.length];
+    return Math.hypot(nextX - x, nextY - y);
+  });
+  let left = part * sides.reduce((sum, side) => sum + side, 0);
+  path.moveTo(...corners[0]);
+  for (let k = 0; k < corners.length && left > 0; k++) {
+    const [[x, y], [nextX, nextY]] = [corners[k], corners[(k + 1) % corners.length]];
+    const gone = Math.min(1, left / (sides[k] || 1));
+    path.lineTo(x + gone * (nextX - x), y + gone * (nextY - y));
+    left -= sides[k];
+  }
+  if (part >= 1) path.closePath();
+  return path;
+}
+
+/** The hand's own press: the rim of its probe, drawn as far as its force goes, the force in words. */
 function drawHeld(pen: Pen, theme: Theme, view: View, held: Held, maxForce: number): void {
-  const [x, y] = toPixels(view, held.x, held.y);
-  const radius = Math.max(10, held.radius * view.scale);
-  const ring = new Path2D();
-  ring.arc(x, y, radius, 0, 2 * Math.PI);
-  haloed(pen, theme, ring, theme.muted, 1);
-  const arc = new Path2D();
-  arc.arc(x, y, radius, -Math.PI / 2, -Math.PI / 2 + (2 * Math.PI * held.force) / maxForce);
-  haloed(pen, theme, arc, theme.ink, 3);
+  const [x] = toPixels(view, held.x, held.y);
+  const size = Math.max(held.radius, 10 / view.scale);
+  const corners = rim(held.face, size, held.angle).map(([dx, dy]) =>
+    toPixels(view, held.x + dx, held.y + dy),
+  );
+  const lowest = Math.max(...corners.map(([, cy]) => cy));
+  haloed(pen, theme, around(corners, 1), theme.muted, 1);
+  haloed(pen, theme, around(corners, held.force / maxForce), theme.ink, 3);
   pen.font = `500 13px ${theme.font}`;
   pen.textAlign = "center";
   pen.textBaseline = "top";
@@ -180,9 +200,9 @@ function drawHeld(pen: Pen, theme: Theme, view: View, held: Held, maxForce: numb
   pen.lineWidth = 4;
   pen.lineJoin = "round";
   const text = `${held.force.toFixed(1)} N`;
-  pen.strokeText(text, x, y + radius + 6);
+  pen.strokeText(text, x, lowest + 6);
   pen.fillStyle = theme.ink;
-  pen.fillText(text, x, y + radius + 6);
+  pen.fillText(text, x, lowest + 6);
 }
 
 function drawCursor(pen: Pen, theme: Theme, view: View, place: readonly [number, number]): void {

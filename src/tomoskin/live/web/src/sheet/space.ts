@@ -32,6 +32,8 @@ export const hovered = signal<readonly [number, number] | null>(null);
 
 /** Source and sink that are looked at; null: none. */
 export const shownDrive = signal<readonly [number, number] | null>(null);
+/** Plus and minus of the measurement that is looked at. */
+export const shownPair = signal<readonly [number, number] | null>(null);
 
 const LOWEST = 0.02;
 const HIGHEST = 1.55;

@@ -1,0 +1,107 @@
+/** What is done to the twin beside pressing it, as the server tells it, and how it is asked for. */
+
+import { signal } from "@preact/signals";
+import { onMessage, send } from "../state";
+
+export interface TwinBend {
+  /** Rad; positive where the front is convex. */
+  readonly angle: number;
+  /** Rad from x. */
+  readonly axis: number;
+  /** Width of the strip that bends, m. */
+  readonly length: number;
+}
+
+export interface TwinStretch {
+  /** Relative elongations. */
+  readonly along: number;
+  readonly across: number;
+  /** Rad from x. */
+  readonly axis: number;
+}
+
+interface TwinState {
+  readonly type: "twin";
+  readonly breakable: boolean;
+  readonly cut: readonly number[];
+  /** LSB of one conversion; null: the twin's own. */
+  readonly noise: number | null;
+  readonly bendable: boolean;
+  /** How it can be bent: along a strip, or at the joint that it lies on; null: not at all. */
+  readonly bends: "hinge" | "joint" | null;
+  readonly bend: TwinBend | null;
+  readonly stretch: TwinStretch | null;
+  /** Largest extent of the sheet, m. */
+  readonly size_m: number;
+}
+
+const UNKNOWN: TwinState = {
+  type: "twin",
+  breakable: false,
+  cut: [],
+  noise: null,
+  bendable: false,
+  bends: null,
+  bend: null,
+  stretch: null,
+  size_m: 0.2,
+};
+
+export const twin = signal<TwinState>(UNKNOWN);
+
+export interface Wanted {
+  readonly bend: TwinBend;
+  readonly stretch: TwinStretch;
+}
+
+const LEVEL: TwinStretch = { along: 0, across: 0, axis: 0 };
+
+const flat = (size: number): Wanted => ({
+  bend: { angle: 0, axis: Math.PI / 2, length: Math.min(0.06, size) },
+  stretch: LEVEL,
+});
+
+/** The sliders: what the twin is, or is being asked for. */
+export const wanted = signal<Wanted>(flat(UNKNOWN.size_m));
+/** Why the last bend was refused, in words. */
+export const refusal = signal<string | null>(null);
+/** Requests that have not been answered yet: an older answer must not move a slider back. */
+let unanswered = 0;
+
+onMessage<TwinState>("twin", (message) => {
+  twin.value = message;
+  unanswered = Math.max(0, unanswered - 1);
+  if (unanswered > 0) return;
+  const { bend, stretch } = flat(message.size_m);
+  wanted.value = {
+    bend: message.bend ?? { ...bend, axis: wanted.value.bend.axis, length: wanted.value.bend.length },
+    stretch: message.stretch ?? { ...stretch, axis: wanted.value.stretch.axis },
+  };
+});
+onMessage<{ readonly type: "twin_refused"; readonly message: string }>(
+  "twin_refused",
+  ({ message }) => (refusal.value = message),
+);
+
+/** Break and mend. */
+export function harm(change: Partial<Pick<TwinState, "cut" | "noise">>): void {
+  const { cut, noise } = twin.value;
+  send({ type: "twin", cut, noise, ...change });
+}
+
+/** Bend and stretch as the sliders stand. */
+export function pose(): void {
+  const { bend, stretch } = wanted.peek();
+  refusal.value = null;
+  unanswered++;
+  send({
+    type: "pose",
+    bend: bend.angle === 0 ? null : bend,
+    stretch: stretch.along === 0 && stretch.across === 0 ? null : stretch,
+  });
+}
+
+export function layFlat(): void {
+  wanted.value = flat(twin.value.size_m);
+  pose();
+}
