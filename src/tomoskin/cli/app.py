@@ -1,7 +1,7 @@
 """The commands, and what becomes of an error: one sentence and an exit code.
 
-To add a command: a module with a function (or a Typer of sub-commands) that imports heavy rooms
-inside, and one line in the list below.
+To add a command: a module of its name with a function of its name (or a Typer of sub-commands,
+``app``) that imports heavy rooms inside, and one line in the list below.
 """
 
 from __future__ import annotations
@@ -14,25 +14,28 @@ from typing import Annotated, NoReturn
 import typer
 
 from tomoskin import __version__
-from tomoskin.cli import (
-    bench,
-    calibrate,
-    design,
-    doctor,
-    firmware,
-    image,
-    live,
-    locate,
-    record,
-    session,
-    simulate,
-    skin,
-    states,
-)
+from tomoskin.cli.contents import later
 from tomoskin.core import TomoskinError
 
 DEBUG = "TOMOSKIN_DEBUG"
 """Environment variable: set it to see the traceback of an error."""
+
+COMMANDS = {
+    "live": "Show a skin live on a page; without options, the twin of a textile disc.",
+    "record": "Record a session without a page: raw bytes, frames, touches and images.",
+    "image": "Reconstruct a recording: images, and the touches in them.",
+    "calibrate": "Learn from labelled presses, states or bends.",
+    "locate": "Locate touches by a calibration.",
+    "states": "Tell the state of each frame by a calibration.",
+    "design": "Say what a skin can resolve before it is built.",
+    "simulate": "Run a script on the twin into a session file, or draw labelled frames.",
+    "bench": "Measure speed on this machine.",
+    "session": "Inspect, mend and convert recorded sessions.",
+    "skin": "List, show, check and lay skins.",
+    "firmware": "Build, flash and emulate the board's firmware.",
+    "doctor": "Look at this installation: versions, page, sources, sinks, skins, ports.",
+}
+"""What each command does; :func:`tomoskin.cli.contents.later` says where it is."""
 
 app = typer.Typer(
     help="Touch for soft robots by electrical impedance tomography.",
@@ -41,20 +44,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # rich alone takes longer to load than all the rest
     context_settings={"help_option_names": ["-h", "--help"]},
+    cls=later(COMMANDS),
 )
-app.command("live")(live.live)
-app.command("record")(record.record)
-app.command("image")(image.image)
-app.add_typer(calibrate.app, name="calibrate")
-app.command("locate")(locate.locate)
-app.command("states")(states.states)
-app.command("design")(design.design)
-app.command("simulate")(simulate.simulate)
-app.command("bench")(bench.bench)
-app.add_typer(session.app, name="session")
-app.add_typer(skin.app, name="skin")
-app.add_typer(firmware.app, name="firmware")
-app.command("doctor")(doctor.doctor)
 
 
 def _show_version(wanted: bool) -> None:

@@ -12,6 +12,7 @@ import typer
 from tomoskin.cli.calibrate_bend import calibrate_bend
 from tomoskin.cli.calibrate_states import calibrate_states
 from tomoskin.cli.calibrate_wiring import calibrate_wiring
+from tomoskin.cli.contents import group
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
     Learn = Callable[[FloatArray, FloatArray], Calibration]
 
-app = typer.Typer(help="Learn from labelled presses or states.", no_args_is_help=True)
+app = group("Learn from labelled presses or states.")
 
 _SHOWN = 10
 _DRIFTED = 2.0

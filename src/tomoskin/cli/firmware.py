@@ -9,7 +9,9 @@ from typing import Annotated
 
 import typer
 
-app = typer.Typer(no_args_is_help=True, help="The board's firmware: build, flash, emulate.")
+from tomoskin.cli.contents import group
+
+app = group("The board's firmware: build, flash, emulate.")
 
 Channels = Annotated[int, typer.Option(help="8 or 16, as the board has.")]
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tomoskin.cli.contents import group
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import say_notes
@@ -16,7 +17,7 @@ from tomoskin.cli.recording import say_notes
 if TYPE_CHECKING:
     from tomoskin.session import Lost, Repaired, SessionInfo
 
-app = typer.Typer(help="Inspect, mend and convert recorded sessions.", no_args_is_help=True)
+app = group("Inspect, mend and convert recorded sessions.")
 
 _A_YEAR = 3.15e7
 """Log times of less are seconds of a clock that began with the machine, not of the day."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.alpha import alpha
+from tomoskin.cli.contents import group
 from tomoskin.cli.lay import lay
 from tomoskin.cli.merit import merit
 from tomoskin.cli.output import JsonFlag, emit
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from tomoskin.mesh import Quality
     from tomoskin.skin import Skin
 
-app = typer.Typer(help="List, show, check and lay skins.", no_args_is_help=True)
+app = group("List, show, check and lay skins.")
 app.command("alpha")(alpha)
 app.command("merit")(merit)
 app.command("lay")(lay)
