@@ -10,22 +10,15 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
-from scipy.spatial import cKDTree
 
 from tomoskin.core import DataError, FloatArray, Image, IntArray, Reading
 from tomoskin.mesh import Mesh
 from tomoskin.skin import TouchSettings
+from tomoskin.touch.blur import REACH, Blur
 from tomoskin.touch.centroid import centroid, centroid_sd
 from tomoskin.touch.connect import connected, neighbour_table
 from tomoskin.touch.floor import NoiseFloor
 from tomoskin.touch.tracking import HELD
-
-_REACH = 2.0
-"""The Gaussian filter is cut off at this many standard deviations."""
-
-_NO_WIDTH = 1e-9
-"""A filter of width zero, m: reaches no other cell."""
 
 
 class Segmenter:
@@ -43,7 +36,7 @@ class Segmenter:
     def __init__(self, mesh: Mesh, settings: TouchSettings) -> None:
         self.mesh = mesh
         self.settings = settings
-        self._filter = _gaussian_filter(mesh, settings.smoothing)
+        self._filter = Blur(mesh, settings.smoothing)
         self._neighbours = neighbour_table(mesh)
 
     def __call__(self, picture: Image, floor: NoiseFloor | None = None) -> list[Reading]:
@@ -66,7 +59,7 @@ class Segmenter:
         limit = self.settings.gamma1 * strength.max()
         if not limit > 0:
             return []
-        filtered = self._filter @ np.where(strength >= limit, image, 0.0).astype(np.float32)
+        filtered = self._filter(np.where(strength >= limit, image, 0.0))
         kept = np.flatnonzero(np.abs(filtered) >= self.settings.gamma2 * limit)
         significant = _significant(kept, strength, floor, HELD * self.settings.snr)
         if not significant.any():
@@ -90,7 +83,7 @@ class Segmenter:
 
         A touch that another one outshines is not lost by that: these may carry it on.
         """
-        height = np.append(np.abs(self._filter @ image.astype(np.float32)), -1.0)
+        height = np.append(np.abs(self._filter(image)), -1.0)
         free = height >= HELD * self.settings.gamma1 * height.max()
         free[:-1] &= height[:-1] >= HELD * self.settings.snr * floor.sd
         for cells in regions:
@@ -106,7 +99,7 @@ class Segmenter:
     def _around(self, top: int, height: FloatArray) -> IntArray:
         """Cells near a maximum that are nearly as high."""
         away = self.mesh.centroids - self.mesh.centroids[top]
-        near = np.flatnonzero((away**2).sum(axis=1) <= (_REACH * self.settings.smoothing) ** 2)
+        near = np.flatnonzero((away**2).sum(axis=1) <= (REACH * self.settings.smoothing) ** 2)
         return np.asarray(near[height[near] >= self.settings.gamma2 * height[top]])
 
     def _accept(self, what: str, mesh_id: str) -> None:
@@ -121,7 +114,7 @@ class Segmenter:
         centre = centroid(self.mesh, cells, np.abs(image))
         sd = np.full(2, np.nan)
         if floor is not None:
-            margin = _REACH * self.settings.smoothing
+            margin = REACH * self.settings.smoothing
             sd = centroid_sd(self.mesh, cells, image, margin, floor)
         return Reading(
             x=float(centre[0]),
@@ -184,17 +177,3 @@ def _snr(cells: IntArray, image: FloatArray, floor: NoiseFloor | None) -> float:
         return float("nan")
     with np.errstate(divide="ignore"):
         return float((np.abs(image[cells]) / floor.sd[cells]).max())
-
-
-def _gaussian_filter(mesh: Mesh, width: float) -> csr_array:
-    """(n_cells, n_cells) area-weighted Gaussian average; rows sum to one.
-
-    In single precision: it is read whole for each frame, and only thresholded.
-    """
-    width = max(width, _NO_WIDTH)
-    tree = cKDTree(mesh.centroids)
-    near = tree.sparse_distance_matrix(tree, _REACH * width, output_type="coo_matrix")
-    weights = np.exp(-0.5 * (near.data / width) ** 2) * mesh.volumes[near.col]
-    weights /= np.bincount(near.row, weights)[near.row]
-    matrix = csr_array(coo_array((weights, (near.row, near.col)), shape=near.shape))
-    return matrix.astype(np.float32)
