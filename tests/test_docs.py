@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 import subprocess
@@ -10,9 +11,16 @@ from pathlib import Path
 
 import pytest
 
+from tomoskin.skin import Skin
+
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
-RUN = ["python.md", "equivalents.md", *sorted(f"theory/{f.name}" for f in DOCS.glob("theory/*.md"))]
+RUN = [
+    "build.md",
+    "equivalents.md",
+    "python.md",
+    *sorted(f"theory/{f.name}" for f in DOCS.glob("theory/*.md")),
+]
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 
@@ -23,6 +31,36 @@ def test_what_a_page_shows_works(page: str) -> None:
     names: dict[str, object] = {}
     for block in blocks:
         exec(compile(block, page, "exec"), names)
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: page.stem)
+def test_what_cannot_be_run_is_python_all_the_same(page: Path) -> None:
+    """Fragments, and programs that wait for a robot."""
+    for block in BLOCK.findall(page.read_text(encoding="utf-8")):
+        compile(block, page.name, "exec")
+
+
+def test_the_skin_of_the_instructions_is_one_and_costs_what_is_said(tmp_path: Path) -> None:
+    page = (DOCS / "build.md").read_text(encoding="utf-8")
+    described = re.search(r"^```toml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    assert described
+    (tmp_path / "my-skin.toml").write_text(described[1])
+    mine, built_in = Skin.load(str(tmp_path / "my-skin.toml")), Skin.load("textile-disc-8")
+    assert mine.electrode_centres == pytest.approx(built_in.electrode_centres)
+    assert mine.current == built_in.current
+    with (ROOT / "hardware" / "board-8.csv").open(encoding="utf-8") as file:
+        bill = {row["part"]: float(row["euros"]) for row in csv.DictReader(file) if row["number"]}
+    board = bill["total"] - bill["Arduino Mega 2560"]
+    costs = re.findall(r"^\| (.+?) \| \**(\d+)\** \|", page, re.MULTILINE)
+    euros = {re.sub(r"\W+", " ", name).strip(): int(value) for name, value in costs}
+    skin, with_arduino, everything = (
+        euros[name] for name in ("the skin", "skin and Arduino", "all that a touch needs")
+    )
+    items = [n for n in euros.values() if n not in (skin, with_arduino, everything)]
+    assert euros["Arduino Mega 2560"] == bill["Arduino Mega 2560"]
+    assert euros["parts of the board for 8 channels without the Arduino"] == pytest.approx(board)
+    assert (sum(items), with_arduino) == (everything, skin + euros["Arduino Mega 2560"])
+    assert with_arduino < 60
 
 
 def test_the_first_steps_give_a_touch(tmp_path: Path) -> None:
