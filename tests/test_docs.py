@@ -33,11 +33,20 @@ def test_what_a_page_shows_works(page: str) -> None:
         exec(compile(block, page, "exec"), names)
 
 
-@pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page", [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))], ids=lambda p: p.stem
+)
 def test_what_cannot_be_run_is_python_all_the_same(page: Path) -> None:
     """Fragments, and programs that wait for a robot."""
     for block in BLOCK.findall(page.read_text(encoding="utf-8")):
         compile(block, page.name, "exec")
+
+
+@pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md"])
+def test_links_lead_somewhere(name: str) -> None:
+    """Sphinx looks after the pages in docs."""
+    links = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", (ROOT / name).read_text(encoding="utf-8"))
+    assert [link for link in links if not (ROOT / link).exists()] == []
 
 
 def test_the_skin_of_the_instructions_is_one_and_costs_what_is_said(tmp_path: Path) -> None:
