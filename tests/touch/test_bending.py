@@ -9,6 +9,7 @@ from tomoskin.core import DataError
 from tomoskin.live import prepare
 from tomoskin.skin import Skin
 from tomoskin.touch import BendExamples, BendModel, BendReader, JointReference, SpotModel
+from tomoskin.touch.bending.memory import Memory
 
 ROWS, NOISE = 40, 1e-5
 ANGLES = np.radians([0, 10, 20, 30, 40, 50, 60, 50, 40, 30, 20, 10, 0] * 3)
@@ -49,14 +50,35 @@ def test_angle_and_axis_of_a_bend_along_any_axis():
     random = np.random.default_rng(1)
     angle, axis = np.radians([25.0, 50.0, -40.0]), np.radians([20.0, 110.0, 160.0])
     z = model.whiten(frames(angle, axis, random)) @ model.whiten(model.directions.T).T
-    from tomoskin.touch.bending.memory import Memory
-
     features = [
         Memory(model.n_modes, model.size, remembers=model.remembers).push(row, 0.0) for row in z
     ]
     told, turned = model.told(np.array(features) @ model.weights)
     assert np.degrees(told) == pytest.approx(np.degrees(angle), abs=2.0)
     assert np.degrees(turned) == pytest.approx(np.degrees(axis), abs=2.0)
+
+
+def test_rows_that_are_lacking_are_left_out_of_what_was_learnt():
+    model = learnt()
+    lacking = np.array([0, 7, 31])
+    left = np.delete(np.arange(ROWS), lacking)
+    less = model.without(lacking)
+    assert less.directions.shape == (ROWS - 3, model.n_modes)
+    assert less.covariance.shape == (ROWS - 3, ROWS - 3)
+    along = (SHAPES[0] - SHAPES[1])[left]
+    part, *_ = np.linalg.lstsq(less.directions, along)
+    assert less.directions @ part == pytest.approx(along, abs=0.02 * np.abs(along).max())
+    assert np.degrees(less.error) < 0.5
+
+
+def test_a_sheet_begins_where_the_bends_that_were_learnt_left_it():
+    """Plays stand at the end that the way back pushed them to, and follow from there."""
+    z = np.array([[0.5], [1.0], [0.5], [0.0]])
+    plays = Memory.plays_after(z, 1.0)
+    assert plays[:, 0] == pytest.approx([0.03, 0.08, 0.16, 0.3])
+    memory = Memory(1, 1.0, remembers=True, plays=plays)
+    assert memory.push(np.array([0.2]), 0.0)[2:6] == pytest.approx([0.17, 0.12, 0.16, 0.3])
+    assert Memory.plays_after(-z, 1.0) == pytest.approx(-plays)
 
 
 def test_what_lags_behind_by_a_play_is_undone():
@@ -132,6 +154,30 @@ def test_states_of_a_sheet(skin):
     assert bent.axis == pytest.approx(0.5, abs=1e-4)
     assert bent.moved == pytest.approx(np.radians(30) * shape, abs=3 * NOISE)
     assert read.push(strange, (), common, 0.2).state == "unknown"
+
+
+def test_rows_that_are_lost_do_not_count_in_the_angle(skin):
+    read, shape, noise = reader(skin)
+    lost = np.zeros(len(shape), bool)
+    lost[::4] = True
+    data = np.where(lost, 0.0, noise + np.radians(30) * shape)
+    common = skin.response.reference[:, None]
+    told = np.hstack([common, np.eye(len(shape))[:, lost]])
+    found = read.push(data, (), told, 0.0)
+    assert np.degrees(found.angle) == pytest.approx(30, abs=1)
+    assert found.state == "bend"
+    assert read.push(data, (), common, 0.1).state == "unknown"
+
+
+def test_a_reading_that_is_no_touch_to_who_saw_the_frames_before(skin):
+    from tomoskin.core import Reading
+
+    read, _, noise = reader(skin)
+    common = skin.response.reference[:, None]
+    left = Reading(x=0.0, y=0.0, sd_x=1e-3, sd_y=1e-3, area=1e-4, peak=-1e-6,
+                   cells=np.zeros(1, int))  # fmt: skip
+    assert read.push(noise, (left,), common, 0.0).state == "touch"
+    assert read.push(noise, (left,), common, 0.1, touched=False).state == "idle"
 
 
 def test_the_angle_is_read_beside_a_touch(skin):

@@ -6,38 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from tomoskin import Locator, Pattern, Skin
 from tomoskin.core import DataError
+from tomoskin.touch import Presses, Region
 from tomoskin.touch.locator.kernel import Basis, Likeness
 from tomoskin.touch.locator.maps import ResponseMaps
 from tomoskin.touch.locator.posterior import GridLikelihood, moments, pooled
-
-RADIUS = 0.1
-ROWS = 40
-Floats = NDArray[np.float64]
-
-
-def places(n: int, seed: int) -> Floats:
-    rng = np.random.default_rng(seed)
-    radius, angle = RADIUS * np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
-    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
-
-
-def presses(n: int, seed: int, noise: float = 0.05) -> tuple[Floats, Floats]:
-    """Smooth bumps, one a row, at places of their own; the same for every seed."""
-    xy = places(n, seed)
-    centres = places(ROWS, 99)
-    near = np.exp(-0.5 * ((xy[:, None] - centres) ** 2).sum(axis=2) / (0.5 * RADIUS) ** 2)
-    rng = np.random.default_rng(seed + 1)
-    return near * np.where(np.arange(ROWS) % 2, 1, -1) + noise * rng.normal(size=near.shape), xy
-
-
-def held(error: Floats, covariance: Floats) -> float:
-    """Part of the errors in their 90 % ellipse."""
-    squared = (error * np.linalg.solve(covariance, error[:, :, None])[:, :, 0]).sum(axis=1)
-    return float((squared < 4.605).mean())
+from touch.labelled import RADIUS, ROWS, Floats, held, places, presses
 
 
 @pytest.fixture(scope="module")
@@ -216,6 +192,21 @@ def test_labels_outside_the_skin_are_refused() -> None:
     assert "metres" in str(caught.value)
     with pytest.raises(DataError, match="shape"):
         Locator.fit(dv[:, 1:], xy, skin=skin)
+
+
+def test_how_far_outside_is_measured_from_the_outline() -> None:
+    """A press 3 mm beyond the short end of a long skin is as much at its rim as one at its side."""
+    region = Region(np.array([[-0.2, -0.02], [0.2, -0.02], [0.2, 0.02], [-0.2, 0.02]]))
+    inside = [[0.1, 0.01], [0.0, -0.01], [-0.1, 0.01]] * 2
+    rims = [[0.203, 0.0], [0.0, 0.023], [-0.202, -0.022]]
+    np.testing.assert_allclose(
+        region.beyond(np.array([*rims, [0.1, 0.01]])), [0.003, 0.003, 0.002 * np.sqrt(2), 0]
+    )
+    for place in rims:
+        Presses.of(np.ones((7, 2)), [*inside, place]).within(region)
+    for place in ([0.208, 0.0], [0.0, 0.028]):
+        with pytest.raises(DataError, match="press 6"):
+            Presses.of(np.ones((7, 2)), [*inside, place]).within(region)
 
 
 def test_a_calibration_of_another_pattern_or_skin_is_refused() -> None:

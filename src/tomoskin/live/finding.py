@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, Image, Reading
 from tomoskin.live.prepare import Prepared
 from tomoskin.signal import Reference
-from tomoskin.touch import Locator, NoiseFloor, SpotFinder, SpotModel, measured_covariance
+from tomoskin.source import Configuration, ScanSettings
+from tomoskin.touch import (
+    WHOLE,
+    Locator,
+    NoiseFloor,
+    Pace,
+    SpotFinder,
+    SpotModel,
+    measured_covariance,
+)
 
 _ALL = 0.999
 """Part of a row that is taken for all of it."""
@@ -69,11 +78,21 @@ class InImage:
 class InData:
     """Touches are fitted to the data themselves; a filter over frames does not enter."""
 
-    def __init__(self, model: SpotModel, prepared: Prepared, reference: Reference | None) -> None:
+    def __init__(
+        self,
+        model: SpotModel,
+        prepared: Prepared,
+        reference: Reference | None,
+        pace: Pace = WHOLE,
+    ) -> None:
         gain = _gain(model, prepared, reference)
         noise = _noise(prepared, reference, gain)
         self._model = model
-        self._spots = SpotFinder(model, prepared.skin, prepared.mesh, noise, gain)
+        skin, settings = prepared.skin, ScanSettings.of(prepared.skin)
+        scan_time = Configuration.of(prepared.scan, settings).scan_time
+        self._spots = SpotFinder(
+            model, skin, prepared.mesh, noise, gain, scan_time=scan_time, pace=pace
+        )
 
     def renew(self, prepared: Prepared, reference: Reference | None) -> None:
         """See :class:`Finder`."""
@@ -121,13 +140,16 @@ class ByCalibration:
         ]
 
 
-def finding(prepared: Prepared, reference: Reference | None) -> Finder:
-    """What finds the touches: a calibration, else the method that the skin names."""
+def finding(prepared: Prepared, reference: Reference | None, pace: Pace = WHOLE) -> Finder:
+    """What finds the touches: a calibration, else the method that the skin names.
+
+    ``pace`` says how much of a fit is tried in a frame.
+    """
     if prepared.locator is not None:
         return ByCalibration(prepared.locator, prepared, reference)
     if prepared.spots is None:
         return InImage(prepared)
-    return InData(prepared.spots, prepared, reference)
+    return InData(prepared.spots, prepared, reference, pace)
 
 
 def rows_of(missing: NDArray[np.bool_]) -> FloatArray:

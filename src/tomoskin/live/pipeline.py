@@ -18,7 +18,7 @@ from tomoskin.live.result import ReferenceState, Result
 from tomoskin.live.tune import tune
 from tomoskin.live.watch import Watch
 from tomoskin.signal import Health, Reference
-from tomoskin.touch import BendReading, Tracker, TrackSettings
+from tomoskin.touch import LIVE, BendReading, Tracker, TrackSettings
 
 REFERENCE_FRAMES = 20
 """Frames of the untouched skin that make a reference."""
@@ -44,7 +44,7 @@ class Pipeline:
         self._reference: Reference | None = None
         self._watch: Watch | None = None
         self._imaging: Alone | Filtered = Alone(prepared, None)
-        self._finder: Finder = finding(prepared, None)
+        self._finder: Finder = finding(prepared, None, LIVE)
         self._bends: Bends | None = None
         self._times: list[float] = []
         self._tuning: Generator[None, None, Prepared] | None = None
@@ -150,7 +150,7 @@ class Pipeline:
         watch = self._watch
         prepared, blind = (watch.prepared, watch.steady()) if watch else (self._prepared, None)
         self._imaging = imaging(prepared, reference, self._interval(), blind)
-        self._finder = finding(prepared, reference)
+        self._finder = finding(prepared, reference, LIVE)
         self._bends = bends_of(prepared, reference)
 
     def _tune(self, reference: Reference) -> None:

@@ -8,9 +8,9 @@ from tomoskin.touch.bending import (
     JointReference,
 )
 from tomoskin.touch.design import Demand, Promise, Variant, promise, variants
-from tomoskin.touch.fit import SpotFinder, SpotModel, measured_covariance
+from tomoskin.touch.fit import LIVE, WHOLE, Pace, SpotFinder, SpotModel, measured_covariance
 from tomoskin.touch.floor import NoiseFloor
-from tomoskin.touch.locator import Locator, Presses, Region
+from tomoskin.touch.locator import Locator, Presses, Region, Watch
 from tomoskin.touch.segment import Segmenter
 from tomoskin.touch.several import Several
 from tomoskin.touch.states import Answers, Codes, Examples, StateClassifier, against_rest
@@ -18,7 +18,9 @@ from tomoskin.touch.tracking import STILL, TouchEvent, Tracker, TrackSettings
 from tomoskin.touch.wiring import Wiring, WiringAnswer, ring_of, solve_wiring
 
 __all__ = [
+    "LIVE",
     "STILL",
+    "WHOLE",
     "Answers",
     "BendExamples",
     "BendModel",
@@ -30,6 +32,7 @@ __all__ = [
     "JointReference",
     "Locator",
     "NoiseFloor",
+    "Pace",
     "Presses",
     "Promise",
     "Region",
@@ -42,6 +45,7 @@ __all__ = [
     "TrackSettings",
     "Tracker",
     "Variant",
+    "Watch",
     "Wiring",
     "WiringAnswer",
     "against_rest",

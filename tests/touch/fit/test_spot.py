@@ -69,14 +69,15 @@ def test_a_direction_is_that_of_a_tensor_on_the_whole_model() -> None:
     assert change == pytest.approx(response.jacobian(spot)[0])
     assert jacobian == pytest.approx(response.jacobian(spot)[1])
     cells, height = response.spots.change(spot)
-    own, (xx, xy, yy) = response.spots.directed(spot[0])
+    part = response.spots.part(spot[0])
+    own, (xx, xy) = part.cells, part.directed
     sigma = response.state.conductivity.copy()
     sigma[cells] *= np.exp(height)
     found = []
     for step in (1e-3, -1e-3):
         tensor = sigma[:, None, None] * np.eye(2)
-        part = np.array([[xx, xy], [xy, yy]]).transpose(2, 0, 1)
-        tensor[own] += step * sigma[own, None, None] * part
+        turned = np.array([[xx, xy], [xy, -xx]]).transpose(2, 0, 1)
+        tensor[own] += step * sigma[own, None, None] * turned
         found.append(response.state.model.at(tensor).voltages)
     slope = (found[0] - found[1]) / 2e-3
     assert directed[:, 0] == pytest.approx(slope, abs=1e-4 * np.abs(slope).max())

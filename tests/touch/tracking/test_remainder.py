@@ -103,3 +103,10 @@ def test_what_a_press_leaves_while_it_still_slides_is_no_touch() -> None:
     assert run.happened == [("onset", 1)]
     run([[sized(1, 0.1), reading(0.0, peak=-0.3, snr=40.0)]] * 8)
     assert run.happened == [("onset", 1), ("onset", 2)]
+
+
+def test_what_shrinks_to_a_remainder_before_it_is_reported_is_no_touch() -> None:
+    """A fit may take what a slide leaves for more than it is in a single frame."""
+    run = Run(20)([[sized(1, 0.012 * k)] for k in range(6)])
+    run([[sized(1, 0.07), sized(0.5)], [sized(1, 0.07), sized(LEFT)], [sized(1, 0.07)]] * 4)
+    assert run.happened == [("onset", 1)]

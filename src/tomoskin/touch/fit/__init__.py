@@ -8,9 +8,13 @@ from tomoskin.touch.fit.bound import (
 )
 from tomoskin.touch.fit.finder import SpotFinder, SpotModel
 from tomoskin.touch.fit.noise import Whitener, measured_covariance, row_covariance
+from tomoskin.touch.fit.pace import LIVE, WHOLE, Pace
 from tomoskin.touch.fit.spot import Response, Spots, depth_of, spots_of
 
 __all__ = [
+    "LIVE",
+    "WHOLE",
+    "Pace",
     "Response",
     "SpotFinder",
     "SpotModel",

@@ -11,6 +11,7 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.prior import Prior
+from tomoskin.touch.fit.refine import Weigh
 from tomoskin.touch.fit.spot import CONTENT, Response, spots_of
 
 _SPACING = 0.7
@@ -51,8 +52,7 @@ class Candidates:
 
     def matched(self, whiten: Whitener) -> Matched:
         """The same for one noise."""
-        signatures = whiten(self.signatures)
-        return Matched(self.spots, signatures, np.einsum("nr,nr->n", signatures, signatures))
+        return Matched.of(self.spots, whiten(self.signatures))
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +62,15 @@ class Matched:
     spots: FloatArray
     signatures: FloatArray
     squares: FloatArray
+
+    @classmethod
+    def of(cls, spots: FloatArray, signatures: FloatArray) -> Self:
+        """Spots (n, 4) of these signatures (n, r)."""
+        return cls(spots, signatures, np.einsum("nr,nr->n", signatures, signatures))
+
+    def weighed(self, weigh: Weigh) -> Self:
+        """The same where some directions are not known."""
+        return self.of(self.spots, weigh(self.signatures.T).T)
 
     def ratios(
         self, residual: FloatArray, explained: FloatArray, sign: str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Self
@@ -14,16 +15,21 @@ from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
 from tomoskin.touch.fit.candidates import Candidates, Matched
 from tomoskin.touch.fit.noise import Whitener
+from tomoskin.touch.fit.pace import WHOLE, Pace
 from tomoskin.touch.fit.prior import Prior
-from tomoskin.touch.fit.refine import Problem, Sheet
+from tomoskin.touch.fit.refine import Problem, Sheet, Weigh
 from tomoskin.touch.fit.search import Found, Search, joined
 from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
+from tomoskin.touch.fit.trail import Trail
 
 _CELLS = 1500
 """Of the mesh that spots are fitted on: their profile is smooth, and a frame is quick."""
 
 _MOST = 5
 """Touches at once: more have more parameters than 8 or 16 electrodes tell apart."""
+
+_SPEED = 0.1
+"""Of touches along each axis, standard deviation, m/s."""
 
 _MASKS = 8
 """Sets of blind directions whose whitening is kept."""
@@ -85,12 +91,27 @@ class SpotFinder:
         (n_meas, n_meas) covariance of difference data, the reference's own part included.
     gain
         Of the data against the model: the ratio of their references.
+    scan_time
+        Between two frames, s: in it touches move and grow. 0 where rows are read all at once.
+    pace
+        How much is tried in a frame.
     """
 
     def __init__(
-        self, model: SpotModel, skin: Skin, mesh: Mesh, noise: FloatArray, gain: float = 1.0
+        self,
+        model: SpotModel,
+        skin: Skin,
+        mesh: Mesh,
+        noise: FloatArray,
+        gain: float = 1.0,
+        *,
+        scan_time: float = 0.0,
+        pace: Pace = WHOLE,
     ) -> None:
         self._model, self._settings, self._mesh = model, skin.touch, mesh
+        self._pace, self._reach = pace, _SPEED * scan_time
+        self._fading = math.ceil(pace.fading / scan_time) if scan_time else 0
+        self._trail = Trail.none(len(model.scale))
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
         self._before = np.zeros((0, N_PARAMETERS))
@@ -108,17 +129,22 @@ class SpotFinder:
         ``blind`` (n_meas, k) are directions along which the data say nothing: columns of one row
         each where rows are left out. There must be more rows than that.
         """
-        whiten, matched = self._whitened(blind)
+        quiet, candidates = self._whitened(blind)
+        whiten, matched = self._with_trail(quiet, candidates)
         problem = Problem(
             response=self._model.response,
             whiten=whiten,
             prior=self._model.prior,
             sheet=self._model.sheet,
             sign=self._settings.sign,
+            reach=self._reach,
             data=whiten(dv / self._scale),
         )
-        found = Search(problem, matched, self._settings.snr, self._most)(self._before)
+        search = Search(problem, matched, self._settings.snr, self._most, self._pace, quiet)
+        found = search(self._before)
         self._before = found.fit.spots
+        if self._fading:
+            self._trail = self._trail.after(self._before, self._model.response, self._fading)
         readings = self._readings(joined(found))
         readings.sort(key=lambda reading: -abs(reading.peak))
         return readings
@@ -132,6 +158,13 @@ class SpotFinder:
                 self._matched.popitem(last=False)
         self._matched.move_to_end(key)
         return self._matched[key]
+
+    def _with_trail(self, whiten: Whitener, matched: Matched) -> tuple[Whitener, Matched]:
+        """The same where what touches have left behind them is noise."""
+        if not len(self._trail.spots):
+            return whiten, matched
+        weigh = Weigh.of(whiten(self._trail.directions.T).T)
+        return Whitener(weigh(whiten.matrix)), matched.weighed(weigh)
 
     def _readings(self, found: Found) -> list[Reading]:
         spots = found.fit.spots

@@ -15,7 +15,7 @@ from tomoskin.core import FloatArray
 from tomoskin.mesh import Mesh
 from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.prior import Prior
-from tomoskin.touch.fit.spot import N_PARAMETERS, Response
+from tomoskin.touch.fit.spot import CONTENT, N_PARAMETERS, Response, X, Y
 
 _SETTLED = 0.02
 """Newton decrement, squared, at which a step is too small to matter: 0.14 deviations."""
@@ -24,7 +24,10 @@ _LEAST_DAMPING = 1e-6
 
 
 _DIRECTED = 0.7
-"""Standard deviation of a spot's direction (:meth:`Spots.directed`) about none."""
+"""Standard deviation of a spot's direction (:class:`Part`) about none."""
+
+_GROWS = 0.5
+"""Standard deviation of what a touch grows by within a scan, in parts of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +121,8 @@ class Fit:
 class Problem:
     """Whitened data (r,) of one frame, and what they are explained with.
 
-    ``sign`` is "decrease", "increase" or "both".
+    ``sign`` is "decrease", "increase" or "both"; ``reach`` the standard deviation of a touch's way
+    within a scan, m; 0 where rows are read all at once.
     """
 
     response: Response
@@ -126,6 +130,7 @@ class Problem:
     prior: Prior
     sheet: Sheet
     sign: str
+    reach: float
     data: FloatArray
 
     def nothing(self) -> Fit:
@@ -139,29 +144,44 @@ class Problem:
     def at(self, spots: FloatArray) -> Fit:
         """The frame with these spots, as they are."""
         change, jacobian, directed = self.response.expanded(spots)
-        seen, weigh = self.whiten(change), Weigh.of(_DIRECTED * self.whiten(directed.T).T)
+        unknown = np.hstack([_DIRECTED * directed, self._within_scan(spots, jacobian)])
+        seen, weigh = self.whiten(change), Weigh.of(self.whiten(unknown.T).T)
         residual, slope = weigh(self.data - seen), weigh(self.whiten(jacobian.T).T)
         away, weights = self.prior.away(spots), np.tile(self.prior.weights, len(spots))
         normal = slope.T @ slope + np.diag(weights**2)
         cost = (residual @ residual + float((away**2).sum())) / 2
         return Fit(spots, seen, residual, slope, weigh, normal, float(cost))
 
+    def _within_scan(self, spots: FloatArray, jacobian: FloatArray) -> FloatArray:
+        """(n_meas, 3k) V: what it does that touches move along x and y, and grow, while the rows
+        are read one after the other."""
+        if not self.reach:
+            return np.zeros((len(jacobian), 0))
+        early = self.response.times[:, None]
+        moves = early * jacobian * self.reach
+        grows = early * jacobian[:, CONTENT::N_PARAMETERS] * (_GROWS * spots[:, CONTENT])
+        return np.hstack([moves[:, X::N_PARAMETERS], moves[:, Y::N_PARAMETERS], grows])
+
     def refined(self, spots: FloatArray, most: int) -> Fit:
-        """The minimum of the cost near ``spots`` (k, 4), after at most so many steps.
+        """The minimum of the cost near ``spots`` (k, 4), after at most so many steps."""
+        return self.settled(self.at(self._allowed(spots)), most)
+
+    def settled(self, best: Fit, most: int) -> Fit:
+        """The minimum of the cost near ``best``, after at most so many steps.
 
         Levenberg (1944) and Marquardt (1963): damping relative to the diagonal.
         """
-        best, damping = self.at(self._allowed(spots)), _LEAST_DAMPING
+        damping = _LEAST_DAMPING
         for _ in range(most):
             gradient = self._gradient(best)
             step = _solved(best.normal, gradient, damping)
             if gradient @ step < _SETTLED:
-                return best
+                return replace(best, settled=True)
             tried = self.at(self._allowed(best.spots + step.reshape(-1, N_PARAMETERS)))
             if tried.cost < best.cost:
                 best, damping = tried, max(damping / 10, _LEAST_DAMPING)
             elif damping > 1e3:
-                return best
+                return replace(best, settled=True)
             else:
                 damping = max(damping * 30, 1e-2)
         return replace(best, settled=False)

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.candidates import Matched
+from tomoskin.touch.fit.noise import Whitener
+from tomoskin.touch.fit.pace import Pace
 from tomoskin.touch.fit.refine import Fit, Problem
 from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, bell
 
@@ -27,9 +29,6 @@ _SHAPE_DOUBT = 0.5
 _UNEVEN = 0.08
 """Part by which each row answers a touch otherwise than the model's, at the least: a sheet is
 uneven, contacts and gains differ. A standard deviation, chosen on the twin's seeds 1 to 3."""
-
-_COLD, _WARM = 15, 6
-"""Steps from a rough start, and from the frame before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,23 +67,31 @@ class Search:
         Likelihood ratio, in deviations, at which a touch begins.
     most
         Touches that are looked for at most.
+    pace
+        How much is tried.
+    quiet
+        What makes data white where nothing has been: by that noise readings say how far they stand
+        out, while by the problem's it is decided whether they are touches.
     """
 
     problem: Problem
     matched: Matched
     least: float
     most: int
+    pace: Pace
+    quiet: Whitener
 
     def __call__(self, before: FloatArray) -> Found:
-        """Touches of the frame; ``before`` (k, 4) are those of the last one.
-
-        Where these do not go on as they were, the frame is looked at without them too, and what
-        has more evidence counts.
-        """
-        warm = self._more(self._pruned(self._started(before)))
-        if len(before) and (len(warm.spots) != len(before) or not warm.settled):
-            warm = max(self._more(self.problem.nothing()), warm, key=self._evidence)
-        return self._judged(warm)
+        """Touches of the frame; ``before`` (k, 4) are those of the last one."""
+        kept = self._pruned(self._started(before))
+        tries = self.pace.tries - (len(before) - len(kept.spots) if len(kept.spots) else 0)
+        fit, tried = self._more(kept, tries)
+        if tries > tried == 0:
+            fit = self._fewer(fit)
+        if self.pace.anew and len(before) and (len(fit.spots) != len(before) or not fit.settled):
+            anew, _ = self._more(self.problem.nothing(), self.pace.tries)
+            fit = max(anew, fit, key=self._evidence)
+        return self._judged(fit)
 
     def _evidence(self, fit: Fit) -> float:
         return fit.log_evidence(self.problem.prior)
@@ -92,7 +99,7 @@ class Search:
     def _started(self, before: FloatArray) -> Fit:
         if not len(before):
             return self.problem.nothing()
-        return self.problem.refined(before[: self.most], _WARM)
+        return self.problem.refined(before[: self.most], self.pace.warm)
 
     def _pruned(self, fit: Fit) -> Fit:
         """Without the spots that have faded."""
@@ -101,23 +108,36 @@ class Search:
             weakest = int(ratio.argmin())
             if ratio[weakest] >= HELD * self.least:
                 return fit
-            left = np.delete(fit.spots, weakest, axis=0)
-            fit = self.problem.refined(left, _WARM) if len(left) else self.problem.nothing()
+            fit = self._without(fit, weakest)
         return fit
 
-    def _more(self, fit: Fit) -> Fit:
-        """With further spots, while they are worth it."""
-        while len(fit.spots) < self.most:
+    def _without(self, fit: Fit, number: int) -> Fit:
+        left = np.delete(fit.spots, number, axis=0)
+        return self._started(left)
+
+    def _fewer(self, fit: Fit) -> Fit:
+        """Without the weakest of several spots, where that explains the frame as well."""
+        if len(fit.spots) < 2:
+            return fit
+        ratio = self._ratios(fit)
+        weakest = int(ratio.argmin())
+        if fit.settled and ratio[weakest] >= self.least:
+            return fit
+        return max(fit, self._without(fit, weakest), key=self._evidence)
+
+    def _more(self, fit: Fit, tries: int) -> tuple[Fit, int]:
+        """With further spots, while they are worth it; and how many of ``tries`` were tried."""
+        for tried in range(min(tries, self.most - len(fit.spots))):
             ratio, content = self._standing_out(fit)
             best = int(ratio.argmax())
             if ratio[best] < self._threshold(fit, HELD if not len(fit.spots) else _DOUBTFUL):
-                return fit
-            tried = self._best(self._starts(fit, self.matched.spot(best, content)))
-            worth = self._ratios(tried).min() >= self._threshold(fit, 1.0)
-            if not worth or self._evidence(tried) <= self._evidence(fit):
-                return fit
-            fit = tried
-        return fit
+                return fit, tried
+            more = self._best(self._starts(fit, self.matched.spot(best, content)))
+            worth = self._ratios(more).min() >= self._threshold(fit, 1.0)
+            if not worth or self._evidence(more) <= self._evidence(fit):
+                return fit, tried + 1
+            fit = more
+        return fit, tries
 
     def _threshold(self, fit: Fit, part: float) -> float:
         """What a wrong profile may leave adds to the noise."""
@@ -142,7 +162,9 @@ class Search:
         return starts
 
     def _best(self, starts: list[FloatArray]) -> Fit:
-        return min((self.problem.refined(s, _COLD) for s in starts), key=lambda fit: fit.cost)
+        seen = (self.problem.refined(start, self.pace.glance) for start in starts)
+        best = min(seen, key=lambda fit: fit.cost)
+        return best if best.settled else self.problem.settled(best, self.pace.cold)
 
     def _ratios(self, fit: Fit) -> FloatArray:
         """(k,) size of what each spot changes that the others could not take up."""
@@ -163,7 +185,14 @@ class Search:
             none = np.zeros(0)
             return Found(fit, none, np.zeros((0, 0)), none.astype(bool))
         covariance = self._covariance(fit)
-        return Found(fit, self._ratios(fit), covariance, self._close(fit))
+        return Found(fit, self._standing(fit), covariance, self._close(fit))
+
+    def _standing(self, fit: Fit) -> FloatArray:
+        """(k,) deviations of the quiet noise by which each spot stands out."""
+        if self.quiet is self.problem.whiten:
+            return self._ratios(fit)
+        problem = replace(self.problem, whiten=self.quiet)
+        return replace(self, problem=problem)._ratios(problem.at(fit.spots))
 
     def _covariance(self, fit: Fit) -> FloatArray:
         """Curvature, scaled where the data scatter more than they should; and the model's part.

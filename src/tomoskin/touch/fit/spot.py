@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -96,6 +98,30 @@ def depth_of(spots: FloatArray) -> FloatArray:
 Shape = Callable[[FloatArray], FloatArray]
 
 
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One spot on its cells.
+
+    Attributes
+    ----------
+    cells
+        (c,) those that it may reach.
+    height
+        (c,) change of log σ.
+    slopes
+        (4, c) derivatives of that by each column of the spot.
+    directed
+        (2, c) xx = −yy and xy of a part of log σ that has a direction: a stretched sheet conducts
+        otherwise along the stretch than across. Round a press that is
+        depth · r|dg/dr|/2 · (r̂r̂ᵀ − 1/2): none in the middle, most on the flank.
+    """
+
+    cells: IntArray
+    height: FloatArray
+    slopes: FloatArray
+    directed: FloatArray
+
+
 class Spots:
     """Spots on the cells of a mesh of triangles in the sheet's own flat coordinates.
 
@@ -129,20 +155,9 @@ class Spots:
             total[own] += depth_of(spot) * shape(square).mean(axis=1)
         return cells, total[cells]
 
-    def slopes(self, spots: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
-        """As :meth:`change`, and (4k, c) its derivatives by each column of each spot."""
-        near = [self._near(spot) for spot in spots]
-        cells, total = self._joined(near), np.zeros(len(self.mesh.cells))
-        rows = np.zeros((N_PARAMETERS * len(spots), len(cells)))
-        for number, (spot, own) in enumerate(zip(spots, near, strict=True)):
-            height, slope = self._slope(spot, own)
-            total[own] += height
-            first = N_PARAMETERS * number
-            rows[first : first + N_PARAMETERS, np.searchsorted(cells, own)] = slope
-        return cells, total[cells], rows
-
-    def _slope(self, spot: FloatArray, cells: IntArray) -> tuple[FloatArray, FloatArray]:
-        """(c,) change of log σ by one spot, and (4, c) its derivatives."""
+    def part(self, spot: FloatArray) -> Part:
+        """What one spot (4,) does to its cells, and how that depends on it."""
+        cells = self._near(spot)
         square, offset = self._squares(spot, cells)
         depth, reach = float(depth_of(spot)), REACH * float(np.exp(spot[LOG_RADIUS]))
         height, fall = _with_steepness(square)
@@ -151,22 +166,9 @@ class Spots:
         towards = -2.0 / reach**2 / _SPLIT**2 * np.einsum("cq,cqd->dc", fall, offset)
         wider = -2.0 * (depth * mean + (fall * square).mean(axis=1))
         more = mean * (REACH**2 / FILLING / reach**2)
-        return depth * mean, np.stack([*towards, wider, more])
-
-    def directed(self, spot: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Cells (c,) of one spot, and (3, c) xx, xy, yy of a part of log σ that has a direction.
-
-        A stretched sheet conducts otherwise along the stretch than across. Round a press that is
-        depth · r|dg/dr|/2 · (r̂r̂ᵀ − 1/2): none in the middle, most on the flank.
-        """
-        cells = self._near(spot)
-        square, offset = self._squares(spot, cells)
-        _, fall = _with_steepness(square)
-        weight = -float(depth_of(spot)) * square * fall
-        away = np.maximum(np.einsum("cqd,cqd->cq", offset, offset), 1e-30)
-        x, y = offset[..., 0], offset[..., 1]
-        xx, xy = (weight * (x * x / away - 0.5)).mean(axis=1), (weight * x * y / away).mean(axis=1)
-        return cells, np.stack([xx, xy, -xx])
+        return Part(
+            cells, depth * mean, np.stack([*towards, wider, more]), _along(-square * fall, offset)
+        )
 
     def _squares(self, spot: FloatArray, cells: IntArray) -> tuple[FloatArray, FloatArray]:
         """(c, q) squared distances in reaches of the points of cells, and (c, q, 2) offsets, m."""
@@ -197,6 +199,12 @@ class Response:
         self.state = state
         self.spots = Spots(state.model.mesh)
 
+    @cached_property
+    def times(self) -> FloatArray:
+        """(n_meas,) when each row is read, in parts of a scan about its middle."""
+        index = self.state.model.pattern.drive_index
+        return np.asarray((index + 0.5) / (index.max() + 1) - 0.5)
+
     @property
     def reference(self) -> FloatArray:
         """(n_meas,) V without a spot."""
@@ -217,40 +225,26 @@ class Response:
 
         The fields of the pressed sheet give both, by reciprocity, whatever the number of spots.
         """
-        pressed, slopes = self._pressed_state(spots)
-        return pressed.voltages - self.reference, slopes
+        return self.expanded(spots)[:2]
 
     def expanded(self, spots: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """As :meth:`jacobian`, and (n_meas, k) V: derivatives by a direction of each spot.
 
-        See :meth:`Spots.directed`.
+        See :class:`Part`.
         """
-        pressed, slopes = self._pressed_state(spots)
-        towards = np.stack([self._directed(pressed, spot) for spot in spots], axis=1)
-        return pressed.voltages - self.reference, slopes, towards
-
-    def _pressed_state(self, spots: FloatArray) -> tuple[State, FloatArray]:
-        """The sheet under spots, and (n_meas, 4k) derivatives."""
-        cells, change, slopes = self.spots.slopes(spots)
-        _, sigma = self._pressed(cells, change)
-        pressed = self._whole(cells, sigma)
-        by_cell = pressed.jacobian.take(cells, axis=1)
-        return pressed, by_cell @ (slopes * sigma).T
+        parts = [self.spots.part(spot) for spot in spots]
+        change = np.zeros(len(self.state.conductivity))
+        for part in parts:
+            change[part.cells] += part.height
+        pressed = self.state.model.at(self.state.conductivity * np.exp(change))
+        found = np.array([_answers(pressed, part) for part in parts])
+        slopes = found[:, :N_PARAMETERS].reshape(-1, found.shape[2]).T
+        return pressed.voltages - self.reference, slopes, found[:, N_PARAMETERS].T
 
     def _whole(self, cells: IntArray, sigma: FloatArray) -> State:
         conductivity = self.state.conductivity.copy()
         conductivity[cells] = sigma
         return self.state.model.at(conductivity)
-
-    def _directed(self, pressed: State, spot: FloatArray) -> FloatArray:
-        """(n_meas,) V: −∫ ∇u · δσ ∇w for a change δσ that has a direction."""
-        cells, (xx, xy, yy) = self.spots.directed(spot)
-        field = pressed.gradient[:, :, cells]
-        sigma = pressed.conductivity[cells]
-        x, y = field[:, 0] * sigma, field[:, 1] * sigma
-        flow = np.concatenate([x * xx + y * xy, x * xy + y * yy], axis=1)
-        moved = flow @ field.reshape(len(field), -1).T
-        return np.asarray(-pressed.model.voltages(moved))
 
     def each(self, spots: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
         """:meth:`jacobian` of each of ``spots`` (n, 4), alone on the sheet."""
@@ -259,6 +253,26 @@ class Response:
 
     def _pressed(self, cells: IntArray, change: FloatArray) -> tuple[IntArray, FloatArray]:
         return cells, self.state.conductivity[cells] * np.exp(change)
+
+
+def _answers(pressed: State, part: Part) -> FloatArray:
+    """(5, n_meas) V: −∫ ∇u · ∂σ ∇w for a spot's four columns, and for its direction."""
+    field = pressed.gradient[:, :, part.cells]
+    n, sigma = len(field), pressed.conductivity[part.cells]
+    flow = np.empty((N_PARAMETERS + 1, *field.shape))
+    np.multiply(field, (part.slopes * sigma)[:, None, None], out=flow[:-1])
+    (x, y), (xx, xy) = field.swapaxes(0, 1), part.directed * sigma
+    flow[-1, :, 0], flow[-1, :, 1] = x * xx + y * xy, x * xy - y * xx
+    moved = flow.reshape(len(flow) * n, -1) @ field.reshape(n, -1).T
+    return np.asarray(-pressed.model.voltages(moved.reshape(-1, n, n)))
+
+
+def _along(weight: FloatArray, offset: FloatArray) -> FloatArray:
+    """(2, c) mean of weight (c, q) times xx and xy of r̂r̂ᵀ − 1/2, for offsets (c, q, 2)."""
+    away = np.maximum(np.einsum("cqd,cqd->cq", offset, offset), 1e-30)
+    x, y = offset[..., 0], offset[..., 1]
+    xx, xy = weight * (x * x / away - 0.5), weight * x * y / away
+    return np.stack([xx.mean(axis=1), xy.mean(axis=1)])
 
 
 def _sub_centroids(split: int) -> FloatArray:

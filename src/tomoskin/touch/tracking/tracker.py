@@ -166,6 +166,9 @@ class Tracker:
             return
         if not self._lasts(trace.since, self.settings.onset):
             return
+        if self._remainders.explain(trace.reading, self._now, self._traces):
+            self._traces.remove(trace)
+            return
         origin = left_by(trace, self._traces)
         if origin is None:
             self.numbered += 1

@@ -1,0 +1,39 @@
+"""How much is tried in one frame: all there is to try, or what leaves time for the next one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """Steps are those of Levenberg–Marquardt; each solves the sheet once.
+
+    Attributes
+    ----------
+    warm
+        Steps from the touches of the frame before.
+    glance, cold
+        Steps from each of the places where a new touch may begin, and then from the best one.
+    tries
+        New touches that are tried in a frame.
+    anew
+        Whether a frame that does not go on as it was is looked at without what was there too.
+    fading
+        Seconds for which what touches have left behind them counts as noise; 0 where frames do
+        not follow each other.
+    """
+
+    warm: int
+    glance: int
+    cold: int
+    tries: int
+    anew: bool
+    fading: float
+
+
+WHOLE = Pace(warm=6, glance=15, cold=0, tries=5, anew=True, fading=0.0)
+"""Each frame as if it were the only one."""
+
+LIVE = Pace(warm=4, glance=1, cold=4, tries=1, anew=False, fading=4.0)
+"""What is not found in this frame is found in the next: one more touch a frame."""

@@ -1,0 +1,123 @@
+"""Live: what moves is one touch, what it leaves behind is none, and a frame's work is bounded."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tomoskin.core import FloatArray, Reading
+from tomoskin.touch import LIVE, WHOLE, Pace, SpotFinder
+from tomoskin.touch.fit.refine import Fit, Problem
+from touch.fit.scene import covariance, noise
+from touch.fit.test_finder import NOTHING, data, model, place, press, skin, spread
+
+SCAN = 0.1
+"""Seconds of a scan."""
+
+STANDING = press(0.05, 0.0, depth=-0.5)
+LEFT = 0.12
+"""Part of a press that stays behind."""
+
+
+def finder(pace: Pace = LIVE, scan_time: float = SCAN) -> SpotFinder:
+    return SpotFinder(model(), skin(), skin().mesh(), covariance(), scan_time=scan_time, pace=pace)
+
+
+def is_at(reading: Reading, x: float, y: float) -> bool:
+    """Within three deviations, which are a few millimetres."""
+    away = place(reading) - [x, y]
+    return bool(away @ np.linalg.solve(spread(reading), away) < 9 and reading.sd_x < 5e-3)
+
+
+def moving(begin: FloatArray, end: FloatArray) -> FloatArray:
+    """Rows of a press that goes from one place to the other while they are read."""
+    response, pattern = model().response, model().response.state.model.pattern
+    way = (response.times + 0.5)[:, None, None]
+    each = response.changes(list(begin + np.unique(way, axis=0) * (end - begin)))
+    return np.asarray(each[pattern.drive_index, np.arange(pattern.n_meas)])
+
+
+def test_a_press_that_moves_during_a_scan_is_one_touch_in_the_middle_of_its_way() -> None:
+    begin, end = (press(x, 0.03, depth=-0.6) for x in (0.015, 0.04))
+    smeared = moving(begin, end) + noise(16, 1, 3)[0]
+    (reading,) = finder(WHOLE).push(smeared, NOTHING)
+    assert is_at(reading, 0.0275, 0.03)
+    at_once = finder(WHOLE, scan_time=0.0).push(smeared, NOTHING)
+    assert len(at_once) > 1 or not is_at(at_once[0], 0.0275, 0.03), "the scan's time tells"
+
+
+def test_a_press_that_begins_during_a_scan_is_where_it_is() -> None:
+    rising = model().response.times + 0.5
+    grown = data(press(-0.03, 0.04)) * rising + noise(16, 1, 4)[0]
+    (reading,) = finder(WHOLE).push(grown, NOTHING)
+    assert is_at(reading, -0.03, 0.04)
+
+
+def test_one_more_touch_a_frame() -> None:
+    ours = finder()
+    three = np.concatenate([press(-0.05, 0.0), press(0.05, 0.02), press(0.0, -0.06)])
+    counts = [len(ours.push(data(three) + n, NOTHING)) for n in noise(16, 5, 5)]
+    assert counts == [1, 2, 3, 3, 3]
+    assert len(finder(WHOLE).push(data(three), NOTHING)) == 3
+
+
+def test_a_frame_solves_the_sheet_a_bounded_number_of_times(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    solved, at = [0], Problem.at
+
+    def counted(problem: Problem, spots: FloatArray) -> Fit:
+        solved[-1] += 1
+        return at(problem, spots)
+
+    monkeypatch.setattr(Problem, "at", counted)
+    ours = finder()
+    three = np.concatenate([press(-0.05, 0.0), press(0.05, 0.02), press(0.0, -0.06)])
+    frames = [*[three] * 4, np.add(three, [0.01, 0.0, 0.0, 0.0]), STANDING, three]
+    for spots, n in zip(frames, noise(16, len(frames), 6), strict=True):
+        ours.push(data(spots) + n, NOTHING)
+        solved.append(0)
+    # the touches of before and their steps, one pruning, two starts, the best one's steps, sizes
+    assert 0 < max(solved) <= 2 * (1 + LIVE.warm) + 2 * (1 + LIVE.glance) + LIVE.cold + 1
+
+
+def after_a_slide(pace: Pace) -> tuple[SpotFinder, list[Reading], FloatArray]:
+    """A finder, what it finds of a press that has left a part of itself behind, and that part."""
+    ours = finder(pace)
+    here = data(STANDING)
+    for n in noise(16, 3, 7):
+        ours.push(here + n, NOTHING)
+    there = data(press(-0.04, 0.0)) + LEFT * here
+    seen = [ours.push(there + n, NOTHING) for n in noise(16, 3, 8)]
+    return ours, seen[-1], LEFT * here
+
+
+def test_what_is_left_behind_is_no_touch_beside_one() -> None:
+    _, (reading,), _ = after_a_slide(LIVE)
+    assert is_at(reading, -0.04, 0.0)
+    _, alone, _ = after_a_slide(WHOLE)
+    assert len(alone) == 2, "frames by themselves show what there is"
+
+
+def test_how_far_a_touch_stands_out_is_told_by_the_noise_alone() -> None:
+    clean = data(STANDING)
+    first, later = finder(), finder()
+    (fresh,) = first.push(clean, NOTHING)
+    for _ in range(3):
+        (known,) = later.push(clean, NOTHING)
+    assert known.snr == pytest.approx(fresh.snr, rel=0.05)
+
+
+def test_after_some_time_without_a_touch_the_trail_is_forgotten() -> None:
+    ours, _, left = after_a_slide(LIVE)
+    found = [bool(ours.push(left + n, NOTHING)) for n in noise(16, 60, 9)]
+    quiet = round(LIVE.fading / SCAN)
+    assert not any(found[:quiet])
+    assert all(found[quiet + 2 :])
+
+
+def test_a_new_press_where_one_was_is_found() -> None:
+    ours, _, left = after_a_slide(LIVE)
+    frames = [left, left, 0.6 * data(STANDING), 0.6 * data(STANDING)]
+    found = [ours.push(dv + n, NOTHING) for dv, n in zip(frames, noise(16, 4, 10), strict=True)]
+    assert [len(readings) for readings in found] == [0, 0, 1, 1]
