@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import sys
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,10 +13,12 @@ import numpy as np
 
 from report import Report
 from tomoskin.core import FloatArray, Frame, Reading
+from tomoskin.live import Pipeline, Result
 from tomoskin.live.finding import View, finding, voltage_covariance
+from tomoskin.live.pipeline import REFERENCE_FRAMES
 from tomoskin.mesh import Cylinder, Hinge
 from tomoskin.signal import Reference
-from tomoskin.touch import BendExamples, BendModel, BendReader, JointReference
+from tomoskin.touch import BendExamples, BendModel, JointReference
 from tomoskin.twin import Bent, Pose, Press
 from touch_fit import HOLD, Lab, drawn
 
@@ -24,30 +28,49 @@ STRIP, FARTHEST = 0.06, 60.0
 TURNS = ((60, 10), (30, 10), (45, 15))
 """Of the calibration: as far as so many degrees and back, in such steps."""
 
-IDLE, FRAMES, PERIOD = 20, 60, 24
-TOUCHED = (1, 2, 4, 5)
-"""Of six frames, those with a touch."""
+LEARNT = sum(2 * round(top / step) for top, step in TURNS)
+
+IDLE, TOUCHES = 20, 30
+REST = 300.0
+"""Seconds that a sheet lies still before a reference is taken."""
+
+STEP, PERIOD, MOVING = 0.1, 240, 480
+"""Seconds between frames while it bends; frames of a bend there and back, and of the whole."""
+
+ON, EVERY = 15, 30
+"""Frames that a touch lasts, and from one to the next."""
+
+SETTLED = 4
+"""Frames from a touch's beginning or end to where it counts: the tracker takes three to be sure."""
+
+PLAIN = 10
+"""Of so many frames with a touch one is looked at without taking bends out too: what bends change
+is then explained by as many touches as there may be, which takes long."""
 
 JOINT = (0.0, 15.0, 30.0, 45.0, 60.0)
+BETWEEN = (7.0, 22.0, 37.0, 52.0)
+"""Degrees at which references were taken, and at which touches are looked for by them."""
 
 
 def run(data: Path | None) -> tuple[Report, ...]:
     """No recordings are needed: the twin is the truth."""
     del data
-    static, moving = [], []
-    for sheet in SHEETS:
-        benches = [Bench(sheet, seed) for seed in SEEDS]
-        static.append(_static_row(sheet, benches))
-        moving.append(_moving_row(sheet, benches))
+    return reports(tuple(SHEETS), SEEDS)
+
+
+def reports(sheets: Sequence[str], seeds: Sequence[int]) -> tuple[Report, ...]:
+    """Both tables; how far it is goes to stderr, a line for each twin."""
+    benches = {sheet: [_told(Bench(sheet, seed)) for seed in seeds] for sheet in sheets}
     return (
         Report(
             "touches on a bent sheet, textile-disc-16: median error, mm",
             ("sheet", "flat", "on 70 mm", "on 40 mm", "joint, own reference", "by its angle"),
-            tuple(static),
+            tuple(_static_row(sheet, found) for sheet, found in benches.items()),
             (
-                f"references taken after wrapping (radii); joint: a strip of {1e3 * STRIP:.0f} mm, "
-                f"references recorded at {', '.join(f'{a:.0f}' for a in JOINT)}°, touches between",
-                f"seeds {', '.join(map(str, SEEDS))}, chosen on 1 to 3; {FRAMES} touches each",
+                f"references taken {REST / 60:.0f} minutes after wrapping (radii); joint: a strip "
+                f"of {1e3 * STRIP:.0f} mm, references recorded at "
+                f"{', '.join(f'{a:.0f}' for a in JOINT)}°, up and down, touches between",
+                f"seeds {', '.join(map(str, seeds))}, chosen on 1 to 3; {TOUCHES} touches each",
             ),
         ),
         Report(
@@ -62,13 +85,22 @@ def run(data: Path | None) -> tuple[Report, ...]:
                 "beside a touch, rms",
                 "states right",
             ),
-            tuple(moving),
+            tuple(_moving_row(sheet, found) for sheet, found in benches.items()),
             (
-                "learnt from one recording of three bends and back, 36 frames",
-                "states: idle, bend, touch and both, a bend from 3° on",
+                f"learnt from one recording of three bends and back, {LEARNT} frames, after one "
+                f"bend and a rest; then {MOVING * STEP:.0f} s of frames, {1 / STEP:.0f}/s, through "
+                f"the live pipeline, touched for {ON * STEP:g} of every {EVERY * STEP:g} s",
+                "states: idle, bend, touch and both, a bend from 3° on; these and places "
+                f"{SETTLED * STEP:g} s after a touch began or ended; a radius where none is found",
             ),
         ),
     )
+
+
+def way(top: int, step: int) -> list[int]:
+    """Degrees: as far as ``top`` in such steps, and back."""
+    there = list(range(step, top + 1, step))
+    return [*there, *there[-2::-1], 0]
 
 
 def hinged(degrees: float) -> Pose:
@@ -91,28 +123,43 @@ class Bench:
     """One twin, and all that is measured on it; the sheet is never renewed."""
 
     def __init__(self, preset: str, seed: int) -> None:
+        began = time.monotonic()
+        self.name = f"{preset}, seed {seed}"
         self.lab = Lab("textile-disc-16", preset, seed)
         self.random = np.random.default_rng(seed)
         self.lab.board.sheet.renew()
-        self.flat = Reference.of(self.frames(IDLE))
         self.errors = {"flat": self.static(())}
-        self.moving = self.moved(self.learnt())
+        for angle in way(60, 15):
+            self.volts((), hinged(angle))
+        self.flat = self.reference(())
+        self.model = self.learnt()
+        self.moving = self.moved()
         for millimetres in (70, 40):
             self.errors[f"{millimetres}"] = self.static((Bent(Cylinder(1e-3 * millimetres)),))
         self.errors["own"], self.errors["joint"] = self.jointed()
+        self.taken = time.monotonic() - began
 
-    def volts(self, presses: Sequence[Press] = (), pose: Pose = ()) -> FloatArray:
-        """(n_meas,) V, one hold later."""
+    def frame(self, presses: Sequence[Press], pose: Pose, after: float) -> Frame:
+        """One frame ``after`` s more."""
         lab = self.lab
         lab.board.sheet.set_presses(tuple(presses))
         lab.board.sheet.set_pose(pose)
-        lab.time += HOLD
-        samples = lab.board.sample(lab.table, lab.time)
-        return lab.prepared.readout(Frame(0, 0, lab.time, 1, 0, 0, samples)).values
+        lab.time += after
+        ticks = round(lab.time * lab.skin.readout.tick_rate)
+        return Frame(0, ticks, lab.time, 1, 0, 0, lab.board.sample(lab.table, lab.time))
+
+    def volts(self, presses: Sequence[Press] = (), pose: Pose = ()) -> FloatArray:
+        """(n_meas,) V, one hold later."""
+        return self.lab.prepared.readout(self.frame(presses, pose, HOLD)).values
 
     def frames(self, count: int, pose: Pose = ()) -> FloatArray:
         """(count, n_meas) V that nothing touches."""
         return np.array([self.volts((), pose) for _ in range(count)])
+
+    def reference(self, pose: Pose) -> Reference:
+        """Of a sheet that has been held so for a while."""
+        self.frame((), pose, REST)
+        return Reference.of(self.frames(IDLE, pose))
 
     def finder(self, reference: Reference) -> Callable[[FloatArray, FloatArray], list[Reading]]:
         """What finds touches in V less the reference, beside directions that say nothing."""
@@ -122,23 +169,20 @@ class Bench:
 
     def static(self, pose: Pose) -> list[float]:
         """Errors of touches on a sheet that is held so, the reference taken there."""
-        self.frames(3, pose)
-        reference = Reference.of(self.frames(IDLE, pose))
+        reference = self.reference(pose)
         find, gain = self.finder(reference), reference.mean[:, None]
         found = []
-        for _ in range(FRAMES // 2):
+        for _ in range(TOUCHES):
             press = drawn(self.random, 1)
             found.append(missed(find(self.volts(press, pose) - reference.mean, gain), press))
             self.volts((), pose)
-        self.frames(3)
         return found
 
     def learnt(self) -> BendModel:
         """From one recording of known bends."""
         rows, angles, times = [], [], []
         for top, step in TURNS:
-            way = np.arange(step, top + 1, step)
-            for angle in [*way.tolist(), *way[-2::-1].tolist(), 0]:
+            for angle in way(top, step):
                 rows.append(self.volts((), hinged(angle)) - self.flat.mean)
                 angles.append(math.radians(angle))
                 times.append(self.lab.time)
@@ -146,29 +190,33 @@ class Bench:
         examples = BendExamples.of(np.array(rows), angles, axis, times)
         return BendModel.learn(examples, voltage_covariance(self.lab.prepared, self.flat))
 
-    def moved(self, model: BendModel) -> Found:
-        """Single touches and none while the sheet bends up and down."""
-        out, gain = Found(), self.flat.mean[:, None]
-        blind = np.hstack([gain, model.directions])
-        find, plain = self.finder(self.flat), self.finder(self.flat)
-        reader = BendReader(model, self.lab.prepared.spots.response)
-        for k in range(FRAMES * 3 // 2):
-            if k % 3 == 0:
+    def moved(self) -> Found:
+        """Single touches while the sheet bends up and down, as the live pipeline sees them."""
+        out, pipeline = Found(), Pipeline(self.lab.prepared.that_bends(self.model))
+        self.frame((), (), REST)
+        for _ in range(REFERENCE_FRAMES):
+            pipeline.push(self.frame((), (), STEP))
+        plain = Plain(self)
+        for k in range(MOVING):
+            if k % EVERY == 0:
                 press = drawn(self.random, 1)
             angle = FARTHEST / 2 * (1 - math.cos(2 * math.pi * k / PERIOD))
-            on = k % 6 in TOUCHED
-            dv = self.volts(press if on else (), hinged(angle)) - self.flat.mean
-            readings = find(dv, blind)
-            told = reader.push(dv, readings, gain, self.lab.time)
+            on, steady = k % EVERY < ON, k % ON >= SETTLED
+            frame = self.frame(press if on else (), hinged(angle), STEP)
+            result = pipeline.push(frame)
+            if result is None or result.bend is None:
+                raise AssertionError("every frame is read")
+            told = result.bend
             (out.touched if on else out.free).append(told.angle - math.radians(angle))
-            if on:
+            readings = [touch.reading for touch in result.touches]
+            if on and steady:
                 out.places.append(missed(readings, press))
-                out.plain.append(missed(plain(dv, gain), press))
-            if angle >= 3.0 or angle < 0.1:
+                if len(out.places) % PLAIN == 0:
+                    out.plain.append(missed(plain(result), press))
+            if steady and (angle >= 3.0 or angle < 0.1):
                 bent, both = angle >= 3.0, "bend and touch"
                 wanted = (both if on else "bend") if bent else ("touch" if on else "idle")
                 out.right.append(told.state == wanted)
-        self.frames(3)
         return out
 
     def jointed(self) -> tuple[list[float], list[float]]:
@@ -179,21 +227,31 @@ class Bench:
             np.concatenate([self.frames(8, hinged(angle)) for angle in course]), angles
         )
         own, other = [], []
-        for angle in (7.0, 22.0, 37.0, 52.0):
+        for angle in BETWEEN:
             pose = hinged(angle)
             self.frames(2, pose)
             there = Reference.of(self.frames(16, pose))
             told = joint.at(math.radians(angle))
-            for _ in range(FRAMES // 6):
+            for _ in range(TOUCHES // len(BETWEEN)):
                 press = drawn(self.random, 1)
                 volts = self.volts(press, pose)
                 for reference, errors in ((there, own), (told, other)):
                     find = self.finder(reference)
-                    errors.append(
-                        missed(find(volts - reference.mean, reference.mean[:, None]), press)
-                    )
+                    blind = np.hstack([reference.mean[:, None], self.model.directions])
+                    errors.append(missed(find(volts - reference.mean, blind), press))
                 self.volts((), pose)
         return own, other
+
+
+class Plain:
+    """Finds touches without taking bends out, in what a pipeline reads."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._find = bench.finder(bench.flat)
+
+    def __call__(self, result: Result) -> list[Reading]:
+        """Of one frame."""
+        return self._find(result.voltages - result.reference, result.reference[:, None])
 
 
 def missed(readings: Sequence[Reading], press: Sequence[Press]) -> float:
@@ -201,6 +259,14 @@ def missed(readings: Sequence[Reading], press: Sequence[Press]) -> float:
     if not readings:
         return 0.1
     return math.hypot(readings[0].x - press[0].x, readings[0].y - press[0].y)
+
+
+def _told(bench: Bench) -> Bench:
+    """The same, when what it found has been said."""
+    medians = ", ".join(f"{k} {1e3 * float(np.median(v)):.2f}" for k, v in bench.errors.items())
+    moving = ", ".join(_moving_row("moving", [bench])[1:])
+    print(f"bend {bench.name}: {bench.taken:.0f} s; {medians}; {moving}", file=sys.stderr)
+    return bench
 
 
 def _static_row(sheet: str, benches: Sequence[Bench]) -> tuple[str, ...]:
@@ -228,3 +294,8 @@ def _moving_row(sheet: str, benches: Sequence[Bench]) -> tuple[str, ...]:
     )
     right = 100 * float(np.mean(all_of("right")))
     return (sheet, *(f"{value:.2f}" for value in numbers), f"{right:.1f} %")
+
+
+if __name__ == "__main__":
+    # One piece of it: python benchmarks/bend.py textile 11 12
+    reports(sys.argv[1:2], [int(seed) for seed in sys.argv[2:]])

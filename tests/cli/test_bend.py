@@ -10,7 +10,7 @@ import pytest
 from tomoskin.cli import main
 from tomoskin.core import DataError
 from tomoskin.live import Pipeline, prepare
-from tomoskin.session import SessionReader, read_bends
+from tomoskin.session import SessionReader, read_bends, read_recording
 from tomoskin.skin import Skin
 
 SCRIPT = """format = 1
@@ -78,6 +78,31 @@ def test_angles_and_touches_of_a_session_that_bends(recorded, tomoskin):
     places = np.array([(t["x_m"], t["y_m"]) for t in found["touches"]])
     assert len(places) >= 5
     assert np.median(np.linalg.norm(places - (0.03, 0.02), axis=1)) < 0.008
+
+
+def test_a_recording_that_lacks_rows_keeps_its_bends(recorded, tomoskin):
+    """Five rows of a pair that was not read: imaged, and the bend read, without them."""
+    whole = read_recording(recorded / "used.mcap")
+    lost = whole.measure[:, 0] == 2
+    assert np.count_nonzero(lost) == 5
+    np.savez(
+        recorded / "less.npz",
+        voltages=np.where(lost, np.nan, whole.voltages),
+        drive=whole.drive,
+        measure=whole.measure,
+        time_s=whole.time,
+    )
+    code, out, err = tomoskin(
+        "image", recorded / "less.npz", "--skin", "textile-disc-8",
+        "--bend", recorded / "c.npz", "--json",
+    )  # fmt: skip
+    assert code == 0, err
+    found = json.loads(out)
+    assert len(found["rows_left_out"]) == 5
+    angle = np.degrees([bend["angle_rad"] for bend in found["bends"]])
+    assert len(angle) == found["frames"]
+    assert angle.max() == pytest.approx(40, abs=ROUGH)
+    assert {bend["state"] for bend in found["bends"]} >= {"idle", "bend", "bend and touch"}
 
 
 def test_options_say_the_angles_where_the_file_does_not(recorded, tomoskin):

@@ -101,7 +101,7 @@ def _report(source: Path, found: Reconstruction, prepared: Prepared, *, json: bo
     if prepared.modes is not None:
         typer.echo(filter_said(prepared.skin))
     if found.bends:
-        states = Counter(reading.state for reading in found.bends)
+        states = Counter(reading.state for reading in found.bends if reading)
         typer.echo(", ".join(f"{state}: {count} frames" for state, count in states.items()))
     for frame, touches in list(zip(found.frames.tolist(), found.touches, strict=True))[:_SHOWN]:
         for t in touches:
@@ -165,6 +165,7 @@ def _document(found: Reconstruction, prepared: Prepared) -> dict[str, Any]:
         "bends": [
             {"frame": f, "angle_rad": b.angle, "sd_rad": b.sd, "axis_rad": b.axis, "state": b.state}
             for f, b in zip(found.frames.tolist(), found.bends, strict=False)
+            if b
         ],
         "touches": [
             {"frame": f, "id": t.id, "x_m": t.reading.x, "y_m": t.reading.y, "peak": t.reading.peak}

@@ -27,13 +27,22 @@ class Bends:
         self._reader = BendReader(prepared.bending, spots.response, gain)
 
     def push(
-        self, watch: Watch, seen: Seen, view: View, found: list[Reading], time: float
+        self,
+        watch: Watch,
+        seen: Seen,
+        view: View,
+        found: list[Reading],
+        time: float,
+        *,
+        touched: bool,
     ) -> BendReading | None:
-        """How the sheet is bent at ``time`` s; ``found`` are the frame's touches."""
+        """How the sheet is bent at ``time`` s; ``found`` is what the frame shows by itself,
+        ``touched`` whether any of it is a touch, as tracked."""
         if seen.whole is None:
             return None
         touches = found if self._own is None else self._own.push(view)
-        reading = self._reader.push(seen.whole, touches, watch.common, time)
+        beside = watch.beside_bends
+        reading = self._reader.push(seen.whole, touches, beside, time, touched=touched)
         watch.bent(reading.moved)
         return reading
 

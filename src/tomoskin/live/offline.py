@@ -45,7 +45,8 @@ class Reconstruction:
     rows_left_out
         (r,) rows of the pattern that hold no finite values, left out of every image.
     bends
-        How the sheet was bent in each frame; empty where its bends were not learnt.
+        How the sheet was bent in each frame, None where too little was left of it; empty where
+        its bends were not learnt.
     """
 
     frames: IntArray
@@ -57,7 +58,7 @@ class Reconstruction:
     agreement: float
     choice: AlphaChoice
     rows_left_out: IntArray
-    bends: tuple[BendReading, ...] = ()
+    bends: tuple[BendReading | None, ...] = ()
 
     def numbered_from(self, first: int) -> Reconstruction:
         """Frames counted from ``first``, for a part of a longer recording."""
@@ -102,8 +103,9 @@ def reconstruct(
         images.append(view.image)
         readings = stage.finder.push(view)
         touches.append(tracker.update(readings, now, now))
-        bends += stage.bent(view, readings, now)
-        stage.learn(now, touched=bool(touches[-1]))
+        touched = bool(touches[-1])
+        bends.append(stage.bent(view, readings, now, touched=touched))
+        stage.learn(now, touched=touched)
     return Reconstruction(
         frames=changes.frames,
         rows_missing=changes.missing.sum(axis=1),
@@ -114,7 +116,7 @@ def reconstruct(
         agreement=changes.agreement,
         choice=prepared.choice,
         rows_left_out=changes.rows_left_out,
-        bends=tuple(bends),
+        bends=() if prepared.bending is None else tuple(bends),
     )
 
 
@@ -154,12 +156,13 @@ class _Stage:
             return self._filled(dv, missing, now)
         return View(*self._imaging.push(seen.dv, now), seen.dv, seen.blind.directions)
 
-    def bent(self, view: View, readings: list[Reading], now: float) -> list[BendReading]:
+    def bent(
+        self, view: View, readings: list[Reading], now: float, *, touched: bool
+    ) -> BendReading | None:
         """How the sheet was bent in the frame that was pushed last, where that is known."""
         if self._bends is None or self._watch is None or self._seen is None:
-            return []
-        found = self._bends.push(self._watch, self._seen, view, readings, now)
-        return [] if found is None else [found]
+            return None
+        return self._bends.push(self._watch, self._seen, view, readings, now, touched=touched)
 
     def _filled(self, dv: FloatArray, missing: NDArray[np.bool_], now: float) -> View:
         filled = self._prepared.operator.filled(dv, missing)

@@ -192,8 +192,10 @@ class Pipeline:
         view = View(image, floor, seen.dv, seen.blind.directions)
         readings = self._finder.push(view)
         touches = self._track(readings, voltages)
-        bend = self._bends.push(watch, seen, view, readings, now) if self._bends else None
-        if watch.learn(now, touched=bool(touches)):
+        touched, bend = bool(touches), None
+        if self._bends:
+            bend = self._bends.push(watch, seen, view, readings, now, touched=touched)
+        if watch.learn(now, touched=touched):
             self._imaging.renew(watch.prepared, watch.baseline.reference, watch.steady())
             self._finder.renew(watch.prepared, watch.baseline.reference)
         return self._result(

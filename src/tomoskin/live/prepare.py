@@ -122,9 +122,12 @@ class Prepared:
     def without(self, rows: IntArray) -> Prepared:
         """The skin as if its pattern had never had ``rows``; an alpha of "auto" is chosen anew.
 
-        Raises DataError when no row is left.
+        Raises DataError when no row is left, or its bends do not show in those that are.
         """
-        return _prepared(self.skin, self.problem.without(rows)) if len(rows) else self
+        if not len(rows):
+            return self
+        left = _prepared(self.skin, self.problem.without(rows))
+        return left if self.bending is None else left.that_bends(self.bending.without(rows))
 
     def blind_to(self, directions: FloatArray) -> Prepared:
         """The skin whose prior knows that data along ``directions`` (n_meas, k) say nothing.

@@ -153,9 +153,9 @@ class Watch:
         return Seen(blind(dv), blind, health, left_out, values - self._baseline.mean)
 
     @property
-    def common(self) -> FloatArray:
-        """(n_meas, k) V: what the skin does by itself, but for bends."""
-        return self._common
+    def beside_bends(self) -> FloatArray:
+        """(n_meas, k) V: what the frame that was looked at last does not tell, but for bends."""
+        return np.hstack([self._common, self._lost_directions(self._health)])
 
     def bent(self, moved: FloatArray) -> None:
         """Say what of the frame that was looked at last, (n_meas,) V, is a bend's."""
@@ -196,6 +196,13 @@ class Watch:
             self._learnt += 1
             self._forget()
 
+    def _lost_directions(self, health: Health | None) -> FloatArray:
+        """(n_meas, k) of rows and readings that ``health`` says nothing is known of."""
+        pattern = self._prepared.pattern
+        if health is None:
+            return np.zeros((pattern.n_meas, 0))
+        return lost_directions(pattern, health.lost, health.floating)
+
     def _gain(self, reference: Reference) -> FloatArray:
         """(n_meas, 1): all voltages in proportion, as conductivity does that changes alike."""
         return reference.mean[:, None]
@@ -218,9 +225,7 @@ class Watch:
         return self._kept[key]
 
     def _made(self, health: Health | None) -> Blind:
-        parts = [self._common, self._bends]
-        if health is not None:
-            parts.append(lost_directions(self._prepared.pattern, health.lost, health.floating))
+        parts = [self._common, self._bends, self._lost_directions(health)]
         directions = np.hstack(parts) / self._scale[:, None]
         return Blind.of(directions, self._prepared.operator.precision)
 

@@ -24,11 +24,16 @@ class Memory:
     ----------
     size
         Largest amplitude that was learnt from.
+    plays
+        Where the plays stand at the reference, as :meth:`plays_after` gives them; without it, in
+        the middle, as in a sheet that has never been bent.
     """
 
-    def __init__(self, n_modes: int, size: float, *, remembers: bool) -> None:
+    def __init__(
+        self, n_modes: int, size: float, *, remembers: bool, plays: FloatArray | None = None
+    ) -> None:
         self._size, self._remembers = size, remembers
-        self._plays = np.zeros((len(_WIDTHS), n_modes))
+        self._plays = np.zeros((len(_WIDTHS), n_modes)) if plays is None else plays
         self._late = np.zeros((len(_LAGS), n_modes))
         self._time: float | None = None
 
@@ -48,7 +53,23 @@ class Memory:
         return np.concatenate([z, curved, *past])
 
     @classmethod
-    def over(cls, z: FloatArray, time: FloatArray, size: float, *, remembers: bool) -> FloatArray:
+    def over(
+        cls,
+        z: FloatArray,
+        time: FloatArray,
+        size: float,
+        *,
+        remembers: bool,
+        plays: FloatArray | None = None,
+    ) -> FloatArray:
         """(n, f) features of a whole recording, from its rest on."""
-        memory = cls(z.shape[1], size, remembers=remembers)
+        memory = cls(z.shape[1], size, remembers=remembers, plays=plays)
         return np.array([memory.push(row, float(t)) for row, t in zip(z, time, strict=True)])
+
+    @classmethod
+    def plays_after(cls, z: FloatArray, size: float) -> FloatArray:
+        """(w, k) where the plays stand once a sheet has been through ``z`` (n, k) and is back."""
+        memory = cls(z.shape[1], size, remembers=True)
+        for row in (*z, np.zeros(z.shape[1])):
+            memory.push(row, 0.0)
+        return memory._plays

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
 import numpy as np
 
-from tomoskin.core import DataError, FloatArray
+from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.touch.bending.examples import BendExamples
 from tomoskin.touch.bending.memory import Memory
 from tomoskin.touch.fit import Whitener
@@ -35,8 +35,9 @@ class BendModel:
         (n_meas, k) V: where bends move the data, orthonormal in units of the noise.
     weights
         (f, t) from features (:class:`Memory`) to the targets of the examples.
-    remembers
-        Whether the sheet's past counts.
+    plays
+        Where the plays of :class:`Memory` stand at the reference; None where the sheet's past
+        does not count.
     errors
         (n, t) rad, what the examples' targets are missed by when their part of the recording is
         left out.
@@ -48,7 +49,7 @@ class BendModel:
     covariance: FloatArray
     directions: FloatArray
     weights: FloatArray
-    remembers: bool
+    plays: FloatArray | None
     errors: FloatArray
     size: float
 
@@ -59,6 +60,8 @@ class BendModel:
         Directions are the principal ones of the whitened frames above the edge of noise
         (Marchenko & Pastur 1967). The angle is a ridge regression on their amplitudes; whether
         the past counts, and the ridge, are what errs least on left-out fifths of the recording.
+        A sheet that remembers is taken to have been bent so before its reference was taken, as
+        it will have been whenever it is used.
 
         Raises
         ------
@@ -78,12 +81,30 @@ class BendModel:
         directions = np.linalg.pinv(whiten.matrix) @ rows[:count].T
         z = seen @ rows[:count].T
         size = float(np.linalg.norm(z, axis=1).max())
-        best, weights, errors = min(
-            (_regressed(Memory.over(z, examples.time, size, remembers=past), examples, past)
-             for past in (False, True)),
+        plays, weights, errors = min(
+            ((plays, *_regressed(_features(z, examples, size, plays), examples))
+             for plays in (None, Memory.plays_after(z, size))),
             key=lambda found: float(np.mean(found[2] ** 2)),
         )  # fmt: skip
-        return cls(examples, covariance, directions, weights, best, errors, size)
+        return cls(examples, covariance, directions, weights, plays, errors, size)
+
+    def without(self, rows: IntArray) -> BendModel:
+        """Learnt again from the rows that are left without ``rows`` (k,), indices.
+
+        Raises DataError when the bends do not show in these.
+        """
+        left = np.delete(np.arange(len(self.covariance)), rows)
+        examples = replace(self.examples, dv=self.examples.dv[:, left])
+        return self.learn(examples, self.covariance[np.ix_(left, left)])
+
+    @property
+    def remembers(self) -> bool:
+        """Whether the sheet's past counts."""
+        return self.plays is not None
+
+    def memory(self) -> Memory:
+        """Of a sheet at its reference."""
+        return Memory(self.n_modes, self.size, remembers=self.remembers, plays=self.plays)
 
     @property
     def n_modes(self) -> int:
@@ -114,9 +135,14 @@ class BendModel:
         return sign * size, np.mod(np.arctan2(sign * sine, sign * cosine) / 2, np.pi)
 
 
-def _regressed(
-    features: FloatArray, examples: BendExamples, past: bool
-) -> tuple[bool, FloatArray, FloatArray]:
+def _features(
+    z: FloatArray, examples: BendExamples, size: float, plays: FloatArray | None
+) -> FloatArray:
+    remembers = plays is not None
+    return Memory.over(z, examples.time, size, remembers=remembers, plays=plays)
+
+
+def _regressed(features: FloatArray, examples: BendExamples) -> tuple[FloatArray, FloatArray]:
     """Weights and left-out errors of the ridge that errs least."""
     targets, scale = examples.targets, np.abs(features).max(axis=0) + 1e-12
     x = features / scale
@@ -129,7 +155,7 @@ def _regressed(
             errors[out] = targets[out] - x[out] @ _ridge(x[~out], targets[~out], ridge)
         found.append((float(np.mean(errors**2)), ridge, errors))
     _, ridge, errors = min(found, key=lambda one: one[0])
-    return past, _ridge(x, targets, ridge) / scale[:, None], errors
+    return _ridge(x, targets, ridge) / scale[:, None], errors
 
 
 def _ridge(x: FloatArray, y: FloatArray, ridge: float) -> FloatArray:

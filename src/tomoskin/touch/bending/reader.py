@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.core import FloatArray, Reading
-from tomoskin.touch.bending.memory import Memory
 from tomoskin.touch.bending.model import BendModel
 from tomoskin.touch.fit import Response, spots_of
 
@@ -62,20 +61,27 @@ class BendReader:
     def __init__(self, model: BendModel, response: Response, gain: float = 1.0) -> None:
         self._model, self._response, self._gain = model, response, gain
         self._modes = model.whiten(model.directions.T).T
-        self._memory = Memory(model.n_modes, model.size, remembers=model.remembers)
+        self._memory = model.memory()
 
     def push(
-        self, dv: FloatArray, readings: Sequence[Reading], common: FloatArray, time: float
+        self,
+        dv: FloatArray,
+        readings: Sequence[Reading],
+        common: FloatArray,
+        time: float,
+        *,
+        touched: bool = True,
     ) -> BendReading:
         """Read ``dv`` (n_meas,) V less the straight sheet, at ``time`` s.
 
         ``readings`` are the touches fitted to it; ``common`` (n_meas, k) directions that say
         nothing. Amplitudes are fitted beside what the touches change, their places, sizes,
-        strengths and directions free to first order.
+        strengths and directions free to first order. ``touched`` is False where none of them is a
+        touch to one who has seen the frames before.
         """
         model = self._model
-        touched, free = self._touches(readings)
-        data = model.whiten(dv) - touched
+        change, free = self._touches(readings)
+        data = model.whiten(dv) - change
         beside = np.hstack([model.whiten(common.T).T, free])
         columns = np.hstack([self._modes, beside / (np.linalg.norm(beside, axis=0) + 1e-300)])
         found, _, rank, _ = np.linalg.lstsq(columns, data, rcond=1e-9)
@@ -86,7 +92,8 @@ class BendReader:
         target = self._memory.push(z, time) @ model.weights
         angle, axis = (float(part[0]) for part in model.told(target[None]))
         sd = self._deviation(columns)
-        state = _state(abs(angle) > _BENT * sd, bool(readings), bool(strange))
+        pressed = bool(readings) and touched
+        state = _state(abs(angle) > _BENT * sd, pressed, bool(strange))
         return BendReading(angle, sd, axis, state, model.directions @ z)
 
     def _touches(self, readings: Sequence[Reading]) -> tuple[FloatArray, FloatArray]:
