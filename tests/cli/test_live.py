@@ -155,7 +155,7 @@ def test_it_replays_with_the_skin_in_the_file(start, refused, tmp_path):
         frame = Frame(0, 0, 0.0, 1, 1, 0, np.full(224, 500, "<u2"))
         session.frame(frame)
     process = start("--port", "0", "--source", f"replay:{path}")
-    assert process.stdout.readline().startswith("textile-disc-16 on replay:")
+    assert process.stdout.readline().startswith(f"textile-disc-16 on replay:{path.name} ")
     assert end(process, signal.SIGTERM)[0] == 0
     code, _, errors = refused("--port", "0", "--source", f"replay:{path}", "--skin", "tank-16")
     assert code == 1

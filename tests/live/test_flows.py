@@ -12,6 +12,7 @@ from live.test_runner import Watch
 from tomoskin.core import DataError
 from tomoskin.live import as_recorded, replayed
 from tomoskin.live.folder import Folder
+from tomoskin.live.stage import Stage
 from tomoskin.session import SessionReader, read_calibration
 from tomoskin.skin import Skin
 from tomoskin.source import open_source
@@ -188,7 +189,7 @@ def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
     with (tmp_path / "sessions" / "run-touches.csv").open() as file:
         assert {row["id"] for row in csv.DictReader(file)} == {"1"}
     page.ask("open", name="run.mcap")
-    assert page.told("scene")["source"].endswith("run.mcap")
+    assert page.told("scene")["source"] == "textile-disc-8 on replay:run.mcap"
     assert page.told("timeline")["touches"]
     page.ask("files")
     told = page.told("files")
@@ -199,6 +200,10 @@ def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
     page.ask("live")
     assert page.told("scene")["source"] == "twin of textile-disc-8"
     assert page.told("state")["replay"] is None
+
+
+def test_a_recording_that_was_named_by_its_path_is_named_by_its_file():
+    assert Stage(None, "replay:/some/where/run.mcap@2,loop").spec == "replay:run.mcap"
 
 
 def test_what_is_no_session_is_said_and_the_source_goes_on(flows, tmp_path):

@@ -52,7 +52,7 @@ class FilesDesk:
                     type="files",
                     files=[asdict(file) for file in found],
                     recording=self._recording(),
-                    playing=self._stage.spec.partition("replay:")[2] or None,
+                    playing=self._playing(),
                     exporting=self._exporting,
                     share=self._share,
                 )
@@ -102,6 +102,10 @@ class FilesDesk:
         if name == self._recording():
             raise DataError("is still being recorded: end the recording first", where=name)
         return self._folder.existing(name, _SESSION)
+
+    def _playing(self) -> str | None:
+        replay = self._hub.runner.replay
+        return replay.path.name if replay is not None else None
 
     def _recording(self) -> str | None:
         path = self._hub.runner.status().recording

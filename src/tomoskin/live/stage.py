@@ -10,7 +10,7 @@ from tomoskin.core import SourceError
 from tomoskin.live.hub import Hub
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.replayed import as_recorded
-from tomoskin.session import ReplayTransport, SessionReader
+from tomoskin.session import ReplayTransport, SessionReader, parse_replay
 from tomoskin.skin import Skin
 from tomoskin.source import Transport, list_ports, open_source
 
@@ -43,8 +43,9 @@ class Stage:
     def __init__(self, hub: Hub, spec: str) -> None:
         self._hub = hub
         self._home = spec
-        self.spec = spec
-        """The source of the moment."""
+        name, _, argument = spec.partition(":")
+        self.spec = f"replay:{parse_replay(argument)[0].name}" if name == "replay" else spec
+        """The source of the moment; a recording by the name of its file."""
         self._live: _Live | None = None
 
     def offers(self) -> list[Offer]:

@@ -61,7 +61,7 @@ class ReplayTransport:
         loop: bool = False,
         clock: Clock | None = None,
     ) -> None:
-        self.name = f"replay:{session.path}"
+        self.name = f"replay:{session.path.name}"
         self._session = session
         self._speed, self._loop = speed, loop
         self._clock = clock or WallClock()
