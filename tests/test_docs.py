@@ -9,8 +9,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from tomoskin.core import Image
 from tomoskin.skin import Skin
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -70,6 +72,13 @@ def test_the_skin_of_the_instructions_is_one_and_costs_what_is_said(tmp_path: Pa
     assert euros["parts of the board for 8 channels without the Arduino"] == pytest.approx(board)
     assert (sum(items), with_arduino) == (everything, skin + euros["Arduino Mega 2560"])
     assert with_arduino < 60
+
+
+def test_the_readme_computes_a_picture() -> None:
+    (block,) = BLOCK.findall((ROOT / "README.md").read_text(encoding="utf-8"))
+    names: dict[str, object] = {"measured": np.ones(40)}
+    exec(compile(block, "README.md", "exec"), names)
+    assert isinstance(names["image"], Image)
 
 
 def test_the_first_steps_give_a_touch(tmp_path: Path) -> None:

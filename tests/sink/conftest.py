@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import queue
+import re
 import socket
+import subprocess
+import sys
 import threading
+import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +20,7 @@ from session.runs import SKIN, TOUCH
 from tomoskin.core import Event, Image
 from tomoskin.sink import Moment, Stream
 
+ROBOT = Path(__file__).resolve().parents[2] / "docs" / "robot.md"
 PATIENCE = 20
 EPOCH = 1_700_000_000.0
 MESH = SKIN.mesh()
@@ -66,3 +74,57 @@ class News:
 @pytest.fixture
 def news():
     return News()
+
+
+class Listener:
+    """A program of docs/robot.md in a process of its own, and the lines that it prints."""
+
+    def __init__(self, library, **changes):
+        blocks = re.findall(r"^```python\n(.*?)^```", ROBOT.read_text(), re.DOTALL | re.MULTILINE)
+        (program,) = (block for block in blocks if f"import {library}" in block)
+        for old, new in changes.values():
+            assert old in program
+            program = program.replace(old, new)
+        self._process = subprocess.Popen(
+            [sys.executable, "-u", "-c", program], stdout=subprocess.PIPE, text=True
+        )
+        self._lines = queue.SimpleQueue()
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def _read(self):
+        for line in self._process.stdout:
+            self._lines.put(line)
+
+    def hears(self, publish):
+        """The first line, while ``publish(n)`` goes on saying the same: it may not listen yet."""
+        deadline = time.monotonic() + 3 * PATIENCE
+        line, number = None, 0
+        while line is None:
+            assert time.monotonic() < deadline
+            assert self._process.poll() is None
+            publish(number)
+            number += 1
+            with contextlib.suppress(queue.Empty):
+                line = self._lines.get(timeout=0.2)
+        return line
+
+    def stop(self):
+        self._process.kill()
+        self._process.wait(PATIENCE)
+        self._reader.join(PATIENCE)
+        self._process.stdout.close()
+
+
+@pytest.fixture
+def listener():
+    """Start a program of docs/robot.md, by the library that it uses; it ends with the test."""
+    started = []
+
+    def start(library, **changes):
+        started.append(Listener(library, **changes))
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.stop()

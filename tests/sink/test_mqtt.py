@@ -148,3 +148,13 @@ def test_a_broker_that_goes_is_noticed(broker, heard, stream):
     with pytest.raises(OSError, match="refused"):
         sink.open(stream)
     sink.close()
+
+
+def test_the_listener_of_the_documentation_hears_touches(broker, listener, stream):
+    place = f'client.username_pw_set("me", "secret")\nclient.connect("127.0.0.1", {broker.port})'
+    heard = listener("paho", place=('client.connect("127.0.0.1", 1883)', place))
+    sink = make_sink(broker.url)
+    sink.open(stream)
+    line = heard.hears(lambda number: sink.publish(moment_at(float(number), TOUCH)))
+    sink.close()
+    assert line.split() == ["4", "0.1", "-0.2"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 
 import pytest
@@ -67,3 +68,26 @@ def test_an_endpoint_that_does_not_answer_is_said(stream, monkeypatch):
     with pytest.raises(SinkError, match="cannot be joined"):
         sink.open(stream)
     sink.close()
+
+
+def test_the_listener_of_the_documentation_hears_touches(listener, stream):
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    config = (
+        f'zenoh.Config.from_json5(\'{{mode: "peer", listen: {{endpoints: ["{endpoint}"]}}, '
+        "scouting: {multicast: {enabled: false}}}')"
+    )
+    heard = listener("zenoh", config=("zenoh.Config()", config))
+    opened = []
+
+    def publish(number):
+        if not opened:
+            with contextlib.suppress(SinkError):  # it does not listen yet
+                sink = make_sink(f"zenoh:{endpoint}")
+                sink.open(stream)
+                opened.append(sink)
+        for sink in opened:
+            sink.publish(moment_at(float(number), TOUCH))
+
+    line = heard.hears(publish)
+    opened[0].close()
+    assert line.strip() == "[(4, 0.1, -0.2)]"
