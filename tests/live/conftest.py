@@ -47,7 +47,6 @@ def browser(chromium):
 def opened(browser, site, prepared):
     """A page of the module's ``site``, on which nothing may go wrong."""
     watched = Watched(browser, site, prepared.mesh)
-    watched.page.set_default_timeout(20_000)
     watched.open()
     yield watched
     watched.context.close()

@@ -1,6 +1,11 @@
 """A page in real Chromium, as tests see and press it."""
 
+from pathlib import Path
+
 import numpy as np
+import pytest
+
+from tomoskin.live import STATIC
 
 ARGUMENTS = [
     "--no-sandbox",
@@ -14,6 +19,7 @@ ARGUMENTS = [
     "--disable-sync",
 ]
 PATIENCE = 60_000
+AXE = Path(STATIC).parent / "web" / "node_modules" / "axe-core" / "axe.min.js"
 READ = """() => {
     const { image, touches, truths, referenceReady, sequence } = window.tomoskin.last;
     return { image: [...image], touches, truths, referenceReady, sequence };
@@ -92,3 +98,14 @@ def number(text):
 
 def distance(one, two):
     return float(np.hypot(*(np.asarray(one) - two)))
+
+
+def axe_finds(page, *parts):
+    """What axe-core objects to on the page, or in the ``parts`` of it that are named by CSS."""
+    if not AXE.is_file():
+        pytest.skip("the page's packages are not installed")
+    if page.evaluate("typeof axe") == "undefined":
+        page.evaluate(AXE.read_text())
+    scope = {"include": [[part] for part in parts]} if parts else None
+    found = page.evaluate("scope => axe.run(scope ?? document)", scope)["violations"]
+    return [(v["id"], [node["target"] for node in v["nodes"]][:3]) for v in found]

@@ -15,7 +15,7 @@ export const CIRCLE: Face = { id: "circle", label: "Circle", shape: "circle" };
 export const FACES: readonly Face[] = [
   CIRCLE,
   { id: "square", label: "Square", shape: "square" },
-  { id: "finger", label: "Fingertip", shape: "finger" },
+  { id: "finger", label: "Finger", shape: "finger" },
   {
     id: "triangle",
     label: "Triangle",

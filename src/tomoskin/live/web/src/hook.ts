@@ -1,6 +1,7 @@
 /** `window.tomoskin`: what tests and benches read of the page. Nothing here changes anything. */
 
 import type { Frame } from "./decode";
+import { first } from "./latency";
 import type { Scene } from "./protocol";
 import { sheetElement, view } from "./sheet/Sheet";
 import { toPixels, toSheet } from "./sheet/view";
@@ -11,6 +12,8 @@ export interface Hook {
   readonly frames: number;
   readonly last: Frame | null;
   readonly scene: Scene | null;
+  /** When the first picture was drawn, ms from the navigation. */
+  readonly ready: number | null;
   /** Scripting time spent on frames so far, s. */
   readonly scripting: number;
   /** Metres on the sheet to client pixels. */
@@ -39,6 +42,9 @@ export function installHook(): void {
     },
     get scene() {
       return scene.peek();
+    },
+    get ready() {
+      return first.at;
     },
     get scripting() {
       return cost.seconds;

@@ -17,11 +17,13 @@ import "./flows/SetUp";
 import "./flows/Sessions";
 import { startHolding } from "./hold";
 import { installHook } from "./hook";
+import { startTelling } from "./latency";
 import "./twin/Twin";
 import "./signals/Signals";
 import "./settings/Settings";
 import { scene, start } from "./state";
 
+start(); // the server answers while the page is laid out
 const page = document.getElementById("page");
 if (page) render(<App />, page);
 window.addEventListener("keydown", onKey);
@@ -31,4 +33,4 @@ effect(() => {
 });
 installHook();
 startHolding();
-start();
+startTelling();

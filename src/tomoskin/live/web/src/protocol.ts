@@ -69,6 +69,12 @@ export interface Replay {
   readonly ended: boolean;
 }
 
+export interface Stage {
+  readonly name: string;
+  readonly p50_ms: number | null;
+  readonly p99_ms: number | null;
+}
+
 export interface Status {
   readonly type: "state";
   readonly running: boolean;
@@ -79,6 +85,8 @@ export interface Status {
   readonly gaps: number;
   readonly p50_ms: number | null;
   readonly p99_ms: number | null;
+  /** How long each stage takes, from the sample to the page. */
+  readonly stages: readonly Stage[];
   readonly reference: {
     readonly frames: number;
     readonly needed: number;

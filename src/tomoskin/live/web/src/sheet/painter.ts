@@ -1,6 +1,7 @@
 /** Paints the newest frame on the sheet's two canvases, once per displayed frame at most. */
 
 import { hand, history, limit, newest, scene, showTruth, smoothed, timed, topology } from "../state";
+import { drewNewest } from "../latency";
 import { theme } from "../theme";
 import { GlPicture, openGl } from "./gl";
 import { drawMarks } from "./overlay";
@@ -90,5 +91,6 @@ export class Painter {
       smoothed: smoothed.peek(),
     };
     drawMarks(this.pen, colours, view, shape, marks, scene.peek()?.probe.max_force_n ?? 1);
+    drewNewest();
   });
 }

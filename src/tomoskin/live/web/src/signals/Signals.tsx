@@ -11,6 +11,7 @@ import { history, newest, onFrame, onMessage, scene, shown } from "../state";
 import type { Status } from "../protocol";
 import { shownDrive } from "../sheet/space";
 import { theme } from "../theme";
+import { Budget } from "./Budget";
 import { Log, NoiseMeter, reciprocalPairs, reciprocity } from "./measures";
 
 const DRIFT_PERIOD = 2;
@@ -279,6 +280,7 @@ function View() {
         </button>
       </p>
       <Plot label={`${tab.label}, ${tab.unit}`} plan={plan} data={data} />
+      <Budget />
     </div>
   );
 }

@@ -1,22 +1,16 @@
 /** Bending and stretching the twin's sheet. */
 
 import { fixed } from "../format";
-import { soon } from "../settings/model";
 import { BendFigure } from "./BendFigure";
-import { layFlat, pose, refusal, twin, type TwinBend, type TwinStretch, wanted } from "./model";
+import { layFlat, refusal, twin, type TwinBend, type TwinStretch, want, wanted } from "./model";
 import { Slider } from "./Slider";
 
 const DEGREE = Math.PI / 180;
 const degrees = (angle: number): number => Math.round(angle / DEGREE);
 
-const bendBy = (part: Partial<TwinBend>): void => {
-  wanted.value = { ...wanted.value, bend: { ...wanted.value.bend, ...part } };
-  soon(pose);
-};
-const stretchBy = (part: Partial<TwinStretch>): void => {
-  wanted.value = { ...wanted.value, stretch: { ...wanted.value.stretch, ...part } };
-  soon(pose);
-};
+const bendBy = (part: Partial<TwinBend>): void => want({ bend: { ...wanted.value.bend, ...part } });
+const stretchBy = (part: Partial<TwinStretch>): void =>
+  want({ stretch: { ...wanted.value.stretch, ...part } });
 
 /** A direction on the sheet, from x counter-clockwise. */
 function Axis({ id, value, set }: { id: string; value: number; set: (axis: number) => void }) {
@@ -56,7 +50,7 @@ function Bend() {
         <>
           <Axis id="bend-axis" value={bend.axis} set={(axis) => bendBy({ axis })} />
           <Slider
-            name="Width of the bend"
+            name="Bend width"
             id="bend-width"
             low={20}
             high={Math.max(20, Math.round(1e3 * size))}

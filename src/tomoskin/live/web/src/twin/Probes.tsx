@@ -61,7 +61,7 @@ export function Probes() {
             {fixed(2e3 * radius, 0)}
           </button>
         ))}
-        <span class="unit">mm (keys 1–9)</span>
+        <span class="unit">mm</span>
       </div>
       {probe.face.shape !== "circle" && (
         <Slider

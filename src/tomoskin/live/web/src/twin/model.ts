@@ -1,6 +1,7 @@
 /** What is done to the twin beside pressing it, as the server tells it, and how it is asked for. */
 
 import { signal } from "@preact/signals";
+import { soon } from "../settings/model";
 import { onMessage, send } from "../state";
 
 export interface TwinBend {
@@ -65,13 +66,20 @@ const flat = (size: number): Wanted => ({
 export const wanted = signal<Wanted>(flat(UNKNOWN.size_m));
 /** Why the last bend was refused, in words. */
 export const refusal = signal<string | null>(null);
-/** Requests that have not been answered yet: an older answer must not move a slider back. */
+/** Requests that have not been answered yet, and whether another is due: an older answer must not
+ * move a slider back. */
 let unanswered = 0;
+let due = false;
 
+// What was asked of another source, or before the connection was lost, is not answered any more.
+onMessage("scene", () => {
+  unanswered = 0;
+  due = false;
+});
 onMessage<TwinState>("twin", (message) => {
   twin.value = message;
   unanswered = Math.max(0, unanswered - 1);
-  if (unanswered > 0) return;
+  if (unanswered > 0 || due) return;
   const { bend, stretch } = flat(message.size_m);
   wanted.value = {
     bend: message.bend ?? { ...bend, axis: wanted.value.bend.axis, length: wanted.value.bend.length },
@@ -89,10 +97,18 @@ export function harm(change: Partial<Pick<TwinState, "cut" | "noise">>): void {
   send({ type: "twin", cut, noise, ...change });
 }
 
+/** Move sliders; the twin follows, no faster than it can. */
+export function want(part: Partial<Wanted>): void {
+  wanted.value = { ...wanted.value, ...part };
+  due = true;
+  soon(pose);
+}
+
 /** Bend and stretch as the sliders stand. */
-export function pose(): void {
+function pose(): void {
   const { bend, stretch } = wanted.peek();
   refusal.value = null;
+  due = false;
   unanswered++;
   send({
     type: "pose",
@@ -102,6 +118,6 @@ export function pose(): void {
 }
 
 export function layFlat(): void {
-  wanted.value = flat(twin.value.size_m);
-  pose();
+  const { bend, stretch } = wanted.peek();
+  want({ bend: { ...bend, angle: 0 }, stretch: { ...LEVEL, axis: stretch.axis } });
 }
