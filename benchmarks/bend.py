@@ -30,7 +30,7 @@ TURNS = ((60, 10), (30, 10), (45, 15))
 
 LEARNT = sum(2 * round(top / step) for top, step in TURNS)
 
-IDLE, TOUCHES = 20, 30
+IDLE, TOUCHES = 20, 24
 REST = 300.0
 """Seconds that a sheet lies still before a reference is taken."""
 
@@ -67,9 +67,10 @@ def reports(sheets: Sequence[str], seeds: Sequence[int]) -> tuple[Report, ...]:
             ("sheet", "flat", "on 70 mm", "on 40 mm", "joint, own reference", "by its angle"),
             tuple(_static_row(sheet, found) for sheet, found in benches.items()),
             (
-                f"references taken {REST / 60:.0f} minutes after wrapping (radii); joint: a strip "
-                f"of {1e3 * STRIP:.0f} mm, references recorded at "
-                f"{', '.join(f'{a:.0f}' for a in JOINT)}°, up and down, touches between",
+                f"{REST / 60:.0f} minutes after wrapping (radii), a reference before each touch",
+                f"joint: a strip of {1e3 * STRIP:.0f} mm, references recorded at "
+                f"{', '.join(f'{a:.0f}' for a in JOINT)}°, up and down, touches between, the "
+                "bends' directions taken out too",
                 f"seeds {', '.join(map(str, seeds))}, chosen on 1 to 3; {TOUCHES} touches each",
             ),
         ),
@@ -168,13 +169,14 @@ class Bench:
         return lambda dv, blind: found.push(View(image(dv), None, dv, blind))
 
     def static(self, pose: Pose) -> list[float]:
-        """Errors of touches on a sheet that is held so, the reference taken there."""
-        reference = self.reference(pose)
-        find, gain = self.finder(reference), reference.mean[:, None]
+        """Errors of touches on a sheet that is held so, a reference taken before each of them."""
+        self.frame((), pose, REST)
         found = []
         for _ in range(TOUCHES):
-            press = drawn(self.random, 1)
-            found.append(missed(find(self.volts(press, pose) - reference.mean, gain), press))
+            reference, press = Reference.of(self.frames(IDLE, pose)), drawn(self.random, 1)
+            change = self.volts(press, pose) - reference.mean
+            readings = self.finder(reference)(change, reference.mean[:, None])
+            found.append(missed(readings, press))
             self.volts((), pose)
         return found
 

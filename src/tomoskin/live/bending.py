@@ -21,6 +21,7 @@ class Bends:
         if prepared.bending is None:
             raise AssertionError("made for skins whose bends were learnt")
         spots = prepared.spots or SpotModel.of(prepared.skin, prepared.model)
+        spots = spots.as_told(reference.mean)
         told = spots.response.reference
         gain = float(reference.mean @ told / (told @ told))
         self._own = None if prepared.spots else InData(spots, prepared, reference)

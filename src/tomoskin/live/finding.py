@@ -143,13 +143,15 @@ class ByCalibration:
 def finding(prepared: Prepared, reference: Reference | None, pace: Pace = WHOLE) -> Finder:
     """What finds the touches: a calibration, else the method that the skin names.
 
+    Fitted touches are those of a sheet that conducts by direction as its reference tells.
     ``pace`` says how much of a fit is tried in a frame.
     """
     if prepared.locator is not None:
         return ByCalibration(prepared.locator, prepared, reference)
     if prepared.spots is None:
         return InImage(prepared)
-    return InData(prepared.spots, prepared, reference, pace)
+    spots = prepared.spots if reference is None else prepared.spots.as_told(reference.mean)
+    return InData(spots, prepared, reference, pace)
 
 
 def rows_of(missing: NDArray[np.bool_]) -> FloatArray:

@@ -10,10 +10,11 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray, Reading, SkinError
-from tomoskin.forward import ForwardModel
+from tomoskin.forward import ForwardModel, State
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
 from tomoskin.touch.fit.candidates import Candidates, Matched
+from tomoskin.touch.fit.grain import grained
 from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.pace import WHOLE, Pace
 from tomoskin.touch.fit.prior import Prior
@@ -68,12 +69,24 @@ class SpotModel:
             When the mesh has no flat coordinates.
         """
         own = ForwardModel(_mesh(skin), model.pattern, model.contact_impedance, model.current)
-        response = Response(own.at(skin.conductivity))
-        prior = Prior.of(own.mesh)
-        normalised = skin.inverse.difference == "normalised"
-        scale = 1 / np.abs(response.reference) if normalised else np.ones(own.pattern.n_meas)
-        candidates = Candidates.of(response, prior)
-        return cls(response, prior, Sheet(own.mesh), candidates, scale)
+        return cls._of(own.at(skin.conductivity), skin.inverse.difference == "normalised")
+
+    @classmethod
+    def _of(cls, state: State, normalised: bool) -> Self:
+        response, mesh = Response(state), state.model.mesh
+        prior, n_meas = Prior.of(mesh), state.model.pattern.n_meas
+        scale = 1 / np.abs(response.reference) if normalised else np.ones(n_meas)
+        return cls(response, prior, Sheet(mesh), Candidates.of(response, prior), scale)
+
+    def as_told(self, reference: FloatArray) -> SpotModel:
+        """The model of a sheet that conducts by direction as its ``reference`` (n_meas,) V tells.
+
+        Itself where the reference tells of no direction; see :mod:`tomoskin.touch.fit.grain`.
+        """
+        state = grained(self.response.state, reference)
+        if state is self.response.state:
+            return self
+        return self._of(state, bool((self.scale != 1.0).any()))
 
 
 class SpotFinder:
