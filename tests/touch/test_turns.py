@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 
 from tomoskin import Locator, Pattern
+from tomoskin.touch.locator.lone import LoneMaps
 from tomoskin.touch.locator.turns import Turns, turned
 from touch.labelled import RADIUS, Floats, places
 
 PATTERN = Pattern.adjacent(8)
 
 
-def alike(n: int, seed: int, way: int, uneven: float = 0.0) -> tuple[Floats, Floats]:
+def alike(
+    n: int, seed: int, way: int, uneven: float = 0.0, noise: float = 0.1
+) -> tuple[Floats, Floats]:
     """Presses on a skin whose rows answer alike when it is turned, and a part that is uneven."""
     xy, turns = places(n, seed), Turns.of(PATTERN)
     rng = np.random.default_rng(99)
@@ -22,7 +25,7 @@ def alike(n: int, seed: int, way: int, uneven: float = 0.0) -> tuple[Floats, Flo
         own = rng.normal(size=(4, 3))
         common = _bumps(turned(xy, way * angle), shared[int(orbit)])
         dv[:, row] = np.sqrt(1 - uneven) * common + np.sqrt(uneven) * _bumps(xy, own)
-    return dv + 0.1 * np.random.default_rng(seed + 1).normal(size=dv.shape), xy
+    return dv + noise * np.random.default_rng(seed + 1).normal(size=dv.shape), xy
 
 
 def _bumps(xy: Floats, table: Floats) -> Floats:
@@ -30,9 +33,12 @@ def _bumps(xy: Floats, table: Floats) -> Floats:
     return np.asarray(np.exp(-2 * (away**2).sum(axis=2)) @ table[:, 2])
 
 
-def missed(locator: Locator, way: int, uneven: float = 0.0) -> float:
-    dv, xy = alike(200, 5, way, uneven)
-    return float(np.linalg.norm(locator.predict(dv)[0] - xy, axis=1).mean()) / RADIUS
+def missed(n: int, way: int, turns: Turns, uneven: float = 0.0) -> float:
+    """Root mean square by which maps from ``n`` presses miss what other presses answer."""
+    dv, xy = alike(n, 0, way, uneven)
+    others, there = alike(300, 5, way, uneven, noise=0.0)
+    told, _ = LoneMaps.of(xy / RADIUS, dv, turns).at(there / RADIUS)
+    return float(np.sqrt(((told - others) ** 2).mean()))
 
 
 def test_rows_of_an_orbit_are_turned_copies() -> None:
@@ -56,14 +62,34 @@ def test_turning_back_undoes_a_turn() -> None:
 
 
 @pytest.mark.parametrize("way", [1, -1])
-def test_few_presses_tell_more_on_a_skin_that_is_alike_all_round(way: int) -> None:
-    dv, xy = alike(14, 0, way)
-    assert missed(Locator.fit(dv, xy, pattern=PATTERN), way) < 0.7 * missed(
-        Locator.fit(dv, xy), way
-    )
+def test_few_presses_tell_more_of_rows_that_are_alike_all_round(way: int) -> None:
+    apart, shared = (missed(8, way, turns) for turns in (Turns.none(40), Turns.of(PATTERN)))
+    assert shared < 0.8 * apart
 
 
-def test_a_skin_that_is_not_alike_all_round_loses_nothing() -> None:
-    dv, xy = alike(25, 0, 1, uneven=1.0)
-    shared, plain = Locator.fit(dv, xy, pattern=PATTERN), Locator.fit(dv, xy)
-    assert missed(shared, 1, uneven=1.0) < 1.1 * missed(plain, 1, uneven=1.0)
+def test_which_way_round_the_electrodes_go_is_found() -> None:
+    turns = Turns.of(PATTERN)
+    for way, angle in ((1, turns.angle), (-1, turns.reversed().angle)):
+        dv, xy = alike(12, 0, way)
+        np.testing.assert_array_equal(LoneMaps.of(xy / RADIUS, dv, turns).turns.angle, angle)
+
+
+def test_rows_that_are_not_alike_all_round_lose_little() -> None:
+    apart, shared = (missed(25, 1, turns, 1.0) for turns in (Turns.none(40), Turns.of(PATTERN)))
+    assert shared < 1.1 * apart
+
+
+def test_maps_of_shared_rows_know_how_far_they_may_be_off() -> None:
+    dv, xy = alike(40, 0, 1, uneven=0.4)
+    others, there = alike(300, 5, 1, uneven=0.4)
+    told, variance = LoneMaps.of(xy / RADIUS, dv, Turns.of(PATTERN)).at(there / RADIUS)
+    assert 0.7 < float(((told - others) ** 2 / variance).mean()) < 1.4
+
+
+def test_a_locator_that_knows_its_pattern_uses_it() -> None:
+    dv, xy = alike(12, 0, 1)
+    others, there = alike(200, 5, 1)
+    known, unknown = Locator.fit(dv, xy, pattern=PATTERN), Locator.fit(dv, xy)
+    assert (known.pattern_id, unknown.pattern_id) == (PATTERN.identity, "")
+    assert np.abs(known.predict(others)[0] - unknown.predict(others)[0]).max() > 0.01 * RADIUS
+    assert np.linalg.norm(known.predict(others)[0] - there, axis=1).mean() < 0.2 * RADIUS

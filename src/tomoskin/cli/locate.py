@@ -87,11 +87,13 @@ def _single(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
     import numpy as np
 
     from tomoskin.core import Reading, Touch
+    from tomoskin.touch import Watch
 
     locator = known.locator
+    watch = Watch(locator)
     for start in range(0, len(dv), _BLOCK):
         part = dv[start : start + _BLOCK]
-        places, covariance = locator.predict(part)
+        places, covariance = watch(part)
         deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
         strength = locator.strength(part)
         for place, sd, peak in zip(places, deviation, strength, strict=True):
@@ -99,6 +101,14 @@ def _single(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
             nothing = np.empty(0, dtype=np.int64)
             reading = Reading(x, y, sd_x, sd_y, area=np.nan, peak=float(peak), cells=nothing)
             yield (Touch(id=1, kind="touch", since=0.0, reading=reading),)
+    if len(watch.jumped):
+        jumped = "; ".join(known.pattern.row_text(row) for row in watch.jumped[:_SHOWN].tolist())
+        typer.echo(
+            f"tomoskin: {len(watch.jumped)} rows have jumped since the calibration and are left "
+            f"out at the end: {jumped}; presses of today mend that: "
+            "tomoskin calibrate touch --onto",
+            err=True,
+        )
 
 
 def _report(

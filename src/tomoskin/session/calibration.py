@@ -83,13 +83,12 @@ def unpack_calibration(data: bytes, where: str) -> Calibration:
 def _read(arrays: Arrays, where: str, progress: Callable[[float, float], None]) -> Calibration:
     pattern = _FILE.pattern(arrays, where)
     strength = real_numbers(arrays, "strength", where) if "strength" in arrays else None
-    with located(where):
-        presses = Presses.of(
-            real_numbers(arrays, "dv", where), real_numbers(arrays, "xy_m", where), strength
-        )
-        region = Region.checked(real_numbers(arrays, "outline_m", where))
-        ids = (pattern.identity, str(arrays.get("skin", "")))
-        locator = Locator.learn(presses.within(region), region, ids, progress)
-    if presses.dv.shape[1] != pattern.n_meas:
+    dv = real_numbers(arrays, "dv", where)
+    if dv.shape[1:] != (pattern.n_meas,):
         raise DataError(f"expected {pattern.n_meas} rows of dv", where=where)
+    with located(where):
+        presses = Presses.of(dv, real_numbers(arrays, "xy_m", where), strength)
+        region = Region.checked(real_numbers(arrays, "outline_m", where))
+        skin_id = str(arrays.get("skin", ""))
+        locator = Locator.learn(presses.within(region), region, pattern, skin_id, progress)
     return Calibration(locator, pattern, str(arrays.get("skin_name", "")))

@@ -91,8 +91,7 @@ class Several:
         """Read the maps of ``locator``."""
         maps, grid = _maps(locator), locator.estimates.grid
         places = grid[_spread_out(grid, _PLACES)]
-        mean, variance = maps.at(places)
-        changes = np.sinh(np.linalg.solve(maps.coregion.whiten.T, mean.T).T + maps.mean)
+        changes, variance = np.sinh(maps.features_at(places)), maps.at(places)[1]
         new = cls(locator, places, changes, variance.mean(axis=0), -np.inf)
         presses = new._features(locator.presses.dv)
         single = np.array([new._single(frame).max() for frame in presses])

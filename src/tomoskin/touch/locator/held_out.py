@@ -10,19 +10,18 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.touch.locator.kernel import Likeness
+from tomoskin.touch.locator.kernel import LENGTHS, Likeness
 from tomoskin.touch.locator.lone import LoneLikelihood, LoneMaps
 from tomoskin.touch.locator.maps import ResponseMaps
 from tomoskin.touch.locator.posterior import GridLikelihood, moments, pooled, powers_of
+from tomoskin.touch.locator.turns import Turns
 
-_LENGTHS = (0.16, 0.22, 0.32, 0.45, 0.65)
-"""Length scales of a response that are tried, in radii of the region."""
-
-_FEW = 80
+FEW = 80
 """So few presses are asked row by row too; with more, all rows together know better."""
 
+_SCARCE = 20
 _FOLDS = (8, 5)
-"""In which presses are left out, when they are few and when they are many."""
+"""In which presses are left out, when they are scarce and when they are not."""
 
 _NEAR = 0.5
 """Mean squared step, in parts of that between any two presses, below which they are in an order."""
@@ -53,6 +52,7 @@ class Estimates:
         features: FloatArray,
         places: FloatArray,
         grid: FloatArray,
+        turns: Turns,
         like: ResponseMaps | None = None,
     ) -> Self:
         """Learn the maps; length scales by evidence, powers by left-out presses.
@@ -60,7 +60,7 @@ class Estimates:
         Maps that are ``like`` others have their length scale and coregionalisation.
         """
         known = like.coregion if like else None
-        lengths = [like.basis.likeness] if like else map(Likeness, _LENGTHS)
+        lengths = [like.basis.likeness] if like else map(Likeness, LENGTHS)
         maps = max(
             (ResponseMaps.of(x, places, features, known) for x in lengths),
             key=lambda m: m.evidence,
@@ -72,15 +72,11 @@ class Estimates:
 
         parts = [_left_out(joint, places, features)]
         alone = None
-        if len(places) < _FEW:
-            alone = max(
-                (LoneMaps.of(Likeness(x), places, features) for x in _LENGTHS),
-                key=lambda m: m.evidence,
-            )
-            apart = alone.likeness
+        if len(places) < FEW:
+            alone = found = LoneMaps.of(places, features, turns)
 
             def single(some: FloatArray, theirs: FloatArray) -> LoneLikelihood:
-                return LoneLikelihood.of(LoneMaps.of(apart, some, theirs), grid)
+                return LoneLikelihood.of(found.again(some, theirs), grid)
 
             parts.append(_left_out(single, places, features))
         powers = powers_of(parts, grid, places)
@@ -114,7 +110,7 @@ def _left_out(
     where presses follow each other over the skin, a stretch of time is a part of the skin.
     """
     n = len(places)
-    folds = min(_FOLDS[n >= _FEW], n)
+    folds = min(_FOLDS[n >= _SCARCE], n)
     order = np.arange(n)
     fold = order * folds // n if _in_any_order(places) else order % folds
     parts = [fold == k for k in range(folds)]

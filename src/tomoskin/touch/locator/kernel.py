@@ -10,6 +10,9 @@ from scipy.linalg import eigh
 
 from tomoskin.core import FloatArray
 
+LENGTHS = (0.16, 0.22, 0.32, 0.45, 0.65)
+"""Length scales of a response that are tried, in radii of the region."""
+
 _CONSTANT = 0.3
 """Variance of what a map has everywhere, in parts of what varies over the skin."""
 

@@ -15,17 +15,21 @@ from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
 from tomoskin.touch.locator.doubt import NINE_IN_TEN, Doubt, dispute_of, squared_lengths
 from tomoskin.touch.locator.features import Features
-from tomoskin.touch.locator.held_out import Estimates
+from tomoskin.touch.locator.held_out import FEW, Estimates
 from tomoskin.touch.locator.presses import Presses, frames
 from tomoskin.touch.locator.region import Region
 from tomoskin.touch.locator.review import Remark, outliers, twins
 from tomoskin.touch.locator.stack import Stack
 from tomoskin.touch.locator.strength import Strength
+from tomoskin.touch.locator.turns import Turns
 
 Advance = Callable[[float, float], None]
 """Told how much of how much is done."""
 
 _STEPS = 4
+
+_COARSE = 600
+"""Places in the grid of few presses: what they know is less than that."""
 
 _GROWN = 1.25
 """Growth up to which settings are kept when presses are added."""
@@ -48,8 +52,10 @@ class Locator:
         What it was learnt from.
     region
         Where a touch may be: the skin, or where the presses were.
-    pattern_id, skin_id
-        Identity of the pattern and the skin, "" where they are not known.
+    pattern
+        What was measured, or None where it is not known.
+    skin_id
+        Identity of the skin, "" where it is not known.
     held
         Part of the presses that lie in their own 90 % ellipse when they are left out.
     remarks
@@ -60,7 +66,7 @@ class Locator:
 
     presses: Presses
     region: Region
-    pattern_id: str
+    pattern: Pattern | None
     skin_id: str
     features: Features
     estimates: Estimates
@@ -108,27 +114,28 @@ class Locator:
         if table is not None:
             frames(presses.dv, table.n_meas)
         region = Region.of(skin) if skin else Region.around(presses.xy)
-        identities = table.identity if table else "", skin.identity if skin else ""
-        return cls.learn(presses.within(region), region, identities, progress)
+        skin_id = skin.identity if skin else ""
+        return cls.learn(presses.within(region), region, table, skin_id, progress)
 
     @classmethod
     def learn(
         cls,
         presses: Presses,
         region: Region,
-        identities: tuple[str, str] = ("", ""),
+        pattern: Pattern | None = None,
+        skin_id: str = "",
         progress: Advance = _silent,
     ) -> Self:
-        """Learn from checked presses in a region; ``identities`` of pattern and skin."""
+        """Learn from checked presses in a region, of a pattern and a skin where they are known."""
         with threadpool_limits(1):  # many small products: more threads only wait for each other
-            return cls._learnt(presses, region, identities, progress)
+            return cls._learnt(presses, region, (pattern, skin_id), progress)
 
     @classmethod
     def _learnt(
         cls,
         presses: Presses,
         region: Region,
-        identities: tuple[str, str],
+        known: tuple[Pattern | None, str],
         progress: Advance,
         like: Locator | None = None,
     ) -> Self:
@@ -137,7 +144,9 @@ class Locator:
         data = features(presses.dv)
         progress(0, _STEPS)
         maps = like.estimates.likelihood.maps if like else None
-        estimates = Estimates.of(data, places, region.grid, maps)
+        turns = Turns.of(known[0]) if known[0] else Turns.none(presses.dv.shape[1])
+        grid = region.lattice(_COARSE) if len(presses) < FEW else region.grid
+        estimates = Estimates.of(data, places, grid, turns.of_rows(features.rows), maps)
         progress(1, _STEPS)
         stack = Stack.of(data, estimates.left_out, places, like.stack if like else None)
         progress(2, _STEPS)
@@ -156,7 +165,7 @@ class Locator:
         return cls(
             presses,
             region,
-            *identities,
+            *known,
             features,
             estimates,
             stack,
@@ -205,15 +214,19 @@ class Locator:
         changed = np.median(missed) > _CHANGED * np.median(self.errors)
         keep = len(presses) <= _GROWN * self.settled and not changed
         like = self if keep else None
-        identities = self.pattern_id, self.skin_id
         with threadpool_limits(1):
-            return self._learnt(presses, region, identities, _silent, like)
+            return self._learnt(presses, region, (self.pattern, self.skin_id), _silent, like)
 
     def settled_anew(self, progress: Advance = _silent) -> Self:
         """Locator with the same presses, every setting learnt from all of them."""
         if self.settled == len(self.presses):
             return self
-        return self.learn(self.presses, self.region, (self.pattern_id, self.skin_id), progress)
+        return self.learn(self.presses, self.region, self.pattern, self.skin_id, progress)
+
+    @property
+    def pattern_id(self) -> str:
+        """Identity of the pattern, "" where it is not known."""
+        return self.pattern.identity if self.pattern else ""
 
     @property
     def errors(self) -> FloatArray:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray
-from tomoskin.touch.locator.kernel import Likeness
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.touch.locator.kernel import LENGTHS, Likeness
+from tomoskin.touch.locator.orbit import Modes, OrbitMaps
+from tomoskin.touch.locator.turns import Turns
 
-_RATIOS = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
-"""Noise over signal of a row, as tried."""
+_SHARES = (0.0, 0.3, 0.6, 0.85)
+"""Part of a row's variance that its turned copies have in common, as tried."""
 
 _FREEDOM = 4.0
 """Degrees of freedom of one row's error: a press may be told wrong by a few rows."""
@@ -22,48 +25,74 @@ _TOGETHER, _FARTHEST = 8, np.float32(1e4)
 
 _SINGLE = np.float32
 
-_FLOOR = 1e-9
-
 
 @dataclass(frozen=True, eq=False)
 class LoneMaps:
-    """A Gaussian process for each row, with a noise of its own (Rasmussen & Williams 2006, 5.8).
+    """A Gaussian process for each row, with a noise of its own and a share in its turned copies.
 
     The matrix-variate process knows more, but must learn two covariances of all rows: from some
     twenty presses it learns the noise of a single row less well than the row alone does.
+
+    ``groups`` are the rows of each group, whose maps are ``orbits``.
     """
 
-    likeness: Likeness
-    places: FloatArray
-    mean: FloatArray
-    modes: tuple[FloatArray, FloatArray]
-    rows: FloatArray
-    noise: FloatArray
-    size: FloatArray
-    evidence: float
+    turns: Turns
+    groups: tuple[IntArray, ...]
+    orbits: tuple[OrbitMaps, ...]
 
     @classmethod
-    def of(cls, likeness: Likeness, places: FloatArray, features: FloatArray) -> Self:
-        """Maps for ``features`` (n, k) of presses at ``places`` (n, 2)."""
-        n, mean = len(places), features.mean(axis=0)
-        weights, axes = np.linalg.eigh(likeness(places, places))
-        weights = np.maximum(weights, 0.0)
-        rows = axes.T @ (features - mean)
-        spread = weights[:, None] + _RATIOS
-        size = (1 / spread).T @ rows**2 / n + _FLOOR
-        log = -0.5 * n * np.log(size) - 0.5 * np.log(spread).sum(axis=0)[:, None]
-        best = log.argmax(axis=0), np.arange(features.shape[1])
-        noise = _RATIOS[best[0]]
-        evidence = float(log[best].sum())
-        return cls(likeness, places, mean, (weights, axes), rows, noise, size[best], evidence)
+    def of(cls, places: FloatArray, features: FloatArray, turns: Turns) -> Self:
+        """Maps for ``features`` (n, k) of presses at ``places`` (n, 2).
+
+        Of each group of rows the length scale and the share, and the way round of all, are those
+        of the largest marginal likelihood.
+        """
+        ways = (turns, turns.reversed()) if turns.any else (turns,)
+        angles = np.concatenate([way.angle for way in ways])
+        modes = [Modes.of(Likeness(length), places, angles) for length in LENGTHS]
+        return max((cls._of(modes, features, way) for way in ways), key=lambda m: m.evidence)
+
+    @classmethod
+    def _of(cls, modes: Sequence[Modes], features: FloatArray, turns: Turns) -> Self:
+        groups = tuple(np.flatnonzero(turns.orbit == orbit) for orbit in np.unique(turns.orbit))
+        shares = _SHARES if turns.any else (0.0,)
+        orbits = (
+            max(
+                (
+                    OrbitMaps.of(m, m.alone(features[:, rows]), turns.angle[rows], share)
+                    for m in modes
+                    for share in shares
+                ),
+                key=lambda maps: maps.evidence,
+            )
+            for rows in groups
+        )
+        return cls(turns, groups, tuple(orbits))
+
+    def again(self, places: FloatArray, features: FloatArray) -> Self:
+        """Maps of other presses with the same settings."""
+        angle, lengths = self.turns.angle, {maps.modes.likeness for maps in self.orbits}
+        modes = {likeness: Modes.of(likeness, places, angle) for likeness in lengths}
+        orbits = []
+        for rows, maps in zip(self.groups, self.orbits, strict=True):
+            theirs = modes[maps.modes.likeness]
+            alone = theirs.alone(features[:, rows])
+            orbits.append(OrbitMaps.of(theirs, alone, angle[rows], maps.share))
+        return replace(self, orbits=tuple(orbits))
+
+    @property
+    def evidence(self) -> float:
+        """Log marginal likelihood, up to a constant of the features."""
+        return sum(maps.evidence for maps in self.orbits)
 
     def at(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean and variance, both (g, k), of the features of a press at ``places`` (g, 2)."""
-        weights, axes = self.modes
-        near = self.likeness(places, self.places) @ axes
-        spread = weights[:, None] + self.noise
-        left = self.likeness.variance + self.noise - near**2 @ (1 / spread)
-        return self.mean + near @ (self.rows / spread), self.size * np.maximum(left, _FLOOR)
+        mean, variance = np.empty((2, len(places), len(self.turns.angle)))
+        modes = {maps.modes.likeness: maps.modes for maps in self.orbits}
+        seen = {likeness: m.at(places) for likeness, m in modes.items()}
+        for rows, maps in zip(self.groups, self.orbits, strict=True):
+            mean[:, rows], variance[:, rows] = maps.at(*seen[maps.modes.likeness])
+        return mean, variance
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,6 +71,14 @@ class ResponseMaps:
         left = self.basis.likeness.variance * gain - (at**2) @ variance_of
         return at @ mean_of, 1.0 + np.maximum(left, 0.0)
 
+    def features_at(self, places: FloatArray) -> FloatArray:
+        """(n, k) features that are expected of presses at ``places`` (n, 2)."""
+        return np.asarray(self.at(places)[0] @ self._unwhiten + self.mean)
+
+    @cached_property
+    def _unwhiten(self) -> FloatArray:
+        return np.asarray(np.linalg.inv(self.coregion.whiten))
+
     @cached_property
     def _solved(self) -> tuple[FloatArray, FloatArray]:
         """What takes a basis function to the mean, and its square to the known variance."""

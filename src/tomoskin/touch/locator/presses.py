@@ -14,7 +14,7 @@ from tomoskin.touch.locator.region import Region
 _FEWEST = 6
 _SHOWN = 10
 _BESIDE = 0.05
-"""A label may lie so far outside, in radii of the region, that it is taken for its rim."""
+"""A label may lie so far beyond the outline, in radii of the region: it is taken for its rim."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +66,7 @@ class Presses:
 
     def within(self, region: Region) -> Self:
         """These presses; DataError, with the rows, where labels lie outside the region."""
-        near = region.centre + (self.xy - region.centre) * (1 - _BESIDE)
-        outside = np.flatnonzero(~region.holds(near))
+        outside = np.flatnonzero(region.beyond(self.xy) > _BESIDE * region.unit)
         _name(outside, "have labels outside the skin", "labels are in metres, from its origin")
         return self
 

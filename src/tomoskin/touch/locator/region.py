@@ -14,7 +14,7 @@ from tomoskin.core import DataError, FloatArray
 from tomoskin.skin import Skin
 
 _PLACES = 1500
-"""Places in the grid."""
+"""Places in the grid, unless another number is asked for."""
 
 _CORNERS = 120
 """Corners of a round outline."""
@@ -91,10 +91,24 @@ class Region:
         left = x < (b[:, 0] - a[:, 0]) * (y - a[:, 1]) / rise + a[:, 0]
         return np.asarray((crosses & left).sum(axis=1) % 2 == 1)
 
+    def beyond(self, xy: FloatArray) -> FloatArray:
+        """(n,) m by which the places (n, 2) m lie outside the outline; 0 for those inside."""
+        start = self.outline
+        side = np.roll(start, -1, axis=0) - start
+        away = xy[:, None] - start
+        along = (away * side).sum(axis=2) / np.maximum((side**2).sum(axis=1), np.finfo(float).tiny)
+        nearest = away - np.clip(along, 0, 1)[:, :, None] * side
+        distance = np.linalg.norm(nearest, axis=2).min(axis=1)
+        return np.where(self.holds(xy), 0.0, distance)
+
     @cached_property
     def grid(self) -> FloatArray:
         """(g, 2) places in the locator's unit, on a hexagonal lattice."""
-        step = np.sqrt(2 * np.pi / (np.sqrt(3) * _PLACES))
+        return self.lattice(_PLACES)
+
+    def lattice(self, n_places: int) -> FloatArray:
+        """The same with about so many places."""
+        step = np.sqrt(2 * np.pi / (np.sqrt(3) * n_places))
         corners = self.scaled(self.outline)
         low, high = corners.min(axis=0), corners.max(axis=0)
         x = np.arange(low[0], high[0] + step, step)
