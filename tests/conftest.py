@@ -19,7 +19,6 @@ from hypothesis import HealthCheck, settings
 ROOT = Path(__file__).resolve().parent.parent
 DEFAULT_DATA = ROOT.parent / "shared" / "data"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-missing_things = pytest.StashKey[set[str]]()
 
 # How long an example takes says more of the machine's other load than of the code.
 settings.register_profile("tomoskin", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -39,10 +38,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    config.stash[missing_things] = set()
-
-
 def pytest_runtest_setup(item: pytest.Item) -> None:
     if item.get_closest_marker("data"):
         require_data(item.config)
@@ -54,8 +49,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     seed = config.getoption("randomly_seed", None)
     if seed is not None:
         terminalreporter.write_line(f"to repeat this order: --randomly-seed={seed}")
-    things: set[str] = config.stash[missing_things]
-    for thing in sorted(things):
+    for thing in sorted(missing_things(config)):
         terminalreporter.write_line(f"NOT TESTED: {thing}", yellow=True, bold=True)
 
 
@@ -140,9 +134,15 @@ def driver_runs() -> bool:
         return False
 
 
+def missing_things(config: pytest.Config) -> set[str]:
+    """What has been missing so far: one set, by whatever name this module was imported."""
+    things: set[str] = vars(config).setdefault("missing_things", set())
+    return things
+
+
 def missing(config: pytest.Config, thing: str) -> None:
     """Skip the test and say so at the end; where everything must be there, fail it."""
     if os.environ.get("CI") == "true":
         pytest.fail(f"CI must test {thing}", pytrace=False)
-    config.stash[missing_things].add(thing)
+    missing_things(config).add(thing)
     pytest.skip(thing)
