@@ -12,10 +12,13 @@ from pathlib import Path
 
 from tomoskin.core import DataError
 from tomoskin.pattern import Pattern
-from tomoskin.session.archive import load_arrays, save_arrays
+from tomoskin.session.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
 from tomoskin.session.calibration_file import CalibrationFile, located
 from tomoskin.session.interchange import real_numbers
 from tomoskin.touch import BendExamples, BendModel
+
+BENDS_FILE = "bends.npz"
+"""Name of the calibration inside a session."""
 
 _FILE = CalibrationFile(
     "tomoskin bend calibration",
@@ -45,18 +48,23 @@ class BendCalibration:
 
 def write_bends(path: Path, calibration: BendCalibration) -> None:
     """Write the file whole or not at all. Raises DataError when it cannot be written."""
+    save_arrays(path, _arrays(calibration))
+
+
+def pack_bends(calibration: BendCalibration) -> bytes:
+    """The same file's bytes, for a session that holds it."""
+    return pack_arrays(_arrays(calibration))
+
+
+def _arrays(calibration: BendCalibration) -> Arrays:
     model, pattern = calibration.model, calibration.pattern
-    save_arrays(
-        path,
-        _FILE.header(pattern, calibration.skin_name)
-        | {
-            "dv": model.examples.dv,
-            "angle_rad": model.examples.angle,
-            "axis_rad": model.examples.axis,
-            "time_s": model.examples.time,
-            "covariance": model.covariance,
-        },
-    )
+    return _FILE.header(pattern, calibration.skin_name) | {
+        "dv": model.examples.dv,
+        "angle_rad": model.examples.angle,
+        "axis_rad": model.examples.axis,
+        "time_s": model.examples.time,
+        "covariance": model.covariance,
+    }
 
 
 def read_bends(path: Path) -> BendCalibration:
@@ -67,7 +75,15 @@ def read_bends(path: Path) -> BendCalibration:
     DataError
         When it is missing, damaged, or no calibration of bends.
     """
-    arrays, where = load_arrays(path), str(path)
+    return _read(load_arrays(path), str(path))
+
+
+def unpack_bends(data: bytes, where: str) -> BendCalibration:
+    """:func:`read_bends` from the file's bytes."""
+    return _read(unpack_arrays(data, where), where)
+
+
+def _read(arrays: Arrays, where: str) -> BendCalibration:
     pattern = _FILE.pattern(arrays, where)
     with located(where):
         dv, *labels, covariance = (
