@@ -44,6 +44,14 @@ def test_what_cannot_be_run_is_python_all_the_same(page: Path) -> None:
         compile(block, page.name, "exec")
 
 
+def test_every_benchmark_that_is_named_exists() -> None:
+    pages = [ROOT / "README.md", *DOCS.rglob("*.md")]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    named = set(re.findall(r"`tomoskin bench ([a-z_]+)", text))
+    assert len(named) > 10
+    assert [name for name in named if not (ROOT / "benchmarks" / f"{name}.py").is_file()] == []
+
+
 @pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md"])
 def test_links_lead_somewhere(name: str) -> None:
     """Sphinx looks after the pages in docs."""
