@@ -7,7 +7,7 @@ import shutil
 import statistics
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -74,7 +74,9 @@ class Stream(Runner):
     def __init__(self, prepared: Prepared) -> None:
         """Nothing is opened."""
         super().__init__(prepared, _no_source)
-        self.source, self._ending, self.made = "a bench", threading.Event(), 0
+        self._ending, self.made = threading.Event(), 0
+        self._shown: Snapshot | None = None
+        self._announces: list[Callable[[], None]] = []
         random = np.random.default_rng(1)
         mesh, reference = prepared.mesh, prepared.operator.reference
         self._images = 1e-3 * random.standard_normal((16, len(mesh.cells)))
@@ -93,6 +95,20 @@ class Stream(Runner):
         self._worker = threading.Thread(target=self._make, daemon=True)
         self._worker.start()
 
+    source = "a bench"
+
+    @property
+    def newest(self) -> Snapshot | None:
+        """What was made last."""
+        return self._shown
+
+    @contextmanager
+    def watched_by(self, announce: Callable[[], None]) -> Iterator[None]:
+        """Call it at each result."""
+        self._announces.append(announce)
+        yield
+        self._announces.remove(announce)
+
     def end(self) -> None:
         """Make no more."""
         self._ending.set()
@@ -103,8 +119,8 @@ class Stream(Runner):
         while not self._ending.is_set():
             now = time.monotonic()
             self.made += 1
-            self.newest = Snapshot(self._next(now), (), 1e-3)
-            for announce in tuple(self._watchers):
+            self._shown = Snapshot(self._next(now), (), 1e-3, now)
+            for announce in tuple(self._announces):
                 announce()
             due += 1 / RATE
             time.sleep(max(due - time.monotonic(), 0.0))

@@ -16,6 +16,7 @@ from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.record import recording_to
 from tomoskin.cli.sink_option import SinkOption, chosen_sinks
 from tomoskin.cli.skin_choice import SkinOption, skin_for_source
+from tomoskin.cli.states_option import StatesOption, with_states
 
 if TYPE_CHECKING:
     from tomoskin.live import Door, Prepared, Runner
@@ -43,6 +44,7 @@ def live(
         ),
     ] = None,
     bend: BendOption = None,
+    states: StatesOption = None,
     sink: SinkOption = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = 8765,
     host: Annotated[
@@ -61,6 +63,7 @@ def live(
         room.check_page()
         sinks = chosen_sinks(sink)
         prepared = with_bends(_prepared(skin, source, calibration), bend)
+        prepared = with_states(prepared, states, prepared.skin)
         chosen = prepared.skin
         with room.listen(host, port) as listener:
             if not room.is_loopback(host):
@@ -121,6 +124,16 @@ def _announce(door: Door, runner: Runner, *, json: bool) -> None:
 
 
 def _farewell(runner: Runner, *, json: bool) -> None:
+    from tomoskin import live as room
+
     status = runner.status()
     if json:
-        emit({"type": "stopped", "frames": status.frames, "p50_ms": 1e3 * status.p50})
+        emit(
+            {
+                "type": "stopped",
+                "frames": status.frames,
+                "p50_ms": 1e3 * status.p50,
+                "p99_ms": 1e3 * status.p99,
+                "stages": room.stages(status),
+            }
+        )

@@ -15,6 +15,7 @@ from tomoskin.live.labelled import (
     on_cluster,
     processors,
 )
+from tomoskin.live.messages import stages
 from tomoskin.live.offline import Reconstruction, reconstruct
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.prepare import Prepared, prepare, prepare_again
@@ -81,6 +82,7 @@ __all__ = [
     "reconstruct",
     "replayed",
     "simulate",
+    "stages",
     "take_flows",
     "voltage_covariance",
 ]

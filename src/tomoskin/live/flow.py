@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tomoskin.core import DataError, Event, Frame
+from tomoskin.live.latency import Latency
 from tomoskin.live.meter import Meter
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.play import where_is
@@ -30,11 +31,13 @@ _STANDSTILL = frozenset({"silent", "fault", "reset"})
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """A result, the presses on the twin when it was read, and its latency in s."""
+    """A result, the presses on the twin when it was read, its latency in s, and when it was
+    ready, host monotonic s."""
 
     result: Result
     truth: tuple[Contact, ...]
     latency: float
+    ready: float
 
 
 class Flow:
@@ -50,8 +53,9 @@ class Flow:
         Source and skin in words, once it has been opened.
     pressable
         Whether the source can be pressed, as the twin can.
-    pipeline, wishes, hands, out
-        What makes results, what is wanted of it, who presses the source, who is told.
+    pipeline, wishes, hands, out, latency
+        What makes results, what is wanted of it, who presses the source, who is told, and how
+        long all that takes.
     """
 
     def __init__(self, prepared: Prepared, audience: Audience) -> None:
@@ -60,6 +64,7 @@ class Flow:
         self.source, self.pressable = "", False
         self.pipeline, self.wishes, self.hands = Pipeline(prepared), Wishes(), Hands()
         self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered)
+        self.latency = Latency()
         self._clock = audience.clock
         self._settings = ScanSettings.of(prepared.skin)
         self._meter = Meter()
@@ -131,7 +136,10 @@ class Flow:
             self._skipped += 1
             return
         self._standstill = None
-        self._meter.arrived(self._read(frame))
+        read, begun = self._read(frame), self._clock()
+        self._meter.arrived(read)
+        self.latency.sampled(frame, self.pipeline.tick_rate)
+        self.latency.took("decode", begun - read)
         try:
             result = advance(self.pipeline, frame, mark)
         except DataError as error:
@@ -140,9 +148,10 @@ class Flow:
             return
         if result is None:
             return
-        latency = self._clock() - self._read(frame)
-        self._meter.took(latency)
-        self.newest = Snapshot(result, self.hands.truth, latency)
+        ready = self._clock()
+        self._meter.took(ready - read)
+        self.latency.took("reconstruct", ready - begun)
+        self.newest = Snapshot(result, self.hands.truth, ready - read, ready)
         self.out.result(result)
 
     def _read(self, frame: Frame) -> float:
@@ -176,6 +185,7 @@ class Flow:
             gaps=total.gaps,
             p50=p50,
             p99=p99,
+            stages=self.latency.stages(),
             reference=reference,
             reference_age=None if reference.since is None else here - reference.since,
             choice=self.pipeline.choice,

@@ -20,6 +20,7 @@ from tomoskin.live.play import play
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.requests import (
     Note,
+    Painted,
     ReplayRequest,
     Request,
     SetPause,
@@ -156,6 +157,7 @@ class Hub:
         """Serve ``page`` no longer, and lift what it pressed."""
         self._pages.discard(page)
         self.runner.set_presses(page, ())
+        self.runner.latency.gone(page)
         if why:
             self.runner.say("page-dropped", why)
 
@@ -168,6 +170,12 @@ class Hub:
             data = encode_result(newest.result, newest.truth, newest.latency)
             self._encoded = (newest, data)
         return self._encoded[1]
+
+    def sent(self, frame: bytes) -> None:
+        """A page's connection has taken this message."""
+        if self._encoded is not None and self._encoded[1] is frame:
+            took = time.monotonic() - self._encoded[0].ready
+            self.runner.latency.took("publish", took)
 
     def take(self, desk: Desk) -> None:
         """Let ``desk`` answer requests of its types, before the first page comes."""
@@ -189,6 +197,8 @@ class Hub:
             self.runner.take_reference()
         elif isinstance(request, Note):
             self.runner.note(request.text)
+        elif isinstance(request, Painted):
+            self.runner.latency.painted(page, request.p50_s, request.p99_s)
         elif isinstance(request, ReplayRequest):
             self._play(page, request)
         else:

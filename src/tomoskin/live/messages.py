@@ -78,6 +78,7 @@ def state(status: Status) -> str:
         gaps=status.gaps,
         p50_ms=_known(1e3 * status.p50),
         p99_ms=_known(1e3 * status.p99),
+        stages=stages(status),
         reference={
             "frames": reference.frames,
             "needed": reference.needed,
@@ -97,6 +98,18 @@ def state(status: Status) -> str:
         problem=status.problem,
         text=status.text,
     )
+
+
+def stages(status: Status) -> list[dict[str, Any]]:
+    """Where the age of a picture comes from, stage by stage."""
+    return [
+        {
+            "name": stage.name,
+            "p50_ms": _known(1e3 * stage.p50),
+            "p99_ms": _known(1e3 * stage.p99),
+        }
+        for stage in status.stages
+    ]
 
 
 def _baseline(now: BaselineState | None) -> dict[str, Any] | None:

@@ -96,6 +96,7 @@ class Page:
         if frame is not None and frame is not self._sent:
             await self._socket.send_bytes(frame)
             self._sent = frame
+            self._hub.sent(frame)
 
 
 def _reason(done: set[asyncio.Task[None]]) -> str:

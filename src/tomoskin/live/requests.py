@@ -80,6 +80,13 @@ class Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="note"):
     text: Annotated[str, Meta(min_length=1, max_length=MAX_NOTE)]
 
 
+class Painted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="painted"):
+    """How long the page took of late from a frame's arrival to the end of drawing it, s."""
+
+    p50_s: Annotated[float, Meta(ge=0, le=3600)]
+    p99_s: Annotated[float, Meta(ge=0, le=3600)]
+
+
 class Seek(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="seek"):
     """Play the recording from so many seconds after its first frame on."""
 
@@ -112,6 +119,7 @@ Request = (
     | SetPause
     | SetRecording
     | Note
+    | Painted
     | TwinRequest
     | SettingsRequest
     | ReplayRequest

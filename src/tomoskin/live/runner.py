@@ -10,6 +10,7 @@ from pathlib import Path
 
 from tomoskin.live.events import EventLog
 from tomoskin.live.flow import Snapshot
+from tomoskin.live.latency import Latency
 from tomoskin.live.loop import Loop
 from tomoskin.live.posing import Posed
 from tomoskin.live.prepare import Prepared
@@ -145,6 +146,11 @@ class Runner:
     def replay(self) -> Replayed | None:
         """The recording that is being played; None where the source is another."""
         return self._loop.flow.wishes.replay
+
+    @property
+    def latency(self) -> Latency:
+        """How long each stage takes; who publishes and paints says so here."""
+        return self._loop.flow.latency
 
     def status(self) -> Status:
         """How it is doing now."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tomoskin.inverse import AlphaChoice
+from tomoskin.live.latency import Stage
 from tomoskin.live.result import ReferenceState
 from tomoskin.signal import ElectrodeHealth
 from tomoskin.sink import SinkReport
@@ -48,6 +49,8 @@ class Status:
         Frames that are missing in the sequence.
     p50, p99
         Latency from a frame's last byte to its touches over the last frames, s; NaN at first.
+    stages
+        How long each stage takes, from the sample to the page.
     reference
         How far the reference is.
     reference_age
@@ -85,6 +88,7 @@ class Status:
     choice: AlphaChoice
     left_out: int
     problem: str | None
+    stages: tuple[Stage, ...] = ()
     recording: Path | None = None
     sinks: tuple[SinkReport, ...] = ()
     electrodes: tuple[ElectrodeHealth, ...] = ()

@@ -14,6 +14,7 @@ const status: Status = {
   gaps: 3,
   p50_ms: 0.3,
   p99_ms: 0.8,
+  stages: [],
   reference: { frames: 20, needed: 20, age_s: 75, ready: true },
   baseline: null,
   sick: [],

@@ -150,6 +150,16 @@ const TABS: readonly Tab[] = [
     data: wayData,
     series: 2 * SLOTS,
   },
+  {
+    id: "latency",
+    label: "Latency",
+    unit: "ms",
+    meaning: "Where the age of a picture comes from: how long each stage took over the last frames.",
+    fit: () => [0, 1],
+    range: [0, 1],
+    data: () => [[], []],
+    series: 1,
+  },
 ];
 
 const current = signal<Tab>(TABS[0]);
@@ -252,6 +262,21 @@ function summary(tab: Tab): string {
   return `rms ${fixed(rms, rms < 10 ? 2 : 0)} ${tab.unit}`;
 }
 
+function Chart({ tab }: { tab: Tab }) {
+  return (
+    <>
+      <p class="sum">
+        <span>{tab.unit}</span>
+        <strong data-testid="signals-sum">{summary(tab)}</strong>
+        <button type="button" onClick={autoOnce}>
+          Auto once
+        </button>
+      </p>
+      <Plot label={`${tab.label}, ${tab.unit}`} plan={plan} data={data} />
+    </>
+  );
+}
+
 function View() {
   const tab = current.value;
   void shown.value;
@@ -272,15 +297,7 @@ function View() {
       </div>
       <p class="hint">{tab.meaning}</p>
       {tab.id === "drive" && <Drives />}
-      <p class="sum">
-        <span>{tab.unit}</span>
-        <strong data-testid="signals-sum">{summary(tab)}</strong>
-        <button type="button" onClick={autoOnce}>
-          Auto once
-        </button>
-      </p>
-      <Plot label={`${tab.label}, ${tab.unit}`} plan={plan} data={data} />
-      <Budget />
+      {tab.id === "latency" ? <Budget /> : <Chart tab={tab} />}
     </div>
   );
 }

@@ -1,0 +1,40 @@
+/** Where the age of a picture comes from: a table of stages, from the sample to the page. */
+
+import { fixed } from "../format";
+import { status } from "../state";
+
+const MEANINGS: Readonly<Record<string, string>> = {
+  sample: "between the scans of two frames, by the device",
+  decode: "from a frame's last byte to the pipeline",
+  reconstruct: "voltages, picture, touches",
+  publish: "from the touches to the last byte given to a page",
+  paint: "from its arrival to the end of drawing; the slowest page",
+};
+
+const milli = (value: number | null): string => (value === null ? "–" : fixed(value, 2));
+
+export function Budget() {
+  return (
+    <table class="budget" data-testid="budget">
+      <caption class="unseen">Time of each stage, ms</caption>
+      <thead>
+        <tr>
+          <th scope="col">stage</th>
+          <th scope="col">median, ms</th>
+          <th scope="col">p99, ms</th>
+        </tr>
+      </thead>
+      <tbody>
+        {status.value?.stages.map(({ name, p50_ms, p99_ms }) => (
+          <tr key={name} data-testid={`stage-${name}`}>
+            <th scope="row">
+              <strong>{name}</strong> <small>{MEANINGS[name]}</small>
+            </th>
+            <td>{milli(p50_ms)}</td>
+            <td>{milli(p99_ms)}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
