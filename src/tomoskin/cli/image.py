@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,6 +21,7 @@ from tomoskin.cli.recording import (
     say_notes,
 )
 from tomoskin.cli.skin_choice import SkinOption, skin_for_file
+from tomoskin.cli.states_option import StatesOption, with_states
 from tomoskin.cli.time_option import TimeConstantOption, filter_said, with_time_constant
 
 if TYPE_CHECKING:
@@ -39,6 +41,7 @@ def image(
     alpha: AlphaOption = None,
     time_constant: TimeConstantOption = None,
     bend: BendOption = None,
+    states: StatesOption = None,
     out: Annotated[
         Path | None, typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go.")
     ] = None,
@@ -55,10 +58,11 @@ def image(
     from tomoskin.session import read_recording
 
     write = _writer(out)
-    chosen, rule = with_alpha(skin_for_file(skin, recording), alpha)
+    told = skin_for_file(skin, recording)
+    chosen, rule = with_alpha(told, alpha)
     chosen = with_time_constant(chosen, time_constant)
     display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
-    prepared = with_bends(prepare(chosen), bend)
+    prepared = with_states(with_bends(prepare(chosen), bend), states, told)
     whole = read_recording(recording).in_order_of(prepared.pattern)
     say_notes(whole)
     idle = idle_frames(whole, reference, prepared.pattern)
@@ -103,6 +107,9 @@ def _report(source: Path, found: Reconstruction, prepared: Prepared, *, json: bo
     if found.bends:
         states = Counter(reading.state for reading in found.bends if reading)
         typer.echo(", ".join(f"{state}: {count} frames" for state, count in states.items()))
+    if found.states:
+        told = Counter("unknown" if s.unknown else s.name for s in found.states)
+        typer.echo(", ".join(f"{state}: {count} frames" for state, count in told.items()))
     for frame, touches in list(zip(found.frames.tolist(), found.touches, strict=True))[:_SHOWN]:
         for t in touches:
             r = t.reading
@@ -166,6 +173,10 @@ def _document(found: Reconstruction, prepared: Prepared) -> dict[str, Any]:
             {"frame": f, "angle_rad": b.angle, "sd_rad": b.sd, "axis_rad": b.axis, "state": b.state}
             for f, b in zip(found.frames.tolist(), found.bends, strict=False)
             if b
+        ],
+        "states": [
+            {"frame": f, **asdict(state)}
+            for f, state in zip(found.frames.tolist(), found.states, strict=False)
         ],
         "touches": [
             {"frame": f, "id": t.id, "x_m": t.reading.x, "y_m": t.reading.y, "peak": t.reading.peak}

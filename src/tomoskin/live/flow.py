@@ -192,5 +192,6 @@ class Flow:
             left_out=result.left_out if result else 0,
             electrodes=result.health.sick if result and result.health else (),
             bend=result.bend if result and result.ready else None,
+            state=result.state if result and result.ready else None,
             problem=trouble or self._standstill or (result.problem if result else None),
         )

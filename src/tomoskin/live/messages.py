@@ -4,6 +4,7 @@ frames: ``live/frames.py``."""
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import msgspec
@@ -16,7 +17,7 @@ from tomoskin.live.status import Status
 from tomoskin.live.twin_requests import MAX_FORCE
 from tomoskin.session import Timeline
 from tomoskin.signal import BaselineState, ElectrodeHealth
-from tomoskin.touch import BendReading
+from tomoskin.touch import BendReading, StateReading
 
 PROBE_RADIUS = 0.015
 """Radius of a press from the page unless it says otherwise, m: the source's usual probe."""
@@ -95,6 +96,7 @@ def state(status: Status) -> str:
         sinks=status.sinks,
         replay=status.replay,
         bend=_bend(status.bend),
+        state=_state(status.state),
         problem=status.problem,
         text=status.text,
     )
@@ -129,6 +131,11 @@ def _bend(now: BendReading | None) -> dict[str, Any] | None:
     if now is None:
         return None
     return {"angle_rad": now.angle, "sd_rad": now.sd, "axis_rad": now.axis, "state": now.state}
+
+
+def _state(now: StateReading | None) -> dict[str, Any] | None:
+    """Which state the newest frame shows, as ``tomoskin image --json`` tells it."""
+    return None if now is None else asdict(now)
 
 
 def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from tomoskin.live.tune import tuned, tuned_by_rule
 from tomoskin.live.watch import Seen, Watch
 from tomoskin.session import Recording
 from tomoskin.signal import undone
-from tomoskin.touch import STILL, BendReading, Tracker
+from tomoskin.touch import STILL, BendReading, StateReading, Tracker
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +47,8 @@ class Reconstruction:
     bends
         How the sheet was bent in each frame, None where too little was left of it; empty where
         its bends were not learnt.
+    states
+        One a frame; empty where none were learnt.
     """
 
     frames: IntArray
@@ -59,6 +61,7 @@ class Reconstruction:
     choice: AlphaChoice
     rows_left_out: IntArray
     bends: tuple[BendReading | None, ...] = ()
+    states: tuple[StateReading, ...] = ()
 
     def numbered_from(self, first: int) -> Reconstruction:
         """Frames counted from ``first``, for a part of a longer recording."""
@@ -117,6 +120,7 @@ def reconstruct(
         choice=prepared.choice,
         rows_left_out=changes.rows_left_out,
         bends=() if prepared.bending is None else tuple(bends),
+        states=_told(prepared, changes),
     )
 
 
@@ -126,6 +130,20 @@ def _tuned(changes: Changes, rule: str | None) -> Prepared:
     if changes.reference is None:
         return changes.prepared
     return tuned(changes.prepared, changes.reference)
+
+
+def _told(prepared: Prepared, changes: Changes) -> tuple[StateReading, ...]:
+    """What state each frame shows, against the reference as it is given."""
+    if prepared.teller is None:
+        return ()
+    found = []
+    for dv, missing in zip(changes.values, changes.missing, strict=True):
+        change = dv
+        if changes.reference is not None:
+            mean = changes.reference.mean
+            change = undone(dv, mean, prepared.operator.difference) - mean
+        found.append(prepared.teller(np.where(missing, np.nan, change)))
+    return tuple(found)
 
 
 class _Stage:

@@ -18,7 +18,7 @@ from tomoskin.live.result import ReferenceState, Result
 from tomoskin.live.tune import tune
 from tomoskin.live.watch import Watch
 from tomoskin.signal import Health, Reference
-from tomoskin.touch import LIVE, BendReading, Tracker, TrackSettings
+from tomoskin.touch import LIVE, BendReading, StateReading, Tracker, TrackSettings
 
 REFERENCE_FRAMES = 20
 """Frames of the untouched skin that make a reference."""
@@ -199,8 +199,23 @@ class Pipeline:
             self._imaging.renew(watch.prepared, watch.baseline.reference, watch.steady())
             self._finder.renew(watch.prepared, watch.baseline.reference)
         return self._result(
-            voltages, image, touches, seen.left_out, health=seen.health, bend=bend, pictured=True
+            voltages,
+            image,
+            touches,
+            seen.left_out,
+            health=seen.health,
+            bend=bend,
+            state=self._told(voltages, unusable | seen.health.lost),
+            pictured=True,
         )
+
+    def _told(self, voltages: Voltages, lost: NDArray[np.bool_]) -> StateReading | None:
+        """What state the frame shows, against the reference as it was taken: a state that lasts
+        is not to be learnt as the skin's rest."""
+        teller, reference = self._prepared.teller, self._reference
+        if teller is None or reference is None:
+            return None
+        return teller(np.where(lost, np.nan, voltages.values - reference.mean))
 
     def _track(self, readings: list[Reading], voltages: Voltages) -> tuple[Touch, ...]:
         return self._tracker.update(readings, self._time(voltages), voltages.host_time)
@@ -215,6 +230,7 @@ class Pipeline:
         pictured: bool,
         health: Health | None = None,
         bend: BendReading | None = None,
+        state: StateReading | None = None,
     ) -> Result:
         return Result(
             sequence=voltages.sequence,
@@ -230,6 +246,7 @@ class Pipeline:
             health=health,
             baseline=self._watch.baseline.state if self._watch else None,
             bend=bend,
+            state=state,
         )
 
     def _time(self, voltages: Voltages) -> float:

@@ -21,10 +21,10 @@ from tomoskin.inverse import (
 )
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern, Scan
-from tomoskin.session import Calibration
+from tomoskin.session import BendCalibration, Calibration, StatesCalibration
 from tomoskin.signal import Blind, Readout, Reference, difference_noise
 from tomoskin.skin import Skin
-from tomoskin.touch import BendModel, Locator, NoiseFloor, Region, Segmenter, SpotModel
+from tomoskin.touch import BendModel, Locator, NoiseFloor, Region, Segmenter, SpotModel, Teller
 
 BODY = ("outline", "surface", "electrodes", "material", "drive", "readout", "mesh", "twin")
 """Sections of a skin that sheet, mesh and scan rest on; the others only make pictures of it."""
@@ -53,6 +53,8 @@ class Prepared:
         Where labelled presses tell the places of touches.
     bending
         What bends of the skin do to the data; None where that was not learnt.
+    teller
+        Tells which of the states that were learnt a frame shows; None where none were.
     """
 
     skin: Skin
@@ -70,6 +72,7 @@ class Prepared:
     spots: SpotModel | None
     locator: Locator | None = None
     bending: BendModel | None = None
+    teller: Teller | None = None
 
     def __post_init__(self) -> None:
         """Refuse stages of different meshes or patterns."""
@@ -96,6 +99,14 @@ class Prepared:
             )
         return replace(self, bending=bending)
 
+    def that_tells(self, states: StatesCalibration) -> Prepared:
+        """With states that were learnt, on this skin with any settings of its pictures.
+
+        Raises DataError for those of another pattern.
+        """
+        states.classifier.check(self.pattern.identity)
+        return replace(self, teller=Teller.of(states.classifier))
+
     def located_by(self, locator: Locator | None) -> Prepared:
         """With places of touches from a calibration, or without.
 
@@ -119,6 +130,20 @@ class Prepared:
             return None
         return Calibration(self.locator, self.pattern, self.skin.name)
 
+    @property
+    def states(self) -> StatesCalibration | None:
+        """The states as they are written to a file."""
+        if self.teller is None:
+            return None
+        return StatesCalibration(self.teller.classifier, self.pattern, self.skin.name)
+
+    @property
+    def bends(self) -> BendCalibration | None:
+        """The bends as they are written to a file."""
+        if self.bending is None:
+            return None
+        return BendCalibration(self.bending, self.pattern, self.skin.name)
+
     def without(self, rows: IntArray) -> Prepared:
         """The skin as if its pattern had never had ``rows``; an alpha of "auto" is chosen anew.
 
@@ -127,6 +152,7 @@ class Prepared:
         if not len(rows):
             return self
         left = _prepared(self.skin, self.problem.without(rows))
+        left = replace(left, teller=self.teller and self.teller.without(rows))
         return left if self.bending is None else left.that_bends(self.bending.without(rows))
 
     def blind_to(self, directions: FloatArray) -> Prepared:
@@ -256,6 +282,7 @@ def _prepared(skin: Skin, problem: LinearProblem, before: Prepared | None = None
         spots=spots if skin.touch.method == "fit" else None,
         locator=before.locator if before else None,
         bending=before.bending if before else None,
+        teller=before.teller if before else None,
     )
 
 

@@ -8,17 +8,25 @@ from tomoskin.core import DataError, Frame
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.prepare import Prepared, prepare
 from tomoskin.live.result import Result
-from tomoskin.session import CALIBRATION_FILE, Mark, SessionReader, unpack_calibration
+from tomoskin.session import (
+    CALIBRATION_FILE,
+    STATES_FILE,
+    Mark,
+    SessionReader,
+    unpack_calibration,
+    unpack_states,
+)
 
 
 def as_recorded(session: SessionReader) -> Prepared:
-    """The session's own skin, with the calibration of touch that was on. Raises DataError."""
-    prepared = prepare(session.skin)
-    data = session.attachments().get(CALIBRATION_FILE)
-    if data is None:
-        return prepared
-    found = unpack_calibration(data, f"{session.path}, {CALIBRATION_FILE}")
-    return prepared.located_by(found.locator)
+    """The session's own skin, with the calibrations that were on. Raises DataError."""
+    prepared, held = prepare(session.skin), session.attachments()
+    if (data := held.get(CALIBRATION_FILE)) is not None:
+        touch = unpack_calibration(data, f"{session.path}, {CALIBRATION_FILE}")
+        prepared = prepared.located_by(touch.locator)
+    if (data := held.get(STATES_FILE)) is not None:
+        prepared = prepared.that_tells(unpack_states(data, f"{session.path}, {STATES_FILE}"))
+    return prepared
 
 
 def advance(pipeline: Pipeline, frame: Frame, mark: Mark) -> Result | None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from tomoskin.core import FloatArray, Image, Touch
 from tomoskin.signal import BaselineState, Health
-from tomoskin.touch import BendReading, TouchEvent
+from tomoskin.touch import BendReading, StateReading, TouchEvent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,6 +36,8 @@ class Result:
         that stands.
     bend
         How the sheet is bent; None where its bends were not learnt.
+    state
+        Which of the states that were learnt it shows; None where none were.
     """
 
     sequence: int
@@ -51,6 +53,7 @@ class Result:
     health: Health | None = None
     baseline: BaselineState | None = None
     bend: BendReading | None = None
+    state: StateReading | None = None
 
     @property
     def problem(self) -> str | None:

@@ -11,7 +11,7 @@ from tomoskin.live.latency import Stage
 from tomoskin.live.result import ReferenceState
 from tomoskin.signal import ElectrodeHealth
 from tomoskin.sink import SinkReport
-from tomoskin.touch import BendReading
+from tomoskin.touch import BendReading, StateReading
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +69,8 @@ class Status:
         Those that are not good.
     bend
         How the sheet is bent; None where its bends were not learnt.
+    state
+        Which of the states that were learnt it shows; None where none were.
     problem
         What someone should see to, in one sentence, or None.
     """
@@ -94,6 +96,7 @@ class Status:
     electrodes: tuple[ElectrodeHealth, ...] = ()
     replay: ReplayStatus | None = None
     bend: BendReading | None = None
+    state: StateReading | None = None
 
     @property
     def text(self) -> str:
@@ -108,7 +111,7 @@ class Status:
         drift = self.reference.baseline.drift if self.reference.baseline else 0.0
         return (
             f"{self.source}: {self.fps:.0f} frames/s, {self.dropped} dropped, "
-            f"p99 {1e3 * self.p99:.1f} ms, drift {100 * drift:.1f} %{self._bent}"
+            f"p99 {1e3 * self.p99:.1f} ms, drift {100 * drift:.1f} %{self._bent}{self._told}"
         )
 
     @property
@@ -116,3 +119,7 @@ class Status:
         if self.bend is None:
             return ""
         return f", bend {math.degrees(self.bend.angle):.0f}° ({self.bend.state})"
+
+    @property
+    def _told(self) -> str:
+        return "" if self.state is None else f", {self.state.text}"

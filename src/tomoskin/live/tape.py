@@ -14,7 +14,15 @@ from tomoskin.live.prepare import Prepared
 from tomoskin.live.presses import described
 from tomoskin.live.published import epoch, glance
 from tomoskin.live.result import Result
-from tomoskin.session import CALIBRATION_FILE, Mark, Recorder, SessionWriter, pack_calibration
+from tomoskin.session import (
+    CALIBRATION_FILE,
+    STATES_FILE,
+    Mark,
+    Recorder,
+    SessionWriter,
+    pack_calibration,
+    pack_states,
+)
 from tomoskin.source import Link
 from tomoskin.twin import Contact
 from tomoskin.wire import Info
@@ -85,6 +93,8 @@ class Tape:
         session = SessionWriter(path, self._prepared.skin, epoch=epoch(), start=self._clock())
         if (calibration := self._prepared.calibration) is not None:
             session.attach(CALIBRATION_FILE, "application/zip", pack_calibration(calibration))
+        if (states := self._prepared.states) is not None:
+            session.attach(STATES_FILE, "application/zip", pack_states(states))
         self._waiting = Recorder(session, glance(self._prepared), self._say)
 
     def _headed(self) -> None:

@@ -38,7 +38,14 @@ from tomoskin.session.session_reader import (
     SessionReader,
     Truth,
 )
-from tomoskin.session.states_file import StatesCalibration, read_states, write_states
+from tomoskin.session.states_file import (
+    STATES_FILE,
+    StatesCalibration,
+    pack_states,
+    read_states,
+    unpack_states,
+    write_states,
+)
 from tomoskin.session.timeline import Span, Timeline, read_timeline
 from tomoskin.session.touch_csv import write_touches
 from tomoskin.session.vtu import write_vtu
@@ -49,6 +56,7 @@ __all__ = [
     "CALIBRATION_FILE",
     "FILMS",
     "MOST_PANELS",
+    "STATES_FILE",
     "BendCalibration",
     "Calibration",
     "Display",
@@ -80,6 +88,7 @@ __all__ = [
     "log_message",
     "open_replay",
     "pack_calibration",
+    "pack_states",
     "parse_replay",
     "plot",
     "read_bends",
@@ -98,6 +107,7 @@ __all__ = [
     "touch_row",
     "touches_message",
     "unpack_calibration",
+    "unpack_states",
     "write_bends",
     "write_calibration",
     "write_choices",

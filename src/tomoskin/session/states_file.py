@@ -15,10 +15,19 @@ import numpy as np
 
 from tomoskin.core import DataError
 from tomoskin.pattern import Pattern
-from tomoskin.session.archive import Arrays, load_arrays, save_arrays
+from tomoskin.session.archive import (
+    Arrays,
+    load_arrays,
+    pack_arrays,
+    save_arrays,
+    unpack_arrays,
+)
 from tomoskin.session.calibration_file import CalibrationFile, located
 from tomoskin.session.interchange import real_numbers, whole_number
 from tomoskin.touch import Codes, Examples, StateClassifier
+
+STATES_FILE = "states.npz"
+"""Name of the calibration inside a session."""
 
 _FILE = CalibrationFile(
     "tomoskin states calibration",
@@ -40,20 +49,25 @@ class StatesCalibration:
 
 def write_states(path: Path, calibration: StatesCalibration) -> None:
     """Write the file whole or not at all. Raises DataError when it cannot be written."""
+    save_arrays(path, _arrays(calibration))
+
+
+def pack_states(calibration: StatesCalibration) -> bytes:
+    """The same file's bytes, for a session that holds it."""
+    return pack_arrays(_arrays(calibration))
+
+
+def _arrays(calibration: StatesCalibration) -> Arrays:
     classifier, pattern = calibration.classifier, calibration.pattern
     examples = classifier.examples
-    save_arrays(
-        path,
-        _FILE.header(pattern, calibration.skin_name)
-        | {
-            "dv": examples.dv,
-            "flags": examples.flags,
-            "session": examples.session,
-            "names": np.array(examples.codes.names),
-            "exclusive": np.array(int(examples.codes.exclusive)),
-            "skin": np.array(classifier.skin_id),
-        },
-    )
+    return _FILE.header(pattern, calibration.skin_name) | {
+        "dv": examples.dv,
+        "flags": examples.flags,
+        "session": examples.session,
+        "names": np.array(examples.codes.names),
+        "exclusive": np.array(int(examples.codes.exclusive)),
+        "skin": np.array(classifier.skin_id),
+    }
 
 
 def read_states(path: Path) -> StatesCalibration:
@@ -64,7 +78,15 @@ def read_states(path: Path) -> StatesCalibration:
     DataError
         When it is missing, damaged, or no calibration of states.
     """
-    arrays, where = load_arrays(path), str(path)
+    return _read(load_arrays(path), str(path))
+
+
+def unpack_states(data: bytes, where: str) -> StatesCalibration:
+    """:func:`read_states` from the file's bytes."""
+    return _read(unpack_arrays(data, where), where)
+
+
+def _read(arrays: Arrays, where: str) -> StatesCalibration:
     pattern = _FILE.pattern(arrays, where)
     with located(where):
         examples = _examples(arrays, where)

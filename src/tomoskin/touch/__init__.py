@@ -13,7 +13,15 @@ from tomoskin.touch.floor import NoiseFloor
 from tomoskin.touch.locator import Locator, Presses, Region, Watch
 from tomoskin.touch.segment import Segmenter
 from tomoskin.touch.several import Several
-from tomoskin.touch.states import Answers, Codes, Examples, StateClassifier, against_rest
+from tomoskin.touch.states import (
+    Answers,
+    Codes,
+    Examples,
+    StateClassifier,
+    StateReading,
+    Teller,
+    against_rest,
+)
 from tomoskin.touch.tracking import STILL, TouchEvent, Tracker, TrackSettings
 from tomoskin.touch.wiring import Wiring, WiringAnswer, ring_of, solve_wiring
 
@@ -41,6 +49,8 @@ __all__ = [
     "SpotFinder",
     "SpotModel",
     "StateClassifier",
+    "StateReading",
+    "Teller",
     "TouchEvent",
     "TrackSettings",
     "Tracker",

@@ -75,6 +75,13 @@ export interface Stage {
   readonly p99_ms: number | null;
 }
 
+export interface StateReading {
+  readonly name: string;
+  readonly probability: number;
+  /** It looks like none that was learnt; `name` is the nearest. */
+  readonly unknown: boolean;
+}
+
 export interface Status {
   readonly type: "state";
   readonly running: boolean;
@@ -103,6 +110,8 @@ export interface Status {
   /** Electrodes that are not good, counted from 0. */
   readonly sick: readonly Sick[];
   readonly replay: Replay | null;
+  /** Which of the states that were learnt the newest frame shows; null where none were. */
+  readonly state: StateReading | null;
   readonly noise_v: number | null;
   /** Weight of the prior in the pictures, and the rule that chose it ("hand": the skin file). */
   readonly alpha: number;

@@ -1,7 +1,7 @@
 /** The state in one sentence, and whether someone must act. */
 
 import { duration, fixed } from "./format";
-import type { Scene, Status } from "./protocol";
+import type { Scene, StateReading, Status } from "./protocol";
 import type { LinkState } from "./socket";
 
 export interface Sentence {
@@ -105,4 +105,10 @@ export function alpha(status: Status): string {
 export function alphaInFull(status: Status): string {
   const by = status.rule === "hand" ? "set by hand" : `chosen by the rule ${status.rule}`;
   return `Weight of the prior, ${status.alpha.toPrecision(4)}, ${by}`;
+}
+
+/** Which of the states that were learnt the sheet is in. */
+export function stateInWords({ name, probability, unknown }: StateReading): string {
+  if (unknown) return `State unknown: it looks like none that was learnt (nearest: ${name})`;
+  return `State: ${name}, ${fixed(100 * probability, 0)} %`;
 }

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { Scene, Status } from "../src/protocol";
 import { backOff, socketAddress } from "../src/socket";
-import { alpha, alphaInFull, facts, sentence } from "../src/words";
+import { alpha, alphaInFull, facts, sentence, stateInWords } from "../src/words";
 
 const scene = { source: "twin of textile-disc-8" } as Scene;
 const status: Status = {
@@ -19,6 +19,7 @@ const status: Status = {
   baseline: null,
   sick: [],
   replay: null,
+  state: null,
   noise_v: 1e-5,
   alpha: 0.0509,
   rule: "light-touch",
@@ -78,4 +79,16 @@ it("waits longer after each failed try, up to a bound", () => {
 it("finds the socket beside the page and leaves the token out", () => {
   expect(socketAddress({ href: "http://127.0.0.1:8765/?token=a" })).toBe("ws://127.0.0.1:8765/ws");
   expect(socketAddress({ href: "https://lab:1/x/" })).toBe("wss://lab:1/x/ws");
+});
+
+describe("the state that the sheet is in", () => {
+  it("is named with its probability", () => {
+    expect(stateInWords({ name: "bend", probability: 0.974, unknown: false })).toBe("State: bend, 97 %");
+  });
+
+  it("is said to be unknown where it is none that was learnt", () => {
+    expect(stateInWords({ name: "bend", probability: 1, unknown: true })).toMatch(
+      /^State unknown: .* \(nearest: bend\)$/,
+    );
+  });
 });

@@ -4,6 +4,7 @@ import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import type { Touch } from "../decode";
 import { inScale, millimetres, scaleFor, type Scale } from "../format";
 import { limit, link, scene, shown, status } from "../state";
+import { stateInWords } from "../words";
 
 const ROWS = 4;
 
@@ -88,6 +89,17 @@ function Announcer() {
   );
 }
 
+/** Which of the states that were learnt the sheet is in. */
+function State() {
+  const state = status.value?.reference.ready ? status.value.state : null;
+  if (!state) return null;
+  return (
+    <p class="hint" data-testid="state">
+      {stateInWords(state)}
+    </p>
+  );
+}
+
 export function Touches() {
   const touches = shown.value?.touches ?? [];
   const scale = scaleFor(limit.value, scene.value?.unit ?? "S");
@@ -124,6 +136,7 @@ export function Touches() {
         )}
         {touches.length > ROWS && <p class="hint">and {touches.length - ROWS} more on the sheet</p>}
       </div>
+      <State />
       <Announcer />
     </section>
   );
