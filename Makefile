@@ -1,7 +1,7 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help soak live test test-all firmware-test fuzz bench bench-docs docs gallery lint lock native wheel clean page dev
+.PHONY: help soak live test test-all firmware-test fuzz bench bench-docs docs gallery lint lock native wheel release clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -39,14 +39,15 @@ fuzz: dev  ## ten million mutated streams through the parsers of board and host;
 	@sh scripts/firmware.sh
 	@sh scripts/fuzz.sh $(PY) $(ARGS)
 
-bench: native  ## time from bytes to touches
-	@$(VENV)/bin/tomoskin bench frame $(ARGS)
+bench: native  ## all in one table, beside plain scipy and, where it is installed, pyEIT; three minutes
+	@$(VENV)/bin/tomoskin bench $(ARGS)
 
 soak: native  ## an hour of a bad day, compressed: faults, a sleeping page, a hanging sink
 	@$(VENV)/bin/tomoskin bench soak $(ARGS)
 
-bench-docs: native  ## measure the forward engine anew into docs/benchmarks.md; seven minutes
+bench-docs: native page  ## measure the table of all and the forward engine anew into docs/benchmarks.md; ten minutes
 	@$(PIP) install --require-hashes --requirement requirements/bench.txt  # pyEIT has no wheel
+	@$(VENV)/bin/tomoskin bench --into docs/benchmarks.md
 	@$(VENV)/bin/tomoskin bench forward --into docs/benchmarks.md
 	@$(VENV)/bin/tomoskin bench forward_large --into docs/benchmarks.md
 
@@ -68,6 +69,9 @@ native: dev  ## the native engine, where Rust is installed; live runs without
 
 wheel: dev page  ## a wheel with the built page, in dist/
 	@$(PY) -m hatchling build -t wheel
+
+release: native page  ## sdist and wheels into dist/, tried in an empty environment; nothing is uploaded
+	@$(PY) scripts/release.py
 
 lock: dev  ## pin the newest packages, with hashes, in requirements/*.txt
 	@for out in $(LOCKS); do $(MAKE) --no-print-directory lock-$$out || exit 1; done

@@ -10,14 +10,9 @@ import numpy as np
 import forward_peer
 from forward_cases import ELECTRODES, clock
 from forward_measure import MANY, TOUCH, Measured
-from report import Report
+from report import Report, cell
 
 Value = float | None
-
-
-def cell(value: Value) -> str:
-    """Three figures, or a dash for what was not measured."""
-    return "–" if value is None else f"{value:,.{max(0, 2 - int(np.floor(np.log10(value))))}f}"
 
 
 def _ms(measured: Measured, name: str) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from forward_cases import clock
 from report import Report
 from tomoskin.core import Frame
 from tomoskin.live import Pipeline, Prepared, prepare
@@ -26,6 +27,10 @@ CASES = (
 TIME_CONSTANTS = ("0 s", "0.2 s")
 IDLE, PRESSED, REPEATS = 30, 60, 40
 SEED = 1
+COLUMNS = (
+    *("electrodes", "triangles", "rows", "filter s", "bytes"),
+    *("p50 ms", "p99 ms", "max ms", "touches", "growth B/frame"),
+)
 
 
 def run(data: Path | None) -> tuple[Report, ...]:
@@ -35,24 +40,14 @@ def run(data: Path | None) -> tuple[Report, ...]:
     for name, cells in CASES:
         skin = Skin.load(name).altered({"mesh": {"cells": cells}})
         for filtered in TIME_CONSTANTS:
-            rows.append(_row(prepare(skin.altered({"inverse": {"time_constant": filtered}}))))
+            rows.append(row(prepare(skin.altered({"inverse": {"time_constant": filtered}}))))
     table = Report(
         "bytes in → touches out",
-        (
-            "electrodes",
-            "triangles",
-            "rows",
-            "filter s",
-            "bytes",
-            "p50 ms",
-            "p99 ms",
-            "max ms",
-            "touches",
-            "growth B/frame",
-        ),
+        COLUMNS,
         tuple(rows),
         (
             f"{PRESSED * REPEATS} frames with two moving presses of a twin, seed {SEED}",
+            f"{clock()[1]} of each",
             "decode, voltages, difference, one-step image, segmentation, tracking",
             "filter: the time constant of the Kalman filter over frames, 0 without it",
             "growth: allocated memory that stays, per frame",
@@ -61,22 +56,12 @@ def run(data: Path | None) -> tuple[Report, ...]:
     return (table,)
 
 
-def _row(prepared: Prepared) -> tuple[object, ...]:
+def row(prepared: Prepared) -> tuple[object, ...]:
+    """Values under ``COLUMNS``."""
     idle, pressed = _chunks(prepared)
     decoder, pipeline = Decoder(), Pipeline(prepared)
-    for chunk in idle:
-        _one(decoder, pipeline, chunk)
-    for chunk in pressed:
-        _one(decoder, pipeline, chunk)
-    gc.collect()
-    taken, touches = [], 0
-    for _ in range(REPEATS):
-        for chunk in pressed:
-            start = time.perf_counter()
-            touches += _one(decoder, pipeline, chunk)
-            taken.append(time.perf_counter() - start)
+    taken, touches = _taken(decoder, pipeline, idle, pressed, REPEATS)
     p50, p99 = 1e3 * np.percentile(taken, (50, 99))
-    n = len(taken)
     return (
         prepared.pattern.n_electrodes,
         len(prepared.mesh.cells),
@@ -86,9 +71,33 @@ def _row(prepared: Prepared) -> tuple[object, ...]:
         round(p50, 3),
         round(p99, 3),
         round(1e3 * max(taken), 3),
-        round(touches / n, 2),
+        round(touches / len(taken), 2),
         round(_growth(decoder, pipeline, pressed), 1),
     )
+
+
+def p50(prepared: Prepared, repeats: int) -> float:
+    """Median of a frame, ms."""
+    idle, pressed = _chunks(prepared)
+    taken, _ = _taken(Decoder(), Pipeline(prepared), idle, pressed, repeats)
+    return 1e3 * float(np.median(taken))
+
+
+def _taken(
+    decoder: Decoder, pipeline: Pipeline, idle: list[bytes], pressed: list[bytes], repeats: int
+) -> tuple[list[float], int]:
+    """s of each frame after a first round, and how many touches there were."""
+    now, _ = clock()
+    for chunk in (*idle, *pressed):
+        _one(decoder, pipeline, chunk)
+    gc.collect()
+    taken, touches = [], 0
+    for _ in range(repeats):
+        for chunk in pressed:
+            start = now()
+            touches += _one(decoder, pipeline, chunk)
+            taken.append(now() - start)
+    return taken, touches
 
 
 def _one(decoder: Decoder, pipeline: Pipeline, chunk: bytes) -> int:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import platform
+import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,15 +13,18 @@ from typing import Any
 import numpy as np
 import scipy
 
+from tomoskin.forward import choose_engine
+
 
 def machine() -> dict[str, str]:
-    """Processor, cores that may be used, and versions that matter for speed."""
+    """Processor, cores that may be used, versions and engine: what matters for speed."""
     return {
         "processor": _processor(),
         "cores": str(len(os.sched_getaffinity(0))),
         "python": platform.python_version(),
         "numpy": np.__version__,
         "scipy": scipy.__version__,
+        "engine": choose_engine().name,
     }
 
 
@@ -41,3 +46,21 @@ class Report:
     rows: tuple[tuple[Any, ...], ...]
     notes: tuple[str, ...] = ()
     machine: dict[str, str] = field(default_factory=machine)
+
+
+def cell(value: float | None) -> str:
+    """Three figures, or a dash for what was not measured."""
+    if not value:
+        return "–" if value is None else "0"
+    return f"{value:,.{max(0, 2 - int(np.floor(np.log10(abs(value)))))}f}"
+
+
+def named(columns: Sequence[str], row: Sequence[Any]) -> dict[str, Any]:
+    """A row's values by the names of their columns."""
+    return dict(zip(columns, row, strict=True))
+
+
+def progress(text: str) -> None:
+    """Say on the terminal what is being measured; nothing where there is none."""
+    if sys.stderr.isatty():
+        print(f"measuring {text}", file=sys.stderr)

@@ -26,6 +26,8 @@ LONG, PACED = 600, 20
 
 HOUR, HOUR_RATE = 3600, 100.0
 SEED, SEEKS = 1, 40
+RECORDED = ("seconds", "frames/s", "MB", "% of a core", "growth MB", "left out")
+OPENED = ("frames", "MB", "open ms", "open and seek ms", "worst ms")
 _BATCH = 200
 _KINDS = 500
 """Different frames; they are sent again and again with new numbers and times."""
@@ -43,14 +45,14 @@ def run(data: Path | None) -> tuple[Report, ...]:
             recorded(place / "paced.mcap", skin, frames, PACED, paced=True),
         )
         (place / "long.mcap").unlink()
-        hour = _hour(place / "hour.mcap", skin, frames)
-        opened = _opened(hour)
+        hour = of_length(place / "hour.mcap", skin, frames, HOUR)
+        found = opened(hour, HOUR)
         exported = _exported(hour, place / "hour.parquet")
     size = encode(frames[0]), Scan.of(skin.pattern()).n_samples
     return (
         Report(
             "recording raw bytes and frames beside a pipeline",
-            ("seconds", "frames/s", "MB", "% of a core", "growth MB", "left out"),
+            RECORDED,
             rows,
             (
                 f"{SKIN}: {size[1]} samples, {len(size[0])} bytes a frame, seed {SEED}",
@@ -60,8 +62,8 @@ def run(data: Path | None) -> tuple[Report, ...]:
         ),
         Report(
             "a session of one hour",
-            ("frames", "MB", "open ms", "open and seek ms", "worst ms", "Parquet s", "Parquet MB"),
-            ((*opened, *exported),),
+            (*OPENED, "Parquet s", "Parquet MB"),
+            ((*found, *exported),),
             (f"{HOUR_RATE:.0f} frames/s of {SKIN}, {SEEKS} random places, seed {SEED}",),
         ),
     )
@@ -84,6 +86,7 @@ def _at(frames: list[Frame], number: int, rate: float) -> Frame:
 def recorded(
     path: Path, skin: Skin, frames: list[Frame], seconds: int, *, paced: bool
 ) -> tuple[object, ...]:
+    """Values under ``RECORDED``; ``paced``: as the frames come, not as fast as they are written."""
     raw = [encode(frame) for frame in frames]
     nothing = threading.Event()
     recorder = Recorder(SessionWriter(path, skin), None, lambda *_: None)
@@ -113,30 +116,32 @@ def _feed(recorder: Recorder, frames: list[Frame], raw: list[bytes], numbers: ra
         recorder.frame(frame, Mark.NONE)
 
 
-def _hour(path: Path, skin: Skin, frames: list[Frame]) -> Path:
+def of_length(path: Path, skin: Skin, frames: list[Frame], seconds: int) -> Path:
+    """Write a session of ``seconds`` at HOUR_RATE; the path."""
     raw = [encode(frame) for frame in frames]
     with SessionWriter(path, skin) as session:
-        for number in range(int(HOUR * HOUR_RATE)):
+        for number in range(int(seconds * HOUR_RATE)):
             frame = _at(frames, number, HOUR_RATE)
             session.raw(frame.host_time, raw[number % _KINDS])
             session.frame(frame)
     return path
 
 
-def _opened(path: Path) -> tuple[object, ...]:
+def opened(path: Path, seconds: int) -> tuple[object, ...]:
+    """Values under ``OPENED``, of a session of ``seconds``."""
     rng = np.random.default_rng(SEED)
-    opened, sought = [], []
-    for place in rng.uniform(0, HOUR - 1, SEEKS):
+    first_look, sought = [], []
+    for place in rng.uniform(0, seconds - 1, SEEKS):
         start = time.perf_counter()
         with SessionReader(path) as session:
-            opened.append(time.perf_counter() - start)
+            first_look.append(time.perf_counter() - start)
             first = next(session.frames(since=place)).frame
             sought.append(time.perf_counter() - start)
         assert abs(first.host_time - place) <= 1 / HOUR_RATE
-    times = [1e3 * value for value in (statistics.median(opened), statistics.median(sought))]
+    times = [1e3 * value for value in (statistics.median(first_look), statistics.median(sought))]
     worst = 1e3 * max(sought)
     size = round(path.stat().st_size / 1e6)
-    return int(HOUR * HOUR_RATE), size, *(round(t, 1) for t in (*times, worst))
+    return int(seconds * HOUR_RATE), size, *(round(t, 1) for t in (*times, worst))
 
 
 def _exported(path: Path, target: Path) -> tuple[object, ...]:

@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 from report import Report
-from session import LONG, SEED, SKIN, frames_of, recorded
+from session import LONG, RECORDED, SEED, SKIN, frames_of, recorded
 from tomoskin.skin import Skin
 
 
@@ -19,7 +19,7 @@ def run(data: Path | None) -> tuple[Report, ...]:
     return (
         Report(
             "recording at its own pace",
-            ("seconds", "frames/s", "MB", "% of a core", "growth MB", "left out"),
+            RECORDED,
             (row,),
             (
                 f"{SKIN}, seed {SEED}; processor time of the whole process, which also makes the "

@@ -36,6 +36,10 @@ CASES = (
     ("textile-disc-8", "textile", 1056),
     ("tank-16", "tank", 3000),
 )
+COLUMNS = (
+    *("skin", "preset", "triangles", "dent ms", "material ms", "solve ms"),
+    *("whole frame ms", "frames /s", "best tenth", "× real time"),
+)
 FRAMES, ROUND = 300, 100
 PROMISED = 500
 SEED = 1
@@ -45,21 +49,10 @@ SET, SET_SKIN, SET_ROUNDS, PROCESSES = 5000, "textile-disc-8", 2, (1, 2)
 def run(data: Path | None) -> tuple[Report, ...]:
     """Time every case; ``data`` is not needed."""
     del data
-    rows = tuple(_row(*case) for case in CASES)
+    rows = tuple(row(*case) for case in CASES)
     report = Report(
         "twin: presses → counts",
-        (
-            "skin",
-            "preset",
-            "triangles",
-            "dent ms",
-            "material ms",
-            "solve ms",
-            "whole frame ms",
-            "frames /s",
-            "best tenth",
-            "× real time",
-        ),
+        COLUMNS,
         rows,
         (
             f"{FRAMES} frames, each with three flat round presses of 12 mm and 3 N that have moved "
@@ -114,7 +107,8 @@ def _set_seconds(plan: SetPlan, out: Path, processes: int) -> float:
     return time.perf_counter() - start
 
 
-def _row(name: str, preset: str, triangles: int) -> tuple[object, ...]:
+def row(name: str, preset: str, triangles: int) -> tuple[object, ...]:
+    """Values under ``COLUMNS``."""
     settings = TwinSettings.preset(preset, SEED)
     cells = round(triangles / settings.mesh_ratio)
     skin = Skin.load(name).altered({"mesh": {"cells": cells}})

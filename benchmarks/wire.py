@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
 
+from forward_cases import clock
 from report import Report
 from tomoskin.core import Frame
 from tomoskin.pattern import Pattern, Scan
@@ -16,19 +16,20 @@ BAUD = 1_000_000
 READ = 4096
 """Bytes that a read brings at most, as from a serial port."""
 FRAMES, REPEATS, SEED = 20_000, 5, 1
+COLUMNS = ("electrodes", "samples", "bytes", "line frames/s", "decoded frames/s", "times")
 
 
 def run(data: Path | None) -> tuple[Report, ...]:
     """Time every case; ``data`` is not needed."""
     del data
-    rows = tuple(_row(n, packed) for n in (8, 16) for packed in (False, True))
+    rows = tuple(row(n, packed) for n in (8, 16) for packed in (False, True))
     return (
         Report(
             "decoding a stream of frames",
-            ("electrodes", "samples", "bytes", "line frames/s", "decoded frames/s", "times"),
+            COLUMNS,
             rows,
             (
-                f"best of {REPEATS} over {FRAMES} frames in reads of {READ} bytes, one core, "
+                f"best of {REPEATS} over {FRAMES} frames in reads of {READ} bytes, {clock()[1]}, "
                 f"seed {SEED}; samples of one conversion, in 16 or packed in 10 bits",
                 f"line: what {BAUD / 1e6:g} Mbaud can carry at 10 bits a byte, more than any scan "
                 "of the board fills",
@@ -37,7 +38,8 @@ def run(data: Path | None) -> tuple[Report, ...]:
     )
 
 
-def _row(electrodes: int, packed: bool) -> tuple[object, ...]:
+def row(electrodes: int, packed: bool) -> tuple[object, ...]:
+    """Values under ``COLUMNS``."""
     random = np.random.default_rng(SEED)
     n = Scan.of(Pattern.adjacent(electrodes)).n_samples
     counts = random.integers(0, 1024, (FRAMES, n)).astype(np.uint16)
@@ -52,18 +54,18 @@ def _row(electrodes: int, packed: bool) -> tuple[object, ...]:
     return (
         electrodes,
         f"{n} of {kind}",
-        f"{size:.0f}",
-        f"{line:.0f}",
-        f"{rate:,.0f}",
-        f"{rate / line:.0f}",
+        round(size),
+        round(line),
+        round(rate),
+        round(rate / line),
     )
 
 
 def _seconds(reads: list[bytes]) -> float:
-    decoder = Decoder()
-    began = time.perf_counter()
+    decoder, (now, _) = Decoder(), clock()
+    began = now()
     for data in reads:
         decoder.feed(data, 0.0)
-    took = time.perf_counter() - began
+    took = now() - began
     assert decoder.counters.messages == FRAMES
     return took

@@ -26,32 +26,41 @@ _FOLDER = Path(__file__).parents[3] / "benchmarks"
 
 def bench(
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="Which one; without it they are listed.")
-    ] = None,
+        str, typer.Argument(metavar="NAME", help="Which one; see --list.", show_default=True)
+    ] = "whole",
     data: Annotated[
         Path | None, typer.Option(help="Folder of public recordings, for those that need it.")
     ] = None,
-    cores: Annotated[int, typer.Option(min=1, help="Processor cores that may be used.")] = 1,
+    cores: Annotated[
+        int | None,
+        typer.Option(min=1, help="Processor cores that may be used: 1, unless it asks for more."),
+    ] = None,
     into: Annotated[
         Path | None, typer.Option(help="Markdown file whose part of that name is written anew.")
     ] = None,
+    list_: Annotated[bool, typer.Option("--list", help="List them, and measure nothing.")] = False,
     json: JsonFlag = False,
 ) -> None:
-    """Measure speed on this machine."""
+    """Measure speed on this machine: of all in one table, or of one part.
+
+    Two to three minutes for all; others take seconds to an hour.
+    """
     from threadpoolctl import threadpool_limits
 
     known = _benchmarks()
-    if name is None:
+    if list_:
         for key, summary in known.items():
             typer.echo(f"{key:<14} {summary}")
         return
     if name not in known:
         raise typer.BadParameter(f'expected {", ".join(known)}, got "{name}"', param_hint="NAME")
+    benchmark = _load(name)
+    cores = cores or getattr(benchmark, "CORES", 1)
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-cores:])
     os.environ["RAYON_NUM_THREADS"] = str(cores)  # the native engine reads it at each call
     with threadpool_limits(cores):
         place = into and _Place.of(into, name)
-        reports = _load(name).run(data)
+        reports = benchmark.run(data)
     if place:
         place.write(reports)
     if json:
