@@ -22,6 +22,9 @@ app = group("Inspect, mend and convert recorded sessions.")
 _A_YEAR = 3.15e7
 """Log times of less are seconds of a clock that began with the machine, not of the day."""
 
+_NO_CLOCK = 0.01
+"""No clock of a board is so far off."""
+
 _File = Annotated[Path, typer.Argument(metavar="FILE", help="A session, such as run.mcap.")]
 
 
@@ -136,13 +139,15 @@ def _lines(found: SessionInfo) -> list[tuple[str, str]]:
                     f"board, {found.skipped} skipped, {found.held} held"),
         ("touches", str(found.touches)),
     ]  # fmt: skip
+    if found.attached:
+        lines.append(("files inside", ", ".join(found.attached)))
     if found.device:
         board, firmware = found.device.get("unique_id"), found.device.get("firmware")
         lines.append(("board", f"{board}, firmware {firmware}"))
     if found.clock:
         rate, residual = found.clock.tick_rate, 1e3 * found.clock.residual
         nominal = found.device.get("tick_rate")
-        drift = f", {1e6 * found.clock.drift(nominal):+.1f} ppm" if nominal else ""
+        drift = f", {_drift(found.clock.drift(nominal))}" if nominal else ""
         lines.append(
             ("clock", f"{rate:.1f} ticks/s by this host{drift}; frames come {residual:.3f} ms late")
         )
@@ -150,6 +155,13 @@ def _lines(found: SessionInfo) -> list[tuple[str, str]]:
         counted = ", ".join(f"{kind} {count}" for kind, count in sorted(found.events.items()))
         lines.append(("events", counted))
     return lines
+
+
+def _drift(part: float) -> str:
+    """Of the board's clock against ours; the twin's may run much faster than time."""
+    if abs(part) > _NO_CLOCK:
+        return f"{1 + part:.3g} times as fast as it says: not in real time"
+    return f"{1e6 * part:+.1f} ppm"
 
 
 def _losses(found: Repaired) -> list[str]:

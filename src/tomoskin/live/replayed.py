@@ -9,10 +9,12 @@ from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.prepare import Prepared, prepare
 from tomoskin.live.result import Result
 from tomoskin.session import (
+    BENDS_FILE,
     CALIBRATION_FILE,
     STATES_FILE,
     Mark,
     SessionReader,
+    unpack_bends,
     unpack_calibration,
     unpack_states,
 )
@@ -24,6 +26,10 @@ def as_recorded(session: SessionReader) -> Prepared:
     if (data := held.get(CALIBRATION_FILE)) is not None:
         touch = unpack_calibration(data, f"{session.path}, {CALIBRATION_FILE}")
         prepared = prepared.located_by(touch.locator)
+    if (data := held.get(BENDS_FILE)) is not None:
+        bends = unpack_bends(data, f"{session.path}, {BENDS_FILE}")
+        bends.check(prepared.pattern)
+        prepared = prepared.that_bends(bends.model)
     if (data := held.get(STATES_FILE)) is not None:
         prepared = prepared.that_tells(unpack_states(data, f"{session.path}, {STATES_FILE}"))
     return prepared

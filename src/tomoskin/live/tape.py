@@ -15,11 +15,13 @@ from tomoskin.live.presses import described
 from tomoskin.live.published import epoch, glance
 from tomoskin.live.result import Result
 from tomoskin.session import (
+    BENDS_FILE,
     CALIBRATION_FILE,
     STATES_FILE,
     Mark,
     Recorder,
     SessionWriter,
+    pack_bends,
     pack_calibration,
     pack_states,
 )
@@ -93,6 +95,8 @@ class Tape:
         session = SessionWriter(path, self._prepared.skin, epoch=epoch(), start=self._clock())
         if (calibration := self._prepared.calibration) is not None:
             session.attach(CALIBRATION_FILE, "application/zip", pack_calibration(calibration))
+        if (bends := self._prepared.bends) is not None:
+            session.attach(BENDS_FILE, "application/zip", pack_bends(bends))
         if (states := self._prepared.states) is not None:
             session.attach(STATES_FILE, "application/zip", pack_states(states))
         self._waiting = Recorder(session, glance(self._prepared), self._say)

@@ -2,7 +2,14 @@
 
 from tomoskin.session.alpha_picture import write_choices
 from tomoskin.session.archive import load_arrays
-from tomoskin.session.bends_file import BendCalibration, read_bends, write_bends
+from tomoskin.session.bends_file import (
+    BENDS_FILE,
+    BendCalibration,
+    pack_bends,
+    read_bends,
+    unpack_bends,
+    write_bends,
+)
 from tomoskin.session.blocks import Rows, all_blocks
 from tomoskin.session.calibration import (
     CALIBRATION_FILE,
@@ -53,6 +60,7 @@ from tomoskin.session.whole import read_session, recording_of
 from tomoskin.session.writer import SessionWriter
 
 __all__ = [
+    "BENDS_FILE",
     "CALIBRATION_FILE",
     "FILMS",
     "MOST_PANELS",
@@ -87,6 +95,7 @@ __all__ = [
     "load_arrays",
     "log_message",
     "open_replay",
+    "pack_bends",
     "pack_calibration",
     "pack_states",
     "parse_replay",
@@ -106,6 +115,7 @@ __all__ = [
     "shard_path",
     "touch_row",
     "touches_message",
+    "unpack_bends",
     "unpack_calibration",
     "unpack_states",
     "write_bends",

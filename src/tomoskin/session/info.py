@@ -9,12 +9,15 @@ from typing import Any
 
 from tomoskin.session import channels
 from tomoskin.session.clock import ClockFit, ClockFitter
+from tomoskin.session.container import SEEK_TABLE
 from tomoskin.session.layout import Mark, MarkedFrame
 from tomoskin.session.session_reader import SessionReader
+from tomoskin.session.writer import SKIN_FILE
 
 Advance = Callable[[float, float], None]
 """Told how much of how much is done."""
 
+_OWN = frozenset({SKIN_FILE, SEEK_TABLE})
 _OFTEN = 1000
 _MODULUS = 2**32
 
@@ -25,7 +28,8 @@ class SessionInfo:
 
     ``frames`` and those of them that were ``held`` or ``skipped``; ``lost`` frames missing in the
     sequence, in ``gaps`` places; ``dropped`` by the device itself; ``rate`` frames/s, NaN below
-    two; ``longest_pause`` s between two frames; ``touches`` number of different ones; ``torn``
+    two; ``longest_pause`` s between two frames; ``touches`` number of different ones;
+    ``attached`` names of the files inside beside the skin, as calibrations that were on; ``torn``
     what is missing at the end, or "".
     """
 
@@ -53,6 +57,7 @@ class SessionInfo:
     device: dict[str, Any]
     clock: ClockFit | None
     messages: dict[str, int]
+    attached: tuple[str, ...] = ()
 
 
 @dataclass
@@ -143,4 +148,5 @@ def session_info(path: Path, advance: Advance = lambda _done, _total: None) -> S
             device=session.device(),
             clock=clock.fit,
             messages=counts,
+            attached=tuple(name for name in session.attachments() if name not in _OWN),
         )

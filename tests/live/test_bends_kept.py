@@ -1,0 +1,83 @@
+"""A recording keeps the bends that were known, and begins with frames of a straight sheet."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from live.test_replay import Recorded, recorded_touches, same, touches_of
+from tomoskin.core import Frame
+from tomoskin.live import Pipeline, as_recorded, prepare, replayed
+from tomoskin.live.beginning import Beginning
+from tomoskin.live.pipeline import REFERENCE_FRAMES
+from tomoskin.session import BENDS_FILE, Mark, SessionReader, session_info
+from tomoskin.touch import BendExamples, BendModel, BendReading
+
+
+@pytest.fixture(scope="module")
+def bending(prepared):
+    """Bends that move the rows as a touch far from those of the test would, and otherwise."""
+    random = np.random.default_rng(3)
+    rows = prepared.pattern.n_meas
+    angle = np.radians([0, 10, 20, 30, 20, 10, 0] * 3)
+    shape = 1e-2 * random.standard_normal(rows)
+    dv = angle[:, None] * shape + 1e-4 * random.standard_normal((len(angle), rows))
+    examples = BendExamples.of(dv, angle, np.full(len(angle), 0.5), np.arange(len(angle)) / 10)
+    return prepared.that_bends(BendModel.learn(examples, 1e-8 * np.eye(rows)))
+
+
+@pytest.fixture(scope="module")
+def run(bending, tmp_path_factory):
+    path = tmp_path_factory.mktemp("bends") / "run.mcap"
+    with Recorded(bending, path) as recorded:
+        recorded.idle(REFERENCE_FRAMES + 5)
+        recorded.touch(0, 12)
+        recorded.idle(6)
+        recorded.touch(1, 12)
+    return path
+
+
+def test_a_replay_reads_bends_and_touches_again_to_the_bit(run, bending):
+    with SessionReader(run) as session:
+        kept = as_recorded(session)
+        again = list(replayed(kept, session))
+        first = list(replayed(bending, session))
+    assert kept.bending is not None
+    live = recorded_touches(run)
+    got = {r.sequence: touches_of(r) for r in again if r.ready}
+    assert len(live) > 20
+    assert all(same(got[number], rows) for number, rows in live.items())
+    angles = [r.bend.angle for r in again if r.bend]
+    assert len(angles) > 20
+    assert angles == [r.bend.angle for r in first if r.bend]
+
+
+def test_without_them_the_touches_would_be_others(run):
+    with SessionReader(run) as session:
+        plain = {r.sequence: touches_of(r) for r in replayed(prepare(session.skin), session)}
+    live = recorded_touches(run)
+    assert any(not same(plain[number], rows) for number, rows in live.items())
+
+
+def test_what_a_session_holds_is_said(run):
+    assert session_info(run).attached == (BENDS_FILE,)
+
+
+def test_a_recording_begun_late_begins_with_frames_of_a_straight_sheet(prepared):
+    pipeline, beginning = Pipeline(prepared), Beginning()
+    samples = np.full(prepared.scan.n_samples, 300, dtype=np.uint16)
+    result = pipeline.push(Frame(0, 0, 0.0, 1, 0, 0, samples))
+    bent = BendReading(0.5, 0.01, 0.0, "bend", np.zeros(prepared.pattern.n_meas))
+    states = {"idle": replace(bent, angle=0.0, state="idle"), "bend": bent}
+    for number in range(300):
+        state = "bend" if number > 200 else "idle"
+        frame = Frame(number, number, 0.01 * number, 1, 0, 0, samples)
+        beginning.frame(frame, Mark.NONE if number else Mark.REFERENCE, 0)
+        beginning.result(replace(result, ready=True, pictured=True, bend=states[state]))
+    frames, _, again = beginning.begin(0)
+    assert again
+    assert len(frames) == 3 * REFERENCE_FRAMES
+    assert frames[0][1] == Mark.REFERENCE
+    assert max(frame.sequence for frame, _ in frames) <= 200
