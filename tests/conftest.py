@@ -7,6 +7,7 @@ import importlib.util
 import ipaddress
 import os
 import shutil
+import signal
 import socket
 import subprocess
 from collections.abc import Iterator
@@ -36,6 +37,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default=DEFAULT_DATA,
         help="folder of the public recordings (default: ../shared/data beside the repository)",
     )
+
+
+def pytest_configure() -> None:
+    """Hear Ctrl-C, which a shell ignores in what it starts in the background."""
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

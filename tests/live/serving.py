@@ -17,7 +17,7 @@ from tomoskin.live import (
     listen,
 )
 
-PATIENCE = 20
+PATIENCE = 60
 
 
 class Site:

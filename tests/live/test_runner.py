@@ -16,7 +16,7 @@ from tomoskin.session import session_info
 from tomoskin.twin import Press
 from tomoskin.wire import Start, Stop
 
-PATIENCE = 20
+PATIENCE = 60
 
 
 class Watch:

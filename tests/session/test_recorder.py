@@ -19,7 +19,7 @@ from tomoskin.session import Mark, Recorder, SessionReader, SessionWriter
 from tomoskin.session.recorder import IMAGE_PERIOD
 from tomoskin.wire import encode
 
-PATIENCE = 20
+PATIENCE = 60
 
 
 class Failing(io.FileIO):

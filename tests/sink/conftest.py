@@ -21,7 +21,7 @@ from tomoskin.core import Event, Image
 from tomoskin.sink import Moment, Stream
 
 ROBOT = Path(__file__).resolve().parents[2] / "docs" / "robot.md"
-PATIENCE = 20
+PATIENCE = 60
 EPOCH = 1_700_000_000.0
 MESH = SKIN.mesh()
 PATTERN = SKIN.pattern()
