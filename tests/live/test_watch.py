@@ -106,6 +106,19 @@ def test_a_change_of_all_voltages_alike_is_no_touch(feed, sixteen, resting):
     assert not feed(warmer, 20).touches
 
 
+def test_a_prior_that_leaves_the_constant_free_makes_none_of_the_gain(sixteen, resting, touched):
+    """Laplace's constant is what all voltages in proportion tell, which is taken out."""
+    laplace = Feed(prepare(sixteen.skin.altered({"inverse": {"prior": "laplace"}})))
+    laplace(resting, NEEDED + 5)
+    result = laplace(touched, 6)
+    values = np.abs(result.image.values)
+    assert abs(result.image.values.mean()) < 1e-3 * values.max()
+    assert values.max() < sixteen.skin.conductivity, "no more than there is"
+    (touch,) = result.touches
+    assert away(touch) < 0.012
+    assert not laplace(np.round(0.98 * resting), 6).touches
+
+
 def test_the_reference_follows_the_idle_skin_and_holds_under_a_touch(feed, resting, touched):
     start = feed(resting).reference
     drifted = resting + 3.0

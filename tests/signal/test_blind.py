@@ -35,6 +35,25 @@ def test_lost_rows_are_directions_too():
     assert not np.abs(blind.seen_by(R)[:, ~kept]).max() > 1e-9
 
 
+def test_a_free_image_is_left_out_whatever_the_data_say():
+    """An operator that fits a constant beside its prior: it makes none of it, lost rows or not."""
+    free = np.full((30, 1), 1 / np.sqrt(30))
+    inner = J - (J @ free) @ free.T
+    precision = np.linalg.inv(inner @ inner.T + 0.5 * np.eye(12))
+    seen = J @ free
+    fitted = np.linalg.solve(seen.T @ precision @ seen, seen.T @ precision)
+    rest = inner.T @ precision
+    matrix = rest + (free - rest @ seen) @ fitted
+    left = precision - precision @ seen @ fitted
+    blind = Blind.of(np.eye(12)[:, :2], left).without_free(seen, free.T @ matrix)
+    dv = RANDOM.standard_normal(12)
+    told = matrix @ blind(dv)
+    assert np.abs(free.T @ told).max() < 1e-9
+    np.testing.assert_allclose(blind.seen_by(matrix) @ dv, told, atol=1e-9)
+    changed = dv + 5.0 * seen[:, 0] + np.where(np.arange(12) < 2, 9.0, 0.0)
+    np.testing.assert_allclose(matrix @ blind(changed), told, atol=1e-8)
+
+
 def test_directions_that_follow_from_others_count_once():
     one = RANDOM.standard_normal((12, 1))
     assert Blind.of(np.hstack([one, 2 * one, 0 * one]), P).count == 1

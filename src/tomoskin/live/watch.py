@@ -225,9 +225,22 @@ class Watch:
         return self._kept[key]
 
     def _made(self, health: Health | None) -> Blind:
-        parts = [self._common, self._bends, self._lost_directions(health)]
-        directions = np.hstack(parts) / self._scale[:, None]
-        return Blind.of(directions, self._prepared.operator.precision)
+        operator, free = self._prepared.operator, self._free()
+        common = self._common[:, 1:] if free.shape[1] else self._common
+        parts = [common, self._bends, self._lost_directions(health)]
+        blind = Blind.of(np.hstack(parts) / self._scale[:, None], operator.precision)
+        if not free.shape[1]:
+            return blind
+        seen = (self._prepared.problem.jacobian @ free).real
+        return blind.without_free(seen, (free.T @ operator.matrix).real)
+
+    def _free(self) -> FloatArray:
+        """(n_cells, k) images that the prior leaves free: those of all conductivity alike, which
+        are the gain's."""
+        prepared = self._prepared
+        if not self._projects or prepared.skin.inverse.method != "one-step":
+            return np.zeros((len(prepared.mesh.cells), 0))
+        return prepared.problem.prior.free
 
 
 def _of_bends(prepared: Prepared) -> FloatArray:

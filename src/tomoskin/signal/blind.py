@@ -47,6 +47,24 @@ class Blind:
             ) from error
         return cls(basis, cho_solve(factor, carried.T, check_finite=False))
 
+    def without_free(self, seen: FloatArray, fitted: FloatArray) -> Self:
+        """The same, and images that the operator's prior leaves free are left out.
+
+        Such an image, as Laplace's constant, is fitted whatever it costs, and nothing in P tells
+        of it: along what it does to the data P is zero, so that it cannot be told from noise there.
+
+        Parameters
+        ----------
+        seen
+            (n_meas, k): what the free images do to the data.
+        fitted
+            (k, n_meas): how large the operator makes each of them.
+        """
+        known = fitted - (fitted @ self.directions) @ self.weights
+        return type(self)(
+            np.hstack([self.directions, seen]), np.concatenate([self.weights, known])
+        )
+
     @property
     def count(self) -> int:
         """Number of directions."""
