@@ -1,57 +1,36 @@
-"""The page in Chromium: scripting per frame, start, bundle, memory, and settings made ready."""
+"""The page in Chromium: first picture, scripting, bundle, memory, many pages, settings."""
 
 from __future__ import annotations
 
 import gzip
-import shutil
 import statistics
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
-import numpy as np
-
+from page_stream import chromium, heap, opened, streaming
 from report import Report
-from tomoskin.core import Image, Reading, Touch
-from tomoskin.live import (
-    STATIC,
-    Door,
-    Hub,
-    Prepared,
-    Result,
-    Runner,
-    Server,
-    SettingsDesk,
-    Snapshot,
-    application,
-    colour_limit,
-    listen,
-    prepare,
-    prepare_again,
-)
+from tomoskin.live import STATIC, Prepared, colour_limit, prepare, prepare_again
 from tomoskin.skin import Skin
 
-CELLS = (3000,)
+CORES = 2
+"""A browser and a server: what every machine that shows a page has."""
+
+CELLS = {3000: 2, 50_000: 6}
+"""Triangles, and what scripting may cost a displayed frame, ms."""
+
 RATE = 1000.0
+OPENINGS = 7
 SECONDS = 6.0
 PAGES = 5
-WATCHED = 15.0
+FILLED, WATCHED = 10.0, 40.0
 REPEATS = 7
-ARGUMENTS = (
-    "--no-sandbox",
-    "--disable-gpu",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--enable-precise-memory-info",
-    "--js-flags=--expose-gc",
-)
 BUSY = "() => { const end = performance.now() + 3000; while (performance.now() < end); }"
 COUNT = "window.tomoskin.frames"
+LOOK = "[window.tomoskin.frames, window.tomoskin.scripting, performance.now()]"
+FLOOR = "performance.getEntriesByName('first-contentful-paint')[0]?.startTime"
 CHANGES: dict[str, dict[str, dict[str, Any]]] = {
     "alpha by hand": {"inverse": {"alpha": 0.05}},
     "threshold": {"touch": {"gamma1": 0.7}},
@@ -60,6 +39,7 @@ CHANGES: dict[str, dict[str, dict[str, Any]]] = {
     "electrode width": {"electrodes": {"width": "12 mm"}},
     "mesh, 2500 triangles": {"mesh": {"cells": 2500}},
 }
+Rows = list[tuple[Any, ...]]
 
 
 def run(data: Path | None) -> tuple[Report, ...]:
@@ -68,121 +48,34 @@ def run(data: Path | None) -> tuple[Report, ...]:
     return _page(), _settings()
 
 
-class Stream(Runner):
-    """Results of no source, as fast as asked: two touches that go round."""
-
-    def __init__(self, prepared: Prepared) -> None:
-        """Nothing is opened."""
-        super().__init__(prepared, _no_source)
-        self._ending, self.made = threading.Event(), 0
-        self._shown: Snapshot | None = None
-        self._announces: list[Callable[[], None]] = []
-        random = np.random.default_rng(1)
-        mesh, reference = prepared.mesh, prepared.operator.reference
-        self._images = 1e-3 * random.standard_normal((16, len(mesh.cells)))
-        self._place = mesh.centroids
-        self._result = Result(
-            sequence=0,
-            host_time=0.0,
-            ready=True,
-            pictured=True,
-            image=Image(self._images[0], "S", mesh.identity),
-            voltages=reference,
-            reference=reference,
-            touches=(),
-            left_out=0,
-        )
-        self._worker = threading.Thread(target=self._make, daemon=True)
-        self._worker.start()
-
-    source = "a bench"
-
-    @property
-    def newest(self) -> Snapshot | None:
-        """What was made last."""
-        return self._shown
-
-    @contextmanager
-    def watched_by(self, announce: Callable[[], None]) -> Iterator[None]:
-        """Call it at each result."""
-        self._announces.append(announce)
-        yield
-        self._announces.remove(announce)
-
-    def end(self) -> None:
-        """Make no more."""
-        self._ending.set()
-        self._worker.join()
-
-    def _make(self) -> None:
-        due = time.monotonic()
-        while not self._ending.is_set():
-            now = time.monotonic()
-            self.made += 1
-            self._shown = Snapshot(self._next(now), (), 1e-3, now)
-            for announce in tuple(self._announces):
-                announce()
-            due += 1 / RATE
-            time.sleep(max(due - time.monotonic(), 0.0))
-
-    def _next(self, now: float) -> Result:
-        image = replace(self._result.image, values=self._images[self.made % 16])
-        touches = tuple(self._touch(k, now) for k in range(2))
-        return replace(
-            self._result, sequence=self.made, host_time=now, image=image, touches=touches
-        )
-
-    def _touch(self, number: int, now: float) -> Touch:
-        angle = now + 3 * number
-        x, y = 0.05 * np.cos(angle), 0.05 * np.sin(angle)
-        near = np.flatnonzero(np.hypot(*(self._place - (x, y)).T) < 0.02)
-        reading = Reading(x, y, 1e-3, 2e-3, 1e-3, -0.1, near, cov_xy=1e-6)
-        return Touch(id=number + 1, since=0.0, reading=reading, kind="decrease")
-
-
-def _no_source() -> Any:
-    raise RuntimeError("a stream opens nothing")
-
-
-@contextmanager
-def _served(runner: Runner) -> Iterator[str]:
-    hub = Hub(runner, limit=colour_limit(runner.prepared))
-    hub.take(SettingsDesk(hub))
-    with listen("127.0.0.1", 0) as listener:
-        door = Door(listener.getsockname()[1])
-        server = Server.of(application(hub, door))
-        thread = threading.Thread(target=server.run_on, args=(listener,))
-        thread.start()
-        try:
-            yield door.address
-        finally:
-            server.stop()
-            thread.join()
-
-
 def _page() -> Report:
-    from playwright.sync_api import sync_playwright
-
-    program = shutil.which("chromium") or shutil.which("google-chrome")
-    rows: list[tuple[Any, ...]] = [("bundle, kB gzipped", _bundle(), "≤ 120")]
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=list(ARGUMENTS))
-        for cells, most in zip(CELLS, (2,), strict=True):
-            stream = Stream(
-                prepare(Skin.load("textile-disc-8").altered({"mesh": {"cells": cells}}))
-            )
-            with _served(stream) as address:
-                rows += _watched(browser, address, cells, most)
-                if cells == CELLS[0]:
-                    rows += _several(browser, address, stream)
-            stream.end()
-        browser.close()
+    rows: Rows = [("bundle, kB gzipped", _bundle(), "≤ 120")]
+    with chromium() as browser:
+        for cells, most in CELLS.items():
+            begun = time.process_time()
+            prepared = prepare(_skin(cells))
+            rows += [
+                (f"prepared, s of processor, {cells}", round(time.process_time() - begun, 1), "")
+            ]
+            rows += _ready(browser, prepared, cells)
+            rows += _watched(browser, prepared, cells, most)
+            if cells == min(CELLS):
+                rows += _several(browser, prepared)
     notes = (
-        f"{RATE:.0f} results/s in, made by no source; Chromium draws in software (SwiftShader).",
+        f"Results made by no source, {RATE:.0f}/s (for the first picture 100/s); Chromium draws in "
+        "software (SwiftShader).",
+        "Ready: from the navigation to the end of drawing the first picture, by the page's clock; "
+        f"median and worst of {OPENINGS} with empty caches. Beside it a page of text of the same "
+        "server in the same browser.",
         "Scripting: arrival, decoding, marks, numbers and calls to WebGL, per displayed frame.",
-        f"Memory: used heap after collection, from the seventh second on, over {WATCHED:.0f} s.",
+        f"Memory: used heap after collection over {WATCHED:.0f} s, once all that the page keeps "
+        "for ten seconds is there; an hour: tomoskin bench page_hour.",
     )
     return Report("page", ("what", "measured", "promised"), tuple(rows), notes)
+
+
+def _skin(cells: int) -> Skin:
+    return Skin.load("textile-disc-8").altered({"mesh": {"cells": cells}})
 
 
 def _bundle() -> float:
@@ -190,56 +83,82 @@ def _bundle() -> float:
     return round(sum(len(gzip.compress(part.read_bytes())) for part in parts) / 1e3, 1)
 
 
-def _watched(browser: Any, address: str, cells: int, most: int) -> list[tuple[Any, ...]]:
-    page = browser.new_page(viewport={"width": 1280, "height": 720})
-    start = time.monotonic()
-    page.goto(address)
-    page.wait_for_function("() => window.tomoskin?.last")
-    ready = time.monotonic() - start
-    page.wait_for_timeout(1e3)
-    look = "[window.tomoskin.frames, window.tomoskin.scripting, performance.now()]"
-    frames, cost, then = page.evaluate(look)
-    page.wait_for_timeout(1e3 * SECONDS)
-    frames2, cost2, now = page.evaluate(look)
-    seen = frames2 - frames
-    heap = "() => { gc(); return performance.memory.usedJSHeapSize; }"
-    before, first = page.evaluate(heap), frames2
-    page.wait_for_timeout(1e3 * WATCHED)
-    grown = page.evaluate(heap) - before
-    streamed = page.evaluate(COUNT) - first
-    page.close()
+def _ready(browser: Any, prepared: Prepared, cells: int) -> Rows:
+    """The first picture, and the first sign of a page with nothing but text."""
+    found, floors = [], []
+    with streaming(prepared, 100.0) as (_, address):
+        for _ in range(OPENINGS):
+            with opened(browser, address) as page:
+                found.append(page.evaluate("window.tomoskin.ready") / 1e3)
+                page.goto(f"{urlsplit(address)._replace(path='/status').geturl()}")
+                page.wait_for_function(f"() => {FLOOR}")
+                floors.append(page.evaluate(FLOOR) / 1e3)
+    promised = "< 1" if cells == min(CELLS) else ""
     return [
-        (f"ready, s, {cells} triangles", round(ready, 2), "< 1" if most == 2 else ""),
-        (f"scripting per frame, ms, {cells}", round(1e3 * (cost2 - cost) / seen, 2), f"≤ {most}"),
-        (f"frames/s shown, {cells}", round(1e3 * seen / (now - then), 1), ""),
-        (f"memory gained over {streamed} frames, kB, {cells}", round(grown / 1e3), "≤ 0"),
+        (f"ready, s, {cells} triangles: median", round(statistics.median(found), 2), promised),
+        (f"ready, s, {cells} triangles: worst", round(max(found), 2), promised),
+        (f"a page of text instead, s, {cells}: median", round(statistics.median(floors), 2), ""),
     ]
 
 
-def _several(browser: Any, address: str, stream: Stream) -> list[tuple[Any, ...]]:
-    """Five pages, and one that stops reading; the maker of results is not slowed."""
-    pages = [browser.new_page() for _ in range(PAGES)]
-    for page in pages:
-        page.goto(address)
-        page.wait_for_function("() => window.tomoskin?.last")
-    pages[0].evaluate(
-        "() => { const end = performance.now() + 3000; while (performance.now() < end); }"
-    )
+def _watched(browser: Any, prepared: Prepared, cells: int, most: int) -> Rows:
+    with streaming(prepared, RATE) as (stream, address), opened(browser, address) as page:
+        page.wait_for_timeout(3e3)
+        frames, cost, then = page.evaluate(LOOK)
+        page.wait_for_timeout(1e3 * SECONDS)
+        frames2, cost2, now = page.evaluate(LOOK)
+        seen = frames2 - frames
+        page.wait_for_timeout(1e3 * FILLED)
+        before, first = heap(page), page.evaluate(COUNT)
+        page.wait_for_timeout(1e3 * WATCHED)
+        grown, streamed = heap(page) - before, page.evaluate(COUNT) - first
+        painted = {s.name: s for s in stream.latency.stages()}["paint"]
+    return [
+        (f"scripting per frame, ms, {cells}", round(1e3 * (cost2 - cost) / seen, 2), f"≤ {most}"),
+        (f"arrival to drawn, ms, {cells}: median, p99", _pair(painted), ""),
+        (f"frames/s shown, {cells}", round(1e3 * seen / (now - then), 1), "≤ 60"),
+        (f"memory gained over {streamed} frames, kB, {cells}", round(grown / 1e3), "none"),
+    ]
+
+
+def _pair(stage: Any) -> str:
+    return f"{1e3 * stage.p50:.1f}, {1e3 * stage.p99:.1f}"
+
+
+def _several(browser: Any, prepared: Prepared) -> Rows:
+    """Five pages, one of them stalled for three seconds; and a client that stops reading."""
+    from websockets.sync.client import connect
+
+    with streaming(prepared, RATE) as (stream, address), ExitStack() as stack:
+        pages = [stack.enter_context(opened(browser, address)) for _ in range(PAGES)]
+        shown, results = _shown(pages, stream)
+        pages[0].evaluate(BUSY)
+        stalled, _ = _shown(pages, stream)
+        at = urlsplit(address)
+        asleep = at._replace(scheme="ws", path="/ws").geturl()
+        stack.enter_context(connect(asleep, origin=f"http://{at.netloc}", max_queue=1))
+        beside, still = _shown(pages, stream)
+    return [
+        (f"results/s in, {PAGES} pages", round(results), f"{RATE:.0f}"),
+        (f"frames/s on the slowest of {PAGES}", round(min(shown), 1), ""),
+        ("the same after one was stalled for 3 s", round(min(stalled), 1), ""),
+        ("results/s in beside a client that stops reading", round(still), f"{RATE:.0f}"),
+        ("frames/s on the slowest page beside it", round(min(beside), 1), ""),
+    ]
+
+
+def _shown(pages: list[Any], stream: Any) -> tuple[list[float], float]:
+    """Frames/s that each page got in three seconds, and results/s that were made."""
     made, then = stream.made, time.monotonic()
     counts = [page.evaluate(COUNT) for page in pages]
     pages[0].wait_for_timeout(3e3)
     shown = [page.evaluate(COUNT) - c for page, c in zip(pages, counts, strict=True)]
     seconds = time.monotonic() - then
-    for page in pages:
-        page.close()
-    return [
-        (f"results/s in, {PAGES} pages", round((stream.made - made) / seconds), f"{RATE:.0f}"),
-        (f"frames/s on the slowest of {PAGES}", round(min(shown) / seconds, 1), ""),
-    ]
+    return [count / seconds for count in shown], (stream.made - made) / seconds
 
 
 def _settings() -> Report:
-    prepared = prepare(Skin.load("textile-disc-8").altered({"mesh": {"cells": 3000}}))
+    prepared = prepare(_skin(3000))
     rows = []
     for name, change in CHANGES.items():
         skin = prepared.skin.altered(change)
