@@ -54,8 +54,9 @@ class Trace:
     strong, low, least
         Device times at which it was last strong for its place, and since which it has been so
         weak that it may be a remainder, or None; least size of its peak since then.
-    footprints
-        Where it has been, the newest last.
+    footprints, top
+        Where it has been, the newest last; and how large it has been where its reading is now,
+        for what is left of a press that slid is found anywhere along its way.
     alone
         As it was before it merged with others, or None.
     others
@@ -77,6 +78,7 @@ class Trace:
     low: float | None = None
     least: float = 0.0
     footprints: list[Footprint] = field(default_factory=list)
+    top: float = 0.0
     alone: Apart | None = None
     others: list[Trace] = field(default_factory=list)
     beside: Mapping[int, Apart] = field(default_factory=dict)
@@ -92,14 +94,6 @@ class Trace:
         """(2,) m where it is expected."""
         expected: FloatArray = self.states.mean[0, :2]
         return expected
-
-    @property
-    def top(self) -> float:
-        """How large it has been where its reading is now: what is left of a press that slid is
-        found anywhere along its way."""
-        x, y, reach = self.reading.x, self.reading.y, max(region_radius(self.reading), _STEP)
-        near = [f for f in self.footprints if math.hypot(f.x - x, f.y - y) <= reach]
-        return max((foot.top for foot in near), default=self.footprints[-1].top)
 
     @property
     def sign(self) -> float:
@@ -136,13 +130,18 @@ class Trace:
 
     def _step(self) -> None:
         x, y, size = self.reading.x, self.reading.y, size_of(self.reading)
-        if self.footprints:
-            last = self.footprints[-1]
-            if (x - last.x) ** 2 + (y - last.y) ** 2 < _STEP**2:
-                last.top = max(last.top, size)
-                return
-        self.footprints.append(Footprint(x, y, size))
-        del self.footprints[:-_MOST_FOOTPRINTS]
+        last = self.footprints[-1] if self.footprints else None
+        if last is None or (x - last.x) ** 2 + (y - last.y) ** 2 >= _STEP**2:
+            last = Footprint(x, y, size)
+            self.footprints.append(last)
+            del self.footprints[:-_MOST_FOOTPRINTS]
+        elif size > last.top:
+            last.top = size
+        self.top = last.top
+        if len(self.footprints) > 1:
+            reach = max(region_radius(self.reading), _STEP) ** 2
+            near = (f.top for f in self.footprints if (f.x - x) ** 2 + (f.y - y) ** 2 <= reach)
+            self.top = max(near, default=last.top)
 
 
 def size_of(reading: Reading) -> float:

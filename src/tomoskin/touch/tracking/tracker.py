@@ -93,23 +93,26 @@ class Tracker:
         pairs: dict[int, int] = {}
         if traces:
             states = motion.predicted(states, elapsed, settings)
-            for trace, state in zip(traces, _rows(states), strict=True):
-                trace.states = state
         if traces and readings:
             signs = np.array([trace.sign for trace in traces])
             behind = np.array([not t.number or t.missing is not None for t in traces], float)
             pairs, far = assigned(states, signs, behind, readings, seen)
-            self._note_missing(set(pairs.values()))
+            self._note_missing(set(pairs.values()), states)
             self._see(readings, pairs, seen, states, far)
         else:
-            self._note_missing(set())
+            self._note_missing(set(), states)
         for index, reading in enumerate(readings):
             if index not in pairs and self._begins(reading):
                 state = motion.begun(seen[0][index], seen[1][index], settings)
                 traces.append(Trace(reading, state, self._now, self._host))
         self._settle()
 
-    def _note_missing(self, found: set[int]) -> None:
+    def _note_missing(self, found: set[int], states: motion.States) -> None:
+        """Of those that no reading is of: they are where they are expected."""
+        if len(found) == len(self._traces):
+            return
+        for trace, state in zip(self._traces, _rows(states), strict=True):
+            trace.states = state
         lost = [trace for k, trace in enumerate(self._traces) if k not in found]
         going = [trace for trace in lost if trace.missing is None]
         if going:
