@@ -51,7 +51,7 @@ class Board:
         self.closed = False
         self.scanning = threading.Event()
         self.sought = threading.Semaphore(0)
-        self._period = period
+        self.period = period
         self._configuration = 0
         self._sequence = count()
         self._out = deque([encode(Hello(*VERSION, HASH))])
@@ -78,7 +78,7 @@ class Board:
     def read(self, timeout):
         self._check()
         if self.free is not None and self.scanning.is_set():
-            threading.Event().wait(self._period)
+            threading.Event().wait(self.period)
             self.send(self.free)
         with self._news:
             self._news.wait_for(lambda: self._out or self.lost, timeout)
