@@ -1,6 +1,9 @@
 # Sourced: provide WHAT TESTS PACKAGE… installs packages with apt-get on Debian, as root, unless the
-# caller's function `ready` says that all is there. Without them the tests that need them are
+# caller's function `ready` says that all is there. Packages whose names only apt knows are printed
+# by the caller's function `more`, after apt has looked. Without them the tests that need them are
 # skipped, loudly; under CI=true that is a failure.
+
+more() { :; }
 
 provide() {
     what=$1 tests=$2
@@ -8,7 +11,8 @@ provide() {
     if ready; then return 0; fi
     if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
         echo "set-up: installing $what with apt-get"
-        { apt-get update && apt-get install -y --no-install-recommends "$@"; } >/dev/null || true
+        # shellcheck disable=SC2046 - a list
+        { apt-get update && apt-get install -y --no-install-recommends "$@" $(more); } >/dev/null || true
         if ready; then return 0; fi
     fi
     echo "set-up: no $what, so $tests." >&2

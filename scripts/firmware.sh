@@ -1,8 +1,7 @@
 #!/bin/sh
-# Sees to it that the firmware's tests find compilers, simavr and GoogleTest: on Debian, as root, it
-# installs them. Without them those tests are skipped, loudly; under CI=true that is a failure.
+# Sees to it that the firmware's tests find compilers, simavr and GoogleTest.
 set -eu
-packages="make gcc g++ libc6-dev gcc-avr avr-libc simavr libsimavr-dev libelf-dev libgtest-dev gcovr cppcheck clang"
+. "$(dirname "$0")/apt.sh"
 
 ready() {
     for program in cc c++ avr-gcc avr-size simavr gcovr cppcheck; do
@@ -21,17 +20,10 @@ ready() {
 }
 
 # libFuzzer is a package of its own, named after the version that clang is.
-fuzzer() {
+more() {
     apt-cache depends clang | sed -n 's/.*Depends: clang-\([0-9]*\)$/libclang-rt-\1-dev/p'
 }
 
-if ready; then exit 0; fi
-if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
-    echo "set-up: installing compiler, emulator and test tools for the firmware with apt-get"
-    # shellcheck disable=SC2086 - a list
-    { apt-get update && apt-get install -y --no-install-recommends $packages $(fuzzer); } >/dev/null || true
-    if ready; then exit 0; fi
-fi
-echo "set-up: no tools for the firmware, so its tests cannot run." >&2
-echo "  On Debian: sudo apt-get install $packages" >&2
-if [ "${CI:-}" = true ]; then exit 1; fi
+provide "compilers, emulator and test tools for the firmware" "its tests cannot run" \
+    make gcc g++ libc6-dev gcc-avr avr-libc simavr libsimavr-dev libelf-dev libgtest-dev gcovr \
+    cppcheck clang

@@ -24,6 +24,8 @@ def test_doctor(tomoskin):
     assert "twin" in found["sources"][0]["text"]
     assert len(found["skin"]) == 4
     assert all(skin["ok"] for skin in found["skin"])
+    assert len(found["sink"]) >= 5
+    assert all(sink["ok"] for sink in found["sink"])  # none of them is needed
     assert "8765" in found["port"][0]["text"]
 
 

@@ -241,10 +241,11 @@ def test_repair_takes_a_skin_where_the_files_own_is_lost(small, tmp_path):
 def test_repair_of_nothing_leaves_nothing(tmp_path):
     path = tmp_path / "x.mcap"
     path.write_bytes(b"nothing at all" * 100)
-    with pytest.raises(DataError, match="skin is lost"):
-        repair(path, tmp_path / "y.mcap")
-    with pytest.raises(DataError, match="no whole chunk"):
-        repair(path, tmp_path / "y.mcap", skin=SKIN)
+    for skin in (None, SKIN):
+        with pytest.raises(DataError, match="no part of a session"):
+            repair(path, tmp_path / "y.mcap", skin=skin)
+    with pytest.raises(DataError, match="there is no such file"):
+        repair(tmp_path / "z.mcap", tmp_path / "y.mcap")
     assert not (tmp_path / "y.mcap").exists()
 
 

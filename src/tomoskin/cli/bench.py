@@ -55,7 +55,7 @@ def bench(
     if name not in known:
         raise typer.BadParameter(f'expected {", ".join(known)}, got "{name}"', param_hint="NAME")
     benchmark = _load(name)
-    cores = cores or getattr(benchmark, "CORES", 1)
+    cores = int(cores or getattr(benchmark, "CORES", 1))
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-cores:])
     os.environ["RAYON_NUM_THREADS"] = str(cores)  # the native engine reads it at each call
     with threadpool_limits(cores):
@@ -119,9 +119,13 @@ class _Place:
     def of(cls, file: Path, name: str) -> Self:
         """Find it, before anything is measured."""
         begin, end = f"<!-- bench {name} -->\n", f"<!-- end {name} -->\n"
-        text = file.read_text(encoding="utf-8") if file.is_file() else ""
+        text = file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
         if text.count(begin) != 1 or text.count(end) != 1:
-            raise DataError(f"expected one {begin.strip()} and {end.strip()}", where=str(file))
+            raise DataError(
+                f"expected a Markdown file with one {begin.strip()} and, below it, {end.strip()}",
+                where=str(file),
+                hint="the tables are written between these two lines",
+            )
         before, rest = text.split(begin)
         return cls(file, before + begin, end + rest.split(end)[1])
 

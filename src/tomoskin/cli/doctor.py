@@ -18,6 +18,10 @@ from tomoskin.core import TomoskinError
 _T = TypeVar("_T")
 
 
+_EXAMPLES = {"mqtt": "mqtt://127.0.0.1/tomoskin"}
+"""Of sinks that want to know where to."""
+
+
 @dataclass(frozen=True, slots=True)
 class Finding:
     """One thing looked at: whether it is as needed, and a sentence."""
@@ -28,7 +32,7 @@ class Finding:
 
 
 def doctor(json: JsonFlag = False) -> None:
-    """Look at this installation: versions, page, sources, skins, ports."""
+    """Look at this installation: versions, page, sources, sinks, skins, ports."""
     findings = [found for look in _LOOKS for found in look()]
     healthy = all(found.ok for found in findings)
     if json:
@@ -67,6 +71,16 @@ def _sources() -> Iterator[Finding]:
     yield Finding("serial", True, ports or "no serial port is connected")
 
 
+def _sinks() -> Iterator[Finding]:
+    """Which could be opened; a package that is not here is no fault."""
+    from tomoskin.sink import make_sink, sink_names
+
+    for name in sink_names():
+        spec = _EXAMPLES.get(name, name)
+        tried = _tried("sink", partial(make_sink, spec), lambda _: "installed")
+        yield Finding("sink", True, f"{name}: {tried.text}")
+
+
 def _skins() -> Iterator[Finding]:
     from tomoskin.skin import Skin
 
@@ -92,4 +106,4 @@ def _tried(name: str, look: Callable[[], _T], say: Callable[[_T], str]) -> Findi
         return Finding(name, False, str(error))
 
 
-_LOOKS = (_python, _page, _sources, _skins, _port)
+_LOOKS = (_python, _page, _sources, _sinks, _skins, _port)

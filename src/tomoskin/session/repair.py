@@ -81,6 +81,8 @@ def repair(
         written, or the skin is lost and none is given.
     """
     found = Repaired(target)
+    if not source.exists():
+        raise DataError("there is no such file", where=str(source))
     with said_of(source), source.open("rb") as file:
         scan = _Scan(file, found)
         about, attachments = _front(scan, skin, str(source))
@@ -105,11 +107,15 @@ def _front(scan: _Scan, skin: Skin | None, where: str) -> tuple[dict[str, str], 
     """The named strings and the attachments, wherever they are in the file."""
     about: dict[str, str] = {}
     attachments: dict[str, Attachment] = {}
+    seen = False
     for part in scan.parts():
+        seen = True
         if isinstance(part, Attachment) and part.name != SEEK_TABLE:
             attachments[part.name] = part
         elif isinstance(part, dict):
             about = part
+    if not seen:
+        raise DataError("holds no part of a session: nothing can be recovered", where=where)
     if skin is None:
         skin = _skin_of(attachments.get(SKIN_FILE), where)
     attachments[SKIN_FILE] = Attachment(SKIN_FILE, "application/toml", skin.to_toml().encode())

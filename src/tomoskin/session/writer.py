@@ -207,10 +207,16 @@ def said_of(path: Path) -> Iterator[None]:
         raise DataError(
             f"cannot be read or written: {error.strerror or error}",
             where=str(path),
-            hint="make the folder first"
-            if isinstance(error, FileNotFoundError)
-            else "look at the disk",
+            hint=_ADVICE.get(type(error), "look at the disk"),
         ) from error
+
+
+_ADVICE: dict[type[OSError], str] = {
+    FileNotFoundError: "make the folder first",
+    IsADirectoryError: "name a file",
+    NotADirectoryError: "name a file in a folder",
+    PermissionError: "choose another place",
+}
 
 
 def _about(skin: Skin, epoch: float) -> dict[str, str]:
