@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import re
+import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from report import Report
+from report import Report, progress
 from tomoskin import Locator, Skin
 from tomoskin.core import DataError, Reading
 from tomoskin.live import Pipeline, Prepared, Result, prepare, simulate
@@ -21,6 +22,7 @@ from tomoskin.touch import Several, Tracker
 from tomoskin.twin import Script
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
+METHODS = ("image", "fit")
 SEEDS = (11, 12, 13)
 """What was chosen was chosen on seeds 1 to 3."""
 
@@ -49,12 +51,13 @@ def run(data: Path | None) -> tuple[Report, ...]:
     folder = (data or SHARED) / "eskin_hydrogel_round"
     if not folder.is_dir():
         raise DataError("expected the public recordings", where=str(folder), hint="--data FOLDER")
-    return (_identities(), _latencies(), _idle(), _remainders(), _two(folder), _cost())
+    twin = (piece(method, SEEDS) for piece in PIECES.values() for method in METHODS)
+    return (*twin, _two(folder), _cost())
 
 
 @cache
-def _prepared(electrodes: int, oversampling: int) -> Prepared:
-    skin = Skin.load(f"textile-disc-{electrodes}")
+def _prepared(electrodes: int, oversampling: int, method: str) -> Prepared:
+    skin = Skin.load(f"textile-disc-{electrodes}").altered({"touch": {"method": method}})
     text = re.sub(r"oversampling = \d+", f"oversampling = {oversampling}", skin.to_toml())
     return prepare(Skin.from_toml(text))
 
@@ -113,30 +116,30 @@ def _pair(key: tuple[int, int], crossing: bool) -> str:
     return script
 
 
-def _identities() -> Report:
+def _identities(method: str, seeds: Sequence[int]) -> Report:
     rows = []
     for kind, crossing in (("together and apart", False), ("past each other", True)):
         for electrodes, oversampling in ((16, 8), (16, 2), (8, 4)):
-            prepared = _prepared(electrodes, oversampling)
-            found = [
-                _judged(list(_frames(prepared, _pair(key, crossing), key[0])))
-                for key in ((seed, number) for seed in SEEDS for number in range(RUNS))
-            ]
+            prepared = _prepared(electrodes, oversampling, method)
+            found = []
+            for key in ((seed, number) for seed in seeds for number in range(RUNS)):
+                progress(f"{kind}, {electrodes} electrodes, {method}, {key}")
+                found.append(_judged(list(_frames(prepared, _pair(key, crossing), key[0]))))
             right, only, third, said = (float(np.mean([f[k] for f in found])) for k in range(4))
             rate = f"{1 / _interval(prepared):.0f}"
             rows.append(
                 (kind, electrodes, rate, *(_percent(x) for x in (right, only, third, said)))
             )
     return Report(
-        "two presses, 90 mm apart, to 20 mm and on",
+        f"two presses, 90 mm apart, to 20 mm and on; method {method}",
         (
             *("motion", "electrodes", "frames/s", "ids right at the end", "two ids in all"),
             *("frames with a third touch", "two seen or said"),
         ),
         tuple(rows),
         (
-            f"twin, textile preset, 12 mm presses of 2 to 5 N, seeds {_listed(SEEDS)}, {RUNS} runs "
-            "each; touches found in the image",
+            f"twin, textile preset, 12 mm presses of 2 to 5 N, seeds {_listed(seeds)}, {RUNS} runs "
+            "each",
             "right: both presses end with the id that they began with, and there is no other id",
             "seen or said: two touches, or one that says that it is merged or too close",
         ),
@@ -165,12 +168,13 @@ def _judged(frames: list[Frame]) -> tuple[bool, bool, float, float]:
     return right, len(ids) == 2, third / both, said / both
 
 
-def _latencies() -> Report:
+def _latencies(method: str, seeds: Sequence[int]) -> Report:
     rows = []
     for electrodes, oversampling in FAST.items():
-        prepared = _prepared(electrodes, oversampling)
+        prepared = _prepared(electrodes, oversampling, method)
         onset, release, double = [], [], []
-        for seed in SEEDS:
+        for seed in seeds:
+            progress(f"latencies, {electrodes} electrodes, {method}, {seed}")
             rng, script, starts = np.random.default_rng(seed), _HEAD.format(16), []
             for number in range(8):
                 x, y = _somewhere(rng)
@@ -194,7 +198,7 @@ def _latencies() -> Report:
             )
         )
     return Report(
-        "press, release, press",
+        f"press, release, press; method {method}",
         (
             *("electrodes", "frames/s", "presses", "onset, median frames", "release, median"),
             *("onset, p95", "release, p95", "presses with not one onset"),
@@ -202,40 +206,42 @@ def _latencies() -> Report:
         tuple(rows),
         (
             f"twin, textile preset, 2 to 6 N within 70 mm, up and down in 100 ms, seeds "
-            f"{_listed(SEEDS)}; onset counts from the first force, release from when it begins to "
+            f"{_listed(seeds)}; onset counts from the first force, release from when it begins to "
             "fall: four frames of each are the hand's",
         ),
     )
 
 
-def _idle() -> Report:
+def _idle(method: str, seeds: Sequence[int]) -> Report:
     rows = []
     for electrodes, oversampling in FAST.items():
-        prepared = _prepared(electrodes, oversampling)
-        onsets = [
-            sum(kind == "onset" for kind, _ in _events(_frames(prepared, _HEAD.format(IDLE), seed)))
-            for seed in SEEDS
-        ]
-        hours = len(SEEDS) * IDLE / 3600
+        prepared = _prepared(electrodes, oversampling, method)
+        onsets = []
+        for seed in seeds:
+            progress(f"idle, {electrodes} electrodes, {method}, {seed}")
+            happened = _events(_frames(prepared, _HEAD.format(IDLE), seed))
+            onsets.append(sum(kind == "onset" for kind, _ in happened))
+        hours = len(seeds) * IDLE / 3600
         frames = round(hours * 3600 / _interval(prepared))
         rows.append(
             (electrodes, frames, round(60 * hours), sum(onsets), round(sum(onsets) / hours))
         )
     return Report(
-        "an untouched skin",
+        f"an untouched skin; method {method}",
         ("electrodes", "frames", "minutes", "false onsets", "an hour"),
         tuple(rows),
-        (f"twin, textile preset, drift of temperature and contacts included, {_listed(SEEDS)}",),
+        (f"twin, textile preset, drift of temperature and contacts included, {_listed(seeds)}",),
     )
 
 
-def _remainders() -> Report:
+def _remainders(method: str, seeds: Sequence[int]) -> Report:
     rows = []
     for electrodes in (8, 16):
-        prepared = _prepared(electrodes, 8)
+        prepared = _prepared(electrodes, 8, method)
         for force in STRENGTHS:
             ghosts, again, releases = 0, 0, 0
-            for seed in SEEDS:
+            for seed in seeds:
+                progress(f"remainders, {electrodes} electrodes, {force:g} N, {method}, {seed}")
                 rng, script, starts = np.random.default_rng(seed), _HEAD.format(24), []
                 for number in range(3):
                     x, y = _somewhere(rng)
@@ -262,15 +268,23 @@ def _remainders() -> Report:
                 )
             )
     return Report(
-        "what a press leaves behind",
+        f"what a press leaves behind; method {method}",
         ("electrodes", "press, N", "releases", "with a ghost", "second press found"),
         tuple(rows),
         (
-            f"twin, textile preset (creep and play), 2 s at a place, seeds {_listed(SEEDS)}; a "
+            f"twin, textile preset (creep and play), 2 s at a place, seeds {_listed(seeds)}; a "
             "ghost is any touch from 0.5 s after the release on; then a press half as hard, 1 N at "
             "least, at the same place",
         ),
     )
+
+
+PIECES: dict[str, Callable[[str, Sequence[int]], Report]] = {
+    "identities": _identities,
+    "latencies": _latencies,
+    "idle": _idle,
+    "remainders": _remainders,
+}
 
 
 def _two(folder: Path) -> Report:
@@ -358,5 +372,11 @@ def _percent(part: float) -> str:
     return f"{100 * part:.0f} %"
 
 
-def _listed(seeds: tuple[int, ...]) -> str:
+def _listed(seeds: Sequence[int]) -> str:
     return ", ".join(map(str, seeds))
+
+
+if __name__ == "__main__":
+    # One piece of it: python benchmarks/tracking.py identities fit 11 12
+    told = PIECES[sys.argv[1]](sys.argv[2], [int(seed) for seed in sys.argv[3:]])
+    print(told.title, *(" | ".join(map(str, row)) for row in (told.columns, *told.rows)), sep="\n")
