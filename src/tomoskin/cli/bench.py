@@ -55,7 +55,8 @@ def bench(
     if name not in known:
         raise typer.BadParameter(f'expected {", ".join(known)}, got "{name}"', param_hint="NAME")
     benchmark = _load(name)
-    cores = int(cores or getattr(benchmark, "CORES", 1))
+    usual: int = getattr(benchmark, "CORES", 1)
+    cores = cores or usual
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-cores:])
     os.environ["RAYON_NUM_THREADS"] = str(cores)  # the native engine reads it at each call
     with threadpool_limits(cores):
