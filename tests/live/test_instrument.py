@@ -1,6 +1,7 @@
 """The page as an instrument: settings, signals, the broken twin, space, and who can use it."""
 
 import gzip
+import re
 from functools import partial
 
 import pytest
@@ -140,6 +141,16 @@ def test_signals(opened):
     opened.test_id("signals-sum").filter(has_text="µV").wait_for()
     opened.test_id("signals-reciprocity").click()
     opened.test_id("signals-sum").filter(has_text="%").wait_for()
+
+
+def test_the_latency_of_every_stage(opened):
+    opened.page.keyboard.press("g")
+    opened.test_id("signals-latency").click()
+    for stage in ("sample", "decode", "reconstruct", "publish", "paint"):
+        known = opened.test_id(f"stage-{stage}").locator("td").filter(has_text=re.compile(r"\d"))
+        known.last.wait_for()
+        assert known.count() == 2
+    assert opened.page.evaluate("window.tomoskin.ready") > 0
 
 
 def test_the_value_under_the_pointer(opened):
