@@ -100,22 +100,22 @@ def test_a_pattern_is_edited_by_keys_and_errors_stand_at_their_row(opened):
     edit_pattern(opened)
     said = opened.test_id("pattern-said")
     words = said.inner_text()
-    cell(opened, 1, "source").focus()
+    cell(opened, 1, "drive +").focus()
     opened.test_id("electrode-2").filter(has_text="E2 I+").wait_for()
     opened.test_id("electrode-3").filter(has_text="E3 V+").wait_for()
     opened.page.keyboard.press("ArrowDown")
     opened.test_id("electrode-4").filter(has_text="E4 V+").wait_for()
-    cell(opened, 3, "plus").fill("9")
-    said.filter(has_text="Row 3: plus: this skin has E1 to E8, not E9").wait_for()
-    assert cell(opened, 3, "plus").get_attribute("aria-invalid") == "true"
+    cell(opened, 3, "read +").fill("9")
+    said.filter(has_text="Row 3: read +: this skin has E1 to E8, not E9").wait_for()
+    assert cell(opened, 3, "read +").get_attribute("aria-invalid") == "true"
     assert opened.test_id("apply-table").is_disabled()
     opened.page.get_by_label("Duplicate row 3").press("Enter")
     said.filter(has_text="and 1 more").wait_for()
     opened.page.get_by_label("Remove row 3").press("Enter")
     opened.page.get_by_label("Remove row 3").press("Enter")
     opened.test_id("add-row").press("Enter")
-    for column in ("source", "sink", "plus", "minus"):
-        opened.page.keyboard.type({"source": "2", "sink": "E1", "plus": "5", "minus": "6"}[column])
+    for electrode in ("2", "E1", "5", "6"):
+        opened.page.keyboard.type(electrode)
         opened.page.keyboard.press("Tab")
     said.filter(has_text="rows under").wait_for()
     assert said.inner_text() == words
@@ -205,7 +205,7 @@ def test_axe_finds_nothing(opened, scheme):
         assert axe_finds(opened.page, ".side") == [], drawer
     opened.page.keyboard.press("Escape")
     edit_pattern(opened)
-    cell(opened, 2, "plus").fill("99")
+    cell(opened, 2, "read +").fill("99")
     opened.test_id("pattern-said").filter(has_text="Row 2").wait_for()
     assert axe_finds(opened.page, ".own") == []
 

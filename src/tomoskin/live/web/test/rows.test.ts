@@ -42,12 +42,12 @@ describe("what is wrong with a row", () => {
   it("is said in words", () => {
     const found = [...rows("9 1 4 5", "2 2 4 5", "2 1 4 4", "2 1 x 5", "0 1 4 5"), fresh(["", "", "", ""])];
     expect(words(found)).toEqual([
-      "source: this skin has E1 to E8, not E9",
-      "source and sink are both E2",
-      "plus and minus are both E4",
-      "plus: expected an electrode from E1 to E8, got “x”",
-      "source: this skin has E1 to E8, not E0",
-      "source: expected an electrode from E1 to E8, got “”",
+      "drive +: this skin has E1 to E8, not E9",
+      "drive + and drive − are both E2",
+      "read + and read − are both E4",
+      "read +: expected an electrode from E1 to E8, got “x”",
+      "drive +: this skin has E1 to E8, not E0",
+      "drive +: expected an electrode from E1 to E8, got “”",
     ]);
   });
 

@@ -120,7 +120,7 @@ export function PatternTable({ rows, wrong, set, goTo }: TableProps) {
         <thead>
           <tr>
             <th scope="col">Row</th>
-            {["drive +", "drive −", "read +", "read −"].map((name) => (
+            {COLUMNS.map((name) => (
               <th key={name} scope="col">
                 {name}
               </th>

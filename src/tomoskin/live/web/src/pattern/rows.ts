@@ -11,7 +11,8 @@ export interface Row {
   readonly cells: Cells;
 }
 
-export const COLUMNS = ["source", "sink", "plus", "minus"] as const;
+/** As people read them; the minus is a true one. */
+export const COLUMNS = ["drive +", "drive \u2212", "read +", "read \u2212"] as const;
 
 export interface Tables {
   readonly drive: readonly (readonly number[])[];
@@ -64,8 +65,8 @@ function problem({ cells }: Row, n: number): string | null {
     if (found) return found;
   }
   const [source, sink, plus, minus] = cells.map(electrode);
-  if (source === sink) return `source and sink are both E${source}`;
-  return plus === minus ? `plus and minus are both E${plus}` : null;
+  if (source === sink) return `${COLUMNS[0]} and ${COLUMNS[1]} are both E${source}`;
+  return plus === minus ? `${COLUMNS[2]} and ${COLUMNS[3]} are both E${plus}` : null;
 }
 
 /** What is wrong with each row, by its identity; rows that are well are not in it. */
