@@ -72,3 +72,28 @@ def test_a_command_that_is_nearly_one_is_named(tomoskin) -> None:
     code, _, err = tomoskin("imge")
     assert code == 2
     assert "'image'" in err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("image", "none.npz", "--out", "{}.png"),
+        ("image", "none.npz", "--touches", "{}.csv"),
+        ("locate", "none.npz", "--calibration", "none.npz", "--touches", "{}.csv"),
+        ("states", "none.npz", "--calibration", "none.npz", "--out", "{}.csv"),
+        ("calibrate", "touch", "none.npz", "--out", "{}.npz"),
+        ("calibrate", "states", "none.npz", "--out", "{}.npz"),
+        ("calibrate", "bend", "none.npz", "--out", "{}.npz"),
+        ("calibrate", "wiring", "none.npz", "--out", "{}.toml"),
+        ("design", "--out", "{}.png"),
+        ("skin", "alpha", "textile-disc-8", "--out", "{}.png"),
+        ("skin", "merit", "textile-disc-8", "--out", "{}.png"),
+    ],
+)
+def test_where_nothing_can_be_written_is_said_before_the_work(tomoskin, tmp_path, words) -> None:
+    """Not even the input is looked at, which is not there either."""
+    target = tmp_path / "no such folder" / "x"
+    code, _, err = tomoskin(*(word.format(target) for word in words))
+    assert code == 1
+    assert "cannot be written: there is no such folder" in err
+    assert err.startswith(f"tomoskin: {target}")

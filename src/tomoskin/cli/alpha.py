@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, writable
 from tomoskin.cli.recording import FramesOption, ReferenceOption, frame_range, idle_frames
 from tomoskin.core import TomoskinError
 
@@ -28,7 +28,8 @@ def alpha(
     frames: FramesOption = None,
     rule: Annotated[str | None, typer.Option(help="Only this rule.")] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="X.png", help="Where the curves are drawn.")
+        Path | None,
+        typer.Option(metavar="X.png", help="Where the curves are drawn.", callback=writable),
     ] = None,
     json: JsonFlag = False,
 ) -> None:

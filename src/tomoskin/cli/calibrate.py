@@ -13,7 +13,7 @@ from tomoskin.cli.calibrate_bend import calibrate_bend
 from tomoskin.cli.calibrate_states import calibrate_states
 from tomoskin.cli.calibrate_wiring import calibrate_wiring
 from tomoskin.cli.contents import group
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, writable
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
@@ -41,7 +41,9 @@ def touch(
     recording: Annotated[
         Path, typer.Argument(metavar="INPUT", help="Frames with labels: one touch each.")
     ],
-    out: Annotated[Path, typer.Option(metavar="C.npz", help="Where the calibration goes.")],
+    out: Annotated[
+        Path, typer.Option(metavar="C.npz", help="Where the calibration goes.", callback=writable)
+    ],
     skin: Annotated[
         str | None,
         typer.Option(help="Built-in name or path; without it the rows are taken as they are."),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, writable
 from tomoskin.cli.recording import ReferenceOption, idle_frames, say_notes
 from tomoskin.core import DataError
 
@@ -23,7 +23,9 @@ def calibrate_bend(
     recording: Annotated[
         Path, typer.Argument(metavar="INPUT", help="Frames of known bends, nothing touching.")
     ],
-    out: Annotated[Path, typer.Option(metavar="C.npz", help="Where the calibration goes.")],
+    out: Annotated[
+        Path, typer.Option(metavar="C.npz", help="Where the calibration goes.", callback=writable)
+    ],
     skin: Annotated[
         str | None, typer.Option(help="Built-in name or path; without it that of the session.")
     ] = None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, writable
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
 if TYPE_CHECKING:
@@ -24,7 +24,9 @@ def calibrate_states(
     recording: Annotated[
         Path, typer.Argument(metavar="INPUT", help="Frames, with the state of some of them.")
     ],
-    out: Annotated[Path, typer.Option(metavar="C.npz", help="Where the calibration goes.")],
+    out: Annotated[
+        Path, typer.Option(metavar="C.npz", help="Where the calibration goes.", callback=writable)
+    ],
     skin: Annotated[
         str | None,
         typer.Option(help="Built-in name or path; without it the rows are taken as they are."),

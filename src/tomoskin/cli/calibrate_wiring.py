@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, writable
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, idle_frames, say_notes
 from tomoskin.cli.skin_choice import SkinOption, skin_for_file
@@ -26,7 +26,10 @@ def calibrate_wiring(
         Path, typer.Argument(metavar="INPUT", help="Frames with labels: one touch each.")
     ],
     out: Annotated[
-        Path, typer.Option(metavar="WIRED.toml", help="Where the skin file as it is wired goes.")
+        Path,
+        typer.Option(
+            metavar="WIRED.toml", help="Where the skin file as it is wired goes.", callback=writable
+        ),
     ],
     skin: SkinOption = None,
     reference: ReferenceOption = None,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, writable
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.skin_choice import DEFAULT_SKIN
 
@@ -28,7 +28,8 @@ _PLACES = 500
 def design(
     skin: Annotated[str, typer.Option(help="Built-in name or path.")] = DEFAULT_SKIN,
     out: Annotated[
-        Path | None, typer.Option(metavar="MAP.png", help="Where the map of the skin goes.")
+        Path | None,
+        typer.Option(metavar="MAP.png", help="Where the map of the skin goes.", callback=writable),
     ] = None,
     radius: Annotated[
         str | None,

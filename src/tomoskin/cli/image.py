@@ -12,7 +12,8 @@ import typer
 from tomoskin.cli.alpha_option import AlphaOption, said, with_alpha
 from tomoskin.cli.bend_option import BendOption, with_bends
 from tomoskin.cli.display_option import LimitOption, PercentFlag, SmoothOption, display_of
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import (
     FramesOption,
     ReferenceOption,
@@ -43,10 +44,11 @@ def image(
     bend: BendOption = None,
     states: StatesOption = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go.")
+        Path | None,
+        typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go.", callback=writable),
     ] = None,
     touches: Annotated[
-        Path | None, typer.Option(metavar="X.csv", help="Where the touches go.")
+        Path | None, typer.Option(metavar="X.csv", help="Where the touches go.", callback=writable)
     ] = None,
     percent: PercentFlag = False,
     limit: LimitOption = None,
@@ -67,7 +69,8 @@ def image(
     say_notes(whole)
     idle = idle_frames(whole, reference, prepared.pattern)
     start, stop = frame_range(whole, frames)
-    found = reconstruct(prepared, whole.part(start, stop), idle, rule=rule)
+    with Bar("reconstructing") as bar:
+        found = reconstruct(prepared, whole.part(start, stop), idle, rule=rule, advance=bar)
     found = found.numbered_from(start)
     if touches is not None:
         _write_touches(touches, whole, found, prepared.skin)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, writable
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
@@ -26,7 +26,7 @@ def locate(
         Path, typer.Option(metavar="C.npz", help="From tomoskin calibrate touch.")
     ],
     touches: Annotated[
-        Path | None, typer.Option(metavar="X.csv", help="Where the touches go.")
+        Path | None, typer.Option(metavar="X.csv", help="Where the touches go.", callback=writable)
     ] = None,
     skin: Annotated[
         str | None, typer.Option(help="Built-in name or path: refused unless calibrated on it.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, writable
 
 if TYPE_CHECKING:
     from tomoskin.forward import ForwardModel
@@ -31,7 +31,8 @@ def merit(
         typer.Option(metavar="FIGURE", help="Also a GREIT operator of that noise figure."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="X.png|.csv", help="Where curves or table go.")
+        Path | None,
+        typer.Option(metavar="X.png|.csv", help="Where curves or table go.", callback=writable),
     ] = None,
     json: JsonFlag = False,
 ) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, writable
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
 if TYPE_CHECKING:
@@ -23,7 +23,9 @@ def states(
     calibration: Annotated[
         Path, typer.Option(metavar="C.npz", help="From tomoskin calibrate states.")
     ],
-    out: Annotated[Path | None, typer.Option(metavar="X.csv", help="Where the table goes.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="X.csv", help="Where the table goes.", callback=writable)
+    ] = None,
     skin: Annotated[
         str | None, typer.Option(help="Built-in name or path: refused unless calibrated on it.")
     ] = None,

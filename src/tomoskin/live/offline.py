@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,7 +70,12 @@ class Reconstruction:
 
 
 def reconstruct(
-    prepared: Prepared, recording: Recording, idle: Idle, *, rule: str | None = None
+    prepared: Prepared,
+    recording: Recording,
+    idle: Idle,
+    *,
+    rule: str | None = None,
+    advance: Callable[[float, float], None] = lambda _done, _total: None,
 ) -> Reconstruction:
     """Reconstruct every frame of ``recording``, whose rows are in the pattern's order.
 
@@ -83,6 +89,8 @@ def reconstruct(
     rule
         Chooses alpha from this recording, by a name of :data:`tomoskin.inverse.RULES`; without
         it the skin's alpha holds, "auto" at the noise of the idle frames.
+    advance
+        Told how many frames of how many are done.
 
     Raises
     ------
@@ -109,6 +117,7 @@ def reconstruct(
         touched = bool(touches[-1])
         bends.append(stage.bent(view, readings, now, touched=touched))
         stage.learn(now, touched=touched)
+        advance(number + 1, len(time))
     return Reconstruction(
         frames=changes.frames,
         rows_missing=changes.missing.sum(axis=1),
