@@ -14,7 +14,7 @@ _PSEUDO_ROWS = 60.0
 """Weight of the prior of both covariances, which is their own diagonal."""
 
 _SIGNAL_AT_FIRST = 0.7
-_ITERATIONS, _ENOUGH = 30, 2e-3
+_ITERATIONS, _ENOUGH, _LEAST = 30, 2e-3, 1.0
 _FLOOR = 1e-6
 
 
@@ -68,7 +68,7 @@ class Coregion:
             gain, q = _modes(signal, noise)
             rows = data.rows @ q
             evidence = _evidence(data, gain, q, rows)
-            if step > 5 and evidence - last < _ENOUGH * data.n:
+            if step > 5 and evidence - last < max(_ENOUGH * data.n, _LEAST):
                 break
             last = evidence
             ratio = data.weights[:, None] * gain
