@@ -44,7 +44,13 @@ def test_it_writes_a_skin_file(tomoskin, surface: Path) -> None:
         ({}, "1,2\n", "places.csv, line 1: expected three numbers"),
         ({}, "1;2;3\n", "line 1: expected three numbers"),
         ({}, "\n", "expected lines x,y,z, got none"),
-        ({}, "0,0,99\n", "electrode 0: lies 99 mm off the surface"),
+        ({}, "-50,0,0\n50,0,0\n0,50,0\n0,0,99\n", "electrode 3: lies 99 mm off the surface"),
+        ({}, "-50,0,0\n50,0,0\n0,50,0\n", "expected at least 4 electrodes, got 3"),
+        (
+            {},
+            "-.1,0,0\n.1,0,0\n0,.1,0\n0,-.1,0\n",
+            "lie within 0.2 mm, the surface extends over 200",
+        ),
     ],
 )
 def test_what_is_wrong_is_said(
@@ -56,6 +62,15 @@ def test_what_is_wrong_is_said(
     assert code == 1
     assert words in error
     assert not (surface / "s.toml").exists()
+
+
+def test_metres_taken_for_millimetres_are_noticed(tomoskin, surface: Path) -> None:
+    mesh = disc(cells=300)
+    small = meshio.Mesh(np.pad(mesh.points, ((0, 0), (0, 1))), [("triangle", mesh.cells)])
+    meshio.write(surface / "sheet.stl", small)
+    code, _, error = tomoskin(*arguments(surface))
+    assert code == 1
+    assert "extends over 0.2 mm, read in mm (if the file is in metres, say so: --unit m)" in error
 
 
 def test_it_overwrites_nothing(tomoskin, surface: Path) -> None:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -32,6 +33,19 @@ def surface(request: pytest.FixtureRequest) -> Surface:
 
 def places(n: int = 200) -> FloatArray:
     return np.random.default_rng(1).uniform(-0.045, 0.045, (n, 2))
+
+
+class Rough(Plane):
+    """Stretched and squeezed from one millimetre to the next."""
+
+    def metric(self, uv: ArrayLike) -> FloatArray:
+        wave = 1 + 0.95 * np.sin(4e3 * np.asarray(uv)[:, 0])
+        return np.asarray(wave[:, None, None] ** 2 * np.eye(2))
+
+
+def test_a_surface_too_rough_for_the_triangles_is_refused() -> None:
+    with pytest.raises(GeometryError, match=r"so rough that .* near \(.* mm of the sheet"):
+        laid_on(disc(), Rough())
 
 
 def test_the_jacobian_is_the_derivative_of_the_point(surface: Surface) -> None:

@@ -8,12 +8,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tomoskin.core import DIMENSIONS, FloatArray
+from tomoskin.core import DIMENSIONS, FloatArray, GeometryError
 from tomoskin.mesh import Draped
 from tomoskin.skin.skin import Skin
 
 _STRAIGHT = 0.002
 """The rim is drawn with the fewest corners that stay within this part of its extent."""
+
+_TOO_SMALL = 5e-3
+"""A surface that extends over fewer metres was read in a unit that is too small."""
+
+_FEWEST = 4
+_APART = 0.1
+"""Electrodes lie at least this part of the surface's extent apart, first to last."""
 
 
 def lay(
@@ -42,11 +49,14 @@ def lay(
     Raises
     ------
     TomoskinError
-        For a surface that is no sheet, or an electrode off the surface or its rim, by number.
+        For a surface that is no sheet, coordinates that seem to be in another unit, or an
+        electrode off the surface or its rim, by number.
     """
     scale = DIMENSIONS["length"][unit]
     draped = Draped.read(Path(file), scale=scale)
-    places = draped.place(scale * np.asarray(electrodes, dtype=np.float64), "electrode")
+    wanted = scale * np.asarray(electrodes, dtype=np.float64)
+    _check_sizes(draped.points, wanted, str(file), unit)
+    places = draped.place(wanted, "electrode")
     rim = fewer_corners(draped.outline.vertices)
     given = like.document["electrodes"]
     from_there = path.relpath(file, Path(source).parent)
@@ -89,6 +99,27 @@ def fewer_corners(rim: FloatArray) -> FloatArray:
             kept.add(middle)
             open_ends += [(first, middle), (middle, last)]
     return np.asarray(rim[sorted(kept)])
+
+
+def _check_sizes(surface: FloatArray, electrodes: FloatArray, file: str, unit: str) -> None:
+    """Refuse a surface, or electrodes on it, in another unit than what is said."""
+    extent, between = (float(np.ptp(xyz, axis=0).max()) for xyz in (surface, electrodes))
+    if extent < _TOO_SMALL:
+        raise GeometryError(
+            f"extends over {1e3 * extent:.4g} mm, read in {unit}",
+            where=file,
+            hint="if the file is in metres, say so: --unit m",
+        )
+    if len(electrodes) < _FEWEST:
+        raise GeometryError(
+            f"expected at least {_FEWEST} electrodes, got {len(electrodes)}", where="electrodes"
+        )
+    if between < _APART * extent:
+        raise GeometryError(
+            f"lie within {1e3 * between:.4g} mm, the surface extends over {1e3 * extent:.4g} mm",
+            where="electrodes",
+            hint="places are in the file's own coordinates and unit",
+        )
 
 
 def _in_mm(points: FloatArray) -> list[list[str]]:
