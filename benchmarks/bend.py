@@ -222,27 +222,30 @@ class Bench:
         return out
 
     def jointed(self) -> tuple[list[float], list[float]]:
-        """Errors at angles between: by a reference of that angle, and by one interpolated."""
+        """Errors at angles between: by a reference of that angle, and by one interpolated.
+
+        All are taken before the first touch, so that what touches leave is in all of them alike.
+        """
         course = [*JOINT, *JOINT[-2::-1]]
-        angles = np.radians(np.repeat(course, 8))
         joint = JointReference.of(
-            np.concatenate([self.frames(8, hinged(angle)) for angle in course]), angles
+            np.concatenate([self.frames(8, hinged(angle)) for angle in course]),
+            np.radians(np.repeat(course, 8)),
         )
-        own, other = [], []
-        for angle in BETWEEN:
-            pose = hinged(angle)
-            self.frames(2, pose)
-            there = Reference.of(self.frames(16, pose))
+        own = {angle: Reference.of(self.frames(16, hinged(angle))) for angle in BETWEEN}
+        self.volts((), hinged(0.0))
+        errors: tuple[list[float], list[float]] = [], []
+        for angle, there in own.items():
+            self.frames(2, hinged(angle))
             told = joint.at(math.radians(angle))
             for _ in range(TOUCHES // len(BETWEEN)):
                 press = drawn(self.random, 1)
-                volts = self.volts(press, pose)
-                for reference, errors in ((there, own), (told, other)):
+                volts = self.volts(press, hinged(angle))
+                for reference, found in zip((there, told), errors, strict=True):
                     find = self.finder(reference)
                     blind = np.hstack([reference.mean[:, None], self.model.directions])
-                    errors.append(missed(find(volts - reference.mean, blind), press))
-                self.volts((), pose)
-        return own, other
+                    found.append(missed(find(volts - reference.mean, blind), press))
+                self.volts((), hinged(angle))
+        return errors
 
 
 class Plain:
