@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
 from shapes import disc
 from tomoskin.core import FloatArray, GeometryError, IntArray
