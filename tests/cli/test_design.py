@@ -46,6 +46,9 @@ def test_for_programs(tomoskin: Run) -> None:
 def test_wrong_options_are_said(tomoskin: Run, tmp_path: Path) -> None:
     assert tomoskin("design", "--electrodes", "many")[0] == 2
     assert tomoskin("design", "--radius", "15 kg", "--electrodes", "")[0] == 2
+    code, _, err = tomoskin("design", "--radius", "9 m", "--electrodes", "")
+    assert code == 1
+    assert "expected a radius below 100 mm" in err
     code, _, err = tomoskin("design", "--depth", "2", "--electrodes", "")
     assert code == 1
     assert "depth between 0 and 1" in err

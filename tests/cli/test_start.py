@@ -74,6 +74,12 @@ def test_a_command_that_is_nearly_one_is_named(tomoskin) -> None:
     assert "'image'" in err
 
 
+def test_firmware_is_of_eight_or_sixteen_channels(tomoskin) -> None:
+    code, _, err = tomoskin("firmware", "build", "--channels", "7")
+    assert code == 2
+    assert "expected 8 or 16, got 7" in err
+
+
 @pytest.mark.parametrize(
     "words",
     [

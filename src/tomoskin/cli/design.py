@@ -10,6 +10,7 @@ import typer
 from tomoskin.cli.output import JsonFlag, emit, writable
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.skin_choice import DEFAULT_SKIN
+from tomoskin.core import DataError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,6 +65,7 @@ def design(
         size = parse_quantity(radius, "length") if radius else None
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--radius") from None
+    _check_size(size, chosen)
     demand = Demand(size, depth, false_alarm, found)
     with Bar("bounding") as bar:
         jobs = 1 + len(counts) * len(patterns.split(","))
@@ -84,6 +86,18 @@ def design(
         emit(document)
     else:
         _say(document)
+
+
+def _check_size(radius: float | None, skin: Skin) -> None:
+    """A press that covers the sheet has no place."""
+    low, high = skin.mesh().points.min(axis=0), skin.mesh().points.max(axis=0)
+    most = float((high - low)[:2].min()) / 2
+    if radius is not None and radius >= most:
+        raise DataError(
+            f"expected a radius below {1e3 * most:.0f} mm, half of the sheet, "
+            f"got {1e3 * radius:.0f} mm",
+            where="--radius",
+        )
 
 
 def _counts(text: str) -> list[int]:

@@ -13,7 +13,14 @@ from tomoskin.cli.contents import group
 
 app = group("The board's firmware: build, flash, emulate.")
 
-Channels = Annotated[int, typer.Option(help="8 or 16, as the board has.")]
+
+def _known(channels: int) -> int:
+    if channels not in (8, 16):
+        raise typer.BadParameter(f"expected 8 or 16, got {channels}")
+    return channels
+
+
+Channels = Annotated[int, typer.Option(help="8 or 16, as the board has.", callback=_known)]
 
 
 @app.command()
