@@ -65,6 +65,22 @@ def test_what_is_learnt_is_used(tomoskin, tmp_path, presses, touched):
     assert all(float(row["sd_x_m"]) > 0 for row in rows)
 
 
+def test_rows_that_have_jumped_are_left_out_and_named(tomoskin, tmp_path, presses):
+    calibration, path, table = (tmp_path / name for name in ("c.npz", "today.npz", "t.csv"))
+    assert tomoskin("calibrate", "touch", presses, "--out", calibration)[0] == 0
+    dv, xy = frames(60, 1)
+    dv[:, [4, 11]] *= -40
+    np.savez(path, dv=dv, drive=PATTERN.drive, measure=PATTERN.measure)
+    code, _, err = tomoskin("locate", path, "--calibration", calibration, "--touches", table)
+    assert code == 0
+    assert "2 rows have jumped" in err
+    assert all(PATTERN.row_text(row) in err for row in (4, 11))
+    assert "--onto" in err
+    with table.open(encoding="utf-8", newline="") as file:
+        told = np.array([[float(row["x_m"]), float(row["y_m"])] for row in csv.DictReader(file)])
+    assert np.median(np.linalg.norm(told - xy, axis=1)[20:]) < 5e-3
+
+
 def test_for_programs(tomoskin, tmp_path, presses, touched):
     calibration = tmp_path / "c.npz"
     code, out, _ = tomoskin("calibrate", "touch", presses, "--out", calibration, "--json")
