@@ -40,16 +40,16 @@ def moving(begin: FloatArray, end: FloatArray) -> FloatArray:
 def test_a_press_that_moves_during_a_scan_is_one_touch_in_the_middle_of_its_way() -> None:
     begin, end = (press(x, 0.03, depth=-0.6) for x in (0.015, 0.04))
     smeared = moving(begin, end) + noise(16, 1, 3)[0]
-    (reading,) = finder(WHOLE).push(smeared, NOTHING)
+    (reading,) = finder().push(smeared, NOTHING)
     assert is_at(reading, 0.0275, 0.03)
-    at_once = finder(WHOLE, scan_time=0.0).push(smeared, NOTHING)
-    assert len(at_once) > 1 or not is_at(at_once[0], 0.0275, 0.03), "the scan's time tells"
+    at_once = finder(WHOLE).push(smeared, NOTHING)
+    assert len(at_once) > 1 or not is_at(at_once[0], 0.0275, 0.03), "time tells"
 
 
 def test_a_press_that_begins_during_a_scan_is_where_it_is() -> None:
     rising = model().response.times + 0.5
     grown = data(press(-0.03, 0.04)) * rising + noise(16, 1, 4)[0]
-    (reading,) = finder(WHOLE).push(grown, NOTHING)
+    (reading,) = finder().push(grown, NOTHING)
     assert is_at(reading, -0.03, 0.04)
 
 

@@ -29,8 +29,11 @@ _CELLS = 1500
 _MOST = 5
 """Touches at once: more have more parameters than 8 or 16 electrodes tell apart."""
 
-_SPEED = 0.1
-"""Of touches along each axis, standard deviation, m/s."""
+_GROWS = 0.5
+"""Standard deviation of what a touch that has just begun grows by within a scan, in parts of it."""
+
+_REST = 0.5
+"""A touch that stood still in the frame before moves, and grows, by this part of that at least."""
 
 _MASKS = 8
 """Sets of blind directions whose whitening is kept."""
@@ -122,7 +125,7 @@ class SpotFinder:
         pace: Pace = WHOLE,
     ) -> None:
         self._model, self._settings, self._mesh = model, skin.touch, mesh
-        self._pace, self._reach = pace, _SPEED * scan_time
+        self._pace, self._reach, self._unrest = pace, pace.speed * scan_time, 1.0
         self._fading = math.ceil(pace.fading / scan_time) if scan_time else 0
         self._trail = Trail.none(len(model.scale))
         self._unit = skin.conductivity
@@ -150,17 +153,27 @@ class SpotFinder:
             prior=self._model.prior,
             sheet=self._model.sheet,
             sign=self._settings.sign,
-            reach=self._reach,
+            reach=self._unrest * self._reach,
+            grows=self._unrest * _GROWS,
             data=whiten(dv / self._scale),
         )
         search = Search(problem, matched, self._settings.snr, self._most, self._pace, quiet)
         found = search(self._before)
+        self._unrest = self._unrest_of(found.fit.spots)
         self._before = found.fit.spots
         if self._fading:
             self._trail = self._trail.after(self._before, self._model.response, self._fading)
         readings = self._readings(joined(found))
         readings.sort(key=lambda reading: -abs(reading.peak))
         return readings
+
+    def _unrest_of(self, spots: FloatArray) -> float:
+        """How much of what touches may do they have done since the frame before; 1 where there
+        are more of them, or fewer."""
+        if len(spots) != len(self._before) or not len(spots) or not self._reach:
+            return 1.0
+        moved = float(np.linalg.norm((spots - self._before)[:, :2], axis=1).max())
+        return min(1.0, math.hypot(_REST, moved / self._reach))
 
     def _whitened(self, blind: FloatArray) -> tuple[Whitener, Matched]:
         key = blind.tobytes()

@@ -19,6 +19,8 @@ class Pace:
         New touches that are tried in a frame.
     anew
         Whether a frame that does not go on as it was is looked at without what was there too.
+    speed
+        Of touches along each axis, standard deviation, m/s; 0 where they are taken to stand still.
     fading
         Seconds for which what touches have left behind them counts as noise; 0 where frames do
         not follow each other.
@@ -29,11 +31,12 @@ class Pace:
     cold: int
     tries: int
     anew: bool
+    speed: float
     fading: float
 
 
-WHOLE = Pace(warm=6, glance=15, cold=0, tries=5, anew=True, fading=0.0)
-"""Each frame as if it were the only one."""
+WHOLE = Pace(warm=6, glance=15, cold=0, tries=5, anew=True, speed=0.0, fading=0.0)
+"""Each frame as if it were the only one, of touches that stand still."""
 
-LIVE = Pace(warm=4, glance=1, cold=4, tries=1, anew=False, fading=4.0)
+LIVE = Pace(warm=4, glance=1, cold=4, tries=1, anew=False, speed=0.1, fading=4.0)
 """What is not found in this frame is found in the next: one more touch a frame."""

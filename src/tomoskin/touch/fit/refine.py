@@ -26,9 +26,6 @@ _LEAST_DAMPING = 1e-6
 _DIRECTED = 0.7
 """Standard deviation of a spot's direction (:class:`Part`) about none."""
 
-_GROWS = 0.5
-"""Standard deviation of what a touch grows by within a scan, in parts of it."""
-
 
 @dataclass(frozen=True, eq=False)
 class Weigh:
@@ -121,8 +118,8 @@ class Fit:
 class Problem:
     """Whitened data (r,) of one frame, and what they are explained with.
 
-    ``sign`` is "decrease", "increase" or "both"; ``reach`` the standard deviation of a touch's way
-    within a scan, m; 0 where rows are read all at once.
+    ``sign`` is "decrease", "increase" or "both". Standard deviations of what a touch does within a
+    scan: its way along each axis, ``reach`` m, and what it ``grows`` by, in parts of it.
     """
 
     response: Response
@@ -131,6 +128,7 @@ class Problem:
     sheet: Sheet
     sign: str
     reach: float
+    grows: float
     data: FloatArray
 
     def nothing(self) -> Fit:
@@ -159,7 +157,7 @@ class Problem:
             return np.zeros((len(jacobian), 0))
         early = self.response.times[:, None]
         moves = early * jacobian * self.reach
-        grows = early * jacobian[:, CONTENT::N_PARAMETERS] * (_GROWS * spots[:, CONTENT])
+        grows = early * jacobian[:, CONTENT::N_PARAMETERS] * (self.grows * spots[:, CONTENT])
         return np.hstack([moves[:, X::N_PARAMETERS], moves[:, Y::N_PARAMETERS], grows])
 
     def refined(self, spots: FloatArray, most: int) -> Fit:
