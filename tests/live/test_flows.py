@@ -43,6 +43,11 @@ def flows(prepared, tmp_path):
         yield found
 
 
+def quick(skin):
+    """Opens a twin that does not wait between frames, the same in each run."""
+    return lambda: open_source("twin:fast,preset=ideal,seed=1", skin)
+
+
 def press_dots(site, page, count):
     """Press where the dot is, ``count`` times; the last flow message."""
     for done in range(count):
@@ -242,9 +247,9 @@ def test_a_listed_source_is_connected_and_says_what_it_is(flows):
 
 @pytest.fixture(scope="module")
 def taught(prepared, tmp_path_factory):
-    """(folder, last message, touches recorded with the calibration on, file of that run)."""
+    """(folder, last message, touches where the first press was, recorded with what was learnt)."""
     folder = tmp_path_factory.mktemp("taught")
-    with flowing(prepared, folder) as (site, page):
+    with flowing(prepared, folder, opening=quick(prepared.skin)) as (site, page):
         runner = site.runner
         until = Watch(runner).until
         until(lambda: runner.newest and runner.newest.result.ready)
@@ -254,7 +259,7 @@ def taught(prepared, tmp_path_factory):
         page.told("flow", lambda m: m["kind"] is None and m["calibration"] == "finger.npz")
         until(lambda: runner.prepared.locator is not None)
         runner.record(folder / "run.mcap")
-        runner.set_presses(page, (Press(0.02, 0.04, FORCE, RADIUS),))
+        runner.set_presses(page, (Press(*told["presses"][0], FORCE, RADIUS),))
         until(lambda: runner.newest.result.touches)
         begun = runner.newest.result.sequence
         until(lambda: runner.newest.result.sequence > begun + 6)
@@ -275,7 +280,8 @@ def test_presses_become_a_calibration(taught, prepared):
     gaps = np.linalg.norm(found.locator.presses.xy[:, None] - found.locator.presses.xy, axis=-1)
     assert gaps[np.triu_indices(10, 1)].min() > 0.01
     (touch,) = last
-    assert np.hypot(touch.reading.x - 0.02, touch.reading.y - 0.04) < 0.03
+    x, y = told["presses"][0]
+    assert np.hypot(touch.reading.x - x, touch.reading.y - y) < 0.015
     assert touch.reading.sd_x > 0.0005
 
 
@@ -335,7 +341,7 @@ def test_scrambled_wires_are_found_kept_and_applied(prepared, tmp_path):
     ring = tuple(range(8))
     wiring = Wiring.as_drawn(8).turned(ring, 3, mirrored=True)
     scrambled = wiring.applied(prepared.skin)
-    with flowing(prepared, tmp_path, opening=lambda: open_source("twin", scrambled)) as (
+    with flowing(prepared, tmp_path, opening=quick(scrambled)) as (
         site,
         page,
     ):

@@ -39,12 +39,15 @@ class View:
         (n_meas,) difference data.
     blind
         (n_meas, k) directions along which they say nothing.
+    whole
+        (n_meas,) V by which the frame differs, with all that is in it; None where that is ``dv``.
     """
 
     image: Image
     floor: NoiseFloor | None
     dv: FloatArray
     blind: FloatArray
+    whole: FloatArray | None = None
 
 
 class Finder(Protocol):
@@ -122,8 +125,10 @@ class ByCalibration:
         found = self._image.push(view)
         if not found:
             return []
+        # Presses were learnt from with all that is in them: what pictures do without is not left
+        # out here either.
         dv = view.dv if self._difference == "plain" else view.dv * np.abs(self._mean)
-        dv = np.where(_lost(view.blind), np.nan, dv)
+        dv = np.where(_lost(view.blind), np.nan, dv if view.whole is None else view.whole)
         if not np.isfinite(dv).any():
             return []
         (place,), (spread,) = self._locator.predict(dv)

@@ -181,7 +181,8 @@ class _Stage:
         seen = self._seen = self._watch.look(values, missing, now)
         if seen.dv is None:  # the frames' own limit is narrower, but electrodes add to it
             return self._filled(dv, missing, now)
-        return View(*self._imaging.push(seen.dv, now), seen.dv, seen.blind.directions)
+        blind = seen.blind.directions
+        return View(*self._imaging.push(seen.dv, now), seen.dv, blind, seen.whole)
 
     def bent(
         self, view: View, readings: list[Reading], now: float, *, touched: bool

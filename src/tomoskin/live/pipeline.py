@@ -189,7 +189,7 @@ class Pipeline:
                 voltages, self._image, touches, seen.left_out, health=seen.health, pictured=False
             )
         image, floor = self._imaging.push(seen.dv, now)
-        view = View(image, floor, seen.dv, seen.blind.directions)
+        view = View(image, floor, seen.dv, seen.blind.directions, seen.whole)
         readings = self._finder.push(view)
         touches = self._track(readings, voltages)
         touched, bend = bool(touches), None
