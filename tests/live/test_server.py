@@ -8,11 +8,12 @@ import time
 from contextlib import ExitStack
 
 import pytest
-from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidState, InvalidStatus
 
 from live.board import Board, pressed, samples_of
 from live.serving import PATIENCE, Site
 from live.test_frames import decode
+from live.test_runner import Watch
 from tomoskin.live import (
     Door,
     Hub,
@@ -276,6 +277,20 @@ def test_what_happened_before_is_told_to_a_new_page(site):
         first(page, "state")
     with site.connect() as page:
         assert first(page, "event")["kind"] == "connected"
+
+
+def test_the_source_goes_on_when_a_page_closes_as_the_server_stops(site, runner):
+    class Closing:
+        def shutdown(self):
+            raise InvalidState("connection is closing")
+
+    with site.connect() as page:
+        first(page, ready)
+        site._server.server_state.connections.add(Closing())
+        site.stop()
+    frames = runner.status().frames
+    Watch(runner).until(lambda: runner.status().frames > frames + 5)
+    assert runner.status().running
 
 
 # several pages

@@ -18,6 +18,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
+from websockets.exceptions import InvalidState
 
 from tomoskin.core import DataError, TomoskinError
 from tomoskin.live import messages
@@ -137,6 +138,13 @@ class Server(uvicorn.Server):
     def run_on(self, listener: socket.socket) -> None:
         """Serve on ``listener`` until stopped; closes it."""
         asyncio.run(self.serve([listener]))
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End all connections, those too that a page closes at that very moment."""
+        try:
+            await super().shutdown(sockets)
+        except InvalidState:  # the base class stops there; the loop's end closes the others
+            await self.lifespan.shutdown()
 
     def stop(self) -> None:
         """End :meth:`run_on`, or let it end at once when it begins; callable from any thread."""
