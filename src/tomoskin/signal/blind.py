@@ -61,9 +61,7 @@ class Blind:
             (k, n_meas): how large the operator makes each of them.
         """
         known = fitted - (fitted @ self.directions) @ self.weights
-        return type(self)(
-            np.hstack([self.directions, seen]), np.concatenate([self.weights, known])
-        )
+        return type(self)(np.hstack([self.directions, seen]), np.concatenate([self.weights, known]))
 
     @property
     def count(self) -> int:
