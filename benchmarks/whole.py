@@ -63,12 +63,13 @@ def run(data: Path | None) -> tuple[Report, ...]:
 
 
 def _row(part: str, line: Line) -> tuple[object, ...]:
-    others = [
-        text
-        for other in (line.scipy, line.peer)
-        for text in (cell(other), cell(None if other is None else other / line.value))
-    ]
-    return part, f"{line.what}, {line.unit}", cell(line.value), line.promised, *others
+    value = line.value
+    here = value if isinstance(value, str) else cell(value)
+    others: list[str] = []
+    for other in (line.scipy, line.peer):
+        times = other / value if other is not None and isinstance(value, float) else None
+        others += [cell(other), cell(times)]
+    return part, f"{line.what}, {line.unit}", here, line.promised, *others
 
 
 def _frame_lines() -> Iterator[Line]:

@@ -11,7 +11,9 @@ class Line:
 
     what: str
     unit: str
-    value: float | None
+    value: float | str | None
+    """In words where it is more than one number."""
+
     promised: str = ""
     scipy: float | None = None
     peer: float | None = None

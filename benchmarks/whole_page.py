@@ -20,7 +20,7 @@ def page_lines() -> Iterator[Line]:
         return
     for what, value, promised in page.run(None)[0].rows:
         name, _, unit = what.partition(", ")
-        yield Line(name, unit or "–", float(value), promised)
+        yield Line(name, unit or "–", value, promised)
 
 
 def _missing() -> str:
