@@ -25,7 +25,7 @@ start = "0 s"
 profile = {profile}
 """
 ROUGH = 8
-"""Degrees: learnt from 35 frames of 8 electrodes, all moving, and read beside a touch."""
+"""Degrees: learnt from 35 moving frames of 8 electrodes; measured up to 7.4 on seeds 5 to 8."""
 
 PRESS = """[[press]]
 id = "a"

@@ -17,6 +17,10 @@ _ABOVE = 1.1
 """A direction counts above so many times the edge of noise."""
 
 _MOST = 8
+
+_WORTH = 0.5
+"""The past counts where squared errors fall to this part by it: else it is chance."""
+
 _FOLDS = 5
 _RIDGES = np.geomspace(1e-6, 1.0, 13)
 
@@ -84,7 +88,7 @@ class BendModel:
         plays, weights, errors = min(
             ((plays, *_regressed(_features(z, examples, size, plays), examples))
              for plays in (None, Memory.plays_after(z, size))),
-            key=lambda found: float(np.mean(found[2] ** 2)),
+            key=lambda found: np.mean(found[2] ** 2) * (_WORTH if found[0] is None else 1.0),
         )  # fmt: skip
         return cls(examples, covariance, directions, weights, plays, errors, size)
 
