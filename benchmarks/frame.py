@@ -26,6 +26,7 @@ CASES = (
 )
 TIME_CONSTANTS = ("0 s", "0.2 s")
 IDLE, PRESSED, REPEATS = 30, 60, 40
+SETTLED = 20
 SEED = 1
 COLUMNS = (
     *("electrodes", "triangles", "rows", "filter s", "bytes"),
@@ -111,8 +112,9 @@ def _one(decoder: Decoder, pipeline: Pipeline, chunk: bytes) -> int:
 
 def _growth(decoder: Decoder, pipeline: Pipeline, chunks: list[bytes]) -> float:
     tracemalloc.start()
-    for chunk in chunks:
-        _one(decoder, pipeline, chunk)
+    for _ in range(SETTLED):  # histories of some hundred frames fill
+        for chunk in chunks:
+            _one(decoder, pipeline, chunk)
     before, _ = tracemalloc.get_traced_memory()
     for _ in range(5):
         for chunk in chunks:
