@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from live.board import pressed, samples_of
 from live.test_replay import Recorded, recorded_touches, same, touches_of
+from live.test_runner import Watch
+from tomoskin import live
+from tomoskin.cli import main
 from tomoskin.core import Frame
 from tomoskin.live import Pipeline, as_recorded, prepare, replayed
 from tomoskin.live.beginning import Beginning
 from tomoskin.live.pipeline import REFERENCE_FRAMES
-from tomoskin.session import BENDS_FILE, Mark, SessionReader, session_info
-from tomoskin.touch import BendExamples, BendModel, BendReading
+from tomoskin.session import (
+    BENDS_FILE,
+    Calibration,
+    Mark,
+    SessionReader,
+    session_info,
+    write_calibration,
+)
+from tomoskin.touch import BendExamples, BendModel, BendReading, Locator
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +93,47 @@ def test_a_recording_begun_late_begins_with_frames_of_a_straight_sheet(prepared)
     assert len(frames) == 3 * REFERENCE_FRAMES
     assert frames[0][1] == Mark.REFERENCE
     assert max(frame.sequence for frame, _ in frames) <= 200
+
+
+@pytest.fixture
+def calibration(prepared, tmp_path):
+    """Places taught by nine presses."""
+    along = (-0.03, 0.0, 0.03)
+    places = [(x, y) for x in along for y in along]
+    samples = [samples_of(prepared)]
+    samples += [samples_of(prepared, pressed(prepared, *place)) for place in places]
+    frames = [Frame(0, 0, 0.0, 1, 0, 0, one) for one in samples]
+    rest, *read = [prepared.readout(frame).values for frame in frames]
+    dv = np.array(read) - rest
+    locator = Locator.fit(dv, places, pattern=prepared.pattern, skin=prepared.skin)
+    path = tmp_path / "c.npz"
+    write_calibration(path, Calibration(locator, prepared.pattern, prepared.skin.name))
+    return path
+
+
+@pytest.mark.usefixtures("built_page")
+def test_the_command_line_takes_them_beside_a_calibration(run, calibration, monkeypatch, capfd):
+    """The command ends where it has shown a bend, and says so in its last line."""
+    runners = []
+
+    class Noted(live.Runner):
+        def start(self):
+            runners.append(self)
+            super().start()
+
+    def until_bent(_server, _listener):
+        runner = runners[0]
+        Watch(runner).until(lambda: runner.status().bend is not None)
+
+    monkeypatch.setattr(live, "Runner", Noted)
+    monkeypatch.setattr(live.Server, "run_on", until_bent)
+    source = f"replay:{run}@max"
+    with pytest.raises(SystemExit) as end:
+        main(["live", "--source", source, "--calibration", str(calibration), "--port", "0",
+              "--json"])  # fmt: skip
+    out, errors = capfd.readouterr()
+    assert (end.value.code or 0, errors) == (0, "")
+    assert runners[0].prepared.locator is not None
+    last = json.loads(out.splitlines()[-1])
+    assert set(last["bend"]) == {"angle_rad", "sd_rad", "axis_rad", "state"}
+    assert last["state"] is None

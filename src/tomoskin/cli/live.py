@@ -34,7 +34,10 @@ def live(
         typer.Option(metavar="C.npz", help="Places of touches by a calibration of touch."),
     ] = None,
     folder: Annotated[
-        Path, typer.Option(file_okay=False, help="Where the page's files go and are looked for.")
+        Path,
+        typer.Option(
+            exists=True, file_okay=False, help="Where the page's files go and are looked for."
+        ),
     ] = Path(),
     token_file: Annotated[
         Path | None,
@@ -87,15 +90,16 @@ def live(
 
 
 def _prepared(skin: str | None, source: str, calibration: Path | None) -> Prepared:
-    """The skin with the calibration named; of a recording with those that it holds."""
+    """The skin with the calibration named; of a recording with the others that it holds."""
     from tomoskin import live as room
     from tomoskin.session import SessionReader, parse_replay, read_calibration
 
     name, _, argument = source.partition(":")
-    if skin is None and calibration is None and name == "replay":
+    if skin is None and name == "replay":
         with SessionReader(parse_replay(argument)[0]) as session:
-            return room.as_recorded(session)
-    prepared = room.prepare(skin_for_source(skin, source))
+            prepared = room.as_recorded(session)
+    else:
+        prepared = room.prepare(skin_for_source(skin, source))
     if calibration is None:
         return prepared
     return prepared.located_by(read_calibration(calibration).locator)
@@ -135,5 +139,6 @@ def _farewell(runner: Runner, *, json: bool) -> None:
                 "p50_ms": 1e3 * status.p50,
                 "p99_ms": 1e3 * status.p99,
                 "stages": room.stages(status),
+                **room.readings(status),
             }
         )

@@ -15,7 +15,7 @@ from tomoskin.live.labelled import (
     on_cluster,
     processors,
 )
-from tomoskin.live.messages import stages
+from tomoskin.live.messages import readings, stages
 from tomoskin.live.offline import Reconstruction, reconstruct
 from tomoskin.live.pipeline import Pipeline
 from tomoskin.live.prepare import Prepared, prepare, prepare_again
@@ -79,6 +79,7 @@ __all__ = [
     "prepare",
     "prepare_again",
     "processors",
+    "readings",
     "reconstruct",
     "replayed",
     "simulate",

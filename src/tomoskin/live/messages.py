@@ -95,8 +95,7 @@ def state(status: Status) -> str:
         recording=status.recording and status.recording.name,
         sinks=status.sinks,
         replay=status.replay,
-        bend=_bend(status.bend),
-        state=_state(status.state),
+        **readings(status),
         problem=status.problem,
         text=status.text,
     )
@@ -112,6 +111,11 @@ def stages(status: Status) -> list[dict[str, Any]]:
         }
         for stage in status.stages
     ]
+
+
+def readings(status: Status) -> dict[str, Any]:
+    """How the newest frame is bent and which state it shows; null where that was not learnt."""
+    return {"bend": _bend(status.bend), "state": _state(status.state)}
 
 
 def _baseline(now: BaselineState | None) -> dict[str, Any] | None:
