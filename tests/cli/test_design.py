@@ -56,3 +56,12 @@ def test_wrong_options_are_said(tomoskin: Run, tmp_path: Path) -> None:
     code, _, err = tomoskin("design", "--out", folder, "--electrodes", "")
     assert code == 1
     assert "cannot be written" in err
+
+
+def test_a_map_of_no_known_kind_is_refused_before_the_work(
+    tomoskin: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(design, "_compared", lambda *_: pytest.fail("it has begun"))
+    code, _, err = tomoskin("design", "--out", "map.xyz")
+    assert code == 2
+    assert "expected a name that ends in .png, .pdf, .svg, got map.xyz" in err

@@ -253,6 +253,7 @@ def test_a_time_constant_needs_times_that_go_on(save, image) -> None:
         (("--smooth", "90 mm", "--out", "maps.png"), "radius above 0 and up to 50 mm"),
         (("--reference", "frame:4"), "0 to 3"),
         (("--reference", "banana"), "expected first:N, frame:K, previous or a file"),
+        (("--reference", ""), 'expected first:N, frame:K, previous or a file, got ""'),
         (("--frames", "3:9"), "within 0:4"),
         (("--skin", "tank-16"), "rows are not in the recording"),
         (("--skin", "nothing"), "built-in skins"),

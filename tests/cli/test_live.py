@@ -129,7 +129,10 @@ def test_what_cannot_start_is_one_sentence(refused, arguments, said):
     assert errors.startswith("tomoskin: ")
 
 
-@pytest.mark.parametrize("arguments", [["--port", "many"], ["--port", "70000"], ["--nonsense"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [["--port", "many"], ["--port", "70000"], ["--nonsense"], ["--folder", "/nowhere/at/all"]],
+)
 def test_wrong_usage(refused, arguments):
     assert refused(*arguments)[0] == 2
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.output import JsonFlag, emit, ending, writable
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.skin_choice import DEFAULT_SKIN
 from tomoskin.core import DataError
@@ -24,6 +24,7 @@ _COARSE = 120
 """Places of each variant in the comparison; the skin's own map has more."""
 
 _PLACES = 500
+_PICTURES = (".png", ".pdf", ".svg")
 
 
 def design(
@@ -60,6 +61,8 @@ def design(
     from tomoskin.touch import Demand, promise
 
     counts = _counts(electrodes)
+    if out is not None:
+        ending(out, _PICTURES, "--out")
     chosen = Skin.load(skin)
     try:
         size = parse_quantity(radius, "length") if radius else None

@@ -12,7 +12,7 @@ import typer
 from tomoskin.cli.alpha_option import AlphaOption, said, with_alpha
 from tomoskin.cli.bend_option import BendOption, with_bends
 from tomoskin.cli.display_option import LimitOption, PercentFlag, SmoothOption, display_of
-from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.output import JsonFlag, emit, ending, writable
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import (
     FramesOption,
@@ -82,13 +82,7 @@ def image(
 def _writer(out: Path | None) -> Any:
     from tomoskin.cli import image_files
 
-    suffix = "" if out is None else out.suffix.lower()
-    if out is not None and suffix not in image_files.WRITERS:
-        raise typer.BadParameter(
-            f"expected a name that ends in {', '.join(image_files.WRITERS)}, got {out}",
-            param_hint="--out",
-        )
-    return image_files.WRITERS.get(suffix)
+    return out and image_files.WRITERS[ending(out, image_files.WRITERS, "--out")]
 
 
 def _write_touches(path: Path, recording: Recording, found: Reconstruction, skin: Skin) -> None:

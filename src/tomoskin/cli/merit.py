@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.output import JsonFlag, emit, ending, writable
 
 if TYPE_CHECKING:
     from tomoskin.forward import ForwardModel
@@ -97,12 +97,7 @@ def _writer(out: Path | None) -> Any:
     from tomoskin.session import write_merit, write_merit_table
 
     writers = {".png": write_merit, ".csv": write_merit_table}
-    suffix = "" if out is None else out.suffix.lower()
-    if out is not None and suffix not in writers:
-        raise typer.BadParameter(
-            f"expected a name that ends in {', '.join(writers)}, got {out}", param_hint="--out"
-        )
-    return writers.get(suffix)
+    return out and writers[ending(out, writers, "--out")]
 
 
 def _report(found: dict[str, Merit], *, json: bool) -> None:

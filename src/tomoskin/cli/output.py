@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -35,3 +36,19 @@ def writable(path: Path | None) -> Path | None:
             "cannot be written: there is no such folder", where=str(path), hint="make it first"
         )
     return path
+
+
+def ending(path: Path, known: Collection[str], option: str) -> str:
+    """The ending of a file's name, in small letters.
+
+    Raises
+    ------
+    typer.BadParameter
+        When it is none of those ``known``.
+    """
+    found = path.suffix.lower()
+    if found not in known:
+        raise typer.BadParameter(
+            f"expected a name that ends in {', '.join(known)}, got {path}", param_hint=option
+        )
+    return found

@@ -45,15 +45,15 @@ def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Idl
         return "previous"
     if spec is None and recording.reference is not None:
         return recording.reference[None]
-    kind, _, number = (spec or f"first:{recording.idle}").partition(":")
+    given = f"first:{recording.idle}" if spec is None else spec
+    kind, _, number = given.partition(":")
     if kind in ("first", "frame") and number.isdigit():
         return _frames_of(recording, kind, int(number))
-    path = Path(spec or "")
-    if not path.exists():
+    if not given or not Path(given).exists():
         raise DataError(
-            f'expected first:N, frame:K, previous or a file, got "{spec}"', where="--reference"
+            f'expected first:N, frame:K, previous or a file, got "{given}"', where="--reference"
         )
-    other = read_recording(path)
+    other = read_recording(Path(given))
     if other.is_change:
         raise DataError("holds differences, not an untouched skin", where=other.source)
     return other.in_order_of(pattern).voltages

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.contents import group
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, ending
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import say_notes
 
@@ -91,11 +91,7 @@ def export(
     from tomoskin.live import WRITERS, Export
     from tomoskin.session import SessionReader
 
-    write = WRITERS.get(out.suffix.lower())
-    if write is None:
-        raise typer.BadParameter(
-            f"expected a name that ends in {', '.join(WRITERS)}, got {out}", param_hint="OUT"
-        )
+    write = WRITERS[ending(out, WRITERS, "OUT")]
     with SessionReader(file) as session, Bar(f"writing {out}") as bar:
         asked = Export(session, every, bar)
         write(asked, out)
@@ -117,8 +113,7 @@ def import_recording(
     """Convert a recording of another program to the interchange file."""
     from tomoskin.session import read_recording, write_interchange
 
-    if out.suffix.lower() != ".npz":
-        raise typer.BadParameter(f"expected a name that ends in .npz, got {out}", param_hint="OUT")
+    ending(out, [".npz"], "OUT")
     recording = read_recording(file)
     write_interchange(out, recording)
     typer.echo(f"{out}: {len(recording)} frames of {len(recording.drive)} rows")
