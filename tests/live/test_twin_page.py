@@ -11,9 +11,11 @@ from live.serving import Site
 from live.test_runner import Watch
 from live.watching import axe_finds, distance
 from tomoskin.live import Runner, TwinDesk, voltage_covariance
+from tomoskin.live.posing import Posed
 from tomoskin.mesh import Hinge
+from tomoskin.session import StatesCalibration
 from tomoskin.source import open_source
-from tomoskin.touch import BendExamples, BendModel
+from tomoskin.touch import BendExamples, BendModel, StateClassifier
 from tomoskin.twin import Bent, Face, TwinSettings, TwinSkin
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
@@ -23,8 +25,8 @@ ANGLES = np.radians([0, 15, 30, 45, 60, 45, 30, 15] * 4 + [0])
 TRUE, ROUGH = math.radians(40), math.radians(8)
 
 
-def learnt(prepared):
-    """What bends over a strip do to the twin's own voltages, with the noise of its board."""
+def bends_of(prepared):
+    """(n, n_meas) V: what bends over a strip do to the twin, with the noise of its board."""
     sheet = TwinSkin.of(prepared.skin, TwinSettings.preset("ideal"))
     seen = {}
     for angle in np.unique(ANGLES):
@@ -34,15 +36,25 @@ def learnt(prepared):
     noise = np.random.default_rng(4).multivariate_normal(
         np.zeros(len(covariance)), covariance, len(ANGLES)
     )
-    dv = np.array([seen[angle] - seen[0.0] for angle in ANGLES]) + noise
+    return np.array([seen[angle] - seen[0.0] for angle in ANGLES]) + noise
+
+
+def learnt(prepared):
+    """The skin with its bends, and with the states straight and bent."""
+    dv, pattern = bends_of(prepared), prepared.pattern
     axes, time = np.full(len(ANGLES), math.pi / 2), 0.1 * np.arange(len(ANGLES))
-    return BendModel.learn(BendExamples.of(dv, ANGLES, axes, time), covariance)
+    examples = BendExamples.of(dv, ANGLES, axes, time)
+    bends = prepared.that_bends(BendModel.learn(examples, voltage_covariance(prepared, None)))
+    labels = ["bent" if angle else "straight" for angle in ANGLES]
+    states = StateClassifier.fit(dv, labels, pattern=pattern, skin_id=prepared.skin.identity)
+    return bends.that_tells(StatesCalibration(states, pattern, prepared.skin.name))
 
 
 @pytest.fixture(scope="module")
 def site(prepared):
-    bends = prepared.that_bends(learnt(prepared))
-    runner = Runner(bends, lambda: open_source("twin:preset=ideal,seed=1", prepared.skin))
+    runner = Runner(
+        learnt(prepared), lambda: open_source("twin:preset=ideal,seed=1", prepared.skin)
+    )
     runner.start()
     site = Site(runner, take=lambda hub: hub.take(TwinDesk(hub)))
     yield site
@@ -78,6 +90,24 @@ def test_the_twin_is_bent_by_keys_and_its_bend_is_read_beside_a_touch(opened):
     assert opened.site.runner.posed.pose == ()
     assert opened.site.runner.status().bend.state == "idle"
     stretched(opened)
+
+
+def place(element):
+    """Where its upper left corner is, and how high it is."""
+    box = element.bounding_box()
+    return box["x"], box["y"], box["height"]
+
+
+def test_the_state_is_said_on_one_line_that_does_not_move(opened):
+    told, runner = opened.test_id("told"), opened.site.runner
+    told.filter(has_text="straight").wait_for()
+    straight = place(told)
+    runner.bend(Posed((Bent(Hinge(TRUE, WIDTH)),)))
+    told.filter(has_text="bent").wait_for()
+    assert place(told) == straight
+    assert told.get_attribute("title").startswith("State")
+    runner.bend(Posed())
+    told.filter(has_text="straight").wait_for()
 
 
 def stretched(opened):

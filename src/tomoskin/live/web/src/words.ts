@@ -109,6 +109,6 @@ export function alphaInFull(status: Status): string {
 
 /** Which of the states that were learnt the sheet is in. */
 export function stateInWords({ name, probability, unknown }: StateReading): string {
-  if (unknown) return `State unknown: it looks like none that was learnt (nearest: ${name})`;
+  if (unknown) return `State unknown (nearest: ${name})`;
   return `State: ${name}, ${fixed(100 * probability, 0)} %`;
 }

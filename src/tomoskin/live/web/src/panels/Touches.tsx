@@ -93,10 +93,11 @@ function Announcer() {
 function State() {
   const state = status.value?.reference.ready ? status.value.state : null;
   if (!state) return null;
+  const words = stateInWords(state);
   return (
-    <p class="hint" data-testid="state">
-      {stateInWords(state)}
-    </p>
+    <span class="told" title={words} data-testid="told">
+      {words}
+    </span>
   );
 }
 
@@ -106,7 +107,10 @@ export function Touches() {
   const stale = link.value.phase === "lost";
   return (
     <section class={`panel touches${stale ? " stale" : ""}`} aria-labelledby="touches-title">
-      <h2 id="touches-title">Touches</h2>
+      <h2>
+        <span id="touches-title">Touches</span>
+        <State />
+      </h2>
       <div class="list" data-testid="touch-list">
         {touches.length === 0 ? (
           <div class="teaching">
@@ -136,7 +140,6 @@ export function Touches() {
         )}
         {touches.length > ROWS && <p class="hint">and {touches.length - ROWS} more on the sheet</p>}
       </div>
-      <State />
       <Announcer />
     </section>
   );
