@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import threading
 
 import pytest
 
@@ -16,11 +17,26 @@ class Terminal(io.StringIO):
         return True
 
 
+class Never(threading.Timer):
+    """A timer whose time does not come."""
+
+    def start(self) -> None:
+        pass
+
+
+class AtOnce(Never):
+    """A timer whose time has come when it starts."""
+
+    def start(self) -> None:
+        self.function()
+
+
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch):
     """Set the time that the bar goes by."""
     now = [100.0]
     monkeypatch.setattr("tomoskin.cli.progress.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("tomoskin.cli.progress.threading.Timer", Never)
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
     return now
@@ -41,6 +57,21 @@ def test_a_terminal_sees_a_bar_after_two_seconds(clock, monkeypatch, seconds, sh
     job(clock, seconds)
     assert ("simulating" in terminal.getvalue()) == shown
     assert ("%" in terminal.getvalue()) == shown
+
+
+@pytest.mark.usefixtures("clock")
+def test_a_job_that_cannot_say_how_far_it_is_is_seen_to_go_on(monkeypatch):
+    monkeypatch.setattr("tomoskin.cli.progress.threading.Timer", AtOnce)
+    monkeypatch.setattr("sys.stderr", terminal := Terminal())
+    with Bar("preparing"):
+        pass
+    shown = terminal.getvalue()
+    assert "preparing" in shown
+    assert "%" not in shown
+    monkeypatch.setattr("sys.stderr", pipe := io.StringIO())
+    with Bar("preparing"):
+        pass
+    assert pipe.getvalue() == ""
 
 
 def test_a_file_or_a_pipe_sees_none(clock, monkeypatch):

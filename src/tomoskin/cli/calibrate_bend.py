@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, idle_frames, say_notes
 from tomoskin.core import DataError
 
@@ -51,7 +52,8 @@ def calibrate_bend(
     from tomoskin.touch import BendExamples, BendModel
 
     chosen = skin_for_file(skin, recording)
-    prepared = prepare(chosen)
+    with Bar("preparing"):
+        prepared = prepare(chosen)
     whole = read_recording(recording).in_order_of(prepared.pattern)
     say_notes(whole)
     idle = idle_frames(whole, reference, prepared.pattern)
@@ -61,7 +63,8 @@ def calibrate_bend(
     frames, angle, axis = _said(bend, len(whole)) if bend else _told(recording, whole)
     examples = BendExamples.of(whole.voltages[frames] - straight.mean, angle, axis,
                                whole.time[frames])  # fmt: skip
-    model = BendModel.learn(examples, voltage_covariance(prepared, straight))
+    with Bar("learning"):
+        model = BendModel.learn(examples, voltage_covariance(prepared, straight))
     write_bends(out, BendCalibration(model, prepared.pattern, chosen.name))
     found = {
         "frames": len(examples.angle),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
 if TYPE_CHECKING:
@@ -58,13 +59,15 @@ def calibrate_states(
 
     whole = read_recording(recording)
     say_notes(whole)
-    old = read_states(onto) if onto else None
+    with Bar("learning the older ones"):
+        old = read_states(onto) if onto else None
     chosen, pattern = _what_of(skin, recording, old)
     pattern = pattern or Pattern.from_tables(whole.drive, whole.measure)
     whole = whole.in_order_of(pattern)
     dv = changes(whole, reference, pattern)
     examples = marked(recording, dv, state or [], old.classifier.examples.codes if old else None)
-    made = _learnt(examples, old, pattern, chosen)
+    with Bar("learning"):
+        made = _learnt(examples, old, pattern, chosen)
     write_states(out, made)
     _report(made, len(dv), old is not None, json=json)
 

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from tomoskin.cli.contents import group
+from tomoskin.cli.progress import Bar
 
 app = group("The board's firmware: build, flash, emulate.")
 
@@ -28,7 +29,9 @@ def build(channels: Channels = 16) -> None:
     """Build the firmware of an ATmega2560 board."""
     from tomoskin.emulator import build_elf
 
-    typer.echo(str(build_elf(channels)))
+    with Bar("building"):
+        elf = build_elf(channels)
+    typer.echo(str(elf))
 
 
 @app.command()
@@ -43,7 +46,8 @@ def flash(
         raise SourceError(
             "avrdude is missing", where="firmware flash", hint="on Debian: apt-get install avrdude"
         )
-    elf = build_elf(channels)
+    with Bar("building"):
+        elf = build_elf(channels)
     command = ["avrdude", "-p", "atmega2560", "-c", "wiring", "-b", "115200", "-D", "-P", port]
     if subprocess.run([*command, "-U", f"flash:w:{elf}:e"], check=False).returncode:
         raise SourceError(

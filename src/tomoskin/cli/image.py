@@ -64,7 +64,8 @@ def image(
     chosen, rule = with_alpha(told, alpha)
     chosen = with_time_constant(chosen, time_constant)
     display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
-    prepared = with_states(with_bends(prepare(chosen), bend), states, told)
+    with Bar("preparing"):
+        prepared = with_states(with_bends(prepare(chosen), bend), states, told)
     whole = read_recording(recording).in_order_of(prepared.pattern)
     say_notes(whole)
     idle = idle_frames(whole, reference, prepared.pattern)

@@ -13,6 +13,7 @@ import typer
 from tomoskin.cli.bend_option import BendOption, with_bends
 from tomoskin.cli.ending import ended_by_signals
 from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.progress import Bar
 from tomoskin.cli.record import recording_to
 from tomoskin.cli.sink_option import SinkOption, chosen_sinks
 from tomoskin.cli.skin_choice import SkinOption, skin_for_source
@@ -65,8 +66,9 @@ def live(
 
         room.check_page()
         sinks = chosen_sinks(sink)
-        prepared = with_bends(_prepared(skin, source, calibration), bend)
-        prepared = with_states(prepared, states, prepared.skin)
+        with Bar("preparing"):
+            prepared = with_bends(_prepared(skin, source, calibration), bend)
+            prepared = with_states(prepared, states, prepared.skin)
         chosen = prepared.skin
         with room.listen(host, port) as listener:
             if not room.is_loopback(host):

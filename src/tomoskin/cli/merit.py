@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.output import JsonFlag, emit, ending, writable
+from tomoskin.cli.progress import Bar
 
 if TYPE_CHECKING:
     from tomoskin.forward import ForwardModel
@@ -41,8 +42,8 @@ def merit(
     from tomoskin.skin import Skin
 
     write = _writer(out)
-    prepared = prepare(Skin.load(skin))
-    found = _found(prepared, towards, greit)
+    with Bar("working out figures"):
+        found = _found(prepare(Skin.load(skin)), towards, greit)
     if out is not None:
         write(out, found)
     _report(found, json=json)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from types import TracebackType
 from typing import Self
@@ -11,35 +12,53 @@ _PATIENCE = 2.0
 
 
 class Bar:
-    """Shows how far a long job is, on stderr, where that is a terminal; a context manager."""
+    """Shows how far a long job is, on stderr, where that is a terminal; a context manager.
+
+    A job that cannot say how far it is need not: the bar then only shows that it goes on.
+    """
 
     def __init__(self, title: str) -> None:
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.progress import (
+            BarColumn,
+            Progress,
+            TaskProgressColumn,
+            TextColumn,
+            TimeRemainingColumn,
+        )
 
         console = Console(stderr=True)
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
-            TextColumn("{task.percentage:>3.0f} %"),
+            TaskProgressColumn("{task.percentage:>3.0f} %", text_format_no_percentage=""),
             TimeRemainingColumn(),
         )
         self._progress = Progress(*columns, console=console, transient=True)
         self._shown = console.is_terminal
         self._task = self._progress.add_task(title, total=None)
         self._begun = time.monotonic()
-        self._running = False
+        self._lock = threading.Lock()
+        self._running = self._over = False
+        self._timer = threading.Timer(_PATIENCE, self._show)
+        self._timer.daemon = True
 
     def __call__(self, done: float, total: float) -> None:
         """Say that ``done`` of ``total`` is done."""
         self._progress.update(self._task, completed=done, total=total)
-        late = time.monotonic() - self._begun > _PATIENCE
-        if late and self._shown and not self._running:
-            self._progress.start()
-            self._running = True
+        if time.monotonic() - self._begun > _PATIENCE:
+            self._show()
+
+    def _show(self) -> None:
+        with self._lock:
+            if self._shown and not self._running and not self._over:
+                self._progress.start()
+                self._running = True
 
     def __enter__(self) -> Self:
         """The bar itself."""
+        if self._shown:
+            self._timer.start()
         return self
 
     def __exit__(
@@ -49,5 +68,8 @@ class Bar:
         trace: TracebackType | None,
     ) -> None:
         """Take it away."""
-        if self._running:
-            self._progress.stop()
+        self._timer.cancel()
+        with self._lock:
+            self._over = True
+            if self._running:
+                self._progress.stop()

@@ -41,7 +41,9 @@ def record(
 
     sinks = chosen_sinks(sink)
     chosen = skin_for_source(skin, source)
-    runner = room.Runner(room.prepare(chosen), lambda: open_source(source, chosen), sinks=sinks)
+    with Bar("preparing"):
+        prepared = room.prepare(chosen)
+    runner = room.Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
     with ended_by_signals(), recording_to(runner, file):
         if seconds is None and frames is None and not json:
             typer.echo(f"{runner.source} is recorded to {file} until Ctrl-C", err=True)

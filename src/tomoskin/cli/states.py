@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
 if TYPE_CHECKING:
@@ -40,16 +41,18 @@ def states(
     from tomoskin.cli.skin_choice import known_skin
     from tomoskin.session import read_recording, read_states
 
-    known = read_states(calibration)
+    with Bar("learning"):
+        known = read_states(calibration)
     whole = read_recording(recording)
     say_notes(whole)
     if (chosen := known_skin(skin, recording)) is not None:
         known.classifier.check(skin_id=chosen.identity)
     whole = whole.in_order_of(known.pattern)
     dv = changes(whole, reference, known.pattern)
-    answers = known.classifier.predict(dv)
+    with Bar("telling states"):
+        answers = known.classifier.predict(dv)
+        asked = known.classifier.most_telling(dv, min(ask, len(dv))).tolist()
     names = known.classifier.examples.codes.names
-    asked = known.classifier.most_telling(dv, min(ask, len(dv))).tolist()
     if out is not None:
         _write(out, whole, answers, names)
     if json:
