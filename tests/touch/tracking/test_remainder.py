@@ -44,6 +44,14 @@ def test_what_is_left_may_come_and_go() -> None:
     assert run.happened == [("onset", 1), ("release", 1), ("onset", 2), ("release", 2)]
 
 
+@pytest.mark.parametrize("rate", [10, 40, 200])
+def test_what_is_left_is_known_again_after_a_few_frames_without_it(rate: float) -> None:
+    """A finder loses what is faint, and finds it as it was."""
+    run = lifted(rate)(fading(1, rate))
+    run([*[[]] * round(0.2 * rate), *fading(2, rate, top=LEFT / 2)] * 3)
+    assert run.happened == [("onset", 1), ("release", 1)]
+
+
 @pytest.mark.parametrize("press", [0.2, 0.5, 1.0])
 @pytest.mark.parametrize("after", [0.3, 5.0])
 def test_a_second_press_at_the_same_place_is_found(press: float, after: float) -> None:

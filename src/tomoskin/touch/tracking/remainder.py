@@ -31,6 +31,10 @@ _CREEP = 10.0
 _BESIDE = 1.25
 """A remainder lies within this many radii of its region, or of its press's."""
 
+_GONE = 0.5
+"""Seconds without any reading after which nothing is left: a finder loses what is faint for a few
+frames."""
+
 _MOST = 64
 
 
@@ -81,10 +85,11 @@ class Remainders:
     def __init__(self, least_snr: float) -> None:
         self._least_snr = least_snr
         self._scars: list[Scar] = []
+        self._quiet_since: float | None = None
 
     def forget(self) -> None:
         """Begin anew, as with a new reference."""
-        self._scars = []
+        self._scars, self._quiet_since = [], None
 
     def leave(self, trace: Trace, time: float) -> None:
         """Remember where a touch was that has ended."""
@@ -95,10 +100,17 @@ class Remainders:
             )
         del self._scars[:-_MOST]
 
-    def nothing_seen(self) -> None:
-        """No reading at all in this frame: what is left is below the noise."""
-        for scar in self._scars:
-            scar.unseen = True
+    def note(self, time: float, *, quiet: bool) -> None:
+        """Follow whether frames are ``quiet``, without any reading: where they stay so, what is
+        left is below the noise."""
+        if not quiet:
+            self._quiet_since = None
+            return
+        if self._quiet_since is None:
+            self._quiet_since = time
+        if time - self._quiet_since >= _GONE:
+            for scar in self._scars:
+                scar.unseen = True
 
     def explain(self, reading: Reading, time: float, traces: Iterable[Trace]) -> bool:
         """Whether the reading is what an earlier touch has left, or one of ``traces`` leaves

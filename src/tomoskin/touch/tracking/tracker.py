@@ -59,8 +59,7 @@ class Tracker:
             self._remainders.forget()
         if readings or self._traces:
             self._follow(list(readings), elapsed)
-        if not readings:
-            self._remainders.nothing_seen()
+        self._remainders.note(self._now, quiet=not readings)
         self.events, self._happened = tuple(self._happened), []
         shown = [trace.touch for trace in self._traces if trace.number]
         return tuple(sorted(shown, key=lambda touch: touch.id))
