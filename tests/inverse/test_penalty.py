@@ -44,12 +44,14 @@ def in_the_space_of_images(
 
 @st.composite
 def semi_definite(draw: st.DrawFn) -> FloatArray:
-    """(n, n) of any rank but zero."""
+    """(n, n) of any rank but zero, eigenvalues that are not zero far from it."""
     n = draw(st.integers(2, 30))
     rank = draw(st.integers(1, n))
     rng = np.random.default_rng(draw(st.integers(0, 999)))
     root = rng.standard_normal((n, rank)) * (rng.random((n, 1)) < draw(st.sampled_from([0.4, 1])))
-    return np.asarray(root @ root.T) + 1e-3 * np.eye(n) * (rank == n)
+    axes, sizes, _ = np.linalg.svd(root, full_matrices=False)
+    axes = axes[:, sizes > 1e-9 * sizes[0]] if sizes[0] else np.eye(n)
+    return np.asarray(axes * rng.uniform(0.1, 30.0, axes.shape[1]) @ axes.T)
 
 
 @pytest.mark.parametrize("form", FORMS)

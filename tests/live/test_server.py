@@ -1,11 +1,13 @@
 """The server as a page, a slow page, several pages and an attacker meet it."""
 
+import gc
 import json
 import os
 import signal
 import socket
 import time
-from contextlib import ExitStack
+import warnings
+from contextlib import ExitStack, contextmanager
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidState, InvalidStatus
@@ -313,10 +315,10 @@ def test_too_many_pages_are_told(site, monkeypatch):
         assert first(one, "state")
 
 
-def test_a_page_that_does_not_read_delays_nobody_and_is_let_go(site, monkeypatch):
-    monkeypatch.setattr(page, "PATIENCE", 0.3)
-    monkeypatch.setattr(page, "FRAME_PERIOD", 0.001)
-    with socket.socket() as stuck, site.connect() as other:
+@contextmanager
+def deaf(site):
+    """A page that opens and then reads nothing."""
+    with socket.socket() as stuck:
         stuck.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         stuck.connect(("127.0.0.1", site.port))
         stuck.sendall(
@@ -324,6 +326,13 @@ def test_a_page_that_does_not_read_delays_nobody_and_is_let_go(site, monkeypatch
             "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
             "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
         )
+        yield
+
+
+def test_a_page_that_does_not_read_delays_nobody_and_is_let_go(site, monkeypatch):
+    monkeypatch.setattr(page, "PATIENCE", 0.3)
+    monkeypatch.setattr(page, "FRAME_PERIOD", 0.001)
+    with deaf(site), site.connect() as other:
         seen = []
         while True:
             message = other.recv(PATIENCE)
@@ -336,6 +345,21 @@ def test_a_page_that_does_not_read_delays_nobody_and_is_let_go(site, monkeypatch
         status = site.runner.status()
         assert status.dropped == 0
         assert status.fps > 50
+
+
+def test_a_page_that_does_not_read_leaves_no_connection_behind(runner, static, monkeypatch):
+    """What it was to be sent would be waited for without end."""
+    monkeypatch.setattr(page, "FRAME_PERIOD", 0.001)
+    runner.start()
+    site = Site(runner, static)
+    with deaf(site), site.connect() as other:
+        for _ in range(40):
+            first(other, ready)
+        site.stop()
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            gc.collect()
+    assert [str(one.message) for one in said] == []
 
 
 def test_stopping_with_a_page_open_is_quick(runner, static):

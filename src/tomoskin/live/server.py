@@ -140,11 +140,15 @@ class Server(uvicorn.Server):
         asyncio.run(self.serve([listener]))
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """End all connections, those too that a page closes at that very moment."""
+        """End all connections: those too that a page closes at that very moment, or never reads."""
         try:
             await super().shutdown(sockets)
-        except InvalidState:  # the base class stops there; the loop's end closes the others
+        except InvalidState:  # the base class stops there
             await self.lifespan.shutdown()
+        finally:
+            for connection in list(self.server_state.connections):
+                connection.transport.abort()
+            await asyncio.sleep(0)  # that they are lost is said in the loop's next turn
 
     def stop(self) -> None:
         """End :meth:`run_on`, or let it end at once when it begins; callable from any thread."""
