@@ -116,6 +116,7 @@ def test_other_hosts_are_warned_about(start):
     ("arguments", "said"),
     [
         (["--skin", "none"], "none"),
+        (["--skin", ""], "not a skin file"),
         (["--source", "telepathy"], "telepathy"),
         (["--source", "twin:backwards"], "backwards"),
         (["--host", "192.0.2.1", "--port", "0"], "192.0.2.1"),

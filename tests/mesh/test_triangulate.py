@@ -233,6 +233,16 @@ def test_overlapping_electrodes_are_refused() -> None:
     assert caught.value.where == "electrode 1"
 
 
+def test_a_sliver_is_refused_before_its_rim_has_nodes_without_number(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each turn of the splitting would double them, up to 2⁶⁰."""
+    monkeypatch.setattr("tomoskin.mesh.boundary._MOST_NODES", 2000)
+    sliver = Polygon(np.array([(0.0, 0.0), (0.3, 0.0), (0.3, 1e-6)]))
+    with pytest.raises(GeometryError, match="too near to itself"):
+        triangulate(sliver, [ElectrodeArc(0.05, 0.06), ElectrodeArc(0.1, 0.11)], 660)
+
+
 def test_quality_of_known_triangles() -> None:
     points = np.array([(0, 0), (1, 0), (0.5, math.sqrt(3) / 2), (0.5, -0.5)])
     mesh = Mesh(points, np.array([(0, 1, 2), (0, 1, 3)]), (np.array([(0, 2)]),))

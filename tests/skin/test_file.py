@@ -105,6 +105,9 @@ def test_arrays_of_a_skin_are_frozen() -> None:
 
 
 BAD = {
+    "name that is empty": ('"mine"', '" "', "[skin] name", "text of 1 to 255 characters"),
+    "name of two lines": ('"mine"', r'"mi\nne"', "[skin] name", "on one line"),
+    "name without end": ('"mine"', f'"{"x" * 256}"', "[skin] name", "text of 1 to 255 characters"),
     "unknown section": ("[drive]", "[drives]", ": unknown", 'did you mean "drive"'),
     "unknown key": ("count =", "counts =", "[electrodes]: unknown", 'did you mean "count"'),
     "unknown top key": ("format = 1", "format = 1\nx = 1", "", 'unknown section "x"'),
@@ -164,7 +167,7 @@ BAD = {
         "entry 1: expected a unit of resistivity",
     ),
     "impedance of zero": ('"0.2 mohm*m"', '"0 ohm*m"', "contact_impedance", "from 1e-09"),
-    "name is no text": ('"mine"', "5", "[skin] name", "expected text, got 5"),
+    "name is no text": ('"mine"', "5", "[skin] name", "on one line, got 5"),
     "current": ('"100 mA"', '"5 A"', "[drive] current", "from 0.001 to 1000 mA"),
 }
 

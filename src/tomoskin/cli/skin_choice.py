@@ -29,7 +29,7 @@ def skin_for_source(skin: str | None, source: str) -> Skin:
     name, _, argument = source.partition(":")
     if skin is None and name == "replay":
         return skin_for_file(None, parse_replay(argument)[0])
-    return Skin.load(skin or DEFAULT_SKIN)
+    return Skin.load(DEFAULT_SKIN if skin is None else skin)
 
 
 def known_skin(skin: str | None, path: Path) -> Skin | None:
@@ -47,4 +47,4 @@ def skin_for_file(skin: str | None, path: Path) -> Skin:
     if skin is None and is_session(path):
         with SessionReader(path) as session:
             return session.skin
-    return Skin.load(skin or DEFAULT_SKIN)
+    return Skin.load(DEFAULT_SKIN if skin is None else skin)

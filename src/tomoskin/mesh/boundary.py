@@ -21,6 +21,9 @@ AT_ELECTRODE = 0.4
 MIN_FACETS = 2
 """An electrode is cut into at least this many facets."""
 
+_MOST_NODES = 300_000
+"""No mesh of 100,000 cells has so many rim nodes; each turn may double them."""
+
 _SAME = 1e-7
 """Nodes nearer than this fraction of the outline's length are one."""
 
@@ -141,6 +144,8 @@ def _split_encroached(outline: Outline, s: FloatArray, owner: IntArray) -> Bound
         owner = np.concatenate([owner, owner[bad]])
         order = np.argsort(s, kind="stable")
         s, owner = s[order], owner[order]
+        if len(s) > _MOST_NODES:
+            break
     worst = rim.points[int(np.argmax(rim.lengths * bad))] * 1e3
     raise GeometryError(
         "the outline comes too near to itself to be meshed",

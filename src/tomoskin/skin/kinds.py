@@ -40,6 +40,26 @@ class Text(Kind):
 
 
 @dataclass(frozen=True)
+class Name(Kind):
+    """A short text on one line, as long as the name of a file may be."""
+
+    most: int = 255
+
+    @property
+    def expected(self) -> str:
+        """The phrase."""
+        return f"text of 1 to {self.most} characters on one line"
+
+    def read(self, value: object) -> str:
+        """The text."""
+        if not isinstance(value, str) or not value.strip():
+            raise _unexpected(self, value)
+        if len(value) > self.most or not value.isprintable():
+            raise _unexpected(self, value)
+        return value
+
+
+@dataclass(frozen=True)
 class Choice(Kind):
     """One of a few words."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tomoskin.skin.kinds import Choice, OneOrEach, Quantity, Rows, Text, Whole
+from tomoskin.skin.kinds import Choice, Name, OneOrEach, Quantity, Rows, Text, Whole
 from tomoskin.skin.schema.entry import Key, Section
 
 _SIZE = Quantity("length", "mm", 1, 5000)
@@ -14,7 +14,7 @@ SHEET: tuple[Section, ...] = (
         "skin",
         "What this skin is.",
         (
-            Key("name", Text(), "Short name, shown on the page.", required=True),
+            Key("name", Name(), "Short name, shown on the page.", required=True),
             Key("description", Text(), "One sentence for people.", default=""),
         ),
     ),
