@@ -85,6 +85,17 @@ def test_free_images_are_the_null_space(form: str) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("little", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
+def test_a_free_image_that_hardly_touches_some_cell(form: str, little: float) -> None:
+    """Pivots alone do not tell it: rounding grows as they shrink."""
+    image = np.array([1.0, -0.7, 0.9, 1.1, little])
+    free = image / np.linalg.norm(image)
+    axes = np.linalg.svd(free[:, None])[0][:, 1:]
+    found = _penalty(FORMS[form](axes * [1.0, 7.0, 20.0, 30.0] @ axes.T)).free
+    assert np.abs(found.T @ free) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("form", FORMS)
 def test_a_prior_with_a_negative_eigenvalue(form: str) -> None:
     q = np.diag([1.0, 2.0, -0.5]) + 0.1
     with pytest.raises(ModelError, match=r"not positive definite: it has eigenvalue -0\.4"):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -23,6 +24,9 @@ from tomoskin.core import FloatArray, ModelError
 
 _ZERO = 1e-12
 """An eigenvalue, pivot or row sum below this part of the largest one is zero."""
+
+_SINGULAR = 1e11
+"""Condition from which on a matrix may be a singular one after rounding: eigenvalues tell."""
 
 Carried = tuple[NDArray[Any], NDArray[Any]]
 """Q⁻¹Jᴴ (n_cells, n_meas) and JQ⁻¹Jᴴ (n_meas, n_meas)."""
@@ -135,7 +139,7 @@ def sparse_penalty(q: csr_array) -> Penalty:
     except RuntimeError:
         return dense_penalty(q.toarray())
     pivots = factor.U.diagonal()
-    if pivots.min() <= _ZERO * pivots.max():
+    if pivots.min() <= _ZERO * pivots.max() or _nearly_singular(grounded, factor.solve):
         return dense_penalty(q.toarray())
     return Factored(q.toarray, free, factor.solve)
 
@@ -162,13 +166,21 @@ def dense_solver(q: FloatArray, free: FloatArray) -> Solve | None:
     grounded = q.copy()
     grounded[np.diag_indices_from(grounded)] += _ground(free, np.diag(q))
     try:
-        factor = cho_factor(grounded, lower=True, overwrite_a=True, check_finite=False)
+        factor = cho_factor(grounded, lower=True, check_finite=False)
     except LinAlgError:
         return None
+    solve = partial(cho_solve, factor, check_finite=False)
     pivots = np.diag(factor[0]) ** 2
-    if pivots.min() <= _ZERO * pivots.max():
+    if pivots.min() <= _ZERO * pivots.max() or _nearly_singular(grounded, solve):
         return None
-    return lambda columns: cho_solve(factor, columns, check_finite=False)
+    return solve
+
+
+def _nearly_singular(matrix: FloatArray | csc_array, solve: Solve) -> bool:
+    """By how much a solution grows: pivots hide a null vector that hardly has some component."""
+    load = np.random.default_rng(0).standard_normal(size=(matrix.shape[0],))
+    grown = np.linalg.norm(solve(load)) / np.linalg.norm(load)
+    return bool(grown * np.abs(matrix.diagonal()).max() > _SINGULAR)
 
 
 def _ground(free: FloatArray, diagonal: FloatArray) -> FloatArray:
