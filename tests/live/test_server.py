@@ -283,13 +283,23 @@ def test_what_happened_before_is_told_to_a_new_page(site):
 
 def test_the_source_goes_on_when_a_page_closes_as_the_server_stops(site, runner):
     class Closing:
+        """A connection, and its transport, that a page has just closed."""
+
+        aborted = False
+        transport = property(lambda self: self)
+
         def shutdown(self):
             raise InvalidState("connection is closing")
 
+        def abort(self):
+            self.aborted = True
+
+    closing = Closing()
     with site.connect() as page:
         first(page, ready)
-        site._server.server_state.connections.add(Closing())
+        site._server.server_state.connections.add(closing)
         site.stop()
+    assert closing.aborted
     frames = runner.status().frames
     Watch(runner).until(lambda: runner.status().frames > frames + 5)
     assert runner.status().running
