@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,17 +28,8 @@ from tomoskin.live import (
     listen,
 )
 
-ARGUMENTS = (
-    "--no-sandbox",
-    "--disable-gpu",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
+_FLAGS = Path(__file__).resolve().parents[1] / "scripts" / "chromium.flags"
+ARGUMENTS = tuple(_FLAGS.read_text(encoding="utf-8").split())
 STEPS = 64
 """Pictures that are made beforehand and then shown in turn."""
 

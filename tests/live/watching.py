@@ -7,17 +7,8 @@ import pytest
 
 from tomoskin.live import STATIC
 
-ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+FLAGS = Path(__file__).resolve().parents[2] / "scripts" / "chromium.flags"
+ARGUMENTS = FLAGS.read_text(encoding="utf-8").split()
 PATIENCE = 60_000
 AXE = Path(STATIC).parent / "web" / "node_modules" / "axe-core" / "axe.min.js"
 READ = """() => {

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from tomoskin.core import Reading
-from tomoskin.live.finding import InData, View
+from tomoskin.live.finding import Finder, InData, View, told_gain
 from tomoskin.live.prepare import Prepared
 from tomoskin.live.watch import Seen, Watch
 from tomoskin.signal import Reference
-from tomoskin.touch import BendReader, BendReading, SpotModel
+from tomoskin.touch import BendReader, BendReading
 
 
 class Bends:
@@ -17,15 +17,16 @@ class Bends:
     angle is told beside a touch only where what the touch changes is known.
     """
 
-    def __init__(self, prepared: Prepared, reference: Reference) -> None:
-        if prepared.bending is None:
+    def __init__(self, prepared: Prepared, reference: Reference, finder: Finder) -> None:
+        if prepared.bending is None or prepared.spots is None:
             raise AssertionError("made for skins whose bends were learnt")
-        spots = prepared.spots or SpotModel.of(prepared.skin, prepared.model)
-        spots = spots.as_told(reference.mean)
-        told = spots.response.reference
-        gain = float(reference.mean @ told / (told @ told))
-        self._own = None if prepared.spots else InData(spots, prepared, reference)
-        self._reader = BendReader(prepared.bending, spots.response, gain)
+        if isinstance(finder, InData):
+            spots = finder.model
+        else:
+            spots = prepared.spots.as_told(reference.mean)
+        known = prepared.skin.touch.method == "fit"
+        self._own = None if known else InData(spots, prepared, reference)
+        self._reader = BendReader(prepared.bending, spots.response, told_gain(spots, reference))
 
     def push(
         self,
@@ -48,6 +49,6 @@ class Bends:
         return reading
 
 
-def bends_of(prepared: Prepared, reference: Reference) -> Bends | None:
-    """What reads the bends, where they have been learnt."""
-    return None if prepared.bending is None else Bends(prepared, reference)
+def bends_of(prepared: Prepared, reference: Reference, finder: Finder) -> Bends | None:
+    """What reads the bends beside the touches of ``finder``, where they have been learnt."""
+    return None if prepared.bending is None else Bends(prepared, reference, finder)

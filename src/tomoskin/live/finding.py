@@ -90,7 +90,8 @@ class InData:
     ) -> None:
         gain = _gain(model, prepared, reference)
         noise = _noise(prepared, reference, gain)
-        self._model = model
+        self.model = model
+        """The sheet on which touches are fitted, as the reference tells of it."""
         skin, settings = prepared.skin, ScanSettings.of(prepared.skin)
         scan_time = Configuration.of(prepared.scan, settings).scan_time
         self._spots = SpotFinder(
@@ -99,7 +100,7 @@ class InData:
 
     def renew(self, prepared: Prepared, reference: Reference | None) -> None:
         """See :class:`Finder`."""
-        gain = _gain(self._model, prepared, reference)
+        gain = _gain(self.model, prepared, reference)
         self._spots.renew(_noise(prepared, reference, gain), gain)
 
     def push(self, view: View) -> list[Reading]:
@@ -153,7 +154,7 @@ def finding(prepared: Prepared, reference: Reference | None, pace: Pace = WHOLE)
     """
     if prepared.locator is not None:
         return ByCalibration(prepared.locator, prepared, reference)
-    if prepared.spots is None:
+    if prepared.spots is None or prepared.skin.touch.method != "fit":
         return InImage(prepared)
     spots = prepared.spots if reference is None else prepared.spots.as_told(reference.mean)
     return InData(spots, prepared, reference, pace)
@@ -201,5 +202,10 @@ def _gain(model: SpotModel, prepared: Prepared, reference: Reference | None) -> 
     """Ratio of measured and modelled voltages, which a change has too; 1 for ratios."""
     if reference is None or prepared.operator.difference == "normalised":
         return 1.0
+    return told_gain(model, reference)
+
+
+def told_gain(model: SpotModel, reference: Reference) -> float:
+    """Ratio of measured and modelled voltages."""
     told = model.response.reference
     return float(reference.mean @ told / (told @ told))

@@ -169,7 +169,9 @@ class _Stage:
             blind = self._watch.steady()
         self._imaging = imaging(prepared, changes.reference, interval, blind)
         self.finder = finding(prepared, changes.reference)
-        self._bends = bends_of(prepared, changes.reference) if changes.reference else None
+        self._bends = None
+        if changes.reference is not None:
+            self._bends = bends_of(prepared, changes.reference, self.finder)
         self._seen: Seen | None = None
 
     def push(self, number: int, now: float) -> View:

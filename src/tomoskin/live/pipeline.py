@@ -151,7 +151,7 @@ class Pipeline:
         prepared, blind = (watch.prepared, watch.steady()) if watch else (self._prepared, None)
         self._imaging = imaging(prepared, reference, self._interval(), blind)
         self._finder = finding(prepared, reference, LIVE)
-        self._bends = bends_of(prepared, reference)
+        self._bends = bends_of(prepared, reference, self._finder)
 
     def _tune(self, reference: Reference) -> None:
         """One step towards the operator for the reference's noise; the old one serves meanwhile."""

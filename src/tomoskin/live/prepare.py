@@ -48,7 +48,8 @@ class Prepared:
     light_touch
         Chooses alpha again when the noise has been measured; None where it was set by hand.
     spots
-        What touches are fitted with; None where they are found in the image.
+        What touches are fitted with; None where they are found in the image, and no bends are read
+        beside them.
     locator
         Where labelled presses tell the places of touches.
     bending
@@ -97,7 +98,8 @@ class Prepared:
             raise DataError(
                 f"expected bends of {self.pattern.n_meas} rows, got {len(bending.directions)}"
             )
-        return replace(self, bending=bending)
+        spots = self.spots or SpotModel.of(self.skin, self.model)
+        return replace(self, bending=bending, spots=spots)
 
     def that_tells(self, states: StatesCalibration) -> Prepared:
         """With states that were learnt, on this skin with any settings of its pictures.
@@ -263,9 +265,11 @@ def _prepared(skin: Skin, problem: LinearProblem, before: Prepared | None = None
         problem, skin, readout, before.light_touch if before and same else None
     )
     segmenter = before.segmenter if before and before.skin.touch == skin.touch else None
-    spots = before.spots if before and _same_difference(before.skin, skin) else None
-    if skin.touch.method == "fit" and spots is None:
-        spots = SpotModel.of(skin, model)
+    bending = before.bending if before else None
+    spots = None
+    if skin.touch.method == "fit" or bending is not None:
+        kept = before.spots if before and _same_difference(before.skin, skin) else None
+        spots = kept or SpotModel.of(skin, model)
     return Prepared(
         skin=skin,
         mesh=model.mesh,
@@ -279,9 +283,9 @@ def _prepared(skin: Skin, problem: LinearProblem, before: Prepared | None = None
         readout=readout,
         choice=choice,
         light_touch=light_touch,
-        spots=spots if skin.touch.method == "fit" else None,
+        spots=spots,
         locator=before.locator if before else None,
-        bending=before.bending if before else None,
+        bending=bending,
         teller=before.teller if before else None,
     )
 
