@@ -172,7 +172,7 @@ def test_replayed_as_a_source_the_touches_are_the_same_to_the_bit(run, prepared,
     runner.record(again)
     until = Watch(runner).until
     runner.start()
-    until(lambda: runner.newest and runner.replay.ended)
+    until(lambda: runner.status().replay.ended)
     status = runner.status()
     runner.stop()
     live, got = recorded_touches(run), recorded_touches(again)

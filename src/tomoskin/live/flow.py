@@ -71,6 +71,7 @@ class Flow:
         self._tally, self._earlier, self._skipped = Tally(), Tally(), 0
         self._drops, self._polled = 0, 0.0
         self._standstill: str | None = None
+        self._ended = False
 
     def opened(self, transport: Transport) -> None:
         """Its source has been opened for the first time; say what it is."""
@@ -120,6 +121,15 @@ class Flow:
             if event.kind in _STANDSTILL:
                 self._standstill = event.text
         self._frames(frames)
+        self._end()
+
+    def _end(self) -> None:
+        """A replay has ended when its last frames have been processed, not when they were read."""
+        replay = self.wishes.replay
+        ended = replay is not None and replay.ended
+        if ended != self._ended:
+            self._ended = ended
+            self.out.announce()
 
     def _frames(self, frames: Sequence[Frame]) -> None:
         late = len(frames) - MOST_AT_ONCE
@@ -177,7 +187,7 @@ class Flow:
             paused=self.wishes.held,
             recording=self.out.tape.path,
             sinks=self.out.sink_reports(),
-            replay=where_is(replay) if replay else None,
+            replay=where_is(replay, ended=self._ended) if replay else None,
             frames=self._meter.frames,
             fps=self._meter.rate(now),
             dropped=total.dropped + self._skipped + self.pipeline.refused,

@@ -9,11 +9,11 @@ from tomoskin.live.status import ReplayStatus
 from tomoskin.live.wishes import Replayed
 
 
-def where_is(replay: Replayed) -> ReplayStatus:
-    """One look at a replay."""
+def where_is(replay: Replayed, *, ended: bool) -> ReplayStatus:
+    """One look at a replay; ``ended``: its last frame has been processed."""
     speed = None if math.isinf(replay.speed) else replay.speed
     now, end = replay.now() - replay.start, replay.end - replay.start
-    return ReplayStatus(now, max(now, end), speed, replay.loop, replay.ended)
+    return ReplayStatus(now, max(now, end), speed, replay.loop, ended)
 
 
 def play(replay: Replayed, request: ReplayRequest) -> None:

@@ -103,6 +103,10 @@ class Publisher:
             self.tape.event(told(happened))
         if self._outlets:
             self._outlets.put(moment_of(result))
+        self.announce()
+
+    def announce(self) -> None:
+        """Wake those who wait for the status to change."""
         self._audience.watchers.call()
 
     def sink_reports(self) -> tuple[SinkReport, ...]:
