@@ -1,13 +1,15 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help soak live test test-all firmware-test fuzz bench bench-docs docs gallery lint lock native wheel release clean page dev
+.PHONY: set-up checks programs style types page-check page-test engine-check help soak live test test-all firmware-test fuzz bench bench-docs docs gallery lint lock native wheel release clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check --quiet
 # uv installs in a tenth of pip's time; where it cannot (a mirror that only pip knows), pip does.
 PINNED := scripts/install.sh $(PY)
+# As many processes as cores; a file's tests stay together, since they share what they set up.
+PYTEST := $(PY) -m pytest -n auto --maxprocesses 8 --dist loadfile
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1	/p' Makefile
@@ -15,21 +17,13 @@ help:  ## this list
 live: $(VENV)/.installed page  ## the live page of a simulated skin
 	@$(VENV)/bin/tomoskin live $(ARGS)
 
-test: lint native docs  ## lint, documentation, page tests and the test suite, without what is slow
-	@$(PY) scripts/page.py run test
-	@sh scripts/chromium.sh
-	@sh scripts/mosquitto.sh
-	@sh scripts/firmware.sh
-	@sh scripts/ngspice.sh
-	@$(PY) -m pytest $(ARGS)
+test: set-up  ## lint, documentation, page tests and the test suite, without what is slow
+	@$(MAKE) --no-print-directory -j2 --output-sync=target checks programs
+	@$(PYTEST) $(ARGS)
 
-test-all: lint native docs  ## the same, with what is slow
-	@$(PY) scripts/page.py run test
-	@sh scripts/chromium.sh
-	@sh scripts/mosquitto.sh
-	@sh scripts/firmware.sh
-	@sh scripts/ngspice.sh
-	@$(PY) -m pytest -m "" $(ARGS)
+test-all: set-up  ## the same, with what is slow
+	@$(MAKE) --no-print-directory -j2 --output-sync=target checks programs
+	@$(PYTEST) -m "" $(ARGS)
 
 firmware-test: dev  ## the firmware alone: GoogleTest, mutants, host build, emulator
 	@sh scripts/firmware.sh
@@ -57,12 +51,33 @@ docs: dev $(VENV)/.docs  ## the documentation, in build/docs; a warning is an er
 gallery: native  ## run the examples anew into docs/gallery.md; two minutes
 	@$(PY) scripts/gallery.py
 
-lint: dev page  ## ruff, mypy, the page's types, and the native engine's where Rust is installed
+lint: style types page-check engine-check  ## ruff, mypy, the page's types, and the native engine's where Rust is installed
+
+style: dev
 	@$(PY) -m ruff check .
 	@$(PY) -m ruff format --check .
+
+types: dev
 	@$(PY) -m mypy src tests
+
+page-check: dev page
 	@$(PY) scripts/page.py run check
+
+page-test: dev page page-check
+	@$(PY) scripts/page.py run test
+
+engine-check: dev native
 	@$(PY) scripts/native.py check
+
+checks: lint page-test docs  # side by side: two cores have two things to do
+
+# What the tests need beside Python packages: Debian's, by apt-get where that is allowed.
+programs: $(VENV)/.dev
+	@for thing in chromium mosquitto firmware ngspice; do sh scripts/$$thing.sh || exit 1; done
+
+set-up: dev page $(VENV)/.docs
+	@mkdir -p build && rm -f build/left-out.txt
+	@echo "checks: style, types, page, documentation, native engine, side by side; two to four minutes"
 
 native: dev  ## the native engine, where Rust is installed; live runs without
 	@$(PY) scripts/native.py

@@ -10,15 +10,20 @@ import shutil
 import signal
 import socket
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+import one_thread  # noqa: F401 - before numpy is loaded
+
 ROOT = Path(__file__).resolve().parent.parent
 DEFAULT_DATA = ROOT.parent / "shared" / "data"
+NOTED = ROOT / "build" / "left-out.txt"
+"""What set-up could not bring, a line each, with the command that would."""
+NO_ENGINE = "the native engine: it has not been built (install Rust, then: make native)"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 # How long an example takes says more of the machine's other load than of the code.
@@ -49,15 +54,25 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     if item.get_closest_marker("data"):
         require_data(item.config)
     if item.get_closest_marker("page"):
-        require_chromium(item.config)
+        require_chromium()
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     seed = config.getoption("randomly_seed", None)
     if seed is not None:
         terminalreporter.write_line(f"to repeat this order: --randomly-seed={seed}")
-    for thing in sorted(missing_things(config)):
-        terminalreporter.write_line(f"NOT TESTED: {thing}", yellow=True, bold=True)
+    things = left_out(terminalreporter.stats.get("skipped", ()))
+    if things:
+        terminalreporter.write_line(f"left out: {'; '.join(things)}", yellow=True, bold=True)
+    else:
+        terminalreporter.write_line("nothing was left out")
+
+
+def left_out(skipped: Iterable[Any]) -> list[str]:
+    """What is missing here, of the reports of skipped tests and of what set-up wrote down."""
+    reasons = {str(report.longrepr[2]).removeprefix("Skipped: ") for report in skipped}
+    noted = NOTED.read_text(encoding="utf-8").splitlines() if NOTED.is_file() else []
+    return sorted(reasons | set(noted))
 
 
 @pytest.fixture(scope="session")
@@ -67,18 +82,18 @@ def data_dir(pytestconfig: pytest.Config) -> Path:
 
 
 @pytest.fixture(scope="session")
-def chromium(pytestconfig: pytest.Config) -> Path:
+def chromium() -> Path:
     """Return the system's Chromium; skip without it (under CI=true: fail)."""
-    return require_chromium(pytestconfig)
+    return require_chromium()
 
 
 @pytest.fixture(scope="session")
-def built_page(pytestconfig: pytest.Config) -> None:
+def built_page() -> None:
     """The page has been built; skip where it has not (under CI=true: fail)."""
     from tomoskin.live import STATIC
 
     if not (STATIC / "index.html").is_file():
-        missing(pytestconfig, "the page: it has not been built (make page)")
+        missing("the page: it has not been built (make page)")
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -116,15 +131,15 @@ def is_loopback(address: Any) -> bool:
 def require_data(config: pytest.Config) -> Path:
     folder: Path = config.getoption("--data")
     if not folder.is_dir():
-        missing(config, f"the public recordings: no folder {folder} (see --data)")
+        missing(f"the public recordings: no folder {folder} (see --data)")
     return folder
 
 
-def require_chromium(config: pytest.Config) -> Path:
+def require_chromium() -> Path:
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None or not driver_runs():
         advice = "Debian: apt-get install chromium libatomic1"
-        missing(config, f"the page in Chromium: none that Playwright can drive ({advice})")
+        missing(f"the page in Chromium: none that Playwright can drive ({advice})")
     return Path(str(found))
 
 
@@ -141,15 +156,8 @@ def driver_runs() -> bool:
         return False
 
 
-def missing_things(config: pytest.Config) -> set[str]:
-    """What has been missing so far: one set, by whatever name this module was imported."""
-    things: set[str] = vars(config).setdefault("missing_things", set())
-    return things
-
-
-def missing(config: pytest.Config, thing: str) -> None:
-    """Skip the test and say so at the end; where everything must be there, fail it."""
+def missing(thing: str) -> None:
+    """Skip the test, which is said at the end; where everything must be there, fail it."""
     if os.environ.get("CI") == "true":
         pytest.fail(f"CI must test {thing}", pytrace=False)
-    missing_things(config).add(thing)
     pytest.skip(thing)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from itertools import permutations
 
 import numpy as np
@@ -12,6 +13,7 @@ from tomoskin.core import FloatArray, IntArray
 from tomoskin.mesh import Disc, ElectrodeArc, Mesh, triangulate
 
 
+@cache
 def disc(n: int = 8, cells: int = 220, *, width: float = 0.02) -> Mesh:
     """Disc of 0.1 m radius, ``n`` electrodes of arclength ``width``, E1 at the top, clockwise."""
     outline = Disc(0.1)

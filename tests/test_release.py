@@ -31,11 +31,11 @@ def release() -> ModuleType:
 
 
 @pytest.fixture(scope="module")
-def built(release, pytestconfig, tmp_path_factory) -> tuple[Path, Path]:
+def built(release, tmp_path_factory) -> tuple[Path, Path]:
     """Return the sdist and the wheel made of it; the page must be built."""
     fresh = [sys.executable, "scripts/page.py", "fresh"]
     if subprocess.run(fresh, cwd=ROOT, check=False).returncode:
-        missing(pytestconfig, "the release: the page has not been built (make page)")
+        missing("the release: the page has not been built (make page)")
     return release.pure(tmp_path_factory.mktemp("release"))
 
 

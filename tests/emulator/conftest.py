@@ -10,6 +10,6 @@ from tomoskin.emulator import Programs
 
 
 @pytest.fixture(scope="session")
-def programs(pytestconfig: pytest.Config) -> Programs:
-    need(pytestconfig, ["make", "cc", "avr-gcc", "simavr"], "gcc-avr avr-libc simavr libsimavr-dev")
+def programs() -> Programs:
+    need(["make", "cc", "avr-gcc", "simavr"], "gcc-avr avr-libc simavr libsimavr-dev")
     return Programs(built("avr", "tomoskin-16.elf"), built("emulator", "tomoskin-emulator"))

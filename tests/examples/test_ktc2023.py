@@ -125,7 +125,9 @@ def test_the_score_is_the_sum_that_defines_it(ktc: Any) -> None:
 # Simulated tanks.
 
 
-@pytest.mark.parametrize(("level", "least"), [(1, 0.85), (5, 0.75)])
+@pytest.mark.parametrize(
+    ("level", "least"), [(1, 0.85), pytest.param(5, 0.75, marks=pytest.mark.slow)]
+)
 def test_targets_of_a_simulated_tank_are_found(ktc: Any, level: int, least: float) -> None:
     inj, mpat = tables()
     labels = ktc.segment(*tank(), inj, mpat, ktc.kept(inj, mpat, level))
@@ -152,6 +154,7 @@ def test_faults_of_the_read_out_are_found(ktc: Any) -> None:
     assert sigma == pytest.approx(0.8, rel=0.01)
 
 
+@pytest.mark.slow
 def test_rows_that_are_not_finite_do_not_count(ktc: Any) -> None:
     inj, mpat = tables()
     u, u_ref = tank()
@@ -264,7 +267,9 @@ def test_rows_of_each_level_are_those_of_the_challenge(
 
 
 @pytest.mark.data
-@pytest.mark.parametrize(("level", "least"), [(1, 0.90), (7, 0.75)])
+@pytest.mark.parametrize(
+    ("level", "least"), [pytest.param(1, 0.90, marks=pytest.mark.slow), (7, 0.75)]
+)
 def test_a_target_of_the_challenge(training: list[Any], ktc: Any, level: int, least: float) -> None:
     result = ktc.scored(training[0], level)
     ours, linear, water = result.scores

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tomoskin.emulator.program import build_alone
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.source import ScanSettings
 from tomoskin.wire import Decoder, Message, encode
@@ -33,13 +34,14 @@ def star_counts(oversampling: int, scan: Scan = SCAN) -> list[int]:
 
 def make(*arguments: str, folder: Path = FIRMWARE) -> subprocess.CompletedProcess[str]:
     """Run make there, as if nobody had run make around it."""
-    return subprocess.run(
-        ["make", "--silent", "-C", str(folder), *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "MAKEFLAGS": ""},
-    )
+    with build_alone():
+        return subprocess.run(
+            ["make", "--silent", "-C", str(folder), *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
+            env={**os.environ, "MAKEFLAGS": ""},
+        )
 
 
 def built(target: str, product: str) -> Path:

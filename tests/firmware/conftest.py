@@ -8,17 +8,17 @@ from conftest import missing
 from firmware.boards import built, running
 
 
-def need(config, programs, packages):
+def need(programs, packages):
     """Skip unless all programs are there; under CI=true fail."""
     absent = [program for program in programs if shutil.which(program) is None]
     if absent:
         advice = f"Debian: apt-get install {packages}"
-        missing(config, f"the firmware: no {', '.join(absent)} ({advice})")
+        missing(f"the firmware: no {', '.join(absent)} ({advice})")
 
 
 @pytest.fixture(scope="session")
-def board_program(pytestconfig):
-    need(pytestconfig, ["make", "cc"], "make gcc libc6-dev")
+def board_program():
+    need(["make", "cc"], "make gcc libc6-dev")
     return built("host", "tomoskin-board")
 
 

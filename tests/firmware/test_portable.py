@@ -96,8 +96,8 @@ MUTANTS = {
 
 
 @pytest.fixture(scope="session")
-def googletest(pytestconfig):
-    need(pytestconfig, ["make", "cc", "c++", "gcovr"], "make g++ libgtest-dev gcovr")
+def googletest():
+    need(["make", "cc", "c++", "gcovr"], "make g++ libgtest-dev gcovr")
     made = make("coverage")
     assert made.returncode == 0, made.stdout + made.stderr
     return json.loads((BUILD / "coverage.json").read_text(encoding="utf-8"))
@@ -130,7 +130,7 @@ def test_a_mutant_is_caught(name, googletest, tmp_path):
     assert ran.returncode != 0, f"nothing noticed: {name}"
 
 
-def test_static_analysis_finds_nothing(pytestconfig):
-    need(pytestconfig, ["make", "cppcheck"], "make cppcheck")
+def test_static_analysis_finds_nothing():
+    need(["make", "cppcheck"], "make cppcheck")
     checked = make("cppcheck")
     assert checked.returncode == 0, checked.stderr

@@ -8,7 +8,7 @@ from conftest import missing
 
 
 @pytest.fixture(scope="session")
-def decks(pytestconfig):
+def decks():
     """Skip what runs decks where there is no ngspice (under CI=true: fail)."""
     if shutil.which("ngspice") is None:
-        missing(pytestconfig, "the board's circuit: no ngspice (Debian: apt-get install ngspice)")
+        missing("the board's circuit: no ngspice (Debian: apt-get install ngspice)")

@@ -83,7 +83,10 @@ def test_the_moving_ball_is_one_body_on_a_path(tanks: Path) -> None:
     assert np.mean([len(touches) == 1 for touches in found.touches[1:]]) > 0.9
 
 
-@pytest.mark.parametrize("name", ["iirc2006_rotating_rod", "montreal1995_rod_circle"])
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param("iirc2006_rotating_rod", marks=pytest.mark.slow), "montreal1995_rod_circle"],
+)
 def test_a_target_carried_round_is_seen_to_go_round(tanks: Path, name: str) -> None:
     found = images(tanks / f"{name}.npz", Skin.load("tank-16"), None)
     places = np.array([(t[0].reading.x, t[0].reading.y) for t in found.touches])
@@ -96,7 +99,12 @@ def test_a_target_carried_round_is_seen_to_go_round(tanks: Path, name: str) -> N
 
 @pytest.mark.parametrize(
     ("reference", "frame", "sign"),
-    [(0, 1, "decrease"), (0, 2, "increase"), (3, 4, "decrease"), (3, 5, "increase")],
+    [
+        pytest.param(0, 1, "decrease", marks=pytest.mark.slow),
+        (0, 2, "increase"),
+        (3, 4, "decrease"),
+        pytest.param(3, 5, "increase", marks=pytest.mark.slow),
+    ],
 )
 def test_targets_in_the_deformed_tank(tanks: Path, reference: int, frame: int, sign: str) -> None:
     """Glass (a large body) and metal, in the round tank and in the squeezed one.

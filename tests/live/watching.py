@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 
+from conftest import missing
 from tomoskin.live import STATIC
 
 FLAGS = Path(__file__).resolve().parents[2] / "scripts" / "chromium.flags"
@@ -94,7 +94,7 @@ def distance(one, two):
 def axe_finds(page, *parts):
     """What axe-core objects to on the page, or in the ``parts`` of it that are named by CSS."""
     if not AXE.is_file():
-        pytest.skip("the page's packages are not installed")
+        missing("the page's accessibility: axe-core is not installed (make page)")
     if page.evaluate("typeof axe") == "undefined":
         page.evaluate(AXE.read_text())
     scope = {"include": [[part] for part in parts]} if parts else None

@@ -12,10 +12,11 @@ from scipy.sparse import csc_array, csr_array, random_array
 from scipy.sparse.linalg import spsolve
 
 import shapes
+from conftest import NO_ENGINE
 from tomoskin.forward import ForwardModel
 from tomoskin.pattern import Pattern
 
-core = pytest.importorskip("tomoskin_core")
+core = pytest.importorskip("tomoskin_core", reason=NO_ENGINE)
 
 TYPES = [np.float64, np.complex128]
 

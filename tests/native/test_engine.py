@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import shapes
+from conftest import NO_ENGINE
 from tomoskin.core import ModelError
 from tomoskin.forward import ForwardModel, choose_engine
 from tomoskin.forward import engine as engines
@@ -47,7 +48,7 @@ def models(
     monkeypatch: pytest.MonkeyPatch, mesh: Mesh, pattern: Pattern, **settings: Any
 ) -> list[ForwardModel]:
     """Return the same model on the native engine and on scipy's."""
-    pytest.importorskip("tomoskin_core")
+    pytest.importorskip("tomoskin_core", reason=NO_ENGINE)
     both = []
     for name in ("native", "scipy"):
         monkeypatch.setenv(engines.VARIABLE, name)
@@ -140,7 +141,7 @@ def test_the_variable_chooses(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_extension_runs_where_it_is_installed() -> None:
-    pytest.importorskip("tomoskin_core")
+    pytest.importorskip("tomoskin_core", reason=NO_ENGINE)
     engine = choose_engine()
     assert engine.name == "native"
     assert "tomoskin_core" in engine.reason

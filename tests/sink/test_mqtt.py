@@ -60,10 +60,10 @@ class Broker:
 
 
 @pytest.fixture
-def broker(tmp_path, pytestconfig):
+def broker(tmp_path):
     program = shutil.which("mosquitto") or shutil.which("mosquitto", path=BROKERS)
     if program is None:
-        missing(pytestconfig, "the MQTT sink: no mosquitto (Debian: apt-get install mosquitto)")
+        missing("the MQTT sink: no mosquitto (Debian: apt-get install mosquitto)")
     broker = Broker(tmp_path, program)
     yield broker
     broker.stop()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
 import shutil
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,6 +49,15 @@ def build_programs() -> Programs:
     return Programs(elf, _BUILD / "tomoskin-emulator")
 
 
+@contextmanager
+def build_alone() -> Iterator[None]:
+    """Wait until no other process builds the firmware: two would write over each other."""
+    _BUILD.mkdir(parents=True, exist_ok=True)
+    with (_BUILD / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
 def _make(*arguments: str) -> None:
     if not FOLDER.is_dir():
         raise SourceError(
@@ -54,13 +66,14 @@ def _make(*arguments: str) -> None:
     absent = [tool for tool in _NEEDED if shutil.which(tool) is None]
     if absent:
         raise SourceError(f"{', '.join(absent)} missing", where="firmware", hint=_HINT)
-    made = subprocess.run(
-        ["make", "--silent", "-C", str(FOLDER), *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=_LONGEST,
-    )
+    with build_alone():
+        made = subprocess.run(
+            ["make", "--silent", "-C", str(FOLDER), *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=_LONGEST,
+        )
     if made.returncode:
         lines = [line for line in made.stderr.splitlines() if "error" in line] or ["make failed"]
         raise SourceError(f"the build failed: {lines[0]}", where="firmware", hint=_HINT)
