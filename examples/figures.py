@@ -107,7 +107,7 @@ def mark_region(ax: Axes, mesh: Mesh, reading: Reading, colour: str = "black") -
 def mark_probe(ax: Axes, corners: FloatArray) -> None:
     """Where the probe really was: its outline ``corners`` (n, 2) m, dashed."""
     closed = MM * np.vstack([corners, corners[:1]])
-    ax.plot(*closed.T, color="0.35", linewidth=0.9, linestyle="--")
+    ax.plot(*closed.T, color="0.1", linewidth=0.9, linestyle="--")
 
 
 def circle(x: float, y: float, radius: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The one scale of colours: what its numbers are, how it looks, and that pictures and films use it."""
+"""The scales of colours: their numbers, how they look, and that pictures and films use them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image as Pillow
 
-from session.oklab import EYES, seen
 from session.runs import TOUCH
+from session.seeing import EYES, blue_beside_red, seen
 from shapes import disc
 from tomoskin.core import DataError
 from tomoskin.session import (
@@ -117,18 +117,6 @@ def test_without_matplotlib_it_says_what_to_do(monkeypatch):
 # Pictures, films and scenes.
 
 
-def shown_sides(picture):
-    """Whether the left half of the sheet in a picture (h, w, 3) is blue, and the right one red."""
-    levels = np.asarray(picture).astype(int)
-    levels = levels[:, : 3 * levels.shape[1] // 4]  # without the bar of colours
-    blue = levels[..., 2] - levels[..., 0] > 90
-    red = levels[..., 0] - levels[..., 2] > 90
-    assert blue.mean() > 0.1
-    assert red.mean() > 0.1
-    left, right = (np.nonzero(side)[1] for side in (blue, red))
-    return np.percentile(left, 90) < np.percentile(right, 10)
-
-
 def sides(sign=1):
     """A sheet that conducts less on its left and more on its right."""
     pytest.importorskip("matplotlib")
@@ -139,7 +127,7 @@ def sides(sign=1):
 def test_a_picture_shows_a_fall_in_blue_and_a_rise_in_red(tmp_path):
     mesh, panel = sides()
     write_picture(tmp_path / "sheet.png", mesh, [panel], "S")
-    assert shown_sides(Pillow.open(tmp_path / "sheet.png").convert("RGB"))
+    assert blue_beside_red(Pillow.open(tmp_path / "sheet.png").convert("RGB"))
 
 
 def test_a_film_shows_a_fall_in_blue_and_a_rise_in_red(tmp_path):
@@ -149,9 +137,9 @@ def test_a_film_shows_a_fall_in_blue_and_a_rise_in_red(tmp_path):
     FILMS[".gif"](path, pictures, 10.0)
     with Pillow.open(path) as film:
         film.seek(0)
-        assert shown_sides(film.convert("RGB"))
+        assert blue_beside_red(film.convert("RGB"))
         film.seek(1)
-        assert not shown_sides(film.convert("RGB"))
+        assert not blue_beside_red(film.convert("RGB"))
 
 
 @pytest.mark.parametrize(("kind", "end"), [("decrease", 0), ("increase", -1)])

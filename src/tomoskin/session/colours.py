@@ -26,7 +26,7 @@ SIZE = 511
 
 @dataclass(frozen=True)
 class ColourScale:
-    """A scale of colours: ``stops`` as ``#rrggbb``, at even distances from its low to its high end."""
+    """A scale of colours: ``stops``, #rrggbb, at even distances from its low to its high end."""
 
     name: str
     stops: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""How colours look: OKLab (B. Ottosson 2020), and to eyes that lack a kind of cone.
+"""How colours look: OKLab (B. Ottosson 2020), to eyes that lack a kind of cone, and where they are.
 
 The linear model of colour vision deficiency, at its full strength, is that of Machado, Oliveira &
 Fernandes 2009, table 1.
@@ -42,3 +42,18 @@ def seen(levels, eye="all cones"):
     linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     shown = np.clip(linear @ EYES[eye].T, 0, 1)
     return np.cbrt(shown @ CONES.T) @ OPPONENTS.T
+
+
+def blue_beside_red(picture):
+    """Whether a picture of one sheet (h, w, 3) is blue at its left and red at its right.
+
+    It has to hold both colours; that its bar of colours does not count.
+    """
+    levels = np.asarray(picture).astype(int)
+    levels = levels[:, : 3 * levels.shape[1] // 4]
+    blue = levels[..., 2] - levels[..., 0] > 90
+    red = levels[..., 0] - levels[..., 2] > 90
+    assert blue.mean() > 0.005
+    assert red.mean() > 0.005
+    left, right = (np.nonzero(side)[1] for side in (blue, red))
+    return np.percentile(left, 90) < np.percentile(right, 10)
