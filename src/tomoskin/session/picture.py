@@ -113,8 +113,10 @@ def _figure(
 
 def _draw(ax: Axes, mesh: Mesh, panel: Panel, limit: float) -> Any:
     x, y = _MM * mesh.points[:, :2].T
-    ends = {"vmin": -limit, "vmax": limit}
-    drawn = ax.tripcolor(x, y, mesh.cells, facecolors=panel.values, cmap=CHANGE.colormap(), **ends)
+    colours = CHANGE.colormap()
+    drawn = ax.tripcolor(
+        x, y, mesh.cells, facecolors=panel.values, cmap=colours, vmin=-limit, vmax=limit
+    )
     for number, facets in enumerate(mesh.electrodes, start=1):
         middle = _MM * mesh.points[np.unique(facets)][:, :2].mean(axis=0)
         ax.plot(*middle, "s", color="0.25", markersize=2.5)
