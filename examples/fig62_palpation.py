@@ -210,7 +210,7 @@ def draw(
     drawn = figures.draw_map(axes[0, 0], palpation.mesh, picture, np.abs(picture).max())
     made.colorbar(drawn, ax=axes[0, 0], label="change of conductivity / mS", shrink=0.8)
     truth = figures.draw_map(axes[0, 1], palpation.mesh, felt, felt.max())
-    truth.set(cmap="Blues", clim=(0.0, felt.max()))  # a pressure has no sign
+    truth.set(cmap=figures.AMOUNTS, clim=(0.0, felt.max()))  # a pressure has no sign
     made.colorbar(truth, ax=axes[0, 1], label="pressure of the foam / Pa", shrink=0.8)
     for ax, title in zip(axes[0], ("found", "what the sheet feels"), strict=True):
         for ball in balls:

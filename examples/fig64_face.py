@@ -252,7 +252,7 @@ def draw(one: Face, pictures: Sequence[Picture]) -> Figure:
         )  # fmt: skip
         true = figures.MM * movement(electrodes(one), EXPRESSIONS[name])
         arrows(ax, at, true, "0.45", "true")
-        arrows(ax, at, figures.MM * places, figures.ORANGE, "found")
+        arrows(ax, at, figures.MM * places, "black", "found")
         ax.set_aspect("equal")
         ax.set_title(name)
     for ax in axes[1]:

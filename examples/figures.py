@@ -14,12 +14,16 @@ from matplotlib.figure import Figure
 
 from tomoskin.core import FloatArray, IntArray, Reading
 from tomoskin.mesh import Mesh
+from tomoskin.session import AMOUNT, CHANGE
 
 BLUE, ORANGE, GREEN, PALE = "#0072B2", "#D55E00", "#009E73", "#56B4E9"
 """Okabe and Ito's colours."""
 
-MAP = "RdBu"
-"""Falling conductivity red, rising blue, white at none."""
+MAP = CHANGE.colormap()
+"""Of a change, as the page has it: a fall blue, a rise red."""
+
+AMOUNTS = AMOUNT.colormap()
+"""Of what has no sign: pale where there is least."""
 
 MM, UV, MV, MS = 1e3, 1e6, 1e3, 1e3
 """From SI to what the axes say: mm, µV, mV, mS."""
@@ -103,7 +107,7 @@ def mark_region(ax: Axes, mesh: Mesh, reading: Reading, colour: str = "black") -
 def mark_probe(ax: Axes, corners: FloatArray) -> None:
     """Where the probe really was: its outline ``corners`` (n, 2) m, dashed."""
     closed = MM * np.vstack([corners, corners[:1]])
-    ax.plot(*closed.T, color="0.35", linewidth=0.9, linestyle="--")
+    ax.plot(*closed.T, color="0.1", linewidth=0.9, linestyle="--")
 
 
 def circle(x: float, y: float, radius: float) -> FloatArray:

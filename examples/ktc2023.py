@@ -34,6 +34,7 @@ from tomoskin.forward import ForwardModel
 from tomoskin.inverse import AbsoluteImaging, Matern, Observation, ShapeImaging, homogeneous
 from tomoskin.mesh import Disc, ElectrodeArc, Mesh, triangulate
 from tomoskin.pattern import Pattern
+from tomoskin.session import CHANGE
 
 Labels = NDArray[np.uint8]
 WATER, RESISTIVE, CONDUCTIVE = 0, 1, 2
@@ -407,7 +408,7 @@ def _one_of(arrays: dict[str, Any], file: Path, *names: str) -> FloatArray:
 
 # The command line.
 
-COLOURS = np.array([[0.93, 0.95, 0.97], [0.84, 0.37, 0.0], [0.0, 0.45, 0.70]])
+COLOURS = CHANGE.table[[len(CHANGE.table) // 2, 0, -1]]
 """Water, resistive, conductive."""
 
 

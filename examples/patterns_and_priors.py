@@ -114,10 +114,11 @@ def draw(lab: Lab, table: Table) -> None:
 
 
 def _cells(ax: Any, means: FloatArray) -> None:
-    ax.imshow(means, cmap="cividis", aspect="auto")
-    middle = (means.min() + means.max()) / 2
+    amounts = np.abs(means)  # a fall is shown by its size
+    ax.imshow(amounts, cmap=figures.AMOUNTS, aspect="auto")
+    middle = (amounts.min() + amounts.max()) / 2
     for (row, column), mean in np.ndenumerate(means):
-        colour = "black" if mean > middle else "white"
+        colour = "white" if abs(mean) > middle else "black"
         ax.text(column, row, f"{mean:.3g}", ha="center", va="center", color=colour)
     ax.set_xticks(range(len(PATTERNS)), PATTERNS)
     ax.tick_params(length=0)

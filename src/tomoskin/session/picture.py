@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, Image, Touch
 from tomoskin.mesh import Mesh
+from tomoskin.session.colours import CHANGE
 from tomoskin.session.display import Display
 from tomoskin.session.figure import new_figure, save_figure
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_PANELS = 16
-_COLOURS = "RdBu"
 _MM = 1e3
 
 
@@ -113,8 +113,9 @@ def _figure(
 
 def _draw(ax: Axes, mesh: Mesh, panel: Panel, limit: float) -> Any:
     x, y = _MM * mesh.points[:, :2].T
+    colours = CHANGE.colormap()
     drawn = ax.tripcolor(
-        x, y, mesh.cells, facecolors=panel.values, cmap=_COLOURS, vmin=-limit, vmax=limit
+        x, y, mesh.cells, facecolors=panel.values, cmap=colours, vmin=-limit, vmax=limit
     )
     for number, facets in enumerate(mesh.electrodes, start=1):
         middle = _MM * mesh.points[np.unique(facets)][:, :2].mean(axis=0)

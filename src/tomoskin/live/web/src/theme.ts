@@ -1,7 +1,7 @@
 /** The colours that canvases need, read from styles/tokens.css, following the system's light or dark. */
 
 import { signal } from "@preact/signals";
-import { DARK_MAP, LIGHT_MAP, mapTable } from "./colours";
+import { CHANGE, mapTable } from "./colours";
 
 const NAMES = ["ground", "ink", "muted", "line", "accent", "halo", "mesh"] as const;
 
@@ -21,7 +21,7 @@ function read(): Theme {
   return {
     ...colours,
     dark: darkQuery.matches,
-    map: mapTable(darkQuery.matches ? DARK_MAP : LIGHT_MAP),
+    map: mapTable(darkQuery.matches ? CHANGE.dark : CHANGE.light),
     font: style.getPropertyValue("--font").trim(),
   };
 }
