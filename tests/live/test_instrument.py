@@ -135,7 +135,7 @@ def test_a_cut_electrode_is_said_in_words_and_by_shape(opened):
 
 def test_signals(opened):
     opened.page.keyboard.press("g")
-    assert "E1 → E2" in opened.test_id("drive").inner_text()
+    assert "E1 to E2" in opened.test_id("drive").inner_text()
     assert "E2 +" in opened.test_id("electrode-2").text_content()
     opened.test_id("signals-noise").click()
     opened.test_id("signals-sum").filter(has_text="µV").wait_for()
