@@ -205,12 +205,16 @@ window.looks = (() => {
     return b.top > a.top || b.left >= a.right - 1;
   }
 
+  const scroller = (element) => ancestors(element).find((each) => scrolls(getComputedStyle(each)));
+
   const outOfOrder = ({ texts }) => {
     const found = [];
     for (const part of document.querySelectorAll(READ)) {
-      const read = texts.filter(({ element, node, svg }) => node && !svg && part.contains(element) && !element.closest(".sheet"));
+      const read = texts.filter(({ element, node, svg }) => node && !svg && part.contains(element));
       read.slice(1).forEach((b, k) => {
-        if (read[k].node !== b.node && !follows(read[k].box, b.box)) found.push(`${said(b)} after ${said(read[k])}`);
+        const a = read[k];
+        if (a.node === b.node || scroller(a.element) !== scroller(b.element)) return;
+        if (!follows(a.box, b.box)) found.push(`${said(b)} after ${said(a)}`);
       });
     }
     const marks = [...document.querySelectorAll(LANDMARKS)].map((each) => [each.className, each.getBoundingClientRect()]);
@@ -253,6 +257,9 @@ window.looks = (() => {
     return (light + 0.05) / (dark + 0.05);
   }
 
+  const faint = (element) =>
+    ancestors(element).reduce((part, each) => part * getComputedStyle(each).opacity, 1);
+
   /** The ground that an element and a colour on it have together, the farthest ancestor first. */
   function seen(element, colour) {
     let ground = rgba("Canvas");
@@ -261,9 +268,8 @@ window.looks = (() => {
       const own = rgba(backgroundColor);
       if (own[3] > 0) ground = over(own, ground, own[3]);
     }
-    const faint = ancestors(element).reduce((part, each) => part * getComputedStyle(each).opacity, 1);
     const ink = rgba(colour);
-    return [over(ink, ground, ink[3] * faint), ground];
+    return [over(ink, ground, ink[3] * faint(element)), ground];
   }
 
   /** What most of the canvas around a word is filled with; where with nothing, the page's ground. */
@@ -276,12 +282,13 @@ window.looks = (() => {
       counted.set(key, (counted.get(key) ?? 0) + 1);
     }
     const [most] = [...counted].reduce((a, b) => (b[1] > a[1] ? b : a));
-    return most === "none" ? seen(element, "#000")[1] : most.split(",").map(Number);
+    const [, ground] = seen(element, "#000");
+    return most === "none" ? ground : over(most.split(",").map(Number), ground, faint(element));
   }
 
   function contrast(text) {
     const { element, style, svg, colour } = text;
-    if (colour) return ratio(rgba(colour), behind(text));
+    if (colour) return ratio(seen(element, colour)[0], behind(text));
     const ink = svg ? style.fill : style.color;
     if (svg && style.stroke !== "none" && parseFloat(style.strokeWidth) >= 3) return ratio(rgba(ink), rgba(style.stroke));
     return ratio(...seen(element, ink));

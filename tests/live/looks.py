@@ -38,5 +38,7 @@ def look_in_both(page, name):
     found = {}
     for scheme in SCHEMES:
         page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
-        found |= {f"{scheme} {fact}": wrong for fact, wrong in look(page, f"{name}-{scheme}").items()}
+        found |= {
+            f"{scheme} {fact}": wrong for fact, wrong in look(page, f"{name}-{scheme}").items()
+        }
     return found

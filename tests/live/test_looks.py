@@ -54,7 +54,9 @@ def test_every_panel_looks_right(browser, site, prepared, size):
     for panel in PANELS:
         show(watched, panel)
         name = f"{panel}-{size[0]}"
-        wrong |= {f"{name}: {fact}": what for fact, what in look_in_both(watched.page, name).items()}
+        wrong |= {
+            f"{name}: {fact}": what for fact, what in look_in_both(watched.page, name).items()
+        }
         sheets.append(watched.test_id("sheet").bounding_box())
     watched.context.close()
     assert not wrong

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -91,7 +92,7 @@ def test_every_panel_is_set_in_it(opened):
     typeset = Typeset(opened.page)
     for panel in PANELS:
         show(opened, panel)
-        fonts = sum(typeset.fonts("body, body *"), [])
+        fonts = list(chain.from_iterable(typeset.fonts("body, body *")))
         assert len(fonts) > 20
         assert ours(fonts), panel
 
@@ -123,7 +124,7 @@ def test_its_figures_and_signs_are_of_one_width(opened):
 def test_it_comes_once_and_moves_nothing(browser, site, prepared):
     watched = Watched(browser, site, prepared.mesh)
     files = []
-    watched.page.on("response", lambda answer: files.append(answer))
+    watched.page.on("response", files.append)
     watched.open()
     arrived = watched.page.evaluate(ARRIVED)
     shown = watched.page.evaluate("performance.getEntriesByName('first-contentful-paint')[0]")
