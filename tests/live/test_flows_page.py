@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
+from live.looks import look_in_both
 from live.serving import Site
 from live.watching import Watched
 from tomoskin.live import Runner, kept_token, take_flows
@@ -15,8 +15,6 @@ from tomoskin.skin import Skin
 from tomoskin.source import open_source
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
-PICTURES = os.environ.get("TOMOSKIN_PICTURES")
-"""A folder for pictures of each flow, light and dark, to be looked at."""
 
 
 @pytest.fixture(scope="module")
@@ -34,13 +32,8 @@ def site(prepared, folder):
     runner.stop()
 
 
-def picture(opened, name):
-    """What is shown, for a person's eyes, where a folder is named for it."""
-    if PICTURES is None:
-        return
-    for scheme in ("light", "dark"):
-        opened.page.emulate_media(color_scheme=scheme)
-        opened.page.screenshot(path=Path(PICTURES) / f"{name}-{scheme}.png")
+def looks_right(opened, name):
+    assert look_in_both(opened.page, name) == {}
 
 
 def press_dot(opened, done):
@@ -69,7 +62,9 @@ def guided(opened, kind, count):
 def test_a_recording_is_marked_listed_exported_played_and_left(opened, folder):
     page = opened.page
     assert opened.test_id("timeline").count() == 0
-    page.keyboard.press("c")
+    opened.test_id("do-record").click()
+    opened.test_id("state").filter(has_text="Live, recording").wait_for()
+    assert opened.test_id("do-record").get_attribute("aria-pressed") == "true"
     opened.test_id("timeline").wait_for()
     opened.press(0.03, 0.02)
     page.keyboard.press("m")
@@ -77,7 +72,7 @@ def test_a_recording_is_marked_listed_exported_played_and_left(opened, folder):
     page.keyboard.press("Enter")
     opened.page.locator(".track-of-time .note").wait_for()
     opened.test_id("span").first.wait_for()
-    picture(opened, "recording")
+    looks_right(opened, "recording")
     page.mouse.up()
     opened.lifted()
     page.keyboard.press("c")
@@ -93,7 +88,7 @@ def test_a_recording_is_marked_listed_exported_played_and_left(opened, folder):
         link.click()
     assert download.value.suggested_filename == f"{path.stem}-touches.csv"
     assert Path(download.value.path()).read_text().startswith("frame,time_s,id,")
-    picture(opened, "sessions")
+    looks_right(opened, "sessions")
     _played_and_left(opened, row, path)
 
 
@@ -118,7 +113,7 @@ def _played_and_left(opened, row, path):
     opened.test_id("step").click()
     opened.until("last.touches.length === 1")
     opened.until(f"last.sequence !== {before}")
-    picture(opened, "replay")
+    looks_right(opened, "replay")
     opened.test_id("track").focus()
     page.keyboard.press("Home")
     opened.test_id("when").filter(has_text="0:00").wait_for()
@@ -137,18 +132,18 @@ def test_the_board_says_what_it_is_and_is_connected_anew(opened):
     opened.test_id("take-reference").click()
     opened.test_id("reference-words").filter(has_text="keep hands off").wait_for()
     opened.test_id("reference-words").filter(has_text="Stands for").wait_for()
-    picture(opened, "board")
+    looks_right(opened, "board")
 
 
 def test_touch_is_taught_by_pressing_dots(opened, folder):
     guided(opened, "touch", 6)
     opened.test_id("told").filter(has_text="Missed by").wait_for()
-    picture(opened, "touch")
+    looks_right(opened, "touch")
     opened.test_id("flow-keep").click()
     opened.test_id("calibration").filter(has_text="touch.npz").wait_for()
     assert len(read_calibration(folder / "touch.npz").locator.presses) == 6
     opened.press(0.03, 0.03)
-    picture(opened, "calibrated")
+    looks_right(opened, "calibrated")
     opened.page.mouse.up()
     opened.lifted()
 
@@ -156,7 +151,7 @@ def test_touch_is_taught_by_pressing_dots(opened, folder):
 def test_the_wires_are_found_by_pressing_dots(opened, folder):
     guided(opened, "wiring", 3)
     opened.test_id("told").filter(has_text="as the skin file says").wait_for()
-    picture(opened, "wiring")
+    looks_right(opened, "wiring")
     opened.test_id("flow-keep").click()
     opened.test_id("flow-begin").wait_for()
     assert Skin.load(folder / "wired.toml").n_electrodes == 8
@@ -179,7 +174,7 @@ def test_a_page_finds_a_server_that_was_started_again_with_its_token(
     third = Site(site.runner, port=first.port)
     try:
         watched.test_id("state").filter(has_text="started again and does not know").wait_for()
-        picture(watched, "refused")
+        looks_right(watched, "refused")
     finally:
         third.stop()
         watched.context.close()

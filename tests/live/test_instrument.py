@@ -6,6 +6,7 @@ from functools import partial
 
 import pytest
 
+from live.looks import look_in_both
 from live.serving import Site
 from live.watching import Watched, axe_finds
 from tomoskin.live import STATIC, Runner, SettingsDesk, TwinDesk, prepare
@@ -16,15 +17,6 @@ pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 
 MOST_GZIPPED = 120_000
 DRAWERS = ("twin", "signals", "settings")
-SIZES = ((1280, 720), (1024, 768), (768, 1024))
-OVERLAPS = """() => {
-    const boxes = [...document.querySelectorAll("header.top, .sheet, .side, footer.controls")]
-        .map((element) => element.getBoundingClientRect());
-    const over = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1
-        && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
-    const out = (box) => box.right > innerWidth + 1 || box.bottom > innerHeight + 1;
-    return boxes.some((a, k) => out(a) || boxes.slice(k + 1).some((b) => over(a, b)));
-}"""
 
 
 def take_desks(hub):
@@ -56,17 +48,6 @@ def test_a_setting_shows_in_the_picture_and_is_taken_back(opened):
     opened.page.keyboard.press("Enter")
     opened.test_id("refused").filter(has_text="expected a number from 0 to 2, got 7").wait_for()
     assert opened.page.evaluate("window.tomoskin.last.referenceReady")
-
-
-def test_the_drawer_never_covers_the_sheet(opened):
-    sheet = opened.test_id("sheet").bounding_box()
-    for drawer in DRAWERS:
-        opened.test_id(f"open-{drawer}").click()
-        box = opened.test_id(f"drawer-{drawer}").bounding_box()
-        assert box["x"] >= sheet["x"] + sheet["width"]
-        assert opened.test_id("sheet").bounding_box() == sheet
-        opened.page.keyboard.press("Escape")
-        opened.test_id(f"drawer-{drawer}").wait_for(state="detached")
 
 
 def edit_pattern(opened):
@@ -135,7 +116,7 @@ def test_a_cut_electrode_is_said_in_words_and_by_shape(opened):
 
 def test_signals(opened):
     opened.page.keyboard.press("g")
-    assert "E1 → E2" in opened.test_id("drive").inner_text()
+    assert "E1 to E2" in opened.test_id("drive").inner_text()
     assert "E2 +" in opened.test_id("electrode-2").text_content()
     opened.test_id("signals-noise").click()
     opened.test_id("signals-sum").filter(has_text="µV").wait_for()
@@ -185,19 +166,7 @@ def test_a_bent_sheet_is_pressed_in_space(browser):
         runner.stop()
 
 
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-def test_nothing_overlaps_or_is_cut_off(opened, size):
-    opened.page.set_viewport_size({"width": size[0], "height": size[1]})
-    opened.page.evaluate("() => new Promise(requestAnimationFrame)")
-    assert not opened.page.evaluate(OVERLAPS)
-    opened.test_id("open-settings").click()
-    opened.test_id("drawer-settings").wait_for()
-    assert not opened.page.evaluate(OVERLAPS)
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing(opened, scheme):
-    opened.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+def test_axe_finds_nothing(opened):
     assert axe_finds(opened.page) == []
     for drawer in DRAWERS:
         opened.test_id(f"open-{drawer}").click()
@@ -208,6 +177,7 @@ def test_axe_finds_nothing(opened, scheme):
     cell(opened, 2, "read +").fill("99")
     opened.test_id("pattern-said").filter(has_text="Row 2").wait_for()
     assert axe_finds(opened.page, ".own") == []
+    assert look_in_both(opened.page, "pattern") == {}
 
 
 def test_the_bundle_is_small():

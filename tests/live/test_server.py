@@ -2,6 +2,7 @@
 
 import gc
 import json
+import mimetypes
 import os
 import signal
 import socket
@@ -44,6 +45,20 @@ def site(runner, static):
     site = Site(runner, static)
     yield site
     site.stop()
+
+
+def test_the_typeface_has_its_own_type_on_a_machine_that_knows_none(runner, static, monkeypatch):
+    monkeypatch.setattr(mimetypes, "_db", mimetypes.MimeTypes())
+    monkeypatch.setattr(mimetypes, "types_map", {})
+    (static / "assets" / "letters.woff2").write_bytes(b"wOF2")
+    site = Site(runner, static)
+    try:
+        with site.client() as client:
+            answer = client.get("/assets/letters.woff2")
+    finally:
+        site.stop()
+    assert answer.headers["content-type"] == "font/woff2"
+    assert "default-src 'self'" in answer.headers["content-security-policy"]
 
 
 def first(socket, wanted):

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from live.looks import look_in_both
 from live.serving import Site
 from live.test_runner import Watch
 from live.watching import axe_finds, distance
@@ -144,14 +145,13 @@ def test_presses_of_any_face_stand_in_a_list(opened):
     assert row.count() == 0
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing_in_the_drawer(opened, scheme):
-    opened.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+def test_axe_finds_nothing_in_the_drawer_and_it_looks_right(opened):
     opened.page.keyboard.press("w")
     opened.test_id("face-bar").click()
     opened.test_id("sheet").focus()
     opened.page.keyboard.press("Enter")
     opened.test_id("held").wait_for()
     assert axe_finds(opened.page, "#drawer", "[data-testid=bend]") == []
+    assert look_in_both(opened.page, "held") == {}
     opened.page.keyboard.press("Escape")
     opened.lifted()

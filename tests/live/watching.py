@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from conftest import missing
+from live.looks import SCRIPT
 from tomoskin.live import STATIC
 
 FLAGS = Path(__file__).resolve().parents[2] / "scripts" / "chromium.flags"
@@ -20,10 +21,16 @@ READ = """() => {
 class Watched:
     """A page of which everything that goes wrong is noted."""
 
-    def __init__(self, browser, site, mesh):
+    def __init__(self, browser, site, mesh, size=(1280, 720), *, touch=False):
+        """``touch``: a screen that is pressed with fingers, without a mouse."""
         self.site, self._mesh = site, mesh
         self.wrong = []
-        self.context = browser.new_context(viewport={"width": 1280, "height": 720})
+        self.context = browser.new_context(
+            viewport={"width": size[0], "height": size[1]},
+            has_touch=touch,
+            reduced_motion="reduce",
+        )
+        self.context.add_init_script(path=SCRIPT)
         self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE)
         self.page.on("console", self._console)
@@ -92,11 +99,16 @@ def distance(one, two):
 
 
 def axe_finds(page, *parts):
-    """What axe-core objects to on the page, or in the ``parts`` of it that are named by CSS."""
+    """What axe-core objects to on the page, or in the ``parts`` of it that are named by CSS.
+
+    Contrast is left to ``looks``, which reads canvases and drawings too.
+    """
     if not AXE.is_file():
         missing("the page's accessibility: axe-core is not installed (make page)")
     if page.evaluate("typeof axe") == "undefined":
         page.evaluate(AXE.read_text())
     scope = {"include": [[part] for part in parts]} if parts else None
-    found = page.evaluate("scope => axe.run(scope ?? document)", scope)["violations"]
+    rules = {"rules": {"color-contrast": {"enabled": False}}}
+    found = page.evaluate("([scope, rules]) => axe.run(scope ?? document, rules)", [scope, rules])
+    found = found["violations"]
     return [(v["id"], [node["target"] for node in v["nodes"]][:3]) for v in found]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import mimetypes
 import signal
 import socket
 from collections.abc import AsyncIterator, Iterator
@@ -82,6 +83,8 @@ def listen(host: str, port: int) -> socket.socket:
 def application(hub: Hub, door: Door, static: Path = STATIC) -> ASGIApp:
     """ASGI application: the built page, ``/ws`` for each open page, ``/status`` for programs,
     ``/files/NAME`` for what is in the session folder."""
+    # Whether Python knows the page's typeface depends on its version and on the machine's list.
+    mimetypes.add_type("font/woff2", ".woff2")
 
     async def stream(websocket: WebSocket) -> None:
         await Page(websocket, hub).run()

@@ -1,6 +1,7 @@
 /** Where the page starts. */
 
 import "./styles/tokens.css";
+import "./styles/typeface.css";
 import "./styles/page.css";
 import "./styles/sheet.css";
 import "./styles/panels.css";
@@ -22,8 +23,10 @@ import "./twin/Twin";
 import "./signals/Signals";
 import "./settings/Settings";
 import { scene, start } from "./state";
+import { typeface } from "./theme";
 
 start(); // the server answers while the page is laid out
+await typeface(); // so that nothing moves when it comes, and canvases have it from the first
 const page = document.getElementById("page");
 if (page) render(<App />, page);
 window.addEventListener("keydown", onKey);

@@ -1,4 +1,4 @@
-/** The colours that canvases need, read from styles/tokens.css, following the system's light or dark. */
+/** The colours and the typeface that canvases need, read from styles/, following the system's light or dark. */
 
 import { signal } from "@preact/signals";
 import { CHANGE, mapTable } from "./colours";
@@ -27,6 +27,11 @@ function read(): Theme {
 }
 
 export const theme = signal<Theme>(read());
+
+/** Settles when the typeface is there, all of its files; or cannot be had, and another must do. */
+export function typeface(): Promise<unknown> {
+  return Promise.allSettled([...document.fonts].map((face) => face.load()));
+}
 
 darkQuery.addEventListener("change", () => {
   theme.value = read();

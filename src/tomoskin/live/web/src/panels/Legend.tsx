@@ -54,7 +54,10 @@ export function Legend() {
         </button>
       )}
       <p class="ring" title="The ellipse around a touch: where it is with 90 % of certainty, by the noise">
-        ◯ 90 %
+        <svg viewBox="0 0 14 14" aria-hidden="true">
+          <circle cx="7" cy="7" r="5.5" />
+        </svg>{" "}
+        90 %
       </p>
     </aside>
   );

@@ -20,7 +20,7 @@ export interface PlotProps {
 export function axis(theme: Theme, more: uPlot.Axis): uPlot.Axis {
   return {
     stroke: theme.muted,
-    font: `13px ${theme.font}`,
+    font: `14px ${theme.font}`,
     grid: { stroke: theme.line, width: 1 },
     ticks: { show: false },
     gap: 4,

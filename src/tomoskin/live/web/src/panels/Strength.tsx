@@ -8,6 +8,9 @@ import { history, limit, link, newest, scene, shown } from "../state";
 import { theme } from "../theme";
 import { axis, Plot, type Plan } from "./Plot";
 
+/** Names of more times would run into one another, px. */
+const NARROW = 320;
+
 const scale = computed(() => scaleFor(limit.value, scene.value?.unit ?? "S"));
 
 /** The touch's number where its line ends. */
@@ -16,7 +19,7 @@ function nameLines(plot: uPlot): void {
   const colours = theme.peek();
   const density = window.devicePixelRatio;
   ctx.save();
-  ctx.font = `600 ${13 * density}px ${colours.font}`;
+  ctx.font = `600 ${14 * density}px ${colours.font}`;
   ctx.fillStyle = colours.accent;
   ctx.textAlign = "left";
   ctx.textBaseline = "middle";
@@ -48,7 +51,7 @@ function plan(): Plan | null {
       axis(colours, {
         size: 26,
         gap: 8,
-        splits: () => [-10, -8, -6, -4, -2, 0],
+        splits: (plot) => (plot.width < NARROW ? [-10, -5, 0] : [-10, -8, -6, -4, -2, 0]),
         values: (_, splits) => splits.map((v) => (v === 0 ? "now" : `−${-v} s`)),
       }),
       axis(colours, {

@@ -19,13 +19,17 @@ export function TopLine() {
       <p class="state" data-testid="state">
         <span class="lamp" aria-hidden="true" />
         <strong>{said.text}</strong>
-        {scene.value && !said.act && <span class="source">{scene.value.source}</span>}
+        {scene.value && !said.act && <span class="source" title={scene.value.source}>{scene.value.source}</span>}
         {status.value && !said.act && (
           <span class="alpha" data-testid="alpha" title={alphaInFull(status.value)}>
             {alpha(status.value)}
           </span>
         )}
-        {notice.value && !said.act && <span class="notice">{notice.value}</span>}
+        {notice.value && !said.act && (
+          <span class="notice" title={notice.value}>
+            {notice.value}
+          </span>
+        )}
         {lost && (
           <button type="button" onClick={() => connection.open()}>
             Try now

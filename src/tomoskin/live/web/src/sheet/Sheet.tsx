@@ -22,10 +22,13 @@ import { Furniture } from "./Furniture";
 import { Painter } from "./painter";
 import { cursor, listen } from "./pointer";
 import { hovered, locator, seen, shownDrive, shownPair } from "./space";
-import { around, boxOf, fit, type View } from "./view";
+import { around, boxOf, fit, type Margin, type View } from "./view";
 
-/** Room for the electrodes' labels all round and for the legend at the left. */
-const MARGIN = { left: 186, right: 64, top: 52, bottom: 80 };
+/** Room for the electrodes' labels all round and for the legend at the left; on a telephone less. */
+const margin = (width: number): Margin =>
+  width > 600
+    ? { left: 186, right: 64, top: 52, bottom: 80 }
+    : { left: 134, right: 50, top: 46, bottom: 46 };
 const NOWHERE: View = { scale: 1, originX: 0, originY: 0, width: 0, height: 0 };
 
 export const view = signal<View>(NOWHERE);
@@ -68,8 +71,8 @@ export function Sheet() {
         const [width, height] = size.value;
         if (scene.value && width > 0) {
           view.value = seen.value
-            ? around(seen.value, width, height, MARGIN)
-            : fit(boxOf(scene.value.outline), width, height, MARGIN);
+            ? around(seen.value, width, height, margin(width))
+            : fit(boxOf(scene.value.outline), width, height, margin(width));
         }
         painter.resize(width, height);
       }),

@@ -139,7 +139,7 @@ function drawNumber(pen: Pen, theme: Theme, view: View, touch: Touch): void {
   pen.fillText(text, cx, cy + 1);
   if (!touch.several) return;
   const remark = touch.several > 1 ? `${touch.several} too close` : "too close?";
-  pen.font = `500 13px ${theme.font}`;
+  pen.font = `500 14px ${theme.font}`;
   pen.textAlign = "left";
   pen.strokeStyle = theme.halo;
   pen.lineWidth = 4;
@@ -193,7 +193,7 @@ function drawHeld(pen: Pen, theme: Theme, view: View, held: Held, maxForce: numb
   const lowest = Math.max(...corners.map(([, cy]) => cy));
   haloed(pen, theme, around(corners, 1), theme.muted, 1);
   haloed(pen, theme, around(corners, held.force / maxForce), theme.ink, 3);
-  pen.font = `500 13px ${theme.font}`;
+  pen.font = `500 14px ${theme.font}`;
   pen.textAlign = "center";
   pen.textBaseline = "top";
   pen.strokeStyle = theme.halo;

@@ -244,7 +244,7 @@ function Drives() {
       <button type="button" aria-label="Drive before" onClick={step(-1)}>
         ‹
       </button>
-      <output data-testid="drive">E{drive?.label.replace("–", " → E")}</output>
+      <output data-testid="drive">E{drive?.label.replace("–", " to E")}</output>
       <button type="button" aria-label="Next drive" data-testid="next-drive" onClick={step(1)}>
         ›
       </button>
