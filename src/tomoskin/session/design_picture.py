@@ -21,13 +21,15 @@ _TICKS = (*_LEVELS, 0.3, 0.7, 1.5, 3.0, 4.0, 7.0, 15.0, 30.0, 70.0)
 _COLOURS = "viridis_r"
 
 
-def write_promise(path: Path, skin: Skin, found: Promise, title: str) -> None:
+def write_promise(
+    path: Path, skin: Skin, found: Promise, title: str, *, overwrite: bool = False
+) -> None:
     """Draw both maps side by side, with the electrodes and, within 85 % of the way out, contours.
 
     Raises
     ------
     DataError
-        When matplotlib is not installed or the file cannot be written.
+        When matplotlib is not installed, and as :func:`written` does.
     """
     figure = new_figure(path, 11.0, 4.7)
     left, right = figure.subplots(1, 2)
@@ -44,7 +46,7 @@ def write_promise(path: Path, skin: Skin, found: Promise, title: str) -> None:
         bar.ax.tick_params(labelsize=8)
         bar.ax.minorticks_off()
     figure.suptitle(title, fontsize=10)
-    save_figure(path, figure)
+    save_figure(path, figure, overwrite=overwrite)
 
 
 def _draw(ax: Any, skin: Skin, found: Promise, values: FloatArray) -> Any:
