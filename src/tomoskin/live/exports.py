@@ -68,9 +68,7 @@ class Export:
         """Write EIDORS' structures."""
         skin = self.session.skin
         recording = recording_of(self.session)
-        write_matlab(
-            path, recording, skin.current, skin.n_electrodes, overwrite=self.overwrite
-        )
+        write_matlab(path, recording, skin.current, skin.n_electrodes, overwrite=self.overwrite)
 
     def series(self, path: Path) -> None:
         """Write a series of meshes with their images."""
