@@ -71,7 +71,7 @@ def make_set(
     ScriptError
         When there is no room on the skin for what is to be drawn.
     """
-    single = out.suffix == ".npz"
+    single = out.suffix.lower() == ".npz"
     if single:
         check_outputs([Output(out, makes_folders=True)], overwrite=overwrite)
     folder = out.with_name(f"{out.name}.parts") if single else out
