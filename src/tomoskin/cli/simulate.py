@@ -11,7 +11,7 @@ import typer
 from tomoskin.cli.named_files import RECORDING, ForceFlag, Given, Reads, Writes
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
-from tomoskin.core import DataError, OutputError
+from tomoskin.core import DataError
 
 if TYPE_CHECKING:
     from tomoskin.live import Workers
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _LARGEST = 10_000_000
 """A script has at most so many bytes."""
 
-LABELLED = {".npz": "labelled frames in one file", "": "a folder of them"}
+ONE_FILE = {".npz": "labelled frames in one file"}
 
 
 def _simulated(out: Path | None, given: Given, called: str) -> list[Output]:
@@ -32,15 +32,10 @@ def _simulated(out: Path | None, given: Given, called: str) -> list[Output]:
     assert out is not None
     if given["presses"] is None:
         return [Output(out, RECORDING, called)]
-    if out.suffix.lower() == ".npz" or not out.exists():
-        return [Output(out, LABELLED, called, makes_folders=True)]
-    if out.is_dir():
+    if out.is_dir() and out.suffix.lower() != ".npz":
         return []
-    raise OutputError(
-        "expected a folder or a new name, got a file",
-        where=f"{called} {out}",
-        hint="choose another name",
-    )
+    endings = ONE_FILE if out.exists() else ONE_FILE | {"": "a folder of them"}
+    return [Output(out, endings, called, makes_folders=True)]
 
 
 def simulate(
@@ -54,7 +49,7 @@ def simulate(
     out: Annotated[
         Path,
         typer.Option(help="Session file; with --presses a folder, or FILE.npz."),
-        Writes(RECORDING | LABELLED, _simulated),
+        Writes(RECORDING | ONE_FILE, _simulated),
     ],
     presses: Annotated[
         int | None,
