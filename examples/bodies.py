@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
+
+from figure_file import chosen, parser_of
 
 
-def options_of(arguments: Sequence[str] | None, title: str | None) -> argparse.Namespace:
-    """Folder of the figure (made if it is not there), and seed."""
-    parser = argparse.ArgumentParser(
-        description=title, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("figures"), help="folder of the figure")
+def options_of(name: str, arguments: Sequence[str] | None, title: str | None) -> argparse.Namespace:
+    """File of the figure, and seed."""
+    parser = parser_of(title)
     parser.add_argument("--seed", type=int, default=1, help="of sheet, noise and chance")
-    options = parser.parse_args(arguments)
-    options.out.mkdir(parents=True, exist_ok=True)
-    return options
+    return chosen(parser, arguments, name)

@@ -27,7 +27,7 @@ TRIANGLES, NODES = 661, 362
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Mesh, check, draw; the numbers that were checked."""
-    options = options_of(arguments, __doc__ or "")
+    options = options_of("fig31_mesh", arguments, __doc__)
     skin = Skin.load(options.skin)
     mesh = skin.mesh()
     found = check(mesh, discretisation_error(skin, mesh))
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     figures.draw_electrodes(ax, mesh)
     ax.set_title(f"{len(mesh.cells)} triangles, {len(mesh.points)} nodes")
     ax.set_ylabel("y / mm")
-    figures.save(made, options.out, "fig31_mesh")
+    options.figure.save(made)
     return found
 
 

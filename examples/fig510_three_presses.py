@@ -43,7 +43,7 @@ Shown = tuple[str, Image, list[Reading]]
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, check, draw; the numbers that were checked."""
-    with open_lab(arguments, __doc__, NOSER) as lab:
+    with open_lab("fig510_three_presses", arguments, __doc__, NOSER) as lab:
         imager = Imager(lab.skin)
         places = lab.skin.outline.centre + FROM_CENTRE * np.column_stack(
             [np.cos(TURNS), np.sin(TURNS)]
@@ -107,7 +107,7 @@ def draw(lab: Lab, imager: Imager, places: FloatArray, shown: Sequence[Shown]) -
         ax.set_ylabel("y / mm")
     figures.letters(axes.ravel())
     figures.colour_bar(made, drawn, axes)
-    figures.save(made, lab.out, "fig510_three_presses")
+    lab.figure.save(made)
 
 
 if __name__ == "__main__":

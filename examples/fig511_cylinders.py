@@ -50,7 +50,7 @@ STAGES: dict[str, tuple[Pose, tuple[Probe, ...]]] = {
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, check, draw; the numbers that were checked."""
-    with open_lab(arguments, __doc__, NOSER) as lab:
+    with open_lab("fig511_cylinders", arguments, __doc__, NOSER) as lab:
         imager = Imager(lab.skin)
         idle = lab.measure("flat, nothing touches the skin", n=20)
         shown = []
@@ -112,7 +112,7 @@ def draw(lab: Lab, imager: Imager, shown: Sequence[Shown]) -> None:
     axes[0, 0].set_ylabel("y / mm")
     figures.letters(axes[0])
     figures.colour_bar(made, drawn, axes)
-    figures.save(made, lab.out, "fig511_cylinders")
+    lab.figure.save(made)
 
 
 if __name__ == "__main__":

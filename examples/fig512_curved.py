@@ -49,7 +49,7 @@ BODIES: dict[str, Pose] = {
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, check, draw; the numbers that were checked."""
-    with open_lab(arguments, __doc__, NOSER) as lab:
+    with open_lab("fig512_curved", arguments, __doc__, NOSER) as lab:
         imager = Imager(lab.skin)
         shown = [on_body(lab, imager, name, pose) for name, pose in BODIES.items()]
         found = {f"{name}: miss, mm": checked(name, regions) for name, _, regions in shown}
@@ -145,7 +145,7 @@ def draw(lab: Lab, imager: Imager, shown: Sequence[Shown]) -> None:
         figures.colour_bar(made, drawn, row)
         row[0].set_ylabel("y / mm")
     figures.letters(axes.ravel())
-    figures.save(made, lab.out, "fig512_curved")
+    lab.figure.save(made)
 
 
 if __name__ == "__main__":

@@ -34,7 +34,7 @@ CHANGES = source_drive(N, driven=True) | {"readout": {"gain": 15}}
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, check, draw; the numbers that were checked."""
-    with open_lab(arguments, __doc__, CHANGES) as lab:
+    with open_lab("fig52_potentials", arguments, __doc__, CHANGES) as lab:
         volts = lab.measure("nothing touches the skin")
         found: dict[str, float] = {}
         for electrode in SHOWN:
@@ -76,7 +76,7 @@ def draw(lab: Lab, volts: FloatArray) -> None:
         ax.set_xticks(np.arange(N), [f"E{(k + 1) % N + 1}" for k in range(N)])
         ax.set_xlabel("grounded electrode (current enters at the one before)")
     axes[0, 0].set_ylabel("potential difference / mV")
-    figures.save(made, lab.out, "fig52_potentials")
+    lab.figure.save(made)
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ N = 8
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, check, draw; the numbers that were checked."""
-    with open_lab(arguments, __doc__, source_drive(N)) as lab:
+    with open_lab("fig54_reference", arguments, __doc__, source_drive(N)) as lab:
         mean = lab.measure("nothing touches the skin").mean(axis=0)
         found = check(lab, mean)
         draw(lab, mean)
@@ -65,7 +65,7 @@ def draw(lab: Lab, mean: FloatArray) -> None:
     ax.bar(figures.places(N), np.nan_to_num(table).ravel(), width=0.8, color=figures.BLUE)
     figures.groups(ax, N)
     ax.set_ylabel("potential difference / mV")
-    figures.save(made, lab.out, "fig54_reference")
+    lab.figure.save(made)
 
 
 if __name__ == "__main__":

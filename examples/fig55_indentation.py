@@ -29,7 +29,7 @@ RADIUS, FORCE, GAP = 15e-3, 3.0, 7.5e-3
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, check, draw; the numbers that were checked."""
     found: dict[str, float] = {}
-    with open_lab(arguments, __doc__, source_drive(N)) as lab:
+    with open_lab("fig55_indentation", arguments, __doc__, source_drive(N)) as lab:
         changes = []
         for electrode in TESTED:
             name = f"E{electrode + 1}"
@@ -86,7 +86,7 @@ def draw(lab: Lab, changes: Sequence[FloatArray]) -> None:
         ax.set_title(f"15 mm, 3 N, in front of {name} (shaded: {name} drives)", loc="left")
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     axes[0, 0].set_xlabel("")
-    figures.save(made, lab.out, "fig55_indentation")
+    lab.figure.save(made)
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ RADII, FORCE, GAP = (15e-3, 18e-3, 25e-3), 5.0, 7.5e-3
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, check, draw; the numbers that were checked."""
-    with open_lab(arguments, __doc__, source_drive(N)) as lab:
+    with open_lab("fig57_probe_sizes", arguments, __doc__, source_drive(N)) as lab:
         changes, sizes, noises = [], [], []
         for radius in RADII:
             mm = f"{1e3 * radius:.0f} mm"
@@ -82,7 +82,7 @@ def draw(lab: Lab, changes: Sequence[FloatArray]) -> None:
     ax.set_ylabel("V − V₀ / µV")
     ax.set_title("5 N in front of E4 (shaded: E4 drives); radius", loc="left")
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
-    figures.save(made, lab.out, "fig57_probe_sizes")
+    lab.figure.save(made)
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ PLACES = ("between E3 and E4", "between E7 and E8", "at the centre")
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, check, draw; the numbers that were checked."""
     found: dict[str, float] = {}
-    with open_lab(arguments, __doc__, NOSER) as lab:
+    with open_lab("fig58_single_press", arguments, __doc__, NOSER) as lab:
         imager = Imager(lab.skin)
         shown = []
         for name, (x, y) in zip(PLACES, places(lab), strict=True):
@@ -98,7 +98,7 @@ def draw(
         ax.set_ylabel("y / mm")
     figures.letters(axes.ravel())
     figures.colour_bar(made, drawn, axes)
-    figures.save(made, lab.out, "fig58_single_press")
+    lab.figure.save(made)
 
 
 if __name__ == "__main__":

@@ -39,7 +39,7 @@ FIRST = (Probe(PROBES["circle, r 25 mm"], 0.0, 0.0, FORCE),)
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, check, draw; the numbers that were checked."""
     found: dict[str, float] = {}
-    with open_lab(arguments, __doc__, NOSER) as lab:
+    with open_lab("fig59_four_probes", arguments, __doc__, NOSER) as lab:
         imager = Imager(lab.skin)
         images, deviations = {}, []
         lab.measure("circle, r 25 mm, 3 N, at the centre, once before all", *FIRST, n=1)
@@ -91,7 +91,7 @@ def draw(lab: Lab, mesh: Mesh, images: dict[str, Image]) -> None:
     axes[0, 0].set_ylabel("y / mm")
     figures.letters(axes.ravel())
     figures.colour_bar(made, drawn, axes)
-    figures.save(made, lab.out, "fig59_four_probes")
+    lab.figure.save(made)
 
 
 if __name__ == "__main__":

@@ -183,7 +183,7 @@ def errors(found: Sequence[Reading], balls: Sequence[Inclusion]) -> FloatArray:
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Press, find, check, draw; the numbers that were checked."""
-    options = options_of(arguments, __doc__)
+    options = options_of("fig62_palpation", arguments, __doc__)
     bed = Bed(options.seed)
     balls = (between(-20e-3, 12e-3, LARGE), between(18e-3, -15e-3, SMALL))
     stages = bed.stages(balls)
@@ -192,7 +192,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     away = errors(found, balls)
     assert len(found) == 2, f"{len(found)} stiff spots were found"
     assert (away < 8e-3).all(), f"they lie {away} m from their places"
-    draw(palpation, stages, found, balls).savefig(options.out / "fig62_palpation.png")
+    options.figure.save(draw(palpation, stages, found, balls))
     return {
         "error of the 10 mm ball, mm": 1e3 * away[0],
         "error of the 8 mm ball, mm": 1e3 * away[1],

@@ -208,7 +208,7 @@ def sessions_of(seed: int, count: int = LEARNT + ASKED) -> list[Session]:
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Move, measure, tell, draw; the numbers that were checked."""
-    options = options_of(arguments, __doc__)
+    options = options_of("fig64_face", arguments, __doc__)
     sessions = sessions_of(options.seed)
     direct, both = (told(sessions, options.seed, direct=one) for one in (True, False))
     found = {
@@ -224,7 +224,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     pictures = [moving(change / np.abs(first.relaxed)) for change in first.changes]
     named = most_moved(pictures, first.moved)
     assert named.sum() >= 5, f"the electrode that moved most is named for {named.sum()} of 6"
-    draw(moving.face, pictures).savefig(options.out / "fig64_face.png")
+    options.figure.save(draw(moving.face, pictures))
     return found | {"expressions whose moving electrode is named": float(named.sum())}
 
 

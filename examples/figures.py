@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -35,7 +34,6 @@ mpl.rcParams.update({
     "axes.spines.right": False,
     "legend.frameon": False,
     "figure.constrained_layout.use": True,
-    "savefig.dpi": 130,
 })  # fmt: skip
 
 
@@ -46,13 +44,6 @@ def figure(
     made = Figure(figsize=size)
     FigureCanvasAgg(made)
     return made, made.subplots(rows, columns, squeeze=False, **options)
-
-
-def save(made: Figure, out: Path, name: str) -> Path:
-    """Write the figure as ``name``.png into the folder ``out``."""
-    path = out / f"{name}.png"
-    made.savefig(path)
-    return path
 
 
 def places(n: int) -> FloatArray:

@@ -19,6 +19,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from figure_file import FigureFile, chosen, parser_of
 from tomoskin.core import DataError, FloatArray, Frame
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.session import SessionReader, SessionWriter
@@ -97,11 +98,11 @@ class RecordedBench:
 
 @dataclass
 class Lab:
-    """A skin, where its frames come from, and where figures go."""
+    """A skin, where its frames come from, and where its figure goes."""
 
     skin: Skin
     bench: Bench
-    out: Path
+    figure: FigureFile
     writer: SessionWriter | None = None
 
     def __post_init__(self) -> None:
@@ -159,19 +160,23 @@ def in_front_of(skin: Skin, electrode: int, distance: float) -> tuple[float, flo
 
 @contextlib.contextmanager
 def open_lab(
+    name: str,
     arguments: Sequence[str] | None,
     title: str | None,
     changes: Changes | None = None,
 ) -> Iterator[Lab]:
-    """The lab that the command line asks for, with the ``changes`` that the experiment needs."""
-    options = options_of(arguments, title or "")
+    """The lab that the command line asks for, with the ``changes`` that the experiment needs.
+
+    ``name`` is that of the experiment's figure.
+    """
+    options = options_of(name, arguments, title)
     skin = Skin.load(options.skin).altered(changes or {})
     with contextlib.ExitStack() as stack:
         bench = stack.enter_context(_bench(options, skin))
         writer = (
             stack.enter_context(SessionWriter(options.record, skin)) if options.record else None
         )
-        yield Lab(skin, bench, options.out, writer)
+        yield Lab(skin, bench, options.figure, writer)
 
 
 def report(found: Mapping[str, float]) -> None:
@@ -223,16 +228,11 @@ def _asked(stage: str) -> threading.Event:
     return done
 
 
-def options_of(arguments: Sequence[str] | None, title: str) -> argparse.Namespace:
-    """The command line that all experiments share."""
-    parser = argparse.ArgumentParser(
-        description=title, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def options_of(name: str, arguments: Sequence[str] | None, title: str | None) -> argparse.Namespace:
+    """The command line that all experiments share; ``name`` is that of the figure."""
+    parser = parser_of(title)
     parser.add_argument("--source", default="twin", help="twin, serial:PORT or replay:FILE")
     parser.add_argument("--skin", default="textile-disc-8", help="built-in name or path")
-    parser.add_argument("--out", type=Path, default=Path("figures"), help="folder of the figure")
     parser.add_argument("--record", type=Path, help="also keep the frames in this session file")
     parser.add_argument("--seed", type=int, default=1, help="of the twin")
-    options = parser.parse_args(arguments)
-    options.out.mkdir(parents=True, exist_ok=True)
-    return options
+    return chosen(parser, arguments, name)

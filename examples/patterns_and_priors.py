@@ -45,7 +45,7 @@ Table = dict[tuple[str, str], list[SourceMetrics]]
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, check, draw; the numbers that were checked."""
-    with open_lab(arguments, __doc__, ALL_ROWS) as lab:
+    with open_lab("patterns_and_priors", arguments, __doc__, ALL_ROWS) as lab:
         centre = tuple(lab.skin.outline.centre.tolist())
         places = {
             "at the centre": centre,
@@ -110,7 +110,7 @@ def draw(lab: Lab, table: Table) -> None:
         _cells(ax, means)
         ax.set_title(name)
     axes[0, 0].set_yticks(range(len(PRIORS)), PRIORS)
-    figures.save(made, lab.out, "patterns_and_priors")
+    lab.figure.save(made)
 
 
 def _cells(ax: Any, means: FloatArray) -> None:

@@ -103,7 +103,7 @@ def centre(mesh: Mesh, values: FloatArray) -> FloatArray:
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     """Measure, find, draw; the numbers that were checked."""
-    options = options_of(arguments, __doc__)
+    options = options_of("soft_volume", arguments, __doc__)
     plain, ball, both = measured(options.seed)
     operator = imaging()
     mesh = operator.model.mesh
@@ -114,7 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     numbers = {"error of the ball, mm": 1e3 * away, "error of the touch, mm": 1e3 * beside}
     assert away < 8e-3, f"the ball is placed {1e3 * away:.1f} mm off"
     assert beside < 6e-3, f"the touch is placed {1e3 * beside:.1f} mm off"
-    draw(mesh, inside, touched, found, place).savefig(options.out / "soft_volume.png")
+    options.figure.save(draw(mesh, inside, touched, found, place))
     return numbers
 
 

@@ -116,7 +116,8 @@ def test_presses_are_added_to_an_older_calibration(tomoskin, tmp_path, presses):
     assert out.startswith("43 presses")
     assert "an older press  doubtful: has the same data as press 2" in out
     code, _, err = tomoskin(
-        "calibrate", "touch", few, "--onto", old, "--out", new, "--skin", "textile-square-16"
+        *("calibrate", "touch", few, "--onto", old, "--out", tmp_path / "other.npz"),
+        *("--skin", "textile-square-16"),
     )
     assert code == 1
     assert "the calibration is of skin" in err

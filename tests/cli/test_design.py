@@ -54,7 +54,7 @@ def test_wrong_options_are_said(tomoskin: Run, tmp_path: Path) -> None:
     assert "depth between 0 and 1" in err
     folder = tmp_path / "none" / "map.png"
     code, _, err = tomoskin("design", "--out", folder, "--electrodes", "")
-    assert code == 1
+    assert code == 2
     assert "cannot be written" in err
 
 
@@ -64,4 +64,4 @@ def test_a_map_of_no_known_kind_is_refused_before_the_work(
     monkeypatch.setattr(design, "_compared", lambda *_: pytest.fail("it has begun"))
     code, _, err = tomoskin("design", "--out", "map.xyz")
     assert code == 2
-    assert "expected a name that ends in .png, .pdf, .svg, got map.xyz" in err
+    assert "ends in .png (a picture), .pdf (a figure), .svg (a drawing), got map.xyz" in err

@@ -275,8 +275,6 @@ def test_a_time_constant_needs_times_that_go_on(save, image) -> None:
         (("--frames", "3:9"), "within 0:4"),
         (("--skin", "tank-16"), "rows are not in the recording"),
         (("--skin", "nothing"), "built-in skins"),
-        (("--out", "/nowhere/maps.png"), "cannot be written"),
-        (("--touches", "/nowhere/touches.csv"), "cannot be written"),
     ],
 )
 def test_what_cannot_be_is_one_sentence(save, image, arguments, said) -> None:

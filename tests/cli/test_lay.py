@@ -76,5 +76,5 @@ def test_metres_taken_for_millimetres_are_noticed(tomoskin, surface: Path) -> No
 def test_it_overwrites_nothing(tomoskin, surface: Path) -> None:
     (surface / "s.toml").write_text("mine")
     code, _, error = tomoskin(*arguments(surface))
-    assert (code, (surface / "s.toml").read_text()) == (1, "mine")
+    assert (code, (surface / "s.toml").read_text()) == (2, "mine")
     assert "exists" in error

@@ -57,7 +57,7 @@ def test_repair_mends_a_cut_file_and_leaves_it_alone(tomoskin, recorded, tmp_pat
     code, _, errors = tomoskin("session", "info", tmp_path / "cut.repaired.mcap")
     assert (code, errors) == (0, "")
     code, _, errors = tomoskin("session", "repair", cut)
-    assert code == 1
+    assert code == 2
     assert "exists already" in errors
 
 
@@ -89,7 +89,7 @@ def test_a_source_that_cannot_be_opened_leaves_no_file(tomoskin, tmp_path):
 
 def test_an_existing_file_is_refused(tomoskin, recorded):
     code, _, errors = tomoskin("record", recorded, "--source", "twin:fast", "--frames", "1")
-    assert code == 1
+    assert code == 2
     assert "exists already" in errors
 
 
@@ -143,4 +143,4 @@ def test_what_is_written_is_said(tomoskin, recorded, tmp_path):
     code, _, err = tomoskin("session", "info", table)
     assert (code, "session import" in err) == (1, True)
     code, _, err = tomoskin("session", "export", recorded, tmp_path / "none" / "x.csv")
-    assert (code, "make the folder first" in err) == (1, True)
+    assert (code, "make the folder first" in err) == (2, True)

@@ -11,7 +11,7 @@ import pytest
 from tomoskin.cli.app import COMMANDS
 
 HEAVY = ("numpy", "scipy", "rich", "msgspec", "starlette", "tomoskin.forward")
-LIGHT = {"app", "contents"}
+LIGHT = {"app", "contents", "named_files"}
 """Modules of the command line that are there before a command is known."""
 
 MOST_MODULES = 60
@@ -78,28 +78,3 @@ def test_firmware_is_of_eight_or_sixteen_channels(tomoskin) -> None:
     code, _, err = tomoskin("firmware", "build", "--channels", "7")
     assert code == 2
     assert "expected 8 or 16, got 7" in err
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("image", "none.npz", "--out", "{}.png"),
-        ("image", "none.npz", "--touches", "{}.csv"),
-        ("locate", "none.npz", "--calibration", "none.npz", "--touches", "{}.csv"),
-        ("states", "none.npz", "--calibration", "none.npz", "--out", "{}.csv"),
-        ("calibrate", "touch", "none.npz", "--out", "{}.npz"),
-        ("calibrate", "states", "none.npz", "--out", "{}.npz"),
-        ("calibrate", "bend", "none.npz", "--out", "{}.npz"),
-        ("calibrate", "wiring", "none.npz", "--out", "{}.toml"),
-        ("design", "--out", "{}.png"),
-        ("skin", "alpha", "textile-disc-8", "--out", "{}.png"),
-        ("skin", "merit", "textile-disc-8", "--out", "{}.png"),
-    ],
-)
-def test_where_nothing_can_be_written_is_said_before_the_work(tomoskin, tmp_path, words) -> None:
-    """Not even the input is looked at, which is not there either."""
-    target = tmp_path / "no such folder" / "x"
-    code, _, err = tomoskin(*(word.format(target) for word in words))
-    assert code == 1
-    assert "cannot be written: there is no such folder" in err
-    assert err.startswith(f"tomoskin: {target}")

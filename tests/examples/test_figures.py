@@ -51,7 +51,7 @@ def test_a_potential_beyond_the_converter_is_no_measurement(imported, tmp_path):
     high = {**example.ALL_ROWS, "readout": {"gain": 40}}
     said = r"at the rail: E\d stands at the converter's upper rail.*lower the amplifier's gain"
     with (
-        lab.open_lab(["--out", str(tmp_path)], "", high) as bench,
+        lab.open_lab("none", ["--out", str(tmp_path)], "", high) as bench,
         pytest.raises(DataError, match=said),
     ):
         bench.measure("at the rail")

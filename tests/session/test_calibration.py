@@ -48,7 +48,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(
     with pytest.raises(DataError, match="cannot be written"):
         write_calibration(tmp_path / "none" / "c.npz", calibration)
     (tmp_path / "folder").mkdir()
-    with pytest.raises(DataError, match="cannot be written"):
+    with pytest.raises(DataError, match="expected the name of a file, got a folder"):
         write_calibration(tmp_path / "folder", calibration)
     assert [p.name for p in tmp_path.iterdir()] == ["folder"]
 

@@ -179,7 +179,7 @@ def test_a_session_without_frames_gives_no_file_of_nothing(tomoskin, tmp_path, n
 @pytest.mark.parametrize("name", ["x.csv", "x.parquet", "x.h5", "x.mat", "x.vtu", "x.gif"])
 def test_a_place_that_cannot_be_written(tomoskin, whole, tmp_path, name):
     code, _, errors = tomoskin("session", "export", whole, tmp_path / "none" / name)
-    assert code == 1
+    assert code == 2
     assert len(errors.splitlines()) == 1
     assert "none" in errors
 

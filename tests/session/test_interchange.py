@@ -84,7 +84,7 @@ def test_unknown_keys_are_left_alone(tmp_path: Path) -> None:
 
 
 def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="cannot be written: Is a directory") as caught:
+    with pytest.raises(DataError, match="expected the name of a file, got a folder") as caught:
         write_interchange(tmp_path, RECORDING)
     assert caught.value.where == str(tmp_path)
 

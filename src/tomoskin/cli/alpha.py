@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.named_files import FIGURE, ForceFlag, Reads, Writes
+from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.recording import FramesOption, ReferenceOption, frame_range, idle_frames
 from tomoskin.core import TomoskinError
 
@@ -22,15 +23,19 @@ Outcome = tuple[str, "AlphaChoice | TomoskinError"]
 def alpha(
     skin: Annotated[str, typer.Argument(metavar="SKIN", help="Built-in name or path.")],
     recording: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Frames that the rules may look at.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Frames that the rules may look at."),
+        Reads(),
     ] = None,
     reference: ReferenceOption = None,
     frames: FramesOption = None,
     rule: Annotated[str | None, typer.Option(help="Only this rule.")] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="X.png", help="Where the curves are drawn.", callback=writable),
+        typer.Option(metavar="X.png", help="Where the curves are drawn."),
+        Writes(FIGURE),
     ] = None,
+    force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
     """Show what each rule chooses for alpha; with a recording, by its noise, frames and labels."""
@@ -45,7 +50,7 @@ def alpha(
     if rule and isinstance(outcomes[0][1], TomoskinError):
         raise outcomes[0][1]
     if out is not None:
-        _draw(out, prepared, spectrum, outcomes, evidence)
+        _draw(out, prepared, spectrum, outcomes, evidence, overwrite=force)
     _report(prepared, spectrum, outcomes, json=json)
 
 
@@ -83,6 +88,8 @@ def _draw(
     spectrum: Spectrum,
     outcomes: list[Outcome],
     evidence: Evidence,
+    *,
+    overwrite: bool,
 ) -> None:
     from tomoskin.inverse import AlphaChoice, picard
     from tomoskin.session import write_choices
@@ -91,7 +98,8 @@ def _draw(
     told = None
     if evidence.frames is not None:
         told = picard(spectrum, evidence.frames, evidence.noise)
-    write_choices(out, f"alpha of {prepared.skin.name}", choices, told)
+    title = f"alpha of {prepared.skin.name}"
+    write_choices(out, title, choices, told, overwrite=overwrite)
 
 
 def _report(prepared: Prepared, spectrum: Spectrum, outcomes: list[Outcome], *, json: bool) -> None:

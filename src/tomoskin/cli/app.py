@@ -15,7 +15,7 @@ import typer
 
 from tomoskin import __version__
 from tomoskin.cli.contents import later
-from tomoskin.core import TomoskinError
+from tomoskin.core import OutputError, TomoskinError
 
 DEBUG = "TOMOSKIN_DEBUG"
 """Environment variable: set it to see the traceback of an error."""
@@ -70,6 +70,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run a command and exit: 0 done, 1 failed, 2 wrong usage."""
     try:
         app(args=None if arguments is None else list(arguments), prog_name="tomoskin")
+    except OutputError as error:
+        _fail(str(error), code=2)
     except TomoskinError as error:
         _fail(str(error))
     except Exception as error:
@@ -80,8 +82,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     sys.exit(0)
 
 
-def _fail(message: str) -> NoReturn:
+def _fail(message: str, code: int = 1) -> NoReturn:
     if os.environ.get(DEBUG):
         raise  # noqa: PLE0704 - called while the error is handled
     typer.echo(f"tomoskin: {message}", err=True)
-    sys.exit(1)
+    sys.exit(code)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 import typer
 
 from tomoskin.cli.bench_table import tables
+from tomoskin.cli.named_files import Otherwise, Reads
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.core import DataError
 
@@ -29,14 +30,18 @@ def bench(
         str, typer.Argument(metavar="NAME", help="Which one; see --list.", show_default=True)
     ] = "whole",
     data: Annotated[
-        Path | None, typer.Option(help="Folder of public recordings, for those that need it.")
+        Path | None,
+        typer.Option(help="Folder of public recordings, for those that need it."),
+        Reads(),
     ] = None,
     cores: Annotated[
         int | None,
         typer.Option(min=1, help="Processor cores that may be used: 1, unless it asks for more."),
     ] = None,
     into: Annotated[
-        Path | None, typer.Option(help="Markdown file whose part of that name is written anew.")
+        Path | None,
+        typer.Option(help="Markdown file whose part of that name is written anew."),
+        Otherwise("a part between two marks is replaced, which is what it is for"),
     ] = None,
     list_: Annotated[bool, typer.Option("--list", help="List them, and measure nothing.")] = False,
     json: JsonFlag = False,
@@ -132,10 +137,12 @@ class _Place:
 
     def write(self, reports: Sequence[Any]) -> None:
         """Put tables, their notes and the machine there."""
+        from tomoskin.session import write_text
+
         machine = ", ".join(f"{key} {value}" for key, value in reports[-1].machine.items())
         parts = [f"\n{date.today():%-d %B %Y}; {machine}.\n", *map(_markdown, reports)]
         text = self.before + "\n".join(parts) + "\n" + self.after
-        self.file.write_text(text, encoding="utf-8")
+        write_text(self.file, text, overwrite=True)
 
 
 def _markdown(report: Any) -> str:

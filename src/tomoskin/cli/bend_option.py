@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tomoskin.cli.named_files import Reads
+
 if TYPE_CHECKING:
     from tomoskin.live import Prepared
 
@@ -15,6 +17,7 @@ BendOption = Annotated[
     typer.Option(
         metavar="C.npz", help="From tomoskin calibrate bend: bends are taken out, and read."
     ),
+    Reads(),
 ]
 
 

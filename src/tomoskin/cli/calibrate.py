@@ -13,7 +13,8 @@ from tomoskin.cli.calibrate_bend import calibrate_bend
 from tomoskin.cli.calibrate_states import calibrate_states
 from tomoskin.cli.calibrate_wiring import calibrate_wiring
 from tomoskin.cli.contents import group
-from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.named_files import CALIBRATION, ForceFlag, Reads, Writes
+from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
@@ -39,10 +40,12 @@ app.command("wiring")(calibrate_wiring)
 @app.command("touch")
 def touch(
     recording: Annotated[
-        Path, typer.Argument(metavar="INPUT", help="Frames with labels: one touch each.")
+        Path, typer.Argument(metavar="INPUT", help="Frames with labels: one touch each."), Reads()
     ],
     out: Annotated[
-        Path, typer.Option(metavar="C.npz", help="Where the calibration goes.", callback=writable)
+        Path,
+        typer.Option(metavar="C.npz", help="Where the calibration goes."),
+        Writes(CALIBRATION),
     ],
     skin: Annotated[
         str | None,
@@ -54,8 +57,10 @@ def touch(
             metavar="OLD.npz",
             help="Calibration that these presses are added to: ten or twenty align it to today.",
         ),
+        Reads(),
     ] = None,
     reference: ReferenceOption = None,
+    force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
     """Learn where a touch is from presses at known places."""
@@ -71,7 +76,7 @@ def touch(
     xy, dv = labels(whole), changes(whole, reference, pattern)
     frames = labelled_frames(xy)
     calibration = learn(dv[frames], xy[frames])
-    write_calibration(out, calibration)
+    write_calibration(out, calibration, overwrite=force)
     found = _findings(calibration, frames.tolist())
     if json:
         emit(found)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.named_files import CALIBRATION, ForceFlag, Reads, Writes
+from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, idle_frames, say_notes
 from tomoskin.core import DataError
@@ -22,10 +23,14 @@ _ALONG_Y = 90.0
 
 def calibrate_bend(
     recording: Annotated[
-        Path, typer.Argument(metavar="INPUT", help="Frames of known bends, nothing touching.")
+        Path,
+        typer.Argument(metavar="INPUT", help="Frames of known bends, nothing touching."),
+        Reads(),
     ],
     out: Annotated[
-        Path, typer.Option(metavar="C.npz", help="Where the calibration goes.", callback=writable)
+        Path,
+        typer.Option(metavar="C.npz", help="Where the calibration goes."),
+        Writes(CALIBRATION),
     ],
     skin: Annotated[
         str | None, typer.Option(help="Built-in name or path; without it that of the session.")
@@ -40,6 +45,7 @@ def calibrate_bend(
         ),
     ] = None,
     reference: ReferenceOption = None,
+    force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
     """Learn the bends of a skin, so that touches are told from them and angles are read."""
@@ -65,7 +71,7 @@ def calibrate_bend(
                                whole.time[frames])  # fmt: skip
     with Bar("learning"):
         model = BendModel.learn(examples, voltage_covariance(prepared, straight))
-    write_bends(out, BendCalibration(model, prepared.pattern, chosen.name))
+    write_bends(out, BendCalibration(model, prepared.pattern, chosen.name), overwrite=force)
     found = {
         "frames": len(examples.angle),
         "directions": model.n_modes,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.named_files import CALIBRATION, ForceFlag, Reads, Writes
+from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
@@ -23,10 +24,14 @@ _HARDLY = 0.5
 
 def calibrate_states(
     recording: Annotated[
-        Path, typer.Argument(metavar="INPUT", help="Frames, with the state of some of them.")
+        Path,
+        typer.Argument(metavar="INPUT", help="Frames, with the state of some of them."),
+        Reads(),
     ],
     out: Annotated[
-        Path, typer.Option(metavar="C.npz", help="Where the calibration goes.", callback=writable)
+        Path,
+        typer.Option(metavar="C.npz", help="Where the calibration goes."),
+        Writes(CALIBRATION),
     ],
     skin: Annotated[
         str | None,
@@ -47,8 +52,10 @@ def calibrate_states(
             help="Calibration of another session: these frames, labelled or not, fit it to this "
             "one.",
         ),
+        Reads(),
     ] = None,
     reference: ReferenceOption = None,
+    force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
     """Learn the state of a frame, or flags, from a few examples of each."""
@@ -68,7 +75,7 @@ def calibrate_states(
     examples = marked(recording, dv, state or [], old.classifier.examples.codes if old else None)
     with Bar("learning"):
         made = _learnt(examples, old, pattern, chosen)
-    write_states(out, made)
+    write_states(out, made, overwrite=force)
     _report(made, len(dv), old is not None, json=json)
 
 

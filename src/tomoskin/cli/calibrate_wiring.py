@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
+from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, idle_frames, say_notes
 from tomoskin.cli.skin_choice import SkinOption, skin_for_file
@@ -23,16 +24,16 @@ if TYPE_CHECKING:
 
 def calibrate_wiring(
     recording: Annotated[
-        Path, typer.Argument(metavar="INPUT", help="Frames with labels: one touch each.")
+        Path, typer.Argument(metavar="INPUT", help="Frames with labels: one touch each."), Reads()
     ],
     out: Annotated[
         Path,
-        typer.Option(
-            metavar="WIRED.toml", help="Where the skin file as it is wired goes.", callback=writable
-        ),
+        typer.Option(metavar="WIRED.toml", help="Where the skin file as it is wired goes."),
+        Writes(SKIN),
     ],
     skin: SkinOption = None,
     reference: ReferenceOption = None,
+    force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
     """Find rotation, mirroring, swapped wires and polarity from a handful of presses.
@@ -41,7 +42,7 @@ def calibrate_wiring(
     other command.
     """
     from tomoskin.cli.labelled import changes, labelled_frames, labels
-    from tomoskin.session import read_recording
+    from tomoskin.session import read_recording, write_text
     from tomoskin.touch import solve_wiring
 
     whole = read_recording(recording)
@@ -58,7 +59,7 @@ def calibrate_wiring(
         )
     found = _findings(answer, drawn, frames.tolist())
     if answer.sure:
-        _write(out, answer.wiring.applied(drawn))
+        write_text(out, answer.wiring.applied(drawn).to_toml(), overwrite=force)
     if json:
         emit(found)
     else:
@@ -138,10 +139,3 @@ def _why(answer: WiringAnswer) -> str:
 def _next(found: dict[str, Any]) -> str:
     x, y = found["next_press_mm"]
     return f"a further press tells most at x {x:+.0f} mm, y {y:+.0f} mm"
-
-
-def _write(path: Path, wired: Skin) -> None:
-    try:
-        path.write_text(wired.to_toml(), encoding="utf-8")
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error

@@ -8,6 +8,22 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from tomoskin.cli.named_files import guarded
+
+
+class Commands(typer.Typer):
+    """Commands whose outputs are looked at before they run."""
+
+    def command(self, name: str | None = None, **options: Any) -> Any:
+        """Add a command, as a decorator that leaves the function as it is."""
+        register = super().command(name, **options)
+
+        def add(function: Any) -> Any:
+            register(guarded(function))
+            return function
+
+        return add
+
 
 class Contents(TyperGroup):
     """Commands with whole sentences: too long ones go on in the next line."""
@@ -50,14 +66,14 @@ def _loaded(name: str) -> Any:
     module = import_module(f"tomoskin.cli.{name}")
     if (group := getattr(module, "app", None)) is not None:
         return typer.main.get_command(group)
-    single = typer.Typer(add_completion=False, rich_markup_mode=None)
+    single = Commands(add_completion=False, rich_markup_mode=None)
     single.command(name)(getattr(module, name))
     return typer.main.get_command(single)
 
 
 def group(help: str) -> typer.Typer:
     """Make a command of sub-commands that stand in it in whole sentences."""
-    return typer.Typer(
+    return Commands(
         help=help,
         no_args_is_help=True,
         add_completion=False,

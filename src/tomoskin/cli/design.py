@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit, ending, writable
+from tomoskin.cli.named_files import FIGURE, ForceFlag, Writes
+from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.skin_choice import DEFAULT_SKIN
 from tomoskin.core import DataError
@@ -24,14 +25,14 @@ _COARSE = 120
 """Places of each variant in the comparison; the skin's own map has more."""
 
 _PLACES = 500
-_PICTURES = (".png", ".pdf", ".svg")
 
 
 def design(
     skin: Annotated[str, typer.Option(help="Built-in name or path.")] = DEFAULT_SKIN,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="MAP.png", help="Where the map of the skin goes.", callback=writable),
+        typer.Option(metavar="MAP.png", help="Where the map of the skin goes."),
+        Writes(FIGURE),
     ] = None,
     radius: Annotated[
         str | None,
@@ -50,6 +51,7 @@ def design(
     patterns: Annotated[
         str, typer.Option(metavar="NAME,NAME", help="To compare, as in a skin file.")
     ] = _PATTERNS,
+    force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
     """Bound the error of a press's place, and the faintest press, by the skin's own read-out.
@@ -61,8 +63,6 @@ def design(
     from tomoskin.touch import Demand, promise
 
     counts = _counts(electrodes)
-    if out is not None:
-        ending(out, _PICTURES, "--out")
     chosen = Skin.load(skin)
     try:
         size = parse_quantity(radius, "length") if radius else None
@@ -76,7 +76,7 @@ def design(
         rows = _compared(chosen, demand, counts, patterns.split(","), bar)
     radius_m = demand.on(chosen.mesh())
     if out is not None:
-        _write(out, chosen, own, demand, radius_m)
+        _write(out, chosen, own, demand, radius_m, overwrite=force)
     document = {
         "skin": chosen.name,
         "press": {"radius_m": radius_m, "depth": depth},
@@ -140,7 +140,9 @@ def _compared(
     return rows
 
 
-def _write(out: Path, skin: Skin, own: Promise, demand: Demand, radius: float) -> None:
+def _write(
+    out: Path, skin: Skin, own: Promise, demand: Demand, radius: float, *, overwrite: bool
+) -> None:
     from tomoskin.session import write_promise
 
     title = (
@@ -148,7 +150,7 @@ def _write(out: Path, skin: Skin, own: Promise, demand: Demand, radius: float) -
         f"{100 * demand.depth:.0f} %; noticed: {100 * demand.found:g} % found, "
         f"{demand.false_alarm:g} false alarms"
     )
-    write_promise(out, skin, own, title)
+    write_promise(out, skin, own, title, overwrite=overwrite)
 
 
 def _say(document: dict[str, Any]) -> None:

@@ -12,7 +12,8 @@ import typer
 from tomoskin.cli.alpha_option import AlphaOption, said, with_alpha
 from tomoskin.cli.bend_option import BendOption, with_bends
 from tomoskin.cli.display_option import LimitOption, PercentFlag, SmoothOption, display_of
-from tomoskin.cli.output import JsonFlag, emit, ending, writable
+from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
+from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import (
     FramesOption,
@@ -34,8 +35,17 @@ if TYPE_CHECKING:
     from tomoskin.skin import Skin
 
 
+IMAGES = {
+    ".png": "pictures of some frames",
+    ".npz": "images of all frames with their mesh",
+    ".vtu": "the mesh with a field for each frame",
+}
+
+
 def image(
-    recording: Annotated[Path, typer.Argument(metavar="INPUT", help="Recording or .npz file.")],
+    recording: Annotated[
+        Path, typer.Argument(metavar="INPUT", help="Recording or .npz file."), Reads()
+    ],
     skin: SkinOption = None,
     reference: ReferenceOption = None,
     frames: FramesOption = None,
@@ -45,21 +55,25 @@ def image(
     states: StatesOption = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go.", callback=writable),
+        typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go."),
+        Writes(IMAGES),
     ] = None,
     touches: Annotated[
-        Path | None, typer.Option(metavar="X.csv", help="Where the touches go.", callback=writable)
+        Path | None,
+        typer.Option(metavar="X.csv", help="Where the touches go."),
+        Writes(TABLE),
     ] = None,
+    force: ForceFlag = False,
     percent: PercentFlag = False,
     limit: LimitOption = None,
     smooth: SmoothOption = None,
     json: JsonFlag = False,
 ) -> None:
     """Reconstruct a recording: images, and the touches in them."""
+    from tomoskin.cli.image_files import WRITERS
     from tomoskin.live import prepare, reconstruct
     from tomoskin.session import read_recording
 
-    write = _writer(out)
     told = skin_for_file(skin, recording)
     chosen, rule = with_alpha(told, alpha)
     chosen = with_time_constant(chosen, time_constant)
@@ -74,23 +88,20 @@ def image(
         found = reconstruct(prepared, whole.part(start, stop), idle, rule=rule, advance=bar)
     found = found.numbered_from(start)
     if touches is not None:
-        _write_touches(touches, whole, found, prepared.skin)
+        _write_touches(touches, whole, found, prepared.skin, overwrite=force)
     if out is not None:
-        write(out, prepared, found, display)
+        WRITERS[out.suffix.lower()](out, prepared, found, display, overwrite=force)
     _report(recording, found, prepared, json=json)
 
 
-def _writer(out: Path | None) -> Any:
-    from tomoskin.cli import image_files
-
-    return out and image_files.WRITERS[ending(out, image_files.WRITERS, "--out")]
-
-
-def _write_touches(path: Path, recording: Recording, found: Reconstruction, skin: Skin) -> None:
+def _write_touches(
+    path: Path, recording: Recording, found: Reconstruction, skin: Skin, *, overwrite: bool
+) -> None:
     from tomoskin.session import write_touches
 
     rows = zip(found.frames.tolist(), found.touches, strict=True)
-    write_touches(path, ((f, float(recording.time[f]), t) for f, t in rows), skin.surface)
+    timed = ((f, float(recording.time[f]), t) for f, t in rows)
+    write_touches(path, timed, skin.surface, overwrite=overwrite)
 
 
 def _report(source: Path, found: Reconstruction, prepared: Prepared, *, json: bool) -> None:

@@ -8,12 +8,21 @@ import numpy as np
 
 from tomoskin.core import DataError
 from tomoskin.live import Prepared, Reconstruction
-from tomoskin.session import MOST_PANELS, Display, Panel, write_picture, write_vtu
+from tomoskin.session import (
+    MOST_PANELS,
+    Display,
+    Panel,
+    save_arrays,
+    write_picture,
+    write_vtu,
+)
 
 _MOST_FIELDS = 200
 
 
-def png(path: Path, prepared: Prepared, found: Reconstruction, display: Display) -> None:
+def png(
+    path: Path, prepared: Prepared, found: Reconstruction, display: Display, *, overwrite: bool
+) -> None:
     """Draw all frames, or as many as fit, evenly spread over the recording."""
     n = len(found.frames)
     chosen = np.unique(np.linspace(0, n - 1, min(n, MOST_PANELS)).round().astype(int))
@@ -22,30 +31,29 @@ def png(path: Path, prepared: Prepared, found: Reconstruction, display: Display)
         Panel(f"frame {found.frames[i]}", image, found.touches[i])
         for i, image in zip(chosen, images, strict=True)
     ]
-    write_picture(path, prepared.mesh, panels, unit, display.limit)
+    write_picture(path, prepared.mesh, panels, unit, display.limit, overwrite=overwrite)
 
 
-def npz(path: Path, prepared: Prepared, found: Reconstruction, display: Display) -> None:
+def npz(
+    path: Path, prepared: Prepared, found: Reconstruction, display: Display, *, overwrite: bool
+) -> None:
     """Write images (n_frames, n_cells) with their mesh."""
     images, unit = display.applied(found.images, prepared.mesh, found.unit)
-    try:
-        with path.open("wb") as file:
-            np.savez_compressed(
-                file,
-                allow_pickle=False,
-                images=images,
-                frames=found.frames,
-                unit=np.array(unit),
-                smoothing_m=np.array(display.smoothing),
-                mesh_id=np.array(prepared.mesh.identity),
-                points=prepared.mesh.points,
-                cells=prepared.mesh.cells,
-            )
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+    arrays = {
+        "images": images,
+        "frames": found.frames,
+        "unit": np.array(unit),
+        "smoothing_m": np.array(display.smoothing),
+        "mesh_id": np.array(prepared.mesh.identity),
+        "points": prepared.mesh.points,
+        "cells": prepared.mesh.cells,
+    }
+    save_arrays(path, arrays, overwrite=overwrite)
 
 
-def vtu(path: Path, prepared: Prepared, found: Reconstruction, display: Display) -> None:
+def vtu(
+    path: Path, prepared: Prepared, found: Reconstruction, display: Display, *, overwrite: bool
+) -> None:
     """Write one cell field a frame."""
     if len(found.frames) > _MOST_FIELDS:
         raise DataError(
@@ -55,7 +63,7 @@ def vtu(path: Path, prepared: Prepared, found: Reconstruction, display: Display)
         )
     images, _ = display.applied(found.images, prepared.mesh, found.unit)
     names = [f"frame_{frame:06d}" for frame in found.frames.tolist()]
-    write_vtu(path, prepared.mesh, dict(zip(names, images, strict=True)))
+    write_vtu(path, prepared.mesh, dict(zip(names, images, strict=True)), overwrite=overwrite)
 
 
 WRITERS = {".png": png, ".npz": npz, ".vtu": vtu}

@@ -7,37 +7,39 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
+
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray
 
 
 def lay(
-    surface: Annotated[Path, typer.Argument(help="A .stl, .obj or .ply file.")],
+    surface: Annotated[Path, typer.Argument(help="A .stl, .obj or .ply file."), Reads()],
     electrodes: Annotated[
         Path,
         typer.Option(metavar="CSV", help="x,y,z of each electrode, E1 first, in the file's unit."),
+        Reads(),
     ],
-    out: Annotated[Path, typer.Option(metavar="TOML", help="The skin file; must not exist.")],
+    out: Annotated[
+        Path, typer.Option(metavar="X.toml", help="Where the skin file goes."), Writes(SKIN)
+    ],
     unit: Annotated[str, typer.Option(help="Of the file: mm, cm or m.")] = "mm",
     like: Annotated[
         str, typer.Option(metavar="SKIN", help="Skin to take material, contacts and drive from.")
     ] = "textile-disc-16",
+    force: ForceFlag = False,
 ) -> None:
     """Write the skin file of a sheet on a scanned or drawn surface."""
     from tomoskin.core import DIMENSIONS, DataError
+    from tomoskin.session import write_text
     from tomoskin.skin import Skin
     from tomoskin.skin import lay as laid
 
     if unit not in ("mm", "cm", "m"):
         raise DataError(f'expected mm, cm or m, got "{unit}"', where="--unit")
-    if out.exists():
-        raise DataError("exists", where=str(out), hint="choose another name for --out")
     skin = laid(surface, _places(electrodes), unit=unit, like=Skin.load(like), source=str(out))
     mesh = skin.mesh()
-    try:
-        out.write_text(skin.to_toml(), encoding="utf-8")
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", where=str(out)) from error
+    write_text(out, skin.to_toml(), overwrite=force)
     scale = DIMENSIONS["length"]["cm"]
     typer.echo(
         f"{out}: {skin.n_electrodes} electrodes on {mesh.volumes.sum() / scale**2:.4g} cm², "

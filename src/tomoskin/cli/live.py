@@ -12,6 +12,7 @@ import typer
 
 from tomoskin.cli.bend_option import BendOption, with_bends
 from tomoskin.cli.ending import ended_by_signals
+from tomoskin.cli.named_files import RECORDING, Otherwise, Reads, Writes
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.record import recording_to
@@ -28,17 +29,21 @@ def live(
     skin: SkinOption = None,
     source: Annotated[str, typer.Option(help="twin, serial:PORT, replay:FILE@SPEED, …")] = "twin",
     record: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Record the session to a new file.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Record the session to a new file, such as run.mcap."),
+        Writes(RECORDING),
     ] = None,
     calibration: Annotated[
         Path | None,
         typer.Option(metavar="C.npz", help="Places of touches by a calibration of touch."),
+        Reads(),
     ] = None,
     folder: Annotated[
         Path,
         typer.Option(
             exists=True, file_okay=False, help="Where the page's files go and are looked for."
         ),
+        Otherwise("what the page writes gets a name that is free"),
     ] = Path(),
     token_file: Annotated[
         Path | None,
@@ -46,6 +51,7 @@ def live(
             metavar="FILE",
             help="Keeps the token, so that open pages find a server that was started again.",
         ),
+        Otherwise("made where there is none, else only read"),
     ] = None,
     bend: BendOption = None,
     states: StatesOption = None,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
+from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
@@ -21,13 +22,18 @@ _SHOWN = 20
 
 
 def locate(
-    recording: Annotated[Path, typer.Argument(metavar="INPUT", help="Recording or .npz file.")],
+    recording: Annotated[
+        Path, typer.Argument(metavar="INPUT", help="Recording or .npz file."), Reads()
+    ],
     calibration: Annotated[
-        Path, typer.Option(metavar="C.npz", help="From tomoskin calibrate touch.")
+        Path, typer.Option(metavar="C.npz", help="From tomoskin calibrate touch."), Reads()
     ],
     touches: Annotated[
-        Path | None, typer.Option(metavar="X.csv", help="Where the touches go.", callback=writable)
+        Path | None,
+        typer.Option(metavar="X.csv", help="Where the touches go."),
+        Writes(TABLE),
     ] = None,
+    force: ForceFlag = False,
     skin: Annotated[
         str | None, typer.Option(help="Built-in name or path: refused unless calibrated on it.")
     ] = None,
@@ -60,7 +66,8 @@ def locate(
     found = list((_several if several else _single)(known, dv[frames]))
     if touches is not None:
         rows = zip(frames.tolist(), found, strict=True)
-        write_touches(touches, ((k, float(whole.time[k]), t) for k, t in rows))
+        timed = ((k, float(whole.time[k]), t) for k, t in rows)
+        write_touches(touches, timed, overwrite=force)
     _report(whole, frames.tolist(), found, json=json)
 
 

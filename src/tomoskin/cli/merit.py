@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit, ending, writable
+from tomoskin.cli.named_files import FIGURE, TABLE, ForceFlag, Writes
+from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 
 if TYPE_CHECKING:
@@ -33,19 +34,20 @@ def merit(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="X.png|.csv", help="Where curves or table go.", callback=writable),
+        typer.Option(metavar="X.png|.csv", help="Where curves or table go."),
+        Writes(FIGURE | TABLE),
     ] = None,
+    force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
     """Show GREIT's figures of merit and the noise figure of a skin's operator."""
     from tomoskin.live import prepare
     from tomoskin.skin import Skin
 
-    write = _writer(out)
     with Bar("working out figures"):
         found = _found(prepare(Skin.load(skin)), towards, greit)
     if out is not None:
-        write(out, found)
+        _write(out, found, overwrite=force)
     _report(found, json=json)
 
 
@@ -94,11 +96,11 @@ def _finer(prepared: Prepared) -> ForwardModel:
     )
 
 
-def _writer(out: Path | None) -> Any:
+def _write(out: Path, found: dict[str, Merit], *, overwrite: bool) -> None:
     from tomoskin.session import write_merit, write_merit_table
 
-    writers = {".png": write_merit, ".csv": write_merit_table}
-    return out and writers[ending(out, writers, "--out")]
+    write = write_merit_table if out.suffix.lower() in TABLE else write_merit
+    write(out, found, overwrite=overwrite)
 
 
 def _report(found: dict[str, Merit], *, json: bool) -> None:

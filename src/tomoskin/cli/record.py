@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.ending import ended_by_signals
+from tomoskin.cli.named_files import RECORDING, Writes
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.sink_option import SinkOption, chosen_sinks
@@ -24,7 +25,11 @@ _OFTEN = 0.1
 
 
 def record(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A new file, such as run.mcap.")],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="A new file, such as run.mcap."),
+        Writes(RECORDING),
+    ],
     skin: SkinOption = None,
     source: Annotated[str, typer.Option(help="twin, serial:PORT, replay:FILE, …")] = "twin",
     seconds: Annotated[

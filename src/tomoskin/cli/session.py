@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.contents import group
-from tomoskin.cli.output import JsonFlag, emit, ending
+from tomoskin.cli.named_files import RECORDING, TABLE, ForceFlag, Given, Reads, Writes
+from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import say_notes
 
 if TYPE_CHECKING:
-    from tomoskin.session import Lost, Repaired, SessionInfo
+    from tomoskin.session import Lost, Output, Repaired, SessionInfo
 
 app = group("Inspect, mend and convert recorded sessions.")
 
@@ -25,7 +26,44 @@ _A_YEAR = 3.15e7
 _NO_CLOCK = 0.01
 """No clock of a board is so far off."""
 
-_File = Annotated[Path, typer.Argument(metavar="FILE", help="A session, such as run.mcap.")]
+_File = Annotated[
+    Path, typer.Argument(metavar="FILE", help="A session, such as run.mcap."), Reads()
+]
+
+EXPORTS = {
+    ".csv": "a table of voltages",
+    ".parquet": "the same for data tools",
+    ".h5": "everything",
+    ".npz": "an interchange file",
+    ".mat": "EIDORS' structures",
+    ".vtu": "a mesh for each moment",
+    ".pvd": "the same",
+    ".png": "a sheet of maps",
+    ".gif": "a film",
+    ".mp4": "a film",
+}
+"""What each ending gives; more is in docs/session-file.md."""
+
+
+def _mended(out: Path | None, given: Given, called: str) -> list[Output]:
+    """The file that a repair makes."""
+    from tomoskin.session import Output
+
+    return [Output(_repaired(given["file"], out), RECORDING, called if out else "")]
+
+
+def _repaired(file: Path, out: Path | None) -> Path:
+    return out or file.with_name(f"{file.stem}.repaired.mcap")
+
+
+def _exported(out: Path | None, _: Given, called: str) -> list[Output]:
+    """What an export writes: of a series more than the file that is named."""
+    from tomoskin.session import Output, series_files
+
+    assert out is not None
+    if out.suffix.lower() in (".vtu", ".pvd"):
+        return [Output(path, EXPORTS, called) for path in series_files(out.with_suffix(".pvd"))]
+    return [Output(out, EXPORTS, called)]
 
 
 @app.command()
@@ -48,7 +86,11 @@ def info(file: _File, json: JsonFlag = False) -> None:
 def repair(
     file: _File,
     out: Annotated[
-        Path | None, typer.Option(help="Where to; without it FILE with .repaired in its name.")
+        Path | None,
+        typer.Option(
+            metavar="NEW.mcap", help="Where to; without it FILE with .repaired in its name."
+        ),
+        Writes(RECORDING, _mended),
     ] = None,
     skin: Annotated[
         str | None, typer.Option(help="Built-in name or path, where the file's own is lost.")
@@ -59,7 +101,7 @@ def repair(
     from tomoskin.session import repair
     from tomoskin.skin import Skin
 
-    target = out or file.with_suffix(f".repaired{file.suffix}")
+    target = _repaired(file, out)
     with Bar("repairing") as bar:
         found = repair(file, target, skin=Skin.load(skin) if skin else None, advance=bar)
     if json:
@@ -79,21 +121,25 @@ def export(
         typer.Argument(
             metavar="OUT", help="X.csv, .parquet, .h5, .npz, .mat, .vtu, .png, .gif or .mp4."
         ),
+        Writes(EXPORTS, _exported),
     ],
     touches: Annotated[
-        Path | None, typer.Option(metavar="X.csv", help="Where the recorded touches go.")
+        Path | None,
+        typer.Option(metavar="X.csv", help="Where the recorded touches go."),
+        Writes(TABLE),
     ] = None,
     every: Annotated[
         float, typer.Option(min=1e-3, help="Seconds between two images, where there are images.")
     ] = 0.1,
+    force: ForceFlag = False,
 ) -> None:
     """Convert a session: voltages, or the images that they give again."""
     from tomoskin.live import WRITERS, Export
     from tomoskin.session import SessionReader
 
-    write = WRITERS[ending(out, WRITERS, "OUT")]
+    write = WRITERS[out.suffix.lower()]
     with SessionReader(file) as session, Bar(f"writing {out}") as bar:
-        asked = Export(session, every, bar)
+        asked = Export(session, every, bar, overwrite=force)
         write(asked, out)
         if touches is not None:
             asked.touches(touches)
@@ -107,15 +153,21 @@ def export(
 
 @app.command("import")
 def import_recording(
-    file: Annotated[Path, typer.Argument(metavar="INPUT", help="Any recording that can be read.")],
-    out: Annotated[Path, typer.Argument(metavar="OUT.npz", help="Interchange file.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="INPUT", help="Any recording that can be read."), Reads()
+    ],
+    out: Annotated[
+        Path,
+        typer.Argument(metavar="OUT.npz", help="Interchange file."),
+        Writes({".npz": "an interchange file"}),
+    ],
+    force: ForceFlag = False,
 ) -> None:
     """Convert a recording of another program to the interchange file."""
     from tomoskin.session import read_recording, write_interchange
 
-    ending(out, [".npz"], "OUT")
     recording = read_recording(file)
-    write_interchange(out, recording)
+    write_interchange(out, recording, overwrite=force)
     typer.echo(f"{out}: {len(recording)} frames of {len(recording.drive)} rows")
     say_notes(recording)
 

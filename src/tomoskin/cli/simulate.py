@@ -8,25 +8,49 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tomoskin.cli.named_files import RECORDING, ForceFlag, Given, Reads, Writes
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
     from tomoskin.live import Workers
+    from tomoskin.session import Output
     from tomoskin.skin import Skin
+    from tomoskin.twin import SetPlan
 
 _LARGEST = 10_000_000
 """A script has at most so many bytes."""
+
+ONE_FILE = {".npz": "labelled frames in one file"}
+
+
+def _simulated(out: Path | None, given: Given, called: str) -> list[Output]:
+    """A session; or labelled frames, of which a folder that is there is looked into later."""
+    from tomoskin.session import Output
+
+    assert out is not None
+    if given["presses"] is None:
+        return [Output(out, RECORDING, called)]
+    if out.is_dir() and out.suffix.lower() != ".npz":
+        return []
+    endings = ONE_FILE if out.exists() else ONE_FILE | {"": "a folder of them"}
+    return [Output(out, endings, called, makes_folders=True)]
 
 
 def simulate(
     *,
     skin: Annotated[str, typer.Option(help="Built-in name or path.")] = "textile-disc-8",
     script: Annotated[
-        Path | None, typer.Option(metavar="X.toml", help="What happens; see docs/simulate.md.")
+        Path | None,
+        typer.Option(metavar="X.toml", help="What happens; see docs/simulate.md."),
+        Reads(),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Session file; with --presses a folder, or FILE.npz.")],
+    out: Annotated[
+        Path,
+        typer.Option(help="Session file; with --presses a folder, or FILE.npz."),
+        Writes(RECORDING | ONE_FILE, _simulated),
+    ],
     presses: Annotated[
         int | None,
         typer.Option(min=1, metavar="N", help="Instead of a timeline, N labelled frames."),
@@ -41,6 +65,7 @@ def simulate(
         str | None,
         typer.Option(metavar="ADDRESS", help="For --presses: a Dask scheduler, tcp://HOST:8786."),
     ] = None,
+    force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
     """Run a script on the twin into a session file, or draw labelled frames."""
@@ -49,7 +74,8 @@ def simulate(
     chosen = Skin.load(skin)
     if presses is not None:
         workers = _workers(processes, cluster)
-        _labelled(chosen, script, out, presses, seed or 0, workers, json=json)
+        plan = _plan(chosen, script, seed or 0, presses)
+        _labelled(plan, out, workers, overwrite=force, json=json)
         return
     if script is None:
         raise typer.BadParameter("give a script, or --presses N", param_hint="--script")
@@ -84,17 +110,7 @@ def _timeline(skin: Skin, script: Path, out: Path, seed: int | None, *, json: bo
     )
 
 
-def _labelled(
-    skin: Skin,
-    script: Path | None,
-    out: Path,
-    n: int,
-    seed: int,
-    workers: Workers,
-    *,
-    json: bool,
-) -> None:
-    from tomoskin.live import make_set
+def _plan(skin: Skin, script: Path | None, seed: int, n: int) -> SetPlan:
     from tomoskin.twin import COMMON_PRESSES, Population, SetPlan, check_settling
 
     population = COMMON_PRESSES
@@ -102,11 +118,17 @@ def _labelled(
         population = Population.from_toml(_text(script), source=str(script))
     preset = population.preset or skin.twin.preset
     check_settling(skin, preset)
-    plan = SetPlan(skin.to_toml(), population, preset, seed, n)
+    return SetPlan(skin.to_toml(), population, preset, seed, n)
+
+
+def _labelled(plan: SetPlan, out: Path, workers: Workers, *, overwrite: bool, json: bool) -> None:
+    from tomoskin.live import make_set
+
+    n = plan.n_frames
     begun = time.monotonic()
     try:
         with Bar("drawing presses") as bar:
-            found = make_set(plan, out, workers, bar)
+            found = make_set(plan, out, workers, bar, overwrite=overwrite)
     except KeyboardInterrupt:
         typer.echo(
             "tomoskin: stopped; the same command goes on where this one was stopped", err=True

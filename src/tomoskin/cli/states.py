@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.output import JsonFlag, emit, writable
+from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
+from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
@@ -20,13 +21,18 @@ _SHOWN = 20
 
 
 def states(
-    recording: Annotated[Path, typer.Argument(metavar="INPUT", help="Recording or .npz file.")],
+    recording: Annotated[
+        Path, typer.Argument(metavar="INPUT", help="Recording or .npz file."), Reads()
+    ],
     calibration: Annotated[
-        Path, typer.Option(metavar="C.npz", help="From tomoskin calibrate states.")
+        Path, typer.Option(metavar="C.npz", help="From tomoskin calibrate states."), Reads()
     ],
     out: Annotated[
-        Path | None, typer.Option(metavar="X.csv", help="Where the table goes.", callback=writable)
+        Path | None,
+        typer.Option(metavar="X.csv", help="Where the table goes."),
+        Writes(TABLE),
     ] = None,
+    force: ForceFlag = False,
     skin: Annotated[
         str | None, typer.Option(help="Built-in name or path: refused unless calibrated on it.")
     ] = None,
@@ -54,7 +60,7 @@ def states(
         asked = known.classifier.most_telling(dv, min(ask, len(dv))).tolist()
     names = known.classifier.examples.codes.names
     if out is not None:
-        _write(out, whole, answers, names)
+        _write(out, whole, answers, names, overwrite=force)
     if json:
         emit({"names": names, "frames": _documents(whole, answers), "ask": asked})
     else:
@@ -75,20 +81,22 @@ def _documents(whole: Recording, answers: Answers) -> list[dict[str, Any]]:
     ]
 
 
-def _write(path: Path, whole: Recording, answers: Answers, names: tuple[str, ...]) -> None:
-    from tomoskin.core import DataError
+def _write(
+    path: Path, whole: Recording, answers: Answers, names: tuple[str, ...], *, overwrite: bool
+) -> None:
+    from tomoskin.session import written
 
-    try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            table = csv.writer(file, lineterminator="\n")
-            table.writerow(["frame", "time_s", "state", "probability", "unknown", *names])
-            for row in _documents(whole, answers):
-                each = [f"{p:.4f}" for p in row["each"]]
-                sure, unknown = f"{row['probability']:.4f}", int(row["unknown"])
-                when = f"{row['time_s']:.6f}"
-                table.writerow([row["frame"], when, row["state"], sure, unknown, *each])
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+    with (
+        written(path, overwrite=overwrite) as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["frame", "time_s", "state", "probability", "unknown", *names])
+        for row in _documents(whole, answers):
+            each = [f"{p:.4f}" for p in row["each"]]
+            sure, unknown = f"{row['probability']:.4f}", int(row["unknown"])
+            when = f"{row['time_s']:.6f}"
+            table.writerow([row["frame"], when, row["state"], sure, unknown, *each])
 
 
 def _say(answers: Answers, asked: list[int]) -> None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tomoskin.cli.named_files import Reads
+
 if TYPE_CHECKING:
     from tomoskin.live import Prepared
     from tomoskin.skin import Skin
@@ -16,6 +18,7 @@ StatesOption = Annotated[
     typer.Option(
         metavar="C.npz", help="From tomoskin calibrate states: the state of each frame is told."
     ),
+    Reads(),
 ]
 
 

@@ -53,6 +53,10 @@ class DataError(TomoskinError):
     """A recording that is empty, damaged, or of another skin."""
 
 
+class OutputError(DataError):
+    """A file that is not written: it would replace what must stay, or its name does not fit."""
+
+
 class WireError(TomoskinError):
     """A message that cannot be encoded, or a device that speaks another protocol."""
 

@@ -38,38 +38,44 @@ Advance = Callable[[float, float], None]
 
 @dataclass(frozen=True)
 class Export:
-    """A session to be exported: ``every`` s between two images, ``advance`` told how far it is."""
+    """A session to be exported: ``every`` s between two images, ``advance`` told how far it is.
+
+    Files that are there are written over with ``overwrite`` only.
+    """
 
     session: SessionReader
     every: float
     advance: Advance
+    overwrite: bool = False
 
     def npz(self, path: Path) -> None:
         """Write the interchange file."""
-        write_interchange(path, recording_of(self.session))
+        write_interchange(path, recording_of(self.session), overwrite=self.overwrite)
 
     def csv(self, path: Path) -> None:
         """Write a table of voltages."""
-        write_csv(path, self.session, self.advance)
+        write_csv(path, self.session, self.advance, overwrite=self.overwrite)
 
     def parquet(self, path: Path) -> None:
         """Write a table of voltages for data tools."""
-        write_parquet(path, self.session, self.advance)
+        write_parquet(path, self.session, self.advance, overwrite=self.overwrite)
 
     def hdf5(self, path: Path) -> None:
         """Write everything."""
-        write_hdf5(path, self.session, self.advance)
+        write_hdf5(path, self.session, self.advance, overwrite=self.overwrite)
 
     def matlab(self, path: Path) -> None:
         """Write EIDORS' structures."""
         skin = self.session.skin
-        write_matlab(path, recording_of(self.session), skin.current, skin.n_electrodes)
+        recording = recording_of(self.session)
+        write_matlab(path, recording, skin.current, skin.n_electrodes, overwrite=self.overwrite)
 
     def series(self, path: Path) -> None:
         """Write a series of meshes with their images."""
         prepared = as_recorded(self.session)
         moments = ((r.host_time, r.image.values) for r in self._images(prepared))
-        write_series(path.with_suffix(".pvd"), prepared.mesh, moments)
+        listing = path.with_suffix(".pvd")
+        write_series(listing, prepared.mesh, moments, overwrite=self.overwrite)
 
     def film(self, path: Path) -> None:
         """Write a film of the map."""
@@ -78,7 +84,8 @@ class Export:
         pictures = (
             rendered(path, prepared.mesh, panel, unit, limit) for panel in self._panels(prepared)
         )
-        FILMS[path.suffix.lower()](path, pictures, 1.0 / self.every)
+        write = FILMS[path.suffix.lower()]
+        write(path, pictures, 1.0 / self.every, overwrite=self.overwrite)
 
     def picture(self, path: Path) -> None:
         """Write a sheet of maps, evenly spread over the session."""
@@ -86,13 +93,14 @@ class Export:
         panels = list(self._panels(prepared))
         chosen = np.linspace(0, len(panels) - 1, min(len(panels), MOST_PANELS)).round()
         some = [panels[int(number)] for number in np.unique(chosen)]
-        write_picture(path, prepared.mesh, some, prepared.operator.unit, colour_limit(prepared))
+        unit, limit = prepared.operator.unit, colour_limit(prepared)
+        write_picture(path, prepared.mesh, some, unit, limit, overwrite=self.overwrite)
 
     def touches(self, path: Path) -> None:
         """Write a table of the recorded touches."""
         found = self.session.touches()
         rows = ((t.sequence, t.host_time, t.touches) for t in found)
-        write_touches(path, rows, self.session.skin.surface)
+        write_touches(path, rows, self.session.skin.surface, overwrite=self.overwrite)
 
     def _panels(self, prepared: Prepared) -> Iterator[Panel]:
         first: float | None = None

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from tomoskin.core import DataError, FloatArray, TomoskinError, WireError
+from tomoskin.core import FloatArray, TomoskinError, WireError
 from tomoskin.live.errand import run_errand, text_of
 from tomoskin.live.flow_requests import (
     BeginFlow,
@@ -23,7 +23,7 @@ from tomoskin.live.hub import Hub, Listener
 from tomoskin.live.lessons import Dots, Lesson, Thought, touch_thought, wiring_thought
 from tomoskin.live.prepare import Prepared, prepare
 from tomoskin.live.taking import Taker
-from tomoskin.session import Calibration, read_calibration, write_calibration
+from tomoskin.session import Calibration, read_calibration, write_calibration, write_text
 from tomoskin.touch import Locator, WiringAnswer
 
 _LEAST = 0.5
@@ -189,10 +189,7 @@ class GuideDesk:
         """Save the skin as it is wired, and go on with it; in a thread."""
         path = self._folder.free(name, ".toml")
         wired = answer.wiring.applied(flow.prepared.skin)
-        try:
-            path.write_text(wired.to_toml(), encoding="utf-8")
-        except OSError as error:
-            raise DataError(f"cannot be written: {error.strerror}", where=path.name) from error
+        write_text(path, wired.to_toml())
         self._hub.runner.change(prepare(wired), self._hub.runner.opening)
         return path.name
 

@@ -12,8 +12,15 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from tomoskin.core import DataError, SourceError
-from tomoskin.session import is_done, join_shards, shard_path, write_whole
+from tomoskin.core import SourceError
+from tomoskin.session import (
+    Output,
+    check_outputs,
+    is_done,
+    join_shards,
+    shard_path,
+    write_whole,
+)
 from tomoskin.twin import SetPlan, make_shard
 
 _PATIENCE = 10.0
@@ -36,7 +43,12 @@ class SetMade:
 
 
 def make_set(
-    plan: SetPlan, out: Path, workers: Workers, advance: Callable[[int, int], None]
+    plan: SetPlan,
+    out: Path,
+    workers: Workers,
+    advance: Callable[[int, int], None],
+    *,
+    overwrite: bool = False,
 ) -> SetMade:
     """Make the shards of ``plan`` that are missing, and write them.
 
@@ -47,28 +59,36 @@ def make_set(
         folder beside it until all are there.
     advance
         Called with the frames that are done and all of them.
+    overwrite
+        The file, or files of other sets in the folder, may be written over.
 
     Raises
     ------
+    OutputError
+        Before anything is made: when the file is there, or the folder holds another set.
     DataError
-        When a file cannot be written, or the folder holds frames of another set.
+        When a file cannot be written.
     ScriptError
         When there is no room on the skin for what is to be drawn.
     """
-    single = out.suffix == ".npz"
-    if single and out.exists():
-        raise DataError("exists already", where=str(out), hint="choose another name")
+    single = out.suffix.lower() == ".npz"
+    if single:
+        check_outputs([Output(out, makes_folders=True)], overwrite=overwrite)
     folder = out.with_name(f"{out.name}.parts") if single else out
     paths = [shard_path(folder, shard) for shard in range(plan.n_shards)]
-    missing = [s for s, path in enumerate(paths) if not is_done(path, shard_identity(plan, s))]
+    missing = [
+        shard
+        for shard, path in enumerate(paths)
+        if not is_done(path, shard_identity(plan, shard), overwrite=overwrite)
+    ]
     done = plan.n_frames - sum(map(plan.size, missing))
     advance(done, plan.n_frames)
     for shard, arrays in workers(plan, missing):
-        write_whole(paths[shard], arrays)
+        write_whole(paths[shard], arrays, overwrite=True)  # one with fewer frames, if any
         done += plan.size(shard)
         advance(done, plan.n_frames)
     if single:
-        join_shards(paths, out)
+        join_shards(paths, out, overwrite=overwrite)
         for path in paths:
             path.unlink()
         folder.rmdir()

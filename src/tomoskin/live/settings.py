@@ -6,6 +6,7 @@ import asyncio
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -25,6 +26,7 @@ from tomoskin.live.requests import (
 from tomoskin.live.scale import colour_limit
 from tomoskin.live.settings_form import altered, refusal, schema, table_of
 from tomoskin.live.tune import tuned
+from tomoskin.session import Output, check_outputs, write_text
 from tomoskin.skin import Skin
 
 MOST_KEPT = 100
@@ -103,17 +105,10 @@ class SettingsDesk:
 
     def _save(self, page: Listener, request: SaveSkin) -> None:
         name = f"{request.name}.toml"
-        skin = self._present()
         try:
-            if "file" in skin.document["surface"]:
-                raise SkinError("a skin on a scanned surface stays beside its file", where=name)
-            with (self._hub.folder / name).open("w" if request.replace else "x") as file:
-                file.write(skin.to_toml())
-        except FileExistsError:
-            page.post(refusal(SkinError("exists; save again to replace it", where=name)))
-            return
-        except (OSError, SkinError) as error:
-            page.post(refusal(SkinError(f"is not saved: {error}", where=name)))
+            _save(self._hub.folder / name, self._present(), replace=request.replace)
+        except TomoskinError as error:  # the page is told names, never paths
+            page.post(refusal(type(error)(error.message, where=name, hint=error.hint)))
             return
         self._hub.runner.say("saved", f"settings saved as {name}")
         self._hub.tell([self._told()])
@@ -227,3 +222,12 @@ class SettingsDesk:
             "builtin": Skin.names(),
         }
         return msgspec.json.encode(fields).decode()
+
+
+def _save(path: Path, skin: Skin, *, replace: bool) -> None:
+    if "file" in skin.document["surface"]:
+        raise SkinError("a skin on a scanned surface stays beside its file")
+    if path.is_symlink():
+        raise SkinError("is a link, and what it leads to is left alone", hint="choose another name")
+    check_outputs([Output(path)], overwrite=replace, consent="save again")
+    write_text(path, skin.to_toml(), overwrite=replace)

@@ -1,7 +1,7 @@
 """Recordings: sessions, interchange, import; pictures and files of their images."""
 
 from tomoskin.session.alpha_picture import write_choices
-from tomoskin.session.archive import load_arrays
+from tomoskin.session.archive import load_arrays, save_arrays
 from tomoskin.session.bends_file import (
     BENDS_FILE,
     BendCalibration,
@@ -27,7 +27,7 @@ from tomoskin.session.documents import encode_json, touch_row, touches_message
 from tomoskin.session.exports.hdf5 import write_hdf5
 from tomoskin.session.exports.matlab import write_matlab
 from tomoskin.session.exports.movie import WRITERS as FILMS
-from tomoskin.session.exports.series import write_series
+from tomoskin.session.exports.series import series_files, write_series
 from tomoskin.session.exports.table import write_csv, write_parquet
 from tomoskin.session.foxglove import grid_message, log_message, scene_message
 from tomoskin.session.info import SessionInfo, session_info
@@ -35,6 +35,7 @@ from tomoskin.session.interchange import write_interchange
 from tomoskin.session.labelled_set import is_done, join_shards, shard_path, write_whole
 from tomoskin.session.layout import Mark, MarkedFrame
 from tomoskin.session.merit_picture import write_merit, write_merit_table
+from tomoskin.session.outputs import RECORDING, Output, check_outputs
 from tomoskin.session.picture import MOST_PANELS, Panel, plot, rendered, write_picture
 from tomoskin.session.reader import is_session, read_recording
 from tomoskin.session.recorder import Recorder
@@ -59,6 +60,7 @@ from tomoskin.session.touch_csv import write_touches
 from tomoskin.session.vtu import write_vtu
 from tomoskin.session.whole import read_session, recording_of
 from tomoskin.session.writer import SessionWriter
+from tomoskin.session.written import write_text, written
 
 __all__ = [
     "AMOUNT",
@@ -68,6 +70,7 @@ __all__ = [
     "CHANGE_ON_DARK",
     "FILMS",
     "MOST_PANELS",
+    "RECORDING",
     "STATES_FILE",
     "BendCalibration",
     "Calibration",
@@ -76,6 +79,7 @@ __all__ = [
     "Lost",
     "Mark",
     "MarkedFrame",
+    "Output",
     "Panel",
     "RecordedTouches",
     "Recorder",
@@ -91,6 +95,7 @@ __all__ = [
     "Timeline",
     "Truth",
     "all_blocks",
+    "check_outputs",
     "circular_average",
     "encode_json",
     "grid_message",
@@ -114,8 +119,10 @@ __all__ = [
     "recording_of",
     "rendered",
     "repair",
+    "save_arrays",
     "scene_message",
     "schema_of",
+    "series_files",
     "session_info",
     "shard_path",
     "touch_row",
@@ -137,7 +144,9 @@ __all__ = [
     "write_promise",
     "write_series",
     "write_states",
+    "write_text",
     "write_touches",
     "write_vtu",
     "write_whole",
+    "written",
 ]

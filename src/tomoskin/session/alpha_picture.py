@@ -21,14 +21,19 @@ _MOST = 30.0
 
 
 def write_choices(
-    path: Path, title: str, choices: Sequence[AlphaChoice], picard: Picard | None = None
+    path: Path,
+    title: str,
+    choices: Sequence[AlphaChoice],
+    picard: Picard | None = None,
+    *,
+    overwrite: bool = False,
 ) -> None:
     """Draw one panel for each choice that has a curve, and one for the Picard plot.
 
     Raises
     ------
     DataError
-        When matplotlib is not installed or the file cannot be written.
+        When matplotlib is not installed, and as :func:`written` does.
     """
     drawn = [(choice, choice.curve) for choice in choices if choice.curve is not None]
     count = len(drawn) + (picard is not None)
@@ -43,7 +48,7 @@ def write_choices(
         _draw_picard(axes[len(drawn)], picard)
     for ax in axes[count:]:
         ax.set_visible(False)
-    save_figure(path, figure)
+    save_figure(path, figure, overwrite=overwrite)
 
 
 def _draw(ax: Axes, choice: AlphaChoice, curve: Curve) -> None:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import io
-import os
-import tempfile
 import tokenize
 import zipfile
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError
+from tomoskin.session.written import written
 
 MAX_BYTES = 4 << 30
 """An archive that unpacks to more than this is refused."""
@@ -76,19 +76,10 @@ def _arrays(file: Path | io.BytesIO, where: str) -> Arrays:
         raise DataError(f"holds an array that cannot be read: {error}", where=where) from error
 
 
-def save_arrays(path: Path, arrays: Arrays) -> None:
-    """Write a .npz file whole or not at all. Raises DataError when it cannot be written."""
-    try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        part = Path(name)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(pack_arrays(arrays))
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], *, overwrite: bool = False) -> None:
+    """Write a .npz file, the same bytes each time; raises as :func:`written` does."""
+    with written(path, overwrite=overwrite) as part, part.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
 def _check_size(file: Path | io.BytesIO, where: str) -> None:

@@ -46,9 +46,9 @@ class BendCalibration:
             )
 
 
-def write_bends(path: Path, calibration: BendCalibration) -> None:
-    """Write the file whole or not at all. Raises DataError when it cannot be written."""
-    save_arrays(path, _arrays(calibration))
+def write_bends(path: Path, calibration: BendCalibration, *, overwrite: bool = False) -> None:
+    """Write the file; raises as :func:`written` does."""
+    save_arrays(path, _arrays(calibration), overwrite=overwrite)
 
 
 def pack_bends(calibration: BendCalibration) -> bytes:

@@ -38,9 +38,9 @@ class Calibration:
     skin_name: str = ""
 
 
-def write_calibration(path: Path, calibration: Calibration) -> None:
-    """Write the file whole or not at all. Raises DataError when it cannot be written."""
-    save_arrays(path, _arrays(calibration))
+def write_calibration(path: Path, calibration: Calibration, *, overwrite: bool = False) -> None:
+    """Write the file; raises as :func:`written` does."""
+    save_arrays(path, _arrays(calibration), overwrite=overwrite)
 
 
 def pack_calibration(calibration: Calibration) -> bytes:

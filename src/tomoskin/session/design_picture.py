@@ -20,13 +20,15 @@ _LEVELS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 _TICKS = (*_LEVELS, 0.3, 0.7, 1.5, 3.0, 4.0, 7.0, 15.0, 30.0, 70.0)
 
 
-def write_promise(path: Path, skin: Skin, found: Promise, title: str) -> None:
+def write_promise(
+    path: Path, skin: Skin, found: Promise, title: str, *, overwrite: bool = False
+) -> None:
     """Draw both maps side by side, with the electrodes and, within 85 % of the way out, contours.
 
     Raises
     ------
     DataError
-        When matplotlib is not installed or the file cannot be written.
+        When matplotlib is not installed, and as :func:`written` does.
     """
     figure = new_figure(path, 11.0, 4.7)
     left, right = figure.subplots(1, 2)
@@ -43,7 +45,7 @@ def write_promise(path: Path, skin: Skin, found: Promise, title: str) -> None:
         bar.ax.tick_params(labelsize=8)
         bar.ax.minorticks_off()
     figure.suptitle(title, fontsize=10)
-    save_figure(path, figure)
+    save_figure(path, figure, overwrite=overwrite)
 
 
 def _draw(ax: Any, skin: Skin, found: Promise, values: FloatArray) -> Any:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tomoskin.core import DataError
+from tomoskin.session.written import written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,13 +34,13 @@ def new_figure(path: Path, width: float, height: float) -> Figure:
     return figure
 
 
-def save_figure(path: Path, figure: Figure) -> None:
+def save_figure(path: Path, figure: Figure, *, overwrite: bool = False) -> None:
     """Write ``figure`` as the ending of ``path`` says.
 
-    Raises DataError when that cannot be done.
+    Raises DataError for an ending that is not known, and as :func:`written` does.
     """
     try:
-        figure.savefig(path, dpi=120)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise DataError(f"cannot be written: {reason}", where=str(path)) from error
+        with written(path, overwrite=overwrite) as part:
+            figure.savefig(part, dpi=120, format=path.suffix[1:].lower() or "png")
+    except ValueError as error:
+        raise DataError(f"cannot be written: {error}", where=str(path)) from error

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray
-from tomoskin.session.archive import Arrays
+from tomoskin.session.archive import Arrays, save_arrays
 from tomoskin.session.recording import Recording, frame_times
 
 _MOST_ELECTRODES = 1024
@@ -52,8 +52,8 @@ def parse(arrays: Arrays, source: str) -> Recording:
     )
 
 
-def write_interchange(path: Path, recording: Recording) -> None:
-    """Write ``recording`` as an interchange file."""
+def write_interchange(path: Path, recording: Recording, *, overwrite: bool = False) -> None:
+    """Write ``recording`` as an interchange file; raises as :func:`written` does."""
     arrays: dict[str, NDArray[Any]] = {
         "dv" if recording.is_change else "voltages": recording.voltages,
         "drive": recording.drive,
@@ -64,11 +64,7 @@ def write_interchange(path: Path, recording: Recording) -> None:
         arrays["reference"] = recording.reference
     if recording.labels is not None:
         arrays["xy_m"] = recording.labels
-    try:
-        with path.open("wb") as file:
-            np.savez_compressed(file, allow_pickle=False, **arrays)
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+    save_arrays(path, arrays, overwrite=overwrite)
 
 
 def numbers(arrays: Arrays, key: str, source: str) -> NDArray[Any]:

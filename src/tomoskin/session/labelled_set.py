@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -11,11 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError
-from tomoskin.session.archive import Arrays, load_arrays
+from tomoskin.core import DataError, OutputError
+from tomoskin.session.archive import Arrays, load_arrays, save_arrays
 
 IDENTITY = "identity"
 """Array that says of which set and shard a file is."""
+
+_DAMAGED = "damaged"
+"""What a shard says of itself that cannot be read to its end."""
 
 _FIXED = ("drive", "measure", "reference")
 """Arrays that are the same in every shard."""
@@ -26,50 +28,49 @@ def shard_path(folder: Path, shard: int) -> Path:
     return folder / f"part-{shard:05d}.npz"
 
 
-def write_whole(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write ``arrays`` as a .npz file that appears when it is complete; the same bytes each time.
-
-    Raises
-    ------
-    DataError
-        When it cannot be written.
-    """
-    partial = path.with_name(f".{path.name}.partial")
+def write_whole(path: Path, arrays: Mapping[str, NDArray[Any]], *, overwrite: bool = False) -> None:
+    """:func:`save_arrays` into a folder that is made where it is not there."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with partial.open("wb") as file:
-            np.savez_compressed(file, allow_pickle=False, **arrays)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
     except OSError as error:
         raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+    save_arrays(path, arrays, overwrite=overwrite)
 
 
-def is_done(path: Path, identity: str) -> bool:
+def is_done(path: Path, identity: str, *, overwrite: bool = False) -> bool:
     """Whether the shard is there, whole, and the one of this ``identity``.
 
-    A torn file, or one with fewer frames, is not there. Raises DataError for one of another set.
+    A damaged shard, or one of the set with fewer frames, is to be made again. Raises OutputError
+    for any other file, unless ``overwrite``.
     """
     if not path.exists():
         return False
+    found = _identity_in(path)
+    if found.split()[:1] == identity.split()[:1]:
+        return found == identity
+    if found != _DAMAGED and not overwrite:
+        raise OutputError(
+            f"is of another set: expected {identity}, got {found or 'no part of a set'}",
+            where=str(path),
+            hint="choose another folder, or remove what is there",
+        )
+    return False
+
+
+def _identity_in(path: Path) -> str:
+    """What a file says of itself; "" where it says nothing."""
     try:
         with zipfile.ZipFile(path) as archive:
             if archive.testzip() is not None:
-                return False
-        found = str(load_arrays(path)[IDENTITY])
-    except (DataError, KeyError, OSError, zipfile.BadZipFile):
-        return False
-    if found.split()[:1] != identity.split()[:1]:
-        raise DataError(
-            f"is of another set: expected {identity}, got {found}",
-            where=str(path),
-            hint="choose another --out, or remove what is there",
-        )
-    return found == identity
+                return _DAMAGED
+        return str(load_arrays(path)[IDENTITY])
+    except KeyError:
+        return ""
+    except (DataError, OSError, zipfile.BadZipFile):
+        return _DAMAGED if f"{IDENTITY}.npy".encode() in path.read_bytes() else ""
 
 
-def join_shards(paths: Iterable[Path], path: Path) -> None:
+def join_shards(paths: Iterable[Path], path: Path, *, overwrite: bool = False) -> None:
     """One file of all shards, in their order.
 
     Raises
@@ -83,4 +84,4 @@ def join_shards(paths: Iterable[Path], path: Path) -> None:
         for key in shards[0]
         if key != IDENTITY
     }
-    write_whole(path, joined)
+    write_whole(path, joined, overwrite=overwrite)

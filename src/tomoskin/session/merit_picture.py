@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tomoskin.core import DataError
 from tomoskin.inverse import Merit
 from tomoskin.session.figure import new_figure, save_figure
+from tomoskin.session.written import written
 
 _FIGURES = (
     ("amplitude", "amplitude response", 1.0),
@@ -35,13 +35,13 @@ COLUMNS = (
 )
 
 
-def write_merit(path: Path, found: Mapping[str, Merit]) -> None:
+def write_merit(path: Path, found: Mapping[str, Merit], *, overwrite: bool = False) -> None:
     """Draw a panel per figure with a curve per operator, named by the keys of ``found``.
 
     Raises
     ------
     DataError
-        When matplotlib is not installed or the file cannot be written.
+        When matplotlib is not installed, and as :func:`written` does.
     """
     figure = new_figure(path, 10.5, 6.0)
     for ax, (name, label, factor) in zip(figure.subplots(2, 3).ravel(), _FIGURES, strict=True):
@@ -55,22 +55,22 @@ def write_merit(path: Path, found: Mapping[str, Merit]) -> None:
         ax.tick_params(labelsize=7)
         ax.grid(alpha=0.25)
     ax.legend(fontsize=7)
-    save_figure(path, figure)
+    save_figure(path, figure, overwrite=overwrite)
 
 
-def write_merit_table(path: Path, found: Mapping[str, Merit]) -> None:
+def write_merit_table(path: Path, found: Mapping[str, Merit], *, overwrite: bool = False) -> None:
     """Write a CSV file of :data:`COLUMNS`, a row for each operator and target.
 
-    Raises DataError when it cannot be written.
+    Raises as :func:`written` does.
     """
-    try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(COLUMNS)
-            for operator, merit in found.items():
-                table = (merit.distance, *(getattr(merit, name) for name, _, _ in _FIGURES))
-                for row in zip(*table, strict=True):
-                    numbers = (merit.noise_figure, *row)
-                    writer.writerow([operator, *(f"{number:.6g}" for number in numbers)])
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+    with (
+        written(path, overwrite=overwrite) as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        for operator, merit in found.items():
+            table = (merit.distance, *(getattr(merit, name) for name, _, _ in _FIGURES))
+            for row in zip(*table, strict=True):
+                numbers = (merit.noise_figure, *row)
+                writer.writerow([operator, *(f"{number:.6g}" for number in numbers)])

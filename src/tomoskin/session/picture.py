@@ -34,7 +34,13 @@ class Panel:
 
 
 def write_picture(
-    path: Path, mesh: Mesh, panels: Sequence[Panel], unit: str, limit: float | None = None
+    path: Path,
+    mesh: Mesh,
+    panels: Sequence[Panel],
+    unit: str,
+    limit: float | None = None,
+    *,
+    overwrite: bool = False,
 ) -> None:
     """Draw at most ``MOST_PANELS`` panels on one symmetric colour scale, and save them.
 
@@ -48,9 +54,9 @@ def write_picture(
     Raises
     ------
     DataError
-        When matplotlib is not installed, the file cannot be written, or the mesh is a volume.
+        When matplotlib is not installed or the mesh is a volume, and as :func:`written` does.
     """
-    save_figure(path, _figure(path, mesh, panels, unit, limit))
+    save_figure(path, _figure(path, mesh, panels, unit, limit), overwrite=overwrite)
 
 
 def plot(

@@ -15,6 +15,7 @@ from tomoskin.core import DataError, SkinError
 from tomoskin.session import channels, mcap
 from tomoskin.session.container import SEEK_TABLE, ContainerWriter
 from tomoskin.session.container_reader import LARGEST
+from tomoskin.session.outputs import Output, check_outputs
 from tomoskin.session.parts import (
     Attachment,
     Chunk,
@@ -24,6 +25,7 @@ from tomoskin.session.parts import (
     parse_metadata,
 )
 from tomoskin.session.writer import ABOUT, FORMAT, LIBRARY, SKIN_FILE, said_of
+from tomoskin.session.written import written
 from tomoskin.skin import Skin
 
 Advance = Callable[[float, float], None]
@@ -67,7 +69,7 @@ def repair(
     skin: Skin | None = None,
     advance: Advance = lambda _done, _total: None,
 ) -> Repaired:
-    """Write every whole chunk of ``source`` to the new file ``target``.
+    """Write every whole chunk of ``source`` to the new file ``target``, which appears at the end.
 
     Parameters
     ----------
@@ -76,34 +78,45 @@ def repair(
 
     Raises
     ------
+    OutputError
+        When the target exists or cannot be made.
     DataError
-        When the source cannot be read or nothing in it is whole, the target exists or cannot be
-        written, or the skin is lost and none is given.
+        When the source cannot be read or nothing in it is whole, the target cannot be written, or
+        the skin is lost and none is given.
     """
-    found = Repaired(target)
+    check_outputs([Output(target)], [source])
     if not source.exists():
         raise DataError("there is no such file", where=str(source))
+    found = Repaired(target)
     with said_of(source), source.open("rb") as file:
         scan = _Scan(file, found)
-        about, attachments = _front(scan, skin, str(source))
-        with said_of(target):
-            output = target.open("xb", buffering=0)
-            container = ContainerWriter(output, LIBRARY, channels.SCHEMAS, channels.CHANNELS)
-        with said_of(target), closing(container):
-            container.describe(ABOUT, about)
-            for item in attachments:
-                container.attach(item.name, item.media_type, item.data)
-            for part in scan.parts():
-                if isinstance(part, Chunk):
-                    _copy(part, container, found, str(source))
-                    advance(part.offset, scan.size)
-    if not found.chunks:
-        target.unlink()
-        raise DataError("holds no whole chunk: nothing can be recovered", where=str(source))
+        front = _front(scan, skin, str(source))
+        with written(target) as part:
+            _mend(scan, front, part, advance)
+            if not found.chunks:
+                raise DataError("holds no whole chunk: nothing can be recovered", where=str(source))
     return found
 
 
-def _front(scan: _Scan, skin: Skin | None, where: str) -> tuple[dict[str, str], list[Attachment]]:
+Front = tuple[dict[str, str], list[Attachment]]
+"""The named strings of a file, and its attachments."""
+
+
+def _mend(scan: _Scan, front: Front, target: Path, advance: Advance) -> None:
+    """What is whole in the file that is scanned → ``target``."""
+    about, attachments = front
+    output = target.open("wb", buffering=0)
+    with closing(ContainerWriter(output, LIBRARY, channels.SCHEMAS, channels.CHANNELS)) as mended:
+        mended.describe(ABOUT, about)
+        for item in attachments:
+            mended.attach(item.name, item.media_type, item.data)
+        for part in scan.parts():
+            if isinstance(part, Chunk):
+                _copy(part, mended, scan.found, scan.name)
+                advance(part.offset, scan.size)
+
+
+def _front(scan: _Scan, skin: Skin | None, where: str) -> Front:
     """The named strings and the attachments, wherever they are in the file."""
     about: dict[str, str] = {}
     attachments: dict[str, Attachment] = {}
@@ -144,14 +157,15 @@ class _Scan:
     """Goes through a file record by record, and to the next whole one where that fails."""
 
     def __init__(self, file: BinaryIO, found: Repaired) -> None:
-        self._file, self._found = file, found
+        self._file, self.found = file, found
+        self.name = str(file.name)
         self.size = file.seek(0, 2)
         self.begin()
 
     def begin(self) -> None:
         """Forget what was found to be lost."""
-        self._found.lost.clear()
-        self._found.ended = False
+        self.found.lost.clear()
+        self.found.ended = False
 
     def parts(self) -> Iterator[Chunk | Attachment | dict[str, str]]:
         """Every whole chunk, attachment and description, in order."""
@@ -171,7 +185,7 @@ class _Scan:
             if part is not None:
                 yield part
             if self._read(place, 1)[0] == mcap.DATA_END:
-                self._found.ended = True
+                self.found.ended = True
                 return
             place += length
 
@@ -218,11 +232,11 @@ class _Scan:
         return self.size
 
     def _lose(self, start: int, stop: int, after: int) -> None:
-        self._found.lost.append(Lost(start, stop, after, None))
+        self.found.lost.append(Lost(start, stop, after, None))
 
     def _bound(self, first: int) -> None:
         """The last stretch lost ends before ``first``."""
-        lost = self._found.lost
+        lost = self.found.lost
         if lost and lost[-1].before is None:
             lost[-1] = Lost(lost[-1].start, lost[-1].stop, lost[-1].after, first)
 

@@ -47,9 +47,9 @@ class StatesCalibration:
     skin_name: str = ""
 
 
-def write_states(path: Path, calibration: StatesCalibration) -> None:
-    """Write the file whole or not at all. Raises DataError when it cannot be written."""
-    save_arrays(path, _arrays(calibration))
+def write_states(path: Path, calibration: StatesCalibration, *, overwrite: bool = False) -> None:
+    """Write the file; raises as :func:`written` does."""
+    save_arrays(path, _arrays(calibration), overwrite=overwrite)
 
 
 def pack_states(calibration: StatesCalibration) -> bytes:

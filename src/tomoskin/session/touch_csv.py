@@ -7,8 +7,9 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
-from tomoskin.core import DataError, Touch
+from tomoskin.core import Touch
 from tomoskin.mesh import Plane, Surface
+from tomoskin.session.written import written
 
 HEADER = (
     *("frame", "time_s", "id", "x_m", "y_m", "sd_x_m", "sd_y_m"),
@@ -23,29 +24,28 @@ def write_touches(
     path: Path,
     frames: Iterable[tuple[int, float, tuple[Touch, ...]]],
     surface: Surface | None = None,
+    *,
+    overwrite: bool = False,
 ) -> int:
     """Write touches of (frame, time, touches); return the number of rows.
 
     A standard deviation that is not known is an empty field; the kind is :attr:`Touch.said`. On
     a ``surface`` that is not flat each row ends with the touch's place on it.
 
-    Raises
-    ------
-    DataError
-        When the file cannot be written.
+    Raises as :func:`written` does.
     """
     count = 0
     on = None if isinstance(surface, Plane) else surface
-    try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            table = csv.writer(file, lineterminator="\n")
-            table.writerow(HEADER + (IN_SPACE if on else ()))
-            for frame, time, touches in frames:
-                for touch in touches:
-                    table.writerow(_row(frame, time, touch) + _in_space(touch, on))
-                    count += 1
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+    with (
+        written(path, overwrite=overwrite) as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(HEADER + (IN_SPACE if on else ()))
+        for frame, time, touches in frames:
+            for touch in touches:
+                table.writerow(_row(frame, time, touch) + _in_space(touch, on))
+                count += 1
     return count
 
 

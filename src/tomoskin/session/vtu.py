@@ -11,21 +11,24 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray
+from tomoskin.core import FloatArray
 from tomoskin.mesh import Mesh
+from tomoskin.session.written import written
 
 _VTK_TYPE = {3: 5, 4: 10}
 _VTK_NAME = {"float64": "Float64", "int64": "Int64", "uint8": "UInt8"}
 
 
-def write_vtu(path: Path, mesh: Mesh, fields: Mapping[str, FloatArray]) -> None:
-    """Write ``fields``, each (n_cells,), as cell data of ``mesh``.
+def write_vtu(
+    path: Path, mesh: Mesh, fields: Mapping[str, FloatArray], *, overwrite: bool = False
+) -> None:
+    """Write ``fields``, each (n_cells,), as cell data of ``mesh``; raises as :func:`written`."""
+    document = _document(mesh, fields)
+    with written(path, overwrite=overwrite) as part:
+        document.write(part, encoding="utf-8", xml_declaration=True)
 
-    Raises
-    ------
-    DataError
-        When the file cannot be written.
-    """
+
+def _document(mesh: Mesh, fields: Mapping[str, FloatArray]) -> Xml.ElementTree[Xml.Element[str]]:
     root = Xml.Element(
         "VTKFile",
         {
@@ -51,10 +54,7 @@ def write_vtu(path: Path, mesh: Mesh, fields: Mapping[str, FloatArray]) -> None:
     data = Xml.SubElement(piece, "CellData")
     for name, values in fields.items():
         _array(data, name, values)
-    try:
-        Xml.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
+    return Xml.ElementTree(root)
 
 
 def _array(parent: Xml.Element, name: str, values: NDArray[Any]) -> None:

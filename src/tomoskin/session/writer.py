@@ -10,12 +10,13 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from tomoskin import __version__
-from tomoskin.core import DataError, Event, Frame, Image, PixelMap, Touch
+from tomoskin.core import DataError, Event, Frame, Image, OutputError, PixelMap, Touch
 from tomoskin.session import channels
 from tomoskin.session.container import ContainerWriter
 from tomoskin.session.documents import encode_json, plain, touches_message
 from tomoskin.session.foxglove import grid_message, log_message, scene_message
 from tomoskin.session.layout import Mark, encode_frame, encode_raw
+from tomoskin.session.outputs import Output, check_outputs
 
 if TYPE_CHECKING:
     from tomoskin.skin import Skin
@@ -54,9 +55,11 @@ class SessionWriter:
 
     Raises
     ------
+    OutputError
+        When the file exists or cannot be made.
     DataError
-        From every method: when the file exists, cannot be made, or cannot be written any further
-        (disk full, drive gone). What was written before stays readable; nothing more is written.
+        From every method: when the file cannot be written any further (disk full, drive gone).
+        What was written before stays readable; nothing more is written.
     """
 
     def __init__(self, path: Path, skin: Skin, *, epoch: float = 0.0, start: float = 0.0) -> None:
@@ -64,6 +67,7 @@ class SessionWriter:
         self.epoch = epoch
         self._now = self._start = start
         self._flushed = 0
+        check_outputs([Output(path)])
         with said_of(self.path):
             file = path.open("xb", buffering=0)
             self._file = ContainerWriter(file, LIBRARY, channels.SCHEMAS, channels.CHANNELS)
@@ -197,12 +201,8 @@ def said_of(path: Path) -> Iterator[None]:
     """OSError → DataError that names the file."""
     try:
         yield
-    except FileExistsError:
-        raise DataError(
-            "exists already, and recordings are never written over",
-            where=str(path),
-            hint="choose another name",
-        ) from None
+    except FileExistsError:  # made since it was looked for
+        raise OutputError("exists already", where=str(path), hint="choose another name") from None
     except OSError as error:
         raise DataError(
             f"cannot be read or written: {error.strerror or error}",

@@ -11,7 +11,7 @@ import numpy as np
 from tomoskin.core import DataError
 from tomoskin.session.blocks import Advance, Block, Rows, all_blocks
 from tomoskin.session.session_reader import SessionReader
-from tomoskin.session.writer import said_of
+from tomoskin.session.written import written
 
 _FRAMES = ("number", "time", "sequence", "ticks", "mark", "samples", "voltages")
 _TOUCH = np.dtype(
@@ -20,7 +20,9 @@ _TOUCH = np.dtype(
 )
 
 
-def write_hdf5(path: Path, session: SessionReader, advance: Advance) -> None:
+def write_hdf5(
+    path: Path, session: SessionReader, advance: Advance, *, overwrite: bool = False
+) -> None:
     """Groups ``frames`` (one dataset a column), ``touches``, ``truth`` and ``events``.
 
     ``drive`` and ``measure`` (n_meas, 2) beside them; the skin file, device and settings are
@@ -29,7 +31,7 @@ def write_hdf5(path: Path, session: SessionReader, advance: Advance) -> None:
     Raises
     ------
     DataError
-        When h5py is missing, the file cannot be written or the session is damaged.
+        When h5py is missing or the session is damaged, and as :func:`written` does.
     """
     try:
         import h5py
@@ -38,7 +40,7 @@ def write_hdf5(path: Path, session: SessionReader, advance: Advance) -> None:
             "HDF5 needs h5py", where=str(path), hint="pip install 'tomoskin[hdf5]'"
         ) from error
     rows = Rows.of(session)
-    with said_of(path), h5py.File(path, "w") as file:
+    with written(path, overwrite=overwrite) as part, h5py.File(part, "w") as file:
         file.attrs["skin"] = session.skin.to_toml()
         file.attrs["epoch_s"] = session.epoch
         file.attrs["device"] = _json(session.device())

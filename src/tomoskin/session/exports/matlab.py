@@ -11,13 +11,15 @@ from scipy.sparse import csc_matrix
 
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.session.recording import Recording
-from tomoskin.session.writer import said_of
+from tomoskin.session.written import written
 
 _LARGEST = 2**31 - 1
 _STIMULATION = [("stimulation", "O"), ("stim_pattern", "O"), ("meas_pattern", "O")]
 
 
-def write_matlab(path: Path, recording: Recording, current: float, n_electrodes: int) -> None:
+def write_matlab(
+    path: Path, recording: Recording, current: float, n_electrodes: int, *, overwrite: bool = False
+) -> None:
     """Write ``stimulation`` (structure array), ``vi`` (n_meas, n_frames) V and ``time_s``.
 
     Each stimulation has ``stimulation`` "Amp", ``stim_pattern`` (n_electrodes, 1) A and
@@ -27,7 +29,7 @@ def write_matlab(path: Path, recording: Recording, current: float, n_electrodes:
     Raises
     ------
     DataError
-        When the file cannot be written, or would be larger than the format allows.
+        When the file would be larger than the format allows, and as :func:`written` does.
     """
     drives, order = _by_drive(recording.drive)
     values = recording.voltages[:, order].T
@@ -52,8 +54,8 @@ def write_matlab(path: Path, recording: Recording, current: float, n_electrodes:
         variables["vh"] = recording.reference[order][:, None]
     if recording.labels is not None:
         variables["xy_m"] = recording.labels
-    with said_of(path):
-        savemat(path, variables, do_compression=True)
+    with written(path, overwrite=overwrite) as part:
+        savemat(part, variables, do_compression=True, appendmat=False)
 
 
 def _by_drive(drive: IntArray) -> tuple[IntArray, IntArray]:

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError
-from tomoskin.session.writer import said_of
+from tomoskin.session.written import written
 
 Pictures = Iterable[NDArray[np.uint8]]
 
 
-def write_gif(path: Path, pictures: Pictures, fps: float) -> None:
+def write_gif(path: Path, pictures: Pictures, fps: float, *, overwrite: bool = False) -> None:
     """Write pictures (h, w, 3) as a GIF that repeats.
 
     Raises
     ------
     DataError
-        When Pillow is missing or the file cannot be written.
+        When Pillow is missing, and as :func:`written` does.
     """
     try:
         from PIL import Image
@@ -33,17 +33,17 @@ def write_gif(path: Path, pictures: Pictures, fps: float) -> None:
         ) from error
     images = (Image.fromarray(picture) for picture in pictures)
     first = next(images)
-    with said_of(path):
-        first.save(path, "GIF", save_all=True, append_images=images, duration=1e3 / fps, loop=0)
+    with written(path, overwrite=overwrite) as part:
+        first.save(part, "GIF", save_all=True, append_images=images, duration=1e3 / fps, loop=0)
 
 
-def write_mp4(path: Path, pictures: Pictures, fps: float) -> None:
+def write_mp4(path: Path, pictures: Pictures, fps: float, *, overwrite: bool = False) -> None:
     """Write pictures (h, w, 3) as H.264 through ffmpeg.
 
     Raises
     ------
     DataError
-        When there is no ffmpeg, or it cannot write the file.
+        When there is no ffmpeg or it cannot write the file, and as :func:`written` does.
     """
     program = shutil.which("ffmpeg")
     if program is None:
@@ -58,22 +58,36 @@ def write_mp4(path: Path, pictures: Pictures, fps: float) -> None:
     command = [
         *(program, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"),
         *("-s", f"{width}x{height}", "-r", str(fps), "-i", "-"),
-        *("-pix_fmt", "yuv420p", "-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2", str(path)),
+        *("-pix_fmt", "yuv420p", "-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2"),
     ]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        _feed(process, first, stream)
-        _, said = process.communicate()
-    if process.returncode:
-        text = said.decode(errors="replace").strip().splitlines()
-        reason = text[-1] if text else f"ffmpeg ended with {process.returncode}"
-        raise DataError(f"cannot be written: {reason}", where=str(path))
+    with written(path, overwrite=overwrite) as part:
+        reason = _encoded([*command, str(part)], first, stream)
+        if reason:
+            raise DataError(f"cannot be written: {reason}", where=str(path))
 
 
-WRITERS: dict[str, Callable[[Path, Pictures, float], None]] = {
-    ".gif": write_gif,
-    ".mp4": write_mp4,
-}
+class Film(Protocol):
+    """What writes pictures (h, w, 3) as a film."""
+
+    def __call__(
+        self, path: Path, pictures: Pictures, fps: float, *, overwrite: bool = False
+    ) -> None:
+        """Raises DataError."""
+
+
+WRITERS: dict[str, Film] = {".gif": write_gif, ".mp4": write_mp4}
 """What writes a film, by the ending of its name."""
+
+
+def _encoded(command: list[str], first: NDArray[np.uint8], rest: Pictures) -> str:
+    """Feed a program; why it failed, or ""."""
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        _feed(process, first, rest)
+        _, said = process.communicate()
+    if not process.returncode:
+        return ""
+    text = said.decode(errors="replace").strip().splitlines()
+    return text[-1] if text else f"ffmpeg ended with {process.returncode}"
 
 
 def _feed(process: Any, first: NDArray[np.uint8], rest: Pictures) -> None:

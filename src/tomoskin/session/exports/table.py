@@ -11,29 +11,36 @@ from tomoskin.core import DataError
 from tomoskin.session.blocks import Advance, Block, Rows, all_blocks
 from tomoskin.session.imports.csv_table import column_names
 from tomoskin.session.session_reader import SessionReader
-from tomoskin.session.writer import said_of
+from tomoskin.session.written import written
 
 _BESIDE = ("frame", "time_s", "sequence", "ticks", "mark")
 
 
-def write_csv(path: Path, session: SessionReader, advance: Advance) -> None:
+def write_csv(
+    path: Path, session: SessionReader, advance: Advance, *, overwrite: bool = False
+) -> None:
     """One line a frame, in the interchange table's columns: ``tomoskin image`` reads it again.
 
     Raises
     ------
     DataError
-        When the file cannot be written or the session is damaged.
+        When the session is damaged, and as :func:`written` does.
     """
     rows = Rows.of(session)
     names = column_names(rows.pattern.drive, rows.pattern.measure)
-    with said_of(path), path.open("w", encoding="utf-8", newline="") as file:
+    with (
+        written(path, overwrite=overwrite) as part,
+        part.open("w", encoding="utf-8", newline="") as file,
+    ):
         file.write(",".join([*_BESIDE, *names]) + "\n")
         for block in all_blocks(session, rows, advance):
             for number in range(len(block.number)):
                 file.write(_line(block, number))
 
 
-def write_parquet(path: Path, session: SessionReader, advance: Advance) -> None:
+def write_parquet(
+    path: Path, session: SessionReader, advance: Advance, *, overwrite: bool = False
+) -> None:
     """One row a frame: frame, time_s, sequence, ticks, mark, and ``voltages`` as a list of floats.
 
     The tables ``drive`` and ``measure`` are JSON in the schema's metadata, with the skin.
@@ -41,7 +48,7 @@ def write_parquet(path: Path, session: SessionReader, advance: Advance) -> None:
     Raises
     ------
     DataError
-        When pyarrow is missing, the file cannot be written or the session is damaged.
+        When pyarrow is missing or the session is damaged, and as :func:`written` does.
     """
     try:
         import pyarrow as pa
@@ -56,7 +63,10 @@ def write_parquet(path: Path, session: SessionReader, advance: Advance) -> None:
     fields = [pa.field(name, kind) for name, kind in zip(_BESIDE, kinds, strict=True)]
     fields.append(pa.field("voltages", pa.list_(pa.float64(), n)))
     schema = pa.schema(fields, metadata=_about(session, rows))
-    with said_of(path), pq.ParquetWriter(path, schema, compression="zstd") as file:
+    with (
+        written(path, overwrite=overwrite) as part,
+        pq.ParquetWriter(part, schema, compression="zstd") as file,
+    ):
         for block in all_blocks(session, rows, advance):
             values = pa.FixedSizeListArray.from_arrays(pa.array(block.voltages.reshape(-1)), n)
             columns = [block.number, block.time, block.sequence, block.ticks, block.mark]

@@ -1,0 +1,124 @@
+"""Files that a command's parameters name: what is read, what is written, and when it may be.
+
+Every parameter that names a file says so in its annotation, beside its option. What is written is
+looked at before the command runs: a command need not, and cannot forget it.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
+
+import typer
+from typer.models import OptionInfo
+
+if TYPE_CHECKING:
+    from tomoskin.session import Output
+
+Given = Mapping[str, Any]
+"""Arguments of a command by the names of its parameters."""
+
+ForceFlag = Annotated[
+    bool,
+    typer.Option(
+        "--force", help="Write over files that are there; inputs and recordings stay as they are."
+    ),
+]
+"""The --force option of every command that writes anything but recordings."""
+
+RECORDING = {".mcap": "a recording"}
+TABLE = {".csv": "a table"}
+CALIBRATION = {".npz": "a calibration"}
+SKIN = {".toml": "a skin file"}
+FIGURE = {".png": "a picture", ".pdf": "a figure", ".svg": "a drawing"}
+
+
+@dataclass(frozen=True)
+class Reads:
+    """The file, or the files of the folder, that the parameter names are only read."""
+
+
+@dataclass(frozen=True)
+class Otherwise:
+    """The file that the parameter names is treated in a way of its own: it says which."""
+
+    why: str
+
+
+@dataclass(frozen=True)
+class Writes:
+    """The file that the parameter names is written.
+
+    Attributes
+    ----------
+    endings
+        What its name may end in, and what each gives.
+    files
+        The files that are written, where it is not just the one: of the value, all arguments,
+        and what a person calls the parameter.
+    """
+
+    endings: Mapping[str, str]
+    files: Callable[[Path | None, Given, str], Iterable[Output]] | None = None
+
+    def outputs(self, value: Path | None, given: Given, called: str) -> Iterable[Output]:
+        """What is to be checked."""
+        from tomoskin.session import Output
+
+        if self.files is not None:
+            return self.files(value, given, called)
+        return () if value is None else (Output(value, self.endings, called),)
+
+
+def guarded(command: Callable[..., None]) -> Callable[..., None]:
+    """The command; what it writes is looked at before it runs, against all that it is given.
+
+    Raises OutputError as :func:`tomoskin.session.check_outputs` does.
+    """
+    written = dict(_written(command))
+    if not written:
+        return command
+
+    @functools.wraps(command)
+    def run(**given: Any) -> None:
+        from tomoskin.session import check_outputs
+
+        outputs = [
+            output
+            for name, (called, writes) in written.items()
+            for output in writes.outputs(given[name], given, called)
+        ]
+        inputs = [
+            path for name, value in given.items() if name not in written for path in _files(value)
+        ]
+        overwrite = given.get("force", False)
+        check_outputs(outputs, inputs, overwrite=overwrite, consent="--force")
+        command(**given)
+
+    return run
+
+
+def _written(command: Callable[..., None]) -> Iterator[tuple[str, tuple[str, Writes]]]:
+    """Each parameter that names what is written: what a person calls it, and its mark."""
+    hints = get_type_hints(command, include_extras=True)
+    for name in inspect.signature(command).parameters:
+        marks = get_args(hints.get(name))
+        for writes in (mark for mark in marks if isinstance(mark, Writes)):
+            called = next(_called(name, info) for info in marks if hasattr(info, "metavar"))
+            yield name, (called, writes)
+
+
+def _called(name: str, info: Any) -> str:
+    return f"--{name.replace('_', '-')}" if isinstance(info, OptionInfo) else info.metavar or name
+
+
+def _files(value: Any) -> Iterator[Path]:
+    """What an argument may name: a path, or the text of an option that also takes other things."""
+    if isinstance(value, Path):
+        yield value
+    elif isinstance(value, str) and value:
+        yield Path(value)

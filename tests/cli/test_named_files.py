@@ -1,0 +1,391 @@
+"""Every command with an output: what it never writes over, and what it does when told to."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_type_hints
+
+import meshio
+import numpy as np
+import pytest
+import typer
+
+from session.runs import write_all
+from shapes import disc
+from tomoskin.cli import image as image_module
+from tomoskin.cli.app import COMMANDS
+from tomoskin.cli.contents import Commands
+from tomoskin.cli.image_files import WRITERS as IMAGE_WRITERS
+from tomoskin.cli.named_files import RECORDING, ForceFlag, Otherwise, Reads, Writes
+from tomoskin.cli.session import EXPORTS
+from tomoskin.core import OutputError
+from tomoskin.forward import ForwardModel
+from tomoskin.live import WRITERS as EXPORT_WRITERS
+from tomoskin.session import RECORDING as SESSION_ENDINGS
+from tomoskin.session.mcap import MAGIC
+from tomoskin.skin import Skin
+from tomoskin.twin.script_page import PRESSES_EXAMPLE
+
+Run = Callable[..., tuple[int, str, str]]
+COARSE = Skin.load("textile-disc-8").altered({"mesh": {"cells": 300}})
+BENDS = ("--bend", "0=0:8", "--bend", "30=8:16", "--bend", "60=16:24")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A command line with one output, and the ending of that; the first input is its own."""
+
+    words: str
+    ending: str
+    options: tuple[str, ...] = ()
+
+    def line(self, files: dict[str, Path], out: Path, *more: str) -> list[str]:
+        """With the ``files`` by their names."""
+        words = [word.format(out=out, **files) for word in self.words.split()]
+        return [*words, *self.options, *more]
+
+    @property
+    def reads(self) -> str:
+        """The name of the first file that it reads."""
+        return next(w[1:-1] for w in self.words.split() if w[0] == "{" and w != "{out}")
+
+
+CASES = {
+    ("image", "out"): Case("image {presses} --skin {skin} --out {out}", ".npz"),
+    ("image", "touches"): Case("image {presses} --skin {skin} --touches {out}", ".csv"),
+    ("locate", "touches"): Case(
+        "locate {presses} --calibration {calibration} --touches {out}", ".csv"
+    ),
+    ("states", "out"): Case("states {presses} --calibration {states} --out {out}", ".csv"),
+    ("calibrate touch", "out"): Case("calibrate touch {presses} --out {out}", ".npz"),
+    ("calibrate states", "out"): Case(
+        "calibrate states {presses} --state a=0:8 --state b=8:16 --out {out}", ".npz"
+    ),
+    ("calibrate bend", "out"): Case(
+        "calibrate bend {bends} --skin {skin} --out {out}", ".npz", BENDS
+    ),
+    ("calibrate wiring", "out"): Case(
+        "calibrate wiring {presses} --skin {skin} --out {out}", ".toml"
+    ),
+    ("design", "out"): Case("design --skin {skin} --out {out}", ".png", ("--electrodes", "")),
+    ("skin alpha", "out"): Case("skin alpha {skin} --rule light-touch --out {out}", ".png"),
+    ("skin merit", "out"): Case("skin merit {skin} --out {out}", ".csv"),
+    ("skin lay", "out"): Case("skin lay {surface} --electrodes {places} --out {out}", ".toml"),
+    ("session export", "out"): Case("session export {session} {out}", ".csv"),
+    ("session export", "touches"): Case("session export {session} {other} --touches {out}", ".csv"),
+    ("session import", "out"): Case("session import {presses} {out}", ".npz"),
+    ("simulate", "out"): Case(
+        "simulate --script {population} --skin {skin} --presses 1 --processes 1 --out {out}", ".npz"
+    ),
+}
+"""One for each output that may be written over with --force."""
+
+NEW_ONLY = {
+    ("record", "file"): Case("record {out} --skin {skin} --source twin:fast --frames 1", ".mcap"),
+    ("live", "record"): Case("live --skin {skin} --record {out} --port 0", ".mcap"),
+    ("session repair", "out"): Case("session repair {session} --out {out}", ".mcap"),
+}
+"""One for each output that is always a new recording."""
+
+BOTH = [pytest.param(case, id=" ".join(name)) for name, case in (CASES | NEW_ONLY).items()]
+FORCED = [pytest.param(case, id=" ".join(name)) for name, case in CASES.items()]
+
+
+def force(case: Case) -> tuple[str, ...]:
+    return ("--force",) if case in CASES.values() else ()
+
+
+# What there is to read: for the refusals nothing of use, so that whoever looks at it says so.
+
+NAMES = {
+    "presses": ".npz", "bends": ".npz", "calibration": ".npz", "states": ".npz", "skin": ".toml",
+    "surface": ".stl", "places": ".csv", "session": ".mcap", "population": ".toml",
+}  # fmt: skip
+
+
+@pytest.fixture
+def broken(tmp_path: Path) -> dict[str, Path]:
+    folder = tmp_path / "broken"
+    folder.mkdir()
+    files = {name: folder / f"{name}{ending}" for name, ending in NAMES.items()}
+    for path in files.values():
+        path.write_bytes(b"\x00 broken")
+    return files | {"other": folder / "other.csv"}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Small inputs that every command can work with."""
+    folder = tmp_path_factory.mktemp("whole")
+    files = {name: folder / f"{name}{ending}" for name, ending in NAMES.items()}
+    files["skin"].write_text(COARSE.to_toml())
+    write_all(files["session"])
+    files["population"].write_text(PRESSES_EXAMPLE)
+    np.savez(files["presses"], **presses())
+    np.savez(files["bends"], **bends())
+    flat = np.pad(1e3 * disc(cells=300).points, ((0, 0), (0, 1)))
+    meshio.write(files["surface"], meshio.Mesh(flat, [("triangle", disc(cells=300).cells)]))
+    turn = 2 * np.pi * np.arange(8) / 8
+    np.savetxt(files["places"], 100 * np.c_[np.cos(turn), np.sin(turn), 0 * turn], "%.3f", ",")
+    for name in ("touch", "states"):
+        case, out = CASES[f"calibrate {name}", "out"], "calibration" if name == "touch" else name
+        with pytest.raises(SystemExit) as end:
+            import_module("tomoskin.cli").main(case.line(files, files[out]))
+        assert not end.value.code
+    return files
+
+
+def presses() -> dict[str, Any]:
+    """Sixteen labelled presses of the coarse skin, with noise."""
+    rng, pattern = np.random.default_rng(3), COARSE.pattern()
+    model = ForwardModel(COARSE.mesh(), pattern, COARSE.contact_impedance, COARSE.current)
+    state = model.at(COARSE.conductivity)
+    turn = rng.uniform(0, 2 * np.pi, 16)
+    xy = 0.06 * np.sqrt(rng.random(16))[:, None] * np.c_[np.cos(turn), np.sin(turn)]
+    near = [np.linalg.norm(model.mesh.centroids - place, axis=1) < 0.02 for place in xy]
+    touches = [(np.flatnonzero(n), np.full(n.sum(), 0.7 * COARSE.conductivity)) for n in near]
+    values = state.local.voltages_of(touches)
+    return _frames(values, state.voltages, rng) | {"xy_m": xy}
+
+
+def bends() -> dict[str, Any]:
+    """Frames whose change grows with an angle: 0, 30 and 60 degrees."""
+    rng, pattern = np.random.default_rng(4), COARSE.pattern()
+    model = ForwardModel(COARSE.mesh(), pattern, COARSE.contact_impedance, COARSE.current)
+    rest = model.solve(COARSE.conductivity).voltages
+    angle = np.repeat([0.0, 30.0, 60.0], 8)[:, None]
+    return _frames(rest * (1 + 1e-3 * angle * rng.random(len(rest))), rest, rng)
+
+
+def _frames(values: np.ndarray, rest: np.ndarray, rng: np.random.Generator) -> dict[str, Any]:
+    noise = rng.normal(0.0, 2e-5, values.shape)
+    pattern = COARSE.pattern()
+    return {"voltages": values + noise, "reference": rest,
+            "drive": pattern.drive, "measure": pattern.measure}  # fmt: skip
+
+
+# Refusals, all before anything of the input is looked at.
+
+
+@pytest.mark.parametrize("case", BOTH)
+def test_an_input_stays_as_it_is(tomoskin: Run, broken: dict[str, Path], case: Case) -> None:
+    mine = broken[case.reads]
+    code, _, err = tomoskin(*case.line(broken, mine, *force(case)))
+    assert (code, mine.read_bytes()) == (2, b"\x00 broken")
+    assert "read here and never written over" in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["run.mcap", "run{}"])
+@pytest.mark.parametrize("case", BOTH)
+def test_a_recording_stays_as_it_is(
+    tomoskin: Run, tmp_path: Path, broken: dict[str, Path], case: Case, name: str
+) -> None:
+    recording = tmp_path / name.format(case.ending)
+    recording.write_bytes(MAGIC)
+    code, _, err = tomoskin(*case.line(broken, recording, *force(case)))
+    assert (code, recording.read_bytes()) == (2, MAGIC)
+    assert "recordings are never written over" in err
+
+
+@pytest.mark.parametrize("case", BOTH)
+def test_a_file_stays_unless_it_is_said(
+    tomoskin: Run, tmp_path: Path, broken: dict[str, Path], case: Case
+) -> None:
+    mine = tmp_path / f"mine{case.ending}"
+    mine.write_bytes(b"mine")
+    code, _, err = tomoskin(*case.line(broken, mine))
+    assert (code, mine.read_bytes()) == (2, b"mine")
+    assert f"{mine}: exists already" in err
+    assert ("--force" in err) == (case in CASES.values())
+
+
+@pytest.mark.parametrize("case", BOTH)
+def test_where_nothing_can_be_written_is_said_before_the_work(
+    tomoskin: Run, tmp_path: Path, broken: dict[str, Path], case: Case
+) -> None:
+    target = tmp_path / "no such folder" / f"x{case.ending}"
+    if not case.words.startswith("simulate"):  # which makes folders
+        code, _, err = tomoskin(*case.line(broken, target))
+        assert (code, "there is no folder" in err) == (2, True)
+    code, _, err = tomoskin(*case.line(broken, tmp_path))
+    folders = case.words.startswith("simulate")  # it may fill one
+    assert ((code, "got a folder" in err) == (2, True)) != folders
+    code, _, err = tomoskin(*case.line(broken, tmp_path / "x.doc"))
+    assert (code, f"{case.ending} (" in err) == (2, True)
+
+
+# With --force.
+
+
+@pytest.mark.parametrize("case", FORCED)
+def test_a_failure_leaves_the_old_file(
+    tomoskin: Run, tmp_path: Path, broken: dict[str, Path], case: Case
+) -> None:
+    """What is broken is looked at only when the output may be written: code 1, not 2."""
+    mine = tmp_path / f"mine{case.ending}"
+    mine.write_bytes(b"mine")
+    code, _, err = tomoskin(*case.line(broken, mine, "--force"))
+    assert (code, mine.read_bytes()) == (1, b"mine")
+    assert str(broken[case.reads].parent) in err
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "broken", mine]
+
+
+@pytest.mark.parametrize("case", FORCED)
+def test_with_force_a_file_is_written_over(
+    tomoskin: Run,
+    tmp_path: Path,
+    whole: dict[str, Path],
+    case: Case,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("tomoskin.cli.design._PLACES", 20)  # a map of few places is one too
+    mine = tmp_path / f"mine{case.ending}"
+    mine.write_bytes(b"mine")
+    code, _, err = tomoskin(*case.line(whole | {"other": tmp_path / "x.csv"}, mine, "--force"))
+    assert code == 0, err
+    assert mine.read_bytes() != b"mine"
+    assert sorted(tmp_path.iterdir()) in ([mine], [mine, tmp_path / "x.csv"])
+
+
+# What belongs to one command.
+
+
+def test_two_outputs_are_two_files(
+    tomoskin: Run, tmp_path: Path, broken: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ("session", "export", broken["session"], "x.csv", "--touches", "./X.csv", "--force")
+    code, _, err = tomoskin(*words)
+    assert (code, "is the same file as OUT x.csv" in err) == (2, True)
+
+
+def test_a_repair_without_a_name_keeps_what_has_it(tomoskin: Run, broken: dict[str, Path]) -> None:
+    mended = broken["session"].with_name("session.repaired.mcap")
+    mended.write_bytes(b"mine")
+    code, _, err = tomoskin("session", "repair", broken["session"])
+    assert (code, mended.read_bytes()) == (2, b"mine")
+    assert err.startswith(f"tomoskin: {mended}: exists already")
+
+
+@pytest.mark.parametrize("ending", [".vtu", ".pvd"])
+def test_the_parts_of_a_series_are_outputs_too(
+    tomoskin: Run, tmp_path: Path, broken: dict[str, Path], ending: str
+) -> None:
+    (tmp_path / "x_000001.vtu").write_text("mine")
+    code, _, err = tomoskin("session", "export", broken["session"], tmp_path / f"x{ending}")
+    assert (code, "x_000001.vtu: exists already" in err) == (2, True)
+
+
+def test_labelled_frames_stay_out_of_the_way_of_others(
+    tomoskin: Run, tmp_path: Path, whole: dict[str, Path]
+) -> None:
+    """A file of a shard's name that is no shard; and a file where a folder is to be."""
+    words = ("simulate", "--skin", whole["skin"], "--presses", "1", "--processes", "1")
+    part = tmp_path / "part-00000.npz"
+    np.savez(part, mine=np.ones(2))
+    mine = part.read_bytes()
+    code, _, err = tomoskin(*words, "--out", tmp_path)
+    assert (code, part.read_bytes(), "no part of a set" in err) == (2, mine, True)
+    code, _, err = tomoskin(*words, "--out", whole["skin"].with_suffix(""), "--force")
+    assert code == 0, err
+    (tmp_path / "set").write_text("mine")
+    code, _, err = tomoskin(*words, "--out", tmp_path / "set", "--force")
+    assert (code, "expected a name that ends in .npz" in err) == (2, True)
+    code, _, err = tomoskin(*words, "--out", tmp_path, "--force")
+    assert (code, part.read_bytes() != mine) == (0, True)
+
+
+def test_endings_are_those_of_what_writes() -> None:
+    assert set(EXPORTS) == set(EXPORT_WRITERS)
+    assert set(image_module.IMAGES) == set(IMAGE_WRITERS)
+    assert RECORDING == SESSION_ENDINGS
+
+
+# No command can forget it.
+
+OUTPUT_WORDS = {"out", "output", "to", "into", "dest", "save", "record", "touches", "write"}
+"""Names of parameters that are outputs, whatever their type."""
+
+
+def commands() -> Iterator[tuple[str, Callable[..., None]]]:
+    """Every command as it is registered, by its words."""
+    for name in COMMANDS:
+        module = import_module(f"tomoskin.cli.{name}")
+        app = getattr(module, "app", None)
+        if app is None:
+            app = Commands()
+            app.command(name)(getattr(module, name))
+            prefix = ""
+        else:
+            prefix = f"{name} "
+        for info in app.registered_commands:
+            yield prefix + (info.name or info.callback.__name__), info.callback
+
+
+ALL = dict(commands())
+
+
+def marks(command: Callable[..., None]) -> dict[str, tuple[Any, list[Any]]]:
+    """Each parameter's annotation without its marks, and the marks."""
+    hints = get_type_hints(inspect.unwrap(command), include_extras=True)
+    return {
+        name: (
+            hints[name],
+            [m for m in get_args(hints[name]) if isinstance(m, Reads | Writes | Otherwise)],
+        )
+        for name in inspect.signature(command).parameters
+    }
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_file_is_marked_as_read_or_written(name: str) -> None:
+    for parameter, (hint, found) in marks(ALL[name]).items():
+        named = "Path" in str(hint) or parameter in OUTPUT_WORDS
+        assert len(found) == named, f"{name} {parameter}: Reads(), Writes(…) or Otherwise(why)?"
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_command_that_writes_is_guarded_and_takes_force(name: str) -> None:
+    command, found = ALL[name], marks(ALL[name])
+    writes = [mark for _, own in found.values() for mark in own if isinstance(mark, Writes)]
+    assert (inspect.unwrap(command) is not command) == bool(writes)
+    replaces = any(set(mark.endings) - set(RECORDING) for mark in writes)
+    assert ("force" in found) == replaces
+    if replaces:
+        assert found["force"][0] == ForceFlag
+
+
+def test_every_output_is_tried_here() -> None:
+    written = {
+        (name, parameter)
+        for name, command in ALL.items()
+        for parameter, (_, own) in marks(command).items()
+        if any(isinstance(mark, Writes) for mark in own)
+    }
+    assert written == set(CASES | NEW_ONLY)
+
+
+def planted(
+    out: Annotated[Path, typer.Option(), Writes({".csv": "a table"})],
+    notes: Annotated[Path, typer.Option(), Reads()],
+) -> None:
+    """A command that reads and writes."""
+    out.write_text(notes.read_text())
+
+
+def test_a_planted_command_is_guarded(tmp_path: Path) -> None:
+    app, out, notes = Commands(), tmp_path / "x.csv", tmp_path / "notes.csv"
+    app.command()(planted)
+    run = partial(typer.main.get_command(app), standalone_mode=False)
+    notes.write_text("mine")
+    run(["--out", str(out), "--notes", str(notes)])
+    assert out.read_text() == "mine"
+    for refused in (out, notes):
+        with pytest.raises(OutputError):
+            run(["--out", str(refused), "--notes", str(notes)])
