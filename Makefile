@@ -92,7 +92,7 @@ lock: dev  ## pin the newest packages, with hashes, in requirements/*.txt
 	@for out in $(LOCKS); do $(MAKE) --no-print-directory lock-$$out || exit 1; done
 
 clean:  ## remove everything that make made
-	rm -rf $(VENV) build dist src/tomoskin/live/static src/tomoskin/live/web/node_modules
+	rm -rf $(VENV) build dist src/tomoskin/server/static web/node_modules
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 # Set-up. A stamp's time says when its step was last done.

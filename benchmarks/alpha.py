@@ -14,8 +14,8 @@ from forward_tables import Promise, cell, promises
 from report import Report
 from tomoskin.core import ModelError
 from tomoskin.inverse import RULES, Evidence, LightTouch, Spectrum, choose
-from tomoskin.live import Prepared, prepare
-from tomoskin.live.tune import tune
+from tomoskin.pipeline import Prepared, prepare
+from tomoskin.pipeline.tune import tune
 from tomoskin.signal import Reference
 from tomoskin.skin import Skin
 

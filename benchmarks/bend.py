@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from report import Report
+from tomoskin.calibration import BendExamples, BendModel, JointReference
 from tomoskin.core import FloatArray, Frame, Reading
-from tomoskin.live import Pipeline, Result
-from tomoskin.live.finding import View, finding, voltage_covariance
-from tomoskin.live.pipeline import REFERENCE_FRAMES
 from tomoskin.mesh import Cylinder, Hinge
+from tomoskin.pipeline import Pipeline, Result
+from tomoskin.pipeline.finding import View, finding, voltage_covariance
+from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.signal import Reference
-from tomoskin.touch import BendExamples, BendModel, JointReference
 from tomoskin.twin import Bent, Pose, Press
 from touch_fit import HOLD, Lab, drawn
 

@@ -12,7 +12,7 @@ import numpy as np
 from forward_cases import clock
 from report import Report
 from tomoskin.core import Frame
-from tomoskin.live import Pipeline, Prepared, prepare
+from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.skin import Skin
 from tomoskin.source import Link, ScanSettings
 from tomoskin.twin import Press, open_twin

@@ -13,8 +13,8 @@ from health_real import real_reports
 from health_rig import PROBE, Rig, missed_by, places
 from report import Report
 from tomoskin.core import FloatArray
-from tomoskin.live import Pipeline, Prepared, prepare
-from tomoskin.live.watch import Watch
+from tomoskin.pipeline import Pipeline, Prepared, prepare
+from tomoskin.pipeline.watch import Watch
 from tomoskin.signal import Health, Reference
 from tomoskin.skin import Skin
 from tomoskin.twin import Faults, Press

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from tomoskin.core import FloatArray, Frame, Touch
-from tomoskin.live import Pipeline, Result
+from tomoskin.pipeline import Pipeline, Result
 from tomoskin.skin import Skin
 from tomoskin.twin import Faults, Press, TwinSettings, make_electronics
 from twin import table_of

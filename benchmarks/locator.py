@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from report import Report
 from tomoskin import Locator, Pattern, Skin
+from tomoskin.calibration import Watch
+from tomoskin.calibration.locator.kernel import squared_distances
+from tomoskin.calibration.locator.process import Process
 from tomoskin.core import DataError
-from tomoskin.touch import Watch
-from tomoskin.touch.locator.kernel import squared_distances
-from tomoskin.touch.locator.process import Process
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 

@@ -14,7 +14,8 @@ from threadpoolctl import threadpool_limits
 
 from page_stream import chromium, heap, opened, streaming
 from report import Report
-from tomoskin.live import STATIC, Prepared, colour_limit, prepare, prepare_again
+from tomoskin.pipeline import Prepared, colour_limit, prepare, prepare_again
+from tomoskin.server import STATIC
 from tomoskin.skin import Skin
 
 CORES = 2

@@ -14,19 +14,9 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import Image, Reading, Touch
-from tomoskin.live import (
-    Door,
-    Hub,
-    Prepared,
-    Result,
-    Runner,
-    Server,
-    SettingsDesk,
-    Snapshot,
-    application,
-    colour_limit,
-    listen,
-)
+from tomoskin.pipeline import Prepared, Result, colour_limit
+from tomoskin.run import Runner, Snapshot
+from tomoskin.server import Door, Hub, Server, SettingsDesk, application, listen
 
 _FLAGS = Path(__file__).resolve().parents[1] / "scripts" / "chromium.flags"
 ARGUMENTS = tuple(_FLAGS.read_text(encoding="utf-8").split())

@@ -14,8 +14,9 @@ import numpy as np
 
 from report import Report
 from tomoskin.core import Frame
+from tomoskin.formats import write_parquet
 from tomoskin.pattern import Scan
-from tomoskin.session import Mark, Recorder, SessionReader, SessionWriter, write_parquet
+from tomoskin.recording import Mark, Recorder, SessionReader, SessionWriter
 from tomoskin.skin import Skin
 from tomoskin.wire import encode
 

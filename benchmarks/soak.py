@@ -14,9 +14,11 @@ from pathlib import Path
 
 from report import Report
 from tomoskin.core import Frame, SourceError
-from tomoskin.live import Door, Hub, Runner, Server, application, colour_limit, listen, prepare
 from tomoskin.pattern import Scan
-from tomoskin.session import session_info
+from tomoskin.pipeline import colour_limit, prepare
+from tomoskin.recording import session_info
+from tomoskin.run import Runner
+from tomoskin.server import Door, Hub, Server, application, listen
 from tomoskin.skin import Skin
 from tomoskin.source import Configuration, ScanSettings
 from tomoskin.twin import (

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from report import Report
 from tomoskin import Skin
+from tomoskin.calibration import StateClassifier, Wiring, against_rest, ring_of, solve_wiring
 from tomoskin.core import DataError
 from tomoskin.pattern import match_rows
-from tomoskin.touch import StateClassifier, Wiring, against_rest, ring_of, solve_wiring
 from tomoskin.twin import COMMON_PRESSES, SetPlan, make_shard
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"

@@ -13,9 +13,9 @@ from scipy.optimize import linear_sum_assignment
 
 from report import Report
 from tomoskin.core import Frame, Reading
-from tomoskin.live import prepare
-from tomoskin.live.finding import Finder, View, finding
-from tomoskin.live.tune import tuned
+from tomoskin.pipeline import prepare
+from tomoskin.pipeline.finding import Finder, View, finding
+from tomoskin.pipeline.tune import tuned
 from tomoskin.signal import Reference
 from tomoskin.skin import Skin
 from tomoskin.source import ScanSettings

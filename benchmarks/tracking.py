@@ -15,10 +15,12 @@ import numpy as np
 
 from report import Report, progress
 from tomoskin import Locator, Skin
+from tomoskin.calibration import Several
 from tomoskin.core import DataError, Reading
-from tomoskin.live import Pipeline, Prepared, Result, prepare, simulate
-from tomoskin.session import SessionReader
-from tomoskin.touch import Several, Tracker
+from tomoskin.pipeline import Pipeline, Prepared, Result, prepare
+from tomoskin.recording import SessionReader
+from tomoskin.run import simulate
+from tomoskin.touch import Tracker
 from tomoskin.twin import Script
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"

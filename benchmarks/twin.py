@@ -10,8 +10,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from report import Report
-from tomoskin.live import in_processes, in_this_process, make_set
 from tomoskin.pattern import Scan
+from tomoskin.run import in_processes, in_this_process, make_set
 from tomoskin.skin import Skin
 from tomoskin.source import ScanSettings
 from tomoskin.twin import (

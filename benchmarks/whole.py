@@ -14,7 +14,7 @@ import twin
 import wire
 from forward_cases import clock
 from report import Report, cell, named, progress
-from tomoskin.live import prepare
+from tomoskin.pipeline import prepare
 from tomoskin.skin import Skin
 from whole_forward import forward_lines
 from whole_line import Line

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 
 import page
-from tomoskin.live import STATIC
+from tomoskin.server import STATIC
 from whole_line import Line
 
 CELLS = 3000

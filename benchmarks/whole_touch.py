@@ -13,8 +13,9 @@ from scipy.interpolate import RBFInterpolator
 import frame
 from tomoskin import Locator, Skin
 from tomoskin.core import FloatArray
-from tomoskin.live import in_this_process, make_set, prepare
-from tomoskin.session import read_recording
+from tomoskin.formats import read_recording
+from tomoskin.pipeline import prepare
+from tomoskin.run import in_this_process, make_set
 from tomoskin.twin import COMMON_PRESSES, SetPlan
 from whole_line import Line
 

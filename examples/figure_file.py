@@ -9,8 +9,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from tomoskin.core import OutputError
-from tomoskin.session import RECORDING, Output, check_outputs, written
+from tomoskin.core import RECORDING, Output, OutputError, check_outputs, written
 
 PICTURE = {".png": "a picture", ".pdf": "a figure", ".svg": "a drawing"}
 

@@ -11,9 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tomoskin.core import FloatArray, IntArray, Reading
+from tomoskin.core import AMOUNT, CHANGE, FloatArray, IntArray, Reading
 from tomoskin.mesh import Mesh
-from tomoskin.session import AMOUNT, CHANGE
 
 BLUE, ORANGE, GREEN, PALE = "#0072B2", "#D55E00", "#009E73", "#56B4E9"
 """Okabe and Ito's colours."""

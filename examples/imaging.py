@@ -8,7 +8,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray, Image, Reading
 from tomoskin.inverse import SourceMetrics
-from tomoskin.live import prepare
+from tomoskin.pipeline import prepare
 from tomoskin.signal import difference
 from tomoskin.skin import Skin
 from tomoskin.touch import Segmenter

@@ -30,12 +30,11 @@ from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
 from figure_file import PICTURE, FigureFile, add_force, check
-from tomoskin.core import DataError, FloatArray, TomoskinError
+from tomoskin.core import CHANGE, DataError, FloatArray, Output, TomoskinError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import AbsoluteImaging, Matern, Observation, ShapeImaging, homogeneous
 from tomoskin.mesh import Disc, ElectrodeArc, Mesh, triangulate
 from tomoskin.pattern import Pattern
-from tomoskin.session import CHANGE, Output
 
 Labels = NDArray[np.uint8]
 WATER, RESISTIVE, CONDUCTIVE = 0, 1, 2

@@ -22,7 +22,7 @@ import numpy as np
 from figure_file import FigureFile, chosen, parser_of
 from tomoskin.core import DataError, FloatArray, Frame
 from tomoskin.pattern import Pattern, Scan
-from tomoskin.session import SessionReader, SessionWriter
+from tomoskin.recording import SessionReader, SessionWriter
 from tomoskin.signal import Readout
 from tomoskin.skin import Skin
 from tomoskin.source import Link, ScanSettings, Transport, open_source

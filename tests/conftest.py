@@ -19,6 +19,8 @@ from hypothesis import HealthCheck, settings
 
 import one_thread  # noqa: F401 - before numpy is loaded
 
+pytest_plugins = ["rig"]
+
 ROOT = Path(__file__).resolve().parent.parent
 DEFAULT_DATA = ROOT.parent / "shared" / "data"
 NOTED = ROOT / "build" / "left-out.txt"
@@ -90,7 +92,7 @@ def chromium() -> Path:
 @pytest.fixture(scope="session")
 def built_page() -> None:
     """The page has been built; skip where it has not (under CI=true: fail)."""
-    from tomoskin.live import STATIC
+    from tomoskin.server import STATIC
 
     if not (STATIC / "index.html").is_file():
         missing("the page: it has not been built (make page)")

@@ -13,9 +13,12 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = [
-    *("core", "mesh", "pattern", "skin", "forward", "inverse", "signal"),
-    *("touch", "wire", "source", "twin", "emulator", "session", "sink", "live", "cli"),
+    *("core", "mesh", "pattern", "skin", "forward", "inverse", "wire", "source", "signal"),
+    *("touch", "calibration", "pipeline", "twin", "emulator", "recording", "formats"),
+    *("sink", "run", "server", "cli"),
 ]
+FORMER = {"live", "session", "_moved"}
+"""Not rooms: the names of former ones, which say where they are now."""
 Sources = Mapping[str, str]
 
 
@@ -93,7 +96,9 @@ def _wrong(module: str, found: Import, sources: Sources) -> str | None:
     if found.module == "tomoskin" and found.name in ROOMS:
         found = Import(found.line, f"tomoskin.{found.name}", "", found.runs_at_import)
     there = room_of(found.module)
-    if here is None or found.module.split(".")[0] != "tomoskin":
+    if here is None or here in FORMER or found.module.split(".")[0] != "tomoskin":
+        return None
+    if found.module == "tomoskin._moved":
         return None
     if there is None:
         own = found.name == "__version__"
@@ -157,8 +162,8 @@ def cycle(sources: Sources) -> list[str]:
 
 
 def table_rooms(text: str) -> list[str]:
-    """The first column of the rooms' table in docs/architecture.md."""
-    return re.findall(r"^\| `(\w+)` \|", text, flags=re.MULTILINE)
+    """The second column of the rooms' table in docs/architecture.md."""
+    return re.findall(r"^\| \w+ \| `(\w+)` \|", text, flags=re.MULTILINE)
 
 
 # The library.
@@ -173,7 +178,7 @@ def test_no_import_cycle() -> None:
 
 
 def test_every_module_stands_in_a_room() -> None:
-    found = {room_of(module) for module in library()} - {None}
+    found = {room_of(module) for module in library()} - {None} - FORMER
     assert found == set(ROOMS)
 
 
@@ -189,14 +194,14 @@ ROOM = {"tomoskin": "", "tomoskin.core": "__all__ = ['errors']", "tomoskin.core.
 @pytest.mark.parametrize(
     "source",
     [
-        "from tomoskin.live import serve",
-        "import tomoskin.live",
-        "import tomoskin.live as page",
-        "from tomoskin import live",
-        "from ..live import serve",
-        "def later():\n    from tomoskin.live import serve",
-        "if TYPE_CHECKING:\n    from tomoskin.live import serve",
-        "import importlib\nimportlib.import_module('tomoskin.live')",
+        "from tomoskin.server import serve",
+        "import tomoskin.server",
+        "import tomoskin.server as page",
+        "from tomoskin import server",
+        "from ..server import serve",
+        "def later():\n    from tomoskin.server import serve",
+        "if TYPE_CHECKING:\n    from tomoskin.server import serve",
+        "import importlib\nimportlib.import_module('tomoskin.server')",
         "from tomoskin.mesh.mesh import Mesh",
         "from tomoskin.mesh import mesh",
         "from tomoskin.nowhere import thing",
@@ -219,7 +224,7 @@ def test_a_planted_import_is_found(source: str) -> None:
         "from .outline import Disc",
         "from tomoskin import __version__",
         "import numpy.linalg",
-        "'from tomoskin.live import serve'",
+        "'from tomoskin.server import serve'",
     ],
 )
 def test_what_is_allowed_passes(source: str) -> None:
@@ -236,4 +241,7 @@ def test_a_planted_cycle_is_found() -> None:
 
 
 def test_a_changed_table_is_seen() -> None:
-    assert table_rooms("| room |\n|---|\n| `core` | x |\n| `mesh` | y |\n") == ["core", "mesh"]
+    assert table_rooms("| flow | room |\n|---|---|\n| a | `core` | x |\n| b | `mesh` | y |\n") == [
+        "core",
+        "mesh",
+    ]

@@ -62,7 +62,8 @@ NPM = """
 case "$1" in
   --version) echo 11.0.0 ;;
   ci) mkdir -p node_modules; echo ci >> CALLS ;;
-  run) mkdir -p ../static; echo page > ../static/index.html; echo "run $2" >> CALLS ;;
+  run) static=../src/tomoskin/server/static
+     mkdir -p $static; echo page > $static/index.html; echo "run $2" >> CALLS ;;
 esac
 """
 
@@ -214,7 +215,7 @@ def test_a_failure_of_npm_says_why(
 
 
 def test_sources_that_are_missing_are_named(tmp_path: Path) -> None:
-    with pytest.raises(page_build.PageError, match=r"expected package\.json in .*live.web"):
+    with pytest.raises(page_build.PageError, match=r"expected package\.json in .*web"):
         page_build.build(page_build.Page.of(tmp_path))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,22 @@ def test_every_public_name_is_there(name: str) -> None:
 def test_an_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="Nonsense"):
         _ = tomoskin.Nonsense
+
+
+@pytest.mark.parametrize(
+    ("room", "name", "now"),
+    [
+        ("live", "prepare", "pipeline"),
+        ("session", "SessionReader", "recording"),
+        ("touch", "Locator", "calibration"),
+    ],
+)
+def test_a_name_of_a_former_room_says_where_it_is_now(room: str, name: str, now: str) -> None:
+    old, new = import_module(f"tomoskin.{room}"), import_module(f"tomoskin.{now}")
+    with pytest.warns(DeprecationWarning, match=rf"{room}\.{name} is now tomoskin\.{now}\.{name}"):
+        assert getattr(old, name) is getattr(new, name)
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = old.nonsense
 
 
 def test_the_package_alone_imports_nothing_heavy() -> None:

@@ -19,7 +19,7 @@ from conftest import missing
 from tomoskin import __version__
 
 ROOT = Path(__file__).resolve().parent.parent
-STATIC = "tomoskin/live/static/"
+STATIC = "tomoskin/server/static/"
 MOST_MB = 6.0
 
 
@@ -118,7 +118,7 @@ def test_the_version_is_one() -> None:
     assert re.findall(r"^version: (.+)$", citation, re.MULTILINE) == [__version__]
     core = tomllib.loads((ROOT / "core-native/Cargo.toml").read_text(encoding="utf-8"))
     assert core["package"]["version"] == __version__
-    page = json.loads((ROOT / "src/tomoskin/live/web/package.json").read_text(encoding="utf-8"))
+    page = json.loads((ROOT / "web/package.json").read_text(encoding="utf-8"))
     assert page["private"] is True  # no package of its own
 
 

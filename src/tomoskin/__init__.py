@@ -6,18 +6,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tomoskin.calibration import Locator
     from tomoskin.forward import ForwardModel
     from tomoskin.inverse import OneStep
     from tomoskin.mesh import Mesh
     from tomoskin.pattern import Pattern
     from tomoskin.skin import Skin
-    from tomoskin.touch import Locator
 
 __version__ = "0.1.0"
 
 _HOME = {
     "ForwardModel": "forward",
-    "Locator": "touch",
+    "Locator": "calibration",
     "Mesh": "mesh",
     "OneStep": "inverse",
     "Pattern": "pattern",

@@ -7,10 +7,12 @@ import json
 import numpy as np
 import pytest
 
+from tomoskin.calibration import read_bends
 from tomoskin.cli import main
 from tomoskin.core import DataError
-from tomoskin.live import Pipeline, prepare
-from tomoskin.session import SessionReader, read_bends, read_recording
+from tomoskin.formats import read_recording
+from tomoskin.pipeline import Pipeline, prepare
+from tomoskin.recording import SessionReader
 from tomoskin.skin import Skin
 
 SCRIPT = """format = 1

@@ -9,7 +9,7 @@ import pytest
 from tomoskin import __version__
 from tomoskin.cli import app as commands
 from tomoskin.cli import main
-from tomoskin.live import check_page
+from tomoskin.server import check_page
 
 
 def test_doctor(tomoskin):
@@ -36,7 +36,7 @@ def test_doctor_for_people(tomoskin):
 
 
 def test_doctor_says_what_fails(tomoskin, monkeypatch, tmp_path):
-    monkeypatch.setattr("tomoskin.live.check_page", lambda: check_page(tmp_path))
+    monkeypatch.setattr("tomoskin.server.check_page", lambda: check_page(tmp_path))
     code, out, _ = tomoskin("doctor")
     assert code == 1
     assert "FAIL  page" in out

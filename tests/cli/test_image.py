@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from session.seeing import blue_beside_red
+from core.seeing import blue_beside_red
 from tomoskin.core import FloatArray
+from tomoskin.formats import circular_average
 from tomoskin.forward import ForwardModel
 from tomoskin.mesh import triangulate
-from tomoskin.session import circular_average
 from tomoskin.skin import Skin
 
 PLACE = (0.03, 0.04)

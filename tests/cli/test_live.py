@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import Frame
-from tomoskin.session import Mark, SessionReader, SessionWriter, session_info
+from tomoskin.recording import Mark, SessionReader, SessionWriter, session_info
 from tomoskin.skin import Skin
 
 COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import typer
 
-from session.runs import write_all
+from recording.runs import write_all
 from shapes import disc
 from tomoskin.cli import image as image_module
 from tomoskin.cli.app import COMMANDS
@@ -23,11 +23,11 @@ from tomoskin.cli.contents import Commands
 from tomoskin.cli.image_files import WRITERS as IMAGE_WRITERS
 from tomoskin.cli.named_files import RECORDING, ForceFlag, Otherwise, Reads, Writes
 from tomoskin.cli.session import EXPORTS
+from tomoskin.core import RECORDING as SESSION_ENDINGS
 from tomoskin.core import OutputError
+from tomoskin.core.outputs import MAGIC
+from tomoskin.formats import WRITERS as EXPORT_WRITERS
 from tomoskin.forward import ForwardModel
-from tomoskin.live import WRITERS as EXPORT_WRITERS
-from tomoskin.session import RECORDING as SESSION_ENDINGS
-from tomoskin.session.mcap import MAGIC
 from tomoskin.skin import Skin
 from tomoskin.twin.script_page import PRESSES_EXAMPLE
 

@@ -6,7 +6,8 @@ import json
 
 import pytest
 
-from tomoskin.session import SessionReader, read_recording
+from tomoskin.formats import read_recording
+from tomoskin.recording import SessionReader
 
 
 @pytest.fixture(scope="module")

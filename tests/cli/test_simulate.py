@@ -10,7 +10,8 @@ import pytest
 
 import tomoskin.cli.simulate as tomoskin_simulate
 from tomoskin.cli.progress import Bar
-from tomoskin.session import SessionReader, read_recording
+from tomoskin.formats import read_recording
+from tomoskin.recording import SessionReader
 from tomoskin.skin import Skin
 from tomoskin.twin.labelled import SHARD_FRAMES
 from tomoskin.twin.script_page import EXAMPLE, PRESSES_EXAMPLE

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tomoskin.calibration import Wiring, ring_of
 from tomoskin.skin import Skin
-from tomoskin.touch import Wiring, ring_of
 from tomoskin.twin import COMMON_PRESSES, SetPlan, make_shard
 
 NAME = "textile-disc-8"

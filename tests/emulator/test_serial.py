@@ -15,8 +15,9 @@ from emulator.watch import CLOCK, Watch
 from firmware.boards import PATIENCE, SCAN, SETTINGS, Talk, running
 from tomoskin.emulator import Programs, SkinMemory
 from tomoskin.emulator.source import front_of
-from tomoskin.live import Runner, prepare
-from tomoskin.session import SessionReader
+from tomoskin.pipeline import prepare
+from tomoskin.recording import SessionReader
+from tomoskin.run import Runner
 from tomoskin.skin import Skin
 from tomoskin.source import Link, SerialTransport, open_source
 from tomoskin.twin import TwinSettings, TwinSkin

@@ -12,7 +12,8 @@ from firmware.boards import PATIENCE
 from tomoskin.core import Touch
 from tomoskin.emulator import Programs
 from tomoskin.emulator.source import open_emulator
-from tomoskin.live import Result, Runner, prepare
+from tomoskin.pipeline import Result, prepare
+from tomoskin.run import Runner
 from tomoskin.skin import Skin
 from tomoskin.twin import Press
 

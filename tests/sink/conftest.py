@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from session.runs import SKIN, TOUCH
+from recording.runs import SKIN, TOUCH
 from tomoskin.core import Event, Image
 from tomoskin.sink import Moment, Stream
 

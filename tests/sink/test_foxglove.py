@@ -14,10 +14,10 @@ import time
 import pytest
 from websockets.sync.client import connect
 
-from session.runs import TOUCH
+from recording.runs import TOUCH
 from sink.conftest import EPOCH, EVENT, PATIENCE, free_port, moment_at
 from tomoskin.core import SinkError
-from tomoskin.session import schema_of
+from tomoskin.recording import schema_of
 from tomoskin.sink import make_sink
 
 _MESSAGE = struct.Struct("<BIQ")

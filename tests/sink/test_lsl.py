@@ -21,7 +21,7 @@ MulticastPort = 16599
 RUN = """
 import json, math, time
 import pylsl
-from session.runs import TOUCH
+from recording.runs import TOUCH
 from sink.conftest import EVENT, STREAM, moment_at
 from tomoskin.sink import make_sink
 

@@ -14,7 +14,7 @@ import pytest
 from paho.mqtt import client as paho
 
 from conftest import missing
-from session.runs import TOUCH
+from recording.runs import TOUCH
 from sink.conftest import EVENT, PATIENCE, free_port, moment_at, touch_of
 from tomoskin.core import SinkError
 from tomoskin.sink import make_sink

@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from session.runs import TOUCH
+from recording.runs import TOUCH
 from sink.conftest import EPOCH, EVENT, VALUES, moment_at, touch_of
 from tomoskin.core import Event, SinkError
 from tomoskin.sink import make_sink

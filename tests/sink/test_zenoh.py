@@ -9,7 +9,7 @@ import pytest
 import zenoh
 from zenoh import ext
 
-from session.runs import TOUCH
+from recording.runs import TOUCH
 from sink.conftest import EPOCH, EVENT, PATIENCE, free_port, moment_at
 from sink.test_ros import Cdr
 from tomoskin.core import SinkError

@@ -14,7 +14,7 @@ from tomoskin.core import TomoskinError
 
 if TYPE_CHECKING:
     from tomoskin.inverse import AlphaChoice, Evidence, Spectrum
-    from tomoskin.live import Prepared
+    from tomoskin.pipeline import Prepared
 
 Outcome = tuple[str, "AlphaChoice | TomoskinError"]
 """A rule, and what it chose or why it could not."""
@@ -40,7 +40,7 @@ def alpha(
 ) -> None:
     """Show what each rule chooses for alpha; with a recording, by its noise, frames and labels."""
     from tomoskin.inverse import RULES, Spectrum
-    from tomoskin.live import prepare
+    from tomoskin.pipeline import prepare
     from tomoskin.skin import Skin
 
     prepared = prepare(Skin.load(skin))
@@ -61,9 +61,9 @@ def _evidence(
 
     Without a recording: the noise that the read-out predicts.
     """
+    from tomoskin.formats import read_recording
     from tomoskin.inverse import Evidence
-    from tomoskin.live import changes_of
-    from tomoskin.session import read_recording
+    from tomoskin.pipeline import changes_of
 
     if recording is None:
         return prepared, Evidence(noise=prepared.predicted_noise())
@@ -91,8 +91,8 @@ def _draw(
     *,
     overwrite: bool,
 ) -> None:
+    from tomoskin.formats import write_choices
     from tomoskin.inverse import AlphaChoice, picard
-    from tomoskin.session import write_choices
 
     choices = [found for _, found in outcomes if isinstance(found, AlphaChoice)]
     told = None

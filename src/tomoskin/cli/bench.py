@@ -137,7 +137,7 @@ class _Place:
 
     def write(self, reports: Sequence[Any]) -> None:
         """Put tables, their notes and the machine there."""
-        from tomoskin.session import write_text
+        from tomoskin.core import write_text
 
         machine = ", ".join(f"{key} {value}" for key, value in reports[-1].machine.items())
         parts = [f"\n{date.today():%-d %B %Y}; {machine}.\n", *map(_markdown, reports)]

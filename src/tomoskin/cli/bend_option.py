@@ -10,7 +10,7 @@ import typer
 from tomoskin.cli.named_files import Reads
 
 if TYPE_CHECKING:
-    from tomoskin.live import Prepared
+    from tomoskin.pipeline import Prepared
 
 BendOption = Annotated[
     Path | None,
@@ -23,7 +23,7 @@ BendOption = Annotated[
 
 def with_bends(prepared: Prepared, path: Path | None) -> Prepared:
     """The skin with its bends, where a calibration is named. Raises DataError for others."""
-    from tomoskin.session import read_bends
+    from tomoskin.calibration import read_bends
 
     if path is None:
         return prepared

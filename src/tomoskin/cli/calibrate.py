@@ -19,9 +19,10 @@ from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
 if TYPE_CHECKING:
+    from tomoskin.calibration import Calibration
     from tomoskin.core import FloatArray
     from tomoskin.pattern import Pattern
-    from tomoskin.session import Calibration, Recording
+    from tomoskin.signal import Recording
     from tomoskin.skin import Skin
 
     Learn = Callable[[FloatArray, FloatArray], Calibration]
@@ -64,8 +65,9 @@ def touch(
     json: JsonFlag = False,
 ) -> None:
     """Learn where a touch is from presses at known places."""
+    from tomoskin.calibration import write_calibration
     from tomoskin.cli.labelled import changes, labelled_frames, labels
-    from tomoskin.session import read_recording, write_calibration
+    from tomoskin.formats import read_recording
 
     whole = read_recording(recording)
     say_notes(whole)
@@ -86,8 +88,7 @@ def touch(
 
 def _anew(skin: Skin | None, pattern: Pattern) -> tuple[Learn, Pattern]:
     """What learns from these presses alone."""
-    from tomoskin.session import Calibration
-    from tomoskin.touch import Locator
+    from tomoskin.calibration import Calibration, Locator
 
     def learn(dv: FloatArray, xy: FloatArray) -> Calibration:
         with Bar("learning") as bar:
@@ -99,8 +100,8 @@ def _anew(skin: Skin | None, pattern: Pattern) -> tuple[Learn, Pattern]:
 
 def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern]:
     """What learns from these presses and those of an older calibration of the same skin."""
+    from tomoskin.calibration import read_calibration
     from tomoskin.cli.skin_choice import known_skin
-    from tomoskin.session import read_calibration
 
     old = read_calibration(path)
     if (skin := known_skin(name, recording)) is not None:

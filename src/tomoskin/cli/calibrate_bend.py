@@ -16,7 +16,7 @@ from tomoskin.core import DataError
 
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray
-    from tomoskin.session import Recording
+    from tomoskin.signal import Recording
 
 _ALONG_Y = 90.0
 
@@ -51,11 +51,11 @@ def calibrate_bend(
     """Learn the bends of a skin, so that touches are told from them and angles are read."""
     import numpy as np
 
+    from tomoskin.calibration import BendCalibration, BendExamples, BendModel, write_bends
     from tomoskin.cli.skin_choice import skin_for_file
-    from tomoskin.live import prepare, voltage_covariance
-    from tomoskin.session import BendCalibration, read_recording, write_bends
+    from tomoskin.formats import read_recording
+    from tomoskin.pipeline import prepare, voltage_covariance
     from tomoskin.signal import Reference
-    from tomoskin.touch import BendExamples, BendModel
 
     chosen = skin_for_file(skin, recording)
     with Bar("preparing"):
@@ -122,7 +122,8 @@ def _told(path: Path, whole: Recording) -> tuple[list[int], FloatArray, FloatArr
     """The same from a session's truth: frames that nothing presses, with one bend or none."""
     import numpy as np
 
-    from tomoskin.session import SessionReader, is_session
+    from tomoskin.formats import is_session
+    from tomoskin.recording import SessionReader
 
     if not is_session(path):
         raise DataError("says no angles", where=str(path), hint="--bend 0=0:20 --bend 30=40:60")

@@ -14,10 +14,9 @@ from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
 if TYPE_CHECKING:
+    from tomoskin.calibration import Examples, StatesCalibration
     from tomoskin.pattern import Pattern
-    from tomoskin.session import StatesCalibration
     from tomoskin.skin import Skin
-    from tomoskin.touch import Examples
 
 _HARDLY = 0.5
 
@@ -59,10 +58,11 @@ def calibrate_states(
     json: JsonFlag = False,
 ) -> None:
     """Learn the state of a frame, or flags, from a few examples of each."""
+    from tomoskin.calibration import read_states, write_states
     from tomoskin.cli.labelled import changes
     from tomoskin.cli.state_labels import marked
+    from tomoskin.formats import read_recording
     from tomoskin.pattern import Pattern
-    from tomoskin.session import read_recording, read_states, write_states
 
     whole = read_recording(recording)
     say_notes(whole)
@@ -95,8 +95,7 @@ def _what_of(
 def _learnt(
     examples: Examples, old: StatesCalibration | None, pattern: Pattern, skin: Skin | None
 ) -> StatesCalibration:
-    from tomoskin.session import StatesCalibration
-    from tomoskin.touch import StateClassifier
+    from tomoskin.calibration import StateClassifier, StatesCalibration
 
     if old is not None:
         fitted = old.classifier.in_session(examples.dv, examples.flags)

@@ -15,11 +15,11 @@ from tomoskin.cli.skin_choice import SkinOption, skin_for_file
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
+    from tomoskin.calibration import WiringAnswer
     from tomoskin.core import FloatArray
     from tomoskin.pattern import Pattern
-    from tomoskin.session import Recording
+    from tomoskin.signal import Recording
     from tomoskin.skin import Skin
-    from tomoskin.touch import WiringAnswer
 
 
 def calibrate_wiring(
@@ -41,9 +41,10 @@ def calibrate_wiring(
     The result is a skin file whose electrodes are where the wires end: give it as --skin to any
     other command.
     """
+    from tomoskin.calibration import solve_wiring
     from tomoskin.cli.labelled import changes, labelled_frames, labels
-    from tomoskin.session import read_recording, write_text
-    from tomoskin.touch import solve_wiring
+    from tomoskin.core import write_text
+    from tomoskin.formats import read_recording
 
     whole = read_recording(recording)
     say_notes(whole)
@@ -83,7 +84,7 @@ def _at_rest(
 
 
 def _findings(answer: WiringAnswer, skin: Skin, frames: list[int]) -> dict[str, Any]:
-    from tomoskin.touch import ring_of
+    from tomoskin.calibration import ring_of
 
     ring = ring_of(skin)
     return {

@@ -143,7 +143,7 @@ def _compared(
 def _write(
     out: Path, skin: Skin, own: Promise, demand: Demand, radius: float, *, overwrite: bool
 ) -> None:
-    from tomoskin.session import write_promise
+    from tomoskin.formats import write_promise
 
     title = (
         f"{skin.name}: one frame, press of radius {1e3 * radius:.0f} mm taking "

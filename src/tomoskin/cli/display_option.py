@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from tomoskin.session import Display
+    from tomoskin.formats import Display
     from tomoskin.skin import Skin
 
 PercentFlag = Annotated[
@@ -28,7 +28,7 @@ SmoothOption = Annotated[
 
 def display_of(skin: Skin, *, percent: bool, limit: float | None, smooth: str | None) -> Display:
     """What the options mean for ``skin``. Raises DataError for what cannot be."""
-    from tomoskin.session import Display
+    from tomoskin.formats import Display
 
     return Display(
         conductivity=skin.conductivity if percent else None,

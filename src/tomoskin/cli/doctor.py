@@ -57,7 +57,7 @@ def _python() -> Iterator[Finding]:
 
 
 def _page() -> Iterator[Finding]:
-    from tomoskin.live import check_page
+    from tomoskin.server import check_page
 
     yield _tried("page", check_page, lambda _: "built")
 
@@ -89,7 +89,7 @@ def _skins() -> Iterator[Finding]:
 
 
 def _port() -> Iterator[Finding]:
-    from tomoskin.live import DEFAULT_PORT, listen
+    from tomoskin.server import DEFAULT_PORT, listen
 
     try:
         listen("127.0.0.1", DEFAULT_PORT).close()

@@ -29,9 +29,9 @@ from tomoskin.cli.time_option import TimeConstantOption, filter_said, with_time_
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tomoskin.live import Prepared, Reconstruction
     from tomoskin.pattern import Pattern
-    from tomoskin.session import Recording
+    from tomoskin.pipeline import Prepared, Reconstruction
+    from tomoskin.signal import Recording
     from tomoskin.skin import Skin
 
 
@@ -71,8 +71,8 @@ def image(
 ) -> None:
     """Reconstruct a recording: images, and the touches in them."""
     from tomoskin.cli.image_files import WRITERS
-    from tomoskin.live import prepare, reconstruct
-    from tomoskin.session import read_recording
+    from tomoskin.formats import read_recording
+    from tomoskin.pipeline import prepare, reconstruct
 
     told = skin_for_file(skin, recording)
     chosen, rule = with_alpha(told, alpha)
@@ -97,7 +97,7 @@ def image(
 def _write_touches(
     path: Path, recording: Recording, found: Reconstruction, skin: Skin, *, overwrite: bool
 ) -> None:
-    from tomoskin.session import write_touches
+    from tomoskin.formats import write_touches
 
     rows = zip(found.frames.tolist(), found.touches, strict=True)
     timed = ((f, float(recording.time[f]), t) for f, t in rows)
@@ -132,7 +132,7 @@ def _report(source: Path, found: Reconstruction, prepared: Prepared, *, json: bo
 
 def _warn(source: Path, found: Reconstruction, pattern: Pattern) -> None:
     """Say on stderr what was left out, and what looks wrong."""
-    from tomoskin.live import DOUBTED
+    from tomoskin.pipeline import DOUBTED
 
     if len(found.rows_left_out):
         rows = found.rows_left_out.tolist()

@@ -6,16 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tomoskin.core import DataError
-from tomoskin.live import Prepared, Reconstruction
-from tomoskin.session import (
-    MOST_PANELS,
-    Display,
-    Panel,
-    save_arrays,
-    write_picture,
-    write_vtu,
-)
+from tomoskin.core import DataError, save_arrays
+from tomoskin.formats import MOST_PANELS, Display, Panel, write_picture, write_vtu
+from tomoskin.pipeline import Prepared, Reconstruction
 
 _MOST_FIELDS = 200
 

@@ -11,7 +11,7 @@ from tomoskin.core import DataError, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from tomoskin.pattern import Pattern
-    from tomoskin.session import Recording
+    from tomoskin.signal import Recording
 
 
 def changes(recording: Recording, reference: str | None, pattern: Pattern) -> FloatArray:

@@ -30,8 +30,7 @@ def lay(
     force: ForceFlag = False,
 ) -> None:
     """Write the skin file of a sheet on a scanned or drawn surface."""
-    from tomoskin.core import DIMENSIONS, DataError
-    from tomoskin.session import write_text
+    from tomoskin.core import DIMENSIONS, DataError, write_text
     from tomoskin.skin import Skin
     from tomoskin.skin import lay as laid
 

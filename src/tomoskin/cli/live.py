@@ -21,7 +21,9 @@ from tomoskin.cli.skin_choice import SkinOption, skin_for_source
 from tomoskin.cli.states_option import StatesOption, with_states
 
 if TYPE_CHECKING:
-    from tomoskin.live import Door, Prepared, Runner
+    from tomoskin.pipeline import Prepared
+    from tomoskin.run import Runner
+    from tomoskin.server import Door
 
 
 def live(
@@ -67,28 +69,41 @@ def live(
 ) -> None:
     """Show a skin live on a page; without options, the twin of a textile disc."""
     with ended_by_signals():
-        from tomoskin import live as room
+        from tomoskin.pipeline import colour_limit
+        from tomoskin.run import Runner
+        from tomoskin.server import (
+            Door,
+            Hub,
+            Server,
+            SettingsDesk,
+            TwinDesk,
+            application,
+            check_page,
+            is_loopback,
+            listen,
+            take_flows,
+        )
         from tomoskin.source import open_source
 
-        room.check_page()
+        check_page()
         sinks = chosen_sinks(sink)
         with Bar("preparing"):
             prepared = with_bends(_prepared(skin, source, calibration), bend)
             prepared = with_states(prepared, states, prepared.skin)
         chosen = prepared.skin
-        with room.listen(host, port) as listener:
-            if not room.is_loopback(host):
+        with listen(host, port) as listener:
+            if not is_loopback(host):
                 _warn(host)
             port = listener.getsockname()[1]
-            door = room.Door(port, host, **_kept(token_file))
-            runner = room.Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
+            door = Door(port, host, **_kept(token_file))
+            runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
             with recording_to(runner, record):
-                hub = room.Hub(runner, limit=room.colour_limit(runner.prepared), folder=folder)
+                hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
                 hub.opener = partial(open_source, source)
-                hub.take(room.SettingsDesk(hub))
-                hub.take(room.TwinDesk(hub))
-                room.take_flows(hub, source)
-                server = room.Server.of(room.application(hub, door))
+                hub.take(SettingsDesk(hub))
+                hub.take(TwinDesk(hub))
+                take_flows(hub, source)
+                server = Server.of(application(hub, door))
                 with server.stopped_by_signals():
                     _announce(door, runner, json=json)
                     if open_browser:
@@ -99,22 +114,23 @@ def live(
 
 def _prepared(skin: str | None, source: str, calibration: Path | None) -> Prepared:
     """The skin with the calibration named; of a recording with the others that it holds."""
-    from tomoskin import live as room
-    from tomoskin.session import SessionReader, parse_replay, read_calibration
+    from tomoskin.calibration import read_calibration
+    from tomoskin.pipeline import prepare
+    from tomoskin.recording import SessionReader, as_recorded, parse_replay
 
     name, _, argument = source.partition(":")
     if skin is None and name == "replay":
         with SessionReader(parse_replay(argument)[0]) as session:
-            prepared = room.as_recorded(session)
+            prepared = as_recorded(session)
     else:
-        prepared = room.prepare(skin_for_source(skin, source))
+        prepared = prepare(skin_for_source(skin, source))
     if calibration is None:
         return prepared
     return prepared.located_by(read_calibration(calibration).locator)
 
 
 def _kept(token_file: Path | None) -> dict[str, str]:
-    from tomoskin.live import kept_token
+    from tomoskin.server import kept_token
 
     return {} if token_file is None else {"token": kept_token(token_file)}
 
@@ -136,7 +152,7 @@ def _announce(door: Door, runner: Runner, *, json: bool) -> None:
 
 
 def _farewell(runner: Runner, *, json: bool) -> None:
-    from tomoskin import live as room
+    from tomoskin.server import readings, stages
 
     status = runner.status()
     if json:
@@ -146,7 +162,7 @@ def _farewell(runner: Runner, *, json: bool) -> None:
                 "frames": status.frames,
                 "p50_ms": 1e3 * status.p50,
                 "p99_ms": 1e3 * status.p99,
-                "stages": room.stages(status),
-                **room.readings(status),
+                "stages": stages(status),
+                **readings(status),
             }
         )

@@ -14,8 +14,9 @@ from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
 if TYPE_CHECKING:
+    from tomoskin.calibration import Calibration
     from tomoskin.core import FloatArray, Touch
-    from tomoskin.session import Calibration, Recording
+    from tomoskin.signal import Recording
 
 _BLOCK = 256
 _SHOWN = 20
@@ -46,8 +47,9 @@ def locate(
     """Locate the one touch in every frame by a calibration, or with --several up to two."""
     import numpy as np
 
+    from tomoskin.calibration import read_calibration
     from tomoskin.cli.labelled import changes
-    from tomoskin.session import read_calibration, read_recording, write_touches
+    from tomoskin.formats import read_recording, write_touches
 
     with Bar("learning") as bar:
         known = read_calibration(calibration, bar)
@@ -79,8 +81,8 @@ def _check_skin(known: Calibration, name: str | None, path: Path) -> None:
 
 
 def _several(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
+    from tomoskin.calibration import Several
     from tomoskin.core import Touch
-    from tomoskin.touch import Several
 
     both = Several.of(known.locator)
     with Bar("locating") as bar:
@@ -93,8 +95,8 @@ def _several(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
 def _single(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
     import numpy as np
 
+    from tomoskin.calibration import Watch
     from tomoskin.core import Reading, Touch
-    from tomoskin.touch import Watch
 
     locator = known.locator
     watch = Watch(locator)

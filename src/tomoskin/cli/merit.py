@@ -14,7 +14,7 @@ from tomoskin.cli.progress import Bar
 if TYPE_CHECKING:
     from tomoskin.forward import ForwardModel
     from tomoskin.inverse import Merit
-    from tomoskin.live import Prepared
+    from tomoskin.pipeline import Prepared
 
 _FINER = 4
 """Targets are simulated on a mesh of so many times the cells."""
@@ -41,7 +41,7 @@ def merit(
     json: JsonFlag = False,
 ) -> None:
     """Show GREIT's figures of merit and the noise figure of a skin's operator."""
-    from tomoskin.live import prepare
+    from tomoskin.pipeline import prepare
     from tomoskin.skin import Skin
 
     with Bar("working out figures"):
@@ -97,7 +97,7 @@ def _finer(prepared: Prepared) -> ForwardModel:
 
 
 def _write(out: Path, found: dict[str, Merit], *, overwrite: bool) -> None:
-    from tomoskin.session import write_merit, write_merit_table
+    from tomoskin.formats import write_merit, write_merit_table
 
     write = write_merit_table if out.suffix.lower() in TABLE else write_merit
     write(out, found, overwrite=overwrite)

@@ -17,7 +17,7 @@ import typer
 from typer.models import OptionInfo
 
 if TYPE_CHECKING:
-    from tomoskin.session import Output
+    from tomoskin.core import Output
 
 Given = Mapping[str, Any]
 """Arguments of a command by the names of its parameters."""
@@ -67,7 +67,7 @@ class Writes:
 
     def outputs(self, value: Path | None, given: Given, called: str) -> Iterable[Output]:
         """What is to be checked."""
-        from tomoskin.session import Output
+        from tomoskin.core import Output
 
         if self.files is not None:
             return self.files(value, given, called)
@@ -77,7 +77,7 @@ class Writes:
 def guarded(command: Callable[..., None]) -> Callable[..., None]:
     """The command; what it writes is looked at before it runs, against all that it is given.
 
-    Raises OutputError as :func:`tomoskin.session.check_outputs` does.
+    Raises OutputError as :func:`tomoskin.core.check_outputs` does.
     """
     written = dict(_written(command))
     if not written:
@@ -85,7 +85,7 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def run(**given: Any) -> None:
-        from tomoskin.session import check_outputs
+        from tomoskin.core import check_outputs
 
         outputs = [
             output

@@ -19,7 +19,7 @@ from tomoskin.cli.skin_choice import SkinOption, skin_for_source
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from tomoskin.live import Runner, Status
+    from tomoskin.run import Runner, Status
 
 _OFTEN = 0.1
 
@@ -41,14 +41,15 @@ def record(
     json: JsonFlag = False,
 ) -> None:
     """Record a session: raw bytes, frames, touches and images, without a page."""
-    from tomoskin import live as room
+    from tomoskin.pipeline import prepare
+    from tomoskin.run import Runner
     from tomoskin.source import open_source
 
     sinks = chosen_sinks(sink)
     chosen = skin_for_source(skin, source)
     with Bar("preparing"):
-        prepared = room.prepare(chosen)
-    runner = room.Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
+        prepared = prepare(chosen)
+    runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
     with ended_by_signals(), recording_to(runner, file):
         if seconds is None and frames is None and not json:
             typer.echo(f"{runner.source} is recorded to {file} until Ctrl-C", err=True)

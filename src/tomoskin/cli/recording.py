@@ -12,9 +12,9 @@ from tomoskin.core import DataError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tomoskin.live import Idle
     from tomoskin.pattern import Pattern
-    from tomoskin.session import Recording
+    from tomoskin.pipeline import Idle
+    from tomoskin.signal import Recording
 
 ReferenceOption = Annotated[
     str | None,
@@ -31,7 +31,7 @@ FramesOption = Annotated[
 
 def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Idle:
     """What the frames are held against; None for a file of differences."""
-    from tomoskin.session import read_recording
+    from tomoskin.formats import read_recording
 
     if recording.is_change:
         if spec is not None:

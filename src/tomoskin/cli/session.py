@@ -16,7 +16,8 @@ from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import say_notes
 
 if TYPE_CHECKING:
-    from tomoskin.session import Lost, Output, Repaired, SessionInfo
+    from tomoskin.core import Output
+    from tomoskin.recording import Lost, Repaired, SessionInfo
 
 app = group("Inspect, mend and convert recorded sessions.")
 
@@ -47,7 +48,7 @@ EXPORTS = {
 
 def _mended(out: Path | None, given: Given, called: str) -> list[Output]:
     """The file that a repair makes."""
-    from tomoskin.session import Output
+    from tomoskin.core import Output
 
     return [Output(_repaired(given["file"], out), RECORDING, called if out else "")]
 
@@ -58,7 +59,8 @@ def _repaired(file: Path, out: Path | None) -> Path:
 
 def _exported(out: Path | None, _: Given, called: str) -> list[Output]:
     """What an export writes: of a series more than the file that is named."""
-    from tomoskin.session import Output, series_files
+    from tomoskin.core import Output
+    from tomoskin.formats import series_files
 
     assert out is not None
     if out.suffix.lower() in (".vtu", ".pvd"):
@@ -69,7 +71,7 @@ def _exported(out: Path | None, _: Given, called: str) -> list[Output]:
 @app.command()
 def info(file: _File, json: JsonFlag = False) -> None:
     """Say what a session holds: duration, rate, gaps, drops, skin, touches."""
-    from tomoskin.session import session_info
+    from tomoskin.recording import session_info
 
     with Bar("reading") as bar:
         found = session_info(file, bar)
@@ -98,7 +100,7 @@ def repair(
     json: JsonFlag = False,
 ) -> None:
     """Recover every whole chunk of a damaged session into a new file."""
-    from tomoskin.session import repair
+    from tomoskin.recording import repair
     from tomoskin.skin import Skin
 
     target = _repaired(file, out)
@@ -134,8 +136,8 @@ def export(
     force: ForceFlag = False,
 ) -> None:
     """Convert a session: voltages, or the images that they give again."""
-    from tomoskin.live import WRITERS, Export
-    from tomoskin.session import SessionReader
+    from tomoskin.formats import WRITERS, Export
+    from tomoskin.recording import SessionReader
 
     write = WRITERS[out.suffix.lower()]
     with SessionReader(file) as session, Bar(f"writing {out}") as bar:
@@ -164,7 +166,7 @@ def import_recording(
     force: ForceFlag = False,
 ) -> None:
     """Convert a recording of another program to the interchange file."""
-    from tomoskin.session import read_recording, write_interchange
+    from tomoskin.formats import read_recording, write_interchange
 
     recording = read_recording(file)
     write_interchange(out, recording, overwrite=force)

@@ -14,8 +14,8 @@ from tomoskin.cli.progress import Bar
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from tomoskin.live import Workers
-    from tomoskin.session import Output
+    from tomoskin.core import Output
+    from tomoskin.run import Workers
     from tomoskin.skin import Skin
     from tomoskin.twin import SetPlan
 
@@ -27,7 +27,7 @@ ONE_FILE = {".npz": "labelled frames in one file"}
 
 def _simulated(out: Path | None, given: Given, called: str) -> list[Output]:
     """A session; or labelled frames, of which a folder that is there is looked into later."""
-    from tomoskin.session import Output
+    from tomoskin.core import Output
 
     assert out is not None
     if given["presses"] is None:
@@ -85,7 +85,7 @@ def simulate(
 
 
 def _timeline(skin: Skin, script: Path, out: Path, seed: int | None, *, json: bool) -> None:
-    from tomoskin.live import simulate as run
+    from tomoskin.run import simulate as run
     from tomoskin.twin import Script
 
     read = Script.from_toml(_text(script), source=str(script))
@@ -122,7 +122,7 @@ def _plan(skin: Skin, script: Path | None, seed: int, n: int) -> SetPlan:
 
 
 def _labelled(plan: SetPlan, out: Path, workers: Workers, *, overwrite: bool, json: bool) -> None:
-    from tomoskin.live import make_set
+    from tomoskin.run import make_set
 
     n = plan.n_frames
     begun = time.monotonic()
@@ -144,7 +144,7 @@ def _labelled(plan: SetPlan, out: Path, workers: Workers, *, overwrite: bool, js
 
 
 def _workers(processes: int | None, cluster: str | None) -> Workers:
-    from tomoskin.live import in_processes, in_this_process, on_cluster, processors
+    from tomoskin.run import in_processes, in_this_process, on_cluster, processors
 
     if cluster is not None:
         if processes is not None:

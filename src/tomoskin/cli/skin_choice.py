@@ -23,7 +23,7 @@ SkinOption = Annotated[
 
 def skin_for_source(skin: str | None, source: str) -> Skin:
     """The skin named, or the one in the session that ``source`` replays, or the default."""
-    from tomoskin.session import parse_replay
+    from tomoskin.recording import parse_replay
     from tomoskin.skin import Skin
 
     name, _, argument = source.partition(":")
@@ -34,14 +34,15 @@ def skin_for_source(skin: str | None, source: str) -> Skin:
 
 def known_skin(skin: str | None, path: Path) -> Skin | None:
     """The skin named, or the one in the session ``path``; None where neither says one."""
-    from tomoskin.session import is_session
+    from tomoskin.formats import is_session
 
     return skin_for_file(skin, path) if skin is not None or is_session(path) else None
 
 
 def skin_for_file(skin: str | None, path: Path) -> Skin:
     """The skin named, or the one in the session ``path``, or the default."""
-    from tomoskin.session import SessionReader, is_session
+    from tomoskin.formats import is_session
+    from tomoskin.recording import SessionReader
     from tomoskin.skin import Skin
 
     if skin is None and is_session(path):

@@ -13,7 +13,7 @@ from tomoskin.core import DataError, FloatArray
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tomoskin.touch import Codes, Examples
+    from tomoskin.calibration import Codes, Examples
 
 
 def marked(path: Path, dv: FloatArray, given: list[str], codes: Codes | None) -> Examples:
@@ -24,7 +24,7 @@ def marked(path: Path, dv: FloatArray, given: list[str], codes: Codes | None) ->
     DataError
         When nothing says what the frames show (and ``codes`` are not known), or it is no label.
     """
-    from tomoskin.touch import Codes, Examples
+    from tomoskin.calibration import Codes, Examples
 
     arrays = {} if given else _arrays(path)
     if "flags" in arrays:
@@ -47,7 +47,8 @@ def marked(path: Path, dv: FloatArray, given: list[str], codes: Codes | None) ->
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
-    from tomoskin.session import is_session, load_arrays
+    from tomoskin.core import load_arrays
+    from tomoskin.formats import is_session
 
     if is_session(path) or path.suffix.lower() != ".npz":
         return {}

@@ -14,8 +14,8 @@ from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
 if TYPE_CHECKING:
-    from tomoskin.session import Recording
-    from tomoskin.touch import Answers
+    from tomoskin.calibration import Answers
+    from tomoskin.signal import Recording
 
 _SHOWN = 20
 
@@ -43,9 +43,10 @@ def states(
     json: JsonFlag = False,
 ) -> None:
     """Tell the state of each frame, or that it is none of those that were learnt."""
+    from tomoskin.calibration import read_states
     from tomoskin.cli.labelled import changes
     from tomoskin.cli.skin_choice import known_skin
-    from tomoskin.session import read_recording, read_states
+    from tomoskin.formats import read_recording
 
     with Bar("learning"):
         known = read_states(calibration)
@@ -84,7 +85,7 @@ def _documents(whole: Recording, answers: Answers) -> list[dict[str, Any]]:
 def _write(
     path: Path, whole: Recording, answers: Answers, names: tuple[str, ...], *, overwrite: bool
 ) -> None:
-    from tomoskin.session import written
+    from tomoskin.core import written
 
     with (
         written(path, overwrite=overwrite) as part,

@@ -10,7 +10,7 @@ import typer
 from tomoskin.cli.named_files import Reads
 
 if TYPE_CHECKING:
-    from tomoskin.live import Prepared
+    from tomoskin.pipeline import Prepared
     from tomoskin.skin import Skin
 
 StatesOption = Annotated[
@@ -28,7 +28,7 @@ def with_states(prepared: Prepared, path: Path | None, skin: Skin) -> Prepared:
     ``skin`` as its file says, whatever pictures are made of it. Raises DataError for states of
     another.
     """
-    from tomoskin.session import read_states
+    from tomoskin.calibration import read_states
 
     if path is None:
         return prepared

@@ -3,6 +3,8 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
+from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
 from tomoskin.core.errors import (
     DataError,
     GeometryError,
@@ -16,7 +18,10 @@ from tomoskin.core.errors import (
     TomoskinError,
     WireError,
 )
+from tomoskin.core.outputs import MAGIC, RECORDING, Output, check_outputs
+from tomoskin.core.typed_arrays import electrode_table, numbers, real_numbers, whole_number
 from tomoskin.core.units import DIMENSIONS, parse_quantity
+from tomoskin.core.written import write_text, written
 
 if TYPE_CHECKING:
     from tomoskin.core.records import (
@@ -33,7 +38,14 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
+    "AMOUNT",
+    "CHANGE",
+    "CHANGE_ON_DARK",
     "DIMENSIONS",
+    "MAGIC",
+    "RECORDING",
+    "Arrays",
+    "ColourScale",
     "ComplexArray",
     "DataError",
     "Event",
@@ -43,6 +55,7 @@ __all__ = [
     "Image",
     "IntArray",
     "ModelError",
+    "Output",
     "OutputError",
     "PatternError",
     "PixelMap",
@@ -55,7 +68,18 @@ __all__ = [
     "Touch",
     "Voltages",
     "WireError",
+    "check_outputs",
+    "electrode_table",
+    "load_arrays",
+    "numbers",
+    "pack_arrays",
     "parse_quantity",
+    "real_numbers",
+    "save_arrays",
+    "unpack_arrays",
+    "whole_number",
+    "write_text",
+    "written",
 ]
 
 

@@ -10,6 +10,7 @@ from tomoskin.signal.idle import Idle
 from tomoskin.signal.monitor import Monitor
 from tomoskin.signal.phase import in_phase
 from tomoskin.signal.readout import Readout
+from tomoskin.signal.recording import Recording, frame_times
 from tomoskin.signal.reference import Reference
 from tomoskin.signal.roles import Roles, lost_directions
 
@@ -26,11 +27,13 @@ __all__ = [
     "Idle",
     "Monitor",
     "Readout",
+    "Recording",
     "Reference",
     "Roles",
     "at_one_time",
     "difference",
     "difference_noise",
+    "frame_times",
     "in_phase",
     "lost_directions",
     "undone",

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tomoskin.core import Event, SinkError
-from tomoskin.session import (
+from tomoskin.recording import (
     encode_json,
     grid_message,
     log_message,

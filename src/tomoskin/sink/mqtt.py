@@ -7,7 +7,7 @@ from typing import Any
 from urllib.parse import SplitResult, unquote, urlsplit
 
 from tomoskin.core import Event, SinkError
-from tomoskin.session import encode_json, touch_row, touches_message
+from tomoskin.recording import encode_json, touch_row, touches_message
 from tomoskin.sink.pace import TouchPace
 from tomoskin.sink.registry import needed
 from tomoskin.sink.sink import Item, Stream

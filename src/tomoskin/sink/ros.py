@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from tomoskin.core import Event, Image, PixelMap, Touch
-from tomoskin.session import touches_message
+from tomoskin.recording import touches_message
 from tomoskin.sink.pace import TouchPace
 from tomoskin.sink.sink import Item, Moment, Stream
 

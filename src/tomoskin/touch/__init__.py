@@ -1,67 +1,46 @@
-"""Image → readings → touches with an identity; labelled presses → places."""
+"""Difference data or an image → detections → touches with an identity; bounds of a design."""
 
-from tomoskin.touch.bending import (
-    BendExamples,
-    BendModel,
-    BendReader,
-    BendReading,
-    JointReference,
-)
-from tomoskin.touch.design import Demand, Promise, Variant, promise, variants
-from tomoskin.touch.fit import LIVE, WHOLE, Pace, SpotFinder, SpotModel, measured_covariance
+from typing import Any
+
+from tomoskin._moved import moved
+from tomoskin.touch.design.compare import Variant, variants
+from tomoskin.touch.design.promise import Demand, Promise, promise
+from tomoskin.touch.fit.finder import SpotFinder, SpotModel
+from tomoskin.touch.fit.noise import Whitener, measured_covariance
+from tomoskin.touch.fit.pace import LIVE, WHOLE, Pace
+from tomoskin.touch.fit.spot import Response, Spots, spots_of
 from tomoskin.touch.floor import NoiseFloor
-from tomoskin.touch.locator import Locator, Presses, Region, Watch
+from tomoskin.touch.region import Region
 from tomoskin.touch.segment import Segmenter
-from tomoskin.touch.several import Several
-from tomoskin.touch.states import (
-    Answers,
-    Codes,
-    Examples,
-    StateClassifier,
-    StateReading,
-    Teller,
-    against_rest,
-)
-from tomoskin.touch.tracking import STILL, TouchEvent, Tracker, TrackSettings
-from tomoskin.touch.wiring import Wiring, WiringAnswer, ring_of, solve_wiring
+from tomoskin.touch.tracking.settings import STILL, TrackSettings
+from tomoskin.touch.tracking.tracker import Tracker
+from tomoskin.touch.tracking.words import TouchEvent
 
 __all__ = [
     "LIVE",
     "STILL",
     "WHOLE",
-    "Answers",
-    "BendExamples",
-    "BendModel",
-    "BendReader",
-    "BendReading",
-    "Codes",
     "Demand",
-    "Examples",
-    "JointReference",
-    "Locator",
     "NoiseFloor",
     "Pace",
-    "Presses",
     "Promise",
     "Region",
+    "Response",
     "Segmenter",
-    "Several",
     "SpotFinder",
     "SpotModel",
-    "StateClassifier",
-    "StateReading",
-    "Teller",
+    "Spots",
     "TouchEvent",
     "TrackSettings",
     "Tracker",
     "Variant",
-    "Watch",
-    "Wiring",
-    "WiringAnswer",
-    "against_rest",
+    "Whitener",
     "measured_covariance",
     "promise",
-    "ring_of",
-    "solve_wiring",
+    "spots_of",
     "variants",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    return moved("touch", name)

@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import expm
 
 from tomoskin.forward import ForwardModel
-from tomoskin.live import prepare
 from tomoskin.mesh import triangulate
+from tomoskin.pipeline import prepare
 from tomoskin.skin import Skin
 from tomoskin.touch import SpotModel
 

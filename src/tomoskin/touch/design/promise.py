@@ -25,7 +25,7 @@ from tomoskin.touch.fit import (
     spots_of,
 )
 from tomoskin.touch.fit.spot import CONTENT
-from tomoskin.touch.locator import Region
+from tomoskin.touch.region import Region
 
 Advance = Callable[[float, float], None]
 

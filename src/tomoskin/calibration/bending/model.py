@@ -1,0 +1,166 @@
+"""What bends do to the data: their directions, and how an angle follows from the amplitudes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from tomoskin.calibration.bending.examples import BendExamples
+from tomoskin.calibration.bending.memory import Memory
+from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.touch import Whitener
+
+_ABOVE = 1.1
+"""A direction counts above so many times the edge of noise."""
+
+_MOST = 8
+
+_WORTH = 0.5
+"""The past counts where squared errors fall to this part by it: else it is chance."""
+
+_FOLDS = 5
+_RIDGES = np.geomspace(1e-6, 1.0, 13)
+
+
+@dataclass(frozen=True, eq=False)
+class BendModel:
+    """Deformation modes of a skin and what their amplitudes say; made by :meth:`learn`.
+
+    Attributes
+    ----------
+    examples
+        What it was learnt from.
+    covariance
+        (n_meas, n_meas) V² of one frame less the reference.
+    directions
+        (n_meas, k) V: where bends move the data, orthonormal in units of the noise.
+    weights
+        (f, t) from features (:class:`Memory`) to the targets of the examples.
+    plays
+        Where the plays of :class:`Memory` stand at the reference; None where the sheet's past
+        does not count.
+    errors
+        (n, t) rad, what the examples' targets are missed by when their part of the recording is
+        left out.
+    size
+        Largest amplitude, for the features.
+    """
+
+    examples: BendExamples
+    covariance: FloatArray
+    directions: FloatArray
+    weights: FloatArray
+    plays: FloatArray | None
+    errors: FloatArray
+    size: float
+
+    @classmethod
+    def learn(cls, examples: BendExamples, covariance: FloatArray) -> Self:
+        """From frames that nothing touches.
+
+        Directions are the principal ones of the whitened frames above the edge of noise
+        (Marchenko & Pastur 1967). The angle is a ridge regression on their amplitudes; whether
+        the past counts, and the ridge, are what errs least on left-out fifths of the recording.
+        A sheet that remembers is taken to have been bent so before its reference was taken, as
+        it will have been whenever it is used.
+
+        Raises
+        ------
+        DataError
+            When the bends do not show above the noise.
+        """
+        whiten = Whitener.of(covariance)
+        seen = whiten(examples.dv)
+        _, singular, rows = np.linalg.svd(seen, full_matrices=False)
+        edge = np.sqrt(seen.shape[1]) + np.sqrt(len(seen))
+        count = min(int(np.count_nonzero(singular > _ABOVE * edge)), _MOST)
+        if count == 0:
+            raise DataError(
+                "the bends do not show above the noise",
+                hint="bend it farther, or check that the frames are those of the angles",
+            )
+        directions = np.linalg.pinv(whiten.matrix) @ rows[:count].T
+        z = seen @ rows[:count].T
+        size = float(np.linalg.norm(z, axis=1).max())
+        plays, weights, errors = min(
+            ((plays, *_regressed(_features(z, examples, size, plays), examples))
+             for plays in (None, Memory.plays_after(z, size))),
+            key=lambda found: np.mean(found[2] ** 2) * (_WORTH if found[0] is None else 1.0),
+        )  # fmt: skip
+        return cls(examples, covariance, directions, weights, plays, errors, size)
+
+    def without(self, rows: IntArray) -> BendModel:
+        """Learnt again from the rows that are left without ``rows`` (k,), indices.
+
+        Raises DataError when the bends do not show in these.
+        """
+        left = np.delete(np.arange(len(self.covariance)), rows)
+        examples = replace(self.examples, dv=self.examples.dv[:, left])
+        return self.learn(examples, self.covariance[np.ix_(left, left)])
+
+    @property
+    def remembers(self) -> bool:
+        """Whether the sheet's past counts."""
+        return self.plays is not None
+
+    def memory(self) -> Memory:
+        """Of a sheet at its reference."""
+        return Memory(self.n_modes, self.size, remembers=self.remembers, plays=self.plays)
+
+    @property
+    def n_modes(self) -> int:
+        """Number of directions."""
+        return int(self.directions.shape[1])
+
+    @cached_property
+    def whiten(self) -> Whitener:
+        """Makes the noise white."""
+        return Whitener.of(self.covariance)
+
+    @cached_property
+    def error(self) -> float:
+        """Rad, root mean square by which left-out angles are missed."""
+        return float(np.sqrt(np.mean(self._angles(self.examples.targets - self.errors) ** 2)))
+
+    def _angles(self, told: FloatArray) -> FloatArray:
+        return np.asarray(self.told(told)[0] - self.examples.angle)
+
+    def told(self, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(n,) angle and axis, rad, of ``targets`` (n, t)."""
+        if targets.shape[1] == 1:
+            axes = self.examples.axes
+            return targets[:, 0], np.full(len(targets), axes[0])
+        trace, cosine, sine = targets.T
+        sign = np.where(trace < 0, -1.0, 1.0)
+        size = (np.abs(trace) + np.hypot(cosine, sine)) / 2
+        return sign * size, np.mod(np.arctan2(sign * sine, sign * cosine) / 2, np.pi)
+
+
+def _features(
+    z: FloatArray, examples: BendExamples, size: float, plays: FloatArray | None
+) -> FloatArray:
+    remembers = plays is not None
+    return Memory.over(z, examples.time, size, remembers=remembers, plays=plays)
+
+
+def _regressed(features: FloatArray, examples: BendExamples) -> tuple[FloatArray, FloatArray]:
+    """Weights and left-out errors of the ridge that errs least."""
+    targets, scale = examples.targets, np.abs(features).max(axis=0) + 1e-12
+    x = features / scale
+    fold = np.arange(len(x)) * _FOLDS // len(x)
+    found = []
+    for ridge in _RIDGES:
+        errors = np.zeros_like(targets)
+        for k in range(_FOLDS):
+            out = fold == k
+            errors[out] = targets[out] - x[out] @ _ridge(x[~out], targets[~out], ridge)
+        found.append((float(np.mean(errors**2)), ridge, errors))
+    _, ridge, errors = min(found, key=lambda one: one[0])
+    return _ridge(x, targets, ridge) / scale[:, None], errors
+
+
+def _ridge(x: FloatArray, y: FloatArray, ridge: float) -> FloatArray:
+    return np.asarray(np.linalg.solve(x.T @ x + ridge * np.eye(x.shape[1]), x.T @ y))

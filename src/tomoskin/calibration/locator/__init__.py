@@ -1,0 +1,9 @@
+"""Where a touch is, learnt from labelled presses."""
+
+from tomoskin.calibration.locator.locator import Locator
+from tomoskin.calibration.locator.presses import Presses
+from tomoskin.calibration.locator.review import Remark
+from tomoskin.calibration.locator.watch import Watch
+from tomoskin.touch import Region
+
+__all__ = ["Locator", "Presses", "Region", "Remark", "Watch"]

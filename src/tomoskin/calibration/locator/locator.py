@@ -1,0 +1,260 @@
+"""The locator: labelled presses → where a frame's touch is, and how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from threadpoolctl import threadpool_limits
+
+from tomoskin.calibration.locator.doubt import NINE_IN_TEN, Doubt, dispute_of, squared_lengths
+from tomoskin.calibration.locator.features import Features
+from tomoskin.calibration.locator.held_out import FEW, Estimates
+from tomoskin.calibration.locator.presses import Presses, frames
+from tomoskin.calibration.locator.review import Remark, outliers, twins
+from tomoskin.calibration.locator.stack import Stack
+from tomoskin.calibration.locator.strength import Strength
+from tomoskin.calibration.locator.turns import Turns
+from tomoskin.core import DataError, FloatArray
+from tomoskin.pattern import Pattern
+from tomoskin.skin import Skin
+from tomoskin.touch import Region
+
+Advance = Callable[[float, float], None]
+"""Told how much of how much is done."""
+
+_STEPS = 4
+
+_COARSE = 600
+"""Places in the grid of few presses: what they know is less than that."""
+
+_GROWN = 1.25
+"""Growth up to which settings are kept when presses are added."""
+
+_CHANGED = 2.5
+"""How many times as far as usual new presses are missed on a skin that has changed (medians)."""
+
+
+def _silent(_done: float, _total: float) -> None:
+    pass
+
+
+@dataclass(frozen=True, eq=False)
+class Locator:
+    """Places of single touches, learnt from labelled presses; made by :meth:`fit`.
+
+    Attributes
+    ----------
+    presses
+        What it was learnt from.
+    region
+        Where a touch may be: the skin, or where the presses were.
+    pattern
+        What was measured, or None where it is not known.
+    skin_id
+        Identity of the skin, "" where it is not known.
+    held
+        Part of the presses that lie in their own 90 % ellipse when they are left out.
+    remarks
+        Labels that the other presses contradict.
+    settled
+        Presses that the settings were learnt from; see :meth:`updated`.
+    """
+
+    presses: Presses
+    region: Region
+    pattern: Pattern | None
+    skin_id: str
+    features: Features
+    estimates: Estimates
+    stack: Stack
+    doubt: Doubt
+    power: Strength
+    held: float
+    remarks: tuple[Remark, ...]
+    settled: int
+
+    @classmethod
+    def fit(
+        cls,
+        dv: ArrayLike,
+        xy: ArrayLike,
+        *,
+        pattern: Pattern | None = None,
+        skin: Skin | None = None,
+        strength: ArrayLike | None = None,
+        progress: Advance = _silent,
+    ) -> Self:
+        """Learn from presses.
+
+        Parameters
+        ----------
+        dv
+            (n, n_meas) pressed frame minus untouched frame, in any one unit; NaN is missing.
+        xy
+            (n, 2) m, the place of each press, in the order in which they were made.
+        pattern, skin
+            What was measured and on what; the skin's outline bounds where a touch may be.
+        strength
+            (n,) force or depth of each press in any unit; without it, see :meth:`strength`.
+        progress
+            Told how much of how much is done.
+
+        Raises
+        ------
+        DataError
+            For arrays that do not belong together, fewer than six presses, labels outside the
+            skin, presses on one line, data that never change.
+        """
+        table = pattern or (skin.pattern() if skin else None)
+        presses = Presses.of(dv, xy, strength)
+        if table is not None:
+            frames(presses.dv, table.n_meas)
+        region = Region.of(skin) if skin else Region.around(presses.xy)
+        skin_id = skin.identity if skin else ""
+        return cls.learn(presses.within(region), region, table, skin_id, progress)
+
+    @classmethod
+    def learn(
+        cls,
+        presses: Presses,
+        region: Region,
+        pattern: Pattern | None = None,
+        skin_id: str = "",
+        progress: Advance = _silent,
+    ) -> Self:
+        """Learn from checked presses in a region, of a pattern and a skin where they are known."""
+        with threadpool_limits(1):  # many small products: more threads only wait for each other
+            return cls._learnt(presses, region, (pattern, skin_id), progress)
+
+    @classmethod
+    def _learnt(
+        cls,
+        presses: Presses,
+        region: Region,
+        known: tuple[Pattern | None, str],
+        progress: Advance,
+        like: Locator | None = None,
+    ) -> Self:
+        places = region.scaled(presses.xy)
+        features = like.features if like else Features.of(presses.dv)
+        data = features(presses.dv)
+        progress(0, _STEPS)
+        maps = like.estimates.likelihood.maps if like else None
+        turns = Turns.of(known[0]) if known[0] else Turns.none(presses.dv.shape[1])
+        grid = region.lattice(_COARSE) if len(presses) < FEW else region.grid
+        estimates = Estimates.of(data, places, grid, turns.of_rows(features.rows), maps)
+        progress(1, _STEPS)
+        stack = Stack.of(data, estimates.left_out, places, like.stack if like else None)
+        progress(2, _STEPS)
+        dispute = dispute_of(stack.left_out_told, stack.left_out)
+        doubt = Doubt.of(stack.left_out - places, estimates.left_out_spread, dispute)
+        covariance = doubt(estimates.left_out_spread, dispute)
+        held = float(np.mean(squared_lengths(stack.left_out - places, covariance) < NINE_IN_TEN))
+        remarks = (
+            *twins(data, places, region.unit),
+            *outliers(stack.left_out, places, covariance, region.unit),
+        )
+        progress(3, _STEPS)
+        power = Strength.of(presses, stack.left_out)
+        progress(_STEPS, _STEPS)
+        settled = like.settled if like else len(presses)
+        return cls(
+            presses,
+            region,
+            *known,
+            features,
+            estimates,
+            stack,
+            doubt,
+            power,
+            held,
+            remarks,
+            settled,
+        )
+
+    def predict(self, dv: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Place (n, 2) m and its covariance (n, 2, 2) m² for frames (n, n_meas).
+
+        Values that are not finite are left out. Raises DataError for another number of rows, and
+        for a frame without any value that is used.
+        """
+        data = self.features(frames(dv, self.presses.dv.shape[1]))
+        guess, spread = self.estimates(data)
+        told = self.stack.told(data, guess)
+        answer = self.stack.combined(told)
+        covariance = self.doubt(spread, dispute_of(told, answer))
+        return self.region.metres(answer), self.region.unit**2 * covariance
+
+    def strength(self, dv: ArrayLike) -> FloatArray:
+        """(n,) strength of each frame's touch.
+
+        In the unit of the labels; without labels, how many times as large the frame is as those
+        of the presses at its place.
+        """
+        data = frames(dv, self.presses.dv.shape[1])
+        guess = self.region.scaled(self.predict(data)[0])
+        return self.power(data, guess)
+
+    def updated(self, dv: ArrayLike, xy: ArrayLike, strength: ArrayLike | None = None) -> Self:
+        """Locator with more presses, soon: scales, covariances and hyper-parameters are kept.
+
+        Maps, processes, weights and doubt are those of all presses. The settings are learnt anew
+        once there are a quarter more presses than they were learnt from, and where the new ones
+        are missed far: then the skin has changed. See :meth:`settled_anew`.
+        """
+        more = Presses.of_more(dv, xy, strength)
+        presses = self.presses.and_then(more)
+        region = self.region if self.skin_id else Region.around(presses.xy)
+        presses.within(region)
+        missed = np.linalg.norm(self.predict(more.dv)[0] - more.xy, axis=1)
+        changed = np.median(missed) > _CHANGED * np.median(self.errors)
+        keep = len(presses) <= _GROWN * self.settled and not changed
+        like = self if keep else None
+        with threadpool_limits(1):
+            return self._learnt(presses, region, (self.pattern, self.skin_id), _silent, like)
+
+    def settled_anew(self, progress: Advance = _silent) -> Self:
+        """Locator with the same presses, every setting learnt from all of them."""
+        if self.settled == len(self.presses):
+            return self
+        return self.learn(self.presses, self.region, self.pattern, self.skin_id, progress)
+
+    @property
+    def pattern_id(self) -> str:
+        """Identity of the pattern, "" where it is not known."""
+        return self.pattern.identity if self.pattern else ""
+
+    @property
+    def errors(self) -> FloatArray:
+        """(n,) m by which each press is missed when it is left out."""
+        return np.asarray(
+            self.region.unit
+            * np.linalg.norm(self.stack.left_out - self.region.scaled(self.presses.xy), axis=1)
+        )
+
+    @property
+    def drift(self) -> float:
+        """How many times as far as usual the last eighth of the presses is missed (medians)."""
+        errors = self.errors
+        return float(np.median(errors[-max(len(errors) // 8, 5) :]) / np.median(errors))
+
+    def next_place(self) -> FloatArray:
+        """(2,) m where the next labelled press tells most: the maps are least certain there."""
+        return self.region.metres(self.estimates.least_known)
+
+    def check(self, pattern: Pattern | None = None, skin: Skin | None = None) -> None:
+        """Refuse data of another pattern or skin. Raises DataError."""
+        pairs = (
+            ("pattern", self.pattern_id, pattern and pattern.identity),
+            ("skin", self.skin_id, skin and skin.identity),
+        )
+        for name, mine, other in pairs:
+            if mine and other and mine != other:
+                raise DataError(
+                    f"the calibration is of {name} {mine}, the data are of {name} {other}",
+                    hint="calibrate this one: tomoskin calibrate touch",
+                )

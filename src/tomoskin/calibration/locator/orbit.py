@@ -1,0 +1,129 @@
+"""Response maps of a group of rows, each with a noise of its own, and what turned copies share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tomoskin.calibration.locator.kernel import Basis, Likeness
+from tomoskin.calibration.locator.turns import turned
+from tomoskin.core import FloatArray
+
+_RATIOS = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
+"""Noise over signal of a row, as tried."""
+
+_FLOOR = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Alone:
+    """Features in the modes of the presses: ``rows`` (n, k) about their ``mean`` (k,), and the
+    ``size`` (k,) of each row's signal and its ``noise`` over that, likeliest for the row alone.
+    """
+
+    mean: FloatArray
+    rows: FloatArray
+    size: FloatArray
+    noise: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Presses at ``places`` (n, 2) in the ``axes`` (n, n) of their likeness, of ``weights`` (n,).
+
+    ``common`` holds what a row and its turned copies share: functions of the turned place, whose
+    values at the presses are ``seen`` for each angle.
+    """
+
+    likeness: Likeness
+    places: FloatArray
+    weights: FloatArray
+    axes: FloatArray
+    common: Basis
+    seen: dict[float, FloatArray]
+
+    @classmethod
+    def of(cls, likeness: Likeness, places: FloatArray, angles: FloatArray) -> Self:
+        """For rows that are turned by one of ``angles``."""
+        weights, axes = np.linalg.eigh(likeness(places, places))
+        copies = {angle: turned(places, angle) for angle in np.unique(angles).tolist()}
+        common = Basis.of(likeness, np.concatenate([*copies.values()]))
+        seen = {angle: axes.T @ common(copy) for angle, copy in copies.items()}
+        return cls(likeness, places, np.maximum(weights, 0.0), axes, common, seen)
+
+    def alone(self, features: FloatArray) -> Alone:
+        """What each row of ``features`` (n, k) tells by itself (Rasmussen & Williams 2006, 5.8)."""
+        n, mean = features.shape[0], features.mean(axis=0)
+        rows = self.axes.T @ (features - mean)
+        spread = self.weights[:, None] + _RATIOS
+        size = (1 / spread).T @ rows**2 / n + _FLOOR
+        log = -0.5 * n * np.log(size) - 0.5 * np.log(spread).sum(axis=0)[:, None]
+        best = log.argmax(axis=0)
+        return Alone(mean, rows, size[best, np.arange(len(mean))], _RATIOS[best])
+
+    def at(self, places: FloatArray) -> tuple[FloatArray, dict[float, FloatArray]]:
+        """(g, n) of the likeness and, for each angle, (g, m) of what is common."""
+        near = self.likeness(places, self.places) @ self.axes
+        return near, {angle: self.common(turned(places, angle)) for angle in self.seen}
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitMaps:
+    """Maps of rows that are turned copies of each other: √size (√share g(turned x) + h(x) + noise).
+
+    g is the same for all, h is each row's own with the rest of the variance: two Gaussian processes
+    of one likeness. Without a ``share`` each row stands for itself. ``angles`` (r,) of the rows;
+    ``left`` (n, r), ``spread`` (n, r): what g leaves over its variance, and that; ``pull`` (m,) and
+    ``root`` (m, m): mean of g's coefficients and a root of their covariance.
+    """
+
+    modes: Modes
+    angles: FloatArray
+    share: float
+    mean: FloatArray
+    size: FloatArray
+    noise: FloatArray
+    left: FloatArray
+    spread: FloatArray
+    pull: FloatArray
+    root: FloatArray
+    evidence: float
+
+    @classmethod
+    def of(cls, modes: Modes, alone: Alone, angles: FloatArray, share: float) -> Self:
+        """From rows that have been looked at alone, turned by ``angles``."""
+        rows = alone.rows / np.sqrt(alone.size)
+        spread = (1 - share) * modes.weights[:, None] + alone.noise
+        functions = len(modes.common.root.T) if share else 0
+        seen = np.stack([modes.seen[angle][:, :functions] for angle in angles.tolist()])
+        weighed = (seen / np.sqrt(spread.T)[:, :, None]).reshape(spread.size, functions)
+        whole = np.eye(functions) / (share or 1.0) + weighed.T @ weighed
+        root = np.linalg.inv(np.linalg.cholesky(whole))
+        known = root @ (weighed.T @ (rows / np.sqrt(spread)).T.ravel())
+        pull = root.T @ known
+        left = (rows - (seen @ pull).T) / spread
+        evidence = (
+            0.5 * float(known @ known)
+            + float(np.log(np.diag(root)).sum())
+            - 0.5 * functions * float(np.log(share or 1.0))
+            - 0.5 * float((rows**2 / spread + np.log(spread) + np.log(alone.size)).sum())
+        )
+        numbers = alone.mean, alone.size, alone.noise, left, spread, pull, root, evidence
+        return cls(modes, angles, share, *numbers)
+
+    def at(
+        self, near: FloatArray, common: dict[float, FloatArray]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Mean and variance, both (g, r), where :meth:`Modes.at` gave ``near`` and ``common``."""
+        own = 1 - self.share
+        mean = own * near @ self.left
+        variance = own * self.modes.likeness.variance + self.noise
+        variance = variance - own**2 * near**2 @ (1 / self.spread)
+        for row, angle in enumerate(self.angles.tolist() if self.share else ()):
+            there, seen = common[angle], self.modes.seen[angle]
+            mean[:, row] += there @ self.pull
+            blind = there - own * near @ (seen / self.spread[:, row, None])
+            variance[:, row] += ((blind @ self.root.T) ** 2).sum(axis=1)
+        return self.mean + np.sqrt(self.size) * mean, self.size * np.maximum(variance, _FLOOR)

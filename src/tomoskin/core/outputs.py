@@ -1,0 +1,168 @@
+"""What may be written where: the one decision for every command, the page and the library."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tomoskin.core.errors import OutputError
+
+MAGIC = b"\x89MCAP0\r\n"
+"""What a session file begins with."""
+
+RECORDING = {".mcap": "a recording"}
+"""The one ending of session files, which are never written over."""
+
+_ELSE = "choose another name"
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """A file that is to be written.
+
+    Attributes
+    ----------
+    endings
+        What its name may end in, and what each gives ("": no ending); empty: any name.
+    name
+        What a person calls it, such as "--out".
+    makes_folders
+        Folders above it that are not there are made.
+    """
+
+    path: Path
+    endings: Mapping[str, str] = field(default_factory=dict)
+    name: str = ""
+    makes_folders: bool = False
+
+
+def check_outputs(
+    outputs: Iterable[Output],
+    inputs: Iterable[Path] = (),
+    *,
+    overwrite: bool = False,
+    consent: str = "overwrite=True",
+) -> None:
+    """Refuse outputs that would replace what must stay, or that cannot be written.
+
+    An input, a session file, and what is no regular file are never written over; any other file
+    that is there only with ``overwrite``. Two outputs are two files. Nothing is made or changed.
+
+    Parameters
+    ----------
+    inputs
+        What is read while the outputs are made; may be missing.
+    overwrite
+        Files that are there may be replaced.
+    consent
+        How a person says so, for the message.
+
+    Raises
+    ------
+    OutputError
+        For the first output with a fault.
+    """
+    wanted, read = list(outputs), list(inputs)
+    for number, output in enumerate(wanted):
+        fault = (
+            _fault_of_others(output, wanted[:number], read)
+            or _fault_of_what_is_there(output.path, overwrite, consent)
+            or _fault_of_ending(output)
+            or _fault_of_folder(output)
+        )
+        if fault:
+            message, hint = fault
+            raise OutputError(message, where=f"{output.name} {output.path}".strip(), hint=hint)
+
+
+def is_same_file(one: Path, other: Path) -> bool:
+    """Whether two names mean one file: by links, by spelling, or by case, which some disks ignore.
+
+    Neither needs to be there.
+    """
+    try:
+        if one.samefile(other):
+            return True
+    except OSError:
+        pass  # one of them is not there
+    (folder, name), (its_folder, its_name) = (_parts(path) for path in (one, other))
+    return name == its_name and (folder == its_folder or _is_one_folder(folder, its_folder))
+
+
+Fault = tuple[str, str] | None
+"""What was expected and found, and what to do."""
+
+
+def _fault_of_others(output: Output, before: Sequence[Output], inputs: Sequence[Path]) -> Fault:
+    for path in inputs:
+        if is_same_file(output.path, path):
+            return f"is the same file as {path}, which is read here and never written over", _ELSE
+    for other in before:
+        if is_same_file(output.path, other.path):
+            named = f"{other.name} {other.path}".strip()
+            return f"is the same file as {named}", "give each its own name"
+    return None
+
+
+def _fault_of_what_is_there(path: Path, overwrite: bool, consent: str) -> Fault:
+    try:
+        mode = path.stat().st_mode
+        is_recording = stat.S_ISREG(mode) and _is_recording(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        return f"cannot be looked at: {error.strerror}", _ELSE
+    if not stat.S_ISREG(mode):
+        kind = "folder" if stat.S_ISDIR(mode) else "device or pipe"
+        return f"expected the name of a file, got a {kind}", "name a file"
+    if is_recording:
+        return "exists already, and recordings are never written over", _ELSE
+    if not overwrite:
+        return "exists already", f"{_ELSE}, or write over it: {consent}"
+    writable = os.access(path, os.W_OK)
+    return None if writable else ("exists already and is write-protected", _ELSE)
+
+
+def _fault_of_ending(output: Output) -> Fault:
+    endings = output.endings
+    if not endings or output.path.suffix.lower() in endings:
+        return None
+    named = ", ".join(f"{end or 'no ending'} ({gives})" for end, gives in endings.items())
+    return f"expected a name that ends in {named}, got {output.path.name}", "change the ending"
+
+
+def _fault_of_folder(output: Output) -> Fault:
+    folder = Path(os.path.realpath(output.path)).parent
+    while output.makes_folders and not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    if not folder.exists():
+        return f"cannot be written: there is no folder {folder}", "make the folder first"
+    if not folder.is_dir():
+        return f"cannot be written: {folder} is no folder", "name a file in a folder"
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return f"cannot be written: nothing may be written in {folder}", "choose another folder"
+    return None
+
+
+def _is_recording(path: Path) -> bool:
+    """By its ending, or by how it begins."""
+    if path.suffix.lower() in RECORDING:
+        return True
+    with path.open("rb") as file:
+        return file.read(len(MAGIC)) == MAGIC
+
+
+def _parts(path: Path) -> tuple[Path, str]:
+    """Folder and name, without links and relative steps; the name without its case."""
+    real = Path(os.path.realpath(path))
+    return real.parent, real.name.casefold()
+
+
+def _is_one_folder(one: Path, other: Path) -> bool:
+    try:
+        return one.samefile(other)
+    except OSError:
+        return False

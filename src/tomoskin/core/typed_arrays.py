@@ -1,0 +1,53 @@
+"""Arrays of a file, checked: numbers, whole numbers, tables of electrodes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core.archive import Arrays
+from tomoskin.core.errors import DataError
+from tomoskin.core.records import FloatArray, IntArray
+
+_MOST_ELECTRODES = 1024
+
+
+def numbers(arrays: Arrays, key: str, source: str) -> NDArray[Any]:
+    """Array ``key`` as float64, or complex128 where it is complex."""
+    array = arrays[key]
+    if array.dtype.kind not in "biufc":
+        raise DataError(f"expected numbers in {key}, got {array.dtype}", where=source)
+    return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64)
+
+
+def real_numbers(arrays: Arrays, key: str, source: str) -> FloatArray:
+    """Array ``key`` as float64."""
+    array = numbers(arrays, key, source)
+    if array.dtype.kind == "c":
+        raise DataError(f"expected real numbers in {key}, got complex ones", where=source)
+    return array
+
+
+def whole_number(arrays: Arrays, key: str, where: str) -> int:
+    """Array ``key`` as one whole number."""
+    value = real_numbers(arrays, key, where)
+    if value.shape or not np.isfinite(value) or value != np.round(value):
+        raise DataError(f"expected one whole number as {key}", where=where)
+    return int(value)
+
+
+def electrode_table(arrays: Arrays, key: str, source: str) -> IntArray:
+    """Array ``key`` as an (n, 2) table of electrodes from 0."""
+    table = real_numbers(arrays, key, source)
+    if table.ndim != 2 or table.shape[1] != 2:
+        raise DataError(f"expected {key} of shape (n_meas, 2), got {table.shape}", where=source)
+    good = (table >= 0) & (table < _MOST_ELECTRODES) & (table == np.round(table))
+    if not good.all():
+        row = int(np.argmin(good.all(axis=1)))
+        raise DataError(
+            f"expected whole electrode numbers from 0, got {table[row].tolist()}",
+            where=f"{source}, {key} row {row}",
+        )
+    return table.astype(np.int64)

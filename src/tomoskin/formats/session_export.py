@@ -1,0 +1,133 @@
+"""Files that a session is exported to, by the ending of their name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tomoskin.core import DataError
+from tomoskin.formats.exports.hdf5 import write_hdf5
+from tomoskin.formats.exports.matlab import write_matlab
+from tomoskin.formats.exports.movie import FILMS
+from tomoskin.formats.exports.series import write_series
+from tomoskin.formats.exports.table import write_csv, write_parquet
+from tomoskin.formats.interchange import write_interchange
+from tomoskin.formats.picture import MOST_PANELS, Panel, rendered, write_picture
+from tomoskin.formats.touch_csv import write_touches
+from tomoskin.pipeline import Prepared, colour_limit
+from tomoskin.recording import SessionReader, as_recorded, recording_of, replayed
+
+if TYPE_CHECKING:
+    from tomoskin.pipeline import Result
+
+Advance = Callable[[float, float], None]
+
+
+@dataclass(frozen=True)
+class Export:
+    """A session to be exported: ``every`` s between two images, ``advance`` told how far it is.
+
+    Files that are there are written over with ``overwrite`` only.
+    """
+
+    session: SessionReader
+    every: float
+    advance: Advance
+    overwrite: bool = False
+
+    def npz(self, path: Path) -> None:
+        """Write the interchange file."""
+        write_interchange(path, recording_of(self.session), overwrite=self.overwrite)
+
+    def csv(self, path: Path) -> None:
+        """Write a table of voltages."""
+        write_csv(path, self.session, self.advance, overwrite=self.overwrite)
+
+    def parquet(self, path: Path) -> None:
+        """Write a table of voltages for data tools."""
+        write_parquet(path, self.session, self.advance, overwrite=self.overwrite)
+
+    def hdf5(self, path: Path) -> None:
+        """Write everything."""
+        write_hdf5(path, self.session, self.advance, overwrite=self.overwrite)
+
+    def matlab(self, path: Path) -> None:
+        """Write EIDORS' structures."""
+        skin = self.session.skin
+        recording = recording_of(self.session)
+        write_matlab(path, recording, skin.current, skin.n_electrodes, overwrite=self.overwrite)
+
+    def series(self, path: Path) -> None:
+        """Write a series of meshes with their images."""
+        prepared = as_recorded(self.session)
+        moments = ((r.host_time, r.image.values) for r in self._images(prepared))
+        listing = path.with_suffix(".pvd")
+        write_series(listing, prepared.mesh, moments, overwrite=self.overwrite)
+
+    def film(self, path: Path) -> None:
+        """Write a film of the map."""
+        prepared = as_recorded(self.session)
+        unit, limit = prepared.operator.unit, colour_limit(prepared)
+        pictures = (
+            rendered(path, prepared.mesh, panel, unit, limit) for panel in self._panels(prepared)
+        )
+        write = FILMS[path.suffix.lower()]
+        write(path, pictures, 1.0 / self.every, overwrite=self.overwrite)
+
+    def picture(self, path: Path) -> None:
+        """Write a sheet of maps, evenly spread over the session."""
+        prepared = as_recorded(self.session)
+        panels = list(self._panels(prepared))
+        chosen = np.linspace(0, len(panels) - 1, min(len(panels), MOST_PANELS)).round()
+        some = [panels[int(number)] for number in np.unique(chosen)]
+        unit, limit = prepared.operator.unit, colour_limit(prepared)
+        write_picture(path, prepared.mesh, some, unit, limit, overwrite=self.overwrite)
+
+    def touches(self, path: Path) -> None:
+        """Write a table of the recorded touches."""
+        found = self.session.touches()
+        rows = ((t.sequence, t.host_time, t.touches) for t in found)
+        write_touches(path, rows, self.session.skin.surface, overwrite=self.overwrite)
+
+    def _panels(self, prepared: Prepared) -> Iterator[Panel]:
+        first: float | None = None
+        for result in self._images(prepared):
+            first = result.host_time if first is None else first
+            title = f"{result.host_time - first:.1f} s"
+            yield Panel(title, result.image.values, result.touches)
+
+    def _images(self, prepared: Prepared) -> Iterator[Result]:
+        """A result every so often; those before the reference stands are left out."""
+        total = self.session.n_frames
+        due = float("-inf")
+        shown = False
+        for done, result in enumerate(replayed(prepared, self.session)):
+            self.advance(done, max(done + 1, total))
+            if result.ready and not due - self.every <= result.host_time < due:
+                due = result.host_time + self.every
+                shown = True
+                yield result
+        if not shown:
+            raise DataError(
+                "holds too few frames for a reference, so there are no images",
+                where=str(self.session.path),
+            )
+
+
+WRITERS: dict[str, Callable[[Export, Path], None]] = {
+    ".csv": Export.csv,
+    ".parquet": Export.parquet,
+    ".h5": Export.hdf5,
+    ".npz": Export.npz,
+    ".mat": Export.matlab,
+    ".vtu": Export.series,
+    ".pvd": Export.series,
+    ".png": Export.picture,
+    ".gif": Export.film,
+    ".mp4": Export.film,
+}
+"""What writes a file, by the ending of its name."""

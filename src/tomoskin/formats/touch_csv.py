@@ -1,0 +1,65 @@
+"""Touches as a table: one row a touch, SI units."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable
+from pathlib import Path
+
+from tomoskin.core import Touch, written
+from tomoskin.mesh import Plane, Surface
+
+HEADER = (
+    *("frame", "time_s", "id", "x_m", "y_m", "sd_x_m", "sd_y_m"),
+    *("area_m2", "peak", "kind"),
+)
+
+IN_SPACE = ("space_x_m", "space_y_m", "space_z_m")
+"""Further columns where the sheet lies on a surface; x_m and y_m are the sheet's own (u, v)."""
+
+
+def write_touches(
+    path: Path,
+    frames: Iterable[tuple[int, float, tuple[Touch, ...]]],
+    surface: Surface | None = None,
+    *,
+    overwrite: bool = False,
+) -> int:
+    """Write touches of (frame, time, touches); return the number of rows.
+
+    A standard deviation that is not known is an empty field; the kind is :attr:`Touch.said`. On
+    a ``surface`` that is not flat each row ends with the touch's place on it.
+
+    Raises as :func:`written` does.
+    """
+    count = 0
+    on = None if isinstance(surface, Plane) else surface
+    with (
+        written(path, overwrite=overwrite) as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(HEADER + (IN_SPACE if on else ()))
+        for frame, time, touches in frames:
+            for touch in touches:
+                table.writerow(_row(frame, time, touch) + _in_space(touch, on))
+                count += 1
+    return count
+
+
+def _row(frame: int, time: float, touch: Touch) -> tuple[object, ...]:
+    r = touch.reading
+    place = (_number(r.x), _number(r.y), _number(r.sd_x), _number(r.sd_y))
+    return (frame, f"{time:.6f}", touch.id, *place, _number(r.area), _number(r.peak), touch.said)
+
+
+def _in_space(touch: Touch, surface: Surface | None) -> tuple[str, ...]:
+    if surface is None:
+        return ()
+    place = surface.point([[touch.reading.x, touch.reading.y]])[0]
+    return tuple(map(_number, place.tolist()))
+
+
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.6g}"

@@ -1,0 +1,244 @@
+"""From a recording to difference data: rows that are dead, frames that lack some, a reference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.inverse import MOST_LEFT_OUT, Evidence
+from tomoskin.pattern import Pattern
+from tomoskin.pipeline.dead_rows import dead_rows
+from tomoskin.pipeline.prepare import Prepared
+from tomoskin.signal import Consecutive, Recording, Reference, difference, in_phase
+
+REFUSED = 0.3
+DOUBTED = 0.8
+"""Agreement of a recording's reference with the model's voltages (cosine, 1 = proportional):
+below the first the recording is refused as another skin's, below the second it is doubted."""
+
+_MOST_SCALE = 30.0
+"""Plain differences are refused where voltages and model differ in size by more than this."""
+
+_STILL = 1e-9
+"""Idle values within this part of their size of each other are the same but for arithmetic."""
+
+Idle = NDArray[Any] | Literal["previous"] | None
+"""(n_idle, n_meas) frames of the untouched skin; "previous" for dynamic imaging, each frame
+against the one before it; None where the recording holds differences."""
+
+
+@dataclass(frozen=True, eq=False)
+class Changes:
+    """Difference data of a recording.
+
+    Attributes
+    ----------
+    prepared
+        The skin without the rows that are dead, ``n_rows`` of them left; alpha chosen for these.
+    rows_left_out
+        (r,) rows of the skin's pattern that are dead.
+    frames
+        (n,) indices in the recording of the frames that can be used.
+    left_out
+        (k,) indices of those that lack too many rows.
+    values
+        (n, n_rows) in the operator's kind of difference; zero where missing.
+    missing
+        (n, n_rows) bool: values that are not finite in the frame, or in the one it is held against.
+    places
+        (n, 2) m, where the skin was touched, or None.
+    reference
+        Mean and noise of the idle frames; None where there are none.
+    agreement
+        Cosine between the reference and the model's voltages, NaN where there is no reference.
+    """
+
+    prepared: Prepared
+    rows_left_out: IntArray
+    frames: IntArray
+    left_out: IntArray
+    values: FloatArray
+    missing: NDArray[np.bool_]
+    places: FloatArray | None
+    reference: Reference | None
+    agreement: float
+
+    def evidence(self) -> Evidence:
+        """What the recording tells a rule that chooses alpha; frames only where they are whole."""
+        noise, whole = None, ~self.missing.any(axis=1)
+        if self.reference is not None and self.reference.noise_is_known:
+            noise = self.prepared.difference_noise(self.reference)
+        return Evidence(
+            noise=noise,
+            frames=self.values[whole],
+            places=None if self.places is None else self.places[whole],
+            locate=self.prepared.places,
+        )
+
+
+def changes_of(prepared: Prepared, recording: Recording, idle: Idle) -> Changes:
+    """Difference data of every frame of ``recording``, whose rows are in the pattern's order.
+
+    Raises
+    ------
+    DataError
+        When the rows are not in the pattern's order, the reference does not look like this
+        skin, or too few frames or rows are left.
+    """
+    pattern = prepared.pattern
+    prepared.operator.accept(
+        Pattern.from_tables(recording.drive, recording.measure, pattern.n_electrodes)
+    )
+    rest = None if isinstance(idle, str) else idle
+    dead = dead_rows(recording.voltages, rest, pattern, recording.source)
+    left = _Left.of(prepared.without(dead), recording, dead)
+    if idle is None:
+        return left.changes(left.missing, _given(left, recording, dead))
+    if isinstance(idle, str):
+        return _against_the_one_before(left)
+    quiet = _complete(np.delete(idle, dead, axis=1), recording.source)
+    values, quiet, agreement = _in_volts(left, quiet)
+    reference = Reference.of(quiet, _rounding(left.prepared, quiet))
+    dv = difference(values, reference.mean, left.prepared.operator.difference)
+    return left.changes(left.missing, dv, reference, agreement)
+
+
+@dataclass(frozen=True, eq=False)
+class _Left:
+    """What is left of a recording: rows that live, ``values`` of frames that hold enough."""
+
+    prepared: Prepared
+    recording: Recording
+    dead: IntArray
+    frames: IntArray
+    left_out: IntArray
+    values: NDArray[Any]
+    missing: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, prepared: Prepared, recording: Recording, dead: IntArray) -> _Left:
+        living = np.delete(recording.voltages, dead, axis=1)
+        missing = ~np.isfinite(living)
+        most = MOST_LEFT_OUT * recording.voltages.shape[1] - len(dead)
+        enough = missing.sum(axis=1) <= most
+        if not enough.any():
+            raise DataError("no frame has finite values in enough rows", where=recording.source)
+        frames, left_out = np.flatnonzero(enough), np.flatnonzero(~enough)
+        return cls(prepared, recording, dead, frames, left_out, living[enough], missing[enough])
+
+    def changes(
+        self,
+        missing: NDArray[np.bool_],
+        dv: FloatArray,
+        reference: Reference | None = None,
+        agreement: float = np.nan,
+    ) -> Changes:
+        """These changes of the last of the frames."""
+        frames, labels = self.frames[len(self.frames) - len(dv) :], self.recording.labels
+        return Changes(
+            prepared=self.prepared,
+            rows_left_out=self.dead,
+            frames=frames,
+            left_out=self.left_out,
+            values=np.where(missing, 0.0, dv),
+            missing=missing,
+            places=None if labels is None else labels[frames],
+            reference=reference,
+            agreement=agreement,
+        )
+
+
+def _complete(idle: NDArray[Any], source: str) -> NDArray[Any]:
+    """Idle frames with a value in every row: a mean of others would hang on which they are."""
+    complete = np.isfinite(idle).all(axis=1)
+    if not complete.any():
+        raise DataError(
+            "no untouched frame has finite values in every row that the others have",
+            where=source,
+            hint="name other frames with --reference",
+        )
+    return np.asarray(idle[complete])
+
+
+def _rounding(prepared: Prepared, quiet: FloatArray) -> FloatArray:
+    """(n_meas,) least noise: where idle frames are all the same, what the read-out would round.
+
+    What recorded a row that wavers is not known, and may be finer than the skin's read-out.
+    """
+    model, mean = prepared.operator.reference, quiet.mean(axis=0)
+    scale = float(np.linalg.norm(mean) / np.linalg.norm(model))
+    still = np.ptp(quiet, axis=0) <= _STILL * np.linalg.norm(mean)
+    return np.where(still, scale * prepared.readout.rounding, 0.0)
+
+
+def _in_volts(left: _Left, quiet: NDArray[Any]) -> tuple[FloatArray, FloatArray, float]:
+    """Values and idle frames as a real model has them, and how well they agree with it."""
+    operator, source = left.prepared.operator, left.recording.source
+    model, mean = operator.reference, quiet.mean(axis=0)
+    values, _ = in_phase(left.values, mean, model)
+    quiet, _ = in_phase(quiet, mean, model)
+    agreement = _agreement(quiet.mean(axis=0), model, source)
+    if operator.difference == "plain":
+        _check_scale(quiet.mean(axis=0), model, source)
+    return values, quiet, agreement
+
+
+def _against_the_one_before(left: _Left) -> Changes:
+    """Dynamic imaging; what a frame or the one before it lacks is missing."""
+    base = left.values.mean(axis=0, where=~left.missing)
+    values, mean, agreement = _in_volts(left, base[None])
+    steps = Consecutive(left.prepared.operator.difference)
+    found = [steps.push(frame) for frame in np.where(left.missing, mean, values)]
+    if len(found) < 2:
+        raise DataError("expected two frames at least", where=left.recording.source)
+    missing = left.missing[1:] | left.missing[:-1]
+    return left.changes(missing, np.array(found[1:]), None, agreement)
+
+
+def _given(left: _Left, recording: Recording, dead: IntArray) -> FloatArray:
+    """Differences of a file in the operator's kind of difference."""
+    operator, dv = left.prepared.operator, left.values
+    if np.iscomplexobj(dv):
+        raise DataError(
+            "expected real dv, got complex", where=recording.source, hint="give voltages instead"
+        )
+    if operator.difference == "plain":
+        return dv
+    reference = operator.reference
+    if recording.reference is not None:
+        reference = np.delete(recording.reference.real, dead)
+    return difference(dv + reference, reference, operator.difference)
+
+
+def _agreement(reference: FloatArray, model: FloatArray, source: str) -> float:
+    length = float(np.linalg.norm(reference) * np.linalg.norm(model))
+    cosine = float(reference @ model) / length if length else 0.0
+    if cosine <= -REFUSED:
+        raise DataError(
+            f"the voltages are those of this skin with the sign reversed (agreement {cosine:.2f})",
+            where=source,
+            hint="exchange source and sink, or plus and minus, in its tables",
+        )
+    if cosine < REFUSED:
+        raise DataError(
+            f"does not look like this skin: its reference agrees with the model by {cosine:.2f}, "
+            "expected close to 1",
+            where=source,
+            hint="check --skin, the order of the electrodes and --reference",
+        )
+    return cosine
+
+
+def _check_scale(reference: FloatArray, model: FloatArray, source: str) -> None:
+    scale = float(np.linalg.norm(reference) / np.linalg.norm(model))
+    if not 1 / _MOST_SCALE < scale < _MOST_SCALE:
+        raise DataError(
+            f"its voltages are {scale:.3g} times those of the skin's model",
+            where=source,
+            hint="give volts, correct the skin's current and sheet resistance, "
+            'or set difference = "normalised" in its [inverse]',
+        )

@@ -1,0 +1,125 @@
+"""Difference data → image and its noise floor: the operator alone, or a filter over frames."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from tomoskin.core import FloatArray, Image
+from tomoskin.inverse import Modes, Temporal
+from tomoskin.pipeline.prepare import Prepared
+from tomoskin.signal import Blind, Reference
+from tomoskin.touch import NoiseFloor
+
+Pictured = tuple[Image, NoiseFloor | None]
+"""An image, and its noise floor where the noise is known."""
+
+_SETTLED = 3.0
+"""Time constants after which the filter's noise is the one of all time."""
+
+_GAP = 2.5
+"""Frames that are further apart than so many intervals start the filter's noise anew."""
+
+
+class Alone:
+    """Each image from its own frame."""
+
+    def __init__(
+        self, prepared: Prepared, reference: Reference | None, blind: Blind | None = None
+    ) -> None:
+        self._operator = prepared.operator
+        self._floor = None if reference is None else prepared.noise_floor(reference, blind)
+
+    def renew(self, prepared: Prepared, reference: Reference, blind: Blind) -> None:
+        """Another operator or noise, or other directions of the data that say nothing."""
+        self._operator = prepared.operator
+        self._floor = prepared.noise_floor(reference, blind)
+
+    def push(self, dv: FloatArray, time: float) -> Pictured:
+        """Image of ``dv`` (n_meas,), measured at ``time`` s. Raises DataError for other data."""
+        del time
+        return self._operator.quick(dv), self._floor
+
+
+class Filtered:
+    """Images that rest on the frames before them too; see :class:`Temporal`.
+
+    Times may have gaps: the filter forgets as much as has passed. Where they do not go on, as
+    when a board starts again, it begins anew.
+
+    Parameters
+    ----------
+    interval
+        Of the frames, s, as a rule; NaN where it is not known.
+    """
+
+    def __init__(
+        self,
+        prepared: Prepared,
+        modes: Modes,
+        reference: Reference | None,
+        interval: float,
+        blind: Blind | None = None,
+    ) -> None:
+        self._temporal = Temporal(modes, prepared.skin.inverse.time_constant)
+        self._interval = interval
+        self._settled = np.inf
+        self._noise: FloatArray | None = None
+        self._alone: NoiseFloor | None = None
+        if reference is not None:
+            self.renew(prepared, reference, blind)
+
+    def renew(self, prepared: Prepared, reference: Reference, blind: Blind | None) -> None:
+        """As :meth:`Alone.renew`, but for the operator: the modes stay."""
+        if not reference.noise_is_known:
+            return
+        noise = prepared.difference_noise(reference)
+        self._noise = noise if blind is None else blind.seen_by(np.eye(len(noise))) * noise
+        self._alone = prepared.noise_floor(reference, blind)
+        for name in ("_steady", "_settling"):
+            self.__dict__.pop(name, None)
+
+    def push(self, dv: FloatArray, time: float) -> Pictured:
+        """As :meth:`Alone.push`."""
+        last = self._temporal.belief
+        if last is not None and not time > last.time:
+            self._temporal.reset()
+            last = None
+        if last is None or time - last.time > _GAP * self._interval:
+            self._settled = time + _SETTLED * self._temporal.time_constant
+        return self._temporal.push(dv, time), self._floor(time)
+
+    def _floor(self, time: float) -> NoiseFloor | None:
+        """The filter's own; until that holds, no less than that of a single frame."""
+        if self._alone is None or self._steady is None:
+            return self._alone
+        if time >= self._settled:
+            return self._steady
+        return self._settling
+
+    @cached_property
+    def _steady(self) -> NoiseFloor | None:
+        if self._noise is None or not self._interval > 0:
+            return None
+        spread = self._temporal.spread(self._noise, self._interval)
+        return NoiseFloor.of(spread, self._temporal.modes.operator.model.mesh.identity)
+
+    @cached_property
+    def _settling(self) -> NoiseFloor | None:
+        if self._alone is None or self._steady is None:
+            return self._alone
+        return replace(self._alone, sd=np.maximum(self._alone.sd, self._steady.sd))
+
+
+def imaging(
+    prepared: Prepared, reference: Reference | None, interval: float, blind: Blind | None = None
+) -> Alone | Filtered:
+    """What makes the images of ``prepared``: filtered where its skin has a time constant.
+
+    ``blind``: what the data do not tell, for the noise floor; the data come without it.
+    """
+    if prepared.modes is None:
+        return Alone(prepared, reference, blind)
+    return Filtered(prepared, prepared.modes, reference, interval, blind)

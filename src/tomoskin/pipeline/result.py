@@ -1,0 +1,98 @@
+"""What the pipeline hands to its readers: one frame, all the way to touches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tomoskin.calibration import BendReading, StateReading
+from tomoskin.core import FloatArray, Image, Touch
+from tomoskin.signal import BaselineState, Health
+from tomoskin.touch import TouchEvent
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Result:
+    """One frame from voltages to touches.
+
+    Attributes
+    ----------
+    sequence, host_time
+        As in the frame that it was made from.
+    ready
+        Whether a reference stands; until then the image is zero and there are no touches.
+    pictured
+        Whether enough rows were usable; where not, the image is zero and there are no touches.
+    image
+        Change of conductivity against the reference.
+    voltages, reference
+        (n_meas,) V; where no reference stands yet, that of the model.
+    touches
+        Tracked touches.
+    left_out
+        Number of rows that were at a rail or not finite and were left out of the picture.
+    events
+        What happened to the touches in this frame.
+    health, baseline
+        Of the electrodes, and of the reference that the frame was held against; None until
+        that stands.
+    bend
+        How the sheet is bent; None where its bends were not learnt.
+    state
+        Which of the states that were learnt it shows; None where none were.
+    """
+
+    sequence: int
+    host_time: float
+    ready: bool
+    pictured: bool
+    image: Image
+    voltages: FloatArray
+    reference: FloatArray
+    touches: tuple[Touch, ...]
+    left_out: int
+    events: tuple[TouchEvent, ...] = ()
+    health: Health | None = None
+    baseline: BaselineState | None = None
+    bend: BendReading | None = None
+    state: StateReading | None = None
+
+    @property
+    def problem(self) -> str | None:
+        """What is wrong with the picture, in a sentence, or None."""
+        if self.health is not None and self.health.sick:
+            return self._sick(self.health)
+        if not self.left_out:
+            return self.baseline.stale if self.baseline else None
+        rows = f"{self.left_out} of {len(self.voltages)} rows"
+        if not self.pictured:
+            return (
+                f"{rows} are at a rail of the converter or without a reference: no picture is "
+                "shown; look at the electrodes and the gain"
+            )
+        return (
+            f"{rows} are at a rail of the converter or without a reference, and the picture is "
+            "made without them"
+        )
+
+    def _sick(self, health: Health) -> str:
+        """Which electrodes, why, and what becomes of the picture."""
+        if not self.pictured:
+            return f"{health.text}; too little is left for a picture: look at the electrodes"
+        return f"{health.text}; the picture is made without {self.left_out} rows"
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceState:
+    """How far the reference is: frames taken of those needed, when it was done, its noise in V,
+    and what has become of it since."""
+
+    frames: int
+    needed: int
+    since: float | None = None
+    noise: float | None = None
+    baseline: BaselineState | None = None
+
+    @property
+    def ready(self) -> bool:
+        """Whether it stands."""
+        return self.since is not None

@@ -1,0 +1,152 @@
+"""What a session file holds, in numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tomoskin.recording import channels
+from tomoskin.recording.clock import ClockFit, ClockFitter
+from tomoskin.recording.container import SEEK_TABLE
+from tomoskin.recording.layout import Mark, MarkedFrame
+from tomoskin.recording.session_reader import SessionReader
+from tomoskin.recording.writer import SKIN_FILE
+
+Advance = Callable[[float, float], None]
+"""Told how much of how much is done."""
+
+_OWN = frozenset({SKIN_FILE, SEEK_TABLE})
+_OFTEN = 1000
+_MODULUS = 2**32
+
+
+@dataclass(frozen=True)
+class SessionInfo:
+    """A session at a glance.
+
+    ``frames`` and those of them that were ``held`` or ``skipped``; ``lost`` frames missing in the
+    sequence, in ``gaps`` places; ``dropped`` by the device itself; ``rate`` frames/s, NaN below
+    two; ``longest_pause`` s between two frames; ``touches`` number of different ones;
+    ``attached`` names of the files inside beside the skin, as calibrations that were on; ``torn``
+    what is missing at the end, or "".
+    """
+
+    path: str
+    size: int
+    torn: str
+    begun: float | None
+    duration: float
+    skin: str
+    skin_identity: str
+    electrodes: int
+    rows: int
+    frames: int
+    rate: float
+    longest_pause: float
+    held: int
+    skipped: int
+    lost: int
+    gaps: int
+    dropped: int
+    touches: int
+    presses: int
+    events: dict[str, int]
+    notes: int
+    device: dict[str, Any]
+    clock: ClockFit | None
+    messages: dict[str, int]
+    attached: tuple[str, ...] = ()
+
+
+@dataclass
+class _Frames:
+    count: int = 0
+    held: int = 0
+    skipped: int = 0
+    lost: int = 0
+    gaps: int = 0
+    dropped: int = 0
+    longest: float = 0.0
+    first: float = 0.0
+    last: float = 0.0
+    _sequence: int = 0
+    _drops: int = 0
+
+    def add(self, item: MarkedFrame) -> None:
+        """Take the next frame; those from before the recording do not count."""
+        frame, mark = item.frame, item.mark
+        if mark & Mark.EARLIER:
+            return
+        self.held += bool(mark & Mark.HELD)
+        self.skipped += bool(mark & Mark.SKIPPED)
+        missing = (frame.sequence - self._sequence - 1) % _MODULUS
+        if self.count and not mark & Mark.OPENED and 0 < missing < _MODULUS // 2:
+            self.lost, self.gaps = self.lost + missing, self.gaps + 1
+        if self.count:
+            self.longest = max(self.longest, frame.host_time - self.last)
+        else:
+            self.first = frame.host_time
+        begun_anew = frame.drops < self._drops
+        self.dropped += frame.drops if begun_anew else frame.drops - self._drops
+        self._sequence, self._drops, self.last = frame.sequence, frame.drops, frame.host_time
+        self.count += 1
+
+    @property
+    def rate(self) -> float:
+        """Frames per second from the first to the last."""
+        span = self.last - self.first
+        return (self.count - 1) / span if span > 0 else float("nan")
+
+
+def session_info(path: Path, advance: Advance = lambda _done, _total: None) -> SessionInfo:
+    """Read a whole session and say what is in it.
+
+    Raises
+    ------
+    DataError
+        When the file cannot be read, is no session, or is damaged.
+    """
+    size = path.stat().st_size if path.is_file() else 0
+    frames, clock = _Frames(), ClockFitter()
+    with SessionReader(path) as session:
+        total = session.totals.counts.get(channels.FRAMES, 0) if session.totals else 0
+        for number, item in enumerate(session.frames()):
+            frames.add(item)
+            clock.add(item.frame.ticks, item.frame.host_time)
+            if number % _OFTEN == 0:
+                advance(number, max(total, number + 1))
+        seen = (touch for item in session.touches() for touch in item.touches)
+        touches = {number for touch in seen for number in (touch.id, *touch.merged)}
+        events: dict[str, int] = {}
+        for event in session.events():
+            events[event.kind] = events.get(event.kind, 0) + 1
+        counts = session.counts()
+        return SessionInfo(
+            path=str(path),
+            size=size,
+            torn=session.torn,
+            begun=session.epoch + frames.first if session.epoch else None,
+            duration=frames.last - frames.first,
+            skin=session.skin.name,
+            skin_identity=session.skin.identity,
+            electrodes=session.skin.n_electrodes,
+            rows=session.skin.pattern().n_meas,
+            frames=frames.count,
+            rate=frames.rate,
+            longest_pause=frames.longest,
+            held=frames.held,
+            skipped=frames.skipped,
+            lost=frames.lost,
+            gaps=frames.gaps,
+            dropped=frames.dropped,
+            touches=len(touches),
+            presses=sum(1 for item in session.truth() if item.presses),
+            events=events,
+            notes=sum(1 for _ in session.notes()),
+            device=session.device(),
+            clock=clock.fit,
+            messages=counts,
+            attached=tuple(name for name in session.attachments() if name not in _OWN),
+        )

@@ -1,0 +1,67 @@
+"""A recorded session through the pipeline again, without a clock: the same touches to the bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tomoskin.calibration import (
+    BENDS_FILE,
+    CALIBRATION_FILE,
+    STATES_FILE,
+    unpack_bends,
+    unpack_calibration,
+    unpack_states,
+)
+from tomoskin.core import DataError, Frame
+from tomoskin.pipeline import Pipeline, Prepared, Result, prepare
+from tomoskin.recording.layout import Mark
+from tomoskin.recording.session_reader import SessionReader
+
+
+def as_recorded(session: SessionReader) -> Prepared:
+    """The session's own skin, with the calibrations that were on. Raises DataError."""
+    prepared, held = prepare(session.skin), session.attachments()
+    if (data := held.get(CALIBRATION_FILE)) is not None:
+        touch = unpack_calibration(data, f"{session.path}, {CALIBRATION_FILE}")
+        prepared = prepared.located_by(touch.locator)
+    if (data := held.get(BENDS_FILE)) is not None:
+        bends = unpack_bends(data, f"{session.path}, {BENDS_FILE}")
+        bends.check(prepared.pattern)
+        prepared = prepared.that_bends(bends.model)
+    if (data := held.get(STATES_FILE)) is not None:
+        prepared = prepared.that_tells(unpack_states(data, f"{session.path}, {STATES_FILE}"))
+    return prepared
+
+
+def advance(pipeline: Pipeline, frame: Frame, mark: Mark) -> Result | None:
+    """Give the pipeline one frame as its ``mark`` says; None where there is no picture of it.
+
+    Raises
+    ------
+    DataError
+        When the frame has another number of samples than the scan.
+    """
+    if mark & Mark.SKIPPED:
+        return None
+    if mark & Mark.REFERENCE:
+        pipeline.take_reference()
+    pipeline.paused = bool(mark & Mark.HELD)
+    return pipeline.push(frame)
+
+
+def replayed(prepared: Prepared, session: SessionReader) -> Iterator[Result]:
+    """What the pipeline made of every frame of ``session``, and makes of it again.
+
+    ``prepared`` is that of the session's own skin for the same touches, or of another with the
+    same scan. Frames that the pipeline refused are refused again.
+    """
+    pipeline = Pipeline(prepared)
+    pipeline.tick_rate = session.tick_rate
+    pipeline.number_after(session.touches_before)
+    for item in session.frames():
+        try:
+            result = advance(pipeline, item.frame, item.mark)
+        except DataError:
+            continue
+        if result is not None and not item.mark & Mark.EARLIER:
+            yield result

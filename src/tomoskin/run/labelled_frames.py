@@ -1,0 +1,159 @@
+"""Labelled frames by the thousand: shards made by many processes or machines, then written."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from tomoskin.core import Output, SourceError, check_outputs
+from tomoskin.formats import is_done, join_shards, shard_path, write_whole
+from tomoskin.twin import SetPlan, make_shard
+
+_PATIENCE = 10.0
+"""Seconds for a scheduler to answer."""
+
+Made = Iterator[tuple[int, dict[str, Any]]]
+"""Shards with their numbers, in whatever order they are finished."""
+
+Workers = Callable[[SetPlan, Sequence[int]], Made]
+"""What makes shards of a plan."""
+
+
+@dataclass(frozen=True)
+class SetMade:
+    """What became of a set: shards that were there already, and made now; the files."""
+
+    found: int
+    made: int
+    files: tuple[Path, ...]
+
+
+def make_set(
+    plan: SetPlan,
+    out: Path,
+    workers: Workers,
+    advance: Callable[[int, int], None],
+    *,
+    overwrite: bool = False,
+) -> SetMade:
+    """Make the shards of ``plan`` that are missing, and write them.
+
+    Parameters
+    ----------
+    out
+        A folder of shards; or a name that ends in .npz for one file: its shards then stand in a
+        folder beside it until all are there.
+    advance
+        Called with the frames that are done and all of them.
+    overwrite
+        The file, or files of other sets in the folder, may be written over.
+
+    Raises
+    ------
+    OutputError
+        Before anything is made: when the file is there, or the folder holds another set.
+    DataError
+        When a file cannot be written.
+    ScriptError
+        When there is no room on the skin for what is to be drawn.
+    """
+    single = out.suffix.lower() == ".npz"
+    if single:
+        check_outputs([Output(out, makes_folders=True)], overwrite=overwrite)
+    folder = out.with_name(f"{out.name}.parts") if single else out
+    paths = [shard_path(folder, shard) for shard in range(plan.n_shards)]
+    missing = [
+        shard
+        for shard, path in enumerate(paths)
+        if not is_done(path, shard_identity(plan, shard), overwrite=overwrite)
+    ]
+    done = plan.n_frames - sum(map(plan.size, missing))
+    advance(done, plan.n_frames)
+    for shard, arrays in workers(plan, missing):
+        write_whole(paths[shard], arrays, overwrite=True)  # one with fewer frames, if any
+        done += plan.size(shard)
+        advance(done, plan.n_frames)
+    if single:
+        join_shards(paths, out, overwrite=overwrite)
+        for path in paths:
+            path.unlink()
+        folder.rmdir()
+    files = (out,) if single else tuple(paths)
+    return SetMade(plan.n_shards - len(missing), len(missing), files)
+
+
+def shard_identity(plan: SetPlan, shard: int) -> str:
+    """What a shard's file says of itself."""
+    return f"{plan.identity} {shard} {plan.size(shard)}"
+
+
+def in_this_process(plan: SetPlan, shards: Sequence[int]) -> Made:
+    """One shard after the other."""
+    for shard in shards:
+        yield shard, make_shard(plan, shard)
+
+
+def in_processes(n: int) -> Workers:
+    """Workers that are ``n`` processes of this machine.
+
+    They import the twin alone. Ctrl-C reaches every process of a terminal: they leave it to this
+    one, which ends them.
+    """
+    calm = (signal.SIGINT, signal.SIG_IGN)
+
+    def run(plan: SetPlan, shards: Sequence[int]) -> Made:
+        count = min(n, len(shards) or 1)
+        with ProcessPoolExecutor(count, get_context("spawn"), signal.signal, calm) as pool:
+            futures = {pool.submit(make_shard, plan, shard): shard for shard in shards}
+            with _cancelled(list(futures)):
+                for future in as_completed(futures):
+                    yield futures[future], future.result()
+
+    return run
+
+
+def on_cluster(address: str) -> Workers:
+    """Workers of a Dask cluster whose scheduler is at ``address``; they need tomoskin too."""
+
+    def run(plan: SetPlan, shards: Sequence[int]) -> Made:
+        try:
+            from dask import distributed  # noqa: PLC0415
+        except ImportError as error:
+            raise SourceError(
+                "needs Dask's distributed", where=address, hint="pip install 'tomoskin[cluster]'"
+            ) from error
+        try:
+            client = distributed.Client(address, timeout=_PATIENCE)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise SourceError(f"no scheduler answers: {error}", where=address) from error
+        with client:
+            futures = client.map(make_shard, [plan] * len(shards), list(shards), pure=False)
+            number = dict(zip((future.key for future in futures), shards, strict=True))
+            for future, arrays in distributed.as_completed(futures, with_results=True):
+                yield number[future.key], arrays
+
+    return run
+
+
+def processors() -> int:
+    """Processors that this process may use."""
+    with contextlib.suppress(AttributeError):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@contextlib.contextmanager
+def _cancelled(futures: list[Future[dict[str, Any]]]) -> Iterator[None]:
+    """Shards that nobody waits for any more are not begun."""
+    try:
+        yield
+    finally:
+        for future in futures:
+            future.cancel()

@@ -1,0 +1,69 @@
+"""How a page's bends and stretches deform the twin's sheet, and how a recording tells them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
+
+from tomoskin.core import WireError
+from tomoskin.mesh import Arm, Hinge, Plane, Surface
+from tomoskin.run.twin_requests import BendRequest, SetPose
+from tomoskin.twin import Bent, Pose, Stretched
+
+
+@runtime_checkable
+class Bendable(Protocol):
+    """A source whose sheet can be bent and stretched, as the twin's can."""
+
+    def set_pose(self, pose: Pose) -> None:
+        """How it lies from now on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Posed:
+    """A deformed sheet: its ``pose``, what was ``asked``, and the truth for a recording."""
+
+    pose: Pose = ()
+    asked: SetPose = field(default_factory=SetPose)
+    told: tuple[dict[str, Any], ...] = ()
+
+
+def way_to_bend(rest: Surface) -> str | None:
+    """How a sheet that lies on ``rest`` can be bent: "hinge", "joint", or not at all."""
+    if isinstance(rest, Plane):
+        return "hinge"
+    return "joint" if isinstance(rest, Arm) else None
+
+
+def posed(asked: SetPose, rest: Surface) -> Posed:
+    """The deformation of a sheet that lies on ``rest``.
+
+    Raises
+    ------
+    WireError
+        Where such a sheet cannot be bent.
+    GeometryError
+        Where it cannot take that shape.
+    """
+    pose: Pose = ()
+    told: list[dict[str, Any]] = []
+    if (bend := asked.bend) is not None:
+        kind = way_to_bend(rest)
+        pose += (Bent(_surface(bend, rest)),)
+        axis = bend.axis if kind == "hinge" else 0.0
+        told.append({"kind": kind, "angle": bend.angle, "axis": axis})
+    if (stretch := asked.stretch) is not None:
+        pose += (Stretched(stretch.along, stretch.across, stretch.axis),)
+        told.append({"kind": "stretch", "strain": stretch.along, "axis": stretch.axis})
+    return Posed(pose, asked, tuple(told))
+
+
+def _surface(bend: BendRequest, rest: Surface) -> Surface:
+    if isinstance(rest, Plane):
+        return Hinge(bend.angle, bend.length, bend.axis, bend.offset)
+    if isinstance(rest, Arm):
+        return Arm(rest.radius, rest.angle + bend.angle, rest.joint)
+    raise WireError(
+        "only a sheet that lies flat or on a limb with a joint can be bent from here; this one can "
+        "be stretched"
+    )

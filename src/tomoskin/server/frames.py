@@ -1,0 +1,144 @@
+"""The binary message: one result for one page, little-endian, every section 4-byte aligned.
+
+====================  ======================================================================
+header, 40 bytes      ``TSK1``, sequence u32, host_time f64, n_cells u32, n_meas u32,
+                      n_touches u16, n_truth u16, flags u32, latency_us u32, reserved u32
+image                 f32 [n_cells], change of conductivity in the scene's unit
+voltages, reference   f32 [n_meas] each, V
+touches, 40 bytes     id u32, kind u8 (0 decrease, 1 increase), apart u8 (0 yes, 1 may be
+each                  several, n > 1: n that have merged), 2 pad, x, y, sd_x, sd_y (NaN unknown),
+                      area, peak, since (s ago), cov_xy (m²) f32
+truth, 16 bytes each  x, y (m), force (N), radius (m) f32: the presses on the twin
+bend, 16 bytes        with flag bit 3 only: angle, its deviation, axis (rad) f32, state u32 (a
+                      place in :data:`BEND_STATES`)
+labels                u8 [n_cells], 0 none, k = cells of the k-th touch; padded to 4 bytes
+====================  ======================================================================
+
+Flags: bit 0 the reference stands; bit 1 too many rows are unusable, there is no picture;
+bit 2 some rows are left out of the picture; bit 3 bends of this skin were learnt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tomoskin.calibration import BendReading
+from tomoskin.core import Touch
+from tomoskin.pipeline import Result
+from tomoskin.twin import Contact
+
+READY, NO_PICTURE, ROWS_LEFT_OUT, BEND = 1, 2, 4, 8
+"""Bits of the header's flags."""
+
+BEND_STATES = ("idle", "bend", "touch", "bend and touch", "unknown")
+"""States of a :class:`~tomoskin.calibration.BendReading`, as they are numbered here."""
+
+_HEADER = np.dtype(
+    [
+        ("magic", "S4"),
+        ("sequence", "<u4"),
+        ("host_time", "<f8"),
+        ("n_cells", "<u4"),
+        ("n_meas", "<u4"),
+        ("n_touches", "<u2"),
+        ("n_truth", "<u2"),
+        ("flags", "<u4"),
+        ("latency_us", "<u4"),
+        ("reserved", "<u4"),
+    ]
+)
+_BEND = np.dtype([("angle", "<f4"), ("sd", "<f4"), ("axis", "<f4"), ("state", "<u4")])
+_MEASURES = ("x", "y", "sd_x", "sd_y", "area", "peak", "since", "cov_xy")
+_TOUCH = np.dtype(
+    [
+        ("id", "<u4"),
+        ("kind", "u1"),
+        ("apart", "u1"),
+        ("pad", "u1", 2),
+        *((name, "<f4") for name in _MEASURES),
+    ]
+)
+_MOST = 255
+"""Labels are bytes: more touches than that are not sent."""
+
+
+def encode_result(result: Result, truth: Sequence[Contact], latency: float) -> bytes:
+    """Message of one result.
+
+    Parameters
+    ----------
+    result
+        What the pipeline made of the frame.
+    truth
+        The twin's own presses when the frame was read; empty for a real skin.
+    latency
+        Seconds from the frame's last byte to its touches.
+    """
+    touches = result.touches[:_MOST]
+    return b"".join(
+        [
+            _header(result, len(touches), len(truth), latency),
+            result.image.values.astype("<f4").tobytes(),
+            result.voltages.astype("<f4").tobytes(),
+            result.reference.astype("<f4").tobytes(),
+            _touches(touches, result.host_time),
+            np.array([(p.x, p.y, p.force, p.radius) for p in truth], "<f4").tobytes(),
+            _bend(result.bend),
+            _labels(touches, len(result.image.values)),
+        ]
+    )
+
+
+def _header(result: Result, n_touches: int, n_truth: int, latency: float) -> bytes:
+    flags = READY * result.ready | NO_PICTURE * (not result.pictured)
+    flags |= ROWS_LEFT_OUT * (result.left_out > 0) | BEND * (result.bend is not None)
+    values = (
+        b"TSK1",
+        result.sequence % 2**32,
+        result.host_time,
+        len(result.image.values),
+        len(result.voltages),
+        n_touches,
+        n_truth,
+        flags,
+        min(max(round(latency * 1e6), 0), 2**32 - 1),
+        0,
+    )
+    return np.array(values, _HEADER).tobytes()
+
+
+def _touches(touches: Sequence[Touch], now: float) -> bytes:
+    rows = [
+        (
+            t.id % 2**32,
+            t.kind == "increase",
+            min(len(t.merged), _MOST) or t.reading.close,
+            (0, 0),
+            t.reading.x,
+            t.reading.y,
+            t.reading.sd_x,
+            t.reading.sd_y,
+            t.reading.area,
+            t.reading.peak,
+            now - t.since,
+            t.reading.cov_xy,
+        )
+        for t in touches
+    ]
+    return np.array(rows, _TOUCH).tobytes()
+
+
+def _bend(bend: BendReading | None) -> bytes:
+    if bend is None:
+        return b""
+    row = (bend.angle, bend.sd, bend.axis, BEND_STATES.index(bend.state))
+    return np.array(row, _BEND).tobytes()
+
+
+def _labels(touches: Sequence[Touch], n_cells: int) -> bytes:
+    labels = np.zeros(n_cells + -n_cells % 4, np.uint8)
+    for number, touch in enumerate(touches, 1):
+        labels[touch.reading.cells] = number
+    return labels.tobytes()

@@ -1,0 +1,239 @@
+"""The desk of the flows in which someone presses where the dot is."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from tomoskin.calibration import (
+    Calibration,
+    Locator,
+    WiringAnswer,
+    read_calibration,
+    write_calibration,
+)
+from tomoskin.core import FloatArray, TomoskinError, WireError, write_text
+from tomoskin.pipeline import Prepared, prepare
+from tomoskin.server.flow_requests import (
+    BeginFlow,
+    EndFlow,
+    FlowKind,
+    KeepFlow,
+    UndoPress,
+    UseCalibration,
+)
+from tomoskin.server.folder import Folder
+from tomoskin.server.hub import Hub, Listener
+from tomoskin.server.lessons import Dots, Lesson, Thought, touch_thought, wiring_thought
+from tomoskin.server.taking import Taker
+from tomoskin.server.task import run_errand, text_of
+
+_LEAST = 0.5
+"""Noise is never taken for less than this part of what the read-out predicts."""
+
+
+class _Flow:
+    """One flow from its first dot to its end; the taker belongs to the runner's thread."""
+
+    def __init__(self, kind: FlowKind, prepared: Prepared) -> None:
+        self.kind, self.prepared = kind, prepared
+        self.taker = Taker(_LEAST * prepared.readout.noise)
+        self.dots = Dots(prepared)
+        self.lessons: list[Lesson] = []
+        self.thought: Thought | None = None
+        self.trouble = ""
+        self.thinking = False
+        self.dot = self.dots.next((), None)
+
+    def think(self, lessons: Sequence[Lesson]) -> Thought:
+        """What these presses tell; in a thread."""
+        if self.kind == "touch":
+            return touch_thought(self.prepared, lessons)
+        return wiring_thought(self.prepared, lessons, self.taker.untouched)
+
+
+class GuideDesk:
+    """Shows a dot, takes the press when it stands still, and says what the presses tell.
+
+    One flow for all pages: whoever stands at the skin presses.
+    """
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._folder = Folder(hub.folder)
+        self._flow: _Flow | None = None
+        self._using: str | None = None  # the calibration's file; "": its name is not known
+        self._used_on = ""
+        self._watching = contextlib.ExitStack()
+
+    @property
+    def handlers(self) -> Mapping[type, Callable[[Listener, Any], None]]:
+        """See :class:`~tomoskin.server.hub.Desk`."""
+        return {
+            BeginFlow: lambda _, request: self._begin(request.kind),
+            UndoPress: lambda _, __: self._undo(),
+            EndFlow: lambda _, __: self._end(),
+            KeepFlow: self._keep,
+            UseCalibration: self._use,
+        }
+
+    def greeting(self) -> Sequence[str]:
+        """Where the flow is."""
+        mesh = self._hub.runner.prepared.mesh
+        if self._flow is not None and self._flow.prepared.mesh.identity != mesh.identity:
+            self._leave()
+        if self._used_on != mesh.identity:
+            self._look_again()
+        return (self._told(),)
+
+    def _begin(self, kind: FlowKind) -> None:
+        if self._hub.runner.replay is not None:
+            raise WireError("nobody can press a recording: go back to live first")
+        self._leave()
+        flow = self._flow = _Flow(kind, self._hub.runner.prepared)
+        loop = asyncio.get_running_loop()
+        self._watching.enter_context(self._hub.runner.watched_by(partial(self._look, flow, loop)))
+        self._tell()
+
+    def _leave(self) -> None:
+        self._watching.close()
+        self._flow = None
+
+    def _end(self) -> None:
+        self._leave()
+        self._tell()
+
+    def _look(self, flow: _Flow, loop: asyncio.AbstractEventLoop) -> None:
+        """A frame has come; in the runner's thread."""
+        newest = self._hub.runner.newest
+        if newest is None:
+            return
+        before = flow.taker.phase
+        dv = flow.taker.push(newest.result.host_time, newest.result.voltages)
+        if dv is not None or flow.taker.phase != before:
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                loop.call_soon_threadsafe(self._moved, flow, dv)
+
+    def _moved(self, flow: _Flow, dv: FloatArray | None) -> None:
+        if flow is not self._flow:
+            return
+        if dv is not None:
+            flow.lessons.append(Lesson(flow.dot, dv))
+            self._turn(flow)
+        self._tell()
+
+    def _undo(self) -> None:
+        flow = self._flow
+        if flow is None or not flow.lessons:
+            raise WireError("there is no press to take back")
+        flow.dot = flow.lessons.pop().place
+        flow.thought = None
+        self._think(flow)
+        self._tell()
+
+    def _turn(self, flow: _Flow) -> None:
+        flow.dot = flow.dots.next(flow.lessons, flow.thought)
+        self._think(flow)
+
+    def _think(self, flow: _Flow) -> None:
+        if not flow.thinking:
+            flow.thinking = True
+            self._hub.keep(self._thinking(flow))
+
+    async def _thinking(self, flow: _Flow) -> None:
+        """Think until nothing newer is to be thought of."""
+        while flow is self._flow:
+            lessons = tuple(flow.lessons)
+            try:
+                flow.thought, flow.trouble = await asyncio.to_thread(flow.think, lessons), ""
+            except TomoskinError as error:
+                flow.thought, flow.trouble = None, str(error)
+            if tuple(flow.lessons) == lessons:
+                break
+        flow.thinking = False
+        if flow is self._flow:
+            self._tell()
+
+    def _keep(self, page: Listener, request: KeepFlow) -> None:
+        flow = self._flow
+        if flow is None:
+            raise WireError("nothing has been pressed")
+        if flow.thinking or flow.thought is None or not flow.thought.ready:
+            raise WireError("the presses do not tell enough yet")
+        answer = flow.thought.answer
+
+        def work() -> str:
+            if isinstance(answer, Locator):
+                return self._calibrated(flow, answer, request.name)
+            assert isinstance(answer, WiringAnswer)
+            return self._wired(flow, answer, request.name)
+
+        def done(name: str) -> None:
+            if flow.kind == "touch":
+                self._using = name
+            self._leave()
+            self._hub.runner.say("kept", f"saved as {name} and in use from now on")
+            if flow.kind == "wiring":
+                self._hub.show()
+            self._tell()
+
+        run_errand(self._hub, page, work, done)
+
+    def _calibrated(self, flow: _Flow, locator: Locator, name: str) -> str:
+        """Save a calibration and switch it on; in a thread."""
+        path = self._folder.free(name, ".npz")
+        prepared = flow.prepared
+        write_calibration(path, Calibration(locator, prepared.pattern, prepared.skin.name))
+        self._hub.runner.adopt(self._hub.runner.prepared.located_by(locator))
+        return path.name
+
+    def _wired(self, flow: _Flow, answer: WiringAnswer, name: str) -> str:
+        """Save the skin as it is wired, and go on with it; in a thread."""
+        path = self._folder.free(name, ".toml")
+        wired = answer.wiring.applied(flow.prepared.skin)
+        write_text(path, wired.to_toml())
+        self._hub.runner.change(prepare(wired), self._hub.runner.opening)
+        return path.name
+
+    def _use(self, page: Listener, request: UseCalibration) -> None:
+        def work() -> None:
+            runner, locator = self._hub.runner, None
+            if request.name is not None:
+                locator = read_calibration(self._folder.existing(request.name, ".npz")).locator
+            runner.adopt(runner.prepared.located_by(locator))
+
+        def done(_: None) -> None:
+            self._using = request.name
+            self._tell()
+
+        run_errand(self._hub, page, work, done)
+
+    def _look_again(self) -> None:
+        """Another skin is there, with a calibration whose name is not known, or without."""
+        prepared = self._hub.runner.prepared
+        self._using = None if prepared.locator is None else ""
+        self._used_on = prepared.mesh.identity
+
+    def _tell(self) -> None:
+        self._hub.tell([self._told()])
+
+    def _told(self) -> str:
+        flow = self._flow
+        if flow is None:
+            return text_of(type="flow", kind=None, calibration=self._using)
+        thought = flow.thought or Thought("")
+        return text_of(
+            type="flow",
+            kind=flow.kind,
+            phase=flow.taker.phase,
+            dot=flow.dot,
+            presses=[lesson.place for lesson in flow.lessons],
+            thinking=flow.thinking,
+            text=flow.trouble or thought.text,
+            ready=thought.ready and not flow.thinking,
+            figures=thought.figures,
+            calibration=self._using,
+        )

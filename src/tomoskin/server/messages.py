@@ -1,0 +1,219 @@
+"""The text messages to a page: scene, state, event and error. Requests: ``live/requests.py``,
+frames: ``live/frames.py``."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from tomoskin import __version__
+from tomoskin.calibration import BendReading, StateReading
+from tomoskin.core import Event, FloatArray, IntArray
+from tomoskin.pipeline import Prepared
+from tomoskin.recording import Timeline
+from tomoskin.run import MAX_FORCE, Status
+from tomoskin.signal import BaselineState, ElectrodeHealth
+
+PROBE_RADIUS = 0.015
+"""Radius of a press from the page unless it says otherwise, m: the source's usual probe."""
+
+PROBE_FORCE = 3.0
+"""Its force, N."""
+
+_OUTLINE_POINTS = 240
+
+
+def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> str:
+    """Everything about the skin that does not change from frame to frame.
+
+    ``limit`` is the end of the fixed symmetric colour scale, in the image's unit; lengths are m,
+    coordinates lie flat as x0, y0, x1, y1, …; electrodes and points are counted from 0, labels
+    from E1. ``solid``: where the points lie in space, x0, y0, z0, …, of a sheet on a surface.
+    """
+    skin, mesh, pattern = prepared.skin, prepared.mesh, prepared.pattern
+    return _text(
+        type="scene",
+        skin={"name": skin.name, "description": skin.description, "source": str(skin.source)},
+        unit=prepared.operator.unit,
+        limit=limit,
+        points=_flat(mesh.points),
+        solid=None if skin.is_flat else _flat(skin.surface.point(mesh.points)),
+        cells=_flat(mesh.cells),
+        outline=_flat(skin.outline.polyline(skin.outline.length / _OUTLINE_POINTS)),
+        electrodes=_electrodes(prepared),
+        pattern={
+            "name": pattern.identity,
+            "n_meas": pattern.n_meas,
+            "n_drive": pattern.n_drive,
+            "drive": _flat(pattern.drive),
+            "measure": _flat(pattern.measure),
+        },
+        source=source,
+        pressable=pressable,
+        probe={"radius_m": PROBE_RADIUS, "force_n": PROBE_FORCE, "max_force_n": MAX_FORCE},
+        version=__version__,
+    )
+
+
+def scale(prepared: Prepared, limit: float) -> str:
+    """The end of the colour scale, and its unit, where nothing else of the scene is new."""
+    return _text(type="scale", limit=limit, unit=prepared.operator.unit)
+
+
+def state(status: Status) -> str:
+    """One look at the runner; numbers that are not known yet are null."""
+    reference = status.reference
+    return _text(
+        type="state",
+        running=status.running,
+        paused=status.paused,
+        fps=status.fps,
+        frames=status.frames,
+        dropped=status.dropped,
+        corrupt=status.corrupt,
+        gaps=status.gaps,
+        p50_ms=_known(1e3 * status.p50),
+        p99_ms=_known(1e3 * status.p99),
+        stages=stages(status),
+        reference={
+            "frames": reference.frames,
+            "needed": reference.needed,
+            "age_s": status.reference_age,
+            "ready": reference.ready,
+        },
+        baseline=_baseline(reference.baseline),
+        sick=[_sick(electrode) for electrode in status.electrodes],
+        noise_v=_known(reference.noise),
+        alpha=status.choice.alpha,
+        rule=status.choice.rule,
+        left_out=status.left_out,
+        recording=status.recording and status.recording.name,
+        sinks=status.sinks,
+        replay=status.replay,
+        **readings(status),
+        problem=status.problem,
+        text=status.text,
+    )
+
+
+def stages(status: Status) -> list[dict[str, Any]]:
+    """Where the age of a picture comes from, stage by stage."""
+    return [
+        {
+            "name": stage.name,
+            "p50_ms": _known(1e3 * stage.p50),
+            "p99_ms": _known(1e3 * stage.p99),
+        }
+        for stage in status.stages
+    ]
+
+
+def readings(status: Status) -> dict[str, Any]:
+    """How the newest frame is bent and which state it shows; null where that was not learnt."""
+    return {"bend": _bend(status.bend), "state": _state(status.state)}
+
+
+def _baseline(now: BaselineState | None) -> dict[str, Any] | None:
+    """Drift since the reference as a part of it, how long it is held, and whether it is stale."""
+    if now is None:
+        return None
+    return {
+        "drift": _known(now.drift),
+        "held_s": now.held,
+        "noise_v": _known(now.noise),
+        "stale": now.stale,
+    }
+
+
+def _bend(now: BendReading | None) -> dict[str, Any] | None:
+    """Angles in rad, as ``tomoskin image --json`` tells them."""
+    if now is None:
+        return None
+    return {"angle_rad": now.angle, "sd_rad": now.sd, "axis_rad": now.axis, "state": now.state}
+
+
+def _state(now: StateReading | None) -> dict[str, Any] | None:
+    """Which state the newest frame shows, as ``tomoskin image --json`` tells it."""
+    return None if now is None else asdict(now)
+
+
+def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
+    return {
+        "electrode": electrode.electrode,
+        "state": electrode.state,
+        "reason": electrode.reason,
+        "since_s": electrode.since,
+    }
+
+
+def event(happened: Event) -> str:
+    """Something that a person should know."""
+    return _text(type="event", time_s=happened.host_time, kind=happened.kind, text=happened.text)
+
+
+def timeline(found: Timeline) -> str:
+    """What happened in the recording that is played; times in s from its first frame."""
+    return _text(
+        type="timeline",
+        end_s=found.end,
+        notes=[{"time_s": time, "text": event.text} for time, event in found.notes],
+        events=[
+            {"time_s": time, "kind": event.kind, "text": event.text} for time, event in found.events
+        ],
+        touches=[
+            {"id": span.id, "kind": span.kind, "begin_s": span.begin, "end_s": span.end}
+            for span in found.touches
+        ],
+    )
+
+
+def error(message: str) -> str:
+    """Answer to a request that was not understood."""
+    return _text(type="error", message=message)
+
+
+def _electrodes(prepared: Prepared) -> list[dict[str, Any]]:
+    centres = prepared.skin.electrode_centres.tolist()
+    return [
+        {"x": x, "y": y, "label": f"E{number}", "points": chain(facets)}
+        for number, ((x, y), facets) in enumerate(
+            zip(centres, prepared.mesh.electrodes, strict=True), 1
+        )
+    ]
+
+
+def chain(facets: IntArray) -> list[int]:
+    """Points along an open chain of edges, from one end to the other.
+
+    ``facets`` is (n, 2); where the edges do not form a single open chain, their points in
+    ascending order.
+    """
+    beside: dict[int, list[int]] = {}
+    for a, b in facets.tolist():
+        beside.setdefault(a, []).append(b)
+        beside.setdefault(b, []).append(a)
+    ends = [point for point, others in beside.items() if len(others) == 1]
+    if len(ends) != 2 or max(map(len, beside.values())) > 2:
+        return sorted(beside)
+    walk, before = [ends[0]], -1
+    while len(onward := [p for p in beside[walk[-1]] if p != before]) == 1:
+        before = walk[-1]
+        walk.append(onward[0])
+    return walk
+
+
+def _known(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else value
+
+
+def _flat(table: FloatArray | IntArray) -> list[float]:
+    flat: list[float] = np.asarray(table).reshape(-1).tolist()
+    return flat
+
+
+def _text(**fields: Any) -> str:
+    return msgspec.json.encode(fields).decode()

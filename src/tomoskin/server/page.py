@@ -1,0 +1,109 @@
+"""One page's connection: reads its requests, and writes no faster than it reads."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import deque
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from tomoskin.core import WireError
+from tomoskin.server import messages
+from tomoskin.server.hub import Hub
+from tomoskin.server.requests import decode_request
+
+FRAME_PERIOD = 1 / 60
+"""A page gets no more frames than it can show, s."""
+
+PATIENCE = 5.0
+"""A page that takes nothing for this long is let go, s."""
+
+_OUTBOX = 64
+_TRY_AGAIN_LATER = 1013
+
+
+class Page:
+    """Serves one WebSocket until it is closed, or does not read for :data:`PATIENCE`.
+
+    Frames are never queued: each time the page can take one, it gets the newest.
+    """
+
+    def __init__(self, socket: WebSocket, hub: Hub) -> None:
+        self._socket = socket
+        self._hub = hub
+        self._outbox: deque[str] = deque(maxlen=_OUTBOX)
+        self._due = asyncio.Event()
+        self._sent: bytes | None = None
+
+    def wake(self) -> None:
+        """Say that there is something new to send."""
+        self._due.set()
+
+    def post(self, text: str) -> None:
+        """Send ``text`` as soon as the page can take it; the oldest make room."""
+        self._outbox.append(text)
+        self._due.set()
+
+    async def run(self) -> None:
+        """Serve until either side ends it."""
+        await self._socket.accept()
+        if self._hub.full:
+            await self._socket.close(_TRY_AGAIN_LATER, "too many pages are open")
+            return
+        self._hub.join(self)
+        reason = ""
+        tasks = {asyncio.create_task(self._read()), asyncio.create_task(self._write())}
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            reason = _reason(done)
+        finally:
+            self._hub.leave(self, reason)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _read(self) -> None:
+        while True:
+            message = await self._socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            self._answer(message.get("text"))
+
+    def _answer(self, text: str | None) -> None:
+        try:
+            if text is None:
+                raise WireError("expected text, got a binary message")
+            self._hub.obey(self, decode_request(text))
+        except WireError as error:
+            self.post(messages.error(str(error)))
+
+    async def _write(self) -> None:
+        loop = asyncio.get_running_loop()
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            while True:
+                await self._due.wait()
+                self._due.clear()
+                following = loop.time() + FRAME_PERIOD
+                async with asyncio.timeout(PATIENCE):
+                    await self._send()
+                await asyncio.sleep(following - loop.time())
+
+    async def _send(self) -> None:
+        while self._outbox:
+            await self._socket.send_text(self._outbox.popleft())
+        frame = self._hub.frame()
+        if frame is not None and frame is not self._sent:
+            await self._socket.send_bytes(frame)
+            self._sent = frame
+            self._hub.sent(frame)
+
+
+def _reason(done: set[asyncio.Task[None]]) -> str:
+    for task in done:
+        error = task.exception()
+        if isinstance(error, TimeoutError):
+            return f"a page that took nothing for {PATIENCE:.0f} s was let go"
+        if error is not None:
+            raise error
+    return ""

@@ -1,0 +1,196 @@
+"""The page's server: an application behind its guard, on a socket of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import mimetypes
+import signal
+import socket
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp
+from starlette.websockets import WebSocket
+from websockets.exceptions import InvalidState
+
+from tomoskin.core import DataError, TomoskinError
+from tomoskin.server import messages
+from tomoskin.server.access import Guard
+from tomoskin.server.folder import Folder
+from tomoskin.server.hub import Hub
+from tomoskin.server.page import PATIENCE, Page
+from tomoskin.server.security import Door
+
+STATIC = Path(__file__).parent / "static"
+"""Where the built page lies."""
+
+DEFAULT_PORT = 8765
+
+_MOST_PER_MESSAGE = 64 * 1024
+_UNDERWAY = 64 * 1024
+"""Bytes that may wait in the kernel for one page: what waits there is no longer the newest."""
+_GRACE = 2
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class ServerError(TomoskinError):
+    """The page cannot be served: port in use, address not of this machine, page not built."""
+
+
+def check_page(static: Path = STATIC) -> None:
+    """Raise ServerError when the page has not been built."""
+    if not (static / "index.html").is_file():
+        raise ServerError(
+            "the page has not been built", where="page", hint='"make live" builds and starts it'
+        )
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Socket that listens on ``host`` and ``port``; port 0 takes a free one.
+
+    Raises
+    ------
+    ServerError
+        When the port is taken or the host is not an address of this machine.
+    """
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        listener = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise ServerError(f"{error.strerror}", where=f"host {host}") from None
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _UNDERWAY)
+        _limit_stalled(listener)
+        listener.bind(address)
+        listener.listen()
+    except OSError as error:
+        listener.close()
+        raise _refused(error, host, port) from None
+    return listener
+
+
+def application(hub: Hub, door: Door, static: Path = STATIC) -> ASGIApp:
+    """ASGI application: the built page, ``/ws`` for each open page, ``/status`` for programs,
+    ``/files/NAME`` for what is in the session folder."""
+    # Whether Python knows the page's typeface depends on its version and on the machine's list.
+    mimetypes.add_type("font/woff2", ".woff2")
+
+    async def stream(websocket: WebSocket) -> None:
+        await Page(websocket, hub).run()
+
+    async def no_icon(_: Request) -> Response:
+        return Response(status_code=204)
+
+    async def status(_: Request) -> Response:
+        return Response(messages.state(hub.runner.status()), media_type="application/json")
+
+    async def download(request: Request) -> Response:
+        name = request.path_params["name"]
+        try:
+            path = Folder(hub.folder).existing(name)
+        except DataError as error:
+            return PlainTextResponse(f"{error}\n", 404)
+        return FileResponse(path, media_type="application/octet-stream", filename=name)
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
+        async with hub.running():
+            yield
+
+    routes = [
+        WebSocketRoute("/ws", stream),
+        Route("/favicon.ico", no_icon),
+        Route("/status", status),
+        Route("/files/{name}", download),
+        Mount("/", StaticFiles(directory=static, html=True)),
+    ]
+    return Guard(Starlette(routes=routes, lifespan=lifespan), door)
+
+
+class Server(uvicorn.Server):
+    """Serves until :meth:`stop`; leaves signals to :meth:`stopped_by_signals`."""
+
+    @classmethod
+    def of(cls, app: ASGIApp) -> Server:
+        """Server with bounded messages and no chatter."""
+        return cls(
+            uvicorn.Config(
+                app,
+                lifespan="on",
+                log_config=None,
+                log_level="critical",
+                access_log=False,
+                server_header=False,
+                ws_max_size=_MOST_PER_MESSAGE,
+                ws_per_message_deflate=False,
+                timeout_graceful_shutdown=_GRACE,
+            )
+        )
+
+    def run_on(self, listener: socket.socket) -> None:
+        """Serve on ``listener`` until stopped; closes it."""
+        asyncio.run(self.serve([listener]))
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End all connections: those too that a page closes at that very moment, or never reads."""
+        try:
+            await super().shutdown(sockets)
+        except InvalidState:  # the base class stops there
+            await self.lifespan.shutdown()
+        finally:
+            for connection in list(self.server_state.connections):
+                connection.transport.abort()
+            await asyncio.sleep(0)  # that they are lost is said in the loop's next turn
+
+    def stop(self) -> None:
+        """End :meth:`run_on`, or let it end at once when it begins; callable from any thread."""
+        self.should_exit = True
+
+    @contextlib.contextmanager
+    def stopped_by_signals(self) -> Iterator[None]:
+        """While the block lasts, SIGINT and SIGTERM stop the server, and do nothing else."""
+        before = {s: signal.signal(s, lambda *_: self.stop()) for s in _SIGNALS}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Nothing: the base class would raise the signal again after a clean end."""
+        yield
+
+
+def _limit_stalled(listener: socket.socket) -> None:
+    """Let the kernel end connections whose other side takes nothing, even after we let go."""
+    option = getattr(socket, "TCP_USER_TIMEOUT", None)
+    if option is not None:
+        listener.setsockopt(socket.IPPROTO_TCP, option, int(2e3 * PATIENCE))
+
+
+def _refused(error: OSError, host: str, port: int) -> ServerError:
+    if error.errno == errno.EADDRINUSE:
+        return ServerError(
+            "the port is in use, perhaps by another tomoskin",
+            where=f"port {port}",
+            hint="choose another with --port, or any free one with --port 0",
+        )
+    if error.errno == errno.EACCES:
+        return ServerError(
+            "this port needs rights that you do not have",
+            where=f"port {port}",
+            hint="choose one above 1023 with --port",
+        )
+    return ServerError(f"{error.strerror}", where=f"host {host}")

@@ -1,0 +1,230 @@
+"""The desk that changes the skin's settings while it runs, takes changes back, saves and loads."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from tomoskin.core import Output, SkinError, SourceError, TomoskinError, check_outputs, write_text
+from tomoskin.inverse import LightTouch, LinearProblem, Spectrum
+from tomoskin.pipeline import Prepared, colour_limit, prepare_again, same_body, tuned
+from tomoskin.server.hub import Hub, Listener
+from tomoskin.server.requests import (
+    AskPattern,
+    LoadSkin,
+    RedoSettings,
+    SaveSkin,
+    SetSettings,
+    UndoSettings,
+)
+from tomoskin.server.settings_form import altered, refusal, schema, table_of
+from tomoskin.skin import Skin
+
+MOST_KEPT = 100
+"""Changes that can be taken back."""
+
+_GESTURE = 1.0
+"""Changes of the same keys within so many s are one, as of a slider that is drawn."""
+
+
+class SettingsDesk:
+    """Settings of the runner's skin, the same for all pages; lives in the event loop.
+
+    What the picture alone rests on is prepared in a thread and taken over between two frames;
+    for anything else the source is opened anew, as the twin and a board must follow it.
+    """
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._wanted: Skin = hub.runner.prepared.skin
+        self._undo: list[Skin] = []
+        self._redo: list[Skin] = []
+        self._last: tuple[object, float] = (None, 0.0)
+        self._working = False
+        self._took: float | None = None
+        self._auto: tuple[LinearProblem, LightTouch] | None = None
+
+    @property
+    def handlers(self) -> Mapping[type, Callable[[Listener, Any], None]]:
+        """See :class:`~tomoskin.server.hub.Desk`."""
+        return {
+            SetSettings: self._set,
+            UndoSettings: lambda page, _: self._step(page, self._undo, self._redo),
+            RedoSettings: lambda page, _: self._step(page, self._redo, self._undo),
+            SaveSkin: self._save,
+            LoadSkin: self._load,
+            AskPattern: self._pattern,
+        }
+
+    def greeting(self) -> Sequence[str]:
+        """The schema, and the settings as they are."""
+        return (schema(), self._told())
+
+    def _set(self, page: Listener, request: SetSettings) -> None:
+        now = time.monotonic()
+        keys = sorted((s, k) for s, keys in request.changes.items() for k in keys)
+        try:
+            skin = altered(self._present(), request.changes)
+            self._check(skin)
+        except TomoskinError as error:
+            page.post(refusal(error))
+            return
+        if self._last[0] != keys or now - self._last[1] > _GESTURE:
+            self._keep(self._present())
+        self._last = keys, now
+        self._go(page, skin)
+
+    def _step(self, page: Listener, back: list[Skin], forth: list[Skin]) -> None:
+        """Take the newest of ``back``, and remember the present in ``forth``."""
+        if not back:
+            return
+        skin = back.pop()
+        forth.append(self._present())
+        self._last = None, 0.0
+        self._go(page, skin)
+
+    def _load(self, page: Listener, request: LoadSkin) -> None:
+        path = self._hub.folder / f"{request.name}.toml"
+        try:
+            skin = Skin.load(path if path.is_file() else request.name)
+            self._check(skin)
+        except TomoskinError as error:
+            page.post(refusal(error))
+            return
+        self._keep(self._present())
+        self._go(page, skin)
+
+    def _save(self, page: Listener, request: SaveSkin) -> None:
+        name = f"{request.name}.toml"
+        try:
+            _save(self._hub.folder / name, self._present(), replace=request.replace)
+        except TomoskinError as error:  # the page is told names, never paths
+            page.post(refusal(type(error)(error.message, where=name, hint=error.hint)))
+            return
+        self._hub.runner.say("saved", f"settings saved as {name}")
+        self._hub.tell([self._told()])
+
+    def _pattern(self, page: Listener, request: AskPattern) -> None:
+        try:
+            page.post(table_of(request.name, self._present().n_electrodes))
+        except TomoskinError as error:
+            page.post(refusal(error))
+
+    def _keep(self, skin: Skin) -> None:
+        self._undo.append(skin)
+        del self._undo[:-MOST_KEPT]
+        self._redo.clear()
+
+    def _present(self) -> Skin:
+        """The settings as they are, or will be when what is being prepared is ready."""
+        return self._wanted if self._working else self._hub.runner.prepared.skin
+
+    def _check(self, skin: Skin) -> None:
+        """Raise SourceError where the source cannot follow ``skin``."""
+        if same_body(skin, self._hub.runner.prepared.skin):
+            return
+        if self._hub.runner.replay is not None:
+            raise SourceError("a recording keeps the sheet and the scan that it was made with")
+        if self._hub.opener is None:
+            raise SourceError("the source cannot be set to another sheet or scan while it runs")
+
+    def _go(self, page: Listener, skin: Skin) -> None:
+        self._wanted = skin
+        if not self._working:
+            self._working = True
+            self._hub.keep(self._work(page))
+        self._hub.tell([self._told()])
+
+    async def _work(self, page: Listener) -> None:
+        """Prepare what is wanted until nothing newer is; what fails is taken back."""
+        while True:
+            skin = self._wanted
+            try:
+                scaled = await asyncio.to_thread(self._bring, skin)
+                if scaled is None:
+                    self._hub.show()
+                else:
+                    self._hub.rescale(*scaled)
+                await asyncio.to_thread(self._remember, self._hub.runner.prepared)
+            except TomoskinError as error:
+                page.post(refusal(error))
+            if self._wanted is skin:
+                break
+        self._working = False
+        self._hub.tell([self._told()])
+
+    def _bring(self, skin: Skin) -> tuple[Prepared, float] | None:
+        """Prepare ``skin`` and have the runner go on with it; in a thread.
+
+        What it was prepared to and the end of its scale; None where the source was opened anew.
+        """
+        start, runner, opener = time.monotonic(), self._hub.runner, self._hub.opener
+        prepared = prepare_again(runner.prepared, skin)
+        if same_body(skin, runner.prepared.skin):
+            if runner.reference is not None:
+                prepared = tuned(prepared, runner.reference)
+            scaled = prepared, colour_limit(prepared)
+            self._took = time.monotonic() - start
+            runner.adopt(prepared)
+            return scaled
+        if opener is None:
+            raise SourceError("the source cannot be set to another sheet or scan while it runs")
+        runner.change(prepared, partial(opener, skin))
+        self._took = time.monotonic() - start
+        return None
+
+    def _remember(self, prepared: Prepared) -> None:
+        """What would choose alpha, for the mark on the slider."""
+        problem = prepared.problem
+        if prepared.light_touch is not None:
+            self._auto = problem, prepared.light_touch
+        elif prepared.skin.inverse.method == "one-step" and (
+            self._auto is None or self._auto[0] is not problem
+        ):
+            self._auto = problem, LightTouch.of(Spectrum.of(problem))
+
+    def _automatic(self) -> float | None:
+        """The alpha that would be chosen by the noise; None where that is not known yet."""
+        runner = self._hub.runner
+        if runner.prepared.light_touch is not None:
+            return runner.status().choice.alpha
+        if self._auto is None or self._auto[0] is not runner.prepared.problem:
+            return None
+        reference, noise = runner.reference, runner.prepared.predicted_noise()
+        if reference is not None and reference.noise_is_known and reference.noise.any():
+            noise = runner.prepared.difference_noise(reference)
+        return self._auto[1](noise).alpha
+
+    def _told(self) -> str:
+        """The settings message."""
+        skin = self._present()
+        files = sorted(path.stem for path in self._hub.folder.glob("*.toml"))
+        fields = {
+            "type": "settings",
+            "document": skin.document,
+            "n_electrodes": skin.n_electrodes,
+            "automatic_alpha": self._automatic(),
+            "alpha": self._hub.runner.status().choice.alpha,
+            "undo": len(self._undo),
+            "redo": len(self._redo),
+            "busy": self._working,
+            "took_ms": None if self._took is None else 1e3 * self._took,
+            "files": files[:200],
+            "builtin": Skin.names(),
+        }
+        return msgspec.json.encode(fields).decode()
+
+
+def _save(path: Path, skin: Skin, *, replace: bool) -> None:
+    if "file" in skin.document["surface"]:
+        raise SkinError("a skin on a scanned surface stays beside its file")
+    if path.is_symlink():
+        raise SkinError("is a link, and what it leads to is left alone", hint="choose another name")
+    check_outputs([Output(path)], overwrite=replace, consent="save again")
+    write_text(path, skin.to_toml(), overwrite=replace)

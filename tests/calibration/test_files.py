@@ -1,0 +1,79 @@
+"""The calibration of touch as a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tomoskin.calibration import Calibration, Locator, read_calibration, write_calibration
+from tomoskin.core import DataError
+from tomoskin.pattern import Pattern
+
+PATTERN = Pattern.adjacent(8)
+
+
+@pytest.fixture(scope="module")
+def calibration() -> Calibration:
+    rng = np.random.default_rng(0)
+    xy = rng.uniform(-0.05, 0.05, (25, 2))
+    dv = np.sin(xy @ rng.normal(scale=30.0, size=(2, PATTERN.n_meas)))
+    dv[3, 5] = np.nan
+    locator = Locator.fit(dv, xy, pattern=PATTERN, strength=rng.uniform(1, 2, 25))
+    return Calibration(locator, PATTERN, "a skin")
+
+
+def test_what_is_read_answers_as_what_was_written(calibration: Calibration, tmp_path: Path) -> None:
+    path = tmp_path / "c.npz"
+    write_calibration(path, calibration)
+    again = read_calibration(path)
+    frames = calibration.locator.presses.dv[:5]
+    for ours, theirs in zip(
+        calibration.locator.predict(frames), again.locator.predict(frames), strict=True
+    ):
+        np.testing.assert_array_equal(ours, theirs)
+    np.testing.assert_array_equal(
+        calibration.locator.strength(frames), again.locator.strength(frames)
+    )
+    assert again.pattern.identity == PATTERN.identity == again.locator.pattern_id
+    assert again.skin_name == "a skin"
+    assert [p.name for p in tmp_path.iterdir()] == ["c.npz"]
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing(
+    calibration: Calibration, tmp_path: Path
+) -> None:
+    with pytest.raises(DataError, match="cannot be written"):
+        write_calibration(tmp_path / "none" / "c.npz", calibration)
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(DataError, match="expected the name of a file, got a folder"):
+        write_calibration(tmp_path / "folder", calibration)
+    assert [p.name for p in tmp_path.iterdir()] == ["folder"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"kind": "another"}, "not a calibration"),
+        ({"version": 2}, "version"),
+        ({"version": 1.5}, "whole number"),
+        ({"xy_m": np.zeros((25, 3))}, "shape"),
+        ({"xy_m": np.ones((25, 2))}, "outside"),
+        ({"outline_m": np.zeros((5, 2))}, "outline"),
+        ({"dv": np.ones((25, 3))}, "expected"),
+        ({"drive": np.zeros((PATTERN.n_meas, 2))}, "source and sink"),
+        ({"n_electrodes": 4}, "electrodes"),
+    ],
+)
+def test_damaged_files_are_refused(
+    calibration: Calibration, tmp_path: Path, change: dict[str, object], words: str
+) -> None:
+    path = tmp_path / "c.npz"
+    write_calibration(path, calibration)
+    with np.load(path) as kept:
+        arrays = dict(kept) | {key: np.asarray(value) for key, value in change.items()}
+    np.savez(path, **arrays)
+    with pytest.raises(DataError, match=words) as caught:
+        read_calibration(path)
+    assert "c.npz" in str(caught.value)

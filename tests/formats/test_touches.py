@@ -1,0 +1,68 @@
+"""Touches in session files and tables: what cannot be told apart is said there too."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tomoskin.core import Reading, Touch
+from tomoskin.formats import write_touches
+from tomoskin.mesh import Cylinder, Plane
+from tomoskin.recording import SessionReader, SessionWriter, session_info
+from tomoskin.skin import Skin
+
+READING = Reading(*(0.01, -0.02, 0.001, 0.002, 3e-4, -0.1, np.array([4])), cov_xy=1e-6, close=True)
+TOUCHES = (
+    Touch(1, "decrease", 0.5, replace(READING, close=False), (1, 3)),
+    Touch(2, "decrease", 0.5, READING),
+    Touch(4, "increase", 0.5, replace(READING, close=False)),
+)
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Path:
+    path = tmp_path / "x.mcap"
+    with SessionWriter(path, Skin.load("textile-disc-8")) as writer:
+        writer.touches(1.0, 7, TOUCHES)
+    return path
+
+
+def test_touches_come_back_as_they_were(session: Path) -> None:
+    with SessionReader(session) as reader:
+        (item,) = reader.touches()
+    for got, put in zip(item.touches, TOUCHES, strict=True):
+        assert (got.id, got.kind, got.since, got.merged) == (
+            put.id,
+            put.kind,
+            put.since,
+            put.merged,
+        )
+        assert (got.reading.cov_xy, got.reading.close) == (put.reading.cov_xy, put.reading.close)
+
+
+def test_a_touch_that_was_only_seen_merged_counts(session: Path) -> None:
+    assert session_info(session).touches == 4
+
+
+def test_the_table_says_what_is_too_close(tmp_path: Path) -> None:
+    write_touches(tmp_path / "x.csv", [(0, 0.0, TOUCHES)])
+    rows = (tmp_path / "x.csv").read_text().splitlines()
+    assert rows[0].split(",")[-1] == "kind"
+    assert [row.split(",")[-1] for row in rows[1:]] == ["merged 1+3", "too close", "increase"]
+
+
+def test_on_a_surface_the_table_says_where_in_space(tmp_path: Path) -> None:
+    around = Cylinder(35e-3)
+    write_touches(tmp_path / "x.csv", [(0, 0.0, TOUCHES)], around)
+    with (tmp_path / "x.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    place = np.array([[float(row[f"space_{c}_m"]) for c in "xyz"] for row in rows])
+    sheet = np.array([[float(row["x_m"]), float(row["y_m"])] for row in rows])
+    assert place == pytest.approx(around.point(sheet), abs=1e-6)
+    assert np.hypot(place[:, 0], place[:, 2] + 35e-3) == pytest.approx(35e-3, rel=1e-4)
+    write_touches(tmp_path / "flat.csv", [(0, 0.0, TOUCHES)], Plane())
+    assert "space" not in (tmp_path / "flat.csv").read_text()

@@ -1,0 +1,103 @@
+"""What a frame costs, counted rather than timed: calls, memory, rooms, bytes to the page."""
+
+from __future__ import annotations
+
+import sys
+import tracemalloc
+from collections import Counter
+from statistics import median
+
+import numpy as np
+import pytest
+
+from run.board import pressed, samples_of
+from tomoskin.core import Frame
+from tomoskin.pipeline import Pipeline
+from tomoskin.wire import Decoder, encode
+
+REFERENCE, WARM, COUNTED = 20, 60, 60
+MOST_CALLS = 900
+"""Of functions in Python and C, per frame with a touch that moves: some 670 when written."""
+
+MOST_PICTURES = 15
+"""Memory that a frame may need, in pictures of eight bytes a cell: seven or eight when written."""
+
+
+@pytest.fixture(scope="module")
+def chunks(prepared, idle):
+    """Bytes of frames: an idle skin, then one press that goes round."""
+    angles = np.linspace(0, 2 * np.pi, 20, endpoint=False)
+    places = 0.03 * np.column_stack([np.cos(angles), np.sin(angles)])
+    kinds = [samples_of(prepared, pressed(prepared, *place)) for place in places.tolist()]
+    noise = np.random.default_rng(5)
+    rows = [idle] * REFERENCE + [kinds[k % 20] for k in range(WARM + COUNTED)]
+    return [
+        encode(Frame(k, 25_000 * k, 0.1 * k, 1, 0, 0, _noisy(row, noise)))
+        for k, row in enumerate(rows)
+    ]
+
+
+def _noisy(row, noise):
+    told = (row > 0) & (row < 65000)
+    return np.where(told, row + noise.integers(-1, 2, len(row)), row).astype(np.uint16)
+
+
+@pytest.fixture
+def one(prepared, chunks):
+    """Takes the next chunk from bytes to touches; the reference and the warm-up are over."""
+    decoder, pipeline = Decoder(), Pipeline(prepared, reference_frames=REFERENCE)
+
+    def take(number):
+        (frame,) = decoder.feed(chunks[number], 0.1 * number)
+        return pipeline.push(frame)
+
+    for number in range(REFERENCE + WARM):
+        result = take(number)
+    assert result.touches
+    return take
+
+
+def _profiled(one, number):
+    """Calls of one frame, and the rooms that ran."""
+    calls, rooms = Counter(), set()
+
+    def seen(frame, event, _argument):
+        if event in ("call", "c_call"):
+            calls[event] += 1
+        if event == "call" and "/tomoskin/" in frame.f_code.co_filename:
+            rooms.add(frame.f_code.co_filename.rpartition("/tomoskin/")[2].split("/")[0])
+
+    before = sys.getprofile()
+    sys.setprofile(seen)
+    try:
+        one(number)
+    finally:
+        sys.setprofile(before)
+    return calls.total(), rooms
+
+
+def test_a_frame_calls_few_functions_and_never_the_model(one):
+    found = [_profiled(one, REFERENCE + WARM + k) for k in range(COUNTED)]
+    assert 100 < median(calls for calls, _ in found) < MOST_CALLS
+    rooms = set().union(*(rooms for _, rooms in found))
+    assert rooms >= {"wire", "signal", "inverse", "touch", "pipeline"}
+    assert rooms & {"mesh", "skin", "forward", "twin", "recording", "formats"} == set()
+
+
+def test_a_frame_needs_little_memory_and_keeps_none(one, prepared):
+    tracemalloc.start()
+    try:
+        peaks = []
+        for k in range(COUNTED):
+            tracemalloc.reset_peak()
+            before, _ = tracemalloc.get_traced_memory()
+            one(REFERENCE + WARM + k)
+            peaks.append(tracemalloc.get_traced_memory()[1] - before)
+            if k == COUNTED // 2:
+                half, _ = tracemalloc.get_traced_memory()
+        after, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    picture = 8 * len(prepared.mesh.cells)
+    assert median(peaks) < MOST_PICTURES * picture
+    assert after - half < picture  # thirty frames that kept one picture each would keep thirty

@@ -1,0 +1,58 @@
+"""What was prepared belongs together: by identity, not by length."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tomoskin.core import DataError, ModelError, SkinError
+from tomoskin.forward import ForwardModel
+from tomoskin.inverse import Evidence, Greit, OneStep
+from tomoskin.mesh import Mesh
+from tomoskin.pattern import Pattern
+from tomoskin.pipeline import prepare
+from tomoskin.pipeline.tune import tuned_by_rule
+from tomoskin.skin import Skin
+from tomoskin.touch import Segmenter
+
+PREPARED = prepare(Skin.load("textile-disc-8").altered({"inverse": {"alpha": 0.1}}))
+MOVED = Mesh(1.01 * PREPARED.mesh.points, PREPARED.mesh.cells, PREPARED.mesh.electrodes)
+
+
+def test_an_operator_of_another_mesh_with_as_many_cells() -> None:
+    other = OneStep(ForwardModel(MOVED, PREPARED.pattern, 0.01), alpha=0.1)
+    with pytest.raises(ModelError, match=f"operator is of mesh {MOVED.identity}, the skin of"):
+        replace(PREPARED, operator=other)
+
+
+def test_an_operator_of_another_pattern_with_as_many_rows() -> None:
+    turned = Pattern.from_tables(PREPARED.pattern.drive[:, ::-1], PREPARED.pattern.measure)
+    other = OneStep(ForwardModel(PREPARED.mesh, turned, 0.01), alpha=0.1)
+    with pytest.raises(DataError, match=f"of pattern {turned.identity}"):
+        replace(PREPARED, operator=other)
+
+
+def test_a_segmenter_of_another_mesh() -> None:
+    with pytest.raises(ModelError, match=f"the segmenter of mesh {MOVED.identity}"):
+        replace(PREPARED, segmenter=Segmenter(MOVED, PREPARED.skin.touch))
+
+
+def test_a_greit_skin_is_prepared_with_the_trained_operator() -> None:
+    coarse = Skin.load("tank-16").altered({"mesh": {"cells": 600}})
+    prepared = prepare(coarse)
+    assert isinstance(prepared.operator, Greit)
+    assert (prepared.choice.rule, prepared.light_touch) == ("greit", None)
+    assert prepared.operator.noise_figure == coarse.inverse.noise_figure == 1.0
+    fewer = prepared.without(np.arange(5))
+    assert isinstance(fewer.operator, Greit)
+    assert fewer.operator.matrix.shape[1] == prepared.operator.matrix.shape[1] - 5
+
+
+def test_a_rule_cannot_choose_the_alpha_of_a_method_without_one() -> None:
+    prepared = prepare(Skin.load("tank-16").altered({"mesh": {"cells": 600}}))
+    with pytest.raises(ModelError, match=r'method "one-step".*"greit"'):
+        tuned_by_rule(prepared, "gcv", Evidence())
+    with pytest.raises(SkinError, match=r"goes with method"):
+        prepared.skin.altered({"inverse": {"alpha": 0.1}})

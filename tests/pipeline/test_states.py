@@ -1,0 +1,155 @@
+"""States that were learnt are told frame by frame: live, in a recording of it, and off-line."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from run.board import pressed, samples_of
+from run.test_replay import Recorded, noisy
+from tomoskin.calibration import (
+    StateClassifier,
+    StateReading,
+    StatesCalibration,
+    Teller,
+    read_states,
+    write_states,
+)
+from tomoskin.cli import main
+from tomoskin.core import DataError, Frame
+from tomoskin.formats import read_recording
+from tomoskin.pipeline import Pipeline, prepare, reconstruct
+from tomoskin.recording import SessionReader, as_recorded, replayed
+from tomoskin.server.messages import state as message
+from tomoskin.skin import Skin
+
+NAMES = ("idle", "left", "right")
+EACH = 12
+FIRST = 20
+"""Frames of the reference."""
+
+
+def volts(prepared, samples, count, seed):
+    """(count, n_meas) V of noisy frames."""
+    frames = [Frame(0, 0, 0.0, 1, 0, 0, noisy(samples, seed + k)) for k in range(count)]
+    return np.array([prepared.readout(frame).values for frame in frames])
+
+
+@pytest.fixture(scope="module")
+def states(prepared):
+    """Idle, and a press on either side, as the runs of this module show them."""
+    idle = samples_of(prepared)
+    sides = [samples_of(prepared, pressed(prepared, x, 0.01)) for x in (-0.03, 0.03)]
+    rest = volts(prepared, idle, 40, 5000).mean(axis=0)
+    dv = [volts(prepared, s, EACH, 6000 + 100 * k) - rest for k, s in enumerate([idle, *sides])]
+    labels = [name for name in NAMES for _ in range(EACH)]
+    known = StateClassifier.fit(
+        np.concatenate(dv), labels, pattern=prepared.pattern, skin_id=prepared.skin.identity
+    )
+    return StatesCalibration(known, prepared.pattern, prepared.skin.name)
+
+
+@pytest.fixture(scope="module")
+def run(prepared, states, tmp_path_factory):
+    """A recorded run of all three states, and its status at the end."""
+    taught = prepared.that_tells(states)
+    with Recorded(taught, tmp_path_factory.mktemp("run") / "run.mcap") as recorded:
+        recorded.idle(FIRST + 5)
+        for side in (0, 1):
+            recorded.touch(side, 6)
+            recorded.idle(6)
+        recorded.touch(1, 6)
+        status = recorded.runner.status()
+    return recorded.path, taught, status
+
+
+def test_a_run_says_which_state_it_is_in(run):
+    _, _, status = run
+    assert status.state == StateReading("right", status.state.probability, False)
+    assert status.text.endswith(f", right {100 * status.state.probability:.0f} %")
+    told = json.loads(message(status))["state"]
+    assert told == {"name": "right", "probability": status.state.probability, "unknown": False}
+    assert json.loads(message(replace(status, state=None)))["state"] is None
+
+
+def test_a_replay_tells_the_same_states_to_the_bit(run):
+    path, taught, status = run
+    with SessionReader(path) as session:
+        again = [result.state for result in replayed(as_recorded(session), session)]
+        frames = [item.frame for item in session.frames()]
+        pipeline = Pipeline(taught)
+        pipeline.tick_rate = session.tick_rate
+    here = [pipeline.push(frame).state for frame in frames]
+    assert again == here
+    assert again[-1] == status.state
+    assert again[: FIRST - 1] == [None] * (FIRST - 1), "no reference yet"
+    names = [state.name for state in again[FIRST:]]
+    assert (
+        names
+        == ["idle"] * 5 + ["left"] * 6 + ["idle"] * 6 + ["right"] * 6 + ["idle"] * 6 + ["right"] * 6
+    )
+    assert sum(state.unknown for state in again[FIRST:]) <= 2, "one frame in a hundred is"
+
+
+def test_a_recording_says_the_same_off_line(run):
+    path, taught, _ = run
+    recording = read_recording(path).in_order_of(taught.pattern)
+    found = reconstruct(taught, recording, recording.voltages[:FIRST])
+    assert [s.name for s in found.states][-12:] == ["idle"] * 6 + ["right"] * 6
+    assert reconstruct(replace(taught, teller=None), recording, recording.voltages[:5]).states == ()
+
+
+def test_what_was_not_learnt_is_unknown(prepared, states):
+    teller = Teller.of(states.classifier)
+    rng = np.random.default_rng(1)
+    strange = teller(rng.normal(size=prepared.pattern.n_meas))
+    assert strange.unknown
+    assert strange.text == f"unknown state (nearest: {strange.name})"
+    assert teller(np.full(prepared.pattern.n_meas, np.nan)).unknown, "nothing was read"
+
+
+def test_rows_that_are_lost_or_left_out_do_not_count(prepared, states):
+    teller, n = Teller.of(states.classifier), prepared.pattern.n_meas
+    sample = states.classifier.examples.dv[EACH + 1]
+    assert teller(sample).name == "left"
+    lost = np.where(np.arange(n) % 5 == 0, np.nan, sample)
+    out = np.arange(0, n, 5)
+    assert teller(lost) == teller.without(out)(np.delete(sample, out))
+    assert teller(lost).name == "left"
+    assert (
+        prepared.that_tells(states).without(out).teller.rows.tolist()
+        == np.delete(np.arange(n), out).tolist()
+    )
+
+
+def test_states_of_another_skin_are_refused(states):
+    with pytest.raises(DataError, match="the calibration is of pattern"):
+        prepare(Skin.load("textile-disc-16")).that_tells(states)
+
+
+def test_on_the_command_line_states_of_another_skin_are_refused(run, states, tmp_path, capfd):
+    other = replace(states.classifier, skin_id="another")
+    write_states(tmp_path / "c.npz", replace(states, classifier=other))
+    with pytest.raises(SystemExit) as end:
+        main(["image", str(run[0]), "--states", str(tmp_path / "c.npz")])
+    assert end.value.code == 1
+    assert "the calibration is of skin another" in capfd.readouterr().err
+
+
+def test_the_command_line_tells_them(run, states, tmp_path, capfd):
+    path, c = run[0], tmp_path / "c.npz"
+    write_states(c, states)
+    assert read_states(c).classifier.right == states.classifier.right
+    said = []
+    for more in ([], ["--json", "--alpha", "0.1"]):
+        with pytest.raises(SystemExit) as end:
+            main(["image", str(path), "--states", str(c), *more])
+        assert not end.value.code
+        said.append(capfd.readouterr().out)
+    told = json.loads(said[1])["states"]
+    assert (told[-1]["name"], told[-1]["unknown"]) == ("right", False)
+    assert 0.5 < told[-1]["probability"] <= 1
+    assert "right: 12 frames" in said[0]

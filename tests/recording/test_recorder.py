@@ -1,0 +1,221 @@
+"""Recording beside a pipeline: nothing waits for the disk, and what goes wrong with it is said."""
+
+from __future__ import annotations
+
+import errno
+import io
+import resource
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from recording.runs import INFO, SKIN, TOUCH, frame_of, same_frame
+from tomoskin.core import DataError, Event, Image
+from tomoskin.recording import Mark, Recorder, SessionReader, SessionWriter
+from tomoskin.recording.recorder import IMAGE_PERIOD
+from tomoskin.wire import encode
+
+PATIENCE = 60
+
+
+class Failing(io.FileIO):
+    """A file on a disk that has room for so many bytes, then an error."""
+
+    room = 40_000
+    number = errno.ENOSPC
+
+    def write(self, data):
+        left = self.room - self.tell()
+        if left <= 0:
+            raise OSError(self.number, "No space left on device")
+        return super().write(bytes(data)[:left])
+
+
+class FailingPath(type(Path())):
+    """A path whose file fails."""
+
+    def open(self, mode="r", buffering=-1, **_):
+        return Failing(str(self), mode) if "x" in mode else super().open(mode, buffering)
+
+
+class Slow(io.FileIO):
+    """A file on a disk that answers when it is told to."""
+
+    go = threading.Event()
+
+    def write(self, data):
+        assert self.go.wait(PATIENCE)
+        return super().write(data)
+
+
+class Said:
+    """Events of a recorder."""
+
+    def __init__(self):
+        self.events = []
+        self._news = threading.Condition()
+
+    def __call__(self, kind, text):
+        with self._news:
+            self.events.append((kind, text))
+            self._news.notify_all()
+
+    def wait_for(self, kind):
+        with self._news:
+            assert self._news.wait_for(lambda: kind in [k for k, _ in self.events], PATIENCE)
+        return next(text for k, text in self.events if k == kind)
+
+
+@pytest.fixture
+def said():
+    return Said()
+
+
+def record(recorder, count, start=0):
+    for number in range(start, start + count):
+        frame = frame_of(number)
+        recorder.raw(frame.host_time, encode(frame))
+        recorder.frame(frame, Mark.NONE)
+
+
+def frames_in(path):
+    with SessionReader(path) as session:
+        return [item.frame for item in session.frames()]
+
+
+def test_everything_is_written(tmp_path, said):
+    path = tmp_path / "x.mcap"
+    pixels = SKIN.mesh().pixels(16)
+    recorder = Recorder(SessionWriter(path, SKIN), pixels, said)
+    recorder.device(0.0, INFO)
+    recorder.truth(0.0, ())
+    recorder.event(Event(0.0, "lost", "two"))
+    recorder.note(0.0, "mark")
+    recorder.settings(0.0, {"source": "test"})
+    record(recorder, 3000)
+    recorder.stop()
+    recorder.stop()
+    assert not said.events
+    with SessionReader(path) as session:
+        frames = [item.frame for item in session.frames()]
+        assert all(same_frame(f, frame_of(n)) for n, f in enumerate(frames))
+        assert len(frames) == 3000
+        assert session.clock()["frames"] >= 2000
+        assert session.clock()["tick_rate"] == pytest.approx(16e6, rel=1e-3)
+        counts = session.counts()
+    assert counts["/events"] == counts["/notes"] == counts["/device"] == counts["/truth"] == 1
+
+
+def test_touches_until_there_are_none_and_images_now_and_then(tmp_path, said):
+    path = tmp_path / "x.mcap"
+    mesh = SKIN.mesh()
+    image = Image(np.zeros(len(mesh.cells)), "S", mesh.identity)
+    recorder = Recorder(SessionWriter(path, SKIN), mesh.pixels(16), said)
+    for number in range(100):
+        touches = (TOUCH,) if 20 <= number < 30 else ()
+        recorder.result(number / 100, number, image, touches)
+    recorder.stop()
+    with SessionReader(path) as session:
+        found = [(item.sequence, len(item.touches)) for item in session.touches()]
+        counts = session.counts()
+    assert found == [*((n, 1) for n in range(20, 30)), (30, 0)]
+    assert counts["/image"] == counts["/scene"] == round(1 / IMAGE_PERIOD)
+
+
+def test_a_curved_sheet_has_no_images(tmp_path, said):
+    image = Image(np.zeros(3), "S", "")
+    recorder = Recorder(SessionWriter(tmp_path / "x.mcap", SKIN), None, said)
+    recorder.result(0.0, 0, image, ())
+    recorder.stop()
+    with SessionReader(tmp_path / "x.mcap") as session:
+        assert session.counts()["/image"] == 0
+
+
+def test_a_full_disk_ends_the_recording_and_leaves_it_readable(tmp_path, said):
+    path = FailingPath(tmp_path / "x.mcap")
+    recorder = Recorder(SessionWriter(path, SKIN), None, said)
+    record(recorder, 500)
+    text = said.wait_for("recording-stopped")
+    assert "No space left" in text
+    assert str(path) in text
+    assert not recorder.running
+    record(recorder, 10, start=500)  # goes nowhere, and hurts nobody
+    recorder.stop()
+    found = frames_in(path)
+    assert len(found) > 30
+    assert all(same_frame(frame, frame_of(n)) for n, frame in enumerate(found))
+    with SessionReader(path) as session:
+        list(session.frames())
+        assert path.stat().st_size <= Failing.room
+        assert "cut" not in session.torn  # it ends with a whole record
+
+
+def test_a_file_that_is_taken_away_ends_the_recording(tmp_path, said):
+    path = tmp_path / "x.mcap"
+    recorder = Recorder(SessionWriter(path, SKIN), None, said)
+    record(recorder, 50)
+    path.unlink()
+    assert "has been removed" in said.wait_for("recording-stopped")
+    recorder.stop()
+
+
+def test_a_slow_disk_loses_messages_but_delays_nobody(tmp_path, said, monkeypatch):
+    path = tmp_path / "x.mcap"
+    Slow.go.set()
+    monkeypatch.setattr(Path, "open", lambda self, *_, **__: Slow(str(self), "x"))
+    session = SessionWriter(path, SKIN)
+    monkeypatch.undo()
+    recorder = Recorder(session, None, said, most_waiting=50_000)
+    Slow.go.clear()
+    record(recorder, 2000)  # returns although nothing can be written
+    said.wait_for("recording-behind")
+    Slow.go.set()
+    text = said.wait_for("recording-gap")
+    record(recorder, 20, start=2000)
+    recorder.stop()
+    assert f"{recorder.left_out} messages" in text
+    found = frames_in(path)
+    assert [f.sequence for f in found[-20:]] == list(range(2000, 2020))
+    assert len(found) < 2020
+
+
+def test_a_fault_of_our_own_ends_the_recording_and_is_said(tmp_path, said, caplog):
+    path = tmp_path / "x.mcap"
+    recorder = Recorder(SessionWriter(path, SKIN), None, said)
+    record(recorder, 50)
+    recorder.truth(0.0, [object()])
+    assert "internal error" in said.wait_for("recording-stopped")
+    recorder.stop()
+    assert "the recording thread ended" in caplog.text
+    assert len(frames_in(path)) == 50
+
+
+@pytest.mark.parametrize("name", ["none/x.mcap", "file/x.mcap"])
+def test_a_place_that_cannot_be_written_is_said_at_once(tmp_path, name):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(DataError, match="cannot be"):
+        SessionWriter(tmp_path / name, SKIN)
+
+
+def test_a_real_limit_on_the_files_size(tmp_path):
+    """The kernel refuses to write on: the command says so, and the file is readable."""
+    path = tmp_path / "x.mcap"
+    command = "from tomoskin.cli import main; main()"
+    limit = 100_000
+    done = subprocess.run(
+        [sys.executable, "-c", command, "record", str(path), "--source", "twin:fast"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
+    )
+    assert done.returncode == 1
+    assert "the recording has ended" in done.stderr
+    assert "File too large" in done.stderr
+    assert len(frames_in(path)) > 10
+    assert path.stat().st_size <= limit

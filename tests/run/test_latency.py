@@ -1,0 +1,75 @@
+"""Where the age of a picture comes from: stages, and what pages say of themselves."""
+
+import json
+
+import numpy as np
+import pytest
+
+from server.serving import Site
+from server.test_server import ask, first, ready
+from tomoskin.core import Frame
+from tomoskin.run.latency import Latency
+
+STAGES = ["sample", "decode", "reconstruct", "publish", "paint"]
+
+
+def frame(sequence, ticks):
+    return Frame(sequence, ticks, 0.0, 0, 0, 0, np.zeros(1, "<u2"))
+
+
+def test_nothing_is_known_at_first():
+    stages = Latency().stages()
+    assert [stage.name for stage in stages] == STAGES
+    assert all(np.isnan([stage.p50, stage.p99]).all() for stage in stages)
+
+
+def test_scans_are_timed_by_the_device_where_none_is_lost():
+    latency = Latency()
+    for number, ticks in [(0, 0), (1, 100), (2, 200), (5, 900), (6, 1010), (0, 20), (1, 110)]:
+        latency.sampled(frame(number, ticks), 1000.0)
+    (sample, *_) = latency.stages()
+    assert sample.p50 == pytest.approx(0.1)
+    assert 0.1 < sample.p99 <= 0.11
+
+
+def test_of_several_pages_the_slowest_counts_until_it_goes():
+    latency = Latency()
+    latency.painted("a", 0.001, 0.002)
+    latency.painted("b", 0.004, 0.02)
+    assert latency.stages()[-1].p99 == 0.02
+    latency.gone("b")
+    assert latency.stages()[-1].p99 == 0.002
+
+
+@pytest.fixture
+def site(runner, tmp_path):
+    (tmp_path / "index.html").write_text("<title>tomoskin</title>")
+    runner.start()
+    site = Site(runner, tmp_path)
+    yield site
+    site.stop()
+
+
+def test_every_stage_is_told_to_pages_and_programs(site):
+    """The state is sent four times a second; by then the page has said how long it paints."""
+    with site.connect() as page:
+        first(page, ready)
+        ask(page, type="painted", p50_s=0.002, p99_s=0.005)
+        while None in (known := {s["name"]: s["p99_ms"] for s in state(page)["stages"]}).values():
+            pass
+        assert list(known) == STAGES
+        assert known["paint"] == 5.0
+        assert known["reconstruct"] > 0
+        with site.client() as client:
+            told = json.loads(client.get("/status").text)["stages"]
+        assert [stage["name"] for stage in told] == STAGES
+
+
+def state(page):
+    return first(page, "state")
+
+
+def test_an_impossible_time_is_refused(site):
+    with site.connect() as page:
+        ask(page, type="painted", p50_s=-1.0, p99_s=0.005)
+        assert "p50_s" in first(page, "error")["message"]

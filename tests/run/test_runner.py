@@ -1,0 +1,257 @@
+"""The thread between source and pages: newest result, losses, clean ends."""
+
+import errno
+import threading
+from pathlib import Path
+
+import pytest
+
+from run.board import Board
+from tomoskin.core import DataError, SourceError
+from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
+from tomoskin.recording import session_info
+from tomoskin.run import Runner
+from tomoskin.run.events import EventLog
+from tomoskin.run.flow import MOST_AT_ONCE
+from tomoskin.twin import Press
+from tomoskin.wire import Start, Stop
+
+PATIENCE = 60
+
+
+class Watch:
+    """Waits for results, woken by the runner itself."""
+
+    def __init__(self, runner):
+        self._runner = runner
+        self._news = threading.Condition()
+
+    def __call__(self):
+        with self._news:
+            self._news.notify_all()
+
+    def until(self, true):
+        with self._runner.watched_by(self), self._news:
+            assert self._news.wait_for(true, PATIENCE)
+
+
+@pytest.fixture
+def until(runner):
+    return Watch(runner).until
+
+
+def test_results_come_and_the_reference_stands(runner, until):
+    runner.start()
+    until(lambda: runner.newest and runner.newest.result.ready)
+    status = runner.status()
+    assert status.running
+    assert status.problem is None
+    assert status.reference.ready
+    assert status.frames >= REFERENCE_FRAMES
+    assert 0 < status.p50 <= status.p99
+    assert status.source == "board on the table of textile-disc-8"
+
+
+def test_a_source_that_cannot_be_opened_is_said_at_once(prepared):
+    def refuse():
+        raise SourceError("no such port", where="serial:/dev/none")
+
+    with pytest.raises(SourceError, match="no such port"):
+        Runner(prepared, refuse).start()
+
+
+def test_stop_stops_the_board_and_closes_it(runner, board, until):
+    runner.start()
+    until(lambda: runner.newest)
+    runner.stop()
+    assert isinstance(board.commands[-1], Stop)
+    assert board.closed
+    runner.stop()
+
+
+def test_stop_before_start_does_nothing(runner):
+    runner.stop()
+
+
+def test_a_lost_source_is_said_and_opened_again(prepared, idle):
+    boards = [Board(free=idle), SourceError("still away"), Board(free=idle)]
+    left = iter(boards)
+
+    def reopen():
+        found = next(left)
+        if isinstance(found, SourceError):
+            raise found
+        return found
+
+    runner = Runner(prepared, reopen)
+    until = Watch(runner).until
+    runner.start()
+    until(lambda: runner.newest and runner.newest.result.ready)
+    before = runner.newest
+    boards[0].lose()
+    until(lambda: runner.newest is not before and boards[2].scanning.is_set())
+    until(lambda: runner.newest.result.host_time > before.result.host_time)
+    runner.stop()
+    kinds = [event.kind for event in runner.events.since(0)[1]]
+    assert kinds.count("connected") == 2
+    assert kinds.count("source-lost") == 1
+    assert runner.newest.result.ready
+    assert boards[0].closed
+
+
+def test_while_the_source_is_away_it_is_the_problem(runner, board, until):
+    runner.start()
+    until(lambda: runner.newest)
+    board.lose()
+    for _ in range(2):  # what the first try said is known when the second begins
+        assert board.sought.acquire(timeout=PATIENCE)
+    status = runner.status()
+    assert not status.running
+    assert "the port is gone" in status.problem
+
+
+def test_pause_and_reference(runner, until):
+    runner.start()
+    until(lambda: runner.newest and runner.newest.result.ready)
+    first = runner.status().reference.since
+    runner.take_reference()
+    until(lambda: runner.newest.result.ready and runner.status().reference.since != first)
+    runner.pause(True)
+    assert runner.status().paused
+    frames = runner.status().frames
+    runner.pause(False)
+    until(lambda: runner.status().frames > frames)
+
+
+def test_presses_of_all_owners_reach_the_source(runner, board, until):
+    one, two = Press(0, 0, 1, 0.01), Press(0.01, 0, 2, 0.01)
+    runner.start()
+    runner.set_presses("a", (one,))
+    runner.set_presses("b", (two,))
+    until(lambda: set(board.presses) == {one, two} == set(runner.newest.truth))
+    runner.set_presses("a", ())
+    until(lambda: board.presses == (two,))
+    runner.set_presses("b", ())
+    until(lambda: board.presses == () and runner.newest.truth == ())
+
+
+def test_losses_are_counted(prepared, idle):
+    board = Board()
+    runner = Runner(prepared, lambda: board)
+    until = Watch(runner).until
+    runner.start()
+    assert board.scanning.wait(PATIENCE)
+    board.raw(b"\x03abc\x00not a message\x00")
+    board.send(idle)
+    board.send(idle, skip=3, drops=2)
+    until(lambda: runner.status().gaps == 3)
+    until(lambda: runner.newest.result.sequence == 4)
+    status = runner.status()
+    runner.stop()
+    assert status.corrupt == 2
+    assert status.dropped == 2
+    assert any("3 frames lost" in event.text for event in runner.events.since(0)[1])
+
+
+def test_a_backlog_is_skipped_and_counted(prepared, idle):
+    board = Board()
+    runner = Runner(prepared, lambda: board)
+    until = Watch(runner).until
+    runner.start()
+    assert board.scanning.wait(PATIENCE)
+    with board._news:
+        for _ in range(MOST_AT_ONCE + 10):
+            board.send(idle)
+    until(lambda: runner.newest and runner.newest.result.sequence == MOST_AT_ONCE + 9)
+    assert runner.status().dropped == 10
+    runner.stop()
+
+
+def test_a_fault_of_our_own_is_said(runner, until, monkeypatch, caplog):
+    pushed = threading.Event()
+
+    def broken(*_):
+        pushed.set()
+        raise ZeroDivisionError("oh")
+
+    runner.start()
+    until(lambda: runner.newest)
+    monkeypatch.setattr(Pipeline, "push", broken)
+    assert pushed.wait(PATIENCE)
+    runner.stop()
+    status = runner.status()
+    assert not status.running
+    assert "internal error" in status.problem
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_commands_start_with_a_handshake(runner, board, until):
+    runner.start()
+    until(lambda: runner.newest)
+    assert any(isinstance(command, Start) for command in board.commands)
+
+
+def test_the_event_log_is_bounded_and_numbered():
+    log = EventLog(size=3)
+    for n in range(5):
+        log.add(n)
+    assert log.since(0) == (5, (2, 3, 4))
+    assert log.since(4) == (5, (4,))
+    assert log.since(5) == (5, ())
+
+
+class FullPath(type(Path())):
+    """A path on a disk that is full after the file has been made."""
+
+    def open(self, mode="r", buffering=-1, **_):
+        file = super().open(mode, buffering)
+        return NoRoom(file) if "x" in mode else file
+
+
+class NoRoom:
+    """A file with room for 20 kB."""
+
+    def __init__(self, file):
+        self._file = file
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+    def write(self, data):
+        if self._file.tell() + len(data) > 20_000:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return self._file.write(data)
+
+
+def test_a_full_disk_ends_the_recording_but_not_the_run(runner, until, tmp_path):
+    path = FullPath(tmp_path / "x.mcap")
+    runner.record(path)
+    assert runner.status().recording == path
+    runner.start()
+    until(lambda: runner.status().recording is None)
+    before = runner.status().frames
+    until(lambda: runner.status().frames > before + 20)
+    status = runner.status()
+    assert status.running
+    assert status.problem is None
+    events = {event.kind: event.text for event in runner.events.since(0)[1]}
+    assert "No space left" in events["recording-stopped"]
+
+
+def test_a_recording_can_be_ended_and_another_begun(runner, until, tmp_path):
+    runner.start()
+    until(lambda: runner.newest)
+    runner.record(tmp_path / "one.mcap")
+    until(lambda: runner.status().frames > 30)
+    runner.record(tmp_path / "two.mcap")
+    until(lambda: runner.status().frames > 60)
+    runner.stop_recording()
+    assert runner.status().recording is None
+    for name in ("one.mcap", "two.mcap"):
+        assert session_info(tmp_path / name).torn == ""
+        assert session_info(tmp_path / name).frames > 0
+
+
+def test_a_recording_that_cannot_begin_is_said(runner, tmp_path):
+    with pytest.raises(DataError, match="cannot be"):
+        runner.record(tmp_path / "none" / "x.mcap")

@@ -1,0 +1,105 @@
+"""Sinks beside a run: bad ones delay nothing, and everybody can see how they are."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from run.test_runner import PATIENCE, Watch
+from server.serving import Site
+from tomoskin.core import Event, SinkError
+from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
+from tomoskin.run import Runner
+from tomoskin.sink import Moment
+
+FRAMES = 3 * REFERENCE_FRAMES
+
+
+class Sink:
+    """Keeps what it is given, and does to each what the test wants."""
+
+    def __init__(self, name, does=lambda: None):
+        self.name, self.does = name, does
+        self.streams, self.items = [], []
+
+    def open(self, stream):
+        self.streams.append(stream)
+
+    def publish(self, item):
+        self.items.append(item)
+        self.does()
+
+    def close(self):
+        pass
+
+
+def fail():
+    raise SinkError("the peer is gone")
+
+
+@pytest.fixture
+def gate():
+    gate = threading.Event()
+    yield gate
+    gate.set()
+
+
+@pytest.fixture
+def sinks(gate):
+    slow = threading.Semaphore(3)
+    return {
+        "good": Sink("good"),
+        "dead": Sink("dead", fail),
+        "hung": Sink("hung", lambda: gate.wait(PATIENCE)),
+        "slow": Sink("slow", lambda: slow.acquire(timeout=PATIENCE)),
+    }
+
+
+@pytest.fixture
+def runner(prepared, board, sinks, monkeypatch):
+    monkeypatch.setattr("tomoskin.sink.outlet.GRACE", 0.1)
+    runner = Runner(prepared, lambda: board, sinks=tuple(sinks.values()))
+    yield runner
+    runner.stop()
+
+
+def test_bad_sinks_delay_nothing(runner, sinks):
+    runner.start()
+    Watch(runner).until(lambda: runner.status().frames >= FRAMES)
+    assert runner.status().dropped == 0
+    assert len(sinks["hung"].items) == 1
+    runner.stop()
+    good = [item for item in sinks["good"].items if isinstance(item, Moment)]
+    assert [item.sequence for item in good] == list(range(runner.status().frames))
+    assert good[-1].image is None or good[-1].ready
+    assert [item.ready for item in good] == [
+        number >= REFERENCE_FRAMES - 1 for number in range(len(good))
+    ]
+    assert all(len(item.told) == len(item.happened) for item in good)
+    kinds = [item.kind for item in sinks["good"].items if isinstance(item, Event)]
+    assert {"connected", "sink-away"} <= set(kinds)
+    (stream,) = sinks["good"].streams
+    assert stream.source == "board on the table of textile-disc-8"
+
+
+def test_how_they_are_is_said(runner, sinks, gate):
+    runner.start()
+    until = Watch(runner).until
+    until(lambda: any(e.kind == "sink-away" for e in runner.events.since(0)[1]))
+    until(lambda: len(sinks["good"].items) > 3)
+    reports = {report.name: report for report in runner.status().sinks}
+    assert reports["good"].well
+    assert not reports["dead"].well
+    assert reports["dead"].text.startswith("is away: the peer is gone")
+    site = Site(runner)
+    try:
+        with site.client() as client:
+            told = client.get("/status").json()
+        with site.client(entered=False) as stranger:
+            assert stranger.get("/status").status_code == 403
+    finally:
+        site.stop()
+    assert [sink["name"] for sink in told["sinks"]] == list(sinks)
+    assert told["sinks"][1]["text"].startswith("is away")
+    gate.set()

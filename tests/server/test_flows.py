@@ -1,0 +1,363 @@
+"""Files, replays, sources and guided presses, as a page asks for them."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+
+from run.test_runner import Watch
+from server.flowing import flowing
+from tomoskin.calibration import Wiring, read_calibration
+from tomoskin.core import DataError
+from tomoskin.recording import SessionReader, as_recorded, replayed
+from tomoskin.server.folder import Folder
+from tomoskin.server.stage import Stage
+from tomoskin.skin import Skin
+from tomoskin.source import open_source
+from tomoskin.twin import Press
+
+FORCE, RADIUS = 9.0, 0.015
+NAMES = [
+    "../secret.npz",
+    "..",
+    "/etc/passwd",
+    "a/b.npz",
+    "a\\b.npz",
+    ".hidden.npz",
+    "run.mcap\n",
+    "run.txt",
+    "-run.npz",
+    "a\0.npz",
+    "x" * 200 + ".npz",
+    "",
+]
+
+
+@pytest.fixture
+def flows(prepared, tmp_path):
+    (tmp_path / "sessions").mkdir()
+    with flowing(prepared, tmp_path / "sessions") as found:
+        yield found
+
+
+def quick(skin):
+    """Opens a twin that does not wait between frames, the same in each run."""
+    return lambda: open_source("twin:fast,preset=ideal,seed=1", skin)
+
+
+def press_dots(site, page, count):
+    """Press where the dot is, ``count`` times; the last flow message."""
+    for done in range(count):
+        press_dot(site, page, done)
+    return page.told("flow", lambda m: len(m["presses"]) == count and not m["thinking"])
+
+
+def press_dot(site, page, done):
+    told = page.told("flow", lambda m: m.get("phase") == "press" and len(m["presses"]) == done)
+    site.runner.set_presses(page, (Press(*told["dot"], FORCE, RADIUS),))
+    page.told("flow", lambda m: len(m.get("presses", ())) == done + 1)
+    site.runner.set_presses(page, ())
+
+
+# the folder
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_reach_nothing_else(tmp_path, name):
+    inside = tmp_path / "in"
+    inside.mkdir()
+    (tmp_path / "secret.npz").write_bytes(b"secret")
+    with pytest.raises(DataError):
+        Folder(inside).existing(name)
+    with pytest.raises(DataError):
+        Folder(inside).free(name, "")
+
+
+def test_links_and_folders_are_no_files(tmp_path):
+    (tmp_path / "secret.npz").write_bytes(b"secret")
+    inside = tmp_path / "in"
+    inside.mkdir()
+    (inside / "link.npz").symlink_to(tmp_path / "secret.npz")
+    (inside / "folder.npz").mkdir()
+    (inside / "run.mcap").write_bytes(b"run")
+    (inside / "notes.txt").write_bytes(b"not listed")
+    folder = Folder(inside)
+    assert [file.name for file in folder.listed()] == ["run.mcap"]
+    for name in ("link.npz", "folder.npz", "none.npz"):
+        with pytest.raises(DataError, match="no such file"):
+            folder.existing(name)
+    with pytest.raises(DataError, match=r"ends in \.npz"):
+        folder.existing("run.mcap", ".npz")
+    assert folder.existing("run.mcap").read_bytes() == b"run"
+
+
+def test_a_name_that_is_taken_gets_a_number(tmp_path):
+    folder = Folder(tmp_path)
+    for expected in ("run.csv", "run-2.csv", "run-3.csv"):
+        path = folder.free("run", ".csv")
+        assert path.name == expected
+        path.touch()
+
+
+def test_a_folder_that_is_gone_is_said(tmp_path):
+    with pytest.raises(DataError, match="cannot be read"):
+        Folder(tmp_path / "gone").listed()
+
+
+# security
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_request_takes_such_a_name(flows, name):
+    _, page = flows
+    for kind, fields in (("open", {}), ("export", {"format": "npz"}), ("calibration", {})):
+        page.ask(kind, name=name, **fields)
+        assert "not understood" in page.told("error")["message"] or name == "run.txt"
+    page.ask("flow_keep", name=name)
+    page.told("error")
+    page.ask("files")
+    assert page.told("files")["files"] == []
+
+
+def test_the_download_stays_in_the_folder(flows, tmp_path):
+    site, _ = flows
+    (tmp_path / "secret.npz").write_bytes(b"secret")
+    (tmp_path / "sessions" / "a.npz").write_bytes(b"numbers")
+    (tmp_path / "sessions" / "b.npz").symlink_to(tmp_path / "secret.npz")
+    with site.client() as client:
+        answer = client.get("/files/a.npz")
+        assert answer.content == b"numbers"
+        assert answer.headers["content-disposition"] == 'attachment; filename="a.npz"'
+        assert answer.headers["x-content-type-options"] == "nosniff"
+        for name in (
+            "../secret.npz",
+            "..%2Fsecret.npz",
+            "%2e%2e/secret.npz",
+            "b.npz",
+            "none.npz",
+            "%2Fetc%2Fpasswd",
+            "a.npz%00",
+            "...npz",
+        ):
+            answer = client.get(f"/files/{name}")
+            assert answer.status_code == 404, name
+            assert b"secret" not in answer.content
+        rebound = client.get("/files/a.npz", headers={"Host": f"evil.example:{site.port}"})
+        assert rebound.status_code == 403
+    with site.client(entered=False) as client:
+        assert client.get("/files/a.npz").status_code == 403
+
+
+def test_malformed_and_oversized_requests_leave_the_connection(flows):
+    site, page = flows
+    for kind, fields in (
+        ("connect", {"source": 7}),
+        ("connect", {"source": "x" * 300}),
+        ("flow_begin", {"kind": "everything"}),
+        ("export", {"name": "run.mcap", "format": "exe"}),
+        ("note", {"text": "x" * 40_000}),
+        ("files", {"path": "/"}),
+    ):
+        page.ask(kind, **fields)
+        page.told("error")
+    for source in ("serial:/dev/null", "replay:/etc/passwd", "twin:seed=1", "tcp:evil.example"):
+        page.ask("connect", source=source)
+        assert "sources that are listed" in page.told("error")["message"]
+    assert site.runner.source.startswith("twin")
+    page.ask("files")
+    page.told("files")
+
+
+# files, replay, export
+
+
+def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
+    site, page = flows
+    runner = site.runner
+    until = Watch(runner).until
+    until(lambda: runner.newest and runner.newest.result.ready)
+    path = tmp_path / "sessions" / "run.mcap"
+    runner.record(path)
+    page.ask("open", name="run.mcap")
+    assert "still being recorded" in page.told("error")["message"]
+    runner.set_presses(page, (Press(0.03, 0.02, 5.0, 0.015),))
+    until(lambda: runner.newest.result.touches)
+    runner.set_presses(page, ())
+    until(lambda: not runner.newest.result.touches)
+    runner.stop_recording()
+    for form, name in (("touches", "run-touches.csv"), ("npz", "run.npz"), ("npz", "run-2.npz")):
+        page.ask("export", name="run.mcap", format=form)
+        assert page.told("exported")["name"] == name
+    with (tmp_path / "sessions" / "run-touches.csv").open() as file:
+        assert {row["id"] for row in csv.DictReader(file)} == {"1"}
+    page.ask("open", name="run.mcap")
+    assert page.told("scene")["source"] == "textile-disc-8 on replay:run.mcap"
+    assert page.told("timeline")["touches"]
+    page.ask("files")
+    told = page.told("files")
+    assert told["playing"] == "run.mcap"
+    assert {f["name"] for f in told["files"]} >= {"run.mcap", "run.npz", "run-touches.csv"}
+    page.ask("flow_begin", kind="touch")
+    assert "nobody can press a recording" in page.told("error")["message"]
+    page.ask("live")
+    assert page.told("scene")["source"] == "twin of textile-disc-8"
+    assert page.told("state")["replay"] is None
+
+
+def test_a_recording_that_was_named_by_its_path_is_named_by_its_file():
+    assert Stage(None, "replay:/some/where/run.mcap@2,loop").spec == "replay:run.mcap"
+
+
+def test_what_is_no_session_is_said_and_the_source_goes_on(flows, tmp_path):
+    site, page = flows
+    (tmp_path / "sessions" / "bad.mcap").write_bytes(b"no session")
+    for kind, fields in (("open", {}), ("export", {"format": "csv"})):
+        page.ask(kind, name="bad.mcap", **fields)
+        assert "bad.mcap" in page.told("error")["message"]
+    page.ask("live")
+    assert "no recording is being played" in page.told("error")["message"]
+    assert site.runner.source.startswith("twin")
+
+
+# sources
+
+
+def test_a_listed_source_is_connected_and_says_what_it_is(flows):
+    site, page = flows
+    page.ask("sources")
+    told = page.told("sources")
+    assert told["current"] == "twin"
+    assert {"twin", "emulator"} <= {offer["id"] for offer in told["sources"]}
+    first = site.runner.newest
+    page.ask("connect", source="twin")
+    page.told("scene")
+    page.told("state", lambda s: s["reference"]["ready"])
+    assert site.runner.newest is not first
+    page.ask("sources")
+    board = page.told("sources")["board"]
+    assert board["firmware"].count(".") == 2
+    assert board["channels"] >= 8
+
+
+# presses where the dot is
+
+
+@pytest.fixture(scope="module")
+def taught(prepared, tmp_path_factory):
+    """(folder, last message, touches where the first press was, recorded with what was learnt)."""
+    folder = tmp_path_factory.mktemp("taught")
+    with flowing(prepared, folder, opening=quick(prepared.skin)) as (site, page):
+        runner = site.runner
+        until = Watch(runner).until
+        until(lambda: runner.newest and runner.newest.result.ready)
+        page.ask("flow_begin", kind="touch")
+        told = press_dots(site, page, 10)
+        page.ask("flow_keep", name="finger")
+        page.told("flow", lambda m: m["kind"] is None and m["calibration"] == "finger.npz")
+        until(lambda: runner.prepared.locator is not None)
+        runner.record(folder / "run.mcap")
+        runner.set_presses(page, (Press(*told["presses"][0], FORCE, RADIUS),))
+        until(lambda: runner.newest.result.touches)
+        begun = runner.newest.result.sequence
+        until(lambda: runner.newest.result.sequence > begun + 6)
+        last = runner.newest.result.touches
+        runner.stop_recording()
+    return folder, told, last
+
+
+def test_presses_become_a_calibration(taught, prepared):
+    folder, told, last = taught
+    assert told["ready"]
+    assert told["figures"]["median_mm"] < 30
+    assert len(told["figures"]["errors_mm"]) == 10
+    found = read_calibration(folder / "finger.npz")
+    assert found.locator.presses.xy == pytest.approx(np.array(told["presses"]))
+    outline = prepared.skin.outline
+    assert outline.contains(found.locator.presses.xy).all()
+    gaps = np.linalg.norm(found.locator.presses.xy[:, None] - found.locator.presses.xy, axis=-1)
+    assert gaps[np.triu_indices(10, 1)].min() > 0.01
+    (touch,) = last
+    x, y = told["presses"][0]
+    assert np.hypot(touch.reading.x - x, touch.reading.y - y) < 0.015
+    assert touch.reading.sd_x > 0.0005
+
+
+def test_a_run_with_a_calibration_replays_to_the_bit(taught):
+    folder, _, _ = taught
+    with SessionReader(folder / "run.mcap") as session:
+        prepared = as_recorded(session)
+        assert prepared.locator is not None
+        recorded = {item.sequence: item.touches for item in session.touches()}
+        again = {r.sequence: r.touches for r in replayed(prepared, session)}
+    pressed = [number for number, touches in recorded.items() if touches]
+    assert len(pressed) > 3
+    for number in pressed:
+        (was,), (now,) = recorded[number], again[number]
+        assert (was.reading.x, was.reading.y, was.reading.sd_x, was.reading.cov_xy) == (
+            now.reading.x,
+            now.reading.y,
+            now.reading.sd_x,
+            now.reading.cov_xy,
+        )
+
+
+def test_a_calibration_of_the_folder_is_switched_on_and_off(taught, prepared):
+    folder, _, _ = taught
+    with flowing(prepared, folder) as (site, page):
+        until = Watch(site.runner).until
+        page.ask("calibration", name="finger.npz")
+        page.told("flow", lambda m: m["calibration"] == "finger.npz")
+        until(lambda: site.runner.prepared.locator is not None)
+        page.ask("calibration", name=None)
+        page.told("flow", lambda m: m["calibration"] is None)
+        until(lambda: site.runner.prepared.locator is None)
+        page.ask("calibration", name="none.npz")
+        assert "no such file" in page.told("error")["message"]
+        page.ask("calibration", name="run.mcap")
+        assert ".npz" in page.told("error")["message"]
+
+
+def test_a_press_is_taken_back_and_the_flow_left(flows):
+    site, page = flows
+    page.ask("flow_undo")
+    assert "no press" in page.told("error")["message"]
+    page.ask("flow_keep", name="early")
+    assert "nothing has been pressed" in page.told("error")["message"]
+    page.ask("flow_begin", kind="touch")
+    first = press_dots(site, page, 1)["presses"][0]
+    page.ask("flow_keep", name="early")
+    assert "do not tell enough" in page.told("error")["message"]
+    page.ask("flow_undo")
+    told = page.told("flow", lambda m: m["presses"] == [])
+    assert told["dot"] == first
+    page.ask("flow_end")
+    page.told("flow", lambda m: m["kind"] is None)
+
+
+def test_scrambled_wires_are_found_kept_and_applied(prepared, tmp_path):
+    ring = tuple(range(8))
+    wiring = Wiring.as_drawn(8).turned(ring, 3, mirrored=True)
+    scrambled = wiring.applied(prepared.skin)
+    with flowing(prepared, tmp_path, opening=quick(scrambled)) as (
+        site,
+        page,
+    ):
+        runner = site.runner
+        until = Watch(runner).until
+        until(lambda: runner.newest and runner.newest.result.ready)
+        page.ask("flow_begin", kind="wiring")
+        told = press_dots(site, page, 4)
+        assert told["ready"], told["text"]
+        assert told["figures"]["wiring"] == wiring.text(ring)
+        page.ask("flow_keep", name="wired")
+        page.told("scene")
+        saved = Skin.load(tmp_path / "wired.toml")
+        assert saved.electrode_centres == pytest.approx(scrambled.electrode_centres, abs=1e-5)
+        until(lambda: runner.newest and runner.newest.result.ready)
+        runner.set_presses(page, (Press(0.03, 0.05, 5.0, 0.015),))
+        until(lambda: runner.newest.result.touches)
+        until(lambda: runner.newest.result.touches[0].reading.snr > 8)
+        reading = runner.newest.result.touches[0].reading
+        assert np.hypot(reading.x - 0.03, reading.y - 0.05) < 0.02

@@ -1,0 +1,181 @@
+"""Every flow once in real Chromium: line of time, sessions, set-up, wires, touch, a server anew."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from server.looks import look_in_both
+from server.serving import Site
+from server.watching import Watched
+from tomoskin.calibration import read_calibration
+from tomoskin.run import Runner
+from tomoskin.server import kept_token, take_flows
+from tomoskin.skin import Skin
+from tomoskin.source import open_source
+
+pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("sessions")
+
+
+@pytest.fixture(scope="module")
+def site(prepared, folder):
+    runner = Runner(prepared, lambda: open_source("twin", prepared.skin))
+    runner.start()
+    site = Site(runner, folder=folder, take=lambda hub: take_flows(hub, "twin"))
+    yield site
+    site.stop()
+    runner.stop()
+
+
+def looks_right(opened, name):
+    assert look_in_both(opened.page, name) == {}
+
+
+def press_dot(opened, done):
+    """Press with the pointer where the dot is; until the press is taken."""
+    opened.test_id("phase").filter(has_text="Press where").wait_for()
+    box = opened.page.locator(".target .core").bounding_box()
+    opened.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    opened.page.mouse.down()
+    opened.test_id("taken").filter(has_text=f"{done + 1} press").wait_for()
+    opened.page.mouse.up()
+
+
+def guided(opened, kind, count):
+    opened.test_id("open-setup").click()
+    opened.test_id(f"step-{kind}").click()
+    opened.test_id("flow-begin").click()
+    for _ in range(20):
+        opened.page.keyboard.press("+")
+    for done in range(count):
+        press_dot(opened, done)
+    opened.page.wait_for_function(
+        "() => !document.querySelector('[data-testid=flow-keep]').disabled"
+    )
+
+
+def test_a_recording_is_marked_listed_exported_played_and_left(opened, folder):
+    page = opened.page
+    assert opened.test_id("timeline").count() == 0
+    opened.test_id("do-record").click()
+    opened.test_id("state").filter(has_text="Live, recording").wait_for()
+    assert opened.test_id("do-record").get_attribute("aria-pressed") == "true"
+    opened.test_id("timeline").wait_for()
+    opened.press(0.03, 0.02)
+    page.keyboard.press("m")
+    opened.test_id("mark-text").fill("a finger")
+    page.keyboard.press("Enter")
+    opened.page.locator(".track-of-time .note").wait_for()
+    opened.test_id("span").first.wait_for()
+    looks_right(opened, "recording")
+    page.mouse.up()
+    opened.lifted()
+    page.keyboard.press("c")
+    opened.test_id("timeline").wait_for(state="detached")
+    [path] = folder.glob("*.mcap")
+
+    opened.test_id("open-sessions").click()
+    row = opened.test_id("session").filter(has_text=path.name)
+    row.get_by_role("button", name="Export").click()
+    link = opened.test_id(f"get-{path.stem}-touches.csv")
+    link.wait_for()
+    with page.expect_download() as download:
+        link.click()
+    assert download.value.suggested_filename == f"{path.stem}-touches.csv"
+    assert Path(download.value.path()).read_text().startswith("frame,time_s,id,")
+    looks_right(opened, "sessions")
+    _played_and_left(opened, row, path)
+
+
+def _played_and_left(opened, row, path):
+    page = opened.page
+    row.get_by_role("button", name="Play").click()
+    opened.test_id("play").wait_for()
+    opened.until(f"scene.source.endsWith('{path.name}')")
+    opened.test_id("span").first.wait_for()
+    assert page.locator(".track-of-time .note").get_attribute("title").endswith("a finger")
+    opened.test_id("speed").select_option("0.5")
+    opened.test_id("loop").click()
+    page.locator("[data-testid=loop][aria-pressed=true]").wait_for()
+    opened.test_id("loop").click()
+    page.locator("[data-testid=loop][aria-pressed=false]").wait_for()
+    opened.test_id("play").filter(has_text="Hold").click()
+    opened.test_id("play").filter(has_text="Play").wait_for()
+    span = opened.test_id("span").first.bounding_box()
+    track = opened.test_id("track").bounding_box()
+    page.mouse.click(span["x"] + span["width"] / 2, track["y"] + 6)
+    before = opened.read()["sequence"]
+    opened.test_id("step").click()
+    opened.until("last.touches.length === 1")
+    opened.until(f"last.sequence !== {before}")
+    looks_right(opened, "replay")
+    opened.test_id("track").focus()
+    page.keyboard.press("Home")
+    opened.test_id("when").filter(has_text="0:00").wait_for()
+    opened.test_id("go-live").click()
+    opened.test_id("play").wait_for(state="detached")
+    opened.until("scene.source.startsWith('twin')")
+
+
+def test_the_board_says_what_it_is_and_is_connected_anew(opened):
+    opened.test_id("open-setup").click()
+    opened.test_id("board").filter(has_text="Firmware").wait_for()
+    opened.test_id("reference-words").filter(has_text="Stands for").wait_for()
+    opened.page.get_by_role("button", name="open it anew").click()
+    opened.test_id("reference-words").filter(has_text="keep hands off").wait_for()
+    opened.test_id("reference-words").filter(has_text="Stands for").wait_for()
+    opened.test_id("take-reference").click()
+    opened.test_id("reference-words").filter(has_text="keep hands off").wait_for()
+    opened.test_id("reference-words").filter(has_text="Stands for").wait_for()
+    looks_right(opened, "board")
+
+
+def test_touch_is_taught_by_pressing_dots(opened, folder):
+    guided(opened, "touch", 6)
+    opened.test_id("told").filter(has_text="Missed by").wait_for()
+    looks_right(opened, "touch")
+    opened.test_id("flow-keep").click()
+    opened.test_id("calibration").filter(has_text="touch.npz").wait_for()
+    assert len(read_calibration(folder / "touch.npz").locator.presses) == 6
+    opened.press(0.03, 0.03)
+    looks_right(opened, "calibrated")
+    opened.page.mouse.up()
+    opened.lifted()
+
+
+def test_the_wires_are_found_by_pressing_dots(opened, folder):
+    guided(opened, "wiring", 3)
+    opened.test_id("told").filter(has_text="as the skin file says").wait_for()
+    looks_right(opened, "wiring")
+    opened.test_id("flow-keep").click()
+    opened.test_id("flow-begin").wait_for()
+    assert Skin.load(folder / "wired.toml").n_electrodes == 8
+
+
+def test_a_page_finds_a_server_that_was_started_again_with_its_token(
+    browser, site, prepared, tmp_path
+):
+    token = kept_token(tmp_path / "token")
+    first = Site(site.runner, token=token)
+    watched = Watched(browser, first, prepared.mesh)
+    watched.open()
+    first.stop()
+    watched.test_id("state").filter(has_text="Connection lost").wait_for()
+    second = Site(site.runner, token=kept_token(tmp_path / "token"), port=first.port)
+    try:
+        watched.test_id("state").filter(has_text="Live").wait_for()
+    finally:
+        second.stop()
+    third = Site(site.runner, port=first.port)
+    try:
+        watched.test_id("state").filter(has_text="started again and does not know").wait_for()
+        looks_right(watched, "refused")
+    finally:
+        third.stop()
+        watched.context.close()

@@ -1,0 +1,141 @@
+"""The binary message, read back as the page reads it: by offsets, not by our own types."""
+
+import math
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tomoskin.calibration import BendReading
+from tomoskin.core import Image, Reading, Touch
+from tomoskin.pipeline import Result
+from tomoskin.server.frames import encode_result
+from tomoskin.twin import Finger, Press, Probe
+
+HEADER = (
+    *("magic", "sequence", "host_time", "n_cells", "n_meas"),
+    *("n_touches", "n_truth", "flags", "latency_us"),
+)
+
+
+def make(n_cells=5, touches=(), **changes):
+    fields = {
+        "sequence": 7,
+        "host_time": 12.5,
+        "ready": True,
+        "pictured": True,
+        "image": Image(np.linspace(-1, 1, n_cells), "S", "m"),
+        "voltages": np.array([0.1, 0.2, 0.3]),
+        "reference": np.array([0.4, 0.5, 0.6]),
+        "touches": touches,
+        "left_out": 0,
+    }
+    return Result(**(fields | changes))
+
+
+def touch(number, cells, kind="decrease", sd=0.001):
+    reading = Reading(0.01, -0.02, sd, sd, 2e-4, -0.3, np.array(cells))
+    return Touch(number, kind, 10.0, reading)
+
+
+def decode(data):
+    """By the contract's table alone."""
+    head = dict(zip(HEADER, struct.unpack_from("<4sIdIIHHII", data), strict=True))
+    at = 40
+
+    def floats(n):
+        nonlocal at
+        found = struct.unpack_from(f"<{n}f", data, at)
+        at += 4 * n
+        return found
+
+    head["image"] = floats(head["n_cells"])
+    head["voltages"] = floats(head["n_meas"])
+    head["reference"] = floats(head["n_meas"])
+    head["touches"] = []
+    for _ in range(head["n_touches"]):
+        number, kind = struct.unpack_from("<IB", data, at)
+        head["touches"].append((number, kind, *struct.unpack_from("<8f", data, at + 8)))
+        at += 40
+    head["truth"] = [floats(4) for _ in range(head["n_truth"])]
+    if head["flags"] & 8:
+        head["bend"] = struct.unpack_from("<3fI", data, at)
+        at += 16
+    head["labels"] = list(data[at : at + head["n_cells"]])
+    at += math.ceil(head["n_cells"] / 4) * 4
+    assert at == len(data)
+    return head
+
+
+@pytest.mark.parametrize("n_cells", [4, 5, 6, 7])
+def test_round_trip(n_cells):
+    touches = (touch(3, [0, 1]), touch(300, [3], "increase", math.nan))
+    data = encode_result(make(n_cells, touches), [Press(0.5, -0.25, 3.0, 0.015)], 0.00025)
+    found = decode(data)
+    assert found["magic"] == b"TSK1"
+    assert found["sequence"] == 7
+    assert found["host_time"] == 12.5
+    assert found["flags"] == 1
+    assert found["latency_us"] == 250
+    np.testing.assert_allclose(found["image"], np.linspace(-1, 1, n_cells), rtol=1e-6)
+    np.testing.assert_allclose(found["voltages"], [0.1, 0.2, 0.3], rtol=1e-6)
+    np.testing.assert_allclose(found["reference"], [0.4, 0.5, 0.6], rtol=1e-6)
+    first, second = found["touches"]
+    assert first == pytest.approx((3, 0, 0.01, -0.02, 0.001, 0.001, 2e-4, -0.3, 2.5, 0))
+    assert second[:2] == (300, 1)
+    assert math.isnan(second[4])
+    assert found["truth"] == [pytest.approx((0.5, -0.25, 3.0, 0.015))]
+    assert found["labels"] == [1, 1, 0, 2] + [0] * (n_cells - 4)
+
+
+def test_nothing_to_tell():
+    found = decode(encode_result(make(ready=False), [], 0.0))
+    assert found["flags"] == 0
+    assert found["touches"] == found["truth"] == []
+    assert not any(found["labels"])
+
+
+def test_flags():
+    assert decode(encode_result(make(left_out=2), [], 0.0))["flags"] == 0b101
+    assert decode(encode_result(make(left_out=2, pictured=False), [], 0.0))["flags"] == 0b111
+
+
+def test_numbers_that_do_not_fit_are_held_at_their_ends():
+    found = decode(encode_result(make(sequence=2**32 + 5), [], 1e9))
+    assert found["sequence"] == 5
+    assert found["latency_us"] == 2**32 - 1
+    assert decode(encode_result(make(), [], -1.0))["latency_us"] == 0
+
+
+def test_a_touch_says_how_many_it_stands_for():
+    alone, several = touch(1, [0]), touch(2, [1])
+    several = replace(several, reading=replace(several.reading, close=True))
+    merged = replace(touch(3, [2]), merged=(3, 5, 8))
+    data = encode_result(make(5, (alone, several, merged)), [], 0.0)
+    at = len(data) - 8 - 3 * 40
+    assert [data[at + 40 * k + 5] for k in range(3)] == [0, 1, 3]
+
+
+def test_a_touch_carries_its_whole_covariance():
+    first = touch(1, [0])
+    first = replace(first, reading=replace(first.reading, cov_xy=-2e-6))
+    found = decode(encode_result(make(touches=(first,)), [], 0.0))
+    assert found["touches"][0][-1] == pytest.approx(-2e-6)
+
+
+@pytest.mark.parametrize(
+    ("state", "number"), [("idle", 0), ("bend", 1), ("bend and touch", 3), ("unknown", 4)]
+)
+def test_a_bend_goes_before_the_labels(state, number):
+    bend = BendReading(0.5, 0.01, 1.25, state, np.zeros(3))
+    found = decode(encode_result(make(5, (touch(1, [4]),), bend=bend), [], 0.0))
+    assert found["flags"] == 0b1001
+    assert found["bend"] == (0.5, pytest.approx(0.01), 1.25, number)
+    assert found["labels"] == [0, 0, 0, 0, 1]
+
+
+def test_a_probe_of_any_face_is_told_by_its_area():
+    probe = Probe(Finger(), 0.5, -0.25, 3.0, angle=1.0)
+    (told,) = decode(encode_result(make(), [probe], 0.0))["truth"]
+    assert told == pytest.approx((0.5, -0.25, 3.0, math.sqrt(22e-3 * 16e-3) / 2))

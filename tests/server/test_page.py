@@ -1,0 +1,102 @@
+"""The built page in real Chromium, on the real server and the twin."""
+
+import pytest
+
+from run.test_runner import Watch
+from server.serving import Site
+from server.watching import distance
+from tomoskin.run import Runner
+from tomoskin.source import open_source
+
+pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
+
+NEAR = 0.015
+
+
+@pytest.fixture(scope="module")
+def site(prepared):
+    runner = Runner(prepared, lambda: open_source("twin", prepared.skin))
+    runner.start()
+    site = Site(runner)
+    yield site
+    site.stop()
+    runner.stop()
+
+
+def test_it_loads_and_says_that_it_is_live(opened, prepared):
+    assert "(light-touch)" in opened.test_id("alpha").inner_text()
+    state = opened.test_id("state")
+    state.filter(has_text="Live").wait_for()
+    assert "twin of textile-disc-8" in state.inner_text()
+    opened.test_id("touch-list").filter(has_text="Press the sheet").wait_for()
+    assert opened.page.evaluate("window.tomoskin.scene.points.length") == prepared.mesh.points.size
+    assert "token" not in opened.page.url
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0), (-0.04, 0.05), (-0.07, -0.03)])
+def test_a_press_appears_where_it_was_pressed(opened, place):
+    opened.press(*place)
+    opened.until("last.touches.length === 1 && window.tomoskin.last.truths[0].force >= 5")
+    read = opened.read()
+    assert distance([read["truths"][0]["x"], read["truths"][0]["y"]], place) < 0.001
+    assert distance([read["touches"][0]["x"], read["touches"][0]["y"]], place) < NEAR
+    assert read["touches"][0]["kind"] == "decrease"
+    assert distance(opened.extreme(), place) < NEAR
+    opened.test_id("touch-row").first.wait_for()
+    rows = opened.rows()
+    assert len(rows) == 1
+    assert distance(rows[0], place) < NEAR
+    opened.page.mouse.up()
+    opened.lifted()
+    opened.test_id("touch-row").first.wait_for(state="detached")
+
+
+def test_a_press_slides_and_keeps_its_number(opened):
+    opened.press(0.04, 0.0)
+    first = opened.read()["touches"][0]["id"]
+    for step in range(1, 9):
+        opened.move(0.04 - 0.01 * step, 0.005 * step)
+        opened.until(f"last.truths[0].x < {0.041 - 0.01 * step}")
+    opened.until("last.touches[0]?.x < -0.025")
+    read = opened.read()
+    assert [touch["id"] for touch in read["touches"]] == [first]
+    assert distance([read["touches"][0]["x"], read["touches"][0]["y"]], (-0.04, 0.04)) < NEAR
+    opened.page.mouse.up()
+    opened.lifted()
+
+
+def test_several_presses_stay_with_shift_and_escape_lifts_them(opened):
+    places = [(-0.05, 0.0), (0.05, 0.0)]
+    opened.page.keyboard.down("Shift")
+    for count, place in enumerate(places, 1):
+        opened.move(*place)
+        opened.page.mouse.down()
+        opened.until(f"last.truths.length === {count}")
+        opened.until(f"last.truths[{count - 1}].force >= 6")
+        opened.page.mouse.up()
+    opened.page.keyboard.up("Shift")
+    opened.until("last.touches.length === 2")
+    opened.test_id("touch-row").nth(1).wait_for()
+    rows = opened.rows()
+    for place in places:
+        assert min(distance(row, place) for row in rows) < NEAR
+    opened.page.keyboard.press("Escape")
+    opened.lifted()
+
+
+def test_the_reference_and_pause_by_key(opened):
+    opened.page.keyboard.press("r")
+    opened.until("last.referenceReady === false")
+    opened.until("last.referenceReady")
+    opened.page.keyboard.press(" ")
+    opened.test_id("state").filter(has_text="Paused").wait_for()
+    opened.page.keyboard.press(" ")
+    opened.test_id("state").filter(has_text="Live").wait_for()
+
+
+def test_presses_are_lifted_when_the_page_goes(opened):
+    opened.press(0.03, 0.03)
+    runner = opened.site.runner
+    assert runner.newest.truth
+    opened.page.close()
+    Watch(runner).until(lambda: not runner.newest.truth and not runner.newest.result.touches)

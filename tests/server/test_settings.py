@@ -1,0 +1,228 @@
+"""Settings that are changed while the skin is live."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+
+import msgspec
+import numpy as np
+import pytest
+
+from run.board import Board
+from run.test_runner import Watch
+from tomoskin.core import PatternError
+from tomoskin.pattern import named
+from tomoskin.pipeline import colour_limit, prepare, prepare_again
+from tomoskin.recording import SessionReader, replayed
+from tomoskin.run import Runner
+from tomoskin.server import Hub, SettingsDesk
+from tomoskin.server.requests import decode_request
+from tomoskin.server.settings_form import table_of
+
+CHANGES = {
+    "alpha": {"inverse": {"alpha": 0.05}},
+    "prior": {"inverse": {"prior": "laplace"}},
+    "difference": {"inverse": {"difference": "normalised"}},
+    "threshold": {"touch": {"gamma1": 0.8}},
+    "mesh": {"mesh": {"cells": 600}},
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_prepared_again_is_prepared(prepared, change):
+    skin = prepared.skin.altered(change)
+    again, anew = prepare_again(prepared, skin), prepare(skin)
+    np.testing.assert_allclose(again.operator.matrix, anew.operator.matrix, rtol=1e-9)
+    assert again.choice.alpha == pytest.approx(anew.choice.alpha)
+    assert again.skin is skin
+    assert again.segmenter.settings == anew.segmenter.settings
+    assert (again.model is prepared.model) == ("mesh" not in change)
+
+
+class Heard:
+    """A page that keeps what it is told."""
+
+    def __init__(self):
+        self.told = []
+
+    def wake(self):
+        pass
+
+    def post(self, text):
+        self.told.append(msgspec.json.decode(text))
+
+    def last(self, kind):
+        return next((m for m in reversed(self.told) if m["type"] == kind), None)
+
+
+class Office:
+    """A hub with a settings desk and one page, in an event loop of the test's own."""
+
+    def __init__(self, runner, folder):
+        self.runner, self.page = runner, Heard()
+        self.hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
+        self.hub.take(SettingsDesk(self.hub))
+
+    def ask(self, *requests):
+        """Make requests one after the other, each when the one before is done."""
+        asyncio.run(self._ask(requests))
+
+    async def _ask(self, requests):
+        async with self.hub.running():
+            self.hub.join(self.page)
+            for request in requests:
+                self.hub.obey(self.page, decode_request(msgspec.json.encode(request)))
+                while self.page.last("settings")["busy"]:
+                    await asyncio.sleep(0)
+            self.hub.leave(self.page)
+
+
+@pytest.fixture
+def office(runner, tmp_path):
+    runner.start()
+    Watch(runner).until(lambda: runner.newest and runner.newest.result.ready)
+    return Office(runner, tmp_path)
+
+
+def settings(**keys):
+    return {"type": "settings", "changes": keys}
+
+
+def adopted(office, **expected):
+    """Wait until the runner has taken over settings with these inverse values."""
+
+    def same():
+        now = office.runner.prepared.skin.inverse
+        return all(getattr(now, key) == value for key, value in expected.items())
+
+    Watch(office.runner).until(same)
+
+
+def test_alpha_changes_and_the_reference_stands(office):
+    since = office.runner.status().reference_age
+    office.ask(settings(inverse={"alpha": 0.2}))
+    adopted(office, alpha=0.2)
+    assert office.runner.status().choice.rule == "hand"
+    assert office.runner.status().reference_age >= since
+    told = office.page.last("settings")
+    assert told["document"]["inverse"]["alpha"] == 0.2
+    assert told["automatic_alpha"] > 0
+    assert office.page.last("scale")["limit"] > 0
+
+
+def test_undo_and_redo(office):
+    office.ask(settings(touch={"gamma1": 0.7}), settings(inverse={"alpha": 0.3}), {"type": "undo"})
+    adopted(office, alpha="auto")
+    assert office.runner.prepared.skin.touch.gamma1 == 0.7
+    office.ask({"type": "undo"}, {"type": "redo"}, {"type": "redo"}, {"type": "redo"})
+    adopted(office, alpha=0.3)
+    assert office.page.last("settings")["redo"] == 0
+
+
+@pytest.mark.parametrize(
+    ("changes", "section", "key", "words"),
+    [
+        ({"touch": {"gamma1": 2}}, "touch", "gamma1", "expected a number from 0.1 to 0.99, got 2"),
+        ({"inverse": {"alpha": "much"}}, "inverse", "alpha", 'got "much"'),
+        ({"outline": {"shape": "rectangle"}}, "outline", "width", "is missing"),
+        ({"surface": {"file": "/etc/passwd"}}, "surface", "file", "cannot be set from a page"),
+        ({"drive": {"pattern": "skip:99"}}, "drive", None, "expected k from 0 to 6"),
+        ({"mesh": {"cells": 600}}, None, None, "cannot be set to another sheet"),
+        ({"colour": {"hue": 1}}, None, None, "unknown section"),
+    ],
+)
+def test_a_setting_that_cannot_be_is_refused_in_words(office, changes, section, key, words):
+    before = office.runner.prepared
+    office.ask(settings(**changes))
+    told = office.page.last("settings_error")
+    assert (told["section"], told["key"]) == (section, key)
+    assert words in told["message"]
+    assert office.runner.prepared is before
+
+
+def test_another_sheet_opens_the_source_anew(office, idle):
+    opened = []
+
+    def opener(skin):
+        opened.append(skin)
+        return Board(free=idle)
+
+    office.hub.opener = opener
+    office.ask(settings(material={"sheet_resistance": "2 ohm/sq"}))
+    assert opened == [office.runner.prepared.skin]
+    assert office.runner.prepared.skin.conductivity == pytest.approx(0.5)
+    assert office.page.last("scene") is not None
+
+
+def test_saved_and_loaded(office, tmp_path):
+    save = {"type": "save_skin", "name": "mine"}
+    office.ask(settings(inverse={"alpha": 0.2}), save, settings(inverse={"alpha": 0.4}), save)
+    adopted(office, alpha=0.4)
+    assert "alpha = 0.2" in (tmp_path / "mine.toml").read_text()
+    assert "exists" in office.page.last("settings_error")["message"]
+    office.ask({"type": "load_skin", "name": "mine"})
+    adopted(office, alpha=0.2)
+    office.ask(settings(inverse={"alpha": 0.5}), {**save, "replace": True})
+    adopted(office, alpha=0.5)
+    assert "alpha = 0.5" in (tmp_path / "mine.toml").read_text()
+
+
+@pytest.mark.parametrize("name", ["../evil", "/etc/passwd", ".hidden", "a.b", "", "a" * 65, "a\n"])
+def test_names_stay_in_the_folder(name):
+    for kind in ("save_skin", "load_skin"):
+        with pytest.raises(Exception, match="not understood"):
+            decode_request(msgspec.json.encode({"type": kind, "name": name}))
+
+
+def test_a_recording_ends_and_what_it_holds_replays_to_the_bit(prepared, board, tmp_path):
+    seen = []
+    runner = Runner(prepared, lambda: board)
+    path = tmp_path / "before.mcap"
+    runner.record(path)
+    runner.start()
+    with (
+        contextlib.closing(_Stopped(runner)),
+        runner.watched_by(lambda: seen.append(runner.newest.result)),
+    ):
+        until = Watch(runner).until
+        until(lambda: len(seen) > 60)
+        again = prepare_again(prepared, prepared.skin.altered({"inverse": {"alpha": 0.3}}))
+        runner.adopt(again)
+        until(lambda: runner.prepared is again)
+    assert runner.status().recording is None
+    with SessionReader(path) as session:
+        images = [result.image.values for result in replayed(prepared, session)]
+    assert 60 < len(images) <= len(seen)
+    for image, result in zip(images, seen, strict=False):
+        np.testing.assert_array_equal(image, result.image.values)
+
+
+class _Stopped:
+    def __init__(self, runner):
+        self._runner = runner
+
+    def close(self):
+        self._runner.stop()
+
+
+def test_a_named_pattern_is_told_row_by_row(office):
+    office.ask({"type": "pattern", "name": "adjacent+opposite"})
+    told, pattern = office.page.last("pattern"), named("adjacent+opposite", 8)
+    assert told["drive"] == pattern.drive.tolist()
+    assert told["measure"] == pattern.measure.tolist()
+    assert office.page.last("settings")["undo"] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "says"), [("zigzag", "expected a pattern among"), ("skip:7", "expected k from 0 to 6")]
+)
+def test_a_pattern_that_is_not_there_to_be_edited(office, name, says):
+    office.ask({"type": "pattern", "name": name})
+    assert says in office.page.last("settings_error")["message"]
+    assert office.page.last("pattern") is None
+
+
+def test_a_pattern_too_long_to_be_edited():
+    with pytest.raises(PatternError, match=r"at most 2000 rows to edit, got \d{4}"):
+        table_of("all_pairs", 20)
