@@ -85,7 +85,7 @@ def _entry(name: str, text: str, numbers: Mapping[str, float]) -> str:
 </details>
 
 ```
-python examples/{name}.py --out figures
+python examples/{name}.py --out figures --force
 ```
 """
 

@@ -17,7 +17,10 @@ from tomoskin.skin import Skin
 from tomoskin.twin import TwinSettings, TwinSkin
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
-PAGES = ("bodies", "imaging", "interchange", "states", "touch", "touch-fit", "twin", "wiring")
+PAGES = (
+    *("bodies", "imaging", "interchange", "outputs", "states"),
+    *("touch", "touch-fit", "twin", "wiring"),
+)
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 NOISE, DEPTH = 2e-5, 0.25
 

@@ -134,3 +134,20 @@ def test_a_recording_of_another_scan_is_refused(ran, imported, tmp_path):
     other = ran("fig58_single_press").recording
     with pytest.raises(DataError, match="scan"):
         imported("fig54_reference").main(["--source", f"replay:{other}", "--out", str(tmp_path)])
+
+
+def test_a_figure_is_written_over_only_when_that_is_said(imported, tmp_path, monkeypatch, capsys):
+    example, mine = imported("fig31_mesh"), tmp_path / "fig31_mesh.png"
+    mine.write_bytes(b"mine")
+    with monkeypatch.context() as patch:
+        patch.setattr(example, "discretisation_error", lambda *_: pytest.fail("it has begun"))
+        for more in ((), ("--record", str(tmp_path / "frames.npz"), "--force")):
+            with pytest.raises(SystemExit) as end:
+                example.main(["--out", str(tmp_path), *more])
+            assert end.value.code == 2
+    said = capsys.readouterr().err
+    assert "exists already (choose another name, or write over it: --force)" in said
+    assert "expected a name that ends in .mcap (a recording), got frames.npz" in said
+    assert mine.read_bytes() == b"mine"
+    example.main(["--out", str(tmp_path), "--force"])
+    assert mine.read_bytes().startswith(b"\x89PNG")

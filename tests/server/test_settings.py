@@ -14,6 +14,7 @@ from run.test_runner import Watch
 from tomoskin.core import PatternError
 from tomoskin.pattern import named
 from tomoskin.pipeline import colour_limit, prepare, prepare_again
+from tomoskin.core.outputs import MAGIC
 from tomoskin.recording import SessionReader, replayed
 from tomoskin.run import Runner
 from tomoskin.server import Hub, SettingsDesk
@@ -166,6 +167,20 @@ def test_saved_and_loaded(office, tmp_path):
     office.ask(settings(inverse={"alpha": 0.5}), {**save, "replace": True})
     adopted(office, alpha=0.5)
     assert "alpha = 0.5" in (tmp_path / "mine.toml").read_text()
+
+
+def test_saving_replaces_neither_a_recording_nor_what_a_link_leads_to(office, tmp_path):
+    beyond = tmp_path.parent / f"{tmp_path.name}-beyond.toml"
+    beyond.write_text("mine")
+    (tmp_path / "link.toml").symlink_to(beyond)
+    (tmp_path / "run.toml").write_bytes(MAGIC)
+    for name, said in (("link", "is a link"), ("run", "recordings are never written over")):
+        office.ask({"type": "save_skin", "name": name, "replace": True})
+        message = office.page.last("settings_error")["message"]
+        assert said in message
+        assert message.startswith(f"{name}.toml: ")
+    assert beyond.read_text() == "mine"
+    assert (tmp_path / "run.toml").read_bytes() == MAGIC
 
 
 @pytest.mark.parametrize("name", ["../evil", "/etc/passwd", ".hidden", "a.b", "", "a" * 65, "a\n"])

@@ -98,7 +98,8 @@ where there is exactly one press, else NaN; and of each press, NaN or empty wher
 Shards are spread over the machine's processors (`--processes N`), or over machines by Dask
 (`--cluster tcp://HOST:8786`, with `pip install 'tomoskin[cluster]'` and tomoskin on the workers).
 Each shard has a seed of its own, so that the data do not depend on the number of workers. A command
-that was stopped goes on where it was when it is given again; a folder of another set is refused.
+that was stopped goes on where it was when it is given again; files of another set in the folder are
+refused, or with `--force` written over.
 
 Each process first imports the twin and solves the dents of the faces that it draws: 25 for the
 usual presses, 2.5 s of processor time. Then 500 frames of `textile-disc-8` take 0.8 s. 4,000 took
