@@ -13,7 +13,7 @@ SCRIPT = Path(__file__).with_suffix(".js")
 PICTURES = os.environ.get("TOMOSKIN_PICTURES")
 """A folder for pictures of all that is looked at, for a person's eyes."""
 
-SETTLING = 20_000
+SETTLING = 30_000
 """Plots and messages come when they come, ms; only a page that looks wrong takes all of it."""
 
 SCHEMES = ("light", "dark")
