@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomoskin.server.page
 
+import tomoskin.server.page
 from page_stream import chromium, heap, opened, streaming
 from report import Report
 from tomoskin.pipeline import prepare

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import tomoskin.core.archive
 from hypothesis import given
 from hypothesis import strategies as st
 
+import tomoskin.core.archive
 from tomoskin.core import DataError
 from tomoskin.core.archive import load_arrays
 from tomoskin.formats import read_recording

@@ -181,8 +181,8 @@ def test_a_series_asks_for_its_parts_too(tmp_path: Path) -> None:
 # No other way to write.
 
 OWN_WAYS = {
-    "session/written.py": "the way",
-    "session/writer.py": "a session is written while it happens, into a file that must be new",
+    "core/written.py": "the way",
+    "recording/writer.py": "a session is written while it happens, into a file that must be new",
     "emulator/memory.py": "in a temporary folder of its own",
 }
 OPENERS = {"write_text", "write_bytes", "savefig", "savemat", "ParquetWriter", "mkstemp", "File"}

@@ -12,9 +12,9 @@ import pytest
 from run.board import Board
 from run.test_runner import Watch
 from tomoskin.core import PatternError
+from tomoskin.core.outputs import MAGIC
 from tomoskin.pattern import named
 from tomoskin.pipeline import colour_limit, prepare, prepare_again
-from tomoskin.core.outputs import MAGIC
 from tomoskin.recording import SessionReader, replayed
 from tomoskin.run import Runner
 from tomoskin.server import Hub, SettingsDesk

@@ -150,7 +150,7 @@ export interface Press {
   readonly radius: number;
 }
 
-/** Any message to the server, which checks it strictly (live/requests.py). */
+/** Any message to the server, which checks it strictly (server/requests.py). */
 export interface PageMessage {
   readonly type: string;
 }

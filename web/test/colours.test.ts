@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { CHANGE, mapIndex, mapTable, MAP_SIZE } from "../src/colours";
 
-/** Of values against their limit; tests/session/test_colours.py asks the library for the same. */
+/** Of values against their limit; tests/core/test_colours.py asks the library for the same. */
 const KNOWN = {
   light: {
     "-1": "#0858af",

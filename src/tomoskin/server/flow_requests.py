@@ -8,7 +8,7 @@ import msgspec
 from msgspec import Meta
 
 FileName = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,119}\Z")]
-"""Of a file in the session folder: no folder, nothing hidden; ``live/folder.py`` looks again."""
+"""Of a file in the session folder: no folder, nothing hidden; ``server/folder.py`` looks again."""
 
 Stem = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")]
 """Of a file that is to be written, without its ending."""

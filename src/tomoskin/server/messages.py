@@ -1,5 +1,5 @@
-"""The text messages to a page: scene, state, event and error. Requests: ``live/requests.py``,
-frames: ``live/frames.py``."""
+"""The text messages to a page: scene, state, event and error. Requests: ``server/requests.py``,
+frames: ``server/frames.py``."""
 
 from __future__ import annotations
 
