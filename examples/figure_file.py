@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from tomoskin.core import RECORDING, Output, OutputError, check_outputs, written
 
-PICTURE = {".png": "a picture", ".pdf": "a figure", ".svg": "a drawing"}
+PICTURE = {".png": "the figure"}
 
 DOTS = 130
 """Of a picture, an inch."""
@@ -37,13 +37,8 @@ def parser_of(title: str | None) -> argparse.ArgumentParser:
         description=title, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--out", type=Path, default=Path("figures"), help="folder of the figure")
-    add_force(parser)
-    return parser
-
-
-def add_force(parser: argparse.ArgumentParser) -> None:
-    """The option that every example with a figure has."""
     parser.add_argument("--force", action="store_true", help="write over a figure that is there")
+    return parser
 
 
 def chosen(
@@ -58,20 +53,9 @@ def chosen(
     outputs = [Output(options.figure.path, PICTURE, "--out", makes_folders=True)]
     if getattr(options, "record", None):
         outputs.append(Output(options.record, RECORDING, "--record"))
-    check(parser, outputs, overwrite=options.force)
-    options.out.mkdir(parents=True, exist_ok=True)
-    return options
-
-
-def check(
-    parser: argparse.ArgumentParser,
-    outputs: Sequence[Output],
-    inputs: Sequence[Path] = (),
-    *,
-    overwrite: bool,
-) -> None:
-    """End the program with a sentence where something cannot be written."""
     try:
-        check_outputs(outputs, inputs, overwrite=overwrite, consent="--force")
+        check_outputs(outputs, overwrite=options.force, consent="--force")
     except OutputError as error:
         parser.error(str(error))
+    options.out.mkdir(parents=True, exist_ok=True)
+    return options

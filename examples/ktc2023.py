@@ -29,8 +29,16 @@ from scipy.io import loadmat
 from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
-from figure_file import PICTURE, FigureFile, add_force, check
-from tomoskin.core import CHANGE, DataError, FloatArray, Output, TomoskinError
+from tomoskin.core import (
+    CHANGE,
+    DataError,
+    FloatArray,
+    Output,
+    OutputError,
+    TomoskinError,
+    check_outputs,
+    written,
+)
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import AbsoluteImaging, Matern, Observation, ShapeImaging, homogeneous
 from tomoskin.mesh import Disc, ElectrodeArc, Mesh, triangulate
@@ -437,7 +445,7 @@ def scored(sample: Sample, level: int) -> Scored:
     return Scored(sample, level, labels, seconds, (scores[0], scores[1], scores[2]))
 
 
-def draw(results: Sequence[Scored], file: FigureFile) -> None:
+def draw(results: Sequence[Scored], file: Path, *, overwrite: bool) -> None:
     """Labels with the outline of the truth, samples down and levels across."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - an extra
 
@@ -454,7 +462,17 @@ def draw(results: Sequence[Scored], file: FigureFile) -> None:
         tail = f": {r.scores[0]:.2f}" if r.scores else ""
         ax.set_title(f"{r.sample.name}, level {r.level}{tail}", fontsize=8)
         ax.set_axis_off()
-    file.save(made)
+    with written(file, overwrite=overwrite) as part:
+        made.savefig(part, dpi=130)
+
+
+def check_figure(chosen: argparse.Namespace) -> None:
+    """Look where the figure is to go, before anything is segmented; raises OutputError."""
+    folders = [folder for folder in (chosen.data, chosen.truth) if folder]
+    read = [chosen.data, *(file for folder in folders for file in folder.glob("*.mat"))]
+    endings = {".png": "a picture", ".pdf": "a figure", ".svg": "a drawing"}
+    outputs = [Output(chosen.figure, endings, "--figure")] if chosen.figure else []
+    check_outputs(outputs, read, overwrite=chosen.force, consent="--force")
 
 
 def main(arguments: Sequence[str] | None = None) -> list[Scored]:
@@ -464,13 +482,12 @@ def main(arguments: Sequence[str] | None = None) -> list[Scored]:
     parser.add_argument("--truth", type=Path, help="folder of the true pictures")
     parser.add_argument("--level", type=int, nargs="+", default=range(1, 8))
     parser.add_argument("--figure", type=Path)
-    add_force(parser)
+    parser.add_argument("--force", action="store_true", help="write over a figure that is there")
     chosen = parser.parse_args(arguments)
-    if chosen.figure:
-        outputs = [Output(chosen.figure, PICTURE, "--figure")]
-        folders = [folder for folder in (chosen.data, chosen.truth) if folder and folder.is_dir()]
-        read = [file for folder in folders for file in folder.iterdir()]
-        check(parser, outputs, read, overwrite=chosen.force)
+    try:
+        check_figure(chosen)
+    except OutputError as error:
+        parser.error(str(error))
     results = []
     print("sample   level  score  linear  water  seconds")
     for sample in samples(chosen.data, chosen.truth):
@@ -483,7 +500,7 @@ def main(arguments: Sequence[str] | None = None) -> list[Scored]:
     if known:
         print("mean          ", "".join(f"{s:7.3f}" for s in np.mean(known, axis=0)))
     if chosen.figure:
-        draw(results, FigureFile(chosen.figure, chosen.force))
+        draw(results, chosen.figure, overwrite=chosen.force)
     return results
 
 

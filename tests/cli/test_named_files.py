@@ -325,6 +325,7 @@ def commands() -> Iterator[tuple[str, Callable[..., None]]]:
         else:
             prefix = f"{name} "
         for info in app.registered_commands:
+            assert info.callback is not None
             yield prefix + (info.name or info.callback.__name__), info.callback
 
 

@@ -173,7 +173,9 @@ def test_the_linear_method_finds_something(ktc: Any) -> None:
 # Files and bad input.
 
 
-def test_files_of_the_challenge(ktc: Any, tmp_path: Path) -> None:
+def test_files_of_the_challenge(
+    ktc: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     inj, mpat = tables()
     u, u_ref = tank()
     column = {"Inj": inj, "Mpat": mpat}
@@ -191,6 +193,12 @@ def test_files_of_the_challenge(ktc: Any, tmp_path: Path) -> None:
     (result,) = ktc.main(arguments)
     assert result.scores[0] > max(result.scores[1:])
     assert figure.read_bytes().startswith(b"\x89PNG")
+    data = tmp_path / "data1.mat"
+    for refused, said in ((figure, "--force"), (data, "read here and never written over")):
+        with pytest.raises(SystemExit) as end:
+            ktc.main([*arguments[:-1], str(refused)])
+        assert end.value.code == 2
+        assert said in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -26,7 +28,7 @@ def brick() -> Mesh:
     )
 
 
-MESHES = {"disc": disc, "brick": brick}
+MESHES: dict[str, Callable[[], Mesh]] = {"disc": disc, "brick": brick}
 
 
 @pytest.mark.parametrize("order", [1, 2])
