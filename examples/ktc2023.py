@@ -8,8 +8,7 @@ each sample and level where there is a truth, beside a linear method and a pictu
 
 The tank (Räsänen et al., 23 cm across, 32 electrodes) has its own faults, which are measured on
 water: each channel lets some of the common voltage through, and each electrode has its contact
-impedance. What is left is told by how well the redundant rows agree, and enters as noise. Regions
-come from :class:`tomoskin.inverse.ShapeImaging`.
+impedance. Redundant rows tell the noise. :class:`tomoskin.inverse.ShapeImaging` finds the regions.
 """
 
 from __future__ import annotations
@@ -29,16 +28,8 @@ from scipy.io import loadmat
 from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
-from tomoskin.core import (
-    CHANGE,
-    DataError,
-    FloatArray,
-    Output,
-    OutputError,
-    TomoskinError,
-    check_outputs,
-    written,
-)
+from tomoskin import core
+from tomoskin.core import CHANGE, DataError, FloatArray, TomoskinError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import AbsoluteImaging, Matern, Observation, ShapeImaging, homogeneous
 from tomoskin.mesh import Disc, ElectrodeArc, Mesh, triangulate
@@ -462,17 +453,17 @@ def draw(results: Sequence[Scored], file: Path, *, overwrite: bool) -> None:
         tail = f": {r.scores[0]:.2f}" if r.scores else ""
         ax.set_title(f"{r.sample.name}, level {r.level}{tail}", fontsize=8)
         ax.set_axis_off()
-    with written(file, overwrite=overwrite) as part:
+    with core.written(file, overwrite=overwrite) as part:
         made.savefig(part, dpi=130)
 
 
 def check_figure(chosen: argparse.Namespace) -> None:
     """Look where the figure is to go, before anything is segmented; raises OutputError."""
-    folders = [folder for folder in (chosen.data, chosen.truth) if folder]
-    read = [chosen.data, *(file for folder in folders for file in folder.glob("*.mat"))]
+    read = [f for d in (chosen.data, chosen.truth or chosen.data) for f in (d, *d.glob("*.mat"))]
     endings = {".png": "a picture", ".pdf": "a figure", ".svg": "a drawing"}
-    outputs = [Output(chosen.figure, endings, "--figure")] if chosen.figure else []
-    check_outputs(outputs, read, overwrite=chosen.force, consent="--force")
+    if chosen.figure:
+        output = core.Output(chosen.figure, endings, "--figure")
+        core.check_outputs([output], read, overwrite=chosen.force, consent="--force")
 
 
 def main(arguments: Sequence[str] | None = None) -> list[Scored]:
@@ -486,18 +477,16 @@ def main(arguments: Sequence[str] | None = None) -> list[Scored]:
     chosen = parser.parse_args(arguments)
     try:
         check_figure(chosen)
-    except OutputError as error:
+    except core.OutputError as error:
         parser.error(str(error))
-    results = []
+    results: list[Scored] = []
     print("sample   level  score  linear  water  seconds")
     for sample in samples(chosen.data, chosen.truth):
         for level in chosen.level:
-            results.append(scored(sample, level))
-            last = results[-1]
+            results.append(last := scored(sample, level))
             numbers = "".join(f"{s:7.3f}" for s in last.scores or ()) or " " * 21
             print(f"{sample.name:8} {level:5d} {numbers} {last.seconds:8.1f}", flush=True)
-    known = [r.scores for r in results if r.scores]
-    if known:
+    if known := [r.scores for r in results if r.scores]:
         print("mean          ", "".join(f"{s:7.3f}" for s in np.mean(known, axis=0)))
     if chosen.figure:
         draw(results, chosen.figure, overwrite=chosen.force)

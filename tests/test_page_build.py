@@ -137,8 +137,8 @@ def test_builds_once_and_again_when_a_source_changes(page: Any, fake_npm: Path) 
 
 
 def test_a_file_that_the_library_reads_too_is_a_source(page: Any, fake_npm: Path) -> None:
-    (shared,) = (page.package / name for name in page_build.SHARED)
-    shared.parent.mkdir()
+    (shared,) = (page.root / name for name in page_build.SHARED)
+    shared.parent.mkdir(parents=True)
     shared.write_text('{"change": "blue"}')
     page_build.build(page)
     assert page.fresh()
@@ -151,7 +151,7 @@ def test_every_import_from_outside_the_pages_folder_is_a_source() -> None:
     """Or a change there would not be built."""
     page = page_build.Page.of(SCRIPT.parent.parent)
     found = {
-        (file.parent / name).resolve().relative_to(page.package).as_posix()
+        (file.parent / name).resolve().relative_to(page.root).as_posix()
         for file in sorted((page.web / "src").rglob("*.ts*"))
         for name in re.findall(r'from "(\.[^"]*)"', file.read_text(encoding="utf-8"))
         if not (file.parent / name).resolve().is_relative_to(page.web)
@@ -175,7 +175,7 @@ def test_installed_packages_are_no_sources(page: Any) -> None:
 
 @pytest.mark.usefixtures("no_packaged_node")
 def test_a_built_page_needs_no_node(page: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    page.static.mkdir()
+    page.static.mkdir(parents=True)
     (page.static / "index.html").touch()
     page.stamp.write_text(page.digest())
     monkeypatch.setenv("PATH", "")

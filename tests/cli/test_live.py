@@ -75,8 +75,8 @@ def test_it_serves_at_the_printed_address_and_ends_cleanly(start, number):
 @pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
 def test_a_signal_before_it_is_ready_is_a_clean_end_too(number):
     code = (
-        "import os, signal; from tomoskin import live; from tomoskin.cli import main\n"
-        f"live.prepare = lambda skin: os.kill(os.getpid(), signal.{number})\n"
+        "import os, signal; from tomoskin import pipeline; from tomoskin.cli import main\n"
+        f"pipeline.prepare = lambda skin: os.kill(os.getpid(), signal.{number})\n"
         "main(['live', '--port', '0'])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from recording.runs import SKIN, write_all
-from tomoskin import session as room
+from tomoskin import core, formats
 from tomoskin.core import DataError, OutputError, write_text, written
 from tomoskin.pattern import Pattern
 from tomoskin.recording import SessionReader
@@ -113,29 +113,29 @@ def of_session(write: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-def writes(name: str, *arguments: Any) -> Callable[..., None]:
+def writes(write: Callable[..., Any], *arguments: Any) -> Callable[..., None]:
     def run(path: Path, _: Path, **options: Any) -> None:
         given = [argument() if callable(argument) else argument for argument in arguments]
-        getattr(room, name)(path, *given, **options)
+        write(path, *given, **options)
 
     return run
 
 
 WRITERS: dict[str, Callable[..., None]] = {
-    "x.toml": writes("write_text", "text"),
-    "x.npz": writes("save_arrays", {"a": np.ones(2)}),
-    "whole.npz": writes("write_whole", {"a": np.ones(2)}),
-    "interchange.npz": writes("write_interchange", recording),
-    "touches.csv": writes("write_touches", ()),
-    "merit.csv": writes("write_merit_table", {}),
-    "curves.png": writes("write_choices", "none", ()),
-    "x.vtu": writes("write_vtu", SKIN.mesh, {}),
-    "x.pvd": writes("write_series", SKIN.mesh, ()),
-    "x.mat": writes("write_matlab", recording, 1.0, 8),
-    "x.gif": lambda path, _, **options: room.FILMS[".gif"](path, frames(), 10.0, **options),
-    "x.csv": of_session(room.write_csv),
-    "x.parquet": of_session(room.write_parquet),
-    "x.h5": of_session(room.write_hdf5),
+    "x.toml": writes(core.write_text, "text"),
+    "x.npz": writes(core.save_arrays, {"a": np.ones(2)}),
+    "whole.npz": writes(formats.write_whole, {"a": np.ones(2)}),
+    "interchange.npz": writes(formats.write_interchange, recording),
+    "touches.csv": writes(formats.write_touches, ()),
+    "merit.csv": writes(formats.write_merit_table, {}),
+    "curves.png": writes(formats.write_choices, "none", ()),
+    "x.vtu": writes(formats.write_vtu, SKIN.mesh, {}),
+    "x.pvd": writes(formats.write_series, SKIN.mesh, ()),
+    "x.mat": writes(formats.write_matlab, recording, 1.0, 8),
+    "x.gif": lambda path, _, **options: formats.FILMS[".gif"](path, frames(), 10.0, **options),
+    "x.csv": of_session(formats.write_csv),
+    "x.parquet": of_session(formats.write_parquet),
+    "x.h5": of_session(formats.write_hdf5),
 }
 
 
@@ -163,17 +163,17 @@ def test_a_series_asks_for_its_parts_too(tmp_path: Path) -> None:
     part.write_text("mine")
     (tmp_path / "xy_000001.vtu").write_text("another's")
     with pytest.raises(OutputError, match=r"x_000002\.vtu: exists already"):
-        room.write_series(tmp_path / "x.pvd", mesh, iter(moments))
+        formats.write_series(tmp_path / "x.pvd", mesh, iter(moments))
 
     def broken() -> Iterator[tuple[float, np.ndarray]]:
         yield from moments
         raise DataError("half-way")
 
     with pytest.raises(DataError, match="half-way"):
-        room.write_series(tmp_path / "x.pvd", mesh, broken(), overwrite=True)
+        formats.write_series(tmp_path / "x.pvd", mesh, broken(), overwrite=True)
     assert part.read_text() == "mine"
     assert len(list(tmp_path.iterdir())) == 2
-    assert room.write_series(tmp_path / "x.pvd", mesh, moments, overwrite=True) == 2
+    assert formats.write_series(tmp_path / "x.pvd", mesh, moments, overwrite=True) == 2
     assert part.read_text().startswith("<?xml")
     assert len(list(tmp_path.iterdir())) == 4
 
@@ -183,6 +183,7 @@ def test_a_series_asks_for_its_parts_too(tmp_path: Path) -> None:
 OWN_WAYS = {
     "core/written.py": "the way",
     "recording/writer.py": "a session is written while it happens, into a file that must be new",
+    "emulator/program.py": "a lock beside what make builds",
     "emulator/memory.py": "in a temporary folder of its own",
 }
 OPENERS = {"write_text", "write_bytes", "savefig", "savemat", "ParquetWriter", "mkstemp", "File"}

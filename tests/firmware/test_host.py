@@ -158,7 +158,7 @@ def test_a_killed_host_leaves_a_board_that_starts_anew(board):
     first.close()  # no STOP
     with Link(port.open_serial(board.path, None), SCAN, SETTINGS) as link:
         frames, events = frames_of(link, 3)
-        assert [frame.sequence for frame in frames] == [0, 1, 2]
+        assert [frame.sequence for frame in frames[:3]] == [0, 1, 2]
         assert not [e for e in events if isinstance(e, Event) and e.kind == "foreign"]
 
 

@@ -11,7 +11,8 @@ import pytest
 from run.board import pressed, samples_of
 from run.test_replay import Recorded, recorded_touches, same, touches_of
 from run.test_runner import Watch
-from tomoskin import live
+from tomoskin import run as room
+from tomoskin import server
 from tomoskin.calibration import (
     BENDS_FILE,
     BendExamples,
@@ -117,7 +118,7 @@ def test_the_command_line_takes_them_beside_a_calibration(run, calibration, monk
     """The command ends where it has shown a bend, and says so in its last line."""
     runners = []
 
-    class Noted(live.Runner):
+    class Noted(room.Runner):
         def start(self):
             runners.append(self)
             super().start()
@@ -126,8 +127,8 @@ def test_the_command_line_takes_them_beside_a_calibration(run, calibration, monk
         runner = runners[0]
         Watch(runner).until(lambda: runner.status().bend is not None)
 
-    monkeypatch.setattr(live, "Runner", Noted)
-    monkeypatch.setattr(live.Server, "run_on", until_bent)
+    monkeypatch.setattr(room, "Runner", Noted)
+    monkeypatch.setattr(server.Server, "run_on", until_bent)
     source = f"replay:{run}@max"
     with pytest.raises(SystemExit) as end:
         main(["live", "--source", source, "--calibration", str(calibration), "--port", "0",

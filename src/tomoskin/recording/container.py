@@ -10,6 +10,7 @@ import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import IO, BinaryIO
 
+from tomoskin.core import MAGIC
 from tomoskin.recording import mcap
 
 CHUNK_BYTES = 8192
@@ -68,7 +69,7 @@ class ContainerWriter:
         self._records = bytearray(self._schemas + self._channels)
         self._indexes: dict[int, list[tuple[int, int]]] = {}
         self._span: tuple[int, int] | None = None
-        self._write(mcap.MAGIC + mcap.header(library))
+        self._write(MAGIC + mcap.header(library))
 
     @property
     def size(self) -> int:

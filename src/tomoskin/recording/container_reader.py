@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, Self
 
-from tomoskin.core import DataError
+from tomoskin.core import MAGIC, DataError
 from tomoskin.recording import mcap
 from tomoskin.recording.container import SEEK_ROW, SEEK_TABLE
 from tomoskin.recording.parts import (
@@ -152,7 +152,7 @@ class ContainerReader:
             raise self._damaged(end, "the index of the chunks is cut")
 
     def _start(self) -> None:
-        if self._read(0, len(mcap.MAGIC)) != mcap.MAGIC:
+        if self._read(0, len(MAGIC)) != MAGIC:
             raise DataError(
                 "is not an MCAP file",
                 where=self.where,
@@ -163,7 +163,7 @@ class ContainerReader:
         self._end = self.size
         tail = self._read(self.size - mcap.FOOTER_SIZE, mcap.FOOTER_SIZE)
         head = mcap.PREFIX.pack(mcap.FOOTER, mcap.FOOTER_BODY.size)
-        if not (tail.startswith(head) and tail.endswith(mcap.MAGIC)):
+        if not (tail.startswith(head) and tail.endswith(MAGIC)):
             self.torn = "was not ended: the program or the computer stopped while it was written"
             return
         start, offsets, crc = mcap.FOOTER_BODY.unpack_from(tail, len(head))
@@ -173,7 +173,7 @@ class ContainerReader:
 
     def _open_summary(self, start: int, offsets: int, crc: int) -> None:
         where = f"{self.where}, byte {start}"
-        if not len(mcap.MAGIC) <= start <= offsets <= self._end:
+        if not len(MAGIC) <= start <= offsets <= self._end:
             raise DataError("the index is not in the file", where=where, hint=MEND)
         length = self.size - mcap.FOOTER_SIZE + mcap.PREFIX.size + 16 - start
         if crc and crc != self._crc(start, length):
@@ -194,7 +194,7 @@ class ContainerReader:
 
     def _front(self) -> Iterator[tuple[int, int, bytes]]:
         """(opcode, offset, body) of the records before the first chunk."""
-        for opcode, offset, _ in self._records(len(mcap.MAGIC)):
+        for opcode, offset, _ in self._records(len(MAGIC)):
             if opcode == mcap.CHUNK:
                 return
             yield opcode, offset, self._body(offset)
@@ -207,7 +207,7 @@ class ContainerReader:
                     with self._understood(offset):
                         yield Fields(self._body(offset)).numbers("Q")[0]
             return
-        for opcode, offset, _ in self._records(len(mcap.MAGIC)):
+        for opcode, offset, _ in self._records(len(MAGIC)):
             if opcode == mcap.ATTACHMENT:
                 yield offset
 
@@ -217,7 +217,7 @@ class ContainerReader:
 
     def _offset_of(self, since: int) -> int:
         """Where to begin so as to meet everything from ``since`` on."""
-        best = len(mcap.MAGIC)
+        best = len(MAGIC)
         if since <= 0 or not self.whole:
             return best
         for found in self.attachments():

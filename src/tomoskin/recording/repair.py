@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
-from tomoskin.core import DataError, Output, SkinError, check_outputs, written
+from tomoskin.core import MAGIC, DataError, Output, SkinError, check_outputs, written
 from tomoskin.recording import channels, mcap
 from tomoskin.recording.container import SEEK_TABLE, ContainerWriter
 from tomoskin.recording.container_reader import LARGEST
@@ -167,7 +167,7 @@ class _Scan:
 
     def parts(self) -> Iterator[Chunk | Attachment | dict[str, str]]:
         """Every whole chunk, attachment and description, in order."""
-        place = len(mcap.MAGIC) if self._read(0, len(mcap.MAGIC)) == mcap.MAGIC else 0
+        place = len(MAGIC) if self._read(0, len(MAGIC)) == MAGIC else 0
         after = 0
         while place < self.size:
             length = self._length(place)
