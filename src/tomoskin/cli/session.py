@@ -148,8 +148,8 @@ def export(
         if session.torn:
             typer.echo(f"tomoskin: {file}: {session.torn}", err=True)
     series = out.with_suffix(".pvd")  # names the files of a series
-    for path in filter(None, (out, series, touches)):
-        if path.is_file():
+    for path in dict.fromkeys((out, series, touches)):
+        if path is not None and path.is_file():
             typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
 
 
