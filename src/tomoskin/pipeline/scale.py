@@ -22,9 +22,7 @@ def colour_limit(prepared: Prepared) -> float:
     distance = np.linalg.norm(mesh.centroids - middle, axis=1)
     touched = distance <= max(_RADIUS, float(distance.min()))
     change = np.where(touched, -skin.conductivity, 0.0)
-    dv = prepared.model.jacobian(skin.conductivity) @ change
-    if skin.inverse.difference == "normalised":
-        dv = dv / np.abs(prepared.operator.reference)
+    dv = (prepared.problem.jacobian @ change).real
     return _rounded(float(np.abs(prepared.operator(dv).values).max()))
 
 
