@@ -1,6 +1,6 @@
 """Kuopio Tomography Challenge 2023: plastic and metal in a water tank, found without a person.
 
-    python examples/ktc2023.py DATA [--truth FOLDER] [--level N ...] [--figure FILE]
+    python examples/ktc2023.py DATA [--truth FOLDER] [--level N ...] [--figure FILE [--force]]
 
 DATA is a folder of the challenge's files (ref.mat and data1.mat, data2.mat, …) or an .npz with
 the same arrays. Level n leaves out what touches the first 2(n − 1) electrodes. Prints the score of
@@ -475,11 +475,8 @@ def main(arguments: Sequence[str] | None = None) -> list[Scored]:
     parser.add_argument("--figure", type=Path)
     parser.add_argument("--force", action="store_true", help="write over a figure that is there")
     chosen = parser.parse_args(arguments)
-    try:
-        check_figure(chosen)
-    except core.OutputError as error:
-        parser.error(str(error))
-    results: list[Scored] = []
+    check_figure(chosen)
+    results = []
     print("sample   level  score  linear  water  seconds")
     for sample in samples(chosen.data, chosen.truth):
         for level in chosen.level:

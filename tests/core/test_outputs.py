@@ -132,3 +132,14 @@ def test_the_folder_is_there_and_may_be_written_in(
     assert "nothing may be written in" in refusal(Output(tmp_path / "x.csv"))
     monkeypatch.setattr(os, "access", lambda path, mode: False)  # noqa: ARG005
     assert "write-protected" in refusal(Output(mine), overwrite=True)
+
+
+def test_where_the_folder_that_we_are_in_is_gone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    assert "x.csv: cannot be looked at" in refusal(Output(Path("x.csv")))
+    check_outputs([Output(tmp_path / "x.csv")])

@@ -92,6 +92,15 @@ def is_same_file(one: Path, other: Path) -> bool:
     return name == its_name and (folder == its_folder or _is_one_folder(folder, its_folder))
 
 
+def real_path(path: Path) -> Path:
+    """Without links and relative steps; OutputError where the folder that we are in is gone."""
+    try:
+        return Path(os.path.realpath(path))
+    except OSError as error:
+        message = f"cannot be looked at: {error.strerror}"
+        raise OutputError(message, where=str(path), hint="choose another folder") from error
+
+
 Fault = tuple[str, str] | None
 """What was expected and found, and what to do."""
 
@@ -135,7 +144,7 @@ def _fault_of_ending(output: Output) -> Fault:
 
 
 def _fault_of_folder(output: Output) -> Fault:
-    folder = Path(os.path.realpath(output.path)).parent
+    folder = real_path(output.path).parent
     while output.makes_folders and not folder.exists() and folder != folder.parent:
         folder = folder.parent
     if not folder.exists():
@@ -157,7 +166,7 @@ def _is_recording(path: Path) -> bool:
 
 def _parts(path: Path) -> tuple[Path, str]:
     """Folder and name, without links and relative steps; the name without its case."""
-    real = Path(os.path.realpath(path))
+    real = real_path(path)
     return real.parent, real.name.casefold()
 
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tomoskin.core.errors import DataError
-from tomoskin.core.outputs import Output, check_outputs
+from tomoskin.core.outputs import Output, check_outputs, real_path
 
 
 @contextmanager
@@ -28,7 +28,7 @@ def written(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
         When the disk refuses.
     """
     check_outputs([Output(path)], overwrite=overwrite)
-    target = Path(os.path.realpath(path))
+    target = real_path(path)
     part = target.with_name(f".tomoskin-{secrets.token_hex(8)}{target.suffix}")
     try:
         try:
