@@ -27,7 +27,7 @@ test-all: set-up  ## the same, with what is slow
 
 firmware-test: dev  ## the firmware alone: GoogleTest, mutants, host build, emulator
 	@sh scripts/firmware.sh
-	@$(PY) -m pytest tests/firmware tests/emulator tests/wire/test_fuzz.py $(ARGS)
+	@$(PY) -m pytest -m "" tests/firmware tests/emulator tests/wire/test_fuzz.py $(ARGS)
 
 fuzz: dev  ## ten million mutated streams through the parsers of board and host; ten minutes
 	@sh scripts/firmware.sh

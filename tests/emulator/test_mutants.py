@@ -147,12 +147,14 @@ def test_the_real_one_passes(programs: Programs, tmp_path: Path) -> None:
     assert found.watch.resets == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_mutant_does_not(name: str, programs: Programs, tmp_path: Path) -> None:
     found = examine(programs, mutated(MUTANTS[name], tmp_path), tmp_path)
     assert found.wrong, f"nothing noticed: {name}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hang", "longest"),
     [(HANG, WATCHDOG), (STALL, LONGEST_ON)],

@@ -33,12 +33,14 @@ def test_the_numbers_hold_on_other_seeds(imported, name, seed, tmp_path):
     assert imported(name).main(["--seed", str(seed), "--out", str(tmp_path)])
 
 
+@pytest.mark.slow
 def test_on_foam_without_balls_nothing_stiff_is_found(imported):
     example = imported("fig62_palpation")
     bed = example.Bed(1)
     assert example.Palpation(bed.skin)(bed.stages(())) == []
 
 
+@pytest.mark.slow
 def test_balls_elsewhere_are_a_failure(imported, monkeypatch, tmp_path):
     example = imported("fig62_palpation")
     measured = example.Bed.stages
@@ -64,6 +66,7 @@ def test_a_face_that_moves_as_a_whole_changes_nothing(imported):
     assert np.abs(smile - rest).max() > 0.05 * np.abs(rest).max()
 
 
+@pytest.mark.slow
 def test_small_moves_of_electrodes_are_found(imported):
     example = imported("fig64_face")
     moving = example.Moving()

@@ -57,6 +57,7 @@ def test_a_potential_beyond_the_converter_is_no_measurement(imported, tmp_path):
         bench.measure("at the rail")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MEASURED)
 def test_a_recording_gives_the_same_numbers(ran, name, tmp_path):
     run = ran(name)
@@ -64,6 +65,7 @@ def test_a_recording_gives_the_same_numbers(ran, name, tmp_path):
     assert again == run.found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MEASURED)
 def test_the_checks_fail_on_rows_in_a_wrong_order(ran, imported, name, monkeypatch, tmp_path):
     run = ran(name)
@@ -79,6 +81,7 @@ def test_the_checks_fail_on_rows_in_a_wrong_order(ran, imported, name, monkeypat
         run.module.main(["--source", f"replay:{run.recording}", "--out", str(tmp_path)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [n for n in MEASURED if n not in MEASURED[:2]])
 def test_the_checks_fail_where_nothing_is_pressed(ran, imported, name, monkeypatch, tmp_path):
     run = ran(name)
@@ -88,6 +91,7 @@ def test_the_checks_fail_where_nothing_is_pressed(ran, imported, name, monkeypat
         run.module.main(["--out", str(tmp_path)])
 
 
+@pytest.mark.slow
 def test_the_mesh_check_fails_on_another_mesh(imported, tmp_path):
     with pytest.raises(AssertionError, match="triangles"):
         imported("fig31_mesh").main(["--skin", "textile-disc-16", "--out", str(tmp_path)])

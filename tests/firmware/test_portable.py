@@ -108,6 +108,7 @@ def test_the_portable_part_passes_and_is_covered(googletest):
     assert googletest["branch_percent"] >= LEAST_BRANCHES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_mutant_is_caught(name, googletest, tmp_path):
     assert googletest

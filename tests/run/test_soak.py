@@ -10,6 +10,7 @@ import pytest
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 
 
+@pytest.mark.slow
 def test_every_frame_of_a_bad_day_is_accounted_for(tmp_path, monkeypatch: pytest.MonkeyPatch):
     """Line, reboots, unplugging, a cut electrode, a page that sleeps, a sink that hangs."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))

@@ -41,6 +41,7 @@ def test_on_a_coarse_mesh_it_is_its_definition(width: float) -> None:
     np.testing.assert_allclose(Blur(mesh, width)(values), expected, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_on_a_fine_mesh_a_touch_is_averaged_alike() -> None:
     mesh, width = sheet(FINE), 8 * side(sheet(FINE))
     assert (np.sqrt(mesh.volumes) < width / 6).all()

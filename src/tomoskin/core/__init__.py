@@ -3,8 +3,6 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
-from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
 from tomoskin.core.errors import (
     DataError,
     GeometryError,
@@ -19,11 +17,12 @@ from tomoskin.core.errors import (
     WireError,
 )
 from tomoskin.core.outputs import MAGIC, RECORDING, Output, check_outputs
-from tomoskin.core.typed_arrays import electrode_table, numbers, real_numbers, whole_number
 from tomoskin.core.units import DIMENSIONS, parse_quantity
 from tomoskin.core.written import write_text, written
 
 if TYPE_CHECKING:
+    from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
+    from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
     from tomoskin.core.records import (
         ComplexArray,
         Event,
@@ -36,6 +35,24 @@ if TYPE_CHECKING:
         Touch,
         Voltages,
     )
+    from tomoskin.core.typed_arrays import electrode_table, numbers, real_numbers, whole_number
+
+_HOME = {
+    "AMOUNT": "colours",
+    "Arrays": "archive",
+    "CHANGE": "colours",
+    "CHANGE_ON_DARK": "colours",
+    "ColourScale": "colours",
+    "electrode_table": "typed_arrays",
+    "load_arrays": "archive",
+    "numbers": "typed_arrays",
+    "pack_arrays": "archive",
+    "real_numbers": "typed_arrays",
+    "save_arrays": "archive",
+    "unpack_arrays": "archive",
+    "whole_number": "typed_arrays",
+}
+"""Where names live that need numpy, if not in ``records``: loaded when they are first asked for."""
 
 __all__ = [
     "AMOUNT",
@@ -84,7 +101,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    # Records bring numpy with them; the command line needs errors only until a command runs.
+    # numpy comes with them; the command line needs errors only until a command runs.
     if name not in __all__:
         raise AttributeError(f"module 'tomoskin.core' has no attribute {name!r}")
-    return getattr(import_module("tomoskin.core.records"), name)
+    return getattr(import_module(f"tomoskin.core.{_HOME.get(name, 'records')}"), name)
