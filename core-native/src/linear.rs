@@ -8,9 +8,9 @@ use crate::dense::{Matrix, Target, View, add_product};
 use crate::scalar::Scalar;
 
 /// Columns that are eliminated before a product updates the rest.
-const BLOCK: usize = 32;
+const BLOCK: usize = 12;
 /// Up to this size the short loops are faster than products.
-const SMALL: usize = 96;
+const SMALL: usize = 48;
 
 /// Gaussian elimination with row exchanges: replaces B by A⁻¹ B; NaN where A is singular.
 pub fn solve<T: Scalar>(system: &Matrix<T>, rhs: &mut Matrix<T>) {
@@ -22,19 +22,29 @@ pub fn solve<T: Scalar>(system: &Matrix<T>, rhs: &mut Matrix<T>) {
         joined.extend((0..width).map(|j| rhs[(i, j)]));
     }
     let block = if m <= SMALL { m } else { BLOCK };
-    for first in (0..m).step_by(block.max(1)) {
-        let columns = first..m.min(first + block);
+    let blocks = (0..m).step_by(block.max(1)).map(|k| k..m.min(k + block));
+    for columns in blocks.clone() {
         Arch::new().dispatch(Eliminate {
             joined: &mut joined,
             row,
             columns: columns.clone(),
         });
-        subtract_rows(&mut joined, row, columns);
+        subtract(
+            &mut joined,
+            row,
+            columns.clone(),
+            columns.end..m,
+            columns.end,
+        );
     }
-    Arch::new().dispatch(Substitute {
-        joined: &mut joined,
-        row,
-    });
+    for columns in blocks.rev() {
+        Arch::new().dispatch(Substitute {
+            joined: &mut joined,
+            row,
+            columns: columns.clone(),
+        });
+        subtract(&mut joined, row, columns.clone(), 0..columns.start, m);
+    }
     for (i, joined) in joined.chunks_exact(row).enumerate() {
         for (j, &value) in joined[m..].iter().enumerate() {
             rhs[(i, j)] = value;
@@ -42,30 +52,45 @@ pub fn solve<T: Scalar>(system: &Matrix<T>, rhs: &mut Matrix<T>) {
     }
 }
 
-/// Subtracts from the rows below some eliminated columns what these still owe them.
-fn subtract_rows<T: Scalar>(joined: &mut [T], row: usize, columns: Range<usize>) {
-    let (above, below) = joined.split_at_mut(columns.end * row);
-    let count = below.len() / row;
-    if count == 0 {
+/// Subtracts from rows above or below a block, from column `from` on, what they have in the columns
+/// of the block times its rows.
+fn subtract<T: Scalar>(
+    joined: &mut [T],
+    row: usize,
+    block: Range<usize>,
+    rows: Range<usize>,
+    from: usize,
+) {
+    if rows.is_empty() {
         return;
     }
-    let rows = below.chunks_exact(row);
-    let factors: Vec<T> = rows
-        .flat_map(|row| &row[columns.clone()])
-        .copied()
-        .collect();
-    // rows of these are columns of their transposes
-    let target = Target::full(&mut below[columns.end..], row);
+    let mut factors = Vec::with_capacity(rows.len() * block.len());
+    for other in joined[rows.start * row..rows.end * row].chunks_exact(row) {
+        factors.extend_from_slice(&other[block.clone()]);
+    }
+    let (above, below) = joined.split_at_mut(rows.start.max(block.start) * row);
+    let (block_rows, others) = if rows.start < block.start {
+        (&below[from..], &mut above[rows.start * row..])
+    } else {
+        (&above[block.start * row + from..], below)
+    };
+    // by columns, these rows are their transposes
+    let target = Target::full(&mut others[from..], row);
     let left = View {
-        values: &above[columns.start * row + columns.end..],
+        values: block_rows,
         strides: [1, row],
     };
     let right = View {
         values: &factors,
-        strides: [1, columns.len()],
+        strides: [1, block.len()],
     };
-    let size = [row - columns.end, count, columns.len()];
-    add_product(target, -1.0, left, right, size);
+    add_product(
+        target,
+        -1.0,
+        left,
+        right,
+        [row - from, rows.len(), block.len()],
+    );
 }
 
 /// Eliminates some columns: of their own rows all is done, of those below these columns only.
@@ -102,6 +127,9 @@ impl<T: Scalar> WithSimd for Eliminate<'_, T> {
                 reduce(&mut other[k + 1..end], factor, &top[k + 1..end]);
             }
         }
+        if end == row {
+            return;
+        }
         for i in columns.clone() {
             let (above, own) = joined.split_at_mut(i * row);
             let (factors, own) = own[columns.start..row].split_at_mut(end - columns.start);
@@ -112,11 +140,12 @@ impl<T: Scalar> WithSimd for Eliminate<'_, T> {
     }
 }
 
-/// Solves the upper triangle that is left.
+/// Solves a block of the upper triangle that is left.
 struct Substitute<'a, T> {
     /// The system and its right-hand sides, by rows.
     joined: &'a mut [T],
     row: usize,
+    columns: Range<usize>,
 }
 
 impl<T: Scalar> WithSimd for Substitute<'_, T> {
@@ -126,14 +155,14 @@ impl<T: Scalar> WithSimd for Substitute<'_, T> {
     fn with_simd<S: Simd>(self, _: S) {
         let (joined, row) = (self.joined, self.row);
         let m = joined.len() / row;
-        for k in (0..m).rev() {
+        for k in self.columns.clone().rev() {
             let (above, below) = joined.split_at_mut(k * row);
             let inverse = T::ONE / below[k];
             let known = &mut below[m..row];
             for value in known.iter_mut() {
                 *value *= inverse;
             }
-            for other in above.chunks_exact_mut(row) {
+            for other in above[self.columns.start * row..].chunks_exact_mut(row) {
                 let factor = other[k];
                 reduce(&mut other[m..], factor, known);
             }

@@ -53,9 +53,13 @@ impl Panels {
         };
         let tree: Vec<u32> = post.iter().map(moved).collect();
         let order: Vec<u32> = post.iter().map(|&old| order[old as usize]).collect();
-        let counts = column_counts(matrix, &order, &tree);
-        let starts = merged(&tree, &counts);
-        let (below_starts, below) = rows_below(matrix, &order, &starts);
+        let (column_starts, rows) = lower(matrix, &order);
+        let lower = Structure {
+            starts: &column_starts,
+            rows: &rows,
+        };
+        let starts = merged(&tree, &column_counts(lower, &tree));
+        let (below_starts, below) = rows_below(lower, &starts);
         Self {
             order,
             starts,
@@ -84,6 +88,19 @@ pub fn inverse(order: &[u32]) -> Vec<u32> {
         place[old as usize] = new;
     }
     place
+}
+
+/// The structure below the diagonal, in this order; rows of a column in any.
+fn lower(matrix: Structure<'_>, order: &[u32]) -> (Vec<u32>, Vec<u32>) {
+    let place = inverse(order);
+    let mut starts = vec![0];
+    let mut rows = Vec::with_capacity(matrix.rows.len() / 2);
+    for (column, &old) in (0..).zip(order) {
+        let places = matrix.column(old).iter().map(|&row| place[row as usize]);
+        rows.extend(places.filter(|&row| row > column));
+        starts.push(rows.len() as u32);
+    }
+    (starts, rows)
 }
 
 /// For each column, the first row below its diagonal in the factor, by way of shortened paths
@@ -141,9 +158,8 @@ fn postorder(parent: &[u32]) -> Vec<u32> {
 ///
 /// A row of the factor is the subtree whose leaves are among the row's entries in the matrix; paths
 /// from two leaves that follow each other meet at their lowest common ancestor.
-fn column_counts(matrix: Structure<'_>, order: &[u32], parent: &[u32]) -> Vec<u32> {
-    let size = order.len();
-    let place = inverse(order);
+fn column_counts(lower: Structure<'_>, parent: &[u32]) -> Vec<u32> {
+    let size = parent.len();
     let mut first: Vec<u32> = (0..size as u32).collect();
     let mut change = vec![1_i32; size];
     for (node, &up) in parent.iter().enumerate() {
@@ -158,14 +174,12 @@ fn column_counts(matrix: Structure<'_>, order: &[u32], parent: &[u32]) -> Vec<u3
         if up != NONE {
             change[up as usize] -= 1;
         }
-        for &other in matrix.column(order[node as usize]) {
-            let row = place[other as usize] as usize;
-            let last = leaf[row];
-            if row <= node as usize || (last != NONE && last >= first[node as usize]) {
-                continue;
+        for &row in lower.column(node) {
+            let last = std::mem::replace(&mut leaf[row as usize], node);
+            if last != NONE && last >= first[node as usize] {
+                continue; // an ancestor of the last one, no leaf
             }
             change[node as usize] += 1;
-            leaf[row] = node;
             if last != NONE {
                 change[root(&mut ancestor, last) as usize] -= 1;
             }
@@ -253,11 +267,10 @@ fn merged(parent: &[u32], counts: &[u32]) -> Vec<u32> {
 }
 
 /// Rows below each panel: those of its columns and of its children.
-fn rows_below(matrix: Structure<'_>, order: &[u32], starts: &[u32]) -> (Vec<usize>, Vec<u32>) {
-    let place = inverse(order);
+fn rows_below(lower: Structure<'_>, starts: &[u32]) -> (Vec<usize>, Vec<u32>) {
     let n_panels = starts.len() - 1;
-    let mut panel_of = vec![0; order.len()];
-    let mut seen = vec![NONE; order.len()];
+    let mut panel_of = vec![0; lower.size()];
+    let mut seen = vec![NONE; lower.size()];
     let (mut child, mut sibling) = (vec![NONE; n_panels], vec![NONE; n_panels]);
     let (mut below_starts, mut below) = (vec![0], Vec::new());
     for (number, columns) in (0..).zip(starts.windows(2)) {
@@ -270,9 +283,9 @@ fn rows_below(matrix: Structure<'_>, order: &[u32], starts: &[u32]) -> (Vec<usiz
                 below.push(row);
             }
         };
-        for &old in &order[columns[0] as usize..columns[1] as usize] {
-            for &row in matrix.column(old) {
-                add(&mut below, place[row as usize]);
+        for column in columns[0]..columns[1] {
+            for &row in lower.column(column) {
+                add(&mut below, row);
             }
         }
         let mut next = child[number as usize];

@@ -155,15 +155,16 @@ impl Symbolic {
             for j in 0..panel.width {
                 let column = self.order[panel.start + j] as usize;
                 let first = panel.first_value + j * panel.height();
+                let done = scatter.len();
                 for from in column_starts[column]..column_starts[column + 1] {
                     let row = place[rows[from as usize] as usize] as usize;
                     if row >= panel.start + j {
                         scatter.push((first as u32 + row_in_front[row], from));
                     }
                 }
+                scatter[done..].sort_unstable();
             }
         }
-        scatter.sort_unstable();
         Ok(scatter)
     }
 
