@@ -24,7 +24,7 @@ CHECKED = Path(sys.prefix) / ".native-checked.sha256"
 CHECKS = (
     ("fmt", "--check"),
     ("clippy", "--quiet", "--release", "--all-targets", "--", "-D", "warnings"),
-    ("test", "--quiet", "--release"),
+    ("test", "--quiet", "--release", "--no-default-features"),
 )
 
 
@@ -104,7 +104,7 @@ def main() -> int:
     if reason:
         print(f"set-up: no native engine, scipy does its job: {reason}")
         return 0
-    print("set-up: the native engine (some minutes the first time)", flush=True)
+    print("set-up: the native engine (a minute or two the first time)", flush=True)
     try:
         build()
     except subprocess.CalledProcessError as error:
