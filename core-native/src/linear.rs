@@ -12,13 +12,13 @@ const BLOCK: usize = 12;
 /// Up to this size the short loops are faster than products.
 const SMALL: usize = 48;
 
-/// Gaussian elimination with row exchanges: replaces B by A⁻¹ B; NaN where A is singular.
-pub fn solve<T: Scalar>(system: &Matrix<T>, rhs: &mut Matrix<T>) {
+/// Gaussian elimination with row exchanges: replaces B by A⁻¹ B, given Aᵀ; NaN where A is singular.
+pub fn solve<T: Scalar>(transposed: &Matrix<T>, rhs: &mut Matrix<T>) {
     let (m, width) = (rhs.height, rhs.width());
     let row = m + width;
     let mut joined = Vec::with_capacity(m * row);
     for i in 0..m {
-        joined.extend((0..m).map(|j| system[(i, j)]));
+        joined.extend_from_slice(&transposed.values[i * m..(i + 1) * m]);
         joined.extend((0..width).map(|j| rhs[(i, j)]));
     }
     let block = if m <= SMALL { m } else { BLOCK };

@@ -4,6 +4,7 @@
 //! side, in the order of least degree. The difference of what is left on the rim changes the
 //! system there (Woodbury), with the inverse of the base system between the nodes of the rim.
 
+use pulp::bytemuck::fill_zeroes;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::dense::Matrix;
@@ -157,7 +158,7 @@ struct Patch<T> {
     /// Neighbours of each node, a bit for each.
     graph: Vec<u64>,
     degree: Vec<u32>,
-    /// Matrix before and after, lower triangle, row-major.
+    /// Matrix before and after, row-major; of use is the lower triangle only.
     matrix: Vec<[T; 2]>,
     list: Vec<u32>,
     column: Vec<[T; 2]>,
@@ -282,8 +283,11 @@ impl<T: Scalar> Patch<T> {
     /// Fills matrix and graph from the cells.
     fn assemble<B: Lift<T>>(&mut self, cells: &Cells, base: &Base<B>, touch: Touch<'_, T>) {
         let (n, words, k) = (self.nodes.len(), self.words(), cells.per_cell);
-        self.matrix.clear();
-        self.matrix.resize(n * n, [T::ZERO; 2]);
+        let long_enough = self.matrix.len().max(n * n);
+        self.matrix.resize(long_enough, [T::ZERO; 2]);
+        for (i, row) in self.matrix.chunks_exact_mut(n).take(n).enumerate() {
+            fill_zeroes(&mut row[..=i]);
+        }
         self.graph.clear();
         self.graph.resize(n * words, 0);
         let touched = touch.cells.iter().zip(touch.conductivity);
@@ -431,8 +435,9 @@ fn woodbury<T: Scalar, B: Lift<T>>(
     let field = |row: usize, k: usize| -> T { base.fields[nodes[row] as usize * width + k].lift() };
     let fields = Matrix::from_fn(m, width, |row, k| field(row + 1, k) - field(0, k));
 
+    // by rows: both are symmetric, so that (I + A C)ᵀ = I + C A
     let mut system = Matrix::from_fn(m, m, |i, j| if i == j { T::ONE } else { T::ZERO });
-    system.add(1.0, change.view(), between.view(), m);
+    system.add(1.0, between.view(), change.view(), m);
     let mut current = Matrix::zeros(m, width);
     current.add(1.0, change.view(), fields.view(), m);
     solve(&system, &mut current);
