@@ -2,13 +2,13 @@
 
 #[cfg(target_arch = "x86_64")]
 mod assembly;
-mod dense;
+pub mod dense;
 pub mod factor;
 pub mod jacobian;
 mod kernel;
-mod linear;
+pub mod linear;
 mod ordering;
-mod panels;
+pub mod panels;
 pub mod patch;
 #[cfg(feature = "python")]
 mod patches;
@@ -22,4 +22,4 @@ pub mod scalar;
 pub mod solve;
 pub mod symbolic;
 pub mod threads;
-mod tiles;
+pub mod tiles;
