@@ -41,6 +41,7 @@ soak: native  ## an hour of a bad day, compressed: faults, a sleeping page, a ha
 
 bench-docs: native page  ## measure the table of all and the forward engine anew into docs/benchmarks.md; ten minutes
 	@$(PIP) install --require-hashes --requirement requirements/bench.txt  # pyEIT has no wheel
+	@$(PY) scripts/native.py reference
 	@$(VENV)/bin/tomoskin bench --into docs/benchmarks.md
 	@$(VENV)/bin/tomoskin bench forward --into docs/benchmarks.md
 	@$(VENV)/bin/tomoskin bench forward_large --into docs/benchmarks.md

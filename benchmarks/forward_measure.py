@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from importlib import import_module
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 
@@ -76,8 +78,9 @@ def _against_library(model: ForwardModel, sigma: FloatArray) -> dict[str, float]
 def _factor_and_solve(state: State) -> dict[str, Callable[[], object]]:
     """Calls that factorise and solve on ready arrays, and do nothing else.
 
-    ``own`` by our engine; ``faer``, where the native engine is installed, by that library as it
-    comes: minimum degree, panels or not as it finds better, all of it analysed beforehand.
+    ``own`` by our engine; ``faer``, where the native engine was built with it (`make bench-docs`),
+    by that library as it comes: minimum degree, panels or not as it finds better, all of it
+    analysed beforehand.
     """
     model, matrix = state.model, state.model.assembly.matrix
     ready = matrix(state.conductivity, model.contacts)
@@ -85,14 +88,20 @@ def _factor_and_solve(state: State) -> dict[str, Callable[[], object]]:
     rhs = np.zeros((model.assembly.n_unknowns, n_basis))
     rhs[n + np.arange(n_basis), np.arange(n_basis)] = 1.0
     calls = {"own": lambda: model.factorise(ready.values).solve(rhs)}
-    if find_spec("tomoskin_core") is None:
+    reference = _reference()
+    if reference is None:
         return calls
-    from tomoskin_core import Reference
-
-    faer = Reference(len(rhs), ready.indptr, ready.indices, n_basis)
+    faer = reference(len(rhs), ready.indptr, ready.indices, n_basis)
     columns = np.ascontiguousarray(rhs.T)
     _agree(faer.solve(ready.values, columns).T, state.basis, "faer")
     return {**calls, "faer": lambda: faer.solve(ready.values, columns)}
+
+
+def _reference() -> Any:
+    """The class of bare faer, where the native engine was built with it."""
+    if find_spec("tomoskin_core") is None:
+        return None
+    return getattr(import_module("tomoskin_core"), "Reference", None)
 
 
 def _rows(state: State) -> FloatArray:

@@ -44,7 +44,10 @@ class Factor:
 
 @final
 class Reference:
-    """faer's own Cholesky of a real matrix, for benchmarks: minimum degree, one thread."""
+    """faer's own Cholesky of a real matrix, for benchmarks: minimum degree, one thread.
+
+    Only where the engine was built with the feature ``reference``.
+    """
 
     def __new__(
         cls, n: int, indptr: NDArray[np.int32], indices: NDArray[np.int32], n_rhs: int

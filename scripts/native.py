@@ -2,6 +2,7 @@
 
 With the argument ``check``: format, clippy and tests of its sources instead, unless they have
 passed already.
+With ``reference``: the wheel with bare faer in it, which `tomoskin bench forward` compares with.
 
 Without one nothing is built and nothing fails: scipy does the same job more slowly. Standard
 library only; run by the virtual environment's Python, which has maturin and pip.
@@ -10,6 +11,7 @@ library only; run by the virtual environment's Python, which has maturin and pip
 from __future__ import annotations
 
 import hashlib
+import importlib
 import importlib.util
 import shutil
 import subprocess
@@ -24,7 +26,7 @@ CHECKED = Path(sys.prefix) / ".native-checked.sha256"
 CHECKS = (
     ("fmt", "--check"),
     ("clippy", "--quiet", "--release", "--all-targets", "--", "-D", "warnings"),
-    ("test", "--quiet", "--release"),
+    ("test", "--quiet", "--release", "--no-default-features"),
 )
 
 
@@ -57,8 +59,13 @@ def is_fresh() -> bool:
     return STAMP.read_text(encoding="ascii").strip() == sources()
 
 
-def build() -> None:
-    """Build the wheel and install it beside tomoskin.
+def has_reference() -> bool:
+    """Whether the engine that is installed has bare faer in it."""
+    return hasattr(importlib.import_module("tomoskin_core"), "Reference")
+
+
+def build(*features: str) -> None:
+    """Build the wheel, with these features of the crate, and install it beside tomoskin.
 
     Raises
     ------
@@ -69,7 +76,9 @@ def build() -> None:
     with tempfile.TemporaryDirectory() as folder:
         manifest = str(CORE / "Cargo.toml")
         maturin = (python, "-m", "maturin", "build", "--release", "--quiet")
-        subprocess.run([*maturin, "--manifest-path", manifest, "--out", folder], check=True)
+        chosen = ("--features", ",".join(features)) if features else ()
+        words = (*maturin, *chosen, "--manifest-path", manifest, "--out", folder)
+        subprocess.run(words, check=True)
         (wheel,) = Path(folder).glob("*.whl")
         pip = (python, "-m", "pip", "--disable-pip-version-check", "--quiet", "install")
         subprocess.run(
@@ -96,22 +105,35 @@ def check() -> int:
     return 0
 
 
-def main() -> int:
+def install(*features: str) -> int:
     """Build unless fresh or impossible; a build that fails is said, and scipy goes on."""
-    if is_fresh():
+    if is_fresh() and (not features or has_reference()):
         return 0
     reason = why_not()
     if reason:
         print(f"set-up: no native engine, scipy does its job: {reason}")
         return 0
-    print("set-up: the native engine (some minutes the first time)", flush=True)
+    print("set-up: the native engine (a minute or two the first time)", flush=True)
     try:
-        build()
+        build(*features)
     except subprocess.CalledProcessError as error:
         print(f"set-up: the native engine was not built: {error}", file=sys.stderr)
         return 1
     return 0
 
 
+def main(words: list[str]) -> int:
+    """Do what the words ask for."""
+    match words:
+        case ["check"]:
+            return check()
+        case ["reference"]:
+            return install("reference")
+        case []:
+            return install()
+    print(f"native.py: expected nothing, check or reference, got {words}", file=sys.stderr)
+    return 2
+
+
 if __name__ == "__main__":
-    sys.exit(check() if sys.argv[1:] == ["check"] else main())
+    sys.exit(main(sys.argv[1:]))

@@ -46,7 +46,7 @@ def pure(folder: Path) -> tuple[Path, Path]:
 
 
 def fast(folder: Path) -> Path:
-    """Build the native engine's wheel; some minutes the first time."""
+    """Build the native engine's wheel; a minute or two the first time."""
     manifest = str(native.CORE / "Cargo.toml")
     words = ("-m", "maturin", "build", "--release", "--quiet", "--out", str(folder))
     run(sys.executable, *words, "--manifest-path", manifest)

@@ -1,74 +1,170 @@
-//! A small dense system, solved by short loops.
+//! Dense matrices and their products.
 
-use faer::MatMut;
-use pulp::{Simd, WithSimd};
+use std::ops::{Index, IndexMut};
+
+use pulp::Arch;
 
 use crate::scalar::Scalar;
+use crate::tiles::Tiled;
 
-/// Gaussian elimination with row exchanges; NaN where the system is singular.
-pub struct Small<'a, T> {
-    /// (m, m); read only.
-    pub system: MatMut<'a, T>,
-    /// (m, k) right-hand sides; the solution afterwards.
-    pub current: MatMut<'a, T>,
+/// A matrix by columns.
+#[derive(Clone, Debug)]
+pub struct Matrix<T> {
+    /// Column after column.
+    pub values: Vec<T>,
+    /// Number of rows.
+    pub height: usize,
 }
 
-impl<T: Scalar> WithSimd for Small<'_, T> {
-    type Output = ();
+impl<T: Scalar> Matrix<T> {
+    /// All zero.
+    pub fn zeros(height: usize, width: usize) -> Self {
+        let values = vec![T::ZERO; height * width];
+        Self { values, height }
+    }
+
+    /// Entry (i, j) is `entry(i, j)`.
+    pub fn from_fn(height: usize, width: usize, entry: impl Fn(usize, usize) -> T) -> Self {
+        let mut made = Self::zeros(height, width);
+        for (j, column) in made.values.chunks_exact_mut(height.max(1)).enumerate() {
+            for (i, value) in column.iter_mut().enumerate() {
+                *value = entry(i, j);
+            }
+        }
+        made
+    }
+
+    /// Number of columns.
+    pub fn width(&self) -> usize {
+        self.values.len() / self.height.max(1)
+    }
+
+    /// Its entries as an operand.
+    pub fn view(&self) -> View<'_, T> {
+        View {
+            values: &self.values,
+            strides: [1, self.height],
+        }
+    }
+
+    /// Adds `scale` · left · right, `inner` the index that both share.
+    pub fn add(&mut self, scale: f64, left: View<'_, T>, right: View<'_, T>, inner: usize) {
+        let size = [self.height, self.width(), inner];
+        let target = Target::full(&mut self.values, self.height);
+        add_product(target, scale, left, right, size);
+    }
+}
+
+impl<T> Index<(usize, usize)> for Matrix<T> {
+    type Output = T;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let (m, width) = self.current.shape();
-        let row = m + width;
-        let mut joined = vec![T::ZERO; m * row];
-        for (i, joined) in joined.chunks_exact_mut(row).enumerate() {
-            for (j, value) in joined.iter_mut().enumerate() {
-                *value = if j < m {
-                    self.system[(i, j)]
-                } else {
-                    self.current[(i, j - m)]
-                };
-            }
-        }
-        for k in 0..m {
-            let size = |&i: &usize| joined[i * row + k].norm_sqr();
-            let largest = |a: &usize, b: &usize| size(a).total_cmp(&size(b));
-            let pivot = (k..m).max_by(largest).unwrap_or(k);
-            let (above, below) = joined.split_at_mut((k + 1) * row);
-            let top = &mut above[k * row..];
-            if pivot > k {
-                top.swap_with_slice(&mut below[(pivot - k - 1) * row..][..row]);
-            }
-            let inverse = T::ONE / top[k];
-            for other in below.chunks_exact_mut(row) {
-                let factor = other[k] * inverse;
-                reduce(&mut other[k + 1..], factor, &top[k + 1..]);
-            }
-        }
-        for k in (0..m).rev() {
-            let (above, below) = joined.split_at_mut(k * row);
-            let inverse = T::ONE / below[k];
-            let known = &mut below[m..row];
-            for value in known.iter_mut() {
-                *value *= inverse;
-            }
-            for other in above.chunks_exact_mut(row) {
-                let factor = other[k];
-                reduce(&mut other[m..], factor, known);
-            }
-        }
-        let mut current = self.current;
-        for (i, joined) in joined.chunks_exact(row).enumerate() {
-            for (j, &value) in joined[m..].iter().enumerate() {
-                current[(i, j)] = value;
-            }
+    fn index(&self, (i, j): (usize, usize)) -> &T {
+        &self.values[j * self.height + i]
+    }
+}
+
+impl<T> IndexMut<(usize, usize)> for Matrix<T> {
+    #[inline(always)]
+    fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut T {
+        &mut self.values[j * self.height + i]
+    }
+}
+
+/// An operand: entry (i, j) stands at i · strides[0] + j · strides[1].
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a, T> {
+    /// From its first entry on.
+    pub values: &'a [T],
+    /// From row to row, from column to column.
+    pub strides: [usize; 2],
+}
+
+impl<T> View<'_, T> {
+    /// The same entries, rows for columns.
+    pub fn transposed(self) -> Self {
+        let [row, column] = self.strides;
+        Self {
+            values: self.values,
+            strides: [column, row],
         }
     }
 }
 
-#[inline(always)]
-fn reduce<T: Scalar>(row: &mut [T], factor: T, by: &[T]) {
-    for (value, &other) in row.iter_mut().zip(by) {
-        *value -= factor * other;
+/// What a product is added to: entry (i, j) stands at i + j · column.
+pub struct Target<'a, T> {
+    /// From its first entry on.
+    pub values: &'a mut [T],
+    /// From column to column.
+    pub column: usize,
+    /// Whether entries above the diagonal are of no use: most of them stay as they are.
+    pub lower: bool,
+}
+
+impl<'a, T> Target<'a, T> {
+    /// Of which only the lower triangle is of use.
+    pub fn lower(values: &'a mut [T], column: usize) -> Self {
+        Self {
+            values,
+            column,
+            lower: true,
+        }
     }
+
+    /// All of which is of use.
+    pub fn full(values: &'a mut [T], column: usize) -> Self {
+        Self {
+            values,
+            column,
+            lower: false,
+        }
+    }
+}
+
+/// A product to be added, `scale` · left · right, whose sizes have been checked.
+pub struct Product<'a, T> {
+    /// What it is added to.
+    pub target: Target<'a, T>,
+    /// A factor.
+    pub scale: f64,
+    /// Rows by the inner index.
+    pub left: View<'a, T>,
+    /// The inner index by columns.
+    pub right: View<'a, T>,
+    /// Rows, columns, inner index; none is zero.
+    pub size: [usize; 3],
+}
+
+/// Adds `scale` · left · right, of `size` rows, columns and inner index.
+///
+/// # Panics
+/// When an operand or the target is smaller than that.
+pub fn add_product<T: Scalar>(
+    target: Target<'_, T>,
+    scale: f64,
+    left: View<'_, T>,
+    right: View<'_, T>,
+    [m, n, inner]: [usize; 3],
+) {
+    if m * n * inner == 0 {
+        return;
+    }
+    let reach =
+        |[i, j]: [usize; 2], strides: [usize; 2]| (i - 1) * strides[0] + (j - 1) * strides[1];
+    assert!(reach([m, inner], left.strides) < left.values.len());
+    assert!(reach([inner, n], right.strides) < right.values.len());
+    assert!(reach([m, n], [1, target.column]) < target.values.len() && m <= target.column);
+    let product = Product {
+        target,
+        scale,
+        left,
+        right,
+        size: [m, n, inner],
+    };
+    #[cfg(target_arch = "x86_64")]
+    let product = match crate::assembly::add(product) {
+        None => return,
+        Some(left_over) => left_over,
+    };
+    Arch::new().dispatch(Tiled(product));
 }

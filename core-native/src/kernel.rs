@@ -1,15 +1,11 @@
-//! Dense work on one panel: small sizes by short loops, large ones by faer.
+//! Dense work on one panel: small sizes by short loops, large ones by products.
 
-use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par};
-
+use crate::dense::{Target, View, add_product};
 use crate::scalar::Scalar;
 
 /// Columns that are eliminated by short loops before the rest is updated as a whole.
 const BLOCK: usize = 32;
-/// Columns of the update that one product of faer writes, its triangle's waste included.
-const STRIPE: usize = 64;
-/// From this many multiplications on, faer's product is the faster one.
+/// From this many multiplications on, the product is the faster one.
 const LARGE: usize = 16 * 1024;
 
 /// Cholesky factor, without conjugation, of a panel's first rows, and the rows below solved for it.
@@ -22,10 +18,9 @@ pub fn eliminate<T: Scalar>(panel: &mut [T], height: usize, width: usize) -> Res
         eliminate_block(panel, height, first, end)?;
         if end < width {
             let (done, rest) = panel.split_at_mut(end * height);
-            let done = columns(&done[first * height..], height, end - first, end);
-            let top = done.subrows(0, width - end);
-            let rest = MatMut::from_column_major_slice_mut(rest, height, width - end);
-            subtract_product(rest.subrows_mut(end, height - end), done, top);
+            let size = [height - end, width - end, end - first];
+            let target = Target::lower(&mut rest[end..], height);
+            subtract_lower(target, &done[first * height + end..], height, size);
         }
     }
     Ok(())
@@ -63,16 +58,8 @@ pub fn subtract_square<T: Scalar>(update: &mut [T], panel: &[T], height: usize, 
         }
         return;
     }
-    let below = columns(panel, height, width, width);
-    let mut rest = MatMut::from_column_major_slice_mut(update, size, size);
-    for first in (0..size).step_by(STRIPE) {
-        let count = STRIPE.min(size - first);
-        let target = rest
-            .as_mut()
-            .submatrix_mut(first, first, size - first, count);
-        let rows = below.subrows(first, size - first);
-        subtract_product(target, rows, rows.subrows(0, count));
-    }
+    let target = Target::lower(update, size);
+    subtract_lower(target, &panel[width..], height, [size, size, width]);
 }
 
 /// Subtracts, from a target that begins at row `from`, the columns times their entries in `row`.
@@ -113,19 +100,11 @@ fn subtract_some<const K: usize, T: Scalar>(
     }
 }
 
-/// Rows from `from` on of column-major columns.
-fn columns<T: Scalar>(values: &[T], height: usize, width: usize, from: usize) -> MatRef<'_, T> {
-    MatRef::from_column_major_slice(&values[..height * width], height, width)
-        .subrows(from, height - from)
-}
-
-fn subtract_product<T: Scalar>(target: MatMut<'_, T>, left: MatRef<'_, T>, right: MatRef<'_, T>) {
-    matmul(
-        target,
-        Accum::Add,
-        left,
-        right.transpose(),
-        -T::ONE,
-        Par::Seq,
-    );
+/// Subtracts L (first rows of L)ᵀ below the diagonal; `size`: rows, columns, columns of L.
+fn subtract_lower<T: Scalar>(target: Target<'_, T>, rows: &[T], height: usize, size: [usize; 3]) {
+    let rows = View {
+        values: rows,
+        strides: [1, height],
+    };
+    add_product(target, -1.0, rows, rows.transposed(), size);
 }

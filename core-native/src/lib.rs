@@ -1,17 +1,25 @@
 //! Sparse Cholesky factors and Jacobian rows for tomoskin.
 
-mod dense;
+#[cfg(target_arch = "x86_64")]
+mod assembly;
+pub mod dense;
 pub mod factor;
 pub mod jacobian;
 mod kernel;
+pub mod linear;
 mod ordering;
+pub mod panels;
 pub mod patch;
+#[cfg(feature = "python")]
 mod patches;
 pub mod product;
+#[cfg(feature = "python")]
 mod python;
-pub mod reference;
+#[cfg(feature = "reference")]
+mod reference;
 pub mod residual;
 pub mod scalar;
 pub mod solve;
 pub mod symbolic;
 pub mod threads;
+pub mod tiles;

@@ -1,21 +1,13 @@
 //! Ordering of the unknowns and symbolic analysis: once per mesh.
 //!
-//! Minimum degree (faer's AMD) is quick, and as good as nested dissection on small sheets. Large
+//! Minimum degree (AMD) is quick, and as good as nested dissection on small sheets. Large
 //! sheets and volumes fill in more: there nested dissection saves half of the work or more.
 
-use faer::Side;
-use faer::perm::PermRef;
-use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
-    factorize_symbolic_cholesky,
-};
-use faer::sparse::linalg::{SupernodalThreshold, SymbolicSupernodalParams};
+use feral_amd::amd_order;
 use feral_metis::metis_order;
-use feral_ordering_core::CscPattern;
+use feral_ordering_core::{CscPattern, OrderingError};
 
-/// Adjacent panels are merged up to this many columns with up to this part of zeros.
-const MERGE: &[(usize, f64)] = &[(2, 1.0), (8, 0.5), (32, 0.1), (usize::MAX, 0.02)];
+use crate::panels::{Panels, Structure};
 
 /// Multiplications per unknown in a factorisation from which nested dissection is tried: sheets of
 /// 50 000 triangles have some 3000. It takes 10 µs per unknown, which 20 solves on such a sheet, or
@@ -26,74 +18,44 @@ const COSTLY: f64 = 2000.0;
 ///
 /// # Errors
 /// When the arrays are no such structure, or the factor is too large to index.
-pub fn analyse(
-    size: usize,
-    column_starts: &[u32],
-    rows: &[u32],
-) -> Result<SymbolicCholesky<u32>, String> {
+pub fn analyse(size: usize, column_starts: &[u32], rows: &[u32]) -> Result<Panels, String> {
     check(size, column_starts, rows)?;
-    let matrix =
-        SymbolicSparseColMatRef::new_unsorted_checked(size, size, column_starts, None, rows);
-    let analysis = with_ordering(matrix, SymmetricOrdering::Amd)?;
-    if multiplications(&analysis) < COSTLY * size as f64 {
-        return Ok(analysis);
+    let matrix = Structure {
+        starts: column_starts,
+        rows,
+    };
+    let order = ordered(matrix, amd_order)
+        .ok_or_else(|| "the structure has too many entries to order".to_owned())?;
+    let panels = Panels::new(matrix, &order);
+    if panels.multiplications() < COSTLY * size as f64 {
+        return Ok(panels);
     }
-    let Some(order) = dissect(size, column_starts, rows) else {
-        return Ok(analysis);
+    let Some(order) = ordered(matrix, metis_order) else {
+        return Ok(panels);
     };
-    let mut place = vec![0; size];
-    for (new, &old) in order.iter().enumerate() {
-        place[old as usize] = new as u32;
-    }
-    let order = PermRef::new_checked(&order, &place, size);
-    let dissected = with_ordering(matrix, SymmetricOrdering::Custom(order))?;
-    let pays = multiplications(&dissected) < multiplications(&analysis);
-    Ok(if pays { dissected } else { analysis })
+    let dissected = Panels::new(matrix, &order);
+    let pays = dissected.multiplications() < panels.multiplications();
+    Ok(if pays { dissected } else { panels })
 }
 
-fn with_ordering(
-    matrix: SymbolicSparseColMatRef<'_, u32>,
-    ordering: SymmetricOrdering<'_, u32>,
-) -> Result<SymbolicCholesky<u32>, String> {
-    let params = CholeskySymbolicParams {
-        // below zero: a diagonal matrix, too, gets panels
-        supernodal_flop_ratio_threshold: SupernodalThreshold(-1.0),
-        supernodal_params: SymbolicSupernodalParams { relax: Some(MERGE) },
-        ..Default::default()
-    };
-    factorize_symbolic_cholesky(matrix, Side::Lower, ordering, params)
-        .map_err(|error| format!("the symbolic analysis failed: {error:?}"))
-}
-
-fn multiplications(analysis: &SymbolicCholesky<u32>) -> f64 {
-    let SymbolicCholeskyRaw::Supernodal(panels) = analysis.raw() else {
-        return 0.0;
-    };
-    let ends = panels.supernode_begin().iter().zip(panels.supernode_end());
-    let panels = ends.enumerate().map(|(number, (&begin, &end))| {
-        let below = panels.supernode(number).pattern().len() as f64;
-        let width = f64::from(end - begin);
-        // Σ (below + j)² / 2 over the columns j, as an integral
-        ((below + width).powi(3) - below.powi(3)) / 6.0
-    });
-    panels.sum()
-}
-
-/// Nested dissection; `None` where it finds no order of all unknowns.
-fn dissect(size: usize, column_starts: &[u32], rows: &[u32]) -> Option<Vec<u32>> {
+/// The order that `method` finds; `None` where it is not one of all unknowns.
+fn ordered(
+    matrix: Structure<'_>,
+    method: impl Fn(&CscPattern<'_>) -> Result<Vec<i32>, OrderingError>,
+) -> Option<Vec<u32>> {
     let signed = |part: &[u32]| {
         part.iter()
             .map(|&v| i32::try_from(v).ok())
-            .collect::<Option<_>>()
+            .collect::<Option<Vec<i32>>>()
     };
-    let (starts, rows): (Vec<i32>, Vec<i32>) = (signed(column_starts)?, signed(rows)?);
-    let order = metis_order(&CscPattern::new(size, &starts, &rows)?).ok()?;
+    let (size, starts, rows) = (matrix.size(), signed(matrix.starts)?, signed(matrix.rows)?);
+    let order = method(&CscPattern::new(size, &starts, &rows)?).ok()?;
     let mut seen = vec![false; size];
     for &old in &order {
         *seen.get_mut(usize::try_from(old).ok()?)? = true;
     }
     let whole = order.len() == size && seen.iter().all(|&seen| seen);
-    whole.then(|| order.iter().map(|&old| old as u32).collect())
+    whole.then(|| order.iter().map(|&old| old.cast_unsigned()).collect())
 }
 
 /// Checks that the arrays hold the whole structure of a symmetric matrix, rows ascending.

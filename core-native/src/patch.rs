@@ -4,16 +4,12 @@
 //! side, in the order of least degree. The difference of what is left on the rim changes the
 //! system there (Woodbury), with the inverse of the base system between the nodes of the rim.
 
-use faer::linalg::matmul::matmul;
-use faer::linalg::solvers::{PartialPivLu, Solve};
-use faer::{Accum, Mat, MatRef, Par};
+use pulp::bytemuck::fill_zeroes;
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::dense::Small;
-use crate::scalar::Scalar;
-
-/// Up to this size short loops solve a dense system faster than faer.
-const SMALL: usize = 96;
+use crate::dense::Matrix;
+use crate::linear::solve;
+use crate::scalar::{Scalar, c64};
 
 /// A number of a base state as one of a changed state, which may be complex where the base is not.
 pub trait Lift<T>: Scalar {
@@ -28,10 +24,10 @@ impl<T: Scalar> Lift<T> for T {
     }
 }
 
-impl Lift<faer::c64> for f64 {
+impl Lift<c64> for f64 {
     #[inline(always)]
-    fn lift(self) -> faer::c64 {
-        faer::c64::new(self, 0.0)
+    fn lift(self) -> c64 {
+        c64::new(self, 0.0)
     }
 }
 
@@ -162,7 +158,7 @@ struct Patch<T> {
     /// Neighbours of each node, a bit for each.
     graph: Vec<u64>,
     degree: Vec<u32>,
-    /// Matrix before and after, lower triangle, row-major.
+    /// Matrix before and after, row-major; of use is the lower triangle only.
     matrix: Vec<[T; 2]>,
     list: Vec<u32>,
     column: Vec<[T; 2]>,
@@ -287,8 +283,11 @@ impl<T: Scalar> Patch<T> {
     /// Fills matrix and graph from the cells.
     fn assemble<B: Lift<T>>(&mut self, cells: &Cells, base: &Base<B>, touch: Touch<'_, T>) {
         let (n, words, k) = (self.nodes.len(), self.words(), cells.per_cell);
-        self.matrix.clear();
-        self.matrix.resize(n * n, [T::ZERO; 2]);
+        let long_enough = self.matrix.len().max(n * n);
+        self.matrix.resize(long_enough, [T::ZERO; 2]);
+        for (i, row) in self.matrix.chunks_exact_mut(n).take(n).enumerate() {
+            fill_zeroes(&mut row[..=i]);
+        }
         self.graph.clear();
         self.graph.resize(n * words, 0);
         let touched = touch.cells.iter().zip(touch.conductivity);
@@ -372,9 +371,9 @@ impl<T: Scalar> Patch<T> {
 impl<T: Scalar> Patch<T> {
     /// The change of the system on the rim without its first node, and the current that leaks
     /// from each of the others.
-    fn change(&self) -> (Mat<T>, Vec<T>) {
+    fn change(&self) -> (Matrix<T>, Vec<T>) {
         let (n, m) = (self.nodes.len(), self.rim.len() - 1);
-        let mut change = Mat::zeros(m, m);
+        let mut change = Matrix::zeros(m, m);
         let mut leak = vec![T::ZERO; m + 1];
         for (i, &row) in self.rim.iter().enumerate() {
             // The rim's numbers ascend, so that this is the lower triangle.
@@ -434,27 +433,24 @@ fn woodbury<T: Scalar, B: Lift<T>>(
     let (change, leak) = patch.change();
     let between = between(nodes, base);
     let field = |row: usize, k: usize| -> T { base.fields[nodes[row] as usize * width + k].lift() };
-    let fields = Mat::from_fn(m, width, |row, k| field(row + 1, k) - field(0, k));
+    let fields = Matrix::from_fn(m, width, |row, k| field(row + 1, k) - field(0, k));
 
-    let mut system = Mat::identity(m, m);
-    add(&mut system, change.as_ref(), between.as_ref(), T::ONE);
-    let mut current = Mat::zeros(m, width);
-    add(&mut current, change.as_ref(), fields.as_ref(), T::ONE);
-    if m <= SMALL {
-        let (system, current) = (system.as_mut(), current.as_mut());
-        Arch::new().dispatch(Small { system, current });
-    } else {
-        PartialPivLu::new(system.as_ref()).solve_in_place(current.as_mut());
-    }
+    // by rows: both are symmetric, so that (I + A C)ᵀ = I + C A
+    let mut system = Matrix::from_fn(m, m, |i, j| if i == j { T::ONE } else { T::ZERO });
+    system.add(1.0, between.view(), change.view(), m);
+    let mut current = Matrix::zeros(m, width);
+    current.add(1.0, change.view(), fields.view(), m);
+    solve(&system, &mut current);
     let mut changed = fields.clone();
-    add(&mut changed, between.as_ref(), current.as_ref(), -T::ONE);
-    let mut residual = Mat::from_fn(m, width, |i, k| leak[i] * changed[(i, k)] - current[(i, k)]);
-    add(&mut residual, change.as_ref(), changed.as_ref(), T::ONE);
+    changed.add(-1.0, between.view(), current.view(), m);
+    let mut residual =
+        Matrix::from_fn(m, width, |i, k| leak[i] * changed[(i, k)] - current[(i, k)]);
+    residual.add(1.0, change.view(), changed.view(), m);
 
-    let mut result = Mat::zeros(width, width);
-    add(&mut result, fields.transpose(), current.as_ref(), T::ONE);
-    let mut lost = Mat::zeros(width, width);
-    add(&mut lost, changed.transpose(), residual.as_ref(), T::ONE);
+    let mut result = Matrix::zeros(width, width);
+    result.add(1.0, fields.view().transposed(), current.view(), m);
+    let mut lost = Matrix::zeros(width, width);
+    lost.add(1.0, changed.view().transposed(), residual.view(), m);
     for i in 0..width {
         for j in 0..width {
             out.grounded[i * width + j] -= result[(i, j)];
@@ -464,7 +460,7 @@ fn woodbury<T: Scalar, B: Lift<T>>(
 }
 
 /// The inverse of the base system between the rim's nodes, against the first; it is symmetric.
-fn between<T: Scalar, B: Lift<T>>(nodes: &[u32], base: &Base<B>) -> Mat<T> {
+fn between<T: Scalar, B: Lift<T>>(nodes: &[u32], base: &Base<B>) -> Matrix<T> {
     let m = nodes.len() - 1;
     let origin = base.columns[nodes[0] as usize]
         .as_deref()
@@ -473,7 +469,7 @@ fn between<T: Scalar, B: Lift<T>>(nodes: &[u32], base: &Base<B>) -> Mat<T> {
         .iter()
         .map(|&row| origin[row as usize].lift())
         .collect();
-    let mut out = Mat::zeros(m, m);
+    let mut out = Matrix::zeros(m, m);
     for (j, &node) in nodes[1..].iter().enumerate() {
         let column = base.columns[node as usize].as_deref().unwrap_or_default();
         let first = column[nodes[0] as usize].lift() - origin[0];
@@ -484,8 +480,4 @@ fn between<T: Scalar, B: Lift<T>>(nodes: &[u32], base: &Base<B>) -> Mat<T> {
         }
     }
     out
-}
-
-fn add<T: Scalar>(target: &mut Mat<T>, left: MatRef<'_, T>, right: MatRef<'_, T>, scale: T) {
-    matmul(target, Accum::Add, left, right, scale, Par::Seq);
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use numpy::ndarray::ArrayView2;
+use ndarray::ArrayView2;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::scalar::Scalar;

@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use faer::c64;
-use numpy::ndarray::Dimension;
+use ndarray::Dimension;
 use numpy::{
     Element, Ix1, Ix2, Ix3, PyArray2, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2,
     PyReadwriteArray2, PyUntypedArrayMethods, dtype,
@@ -14,8 +13,8 @@ use pyo3::prelude::*;
 use crate::jacobian::{Fields, Table};
 use crate::patches::Patches;
 use crate::product::Rows;
-use crate::scalar::Scalar;
-use crate::{factor, jacobian, product, reference, residual, solve, symbolic, threads};
+use crate::scalar::{Scalar, c64};
+use crate::{factor, jacobian, product, residual, solve, symbolic, threads};
 
 pub(crate) type Any<'py> = Bound<'py, PyAny>;
 
@@ -53,7 +52,7 @@ pub(crate) fn same(what: &str, expected: usize, got: usize) -> PyResult<()> {
     Err(invalid(format!("{what}: expected {expected}, got {got}")))
 }
 
-fn unsigned(name: &str, value: &Any<'_>) -> PyResult<Vec<u32>> {
+pub(crate) fn unsigned(name: &str, value: &Any<'_>) -> PyResult<Vec<u32>> {
     array::<i32, Ix1>(name, value)?
         .as_array()
         .iter()
@@ -136,44 +135,6 @@ fn solution<'py, T: Scalar + Element>(
         py.detach(|| solve::solve(factor, rhs, x));
     }
     Ok(out)
-}
-
-#[pyclass(module = "tomoskin_core")]
-struct Reference(reference::Reference);
-
-#[pymethods]
-impl Reference {
-    #[new]
-    fn new(n: usize, indptr: &Any<'_>, indices: &Any<'_>, n_rhs: usize) -> PyResult<Self> {
-        let (starts, rows) = (unsigned("indptr", indptr)?, unsigned("indices", indices)?);
-        let made = reference::Reference::new(n, starts, rows, n_rhs);
-        made.map(Self).map_err(invalid)
-    }
-
-    /// Number of values in faer's factor.
-    #[getter]
-    fn factor_len(&self) -> usize {
-        self.0.factor_len()
-    }
-
-    fn solve<'py>(
-        &mut self,
-        values: &Any<'py>,
-        rhs: &Any<'py>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let values = array::<f64, Ix1>("values", values)?;
-        let rhs = array::<f64, Ix2>("rhs", rhs)?;
-        same("rows of rhs", self.0.n_rhs(), rhs.shape()[0])?;
-        same("columns of rhs", self.0.size(), rhs.shape()[1])?;
-        let x = PyArray2::<f64>::zeros(rhs.py(), [rhs.shape()[0], rhs.shape()[1]], false);
-        let mut writable = x.readwrite();
-        let solved = writable.as_slice_mut()?;
-        solved.copy_from_slice(contiguous("rhs", &rhs)?);
-        let values = contiguous("values", &values)?;
-        self.0.solve(values, solved).map_err(invalid)?;
-        drop(writable);
-        Ok(x)
-    }
 }
 
 #[pyfunction]
@@ -353,7 +314,8 @@ fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Symbolic>()?;
     module.add_class::<Factor>()?;
     module.add_class::<Patches>()?;
-    module.add_class::<Reference>()?;
+    #[cfg(feature = "reference")]
+    module.add_class::<crate::reference::Reference>()?;
     module.add_function(wrap_pyfunction!(jacobian_rows, module)?)?;
     module.add_function(wrap_pyfunction!(residual_of, module)?)?;
     module.add_function(wrap_pyfunction!(transposed_product, module)?)

@@ -7,12 +7,16 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side, Spec};
+use numpy::{Ix1, Ix2, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
 
 use crate::ordering::check;
+use crate::python::{Any, array, contiguous, invalid, same, unsigned};
 
 /// A structure as faer analyses it by itself: minimum degree, simplicial or by panels as it finds
 /// better, one thread; with the memory that its calls need.
-pub struct Reference {
+#[pyclass(module = "tomoskin_core")]
+pub(crate) struct Reference {
     column_starts: Vec<u32>,
     rows: Vec<u32>,
     symbolic: SymbolicCholesky<u32>,
@@ -21,24 +25,18 @@ pub struct Reference {
     n_rhs: usize,
 }
 
+#[pymethods]
 impl Reference {
-    /// Analyses the structure of a symmetric matrix given in full, for `n_rhs` right-hand sides.
-    ///
-    /// # Errors
-    /// When the arrays are no such structure, or the factor is too large to index.
-    pub fn new(
-        size: usize,
-        column_starts: Vec<u32>,
-        rows: Vec<u32>,
-        n_rhs: usize,
-    ) -> Result<Self, String> {
-        check(size, &column_starts, &rows)?;
+    #[new]
+    fn new(n: usize, indptr: &Any<'_>, indices: &Any<'_>, n_rhs: usize) -> PyResult<Self> {
+        let (column_starts, rows) = (unsigned("indptr", indptr)?, unsigned("indices", indices)?);
+        check(n, &column_starts, &rows).map_err(invalid)?;
         let matrix =
-            SymbolicSparseColMatRef::new_unsorted_checked(size, size, &column_starts, None, &rows);
+            SymbolicSparseColMatRef::new_unsorted_checked(n, n, &column_starts, None, &rows);
         let params = CholeskySymbolicParams::default();
         let symbolic =
             factorize_symbolic_cholesky(matrix, Side::Lower, SymmetricOrdering::Amd, params)
-                .map_err(|error| format!("the symbolic analysis failed: {error:?}"))?;
+                .map_err(|error| invalid(format!("the symbolic analysis failed: {error:?}")))?;
         let factor = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
         let solve = symbolic.solve_in_place_scratch::<f64>(n_rhs, Par::Seq);
         Ok(Self {
@@ -51,33 +49,36 @@ impl Reference {
         })
     }
 
-    /// Number of right-hand sides.
-    #[must_use]
-    pub fn n_rhs(&self) -> usize {
-        self.n_rhs
-    }
-
-    /// Number of rows and columns.
-    #[must_use]
-    pub fn size(&self) -> usize {
-        self.symbolic.nrows()
-    }
-
     /// Number of values in faer's factor.
-    #[must_use]
-    pub fn factor_len(&self) -> usize {
+    #[getter]
+    fn factor_len(&self) -> usize {
         self.values.len()
     }
 
+    fn solve<'py>(
+        &mut self,
+        values: &Any<'py>,
+        rhs: &Any<'py>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let values = array::<f64, Ix1>("values", values)?;
+        let rhs = array::<f64, Ix2>("rhs", rhs)?;
+        same("length of values", self.rows.len(), values.len())?;
+        same("rows of rhs", self.n_rhs, rhs.shape()[0])?;
+        same("columns of rhs", self.symbolic.nrows(), rhs.shape()[1])?;
+        let x = PyArray2::<f64>::zeros(rhs.py(), [rhs.shape()[0], rhs.shape()[1]], false);
+        let mut writable = x.readwrite();
+        let solved = writable.as_slice_mut()?;
+        solved.copy_from_slice(contiguous("rhs", &rhs)?);
+        self.solve_in_place(contiguous("values", &values)?, solved)?;
+        drop(writable);
+        Ok(x)
+    }
+}
+
+impl Reference {
     /// Factorises the matrix with these values, and solves for column-major `x` in its place.
-    ///
-    /// # Errors
-    /// When a size is not the structure's, or the matrix is not positive definite.
-    pub fn solve(&mut self, values: &[f64], x: &mut [f64]) -> Result<(), String> {
-        let size = self.size();
-        if values.len() != self.rows.len() || x.len() != size * self.n_rhs {
-            return Err("expected values and right-hand sides of the structure".into());
-        }
+    fn solve_in_place(&mut self, values: &[f64], x: &mut [f64]) -> PyResult<()> {
+        let size = self.symbolic.nrows();
         let (starts, rows) = (&self.column_starts, &self.rows);
         // SAFETY: `new` has checked them; a second time would be counted in what is measured.
         let structure =
@@ -94,7 +95,7 @@ impl Reference {
                 stack,
                 Spec::default(),
             )
-            .map_err(|error| format!("the matrix is not positive definite: {error:?}"))?;
+            .map_err(|error| invalid(format!("the matrix is not positive definite: {error:?}")))?;
         let x = MatMut::from_column_major_slice_mut(x, size, self.n_rhs);
         factor.solve_in_place_with_conj(Conj::No, x, Par::Seq, stack);
         Ok(())

@@ -1,6 +1,6 @@
 //! What a solve leaves over, and what that may cost, in one pass over the matrix.
 
-use numpy::ndarray::{ArrayView2, s};
+use ndarray::{ArrayView2, s};
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::product::{ABREAST, Lanes, Rows, abreast};

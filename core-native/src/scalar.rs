@@ -1,14 +1,16 @@
 //! The two number types of a system matrix.
 
-use faer::traits::ComplexField;
 use pulp::Simd;
+use pulp::bytemuck::Pod;
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
+/// A complex number.
+pub use num_complex::Complex64 as c64;
+
 /// A real or complex number of double precision.
 pub trait Scalar:
-    ComplexField
-    + Copy
+    Pod
     + Debug
     + PartialEq
     + Add<Output = Self>
@@ -28,6 +30,8 @@ pub trait Scalar:
     const ZERO: Self;
     /// One.
     const ONE: Self;
+    /// How many real numbers it is.
+    const REALS: usize;
 
     /// The diagonal entry of the factor for this pivot.
     ///
@@ -40,6 +44,9 @@ pub trait Scalar:
 
     /// Square of its absolute value.
     fn norm_sqr(self) -> f64;
+
+    /// The number times the imaginary unit; a real number, itself.
+    fn turned(self) -> Self;
 
     /// Writes x b₀ + y b₁ to the first and x c₀ + y c₁ to the second, entry by entry.
     #[inline(always)]
@@ -63,6 +70,7 @@ pub trait Scalar:
 impl Scalar for f64 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
+    const REALS: usize = 1;
 
     #[inline(always)]
     fn pivot(self) -> Option<Self> {
@@ -77,6 +85,11 @@ impl Scalar for f64 {
     #[inline(always)]
     fn norm_sqr(self) -> f64 {
         self * self
+    }
+
+    #[inline(always)]
+    fn turned(self) -> Self {
+        self
     }
 
     /// By hand: the compiler works out anew in each turn how many there are.
@@ -113,9 +126,10 @@ impl Scalar for f64 {
     }
 }
 
-impl Scalar for faer::c64 {
+impl Scalar for c64 {
     const ZERO: Self = Self { re: 0.0, im: 0.0 };
     const ONE: Self = Self { re: 1.0, im: 0.0 };
+    const REALS: usize = 2;
 
     #[inline(always)]
     fn pivot(self) -> Option<Self> {
@@ -130,5 +144,10 @@ impl Scalar for faer::c64 {
     #[inline(always)]
     fn norm_sqr(self) -> f64 {
         self.re * self.re + self.im * self.im
+    }
+
+    #[inline(always)]
+    fn turned(self) -> Self {
+        Self::new(-self.im, self.re)
     }
 }

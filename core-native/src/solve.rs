@@ -4,7 +4,7 @@
 //! serves them all. Panels whose part of the right-hand side is still zero are left out: a current
 //! into one electrode reaches only the columns on its path to the root of the elimination tree.
 
-use numpy::ndarray::ArrayView2;
+use ndarray::ArrayView2;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::factor::Factor;

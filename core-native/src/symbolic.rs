@@ -1,9 +1,7 @@
 //! Layout of a factor: which panels it has, and how each adds to its parent.
 
-use faer::sparse::linalg::cholesky::SymbolicCholeskyRaw;
-use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
-
 use crate::ordering::analyse;
+use crate::panels::{Panels, inverse};
 
 /// What the structure of a symmetric matrix fixes for each of its factors.
 #[derive(Debug)]
@@ -65,43 +63,25 @@ impl Symbolic {
     /// # Errors
     /// When the arrays are no such structure, or the factor is too large to index.
     pub fn new(size: usize, column_starts: &[u32], rows: &[u32]) -> Result<Self, String> {
-        let analysis = analyse(size, column_starts, rows)?;
-        let (Some(permutation), SymbolicCholeskyRaw::Supernodal(panels)) =
-            (analysis.perm(), analysis.raw())
-        else {
-            return Err("the symbolic analysis made no panels".into());
-        };
-        let (order, place) = permutation.arrays();
-        let mut symbolic = Self::of_panels(order.to_vec(), rows.len(), panels);
+        let mut symbolic = Self::of_panels(analyse(size, column_starts, rows)?, rows.len());
         symbolic.link_panels();
-        symbolic.scatter = symbolic.scatter_of(column_starts, rows, place)?;
+        symbolic.scatter = symbolic.scatter_of(column_starts, rows)?;
         Ok(symbolic)
     }
 
-    fn of_panels(
-        order: Vec<u32>,
-        n_values: usize,
-        panels: &SymbolicSupernodalCholesky<u32>,
-    ) -> Self {
-        let mut starts = panels.supernode_begin().to_vec();
-        starts.push(order.len() as u32);
-        let (mut below, mut below_starts) = (Vec::new(), vec![0]);
+    fn of_panels(panels: Panels, n_values: usize) -> Self {
         let mut value_starts = vec![0];
-        for (number, columns) in starts.windows(2).enumerate() {
-            let (width, rows) = (
-                (columns[1] - columns[0]) as usize,
-                panels.supernode(number).pattern(),
-            );
-            value_starts.push(value_starts[number] + width * (width + rows.len()));
-            below.extend_from_slice(rows);
-            below_starts.push(below.len());
+        let ends = panels.starts.windows(2).zip(panels.below_starts.windows(2));
+        for (number, (columns, below)) in ends.enumerate() {
+            let (width, below) = ((columns[1] - columns[0]) as usize, below[1] - below[0]);
+            value_starts.push(value_starts[number] + width * (width + below));
         }
         Self {
             n_values,
-            order,
-            starts,
-            below_starts,
-            below,
+            order: panels.order,
+            starts: panels.starts,
+            below_starts: panels.below_starts,
+            below: panels.below,
             in_parent: Vec::new(),
             value_starts,
             child_starts: Vec::new(),
@@ -157,15 +137,11 @@ impl Symbolic {
         }
     }
 
-    fn scatter_of(
-        &self,
-        column_starts: &[u32],
-        rows: &[u32],
-        place: &[u32],
-    ) -> Result<Vec<(u32, u32)>, String> {
+    fn scatter_of(&self, column_starts: &[u32], rows: &[u32]) -> Result<Vec<(u32, u32)>, String> {
         if u32::try_from(self.factor_len()).is_err() {
             return Err("the factor has too many values to index".into());
         }
+        let place = inverse(&self.order);
         let mut row_in_front = vec![0_u32; self.size()];
         let mut scatter = Vec::with_capacity((rows.len() + self.size()) / 2);
         for number in 0..self.n_panels() {
@@ -179,15 +155,16 @@ impl Symbolic {
             for j in 0..panel.width {
                 let column = self.order[panel.start + j] as usize;
                 let first = panel.first_value + j * panel.height();
+                let done = scatter.len();
                 for from in column_starts[column]..column_starts[column + 1] {
                     let row = place[rows[from as usize] as usize] as usize;
                     if row >= panel.start + j {
                         scatter.push((first as u32 + row_in_front[row], from));
                     }
                 }
+                scatter[done..].sort_unstable();
             }
         }
-        scatter.sort_unstable();
         Ok(scatter)
     }
 

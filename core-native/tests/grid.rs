@@ -2,12 +2,11 @@
 
 use std::sync::Arc;
 
-use faer::c64;
-use numpy::ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2};
 use tomoskin_core::factor::Factor;
 use tomoskin_core::jacobian::{Fields, Table, jacobian};
 use tomoskin_core::product::{Rows, transposed_product};
-use tomoskin_core::scalar::Scalar;
+use tomoskin_core::scalar::{Scalar, c64};
 use tomoskin_core::solve::solve;
 use tomoskin_core::symbolic::Symbolic;
 

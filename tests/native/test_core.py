@@ -224,6 +224,9 @@ def test_a_large_jacobian_is_fetched_ahead() -> None:
     np.testing.assert_allclose(turned, -rows, rtol=0, atol=1e-12)
 
 
+@pytest.mark.skipif(
+    not hasattr(core, "Reference"), reason="built without faer; scripts/native.py reference"
+)
 @pytest.mark.parametrize("cells", [200, 800])
 def test_the_reference_solves_what_we_solve(cells: int) -> None:
     matrix, rhs = system(np.float64, cells)
