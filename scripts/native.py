@@ -23,6 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "core-native"
 STAMP = Path(sys.prefix) / ".native.sha256"
 CHECKED = Path(sys.prefix) / ".native-checked.sha256"
+LEFT_OUT = ROOT / "build" / "left-out.txt"
 CHECKS = (
     ("fmt", "--check"),
     ("clippy", "--quiet", "--release", "--all-targets", "--", "-D", "warnings"),
@@ -87,18 +88,26 @@ def build(*features: str) -> None:
     STAMP.write_text(sources(), encoding="ascii")
 
 
+def leave_out(what: str) -> None:
+    """Say what cannot be done here, now and in the last line of ``make test``."""
+    print(what)
+    LEFT_OUT.parent.mkdir(exist_ok=True)
+    with LEFT_OUT.open("a", encoding="utf-8") as file:
+        file.write(f"{what}\n")
+
+
 def check() -> int:
     """Check format, clippy and tests where cargo has them; nothing when nothing has changed."""
     found = sources("tests/**/*.rs")
     if CHECKED.is_file() and CHECKED.read_text(encoding="ascii") == found:
         return 0
     if reason := why_not():
-        print(f"core-native is not checked: {reason}")
+        leave_out(f"the native engine's own checks: {reason} (install Rust, then: make lint)")
         return 0
     for name, *options in CHECKS:
         asked = subprocess.run(["cargo", name, "--help"], capture_output=True, check=False)
         if asked.returncode:
-            print(f"core-native: cargo {name} is not installed")
+            leave_out(f"core-native: cargo {name} (install it: rustup component add {name})")
         elif subprocess.run(["cargo", name, *options], cwd=CORE, check=False).returncode:
             return 1
     CHECKED.write_text(found, encoding="ascii")
