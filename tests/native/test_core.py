@@ -226,7 +226,7 @@ def test_a_large_jacobian_is_fetched_ahead() -> None:
 
 @pytest.mark.skipif(
     not hasattr(core, "Reference"),
-    reason="bare faer, for benchmarks: it is not built (python scripts/native.py reference)",
+    reason="bare faer, for benchmarks only (python scripts/native.py reference)",
 )
 @pytest.mark.parametrize("cells", [200, 800])
 def test_the_reference_solves_what_we_solve(cells: int) -> None:
