@@ -68,7 +68,7 @@ page-test: dev page page-check
 	@$(PY) scripts/page.py run test
 
 engine-check: dev native
-	@$(PY) scripts/native.py check
+	@MAKEFLAGS= $(PY) scripts/native.py check
 
 checks: lint page-test docs  # side by side: two cores have two things to do
 
@@ -81,7 +81,7 @@ set-up: dev page $(VENV)/.docs
 	@echo "checks: style, types, page, documentation, native engine, side by side; two to four minutes"
 
 native: dev  ## the native engine, where Rust is installed; live runs without
-	@$(PY) scripts/native.py
+	@MAKEFLAGS= $(PY) scripts/native.py
 
 wheel: dev page  ## a wheel with the built page, in dist/
 	@$(PY) -m hatchling build -t wheel
