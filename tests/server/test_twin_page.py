@@ -155,4 +155,4 @@ def test_axe_finds_nothing_in_the_drawer_and_it_looks_right(opened):
     assert axe_finds(opened.page, "#drawer", "[data-testid=bend]") == []
     assert look_in_both(opened.page, "held") == {}
     opened.page.keyboard.press("Escape")
-    opened.lifted()
+    opened.until("last.truths.length === 0")
