@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from report import Report
-from tomoskin.calibration import BendExamples, BendModel, JointReference
+from tomoskin.calibration import BENDS, BendExamples, BendModel, JointReference, Observation
 from tomoskin.core import FloatArray, Frame, Reading
 from tomoskin.mesh import Cylinder, Hinge
 from tomoskin.pipeline import Pipeline, Result
-from tomoskin.pipeline.finding import View, finding, voltage_covariance
+from tomoskin.pipeline.finding import finding, voltage_covariance
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.signal import Reference
 from tomoskin.twin import Bent, Pose, Press
@@ -166,7 +166,10 @@ class Bench:
         """What finds touches in V less the reference, beside directions that say nothing."""
         found = finding(self.lab.prepared, reference)
         image = self.lab.image
-        return lambda dv, blind: found.push(View(image(dv), None, dv, blind))
+        none = np.zeros((self.lab.prepared.pattern.n_meas, 0))
+        return lambda dv, blind: found.push(
+            Observation(0.0, image(dv), None, dv, blind, dv, none, dv)
+        )
 
     def static(self, pose: Pose) -> list[float]:
         """Errors of touches on a sheet that is held so, a reference taken before each of them."""
@@ -194,7 +197,8 @@ class Bench:
 
     def moved(self) -> Found:
         """Single touches while the sheet bends up and down, as the live pipeline sees them."""
-        out, pipeline = Found(), Pipeline(self.lab.prepared.that_bends(self.model))
+        bends = BENDS.of(self.model, self.lab.prepared.pattern)
+        out, pipeline = Found(), Pipeline(self.lab.prepared.calibrated(bends))
         self.frame((), (), REST)
         for _ in range(REFERENCE_FRAMES):
             pipeline.push(self.frame((), (), STEP))

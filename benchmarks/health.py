@@ -13,8 +13,8 @@ from health_real import real_reports
 from health_rig import PROBE, Rig, missed_by, places
 from report import Report
 from tomoskin.core import FloatArray
-from tomoskin.pipeline import Pipeline, Prepared, prepare
-from tomoskin.pipeline.watch import Watch
+from tomoskin.pipeline import Measured, Pipeline, Prepared, prepare
+from tomoskin.pipeline.conditioning import Followed
 from tomoskin.signal import Health, Reference
 from tomoskin.skin import Skin
 from tomoskin.twin import Faults, Press
@@ -244,14 +244,16 @@ def cost() -> Report:
         skin = Skin.load(name)
         rig, prepared = Rig(skin, "textile", 1), prepare(skin)
         idle = np.array([prepared.readout(rig.frame()).values for _ in range(20)])
-        watch = Watch(prepared, Reference.of(idle), np.zeros(idle.shape[1], bool), prepared.scan)
+        none = np.zeros(idle.shape[1], bool)
+        followed = Followed.of(prepared, Reference.of(idle), none, prepared.scan)
         spent = []
         for _ in range(2000):
             frame = rig.frame()
             volts = prepared.readout(frame)
+            measured = Measured.of(volts, frame.samples, prepared.skin.readout.tick_rate)
             start = time.process_time()
-            watch.look(volts.values, volts.railed, frame.host_time, frame.samples)
-            watch.learn(frame.host_time, touched=False)
+            followed.condition(measured)
+            followed.learn(measured.time, 0.0, touched=False)
             spent.append(time.process_time() - start)
         rows.append((name, prepared.pattern.n_meas, *_microseconds(spent)))
     return Report(

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from page_stream import chromium, heap, opened, streaming
 from report import Report
-from tomoskin.pipeline import Prepared, colour_limit, prepare, prepare_again
+from tomoskin.pipeline import Prepared, colour_limit, prepare
 from tomoskin.server import STATIC
 from tomoskin.skin import Skin
 
@@ -179,7 +179,7 @@ def _changed(prepared: Prepared) -> Rows:
         for _ in range(REPEATS):
             fresh = skin.altered({})
             start = time.perf_counter()
-            made = prepare_again(prepared, fresh)
+            made = prepare(fresh, prepared)
             colour_limit(made)
             times.append(1e3 * (time.perf_counter() - start))
         promised = "< 150" if name in ("alpha by hand", "threshold", "prior") else ""

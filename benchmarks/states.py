@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from report import Report
 from tomoskin import Skin
-from tomoskin.calibration import StateClassifier, Wiring, against_rest, ring_of, solve_wiring
+from tomoskin.calibration import Classifier, Wiring, against_rest, ring_of, solve_wiring
 from tomoskin.core import DataError
 from tomoskin.pattern import match_rows
 from tomoskin.twin import COMMON_PRESSES, SetPlan, make_shard
@@ -94,7 +94,7 @@ def _six_points(folder: Path) -> Iterator[Report]:
 def _transfer(old: Batch, new: Batch) -> tuple[object, ...]:
     dv, flags = new
     start = time.process_time()
-    known = StateClassifier.fit(*old)
+    known = Classifier.fit(*old)
     fitted = known.in_session(dv)
     taken = time.process_time() - start
     answers = fitted.predict(dv)
@@ -108,14 +108,14 @@ def _transfer(old: Batch, new: Batch) -> tuple[object, ...]:
         round(_right(fitted, new), 3),
         round(telling, 3),
         round(float(np.mean(drawn)), 3),
-        round(StateClassifier.fit(dv, flags).right, 3),
+        round(Classifier.fit(dv, flags).right, 3),
         round(float(answers.probability.mean()), 3),
         round(float(answers.rejected.mean()), 3),
         round(taken, 2),
     )
 
 
-def _with_labels(known: StateClassifier, new: Batch, chosen: NDArray[np.int64]) -> float:
+def _with_labels(known: Classifier, new: Batch, chosen: NDArray[np.int64]) -> float:
     dv, flags = new
     some = np.full_like(flags, np.nan)
     some[chosen] = flags[chosen]
@@ -124,7 +124,7 @@ def _with_labels(known: StateClassifier, new: Batch, chosen: NDArray[np.int64]) 
 
 
 def _with_few(old: Batch, new: Batch) -> Iterator[float]:
-    known = StateClassifier.fit(*old)
+    known = Classifier.fit(*old)
     for count in FEW:
         found = []
         for seed in range(DRAWS):
@@ -133,7 +133,7 @@ def _with_few(old: Batch, new: Batch) -> Iterator[float]:
         yield round(float(np.mean(found)), 3)
 
 
-def _right(known: StateClassifier, batch: Batch) -> float:
+def _right(known: Classifier, batch: Batch) -> float:
     return float((known.predict(batch[0]).flags == batch[1]).all(axis=1).mean())
 
 

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from report import Report
+from tomoskin.calibration import Observation
 from tomoskin.core import Frame, Reading
 from tomoskin.pipeline import prepare
-from tomoskin.pipeline.finding import Finder, View, finding
+from tomoskin.pipeline.finding import Finder, finding
 from tomoskin.pipeline.tune import tuned
 from tomoskin.signal import Reference
 from tomoskin.skin import Skin
@@ -75,10 +76,19 @@ class Lab:
         samples = self.board.sample(self.table, self.time)
         return self.prepared.readout(Frame(0, 0, self.time, 1, 0, 0, samples)).values
 
-    def view(self, presses: Sequence[Press]) -> View:
+    def view(self, presses: Sequence[Press]) -> Observation:
         """What one frame shows; all voltages in proportion say nothing, as they do live."""
         dv = self.volts(presses) - self.reference.mean
-        return View(self.image(dv), self.floor, dv, self.reference.mean[:, None])
+        return Observation(
+            time=0.0,
+            image=self.image(dv),
+            image_noise=self.floor,
+            dv=dv,
+            nuisance=self.reference.mean[:, None],
+            change=dv,
+            drift=np.zeros((len(dv), 0)),
+            since_reference=dv,
+        )
 
     def exact(self, press: Press) -> Floats:
         """(n_meas,) V of the sheet without any noise."""
@@ -271,7 +281,9 @@ def _moved(presses: Sequence[Press], by: float) -> tuple[Press, ...]:
     return tuple(out)
 
 
-def _timed(finder: Finder, views: Sequence[View]) -> tuple[list[list[Reading]], Sequence[float]]:
+def _timed(
+    finder: Finder, views: Sequence[Observation]
+) -> tuple[list[list[Reading]], Sequence[float]]:
     """Readings, and median and longest processor time, ms."""
     found, taken = [], []
     for view in views:

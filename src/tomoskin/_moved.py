@@ -1,25 +1,42 @@
-"""Names of 0.1 whose rooms were divided: the old ones still work, with a warning."""
+"""Names of 0.1 that have moved or were renamed: the old ones still work, with a warning."""
 
 from __future__ import annotations
 
 import warnings
+from functools import reduce
 from importlib import import_module
 from typing import Any
 
 ROOMS = {
-    "live": ("pipeline", "run", "server", "recording", "formats"),
+    "live": ("pipeline", "run", "server", "recording", "formats", "calibration"),
     "session": ("recording", "formats", "calibration", "signal", "core"),
     "touch": ("calibration",),
+    "calibration": ("calibration",),
 }
 """Where the names of a former room are looked for."""
+
+RENAMED = {
+    "StateClassifier": "Classifier",
+    "StateReading": "ClassReading",
+    "Teller": "FrameClassifier",
+    "read_bends": "BENDS.read",
+    "read_calibration": "TOUCH.read",
+    "read_states": "CLASSES.read",
+    "unpack_bends": "BENDS.decode",
+    "unpack_calibration": "TOUCH.decode",
+    "unpack_states": "CLASSES.decode",
+}
+"""What a name is called now; after a point, an attribute of it."""
 
 
 def moved(room: str, name: str) -> Any:
     """What ``tomoskin.room.name`` is now. Raises AttributeError where there is no such name."""
+    now = RENAMED.get(name, name)
+    first, *rest = now.split(".")
     for new in ROOMS[room]:
         found = import_module(f"tomoskin.{new}")
-        if name in found.__all__:
+        if first in found.__all__:
             old = f"tomoskin.{room}.{name}"
-            warnings.warn(f"{old} is now tomoskin.{new}.{name}", DeprecationWarning, stacklevel=3)
-            return getattr(found, name)
+            warnings.warn(f"{old} is now tomoskin.{new}.{now}", DeprecationWarning, stacklevel=3)
+            return reduce(getattr, rest, getattr(found, first))
     raise AttributeError(f"module 'tomoskin.{room}' has no attribute {name!r}")

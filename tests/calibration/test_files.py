@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tomoskin.calibration import Calibration, Locator, read_calibration, write_calibration
+from tomoskin.calibration import TOUCH, Calibration, Locator
 from tomoskin.core import DataError
 from tomoskin.pattern import Pattern
 
@@ -21,22 +21,20 @@ def calibration() -> Calibration:
     dv = np.sin(xy @ rng.normal(scale=30.0, size=(2, PATTERN.n_meas)))
     dv[3, 5] = np.nan
     locator = Locator.fit(dv, xy, pattern=PATTERN, strength=rng.uniform(1, 2, 25))
-    return Calibration(locator, PATTERN, "a skin")
+    return Calibration(TOUCH, locator, PATTERN, "a skin")
 
 
 def test_what_is_read_answers_as_what_was_written(calibration: Calibration, tmp_path: Path) -> None:
     path = tmp_path / "c.npz"
-    write_calibration(path, calibration)
-    again = read_calibration(path)
-    frames = calibration.locator.presses.dv[:5]
+    calibration.write(path)
+    again = TOUCH.read(path)
+    frames = calibration.model.presses.dv[:5]
     for ours, theirs in zip(
-        calibration.locator.predict(frames), again.locator.predict(frames), strict=True
+        calibration.model.predict(frames), again.model.predict(frames), strict=True
     ):
         np.testing.assert_array_equal(ours, theirs)
-    np.testing.assert_array_equal(
-        calibration.locator.strength(frames), again.locator.strength(frames)
-    )
-    assert again.pattern.identity == PATTERN.identity == again.locator.pattern_id
+    np.testing.assert_array_equal(calibration.model.strength(frames), again.model.strength(frames))
+    assert again.pattern.identity == PATTERN.identity == again.model.pattern_id
     assert again.skin_name == "a skin"
     assert [p.name for p in tmp_path.iterdir()] == ["c.npz"]
 
@@ -45,10 +43,10 @@ def test_a_file_that_cannot_be_written_leaves_nothing(
     calibration: Calibration, tmp_path: Path
 ) -> None:
     with pytest.raises(DataError, match="cannot be written"):
-        write_calibration(tmp_path / "none" / "c.npz", calibration)
+        calibration.write(tmp_path / "none" / "c.npz")
     (tmp_path / "folder").mkdir()
     with pytest.raises(DataError, match="expected the name of a file, got a folder"):
-        write_calibration(tmp_path / "folder", calibration)
+        calibration.write(tmp_path / "folder")
     assert [p.name for p in tmp_path.iterdir()] == ["folder"]
 
 
@@ -70,10 +68,10 @@ def test_damaged_files_are_refused(
     calibration: Calibration, tmp_path: Path, change: dict[str, object], words: str
 ) -> None:
     path = tmp_path / "c.npz"
-    write_calibration(path, calibration)
+    calibration.write(path)
     with np.load(path) as kept:
         arrays = dict(kept) | {key: np.asarray(value) for key, value in change.items()}
     np.savez(path, **arrays)
     with pytest.raises(DataError, match=words) as caught:
-        read_calibration(path)
+        TOUCH.read(path)
     assert "c.npz" in str(caught.value)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tomoskin.calibration.classes import Codes, Examples, StateClassifier, against_rest
+from tomoskin.calibration import Classifier, Codes, Examples, against_rest
 from tomoskin.core import DataError, FloatArray
 from tomoskin.pattern import Pattern
 
@@ -44,7 +44,7 @@ def hit(told: FloatArray, truth: FloatArray) -> float:
 @pytest.mark.parametrize("each", [3, 10, 50])
 def test_states_are_told_from_few_examples(each: int) -> None:
     flags, labels = one_of(3 * each, 0)
-    known = StateClassifier.fit(sheet(0, flags), labels)
+    known = Classifier.fit(sheet(0, flags), labels)
     asked, names = one_of(90, 1)
     answers = known.predict(sheet(1, asked))
     assert known.examples.codes.names == NAMES
@@ -56,7 +56,7 @@ def test_states_are_told_from_few_examples(each: int) -> None:
 
 def test_an_unknown_state_is_rejected() -> None:
     flags, labels = one_of(60, 0)
-    known = StateClassifier.fit(sheet(0, flags), labels)
+    known = Classifier.fit(sheet(0, flags), labels)
     strange = 3 * np.random.default_rng(5).normal(size=(30, ROWS))
     assert known.predict(strange).rejected.mean() > 0.9
     assert known.predict(np.full((1, ROWS), np.nan)).rejected.all()
@@ -64,7 +64,7 @@ def test_an_unknown_state_is_rejected() -> None:
 
 def test_any_set_of_flags_is_told() -> None:
     flags = random_flags(200, 5, 0)
-    known = StateClassifier.fit(sheet(0, flags), flags, names=tuple("abcde"))
+    known = Classifier.fit(sheet(0, flags), flags, names=tuple("abcde"))
     asked = random_flags(200, 5, 1)
     answers = known.predict(sheet(1, asked))
     assert hit(answers.flags, asked) > 0.97
@@ -78,7 +78,7 @@ def test_any_set_of_flags_is_told() -> None:
 def test_another_session_is_fitted_without_labels() -> None:
     """Half as large again, with other templates: what was learnt before is right in part only."""
     flags, asked = random_flags(300, 4, 0), random_flags(300, 4, 1)
-    known = StateClassifier.fit(sheet(0, flags), flags)
+    known = Classifier.fit(sheet(0, flags), flags)
     today = sheet(2, asked, size=0.5, turn=0.5)
     before, fitted = known.predict(today), known.in_session(today)
     after = fitted.predict(today)
@@ -90,7 +90,7 @@ def test_another_session_is_fitted_without_labels() -> None:
 
 def test_labels_of_a_new_session_count() -> None:
     flags, asked = random_flags(200, 4, 0), random_flags(120, 4, 1)
-    known = StateClassifier.fit(sheet(0, flags), flags)
+    known = Classifier.fit(sheet(0, flags), flags)
     today = sheet(3, asked, size=0.5, turn=0.6)
     fitted = known.in_session(today)
     some = np.full(asked.shape, np.nan)
@@ -105,7 +105,7 @@ def test_labels_of_a_new_session_count() -> None:
 
 def test_two_sessions_teach_together() -> None:
     flags = random_flags(100, 3, 0)
-    known = StateClassifier.fit(sheet(0, flags), flags)
+    known = Classifier.fit(sheet(0, flags), flags)
     both = known.in_session(sheet(4, flags, turn=0.3), flags)
     assert both.examples.session.tolist() == [0] * 100 + [1] * 100
     assert hit(both.predict(sheet(4, flags, turn=0.3)).flags, flags) > 0.95
@@ -118,8 +118,8 @@ def test_the_unit_and_missing_values_do_not_matter(seed: int) -> None:
     dv = sheet(seed, flags)
     asked = dv.copy()
     asked[:, 7] = np.nan
-    small = StateClassifier.fit(1e-6 * dv, flags).predict(1e-6 * asked)
-    large = StateClassifier.fit(dv, flags).predict(asked)
+    small = Classifier.fit(1e-6 * dv, flags).predict(1e-6 * asked)
+    large = Classifier.fit(dv, flags).predict(asked)
     np.testing.assert_array_equal(small.flags, large.flags)
     np.testing.assert_allclose(small.probability, large.probability, atol=1e-6)
 
@@ -127,7 +127,7 @@ def test_the_unit_and_missing_values_do_not_matter(seed: int) -> None:
 def test_probabilities_are_honest() -> None:
     flags = random_flags(400, 3, 0)
     hard = 4.0 * np.random.default_rng(1).normal(size=(400, ROWS)) + 1.0 * sheet(0, flags)
-    known = StateClassifier.fit(hard, flags)
+    known = Classifier.fit(hard, flags)
     asked = random_flags(400, 3, 2)
     more = 4.0 * np.random.default_rng(3).normal(size=(400, ROWS)) + 1.0 * sheet(0, asked)
     answers = known.predict(more)
@@ -162,19 +162,19 @@ def test_frames_at_rest_share_their_noise() -> None:
 )
 def test_what_cannot_teach_is_refused(labels: object, words: str) -> None:
     with pytest.raises(DataError, match=words):
-        StateClassifier.fit(np.random.default_rng(0).normal(size=(6, ROWS)), labels)  # type: ignore[arg-type]
+        Classifier.fit(np.random.default_rng(0).normal(size=(6, ROWS)), labels)  # type: ignore[arg-type]
 
 
 def test_what_does_not_belong_together_is_refused() -> None:
     flags = random_flags(20, 2, 0)
     dv = sheet(0, flags)
-    known = StateClassifier.fit(dv, flags)
+    known = Classifier.fit(dv, flags)
     with pytest.raises(DataError, match="shape"):
         known.predict(dv[:, :5])
     with pytest.raises(DataError, match="at least 10 frames"):
         known.in_session(dv[:5])
     with pytest.raises(DataError, match="no row ever changes"):
-        StateClassifier.fit(np.ones((20, ROWS)), flags)
+        Classifier.fit(np.ones((20, ROWS)), flags)
     with pytest.raises(DataError, match="twice"):
         Codes(("a", "a"), exclusive=False)
     with pytest.raises(DataError, match="unknown state c"):
@@ -188,8 +188,8 @@ def test_what_does_not_belong_together_is_refused() -> None:
         examples.and_then(Examples.of(examples.codes, dv[:, :5], flags))
     pattern = Pattern.adjacent(8)
     with pytest.raises(DataError, match="dv of shape"):
-        StateClassifier.fit(dv[:, :39], flags, pattern=pattern)
-    fitted = StateClassifier.fit(dv, flags, pattern=pattern, skin_id="mine")
+        Classifier.fit(dv[:, :39], flags, pattern=pattern)
+    fitted = Classifier.fit(dv, flags, pattern=pattern, skin_id="mine")
     fitted.check(pattern.identity, "mine")
     with pytest.raises(DataError, match="of skin mine"):
         fitted.check(skin_id="another")
@@ -200,7 +200,7 @@ def test_what_does_not_belong_together_is_refused() -> None:
 def test_six_points_on_another_day(data_dir: Path, old: int, new: int) -> None:
     """All six flags of a public membrane, another day and depth, without a label of that day."""
     (learnt, flags), (asked, truth) = (six_points(data_dir, number) for number in (old, new))
-    known = StateClassifier.fit(learnt, flags)
+    known = Classifier.fit(learnt, flags)
     assert hit(known.predict(asked).flags, truth) < 0.6
     answers = known.in_session(asked).predict(asked)
     assert hit(answers.flags, truth) > 0.85

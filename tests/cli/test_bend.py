@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from tomoskin.calibration import read_bends
+from tomoskin.calibration import BENDS
 from tomoskin.cli import main
 from tomoskin.core import DataError
 from tomoskin.formats import read_recording
@@ -66,7 +66,7 @@ def _done(*arguments):
 
 
 def test_angles_and_touches_of_a_session_that_bends(recorded, tomoskin):
-    model = read_bends(recorded / "c.npz").model
+    model = BENDS.read(recorded / "c.npz").model
     assert np.degrees(model.error) < 2.0
     code, out, err = tomoskin(
         "image", recorded / "used.mcap", "--bend", recorded / "c.npz", "--json"
@@ -138,15 +138,15 @@ def test_a_file_that_is_no_calibration_is_refused(recorded, tomoskin, lost):
 
 
 def test_a_calibration_of_another_scan_is_refused(recorded):
-    calibration = read_bends(recorded / "c.npz")
+    calibration = BENDS.read(recorded / "c.npz")
     with pytest.raises(DataError, match="another scan"):
-        calibration.check(Skin.load("textile-disc-16").pattern())
+        calibration.check(Skin.load("textile-disc-16"))
 
 
 def test_the_live_pipeline_reads_the_bend_and_sees_no_touch_in_it(recorded):
     with SessionReader(recorded / "used.mcap") as session:
         frames = [item.frame for item in session.frames()]
-        prepared = prepare(session.skin).that_bends(read_bends(recorded / "c.npz").model)
+        prepared = prepare(session.skin).calibrated(BENDS.read(recorded / "c.npz"))
     pipeline = Pipeline(prepared)
     results = [result for frame in frames if (result := pipeline.push(frame)) is not None]
     bends = [result.bend for result in results if result.bend is not None]

@@ -14,13 +14,12 @@ from run.test_runner import Watch
 from tomoskin import run as room
 from tomoskin import server
 from tomoskin.calibration import (
-    BENDS_FILE,
+    BENDS,
+    TOUCH,
     BendExamples,
     BendModel,
     BendReading,
-    Calibration,
     Locator,
-    write_calibration,
 )
 from tomoskin.cli import main
 from tomoskin.core import Frame
@@ -39,7 +38,8 @@ def bending(prepared):
     shape = 1e-2 * random.standard_normal(rows)
     dv = angle[:, None] * shape + 1e-4 * random.standard_normal((len(angle), rows))
     examples = BendExamples.of(dv, angle, np.full(len(angle), 0.5), np.arange(len(angle)) / 10)
-    return prepared.that_bends(BendModel.learn(examples, 1e-8 * np.eye(rows)))
+    bends = BendModel.learn(examples, 1e-8 * np.eye(rows))
+    return prepared.calibrated(BENDS.of(bends, prepared.pattern))
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_a_replay_reads_bends_and_touches_again_to_the_bit(run, bending):
         kept = as_recorded(session)
         again = list(replayed(kept, session))
         first = list(replayed(bending, session))
-    assert kept.bending is not None
+    assert BENDS.name in kept.calibrations
     live = recorded_touches(run)
     got = {r.sequence: touches_of(r) for r in again if r.ready}
     assert len(live) > 20
@@ -76,7 +76,7 @@ def test_without_them_the_touches_would_be_others(run):
 
 
 def test_what_a_session_holds_is_said(run):
-    assert session_info(run).attached == (BENDS_FILE,)
+    assert session_info(run).attached == (BENDS.attachment,)
 
 
 def test_a_recording_begun_late_begins_with_frames_of_a_straight_sheet(prepared):
@@ -89,7 +89,8 @@ def test_a_recording_begun_late_begins_with_frames_of_a_straight_sheet(prepared)
         state = "bend" if number > 200 else "idle"
         frame = Frame(number, number, 0.01 * number, 1, 0, 0, samples)
         beginning.frame(frame, Mark.NONE if number else Mark.REFERENCE, 0)
-        beginning.result(replace(result, ready=True, pictured=True, bend=states[state]))
+        readings = {BENDS.name: states[state]}
+        beginning.result(replace(result, ready=True, pictured=True, readings=readings))
     frames, _, again = beginning.begin(0)
     assert again
     assert len(frames) == 3 * REFERENCE_FRAMES
@@ -109,7 +110,7 @@ def calibration(prepared, tmp_path):
     dv = np.array(read) - rest
     locator = Locator.fit(dv, places, pattern=prepared.pattern, skin=prepared.skin)
     path = tmp_path / "c.npz"
-    write_calibration(path, Calibration(locator, prepared.pattern, prepared.skin.name))
+    TOUCH.of(locator, prepared.pattern, prepared.skin).write(path)
     return path
 
 
@@ -135,7 +136,7 @@ def test_the_command_line_takes_them_beside_a_calibration(run, calibration, monk
               "--json"])  # fmt: skip
     out, errors = capfd.readouterr()
     assert (end.value.code or 0, errors) == (0, "")
-    assert runners[0].prepared.locator is not None
+    assert TOUCH.name in runners[0].prepared.calibrations
     last = json.loads(out.splitlines()[-1])
     assert set(last["bend"]) == {"angle_rad", "sd_rad", "axis_rad", "state"}
     assert last["state"] is None

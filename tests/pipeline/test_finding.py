@@ -10,7 +10,7 @@ import pytest
 from run.board import pressed, samples_of
 from tomoskin.core import Frame
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
-from tomoskin.pipeline.finding import InData, InImage, finding, rows_of
+from tomoskin.pipeline.finding import InData, InImage, finding
 from tomoskin.signal import Recording, Reference
 from tomoskin.skin import Skin
 
@@ -82,7 +82,3 @@ def test_noise_that_is_not_known_is_the_read_outs(fitted):
     louder = replace(fitted, readout=replace(fitted.readout, noise=3 * fitted.readout.noise))
     quiet, loud = (finding(p, None)._spots._whiten.matrix for p in (fitted, louder))
     assert np.linalg.norm(quiet) == pytest.approx(3 * np.linalg.norm(loud), rel=0.05)
-
-
-def test_missing_rows_are_directions():
-    assert rows_of(np.array([False, True, True])).tolist() == [[0, 0], [1, 0], [0, 1]]

@@ -17,6 +17,7 @@ from run.test_replay import Recorded, recorded_touches, same, touches_of
 from tomoskin.core import FloatArray, Frame
 from tomoskin.inverse import Temporal
 from tomoskin.pipeline import Pipeline, Prepared, Result, prepare
+from tomoskin.pipeline.following import Following
 from tomoskin.pipeline.imaging import Filtered
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.recording import SessionReader, replayed
@@ -149,10 +150,12 @@ def test_the_floor_is_the_noise_of_the_filtered_images() -> None:
     pipeline = settled(filtered(), source)
     results = [shown(pipeline.push(make(False))) for make in islice(source, 3000)]
     images = np.array([r.image.values for r in results])[200:]
-    stage = pipeline._imaging
+    following = pipeline._state
+    assert isinstance(following, Following)
+    stage = following._imaging
     assert isinstance(stage, Filtered)
     floor = stage._floor(np.inf)
-    alone = filtered().noise_floor(pipeline._reference)  # type: ignore[arg-type]
+    alone = filtered().noise_floor(following.rest.reference)  # type: ignore[union-attr]
     ratio = images.std(axis=0) / floor.sd  # type: ignore[union-attr]
     # the reference tells each row's noise from 20 frames only: as far off as that, over all rows
     assert 0.85 < np.median(ratio) < 1.15

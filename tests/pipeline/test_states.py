@@ -10,14 +10,7 @@ import pytest
 
 from run.board import pressed, samples_of
 from run.test_replay import Recorded, noisy
-from tomoskin.calibration import (
-    StateClassifier,
-    StateReading,
-    StatesCalibration,
-    Teller,
-    read_states,
-    write_states,
-)
+from tomoskin.calibration import CLASSES, Classifier, ClassReading, FrameClassifier
 from tomoskin.cli import main
 from tomoskin.core import DataError, Frame
 from tomoskin.formats import read_recording
@@ -46,16 +39,16 @@ def states(prepared):
     rest = volts(prepared, idle, 40, 5000).mean(axis=0)
     dv = [volts(prepared, s, EACH, 6000 + 100 * k) - rest for k, s in enumerate([idle, *sides])]
     labels = [name for name in NAMES for _ in range(EACH)]
-    known = StateClassifier.fit(
+    known = Classifier.fit(
         np.concatenate(dv), labels, pattern=prepared.pattern, skin_id=prepared.skin.identity
     )
-    return StatesCalibration(known, prepared.pattern, prepared.skin.name)
+    return CLASSES.of(FrameClassifier.of(known), prepared.pattern, prepared.skin)
 
 
 @pytest.fixture(scope="module")
 def run(prepared, states, tmp_path_factory):
     """A recorded run of all three states, and its status at the end."""
-    taught = prepared.that_tells(states)
+    taught = prepared.calibrated(states)
     with Recorded(taught, tmp_path_factory.mktemp("run") / "run.mcap") as recorded:
         recorded.idle(FIRST + 5)
         for side in (0, 1):
@@ -68,7 +61,7 @@ def run(prepared, states, tmp_path_factory):
 
 def test_a_run_says_which_state_it_is_in(run):
     _, _, status = run
-    assert status.state == StateReading("right", status.state.probability, False)
+    assert status.state == ClassReading("right", status.state.probability, False)
     assert status.text.endswith(f", right {100 * status.state.probability:.0f} %")
     told = json.loads(message(status))["state"]
     assert told == {"name": "right", "probability": status.state.probability, "unknown": False}
@@ -99,11 +92,12 @@ def test_a_recording_says_the_same_off_line(run):
     recording = read_recording(path).in_order_of(taught.pattern)
     found = reconstruct(taught, recording, recording.voltages[:FIRST])
     assert [s.name for s in found.states][-12:] == ["idle"] * 6 + ["right"] * 6
-    assert reconstruct(replace(taught, teller=None), recording, recording.voltages[:5]).states == ()
+    untaught = taught.uncalibrated(CLASSES)
+    assert reconstruct(untaught, recording, recording.voltages[:5]).states == ()
 
 
 def test_what_was_not_learnt_is_unknown(prepared, states):
-    teller = Teller.of(states.classifier)
+    teller = states.model
     rng = np.random.default_rng(1)
     strange = teller(rng.normal(size=prepared.pattern.n_meas))
     assert strange.unknown
@@ -112,27 +106,27 @@ def test_what_was_not_learnt_is_unknown(prepared, states):
 
 
 def test_rows_that_are_lost_or_left_out_do_not_count(prepared, states):
-    teller, n = Teller.of(states.classifier), prepared.pattern.n_meas
-    sample = states.classifier.examples.dv[EACH + 1]
+    teller, n = states.model, prepared.pattern.n_meas
+    sample = states.model.classifier.examples.dv[EACH + 1]
     assert teller(sample).name == "left"
     lost = np.where(np.arange(n) % 5 == 0, np.nan, sample)
     out = np.arange(0, n, 5)
     assert teller(lost) == teller.without(out)(np.delete(sample, out))
     assert teller(lost).name == "left"
     assert (
-        prepared.that_tells(states).without(out).teller.rows.tolist()
+        prepared.calibrated(states).without(out).calibrations[CLASSES.name].model.rows.tolist()
         == np.delete(np.arange(n), out).tolist()
     )
 
 
 def test_states_of_another_skin_are_refused(states):
     with pytest.raises(DataError, match="the calibration is of pattern"):
-        prepare(Skin.load("textile-disc-16")).that_tells(states)
+        prepare(Skin.load("textile-disc-16")).calibrated(states)
 
 
 def test_on_the_command_line_states_of_another_skin_are_refused(run, states, tmp_path, capfd):
-    other = replace(states.classifier, skin_id="another")
-    write_states(tmp_path / "c.npz", replace(states, classifier=other))
+    other = replace(states.model.classifier, skin_id="another")
+    states.with_model(FrameClassifier.of(other)).write(tmp_path / "c.npz")
     with pytest.raises(SystemExit) as end:
         main(["image", str(run[0]), "--states", str(tmp_path / "c.npz")])
     assert end.value.code == 1
@@ -141,8 +135,8 @@ def test_on_the_command_line_states_of_another_skin_are_refused(run, states, tmp
 
 def test_the_command_line_tells_them(run, states, tmp_path, capfd):
     path, c = run[0], tmp_path / "c.npz"
-    write_states(c, states)
-    assert read_states(c).classifier.right == states.classifier.right
+    states.write(c)
+    assert CLASSES.read(c).model.classifier.right == states.model.classifier.right
     said = []
     for more in ([], ["--json", "--alpha", "0.1"]):
         with pytest.raises(SystemExit) as end:

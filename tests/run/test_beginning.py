@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from run.test_replay import Recorded, recorded_touches, touches_of
-from tomoskin.pipeline import prepare_again
+from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.recording import Mark, SessionReader, as_recorded, replayed
 
@@ -34,7 +34,7 @@ def test_replayed_to_the_bit(prepared, tmp_path, changes, untouched):
     with Recorded(prepared, tmp_path / "whole.mcap") as live:
         live.idle(REFERENCE_FRAMES + before)
         live.touch(0, 6)
-        live.runner.adopt(prepare_again(prepared, prepared.skin.altered(changes)))
+        live.runner.adopt(prepare(prepared.skin.altered(changes), prepared))
         live.idle(after)
         live.drift(3)
         live.touch(0, 4)

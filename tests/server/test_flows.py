@@ -9,7 +9,7 @@ import pytest
 
 from run.test_runner import Watch
 from server.flowing import flowing
-from tomoskin.calibration import Wiring, read_calibration
+from tomoskin.calibration import TOUCH, Wiring
 from tomoskin.core import DataError
 from tomoskin.recording import SessionReader, as_recorded, replayed
 from tomoskin.server.folder import Folder
@@ -256,7 +256,7 @@ def taught(prepared, tmp_path_factory):
         told = press_dots(site, page, 10)
         page.ask("flow_keep", name="finger")
         page.told("flow", lambda m: m["kind"] is None and m["calibration"] == "finger.npz")
-        until(lambda: runner.prepared.locator is not None)
+        until(lambda: TOUCH.name in runner.prepared.calibrations)
         runner.record(folder / "run.mcap")
         runner.set_presses(page, (Press(*told["presses"][0], FORCE, RADIUS),))
         until(lambda: runner.newest.result.touches)
@@ -272,11 +272,11 @@ def test_presses_become_a_calibration(taught, prepared):
     assert told["ready"]
     assert told["figures"]["median_mm"] < 30
     assert len(told["figures"]["errors_mm"]) == 10
-    found = read_calibration(folder / "finger.npz")
-    assert found.locator.presses.xy == pytest.approx(np.array(told["presses"]))
+    found = TOUCH.read(folder / "finger.npz")
+    assert found.model.presses.xy == pytest.approx(np.array(told["presses"]))
     outline = prepared.skin.outline
-    assert outline.contains(found.locator.presses.xy).all()
-    gaps = np.linalg.norm(found.locator.presses.xy[:, None] - found.locator.presses.xy, axis=-1)
+    assert outline.contains(found.model.presses.xy).all()
+    gaps = np.linalg.norm(found.model.presses.xy[:, None] - found.model.presses.xy, axis=-1)
     assert gaps[np.triu_indices(10, 1)].min() > 0.01
     (touch,) = last
     x, y = told["presses"][0]
@@ -288,7 +288,7 @@ def test_a_run_with_a_calibration_replays_to_the_bit(taught):
     folder, _, _ = taught
     with SessionReader(folder / "run.mcap") as session:
         prepared = as_recorded(session)
-        assert prepared.locator is not None
+        assert TOUCH.name in prepared.calibrations
         recorded = {item.sequence: item.touches for item in session.touches()}
         again = {r.sequence: r.touches for r in replayed(prepared, session)}
     pressed = [number for number, touches in recorded.items() if touches]
@@ -309,10 +309,10 @@ def test_a_calibration_of_the_folder_is_switched_on_and_off(taught, prepared):
         until = Watch(site.runner).until
         page.ask("calibration", name="finger.npz")
         page.told("flow", lambda m: m["calibration"] == "finger.npz")
-        until(lambda: site.runner.prepared.locator is not None)
+        until(lambda: TOUCH.name in site.runner.prepared.calibrations)
         page.ask("calibration", name=None)
         page.told("flow", lambda m: m["calibration"] is None)
-        until(lambda: site.runner.prepared.locator is None)
+        until(lambda: TOUCH.name not in site.runner.prepared.calibrations)
         page.ask("calibration", name="none.npz")
         assert "no such file" in page.told("error")["message"]
         page.ask("calibration", name="run.mcap")

@@ -9,7 +9,7 @@ import pytest
 from server.looks import look_in_both
 from server.serving import Site
 from server.watching import Watched
-from tomoskin.calibration import read_calibration
+from tomoskin.calibration import TOUCH
 from tomoskin.run import Runner
 from tomoskin.server import kept_token, take_flows
 from tomoskin.skin import Skin
@@ -142,7 +142,7 @@ def test_touch_is_taught_by_pressing_dots(opened, folder):
     looks_right(opened, "touch")
     opened.test_id("flow-keep").click()
     opened.test_id("calibration").filter(has_text="touch.npz").wait_for()
-    assert len(read_calibration(folder / "touch.npz").locator.presses) == 6
+    assert len(TOUCH.read(folder / "touch.npz").model.presses) == 6
     opened.press(0.03, 0.03)
     looks_right(opened, "calibrated")
     opened.page.mouse.up()

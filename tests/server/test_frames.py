@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tomoskin.calibration import BendReading
+from tomoskin.calibration import BENDS, BendReading
 from tomoskin.core import Image, Reading, Touch
 from tomoskin.pipeline import Result
 from tomoskin.server.frames import encode_result
@@ -129,7 +129,7 @@ def test_a_touch_carries_its_whole_covariance():
 )
 def test_a_bend_goes_before_the_labels(state, number):
     bend = BendReading(0.5, 0.01, 1.25, state, np.zeros(3))
-    found = decode(encode_result(make(5, (touch(1, [4]),), bend=bend), [], 0.0))
+    found = decode(encode_result(make(5, (touch(1, [4]),), readings={BENDS.name: bend}), [], 0.0))
     assert found["flags"] == 0b1001
     assert found["bend"] == (0.5, pytest.approx(0.01), 1.25, number)
     assert found["labels"] == [0, 0, 0, 0, 1]

@@ -14,7 +14,7 @@ from run.test_runner import Watch
 from tomoskin.core import PatternError
 from tomoskin.core.outputs import MAGIC
 from tomoskin.pattern import named
-from tomoskin.pipeline import colour_limit, prepare, prepare_again
+from tomoskin.pipeline import colour_limit, prepare
 from tomoskin.recording import SessionReader, replayed
 from tomoskin.run import Runner
 from tomoskin.server import Hub, SettingsDesk
@@ -33,7 +33,7 @@ CHANGES = {
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
 def test_prepared_again_is_prepared(prepared, change):
     skin = prepared.skin.altered(change)
-    again, anew = prepare_again(prepared, skin), prepare(skin)
+    again, anew = prepare(skin, prepared), prepare(skin)
     np.testing.assert_allclose(again.operator.matrix, anew.operator.matrix, rtol=1e-9)
     assert again.choice.alpha == pytest.approx(anew.choice.alpha)
     assert again.skin is skin
@@ -202,7 +202,7 @@ def test_a_recording_ends_and_what_it_holds_replays_to_the_bit(prepared, board, 
     ):
         until = Watch(runner).until
         until(lambda: len(seen) > 60)
-        again = prepare_again(prepared, prepared.skin.altered({"inverse": {"alpha": 0.3}}))
+        again = prepare(prepared.skin.altered({"inverse": {"alpha": 0.3}}), prepared)
         runner.adopt(again)
         until(lambda: runner.prepared is again)
     assert runner.status().recording is None

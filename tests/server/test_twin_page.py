@@ -11,7 +11,14 @@ from run.test_runner import Watch
 from server.looks import look_in_both
 from server.serving import Site
 from server.watching import axe_finds, distance
-from tomoskin.calibration import BendExamples, BendModel, StateClassifier, StatesCalibration
+from tomoskin.calibration import (
+    BENDS,
+    CLASSES,
+    BendExamples,
+    BendModel,
+    Classifier,
+    FrameClassifier,
+)
 from tomoskin.mesh import Hinge
 from tomoskin.pipeline import voltage_covariance
 from tomoskin.run import Runner
@@ -46,10 +53,11 @@ def learnt(prepared):
     dv, pattern = bends_of(prepared), prepared.pattern
     axes, time = np.full(len(ANGLES), math.pi / 2), 0.1 * np.arange(len(ANGLES))
     examples = BendExamples.of(dv, ANGLES, axes, time)
-    bends = prepared.that_bends(BendModel.learn(examples, voltage_covariance(prepared, None)))
+    bends = BendModel.learn(examples, voltage_covariance(prepared, None))
     labels = ["bent" if angle else "straight" for angle in ANGLES]
-    states = StateClassifier.fit(dv, labels, pattern=pattern, skin_id=prepared.skin.identity)
-    return bends.that_tells(StatesCalibration(states, pattern, prepared.skin.name))
+    states = Classifier.fit(dv, labels, pattern=pattern, skin_id=prepared.skin.identity)
+    classes = CLASSES.of(FrameClassifier.of(states), pattern, prepared.skin)
+    return prepared.calibrated(BENDS.of(bends, pattern)).calibrated(classes)
 
 
 @pytest.fixture(scope="module")

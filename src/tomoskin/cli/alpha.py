@@ -63,13 +63,13 @@ def _evidence(
     """
     from tomoskin.formats import read_recording
     from tomoskin.inverse import Evidence
-    from tomoskin.pipeline import changes_of
+    from tomoskin.pipeline import recorded_frames
 
     if recording is None:
         return prepared, Evidence(noise=prepared.predicted_noise())
     whole = read_recording(recording).in_order_of(prepared.pattern)
     idle = idle_frames(whole, reference, prepared.pattern)
-    changes = changes_of(prepared, whole.part(*frame_range(whole, frames)), idle)
+    changes = recorded_frames(prepared, whole.part(*frame_range(whole, frames)), idle)
     return changes.prepared, changes.evidence()
 
 

@@ -23,10 +23,8 @@ BendOption = Annotated[
 
 def with_bends(prepared: Prepared, path: Path | None) -> Prepared:
     """The skin with its bends, where a calibration is named. Raises DataError for others."""
-    from tomoskin.calibration import read_bends
+    from tomoskin.calibration import BENDS
 
     if path is None:
         return prepared
-    known = read_bends(path)
-    known.check(prepared.pattern)
-    return prepared.that_bends(known.model)
+    return prepared.calibrated(BENDS.read(path))

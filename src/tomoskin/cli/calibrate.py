@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,13 +18,13 @@ from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import Calibration
+    from tomoskin.calibration import Calibration, Locator
     from tomoskin.core import FloatArray
     from tomoskin.pattern import Pattern
     from tomoskin.signal import Recording
     from tomoskin.skin import Skin
 
-    Learn = Callable[[FloatArray, FloatArray], Calibration]
+    Learn = Callable[[FloatArray, FloatArray], Calibration[Locator]]
 
 app = group("Learn from labelled presses or states.")
 
@@ -65,7 +64,6 @@ def touch(
     json: JsonFlag = False,
 ) -> None:
     """Learn where a touch is from presses at known places."""
-    from tomoskin.calibration import write_calibration
     from tomoskin.cli.labelled import changes, labelled_frames, labels
     from tomoskin.formats import read_recording
 
@@ -78,7 +76,7 @@ def touch(
     xy, dv = labels(whole), changes(whole, reference, pattern)
     frames = labelled_frames(xy)
     calibration = learn(dv[frames], xy[frames])
-    write_calibration(out, calibration, overwrite=force)
+    calibration.write(out, overwrite=force)
     found = _findings(calibration, frames.tolist())
     if json:
         emit(found)
@@ -88,28 +86,28 @@ def touch(
 
 def _anew(skin: Skin | None, pattern: Pattern) -> tuple[Learn, Pattern]:
     """What learns from these presses alone."""
-    from tomoskin.calibration import Calibration, Locator
+    from tomoskin.calibration import TOUCH, Locator
 
-    def learn(dv: FloatArray, xy: FloatArray) -> Calibration:
+    def learn(dv: FloatArray, xy: FloatArray) -> Calibration[Locator]:
         with Bar("learning") as bar:
             locator = Locator.fit(dv, xy, pattern=pattern, skin=skin, progress=bar)
-        return Calibration(locator, pattern, skin.name if skin else "")
+        return TOUCH.of(locator, pattern, skin)
 
     return learn, pattern
 
 
 def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern]:
     """What learns from these presses and those of an older calibration of the same skin."""
-    from tomoskin.calibration import read_calibration
+    from tomoskin.calibration import TOUCH
     from tomoskin.cli.skin_choice import known_skin
 
-    old = read_calibration(path)
+    old = TOUCH.read(path)
     if (skin := known_skin(name, recording)) is not None:
-        old.locator.check(skin=skin)
+        old.model.check(skin=skin)
 
-    def learn(dv: FloatArray, xy: FloatArray) -> Calibration:
+    def learn(dv: FloatArray, xy: FloatArray) -> Calibration[Locator]:
         with Bar("learning") as bar:
-            return replace(old, locator=old.locator.updated(dv, xy).settled_anew(bar))
+            return old.with_model(old.model.updated(dv, xy).settled_anew(bar))
 
     return learn, old.pattern
 
@@ -123,10 +121,10 @@ def _what_of(name: str | None, path: Path, whole: Recording) -> tuple[Skin | Non
     return skin, skin.pattern() if skin else Pattern.from_tables(whole.drive, whole.measure)
 
 
-def _findings(calibration: Calibration, frames: list[int]) -> dict[str, Any]:
+def _findings(calibration: Calibration[Locator], frames: list[int]) -> dict[str, Any]:
     import numpy as np
 
-    locator = calibration.locator
+    locator = calibration.model
     older = len(locator.presses) - len(frames)
     errors = 1e3 * locator.errors
     x, y = (1e3 * locator.next_place()).tolist()

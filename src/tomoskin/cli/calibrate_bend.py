@@ -51,7 +51,7 @@ def calibrate_bend(
     """Learn the bends of a skin, so that touches are told from them and angles are read."""
     import numpy as np
 
-    from tomoskin.calibration import BendCalibration, BendExamples, BendModel, write_bends
+    from tomoskin.calibration import BENDS, BendExamples, BendModel
     from tomoskin.cli.skin_choice import skin_for_file
     from tomoskin.formats import read_recording
     from tomoskin.pipeline import prepare, voltage_covariance
@@ -71,7 +71,7 @@ def calibrate_bend(
                                whole.time[frames])  # fmt: skip
     with Bar("learning"):
         model = BendModel.learn(examples, voltage_covariance(prepared, straight))
-    write_bends(out, BendCalibration(model, prepared.pattern, chosen.name), overwrite=force)
+    BENDS.of(model, prepared.pattern, chosen).write(out, overwrite=force)
     found = {
         "frames": len(examples.angle),
         "directions": model.n_modes,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +13,7 @@ from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import Examples, StatesCalibration
+    from tomoskin.calibration import Calibration, Examples, FrameClassifier
     from tomoskin.pattern import Pattern
     from tomoskin.skin import Skin
 
@@ -58,7 +57,7 @@ def calibrate_states(
     json: JsonFlag = False,
 ) -> None:
     """Learn the state of a frame, or flags, from a few examples of each."""
-    from tomoskin.calibration import read_states, write_states
+    from tomoskin.calibration import CLASSES
     from tomoskin.cli.labelled import changes
     from tomoskin.cli.state_labels import marked
     from tomoskin.formats import read_recording
@@ -67,46 +66,51 @@ def calibrate_states(
     whole = read_recording(recording)
     say_notes(whole)
     with Bar("learning the older ones"):
-        old = read_states(onto) if onto else None
+        old = CLASSES.read(onto) if onto else None
     chosen, pattern = _what_of(skin, recording, old)
     pattern = pattern or Pattern.from_tables(whole.drive, whole.measure)
     whole = whole.in_order_of(pattern)
     dv = changes(whole, reference, pattern)
-    examples = marked(recording, dv, state or [], old.classifier.examples.codes if old else None)
+    examples = marked(
+        recording, dv, state or [], old.model.classifier.examples.codes if old else None
+    )
     with Bar("learning"):
         made = _learnt(examples, old, pattern, chosen)
-    write_states(out, made, overwrite=force)
+    made.write(out, overwrite=force)
     _report(made, len(dv), old is not None, json=json)
 
 
 def _what_of(
-    name: str | None, path: Path, old: StatesCalibration | None
+    name: str | None, path: Path, old: Calibration[FrameClassifier] | None
 ) -> tuple[Skin | None, Pattern | None]:
     """The skin, where there is one, and the table of rows where it is known beforehand."""
     from tomoskin.cli.skin_choice import known_skin
 
     skin = known_skin(name, path)
     if old is not None:
-        old.classifier.check(skin_id=skin.identity if skin else "")
+        old.model.classifier.check(skin_id=skin.identity if skin else "")
         return skin, old.pattern
     return skin, skin.pattern() if skin else None
 
 
 def _learnt(
-    examples: Examples, old: StatesCalibration | None, pattern: Pattern, skin: Skin | None
-) -> StatesCalibration:
-    from tomoskin.calibration import StateClassifier, StatesCalibration
+    examples: Examples,
+    old: Calibration[FrameClassifier] | None,
+    pattern: Pattern,
+    skin: Skin | None,
+) -> Calibration[FrameClassifier]:
+    from tomoskin.calibration import CLASSES, Classifier, FrameClassifier
 
     if old is not None:
-        fitted = old.classifier.in_session(examples.dv, examples.flags)
-        return replace(old, classifier=fitted)
+        fitted = old.model.classifier.in_session(examples.dv, examples.flags)
+        return old.with_model(FrameClassifier.of(fitted))
     identities = pattern.identity, skin.identity if skin else ""
-    classifier = StateClassifier.learn(examples, identities)
-    return StatesCalibration(classifier, pattern, skin.name if skin else "")
+    classifier = Classifier.learn(examples, identities)
+    return CLASSES.of(FrameClassifier.of(classifier), pattern, skin)
 
 
-def _report(made: StatesCalibration, n_frames: int, fitted: bool, *, json: bool) -> None:
-    classifier = made.classifier
+def _report(made: Calibration[FrameClassifier], n_frames: int, fitted: bool, *, json: bool) -> None:
+    classifier = made.model.classifier
     examples, codes = classifier.examples, classifier.examples.codes
     here = examples.part(examples.newest)
     known = int(here.labelled.sum())

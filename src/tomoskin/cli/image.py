@@ -117,7 +117,7 @@ def _report(source: Path, found: Reconstruction, prepared: Prepared, *, json: bo
         states = Counter(reading.state for reading in found.bends if reading)
         typer.echo(", ".join(f"{state}: {count} frames" for state, count in states.items()))
     if found.states:
-        told = Counter("unknown" if s.unknown else s.name for s in found.states)
+        told = Counter("unknown" if s.unknown else s.name for s in found.states if s)
         typer.echo(", ".join(f"{state}: {count} frames" for state, count in told.items()))
     for frame, touches in list(zip(found.frames.tolist(), found.touches, strict=True))[:_SHOWN]:
         for t in touches:
@@ -186,6 +186,7 @@ def _document(found: Reconstruction, prepared: Prepared) -> dict[str, Any]:
         "states": [
             {"frame": f, **asdict(state)}
             for f, state in zip(found.frames.tolist(), found.states, strict=False)
+            if state
         ],
         "touches": [
             {"frame": f, "id": t.id, "x_m": t.reading.x, "y_m": t.reading.y, "peak": t.reading.peak}

@@ -114,7 +114,7 @@ def live(
 
 def _prepared(skin: str | None, source: str, calibration: Path | None) -> Prepared:
     """The skin with the calibration named; of a recording with the others that it holds."""
-    from tomoskin.calibration import read_calibration
+    from tomoskin.calibration import TOUCH
     from tomoskin.pipeline import prepare
     from tomoskin.recording import SessionReader, as_recorded, parse_replay
 
@@ -126,7 +126,7 @@ def _prepared(skin: str | None, source: str, calibration: Path | None) -> Prepar
         prepared = prepare(skin_for_source(skin, source))
     if calibration is None:
         return prepared
-    return prepared.located_by(read_calibration(calibration).locator)
+    return prepared.calibrated(TOUCH.read(calibration))
 
 
 def _kept(token_file: Path | None) -> dict[str, str]:

@@ -14,7 +14,7 @@ from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import ReferenceOption, say_notes
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import Calibration
+    from tomoskin.calibration import Calibration, Locator
     from tomoskin.core import FloatArray, Touch
     from tomoskin.signal import Recording
 
@@ -47,18 +47,18 @@ def locate(
     """Locate the one touch in every frame by a calibration, or with --several up to two."""
     import numpy as np
 
-    from tomoskin.calibration import read_calibration
+    from tomoskin.calibration import TOUCH
     from tomoskin.cli.labelled import changes
     from tomoskin.formats import read_recording, write_touches
 
     with Bar("learning") as bar:
-        known = read_calibration(calibration, bar)
+        known = TOUCH.read(calibration, bar)
     whole = read_recording(recording)
     say_notes(whole)
     _check_skin(known, skin, recording)
     whole = whole.in_order_of(known.pattern)
     dv = changes(whole, reference, known.pattern)
-    frames = np.flatnonzero(np.isfinite(dv[:, known.locator.features.rows]).any(axis=1))
+    frames = np.flatnonzero(np.isfinite(dv[:, known.model.features.rows]).any(axis=1))
     if len(frames) < len(dv):
         typer.echo(
             f"tomoskin: {recording}: {len(dv) - len(frames)} frames hold no finite value "
@@ -73,18 +73,18 @@ def locate(
     _report(whole, frames.tolist(), found, json=json)
 
 
-def _check_skin(known: Calibration, name: str | None, path: Path) -> None:
+def _check_skin(known: Calibration[Locator], name: str | None, path: Path) -> None:
     from tomoskin.cli.skin_choice import known_skin
 
     if (skin := known_skin(name, path)) is not None:
-        known.locator.check(skin=skin)
+        known.model.check(skin=skin)
 
 
-def _several(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
+def _several(known: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
     from tomoskin.calibration import Several
     from tomoskin.core import Touch
 
-    both = Several.of(known.locator)
+    both = Several.of(known.model)
     with Bar("locating") as bar:
         for number, frame in enumerate(dv):
             bar(number, len(dv))
@@ -92,13 +92,13 @@ def _several(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
             yield tuple(Touch(k, "touch", 0.0, reading) for k, reading in enumerate(readings, 1))
 
 
-def _single(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
+def _single(known: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
     import numpy as np
 
     from tomoskin.calibration import Watch
     from tomoskin.core import Reading, Touch
 
-    locator = known.locator
+    locator = known.model
     watch = Watch(locator)
     for start in range(0, len(dv), _BLOCK):
         part = dv[start : start + _BLOCK]

@@ -43,23 +43,24 @@ def states(
     json: JsonFlag = False,
 ) -> None:
     """Tell the state of each frame, or that it is none of those that were learnt."""
-    from tomoskin.calibration import read_states
+    from tomoskin.calibration import CLASSES
     from tomoskin.cli.labelled import changes
     from tomoskin.cli.skin_choice import known_skin
     from tomoskin.formats import read_recording
 
     with Bar("learning"):
-        known = read_states(calibration)
+        known = CLASSES.read(calibration)
+    classifier = known.model.classifier
     whole = read_recording(recording)
     say_notes(whole)
     if (chosen := known_skin(skin, recording)) is not None:
-        known.classifier.check(skin_id=chosen.identity)
+        classifier.check(skin_id=chosen.identity)
     whole = whole.in_order_of(known.pattern)
     dv = changes(whole, reference, known.pattern)
     with Bar("telling states"):
-        answers = known.classifier.predict(dv)
-        asked = known.classifier.most_telling(dv, min(ask, len(dv))).tolist()
-    names = known.classifier.examples.codes.names
+        answers = classifier.predict(dv)
+        asked = classifier.most_telling(dv, min(ask, len(dv))).tolist()
+    names = classifier.examples.codes.names
     if out is not None:
         _write(out, whole, answers, names, overwrite=force)
     if json:

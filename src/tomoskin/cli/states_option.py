@@ -28,10 +28,10 @@ def with_states(prepared: Prepared, path: Path | None, skin: Skin) -> Prepared:
     ``skin`` as its file says, whatever pictures are made of it. Raises DataError for states of
     another.
     """
-    from tomoskin.calibration import read_states
+    from tomoskin.calibration import CLASSES
 
     if path is None:
         return prepared
-    known = read_states(path)
-    known.classifier.check(skin_id=skin.identity)
-    return prepared.that_tells(known)
+    calibration = CLASSES.read(path)
+    calibration.model.classifier.check(skin_id=skin.identity)
+    return prepared.calibrated(calibration)

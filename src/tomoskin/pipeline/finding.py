@@ -1,46 +1,18 @@
-"""Image and difference data → readings: regions of the picture, touches fitted to the data, or
-places that labelled presses tell."""
+"""Image and difference data → detections: regions of the image, or touches fitted to the data."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tomoskin.calibration import Locator
-from tomoskin.core import FloatArray, Image, Reading
+from tomoskin.calibration import Observation, TouchFit
+from tomoskin.core import FloatArray, Reading
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import Reference
 from tomoskin.source import Configuration, ScanSettings
-from tomoskin.touch import WHOLE, NoiseFloor, Pace, SpotFinder, SpotModel, measured_covariance
-
-_ALL = 0.999
-"""Part of a row that is taken for all of it."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class View:
-    """What one frame shows.
-
-    Attributes
-    ----------
-    image, floor
-        Its picture, and the noise of that where it is known.
-    dv
-        (n_meas,) difference data.
-    blind
-        (n_meas, k) directions along which they say nothing.
-    whole
-        (n_meas,) V by which the frame differs, with all that is in it; None where that is ``dv``.
-    """
-
-    image: Image
-    floor: NoiseFloor | None
-    dv: FloatArray
-    blind: FloatArray
-    whole: FloatArray | None = None
+from tomoskin.touch import WHOLE, Pace, SpotFinder, SpotModel, measured_covariance
 
 
 class Finder(Protocol):
@@ -50,7 +22,7 @@ class Finder(Protocol):
         """Go on with another operator or noise."""
         ...
 
-    def push(self, view: View) -> list[Reading]:
+    def push(self, observation: Observation) -> list[Reading]:
         """Readings of a frame, strongest first."""
         ...
 
@@ -66,9 +38,9 @@ class InImage:
         del reference
         self._segmenter = prepared.segmenter
 
-    def push(self, view: View) -> list[Reading]:
+    def push(self, observation: Observation) -> list[Reading]:
         """See :class:`Finder`."""
-        return self._segmenter(view.image, view.floor)
+        return self._segmenter(observation.image, observation.image_noise)
 
 
 class InData:
@@ -96,71 +68,56 @@ class InData:
         gain = _gain(self.model, prepared, reference)
         self._spots.renew(_noise(prepared, reference, gain), gain)
 
-    def push(self, view: View) -> list[Reading]:
+    def push(self, observation: Observation) -> list[Reading]:
         """See :class:`Finder`."""
-        return self._spots.push(view.dv, view.blind)
-
-
-class ByCalibration:
-    """The picture tells that there is a touch, labelled presses where: of one touch at a time."""
-
-    def __init__(self, locator: Locator, prepared: Prepared, reference: Reference | None) -> None:
-        self._locator = locator
-        self.renew(prepared, reference)
-
-    def renew(self, prepared: Prepared, reference: Reference | None) -> None:
-        """See :class:`Finder`."""
-        self._image = InImage(prepared)
-        self._difference = prepared.operator.difference
-        self._mean = prepared.operator.reference if reference is None else reference.mean
-
-    def push(self, view: View) -> list[Reading]:
-        """See :class:`Finder`."""
-        found = self._image.push(view)
-        if not found:
-            return []
-        # Presses were learnt from with all that is in them: what pictures do without is not left
-        # out here either.
-        dv = view.dv if self._difference == "plain" else view.dv * np.abs(self._mean)
-        dv = np.where(_lost(view.blind), np.nan, dv if view.whole is None else view.whole)
-        if not np.isfinite(dv).any():
-            return []
-        (place,), (spread,) = self._locator.predict(dv)
-        sd_x, sd_y = np.sqrt(np.diag(spread)).tolist()
-        return [
-            replace(
-                found[0],
-                x=float(place[0]),
-                y=float(place[1]),
-                sd_x=sd_x,
-                sd_y=sd_y,
-                cov_xy=float(spread[0, 1]),
-            )
-        ]
+        return self._spots.push(observation.dv, observation.nuisance)
 
 
 def finding(prepared: Prepared, reference: Reference | None, pace: Pace = WHOLE) -> Finder:
-    """What finds the touches: a calibration, else the method that the skin names.
+    """What finds the touches: the method that the skin names, unless a calibration locates them.
 
     Fitted touches are those of a sheet that conducts by direction as its reference tells.
     ``pace`` says how much of a fit is tried in a frame.
     """
-    if prepared.locator is not None:
-        return ByCalibration(prepared.locator, prepared, reference)
-    if prepared.spots is None or prepared.skin.touch.method != "fit":
+    located = any(c.kind.locates for c in prepared.calibrations.values())
+    if located or prepared.spots is None or prepared.skin.touch.method != "fit":
         return InImage(prepared)
-    spots = prepared.spots if reference is None else prepared.spots.as_told(reference.mean)
-    return InData(spots, prepared, reference, pace)
+    return InData(_spots(prepared.spots, reference), prepared, reference, pace)
 
 
-def rows_of(missing: NDArray[np.bool_]) -> FloatArray:
-    """(n_meas, k) blind directions of rows that are ``missing`` (n_meas,) bool."""
-    return np.eye(len(missing))[:, missing]
+@dataclass(frozen=True, eq=False)
+class Fitting:
+    """Conditions under which calibrations are applied: touches can be fitted beside them.
+
+    Attributes
+    ----------
+    prepared, reference
+        The skin, and what it reads while nothing touches it, where that is known.
+    finder
+        What finds the touches of the skin itself.
+    """
+
+    prepared: Prepared
+    reference: Reference | None
+    finder: Finder
+
+    def touch_fit(self) -> TouchFit | None:
+        """See :class:`tomoskin.calibration.Conditions`."""
+        prepared, reference = self.prepared, self.reference
+        if reference is None or prepared.spots is None:
+            return None
+        finder = self.finder
+        model = finder.model if isinstance(finder, InData) else _spots(prepared.spots, reference)
+        gain = _voltage_ratio(model, reference)
+        if prepared.skin.touch.method == "fit":
+            return TouchFit(model.response, gain, lambda _, detections: detections)
+        beside = InData(model, prepared, reference)
+        return TouchFit(model.response, gain, lambda observation, _: beside.push(observation))
 
 
-def _lost(blind: FloatArray) -> NDArray[np.bool_]:
-    """(n_meas,) rows of which the blind directions (n_meas, k), orthonormal, leave nothing."""
-    return np.asarray((blind**2).sum(axis=1) > _ALL)
+def _spots(spots: SpotModel, reference: Reference | None) -> SpotModel:
+    """On the sheet as its reference tells of it."""
+    return spots if reference is None else spots.as_told(reference.mean)
 
 
 def voltage_covariance(
@@ -195,10 +152,10 @@ def _gain(model: SpotModel, prepared: Prepared, reference: Reference | None) -> 
     """Ratio of measured and modelled voltages, which a change has too; 1 for ratios."""
     if reference is None or prepared.operator.difference == "normalised":
         return 1.0
-    return told_gain(model, reference)
+    return _voltage_ratio(model, reference)
 
 
-def told_gain(model: SpotModel, reference: Reference) -> float:
+def _voltage_ratio(model: SpotModel, reference: Reference) -> float:
     """Ratio of measured and modelled voltages."""
-    told = model.response.reference
-    return float(reference.mean @ told / (told @ told))
+    modelled = model.response.reference
+    return float(reference.mean @ modelled / (modelled @ modelled))

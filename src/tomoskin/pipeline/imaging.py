@@ -13,7 +13,7 @@ from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import Blind, Reference
 from tomoskin.touch import NoiseFloor
 
-Pictured = tuple[Image, NoiseFloor | None]
+ImageAndNoise = tuple[Image, NoiseFloor | None]
 """An image, and its noise floor where the noise is known."""
 
 _SETTLED = 3.0
@@ -23,21 +23,21 @@ _GAP = 2.5
 """Frames that are further apart than so many intervals start the filter's noise anew."""
 
 
-class Alone:
+class SingleFrame:
     """Each image from its own frame."""
 
     def __init__(
-        self, prepared: Prepared, reference: Reference | None, blind: Blind | None = None
+        self, prepared: Prepared, reference: Reference | None, subspace: Blind | None = None
     ) -> None:
         self._operator = prepared.operator
-        self._floor = None if reference is None else prepared.noise_floor(reference, blind)
+        self._floor = None if reference is None else prepared.noise_floor(reference, subspace)
 
-    def renew(self, prepared: Prepared, reference: Reference, blind: Blind) -> None:
+    def renew(self, prepared: Prepared, reference: Reference, subspace: Blind | None) -> None:
         """Another operator or noise, or other directions of the data that say nothing."""
         self._operator = prepared.operator
-        self._floor = prepared.noise_floor(reference, blind)
+        self._floor = prepared.noise_floor(reference, subspace)
 
-    def push(self, dv: FloatArray, time: float) -> Pictured:
+    def push(self, dv: FloatArray, time: float) -> ImageAndNoise:
         """Image of ``dv`` (n_meas,), measured at ``time`` s. Raises DataError for other data."""
         del time
         return self._operator.quick(dv), self._floor
@@ -61,7 +61,7 @@ class Filtered:
         modes: Modes,
         reference: Reference | None,
         interval: float,
-        blind: Blind | None = None,
+        subspace: Blind | None = None,
     ) -> None:
         self._temporal = Temporal(modes, prepared.skin.inverse.time_constant)
         self._interval = interval
@@ -69,20 +69,20 @@ class Filtered:
         self._noise: FloatArray | None = None
         self._alone: NoiseFloor | None = None
         if reference is not None:
-            self.renew(prepared, reference, blind)
+            self.renew(prepared, reference, subspace)
 
-    def renew(self, prepared: Prepared, reference: Reference, blind: Blind | None) -> None:
-        """As :meth:`Alone.renew`, but for the operator: the modes stay."""
+    def renew(self, prepared: Prepared, reference: Reference, subspace: Blind | None) -> None:
+        """As :meth:`SingleFrame.renew`, but for the operator: the modes stay."""
         if not reference.noise_is_known:
             return
         noise = prepared.difference_noise(reference)
-        self._noise = noise if blind is None else blind.seen_by(np.eye(len(noise))) * noise
-        self._alone = prepared.noise_floor(reference, blind)
+        self._noise = noise if subspace is None else subspace.seen_by(np.eye(len(noise))) * noise
+        self._alone = prepared.noise_floor(reference, subspace)
         for name in ("_steady", "_settling"):
             self.__dict__.pop(name, None)
 
-    def push(self, dv: FloatArray, time: float) -> Pictured:
-        """As :meth:`Alone.push`."""
+    def push(self, dv: FloatArray, time: float) -> ImageAndNoise:
+        """As :meth:`SingleFrame.push`."""
         last = self._temporal.belief
         if last is not None and not time > last.time:
             self._temporal.reset()
@@ -114,12 +114,12 @@ class Filtered:
 
 
 def imaging(
-    prepared: Prepared, reference: Reference | None, interval: float, blind: Blind | None = None
-) -> Alone | Filtered:
+    prepared: Prepared, reference: Reference | None, interval: float, subspace: Blind | None = None
+) -> SingleFrame | Filtered:
     """What makes the images of ``prepared``: filtered where its skin has a time constant.
 
-    ``blind``: what the data do not tell, for the noise floor; the data come without it.
+    ``subspace``: the nuisance subspace, for the noise of the image; the data come without it.
     """
     if prepared.modes is None:
-        return Alone(prepared, reference, blind)
-    return Filtered(prepared, prepared.modes, reference, interval, blind)
+        return SingleFrame(prepared, reference, subspace)
+    return Filtered(prepared, prepared.modes, reference, interval, subspace)

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tomoskin.calibration import BendReading, StateReading
-from tomoskin.core import DataError, FloatArray, IntArray, Reading, Touch
+from tomoskin.calibration import BENDS, CLASSES, BendReading, ClassReading
+from tomoskin.core import DataError, FloatArray, IntArray, Touch
 from tomoskin.inverse import AlphaChoice
-from tomoskin.pipeline.bending import bends_of
-from tomoskin.pipeline.changes import Changes, Idle, changes_of
-from tomoskin.pipeline.finding import View, finding, rows_of
-from tomoskin.pipeline.imaging import imaging
+from tomoskin.pipeline.collecting import Rest
+from tomoskin.pipeline.following import Following, Setting
+from tomoskin.pipeline.measured import Measured
 from tomoskin.pipeline.prepare import Prepared
+from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
 from tomoskin.pipeline.tune import tuned, tuned_by_rule
-from tomoskin.pipeline.watch import Seen, Watch
-from tomoskin.signal import Recording, undone
+from tomoskin.signal import Recording
 from tomoskin.touch import STILL, Tracker
 
 
@@ -45,11 +44,9 @@ class Reconstruction:
         The alpha of the images, and what chose it.
     rows_left_out
         (r,) rows of the pattern that hold no finite values, left out of every image.
-    bends
-        How the sheet was bent in each frame, None where too little was left of it; empty where
-        its bends were not learnt.
-    states
-        One a frame; empty where none were learnt.
+    readings
+        What the skin's calibrations read, by the name of their kind: one a frame, None where too
+        little was left of it.
     """
 
     frames: IntArray
@@ -61,8 +58,17 @@ class Reconstruction:
     agreement: float
     choice: AlphaChoice
     rows_left_out: IntArray
-    bends: tuple[BendReading | None, ...] = ()
-    states: tuple[StateReading, ...] = ()
+    readings: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
+
+    @property
+    def bends(self) -> tuple[BendReading | None, ...]:
+        """How the sheet was bent in each frame; empty where its bends were not learnt."""
+        return self.readings.get(BENDS.name, ())
+
+    @property
+    def states(self) -> tuple[ClassReading | None, ...]:
+        """The class of each frame; empty where none were learnt."""
+        return self.readings.get(CLASSES.name, ())
 
     def numbered_from(self, first: int) -> Reconstruction:
         """Frames counted from ``first``, for a part of a longer recording."""
@@ -101,109 +107,50 @@ def reconstruct(
     ModelError
         When the rule is not known or finds no alpha.
     """
-    changes = changes_of(prepared, recording, idle)
-    prepared = _tuned(changes, rule)
-    time = recording.time[changes.frames]
+    recorded = recorded_frames(prepared, recording, idle)
+    prepared = _tuned(recorded, rule)
+    time = recording.time[recorded.frames]
     if prepared.modes is not None:
         _check_times(time, idle, recording.source)
-    tracker = Tracker(replace(STILL, snr=prepared.skin.touch.snr))
-    stage = _Stage(prepared, changes, time)
-    images, touches, bends = [], [], []
+    following = _following(prepared, recorded, time)
+    results = []
     for number, now in enumerate(time.tolist()):
-        view = stage.push(number, now)
-        images.append(view.image)
-        readings = stage.finder.push(view)
-        touches.append(tracker.update(readings, now, now))
-        touched = bool(touches[-1])
-        bends.append(stage.bent(view, readings, now, touched=touched))
-        stage.learn(now, touched=touched)
+        values, missing = recorded.values[number], recorded.missing[number]
+        results.append(following.push(Measured(values, missing, now, now, number)))
         advance(number + 1, len(time))
     return Reconstruction(
-        frames=changes.frames,
-        rows_missing=changes.missing.sum(axis=1),
-        left_out=changes.left_out,
-        images=np.stack([image.values for image in images]),
+        frames=recorded.frames,
+        rows_missing=recorded.missing.sum(axis=1),
+        left_out=recorded.left_out,
+        images=np.stack([result.image.values for result in results]),
         unit=prepared.operator.unit,
-        touches=tuple(touches),
-        agreement=changes.agreement,
+        touches=tuple(result.touches for result in results),
+        agreement=recorded.agreement,
         choice=prepared.choice,
-        rows_left_out=changes.rows_left_out,
-        bends=() if prepared.bending is None else tuple(bends),
-        states=_told(prepared, changes),
+        rows_left_out=recorded.rows_left_out,
+        readings={
+            kind: tuple(result.readings.get(kind) for result in results)
+            for kind in prepared.calibrations
+        },
     )
 
 
-def _tuned(changes: Changes, rule: str | None) -> Prepared:
+def _tuned(recorded: RecordedFrames, rule: str | None) -> Prepared:
     if rule is not None:
-        return tuned_by_rule(changes.prepared, rule, changes.evidence())
-    if changes.reference is None:
-        return changes.prepared
-    return tuned(changes.prepared, changes.reference)
+        return tuned_by_rule(recorded.prepared, rule, recorded.evidence())
+    if recorded.reference is None:
+        return recorded.prepared
+    return tuned(recorded.prepared, recorded.reference)
 
 
-def _told(prepared: Prepared, changes: Changes) -> tuple[StateReading, ...]:
-    """What state each frame shows, against the reference as it is given."""
-    if prepared.teller is None:
-        return ()
-    found = []
-    for dv, missing in zip(changes.values, changes.missing, strict=True):
-        change = dv
-        if changes.reference is not None:
-            mean = changes.reference.mean
-            change = undone(dv, mean, prepared.operator.difference) - mean
-        found.append(prepared.teller(np.where(missing, np.nan, change)))
-    return tuple(found)
-
-
-class _Stage:
-    """Frame by frame as the pipeline does it live, where there is a reference to follow."""
-
-    def __init__(self, prepared: Prepared, changes: Changes, time: FloatArray) -> None:
-        self._prepared, self._changes = prepared, changes
-        interval = float(np.median(np.diff(time))) if len(time) > 1 else np.nan
-        self._watch: Watch | None = None
-        blind = None
-        if changes.reference is not None:
-            none = np.zeros(prepared.pattern.n_meas, bool)
-            self._watch = Watch(prepared, changes.reference, none, None)
-            blind = self._watch.steady()
-        self._imaging = imaging(prepared, changes.reference, interval, blind)
-        self.finder = finding(prepared, changes.reference)
-        self._bends = None
-        if changes.reference is not None:
-            self._bends = bends_of(prepared, changes.reference, self.finder)
-        self._seen: Seen | None = None
-
-    def push(self, number: int, now: float) -> View:
-        """What that frame of the changes shows."""
-        dv, missing = self._changes.values[number], self._changes.missing[number]
-        if self._watch is None or self._changes.reference is None:
-            return self._filled(dv, missing, now)
-        values = undone(dv, self._changes.reference.mean, self._prepared.operator.difference)
-        seen = self._seen = self._watch.look(values, missing, now)
-        if seen.dv is None:  # the frames' own limit is narrower, but electrodes add to it
-            return self._filled(dv, missing, now)
-        blind = seen.blind.directions
-        return View(*self._imaging.push(seen.dv, now), seen.dv, blind, seen.whole)
-
-    def bent(
-        self, view: View, readings: list[Reading], now: float, *, touched: bool
-    ) -> BendReading | None:
-        """How the sheet was bent in the frame that was pushed last, where that is known."""
-        if self._bends is None or self._watch is None or self._seen is None:
-            return None
-        return self._bends.push(self._watch, self._seen, view, readings, now, touched=touched)
-
-    def _filled(self, dv: FloatArray, missing: NDArray[np.bool_], now: float) -> View:
-        filled = self._prepared.operator.filled(dv, missing)
-        return View(*self._imaging.push(filled, now), filled, rows_of(missing))
-
-    def learn(self, now: float, *, touched: bool) -> None:
-        """What the frame tells of the reference."""
-        watch = self._watch
-        if watch is not None and watch.learn(now, touched=touched):
-            self._imaging.renew(watch.prepared, watch.baseline.reference, watch.steady())
-            self.finder.renew(watch.prepared, watch.baseline.reference)
+def _following(prepared: Prepared, recorded: RecordedFrames, time: FloatArray) -> Following:
+    """The state that the pipeline is in from the idle frames on."""
+    tracker = Tracker(replace(STILL, snr=prepared.skin.touch.snr))
+    if recorded.reference is None:
+        return Following.of_differences(prepared, tracker)
+    interval = float(np.median(np.diff(time))) if len(time) > 1 else np.nan
+    rest = Rest(recorded.reference, np.zeros(prepared.pattern.n_meas, bool), interval)
+    return Following.from_rest(prepared, rest, tracker, Setting())
 
 
 def _check_times(time: FloatArray, idle: Idle, source: str) -> None:

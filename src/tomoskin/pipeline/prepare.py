@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from tomoskin.calibration import (
-    BendCalibration,
-    BendModel,
-    Calibration,
-    Locator,
-    StatesCalibration,
-    Teller,
-)
-from tomoskin.core import DataError, FloatArray, Image, IntArray, ModelError
+from tomoskin.calibration import Calibration, Kind
+from tomoskin.core import FloatArray, Image, IntArray, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import (
     AlphaChoice,
@@ -31,13 +27,7 @@ from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.signal import Blind, Readout, Reference, difference_noise
 from tomoskin.skin import Skin
-from tomoskin.touch import NoiseFloor, Region, Segmenter, SpotModel
-
-BODY = ("outline", "surface", "electrodes", "material", "drive", "readout", "mesh", "twin")
-"""Sections of a skin that sheet, mesh and scan rest on; the others only make pictures of it."""
-
-_SAME_SHAPE = 1e-4
-"""Outlines within so many metres of each other are one."""
+from tomoskin.touch import NoiseFloor, Segmenter, SpotModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +47,8 @@ class Prepared:
     spots
         What touches are fitted with; None where they are found in the image, and no bends are read
         beside them.
-    locator
-        Where labelled presses tell the places of touches.
-    bending
-        What bends of the skin do to the data; None where that was not learnt.
-    teller
-        Tells which of the states that were learnt a frame shows; None where none were.
+    calibrations
+        What was learnt from examples, by the name of its kind.
     """
 
     skin: Skin
@@ -78,9 +64,7 @@ class Prepared:
     choice: AlphaChoice
     light_touch: LightTouch | None
     spots: SpotModel | None
-    locator: Locator | None = None
-    bending: BendModel | None = None
-    teller: Teller | None = None
+    calibrations: Mapping[str, Calibration[Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse stages of different meshes or patterns."""
@@ -99,70 +83,45 @@ class Prepared:
             modes = Modes.of_spectrum(spectrum, choice.alpha, operator)
         return replace(self, operator=operator, modes=modes, choice=choice)
 
-    def that_bends(self, bending: BendModel) -> Prepared:
-        """With what was learnt of the skin's bends. Raises DataError for those of other rows."""
-        if len(bending.directions) != self.pattern.n_meas:
-            raise DataError(
-                f"expected bends of {self.pattern.n_meas} rows, got {len(bending.directions)}"
-            )
-        spots = self.spots or SpotModel.of(self.skin, self.model)
-        return replace(self, bending=bending, spots=spots)
+    def calibrated(self, calibration: Calibration[Any]) -> Prepared:
+        """With a calibration, in place of an earlier one of its kind.
 
-    def that_tells(self, states: StatesCalibration) -> Prepared:
-        """With states that were learnt, on this skin with any settings of its pictures.
-
-        Raises DataError for those of another pattern.
+        Raises DataError where it is not of this skin.
         """
-        states.classifier.check(self.pattern.identity)
-        return replace(self, teller=Teller.of(states.classifier))
+        calibration.check(self.skin)
+        return self._with({**self.calibrations, calibration.kind.name: calibration})
 
-    def located_by(self, locator: Locator | None) -> Prepared:
-        """With places of touches from a calibration, or without.
+    def uncalibrated(self, kind: Kind[Any]) -> Prepared:
+        """Without a calibration of that kind."""
+        return self._with({k: c for k, c in self.calibrations.items() if k != kind.name})
 
-        It rests on rows and places alone, so that other settings of the picture do not matter.
-        Raises DataError where it is of another pattern or a sheet of another shape.
-        """
-        if locator is not None:
-            locator.check(self.pattern)
-            outline = Region.of(self.skin).outline
-            known = locator.region.outline
-            if locator.skin_id and not (
-                outline.shape == known.shape and np.allclose(outline, known, atol=_SAME_SHAPE)
-            ):
-                raise DataError("the calibration is of a sheet of another shape")
-        return replace(self, locator=locator)
+    def _with(self, calibrations: Mapping[str, Calibration[Any]]) -> Prepared:
+        spots = self.spots
+        if spots is None and _fits(self.skin, calibrations):
+            spots = SpotModel.of(self.skin, self.model)
+        return replace(self, calibrations=calibrations, spots=spots)
+
+    @cached_property
+    def no_image(self) -> Image:
+        """The image of no change."""
+        return self.operator(np.zeros(self.pattern.n_meas))
 
     @property
-    def calibration(self) -> Calibration | None:
-        """The locator as it is written to a file."""
-        if self.locator is None:
-            return None
-        return Calibration(self.locator, self.pattern, self.skin.name)
+    def directions(self) -> FloatArray:
+        """(n_meas, k) V along which what its calibrations read moves the data."""
+        found = [c.directions for c in self.calibrations.values() if c.kind.directions]
+        return np.hstack([np.zeros((self.pattern.n_meas, 0)), *found])
 
-    @property
-    def states(self) -> StatesCalibration | None:
-        """The states as they are written to a file."""
-        if self.teller is None:
-            return None
-        return StatesCalibration(self.teller.classifier, self.pattern, self.skin.name)
+    def without(self, measurements: IntArray) -> Prepared:
+        """The skin as if its pattern had never had them; an alpha of "auto" is chosen anew.
 
-    @property
-    def bends(self) -> BendCalibration | None:
-        """The bends as they are written to a file."""
-        if self.bending is None:
-            return None
-        return BendCalibration(self.bending, self.pattern, self.skin.name)
-
-    def without(self, rows: IntArray) -> Prepared:
-        """The skin as if its pattern had never had ``rows``; an alpha of "auto" is chosen anew.
-
-        Raises DataError when no row is left, or its bends do not show in those that are.
+        Raises DataError when none is left, or a calibration does not show in those that are.
         """
-        if not len(rows):
+        if not len(measurements):
             return self
-        left = _prepared(self.skin, self.problem.without(rows))
-        left = replace(left, teller=self.teller and self.teller.without(rows))
-        return left if self.bending is None else left.that_bends(self.bending.without(rows))
+        reduced = _prepared(self.skin, self.problem.without(measurements))
+        kept = (c.without(measurements) for c in self.calibrations.values())
+        return reduced._with({c.kind.name: c for c in kept if c is not None})
 
     def blind_to(self, directions: FloatArray) -> Prepared:
         """The skin whose prior knows that data along ``directions`` (n_meas, k) say nothing.
@@ -205,52 +164,44 @@ class Prepared:
         return np.array(found).reshape(-1, 2)
 
 
-def prepare(skin: Skin) -> Prepared:
+def prepare(skin: Skin, previous: Prepared | None = None) -> Prepared:
     """Mesh, model, operator and stages of ``skin``.
 
-    Where the skin's alpha is "auto", it is chosen by the noise that its read-out predicts.
+    Where the skin's alpha is "auto", it is chosen by the noise that its read-out predicts. Of
+    ``previous``, the same body with other settings, all that these leave as it is serves again,
+    and its calibrations stay.
 
     Raises
     ------
     TomoskinError
         When the skin cannot be meshed, modelled or inverted; the message says which.
     """
+    if previous is not None and previous.skin.body == skin.body:
+        return _prepared(skin, _problem_after(previous, skin), previous)
     model = ForwardModel(
         skin.mesh(), skin.pattern(), skin.contact_impedance, skin.polarity * skin.current
     )
-    problem = LinearProblem.of(
+    return _prepared(skin, _problem(model, skin))
+
+
+def _problem(model: ForwardModel, skin: Skin) -> LinearProblem:
+    return LinearProblem.of(
         model,
         _prior(skin),
         conductivity=skin.conductivity,
         difference=skin.inverse.difference,
     )
-    return _prepared(skin, problem)
 
 
-def prepare_again(before: Prepared, skin: Skin) -> Prepared:
-    """:func:`prepare` for a skin with other settings: what they leave as it is serves again.
-
-    Raises as :func:`prepare` does.
-    """
-    if not same_body(before.skin, skin):
-        return prepare(skin)
-    problem, settings, then = before.problem, skin.inverse, before.skin.inverse
-    if settings.difference != then.difference:
-        problem = LinearProblem.of(
-            before.model,
-            _prior(skin),
-            conductivity=skin.conductivity,
-            difference=settings.difference,
-        )
-    elif _prior(skin) != _prior(before.skin):
-        penalty = _prior(skin).penalty(before.mesh, problem.jacobian)
-        problem = replace(problem, prior=penalty)
-    return _prepared(skin, problem, before)
-
-
-def same_body(one: Skin, other: Skin) -> bool:
-    """Whether both have the same sheet, mesh and scan: only pictures and touches may differ."""
-    return all(one.document[name] == other.document[name] for name in BODY)
+def _problem_after(previous: Prepared, skin: Skin) -> LinearProblem:
+    """The linear problem of ``skin``; the previous one as far as its settings are the same."""
+    problem = previous.problem
+    if not _same_difference(skin, previous.skin):
+        return _problem(previous.model, skin)
+    if _prior(skin) == _prior(previous.skin):
+        return problem
+    penalty = _prior(skin).penalty(previous.mesh, problem.jacobian)
+    return replace(problem, prior=penalty)
 
 
 def _prior(skin: Skin) -> Prior:
@@ -262,20 +213,20 @@ def _prior(skin: Skin) -> Prior:
     )
 
 
-def _prepared(skin: Skin, problem: LinearProblem, before: Prepared | None = None) -> Prepared:
-    """``before``: the same skin with other settings, of which what is the same serves again."""
+def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = None) -> Prepared:
+    """``previous``: the same body with other settings; what is the same serves again."""
     model = problem.model
     scan = Scan.of(model.pattern)
     readout = Readout.of(scan, skin.readout)
-    same = before is not None and before.problem is problem
+    same = previous is not None and previous.problem is problem
     light_touch, choice, operator = _chosen(
-        problem, skin, readout, before.light_touch if before and same else None
+        problem, skin, readout, previous.light_touch if previous and same else None
     )
-    segmenter = before.segmenter if before and before.skin.touch == skin.touch else None
-    bending = before.bending if before else None
+    segmenter = previous.segmenter if previous and previous.skin.touch == skin.touch else None
+    calibrations = previous.calibrations if previous else {}
     spots = None
-    if skin.touch.method == "fit" or bending is not None:
-        kept = before.spots if before and _same_difference(before.skin, skin) else None
+    if _fits(skin, calibrations):
+        kept = previous.spots if previous and _same_difference(previous.skin, skin) else None
         spots = kept or SpotModel.of(skin, model)
     return Prepared(
         skin=skin,
@@ -291,10 +242,13 @@ def _prepared(skin: Skin, problem: LinearProblem, before: Prepared | None = None
         choice=choice,
         light_touch=light_touch,
         spots=spots,
-        locator=before.locator if before else None,
-        bending=bending,
-        teller=before.teller if before else None,
+        calibrations=calibrations,
     )
+
+
+def _fits(skin: Skin, calibrations: Mapping[str, Calibration[Any]]) -> bool:
+    """Whether touches are fitted to the data: by the skin's method, or for a calibration."""
+    return skin.touch.method == "fit" or any(c.kind.fits for c in calibrations.values())
 
 
 def _same_difference(one: Skin, other: Skin) -> bool:

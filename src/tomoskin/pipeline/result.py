@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
-from tomoskin.calibration import BendReading, StateReading
+from tomoskin.calibration import BENDS, CLASSES, BendReading, ClassReading
 from tomoskin.core import FloatArray, Image, Touch
 from tomoskin.signal import BaselineState, Health
 from tomoskin.touch import TouchEvent
@@ -35,10 +37,8 @@ class Result:
     health, baseline
         Of the electrodes, and of the reference that the frame was held against; None until
         that stands.
-    bend
-        How the sheet is bent; None where its bends were not learnt.
-    state
-        Which of the states that were learnt it shows; None where none were.
+    readings
+        What the skin's calibrations read in it, by the name of their kind.
     """
 
     sequence: int
@@ -53,8 +53,17 @@ class Result:
     events: tuple[TouchEvent, ...] = ()
     health: Health | None = None
     baseline: BaselineState | None = None
-    bend: BendReading | None = None
-    state: StateReading | None = None
+    readings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def bend(self) -> BendReading | None:
+        """How the sheet is bent; None where its bends were not learnt."""
+        return self.readings.get(BENDS.name)
+
+    @property
+    def state(self) -> ClassReading | None:
+        """Which of the classes that were learnt it shows; None where none were."""
+        return self.readings.get(CLASSES.name)
 
     @property
     def problem(self) -> str | None:

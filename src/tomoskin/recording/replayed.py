@@ -4,14 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tomoskin.calibration import (
-    BENDS_FILE,
-    CALIBRATION_FILE,
-    STATES_FILE,
-    unpack_bends,
-    unpack_calibration,
-    unpack_states,
-)
+from tomoskin.calibration import KINDS
 from tomoskin.core import DataError, Frame
 from tomoskin.pipeline import Pipeline, Prepared, Result, prepare
 from tomoskin.recording.layout import Mark
@@ -21,15 +14,10 @@ from tomoskin.recording.session_reader import SessionReader
 def as_recorded(session: SessionReader) -> Prepared:
     """The session's own skin, with the calibrations that were on. Raises DataError."""
     prepared, held = prepare(session.skin), session.attachments()
-    if (data := held.get(CALIBRATION_FILE)) is not None:
-        touch = unpack_calibration(data, f"{session.path}, {CALIBRATION_FILE}")
-        prepared = prepared.located_by(touch.locator)
-    if (data := held.get(BENDS_FILE)) is not None:
-        bends = unpack_bends(data, f"{session.path}, {BENDS_FILE}")
-        bends.check(prepared.pattern)
-        prepared = prepared.that_bends(bends.model)
-    if (data := held.get(STATES_FILE)) is not None:
-        prepared = prepared.that_tells(unpack_states(data, f"{session.path}, {STATES_FILE}"))
+    for kind in KINDS:
+        if (data := held.get(kind.attachment)) is not None:
+            where = f"{session.path}, {kind.attachment}"
+            prepared = prepared.calibrated(kind.decode(data, where))
     return prepared
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tomoskin.core import DataError, Event, Frame
-from tomoskin.pipeline import Pipeline, Prepared, Result, same_body
+from tomoskin.pipeline import Pipeline, Prepared, Result
 from tomoskin.recording import Mark, advance
 from tomoskin.run.counters import Tally
 from tomoskin.run.latency import Latency
@@ -94,7 +94,7 @@ class Flow:
 
     def adopt(self, prepared: Prepared) -> None:
         """Go on with other settings; nothing is done where they are of another sheet or scan."""
-        if same_body(prepared.skin, self.prepared.skin):
+        if prepared.skin.body == self.prepared.skin.body:
             self.out.tape.adopt(prepared)
             self.prepared = prepared
             self.pipeline.adopt(prepared)

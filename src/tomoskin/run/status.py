@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from tomoskin.calibration import BendReading, StateReading
+from tomoskin.calibration import BendReading, ClassReading
 from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline import ReferenceState
 from tomoskin.run.latency import Stage
@@ -96,7 +96,7 @@ class Status:
     electrodes: tuple[ElectrodeHealth, ...] = ()
     replay: ReplayStatus | None = None
     bend: BendReading | None = None
-    state: StateReading | None = None
+    state: ClassReading | None = None
 
     @property
     def text(self) -> str:

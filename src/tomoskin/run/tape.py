@@ -7,14 +7,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tomoskin.calibration import (
-    BENDS_FILE,
-    CALIBRATION_FILE,
-    STATES_FILE,
-    pack_bends,
-    pack_calibration,
-    pack_states,
-)
 from tomoskin.core import Event, Frame
 from tomoskin.pipeline import REFERENCE_FRAMES, Prepared, Result
 from tomoskin.recording import Mark, Recorder, SessionWriter
@@ -89,12 +81,8 @@ class Tape:
 
     def _begin(self, path: Path) -> None:
         session = SessionWriter(path, self._prepared.skin, epoch=epoch(), start=self._clock())
-        if (calibration := self._prepared.calibration) is not None:
-            session.attach(CALIBRATION_FILE, "application/zip", pack_calibration(calibration))
-        if (bends := self._prepared.bends) is not None:
-            session.attach(BENDS_FILE, "application/zip", pack_bends(bends))
-        if (states := self._prepared.states) is not None:
-            session.attach(STATES_FILE, "application/zip", pack_states(states))
+        for calibration in self._prepared.calibrations.values():
+            session.attach(calibration.kind.attachment, "application/zip", calibration.encode())
         self._waiting = Recorder(session, glance(self._prepared), self._say)
 
     def _headed(self) -> None:

@@ -8,13 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from tomoskin.calibration import (
-    Calibration,
-    Locator,
-    WiringAnswer,
-    read_calibration,
-    write_calibration,
-)
+from tomoskin.calibration import TOUCH, Locator, WiringAnswer
 from tomoskin.core import FloatArray, TomoskinError, WireError, write_text
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.server.flow_requests import (
@@ -186,8 +180,9 @@ class GuideDesk:
         """Save a calibration and switch it on; in a thread."""
         path = self._folder.free(name, ".npz")
         prepared = flow.prepared
-        write_calibration(path, Calibration(locator, prepared.pattern, prepared.skin.name))
-        self._hub.runner.adopt(self._hub.runner.prepared.located_by(locator))
+        calibration = TOUCH.of(locator, prepared.pattern, prepared.skin)
+        calibration.write(path)
+        self._hub.runner.adopt(self._hub.runner.prepared.calibrated(calibration))
         return path.name
 
     def _wired(self, flow: _Flow, answer: WiringAnswer, name: str) -> str:
@@ -200,10 +195,12 @@ class GuideDesk:
 
     def _use(self, page: Listener, request: UseCalibration) -> None:
         def work() -> None:
-            runner, locator = self._hub.runner, None
-            if request.name is not None:
-                locator = read_calibration(self._folder.existing(request.name, ".npz")).locator
-            runner.adopt(runner.prepared.located_by(locator))
+            runner = self._hub.runner
+            if request.name is None:
+                runner.adopt(runner.prepared.uncalibrated(TOUCH))
+                return
+            calibration = TOUCH.read(self._folder.existing(request.name, ".npz"))
+            runner.adopt(runner.prepared.calibrated(calibration))
 
         def done(_: None) -> None:
             self._using = request.name
@@ -214,7 +211,7 @@ class GuideDesk:
     def _look_again(self) -> None:
         """Another skin is there, with a calibration whose name is not known, or without."""
         prepared = self._hub.runner.prepared
-        self._using = None if prepared.locator is None else ""
+        self._using = "" if TOUCH.name in prepared.calibrations else None
         self._used_on = prepared.mesh.identity
 
     def _tell(self) -> None:

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from tomoskin import __version__
-from tomoskin.calibration import BendReading, StateReading
+from tomoskin.calibration import BendReading, ClassReading
 from tomoskin.core import Event, FloatArray, IntArray
 from tomoskin.pipeline import Prepared
 from tomoskin.recording import Timeline
@@ -136,7 +136,7 @@ def _bend(now: BendReading | None) -> dict[str, Any] | None:
     return {"angle_rad": now.angle, "sd_rad": now.sd, "axis_rad": now.axis, "state": now.state}
 
 
-def _state(now: StateReading | None) -> dict[str, Any] | None:
+def _state(now: ClassReading | None) -> dict[str, Any] | None:
     """Which state the newest frame shows, as ``tomoskin image --json`` tells it."""
     return None if now is None else asdict(now)
 

@@ -13,7 +13,7 @@ import msgspec
 
 from tomoskin.core import Output, SkinError, SourceError, TomoskinError, check_outputs, write_text
 from tomoskin.inverse import LightTouch, LinearProblem, Spectrum
-from tomoskin.pipeline import Prepared, colour_limit, prepare_again, same_body, tuned
+from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned
 from tomoskin.server.hub import Hub, Listener
 from tomoskin.server.requests import (
     AskPattern,
@@ -127,7 +127,7 @@ class SettingsDesk:
 
     def _check(self, skin: Skin) -> None:
         """Raise SourceError where the source cannot follow ``skin``."""
-        if same_body(skin, self._hub.runner.prepared.skin):
+        if skin.body == self._hub.runner.prepared.skin.body:
             return
         if self._hub.runner.replay is not None:
             raise SourceError("a recording keeps the sheet and the scan that it was made with")
@@ -165,8 +165,8 @@ class SettingsDesk:
         What it was prepared to and the end of its scale; None where the source was opened anew.
         """
         start, runner, opener = time.monotonic(), self._hub.runner, self._hub.opener
-        prepared = prepare_again(runner.prepared, skin)
-        if same_body(skin, runner.prepared.skin):
+        prepared = prepare(skin, runner.prepared)
+        if skin.body == runner.prepared.skin.body:
             if runner.reference is not None:
                 prepared = tuned(prepared, runner.reference)
             scaled = prepared, colour_limit(prepared)

@@ -84,10 +84,17 @@ class Baseline:
         Where it begins.
     follows
         False: it stays there; noise is estimated all the same.
+
+    Attributes
+    ----------
+    start
+        (n_meas,) V, mean of that reference.
+    mean
+        (n_meas,) V, what the untouched skin reads now.
     """
 
     def __init__(self, reference: Reference, *, follows: bool = True) -> None:
-        self._start = reference.mean
+        self.start = reference.mean
         self._size = float(np.sqrt(np.mean(reference.mean**2)))
         # frames that are all the same have no noise but for rounding
         least = _ROUNDING * self._size
@@ -166,7 +173,7 @@ class Baseline:
     @property
     def state(self) -> BaselineState:
         """How it is now."""
-        moved = float(np.sqrt(np.mean((self.mean - self._start) ** 2)))
+        moved = float(np.sqrt(np.mean((self.mean - self.start) ** 2)))
         noise = self.idle.noise
         doubt = self._doubt() if self._held else 0.0
         return BaselineState(
@@ -183,6 +190,6 @@ class Baseline:
         walked = self._variance / noise**2
         if self._followed < _TREND:
             return float(np.sqrt(np.median(walked)))
-        moved = np.mean(((self.mean - self._start) / noise) ** 2) - 1.0 / self._n_frames
+        moved = np.mean(((self.mean - self.start) / noise) ** 2) - 1.0 / self._n_frames
         trend = np.sqrt(max(float(moved - walked.mean()), 0.0)) * self._held / self._followed
         return float(np.hypot(np.sqrt(np.median(walked)), trend))

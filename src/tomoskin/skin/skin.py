@@ -27,6 +27,9 @@ from tomoskin.skin.settings import (
 )
 from tomoskin.skin.write import toml
 
+_BODY = ("outline", "surface", "electrodes", "material", "drive", "readout", "mesh", "twin")
+"""Sections that sheet, mesh and scan rest on; the others only make images of it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Skin:
@@ -108,6 +111,14 @@ class Skin:
             merged = raw.get(section, {}) | dict(keys)
             raw[section] = {key: value for key, value in merged.items() if value is not None}
         return self._of(complete(raw, source), source)
+
+    @property
+    def body(self) -> dict[str, Any]:
+        """Sections of the document that sheet, mesh and scan rest on.
+
+        Skins whose bodies are equal differ in what is made of their voltages only.
+        """
+        return {name: self.document[name] for name in _BODY}
 
     @property
     def n_electrodes(self) -> int:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import t as student
 
-from tomoskin.calibration.classes.codes import Codes
-from tomoskin.calibration.classes.examples import Examples
-from tomoskin.calibration.classes.mixture import Mixture, entropy, posterior
-from tomoskin.calibration.classes.subspace import Subspace, session_mean
+from tomoskin.calibration.classifier.codes import Codes
+from tomoskin.calibration.classifier.examples import Examples
+from tomoskin.calibration.classifier.mixture import Mixture, entropy, posterior
+from tomoskin.calibration.classifier.subspace import Subspace, session_mean
 from tomoskin.calibration.locator.presses import frames
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.pattern import Pattern
@@ -42,7 +42,7 @@ class Answers:
 
 
 @dataclass(frozen=True, eq=False)
-class StateClassifier:
+class Classifier:
     """States or flags of frames, learnt from examples; made by :meth:`fit`.
 
     Attributes

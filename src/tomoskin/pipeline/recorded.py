@@ -1,4 +1,4 @@
-"""From a recording to difference data: rows that are dead, frames that lack some, a reference."""
+"""A recording as the pipeline takes it: frames and measurements that serve, and a reference."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.inverse import MOST_LEFT_OUT, Evidence
 from tomoskin.pattern import Pattern
-from tomoskin.pipeline.dead_rows import dead_rows
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import Consecutive, Recording, Reference, difference, in_phase
 
@@ -19,6 +18,9 @@ REFUSED = 0.3
 DOUBTED = 0.8
 """Agreement of a recording's reference with the model's voltages (cosine, 1 = proportional):
 below the first the recording is refused as another skin's, below the second it is doubted."""
+
+_LISTED = 5
+"""Measurements that a message names."""
 
 _MOST_SCALE = 30.0
 """Plain differences are refused where voltages and model differ in size by more than this."""
@@ -32,24 +34,25 @@ against the one before it; None where the recording holds differences."""
 
 
 @dataclass(frozen=True, eq=False)
-class Changes:
-    """Difference data of a recording.
+class RecordedFrames:
+    """Frames of a recording that can be reconstructed.
 
     Attributes
     ----------
     prepared
-        The skin without the rows that are dead, ``n_rows`` of them left; alpha chosen for these.
+        The skin without the measurements that are excluded, ``n_meas`` of them left; alpha chosen
+        for these.
     rows_left_out
-        (r,) rows of the skin's pattern that are dead.
+        (r,) measurements of the skin's pattern that are excluded: dead in the whole recording.
     frames
         (n,) indices in the recording of the frames that can be used.
     left_out
-        (k,) indices of those that lack too many rows.
+        (k,) indices of those that lack too many measurements.
     values
-        (n, n_rows) in the operator's kind of difference; zero where missing.
+        (n, n_meas) V; difference data where there is no reference.
     missing
-        (n, n_rows) bool: values that are not finite in the frame, or in the one it is held against.
-    places
+        (n, n_meas) bool: values that are not finite in the frame, or in the one it is held against.
+    positions
         (n, 2) m, where the skin was touched, or None.
     reference
         Mean and noise of the idle frames; None where there are none.
@@ -63,25 +66,33 @@ class Changes:
     left_out: IntArray
     values: FloatArray
     missing: NDArray[np.bool_]
-    places: FloatArray | None
+    positions: FloatArray | None
     reference: Reference | None
     agreement: float
 
+    @property
+    def differences(self) -> FloatArray:
+        """(n, n_meas) in the operator's kind of difference; zero where missing."""
+        dv = self.values
+        if self.reference is not None:
+            dv = difference(dv, self.reference.mean, self.prepared.operator.difference)
+        return np.where(self.missing, 0.0, dv)
+
     def evidence(self) -> Evidence:
-        """What the recording tells a rule that chooses alpha; frames only where they are whole."""
-        noise, whole = None, ~self.missing.any(axis=1)
+        """What the recording tells a parameter-choice criterion; complete frames only."""
+        noise, complete = None, ~self.missing.any(axis=1)
         if self.reference is not None and self.reference.noise_is_known:
             noise = self.prepared.difference_noise(self.reference)
         return Evidence(
             noise=noise,
-            frames=self.values[whole],
-            places=None if self.places is None else self.places[whole],
+            frames=self.differences[complete],
+            places=None if self.positions is None else self.positions[complete],
             locate=self.prepared.places,
         )
 
 
-def changes_of(prepared: Prepared, recording: Recording, idle: Idle) -> Changes:
-    """Difference data of every frame of ``recording``, whose rows are in the pattern's order.
+def recorded_frames(prepared: Prepared, recording: Recording, idle: Idle) -> RecordedFrames:
+    """Every frame of ``recording``, whose rows are in the pattern's order, that can be used.
 
     Raises
     ------
@@ -97,14 +108,14 @@ def changes_of(prepared: Prepared, recording: Recording, idle: Idle) -> Changes:
     dead = dead_rows(recording.voltages, rest, pattern, recording.source)
     left = _Left.of(prepared.without(dead), recording, dead)
     if idle is None:
-        return left.changes(left.missing, _given(left, recording, dead))
+        return left.frames_of(left.missing, _given(left, recording, dead))
     if isinstance(idle, str):
         return _against_the_one_before(left)
     quiet = _complete(np.delete(idle, dead, axis=1), recording.source)
     values, quiet, agreement = _in_volts(left, quiet)
     reference = Reference.of(quiet, _rounding(left.prepared, quiet))
-    dv = difference(values, reference.mean, left.prepared.operator.difference)
-    return left.changes(left.missing, dv, reference, agreement)
+    values = np.where(left.missing, reference.mean, values)
+    return left.frames_of(left.missing, values, reference, agreement)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,23 +141,23 @@ class _Left:
         frames, left_out = np.flatnonzero(enough), np.flatnonzero(~enough)
         return cls(prepared, recording, dead, frames, left_out, living[enough], missing[enough])
 
-    def changes(
+    def frames_of(
         self,
         missing: NDArray[np.bool_],
-        dv: FloatArray,
+        values: FloatArray,
         reference: Reference | None = None,
         agreement: float = np.nan,
-    ) -> Changes:
-        """These changes of the last of the frames."""
-        frames, labels = self.frames[len(self.frames) - len(dv) :], self.recording.labels
-        return Changes(
+    ) -> RecordedFrames:
+        """These values of the last of the frames."""
+        frames, labels = self.frames[len(self.frames) - len(values) :], self.recording.labels
+        return RecordedFrames(
             prepared=self.prepared,
             rows_left_out=self.dead,
             frames=frames,
             left_out=self.left_out,
-            values=np.where(missing, 0.0, dv),
+            values=values,
             missing=missing,
-            places=None if labels is None else labels[frames],
+            positions=None if labels is None else labels[frames],
             reference=reference,
             agreement=agreement,
         )
@@ -187,7 +198,7 @@ def _in_volts(left: _Left, quiet: NDArray[Any]) -> tuple[FloatArray, FloatArray,
     return values, quiet, agreement
 
 
-def _against_the_one_before(left: _Left) -> Changes:
+def _against_the_one_before(left: _Left) -> RecordedFrames:
     """Dynamic imaging; what a frame or the one before it lacks is missing."""
     base = left.values.mean(axis=0, where=~left.missing)
     values, mean, agreement = _in_volts(left, base[None])
@@ -196,7 +207,7 @@ def _against_the_one_before(left: _Left) -> Changes:
     if len(found) < 2:
         raise DataError("expected two frames at least", where=left.recording.source)
     missing = left.missing[1:] | left.missing[:-1]
-    return left.changes(missing, np.array(found[1:]), None, agreement)
+    return left.frames_of(missing, np.array(found[1:]), None, agreement)
 
 
 def _given(left: _Left, recording: Recording, dead: IntArray) -> FloatArray:
@@ -242,3 +253,35 @@ def _check_scale(reference: FloatArray, model: FloatArray, source: str) -> None:
             hint="give volts, correct the skin's current and sheet resistance, "
             'or set difference = "normalised" in its [inverse]',
         )
+
+
+def dead_rows(
+    values: NDArray[Any], idle: NDArray[Any] | None, pattern: Pattern, source: str
+) -> IntArray:
+    """(k,) rows that are not finite in most frames, or in most of the idle ones.
+
+    Parameters
+    ----------
+    values, idle
+        (n_frames, n_meas) and (n_idle, n_meas) in the order of ``pattern``, or None.
+    source
+        Where they came from, for messages.
+
+    Raises
+    ------
+    DataError
+        When so few rows are left that the picture would be mostly prior.
+    """
+    parts = [values] if idle is None else [values, idle]
+    dead = [(~np.isfinite(part)).mean(axis=0) > 0.5 for part in parts]
+    rows = np.flatnonzero(np.any(dead, axis=0))
+    if len(rows) == pattern.n_meas:
+        raise DataError("no frame has finite values", where=source)
+    if len(rows) > MOST_LEFT_OUT * pattern.n_meas:
+        listed = "; ".join(pattern.row_text(row) for row in rows[:_LISTED])
+        raise DataError(
+            f"{len(rows)} of {pattern.n_meas} rows hold no finite values, too many to leave out: "
+            f"{listed}; …",
+            where=source,
+        )
+    return rows

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tomoskin.calibration.classes.codes import Codes
+from tomoskin.calibration.classifier.codes import Codes
 from tomoskin.calibration.locator.presses import frames
 from tomoskin.core import DataError, FloatArray, IntArray
 

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from scipy.linalg import eigh
 
-from tomoskin.calibration.classes.examples import Examples
+from tomoskin.calibration.classifier.examples import Examples
 from tomoskin.core import DataError, FloatArray
 
 _MOST = 20

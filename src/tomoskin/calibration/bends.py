@@ -1,0 +1,103 @@
+"""The kind of calibration that tells how the sheet is bent, from recorded bends.
+
+Keys of the .npz: ``kind``, ``version``; ``dv`` (n, n_meas) V, ``angle_rad``, ``axis_rad``,
+``time_s`` (n,); ``covariance`` (n_meas, n_meas) V²; ``drive``, ``measure`` (n_meas, 2),
+``n_electrodes``; ``skin_name``. What was learnt is learnt again when it is read.
+"""
+
+from __future__ import annotations
+
+from tomoskin.calibration.applied import Applied, Conditions, Observation, TouchFit
+from tomoskin.calibration.bending.examples import BendExamples
+from tomoskin.calibration.bending.model import BendModel
+from tomoskin.calibration.bending.reader import BendReader, BendReading
+from tomoskin.calibration.kind import Calibration, Kind, Progress, located
+from tomoskin.core import Arrays, DataError, FloatArray, IntArray, Reading, real_numbers
+from tomoskin.pattern import Pattern
+from tomoskin.skin import Skin
+
+_LABELS = ("angle_rad", "axis_rad", "time_s")
+
+
+class BendApplied(Applied):
+    """Reads how the sheet is bent, beside the touches of each frame.
+
+    An angle is told beside a touch only where what the touch changes is known, so that touches
+    are fitted to the data here where the skin finds its own in the image.
+    """
+
+    def __init__(self, model: BendModel, fit: TouchFit) -> None:
+        self._reader = BendReader(model, fit.response, fit.gain)
+        self._detect = fit.detect
+
+    def read(
+        self, observation: Observation, detections: list[Reading], *, touched: bool
+    ) -> BendReading:
+        """How the sheet is bent in this frame."""
+        touches = self._detect(observation, detections)
+        reading = self._reader.push(
+            observation.change, touches, observation.drift, observation.time, touched=touched
+        )
+        self.moved = reading.moved
+        return reading
+
+
+def _pack(model: BendModel) -> Arrays:
+    examples = model.examples
+    labels = (examples.angle, examples.axis, examples.time)
+    return {
+        "dv": examples.dv,
+        **dict(zip(_LABELS, labels, strict=True)),
+        "covariance": model.covariance,
+    }
+
+
+def _unpack(arrays: Arrays, pattern: Pattern, where: str, _progress: Progress) -> BendModel:
+    with located(where):
+        dv, *labels, covariance = (
+            real_numbers(arrays, key, where) for key in ("dv", *_LABELS, "covariance")
+        )
+        if covariance.shape != (pattern.n_meas,) * 2 or dv.shape[1:] != (pattern.n_meas,):
+            raise DataError(f"expected {pattern.n_meas} rows of dv and covariance")
+        return BendModel.learn(BendExamples.of(dv, *labels), covariance)
+
+
+def _check(calibration: Calibration[BendModel], skin: Skin) -> None:
+    if skin.pattern().identity != calibration.pattern.identity:
+        raise DataError(
+            f'the calibration of bends is of another scan, that of "{calibration.skin_name}"',
+            hint="learn the bends of this one: tomoskin calibrate bend",
+        )
+
+
+def _exclude(model: BendModel, measurements: IntArray) -> BendModel:
+    """Raises DataError where its bends do not show in what is left."""
+    return model.without(measurements)
+
+
+def _apply(model: BendModel, conditions: Conditions) -> Applied:
+    fit = conditions.touch_fit()
+    return Applied() if fit is None else BendApplied(model, fit)
+
+
+def _directions(model: BendModel) -> FloatArray:
+    return model.directions
+
+
+BENDS = Kind(
+    name="bends",
+    title="tomoskin bend calibration",
+    version=1,
+    subject="bends",
+    command="bend",
+    attachment="bends.npz",
+    keys=frozenset({"dv", *_LABELS, "covariance"}),
+    pack=_pack,
+    unpack=_unpack,
+    check=_check,
+    exclude=_exclude,
+    apply=_apply,
+    directions=_directions,
+    fits=True,
+)
+"""Bends of the sheet; its model is a :class:`BendModel`."""

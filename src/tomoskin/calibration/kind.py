@@ -1,0 +1,204 @@
+"""One concept of calibration: what is learnt from examples, kept in a file, and applied to frames.
+
+A kind says how its model is packed, unpacked, checked and applied; files, sessions, the pipeline
+and the command line go through the kinds and know none of them by name. A further kind is one
+module that makes a :class:`Kind` and stands in :data:`tomoskin.calibration.KINDS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Generic, Self, TypeVar
+
+import numpy as np
+
+from tomoskin.calibration.applied import Applied, Conditions
+from tomoskin.core import (
+    Arrays,
+    DataError,
+    FloatArray,
+    IntArray,
+    ModelError,
+    PatternError,
+    electrode_table,
+    load_arrays,
+    pack_arrays,
+    save_arrays,
+    unpack_arrays,
+    whole_number,
+)
+from tomoskin.pattern import Pattern
+from tomoskin.skin import Skin
+
+Progress = Callable[[float, float], None]
+"""Called with how much of how much is done."""
+
+M = TypeVar("M")
+
+_PATTERN_KEYS = frozenset({"version", "drive", "measure", "n_electrodes"})
+
+
+def silent(_done: float, _total: float) -> None:
+    """Report no progress."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kind(Generic[M]):
+    """One kind of calibration, whose model is an M.
+
+    Attributes
+    ----------
+    name
+        Its key in :data:`tomoskin.calibration.KINDS`.
+    title, version
+        What its file says that it is.
+    subject
+        What it calibrates, for messages.
+    command
+        The sub-command of ``tomoskin calibrate`` that makes one.
+    attachment
+        Name of its file inside a session.
+    keys
+        Arrays that its file must have beside those of the pattern.
+    pack
+        Model → arrays of its file.
+    unpack
+        Arrays of a file, the pattern, the file's name and a progress → model, learnt again.
+        Raises DataError.
+    check
+        Raises DataError where a calibration cannot serve a skin.
+    exclude
+        Model without some measurements; None where it cannot do without.
+    apply
+        Model and conditions → what it does with each frame.
+    directions
+        Model → (n_meas, k) V along which what it reads moves the data: images do without them.
+        None where it reads nothing of that sort.
+    locates
+        Whether its positions stand in for those of the image.
+    fits
+        Whether it needs touches fitted to the data of each frame.
+    """
+
+    name: str
+    title: str
+    version: int
+    subject: str
+    command: str
+    attachment: str
+    keys: frozenset[str]
+    pack: Callable[[M], Arrays]
+    unpack: Callable[[Arrays, Pattern, str, Progress], M]
+    check: Callable[[Calibration[M], Skin], None]
+    exclude: Callable[[M, IntArray], M | None]
+    apply: Callable[[M, Conditions], Applied]
+    directions: Callable[[M], FloatArray] | None = None
+    locates: bool = False
+    fits: bool = False
+
+    def of(self, model: M, pattern: Pattern, skin: Skin | None = None) -> Calibration[M]:
+        """A calibration of this kind, of the measurements of ``pattern``."""
+        return Calibration(self, model, pattern, skin.name if skin else "")
+
+    def read(self, path: Path, progress: Progress = silent) -> Calibration[M]:
+        """Read a file of this kind and learn from its examples again.
+
+        Raises
+        ------
+        DataError
+            When it is missing, damaged, or of another kind.
+        """
+        return self._learn(load_arrays(path), str(path), progress)
+
+    def decode(self, data: bytes, where: str) -> Calibration[M]:
+        """:meth:`read` from the file's bytes."""
+        return self._learn(unpack_arrays(data, where), where, silent)
+
+    def _learn(self, arrays: Arrays, where: str, progress: Progress) -> Calibration[M]:
+        pattern = self._pattern(arrays, where)
+        model = self.unpack(arrays, pattern, where, progress)
+        return Calibration(self, model, pattern, str(arrays.get("skin_name", "")))
+
+    def _pattern(self, arrays: Arrays, where: str) -> Pattern:
+        title = str(arrays.get("kind", ""))
+        if title != self.title or not set(arrays) >= self.keys | _PATTERN_KEYS:
+            raise DataError(
+                f"is not a calibration of {self.subject}",
+                where=where,
+                hint=f"make one: tomoskin calibrate {self.command}",
+            )
+        if whole_number(arrays, "version", where) != self.version:
+            raise DataError(
+                f"expected version {self.version}, got {arrays['version']}", where=where
+            )
+        drive, measure = (electrode_table(arrays, key, where) for key in ("drive", "measure"))
+        with located(where):
+            return Pattern.from_tables(drive, measure, whole_number(arrays, "n_electrodes", where))
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration(Generic[M]):
+    """A ``model`` of one ``kind``, the pattern of its measurements and the name of its skin.
+
+    ``skin_name`` is "" where there is no skin.
+    """
+
+    kind: Kind[M]
+    model: M
+    pattern: Pattern
+    skin_name: str = ""
+
+    def write(self, path: Path, *, overwrite: bool = False) -> None:
+        """Write the file; raises as :func:`tomoskin.core.written` does."""
+        save_arrays(path, self._arrays(), overwrite=overwrite)
+
+    def encode(self) -> bytes:
+        """The same file's bytes, for a session that holds it."""
+        return pack_arrays(self._arrays())
+
+    def check(self, skin: Skin) -> None:
+        """Raise DataError where it cannot serve ``skin``."""
+        self.kind.check(self, skin)
+
+    def with_model(self, model: M) -> Self:
+        """The same with another model."""
+        return replace(self, model=model)
+
+    def without(self, measurements: IntArray) -> Self | None:
+        """The same without some measurements; None where it cannot do without."""
+        model = self.kind.exclude(self.model, measurements)
+        return None if model is None else self.with_model(model)
+
+    @property
+    def directions(self) -> FloatArray:
+        """(n_meas, k) V along which what it reads moves the data."""
+        if self.kind.directions is None:
+            return np.zeros((self.pattern.n_meas, 0))
+        return self.kind.directions(self.model)
+
+    def apply(self, conditions: Conditions) -> Applied:
+        """What it does with each frame under ``conditions``."""
+        return self.kind.apply(self.model, conditions)
+
+    def _arrays(self) -> Arrays:
+        return {
+            "kind": np.array(self.kind.title),
+            "version": np.array(self.kind.version),
+            "drive": self.pattern.drive,
+            "measure": self.pattern.measure,
+            "n_electrodes": np.array(self.pattern.n_electrodes),
+            "skin_name": np.array(self.skin_name),
+            **self.kind.pack(self.model),
+        }
+
+
+@contextmanager
+def located(where: str) -> Iterator[None]:
+    """Name the file in errors of what is made from its arrays, as DataError."""
+    try:
+        yield
+    except (DataError, ModelError, PatternError) as error:
+        raise DataError(error.message, where=f"{where}, {error.where}".rstrip(", ")) from error

@@ -1,0 +1,115 @@
+"""The kind of calibration that tells where a touch is, from labelled presses.
+
+Keys of the .npz: ``kind``, ``version``; ``dv`` (n, n_meas), ``xy_m`` (n, 2), optional ``strength``
+(n,); ``outline_m`` (k, 2); ``drive``, ``measure`` (n_meas, 2), ``n_electrodes``; ``pattern``,
+``skin`` identities, ``skin_name``. What was learnt is learnt again when the file is read, which
+gives the same locator: a file outlives the method.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tomoskin.calibration.applied import Applied, Conditions, Observation, without_information
+from tomoskin.calibration.kind import Calibration, Kind, Progress, located
+from tomoskin.calibration.locator.locator import Locator
+from tomoskin.calibration.locator.presses import Presses
+from tomoskin.core import Arrays, DataError, IntArray, Reading, real_numbers
+from tomoskin.pattern import Pattern
+from tomoskin.skin import Skin
+from tomoskin.touch import Region
+
+_SAME_SHAPE = 1e-4
+"""Outlines within so many metres of each other are one."""
+
+
+class LocatedTouch(Applied):
+    """The image tells that there is a touch, labelled presses where: of one touch at a time."""
+
+    def __init__(self, locator: Locator) -> None:
+        self._locator = locator
+
+    def locate(self, observation: Observation, detections: list[Reading]) -> list[Reading]:
+        """The strongest detection, at the position that the presses tell."""
+        if not detections:
+            return []
+        # The presses were learnt with all that is in them: nothing is taken out here either.
+        excluded = without_information(observation.nuisance)
+        dv = np.where(excluded, np.nan, observation.change)
+        if not np.isfinite(dv).any():
+            return []
+        (position,), (covariance,) = self._locator.predict(dv)
+        sd_x, sd_y = np.sqrt(np.diag(covariance)).tolist()
+        return [
+            replace(
+                detections[0],
+                x=float(position[0]),
+                y=float(position[1]),
+                sd_x=sd_x,
+                sd_y=sd_y,
+                cov_xy=float(covariance[0, 1]),
+            )
+        ]
+
+
+def _pack(locator: Locator) -> Arrays:
+    arrays: Arrays = {
+        "dv": locator.presses.dv,
+        "xy_m": locator.presses.xy,
+        "outline_m": locator.region.outline,
+        "pattern": np.array(locator.pattern_id),
+        "skin": np.array(locator.skin_id),
+    }
+    if locator.presses.strength is not None:
+        arrays["strength"] = locator.presses.strength
+    return arrays
+
+
+def _unpack(arrays: Arrays, pattern: Pattern, where: str, progress: Progress) -> Locator:
+    strength = real_numbers(arrays, "strength", where) if "strength" in arrays else None
+    dv = real_numbers(arrays, "dv", where)
+    if dv.shape[1:] != (pattern.n_meas,):
+        raise DataError(f"expected {pattern.n_meas} rows of dv", where=where)
+    with located(where):
+        presses = Presses.of(dv, real_numbers(arrays, "xy_m", where), strength)
+        region = Region.checked(real_numbers(arrays, "outline_m", where))
+        skin_id = str(arrays.get("skin", ""))
+        return Locator.learn(presses.within(region), region, pattern, skin_id, progress)
+
+
+def _check(calibration: Calibration[Locator], skin: Skin) -> None:
+    """It rests on measurements and positions alone: other settings of the image do not matter."""
+    locator = calibration.model
+    locator.check(skin.pattern())
+    outline, known = Region.of(skin).outline, locator.region.outline
+    same = outline.shape == known.shape and np.allclose(outline, known, atol=_SAME_SHAPE)
+    if locator.skin_id and not same:
+        raise DataError("the calibration is of a sheet of another shape")
+
+
+def _exclude(_locator: Locator, _measurements: IntArray) -> None:
+    """The locator's features rest on all measurements."""
+
+
+def _apply(locator: Locator, _conditions: Conditions) -> Applied:
+    return LocatedTouch(locator)
+
+
+TOUCH = Kind(
+    name="touch",
+    title="tomoskin touch calibration",
+    version=1,
+    subject="touch",
+    command="touch",
+    attachment="calibration.npz",
+    keys=frozenset({"dv", "xy_m", "outline_m"}),
+    pack=_pack,
+    unpack=_unpack,
+    check=_check,
+    exclude=_exclude,
+    apply=_apply,
+    locates=True,
+)
+"""Touch positions from labelled presses; its model is a :class:`Locator`."""

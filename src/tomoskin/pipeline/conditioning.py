@@ -1,0 +1,322 @@
+"""Voltages → difference data: electrode health, the baseline, and what carries no information."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.pattern import Scan
+from tomoskin.pipeline.measured import Measured
+from tomoskin.pipeline.nuisance import Drift, Nuisance
+from tomoskin.pipeline.prepare import Prepared
+from tomoskin.signal import (
+    Baseline,
+    BaselineState,
+    Blind,
+    Health,
+    Monitor,
+    Reference,
+    difference,
+    lost_directions,
+)
+
+MOST_NUISANCE = 0.5
+"""No image is made when more than this part of the data carries no information."""
+
+_NEW_NOISE = 0.1
+"""Noise that has changed by more than this part makes a new noise of the image."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Conditioned:
+    """Difference data of one frame.
+
+    Attributes
+    ----------
+    dv
+        (n_meas,) without their part in the nuisance subspace; None where too little is left.
+    nuisance
+        (n_meas, k) orthonormal directions of that subspace.
+    n_excluded
+        How many measurements are excluded, or count in a sum only.
+    change
+        (n_meas,) V by which the frame differs from the baseline, with all that is in it.
+    since_reference
+        (n_meas,) V by which it differs from the reference as that was taken; NaN where a
+        measurement is excluded.
+    drift
+        (n_meas, k) V: directions of drift and of excluded measurements.
+    health
+        Of the electrodes; None where there are no voltages to tell it from.
+    """
+
+    dv: FloatArray | None
+    nuisance: FloatArray
+    n_excluded: int
+    change: FloatArray
+    since_reference: FloatArray
+    drift: FloatArray
+    health: Health | None = None
+
+
+class Conditioning(Protocol):
+    """What makes difference data of one frame after the other."""
+
+    @property
+    def prepared(self) -> Prepared:
+        """The skin with the operator for what is well."""
+        ...
+
+    @property
+    def reference(self) -> Reference | None:
+        """What the untouched skin reads as far as it is known now."""
+        ...
+
+    @property
+    def mean(self) -> FloatArray:
+        """(n_meas,) V of the untouched skin, as they are known now; else the model's."""
+        ...
+
+    @property
+    def state(self) -> BaselineState | None:
+        """How the baseline is."""
+        ...
+
+    def subspace(self) -> Blind | None:
+        """The nuisance subspace of late."""
+        ...
+
+    def condition(self, measured: Measured) -> Conditioned:
+        """Difference data of a frame."""
+        ...
+
+    def learn(self, time: float, moved: FloatArray | float, *, touched: bool) -> bool:
+        """Take the newest frame, without what of it has ``moved`` V, for the baseline.
+
+        True where the operator or the noise has changed.
+        """
+        ...
+
+    def renew(self, prepared: Prepared) -> None:
+        """Go on with another operator of the same skin."""
+        ...
+
+
+class Followed:
+    """Against a baseline that follows the skin from its reference on.
+
+    Parameters
+    ----------
+    prepared
+        The skin.
+    monitor, baseline, drift
+        What has been learnt of electrodes and reference.
+    health
+        Of the electrodes, where it is known.
+    """
+
+    def __init__(
+        self,
+        prepared: Prepared,
+        monitor: Monitor,
+        baseline: Baseline,
+        drift: Drift,
+        health: Health | None = None,
+    ) -> None:
+        self._monitor, self._baseline, self._drift = monitor, baseline, drift
+        self._scale = _scale(prepared, baseline.start)
+        self._health = health
+        self._noise_for: tuple[object, float] = (None, np.nan)
+        self._values, self._excluded = baseline.mean, np.zeros(len(baseline.mean), bool)
+        self.renew(prepared)
+
+    @classmethod
+    def of(
+        cls,
+        prepared: Prepared,
+        reference: Reference,
+        without_reference: NDArray[np.bool_],
+        scan: Scan | None,
+    ) -> Self:
+        """From its ``reference`` on.
+
+        ``without_reference`` (n_meas,) bool: measurements that have none. ``scan``: what samples
+        are, where frames bring them; None where there are voltages only.
+        """
+        monitor = Monitor(
+            prepared.pattern,
+            reference,
+            prepared.operator.reference,
+            unusable=without_reference,
+            scan=scan,
+            rank=_rank(prepared),
+        )
+        drift = Drift(prepared, reference)
+        return cls(prepared, monitor, _baseline(prepared, reference), drift)
+
+    def with_settings(self, prepared: Prepared, reference: Reference) -> Followed:
+        """One for other settings of the same skin that goes on where this one is.
+
+        ``reference`` is that which this one was made with.
+        """
+        baseline, drift = self._baseline, self._drift
+        if prepared.skin.signal != self._given.skin.signal:
+            baseline, drift = _baseline(prepared, reference), Drift(prepared, reference)
+        return Followed(prepared, self._monitor, baseline, drift, self._health)
+
+    def renew(self, prepared: Prepared) -> None:
+        """See :class:`Conditioning`."""
+        self._given = self._prepared = prepared
+        health = self._health
+        if health is not None and health.sick:
+            lost = lost_directions(prepared.pattern, health.lost, health.floating)
+            self._prepared = prepared.blind_to(lost / self._scale[:, None])
+        self._nuisance = Nuisance(self._prepared, self._scale, self._drift)
+
+    @property
+    def prepared(self) -> Prepared:
+        """The skin with the operator for the electrodes that are well."""
+        return self._prepared
+
+    @property
+    def reference(self) -> Reference:
+        """The baseline as it is now."""
+        return self._baseline.reference
+
+    @property
+    def mean(self) -> FloatArray:
+        """See :class:`Conditioning`."""
+        return self._baseline.mean
+
+    @property
+    def state(self) -> BaselineState:
+        """See :class:`Conditioning`."""
+        return self._baseline.state
+
+    def subspace(self) -> Blind:
+        """See :class:`Conditioning`."""
+        return self._nuisance(self._health).blind
+
+    def condition(self, measured: Measured) -> Conditioned:
+        """See :class:`Conditioning`."""
+        values, baseline = measured.values, self._baseline
+        mean = baseline.mean
+        if measured.excluded.any():
+            values = np.where(np.isfinite(values), values, mean)
+        health = self._monitor.push(values, measured.excluded, measured.time, measured.samples)
+        self._values, self._health = values, health
+        subspace = self._nuisance(health)
+        self._excluded = health.lost
+        if health.floating.any():
+            self._excluded = health.lost | health.floating[self._prepared.pattern.measure].any(
+                axis=1
+            )
+        n_excluded = int(np.count_nonzero(self._excluded))
+        if n_excluded:
+            values = np.where(health.lost, mean, values)
+        dv, excluded = None, measured.excluded | health.lost
+        if subspace.blind.count <= MOST_NUISANCE * len(values):
+            dv = subspace.blind(difference(values, mean, self._prepared.operator.difference))
+        return Conditioned(
+            dv=dv,
+            nuisance=subspace.blind.directions,
+            n_excluded=n_excluded,
+            change=values - mean,
+            since_reference=np.where(excluded, np.nan, measured.values - baseline.start),
+            drift=subspace.drift,
+            health=health,
+        )
+
+    def learn(self, time: float, moved: FloatArray | float, *, touched: bool) -> bool:
+        """See :class:`Conditioning`."""
+        health, baseline = self._health, self._baseline
+        if health is None:
+            return False
+        if baseline.push(self._values - moved, self._excluded, time, touched=touched):
+            self._drift.learn(baseline, self._signatures)
+        noise = baseline.idle.noise
+        level = float(noise @ noise)
+        sick = tuple((e.electrode, e.state) for e in health.sick)
+        states = (sick, self._drift.revision)
+        before, then = self._noise_for
+        changed = then > 0 and abs(np.log(level / then)) > 2.0 * _NEW_NOISE
+        if states == before and not changed:
+            return False
+        self._noise_for = (states, level)
+        if before is not None and states != before:
+            self.renew(self._given)
+        return before is not None
+
+    def _signatures(self) -> FloatArray:
+        """(n_meas, n_cells) V: what a change of each cell does."""
+        return np.asarray((self._prepared.problem.jacobian * self._scale[:, None]).real)
+
+
+class GivenDifferences:
+    """Difference data that stand in a file, where no reference is known.
+
+    Parameters
+    ----------
+    prepared
+        The skin.
+    """
+
+    reference = None
+    state = None
+
+    def __init__(self, prepared: Prepared) -> None:
+        self.prepared = prepared
+
+    @property
+    def mean(self) -> FloatArray:
+        """See :class:`Conditioning`."""
+        return self.prepared.operator.reference
+
+    def subspace(self) -> None:
+        """See :class:`Conditioning`."""
+
+    def condition(self, measured: Measured) -> Conditioned:
+        """Of a frame whose values are difference data already."""
+        operator, excluded = self.prepared.operator, measured.excluded
+        change = measured.values
+        if operator.difference == "normalised":
+            change = change * np.abs(operator.reference)
+        return Conditioned(
+            dv=operator.filled(measured.values, excluded),
+            nuisance=np.eye(len(excluded))[:, excluded],
+            n_excluded=int(np.count_nonzero(excluded)),
+            change=change,
+            since_reference=np.where(excluded, np.nan, change),
+            drift=np.zeros((len(excluded), 0)),
+        )
+
+    def learn(self, time: float, moved: FloatArray | float, *, touched: bool) -> bool:
+        """Nothing can be learnt."""
+        del time, moved, touched
+        return False
+
+    def renew(self, prepared: Prepared) -> None:
+        """See :class:`Conditioning`."""
+        self.prepared = prepared
+
+
+def _baseline(prepared: Prepared, reference: Reference) -> Baseline:
+    return Baseline(reference, follows=prepared.skin.signal.baseline == "follow")
+
+
+def _scale(prepared: Prepared, reference: FloatArray) -> FloatArray:
+    """(n_meas,) V per unit of difference data."""
+    if prepared.operator.difference == "plain":
+        return np.ones_like(reference)
+    return np.abs(reference)
+
+
+def _rank(prepared: Prepared) -> IntArray:
+    """(n_electrodes,) rank of each electrode along the rim."""
+    length = prepared.skin.outline.length
+    start = [arc.start % length for arc in prepared.skin.arcs]
+    return np.argsort(np.argsort(start))

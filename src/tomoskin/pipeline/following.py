@@ -1,0 +1,220 @@
+"""The second state of the pipeline: each frame to its image, touches and what else was learnt."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tomoskin.calibration import Observation
+from tomoskin.core import FloatArray, Image, Reading, Touch
+from tomoskin.pattern import Scan
+from tomoskin.pipeline.collecting import Rest
+from tomoskin.pipeline.conditioning import (
+    Conditioned,
+    Conditioning,
+    Followed,
+    GivenDifferences,
+)
+from tomoskin.pipeline.finding import Finder, Fitting, finding
+from tomoskin.pipeline.imaging import Filtered, SingleFrame, imaging
+from tomoskin.pipeline.measured import Measured
+from tomoskin.pipeline.prepare import Prepared
+from tomoskin.pipeline.result import Result
+from tomoskin.pipeline.tune import tune
+from tomoskin.signal import Reference
+from tomoskin.touch import WHOLE, Pace, Tracker
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Setting:
+    """How frames are followed, whatever the skin: ``pace`` of the fit, and ``scan``, what samples
+    are, where frames bring them."""
+
+    pace: Pace = WHOLE
+    scan: Scan | None = None
+
+
+class Following:
+    """Follows a skin from its rest on.
+
+    Parameters
+    ----------
+    prepared
+        The skin.
+    rest
+        What it reads untouched.
+    conditioning
+        What makes difference data of its frames.
+    tracker
+        Gives the touches their identity.
+    setting
+        Of the run.
+    reference
+        Of the first frames: as it was taken, or as the baseline tells it by now.
+    """
+
+    def __init__(
+        self,
+        prepared: Prepared,
+        rest: Rest | None,
+        conditioning: Conditioning,
+        tracker: Tracker,
+        setting: Setting,
+        reference: Reference | None,
+    ) -> None:
+        self.rest, self._setting = rest, setting
+        self._prepared, self._conditioning = prepared, conditioning
+        self._tracker = tracker
+        self._imaging = self._new_imaging(reference)
+        self._finder: Finder = finding(prepared, reference, setting.pace)
+        conditions = Fitting(prepared, reference, self._finder)
+        self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
+        self._tuning: Generator[None, None, Prepared] | None = None
+        if reference is not None:
+            self._tuning = tune(prepared, reference)
+
+    @classmethod
+    def from_rest(
+        cls, prepared: Prepared, rest: Rest, tracker: Tracker, setting: Setting
+    ) -> Following:
+        """Against the voltages of the untouched skin."""
+        conditioning = Followed.of(prepared, rest.reference, rest.without_reference, setting.scan)
+        return cls(prepared, rest, conditioning, tracker, setting, rest.reference)
+
+    @classmethod
+    def of_differences(cls, prepared: Prepared, tracker: Tracker) -> Following:
+        """Of frames that are difference data already."""
+        return cls(prepared, None, GivenDifferences(prepared), tracker, Setting(), None)
+
+    def with_settings(self, prepared: Prepared, tracker: Tracker) -> Following:
+        """One for other settings of the same body that goes on where this one is."""
+        conditioning = self._conditioning
+        if self.rest is not None and isinstance(conditioning, Followed):
+            conditioning = conditioning.with_settings(prepared, self.rest.reference)
+        reference = conditioning.reference
+        return Following(prepared, self.rest, conditioning, tracker, self._setting, reference)
+
+    @property
+    def prepared(self) -> Prepared:
+        """The skin, its alpha as it has been tuned."""
+        return self._prepared
+
+    @property
+    def conditioning(self) -> Conditioning:
+        """What is known of the reference and of the electrodes."""
+        return self._conditioning
+
+    def push(self, measured: Measured) -> Result:
+        """Take one frame."""
+        self._tune()
+        conditioned = self._conditioning.condition(measured)
+        if conditioned.dv is None:
+            touches = self._track([], measured)
+            return self._result(measured, conditioned, self._prepared.no_image, touches, {})
+        observation = self._observe(conditioned, conditioned.dv, measured.time)
+        detections = self._finder.push(observation)
+        for applied in self._applied.values():
+            detections = applied.locate(observation, detections)
+        touches = self._track(detections, measured)
+        readings = self._read(observation, detections, touched=bool(touches))
+        self._learn(measured.time, touched=bool(touches))
+        return self._result(measured, conditioned, observation.image, touches, readings)
+
+    def first(self, measured: Measured) -> Result:
+        """The frame that completed the rest: nothing shows in it."""
+        return Result(
+            sequence=measured.sequence,
+            host_time=measured.host_time,
+            ready=True,
+            pictured=True,
+            image=self._prepared.no_image,
+            voltages=measured.values,
+            reference=self._conditioning.mean,
+            touches=(),
+            left_out=int(np.count_nonzero(measured.excluded)),
+            events=self._tracker.events,
+            baseline=self._conditioning.state,
+        )
+
+    def _observe(self, conditioned: Conditioned, dv: FloatArray, time: float) -> Observation:
+        image, noise = self._imaging.push(dv, time)
+        return Observation(
+            time=time,
+            image=image,
+            image_noise=noise,
+            dv=dv,
+            nuisance=conditioned.nuisance,
+            change=conditioned.change,
+            drift=conditioned.drift,
+            since_reference=conditioned.since_reference,
+        )
+
+    def _read(
+        self, observation: Observation, detections: list[Reading], *, touched: bool
+    ) -> dict[str, Any]:
+        readings = {
+            kind: applied.read(observation, detections, touched=touched)
+            for kind, applied in self._applied.items()
+        }
+        return {kind: reading for kind, reading in readings.items() if reading is not None}
+
+    def _learn(self, time: float, *, touched: bool) -> None:
+        conditioning = self._conditioning
+        moved = sum((applied.moved for applied in self._applied.values()), start=0.0)
+        if conditioning.learn(time, moved, touched=touched) and conditioning.reference:
+            prepared, reference = conditioning.prepared, conditioning.reference
+            self._imaging.renew(prepared, reference, conditioning.subspace())
+            self._finder.renew(prepared, reference)
+
+    def _tune(self) -> None:
+        """One step towards the alpha for the reference's noise; the old one serves meanwhile."""
+        if self._tuning is None:
+            return
+        try:
+            next(self._tuning)
+        except StopIteration as end:
+            self._tuning = None
+            if end.value is not self._prepared:
+                self._renew(end.value)
+
+    def _renew(self, prepared: Prepared) -> None:
+        self._prepared = prepared
+        self._conditioning.renew(prepared)
+        reference = self._conditioning.reference
+        self._imaging = self._new_imaging(reference)
+        self._finder.renew(self._conditioning.prepared, reference)
+
+    def _new_imaging(self, reference: Reference | None) -> SingleFrame | Filtered:
+        conditioning = self._conditioning
+        interval = np.nan if self.rest is None else self.rest.interval
+        return imaging(conditioning.prepared, reference, interval, conditioning.subspace())
+
+    def _track(self, detections: list[Reading], measured: Measured) -> tuple[Touch, ...]:
+        return self._tracker.update(detections, measured.time, measured.host_time)
+
+    def _result(
+        self,
+        measured: Measured,
+        conditioned: Conditioned,
+        image: Image,
+        touches: tuple[Touch, ...],
+        readings: dict[str, Any],
+    ) -> Result:
+        return Result(
+            sequence=measured.sequence,
+            host_time=measured.host_time,
+            ready=True,
+            pictured=conditioned.dv is not None,
+            image=image,
+            voltages=measured.values,
+            reference=self._conditioning.mean,
+            touches=touches,
+            left_out=conditioned.n_excluded,
+            events=self._tracker.events,
+            health=conditioned.health,
+            baseline=self._conditioning.state,
+            readings=readings,
+        )
