@@ -168,7 +168,7 @@ class Bench:
         image = self.lab.image
         none = np.zeros((self.lab.prepared.pattern.n_meas, 0))
         return lambda dv, blind: found.push(
-            Observation(0.0, image(dv), None, dv, blind, dv, none, dv)
+            Observation(0.0, image(dv), None, dv, blind, dv, none, dv, np.zeros(len(dv), bool))
         )
 
     def static(self, pose: Pose) -> list[float]:

@@ -87,7 +87,8 @@ class Lab:
             nuisance=self.reference.mean[:, None],
             change=dv,
             drift=np.zeros((len(dv), 0)),
-            since_reference=dv,
+            from_rest=dv,
+            excluded=np.zeros(len(dv), bool),
         )
 
     def exact(self, press: Press) -> Floats:

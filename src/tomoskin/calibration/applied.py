@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, Image, Reading
 from tomoskin.touch import NoiseFloor, Response
+
+BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,9 +33,10 @@ class Observation:
         (n_meas,) V by which the frame differs from the baseline, with all that is in it.
     drift
         (n_meas, k) V: directions of drift and of excluded measurements.
-    since_reference
-        (n_meas,) V by which it differs from the reference as that was taken; NaN where a
-        measurement is excluded.
+    from_rest
+        (n_meas,) V by which it differs from the reference as that was taken.
+    excluded
+        (n_meas,) bool: measurements that do not count.
     """
 
     time: float
@@ -42,7 +46,13 @@ class Observation:
     nuisance: FloatArray
     change: FloatArray
     drift: FloatArray
-    since_reference: FloatArray
+    from_rest: FloatArray
+    excluded: BoolArray
+
+    @property
+    def since_reference(self) -> FloatArray:
+        """(n_meas,) V by which it differs from that reference, NaN where excluded."""
+        return np.where(self.excluded, np.nan, self.from_rest)
 
 
 Detect = Callable[[Observation, list[Reading]], list[Reading]]
@@ -95,7 +105,7 @@ _ALL = 0.999
 """Part of a measurement that is taken for all of it."""
 
 
-def without_information(nuisance: FloatArray) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def without_information(nuisance: FloatArray) -> BoolArray:
     """(n_meas,) measurements of which the nuisance directions (n_meas, k), orthonormal, leave
     nothing."""
     return np.asarray((nuisance**2).sum(axis=1) > _ALL)

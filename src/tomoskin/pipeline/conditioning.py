@@ -45,9 +45,10 @@ class Conditioned:
         How many measurements are excluded, or count in a sum only.
     change
         (n_meas,) V by which the frame differs from the baseline, with all that is in it.
-    since_reference
-        (n_meas,) V by which it differs from the reference as that was taken; NaN where a
-        measurement is excluded.
+    from_rest
+        (n_meas,) V by which it differs from the reference as that was taken.
+    excluded
+        (n_meas,) bool: measurements that do not count.
     drift
         (n_meas, k) V: directions of drift and of excluded measurements.
     health
@@ -58,7 +59,8 @@ class Conditioned:
     nuisance: FloatArray
     n_excluded: int
     change: FloatArray
-    since_reference: FloatArray
+    from_rest: FloatArray
+    excluded: NDArray[np.bool_]
     drift: FloatArray
     health: Health | None = None
 
@@ -218,7 +220,7 @@ class Followed:
         n_excluded = int(np.count_nonzero(self._excluded))
         if n_excluded:
             values = np.where(health.lost, mean, values)
-        dv, excluded = None, measured.excluded | health.lost
+        dv = None
         if subspace.blind.count <= MOST_NUISANCE * len(values):
             dv = subspace.blind(difference(values, mean, self._prepared.operator.difference))
         return Conditioned(
@@ -226,7 +228,8 @@ class Followed:
             nuisance=subspace.blind.directions,
             n_excluded=n_excluded,
             change=values - mean,
-            since_reference=np.where(excluded, np.nan, measured.values - baseline.start),
+            from_rest=measured.values - baseline.start,
+            excluded=health.lost,
             drift=subspace.drift,
             health=health,
         )
@@ -236,7 +239,8 @@ class Followed:
         health, baseline = self._health, self._baseline
         if health is None:
             return False
-        if baseline.push(self._values - moved, self._excluded, time, touched=touched):
+        values = self._values if isinstance(moved, float) else self._values - moved
+        if baseline.push(values, self._excluded, time, touched=touched):
             self._drift.learn(baseline, self._signatures)
         noise = baseline.idle.noise
         level = float(noise @ noise)
@@ -290,7 +294,8 @@ class GivenDifferences:
             nuisance=np.eye(len(excluded))[:, excluded],
             n_excluded=int(np.count_nonzero(excluded)),
             change=change,
-            since_reference=np.where(excluded, np.nan, change),
+            from_rest=change,
+            excluded=excluded,
             drift=np.zeros((len(excluded), 0)),
         )
 

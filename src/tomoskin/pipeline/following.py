@@ -63,6 +63,7 @@ class Following:
         conditioning: Conditioning,
         tracker: Tracker,
         setting: Setting,
+        *,
         reference: Reference | None,
     ) -> None:
         self.rest, self._setting = rest, setting
@@ -82,20 +83,26 @@ class Following:
     ) -> Following:
         """Against the voltages of the untouched skin."""
         conditioning = Followed.of(prepared, rest.reference, rest.without_reference, setting.scan)
-        return cls(prepared, rest, conditioning, tracker, setting, rest.reference)
+        return cls(prepared, rest, conditioning, tracker, setting, reference=rest.reference)
 
     @classmethod
     def of_differences(cls, prepared: Prepared, tracker: Tracker) -> Following:
         """Of frames that are difference data already."""
-        return cls(prepared, None, GivenDifferences(prepared), tracker, Setting(), None)
+        return cls(prepared, None, GivenDifferences(prepared), tracker, Setting(), reference=None)
 
     def with_settings(self, prepared: Prepared, tracker: Tracker) -> Following:
         """One for other settings of the same body that goes on where this one is."""
         conditioning = self._conditioning
         if self.rest is not None and isinstance(conditioning, Followed):
             conditioning = conditioning.with_settings(prepared, self.rest.reference)
-        reference = conditioning.reference
-        return Following(prepared, self.rest, conditioning, tracker, self._setting, reference)
+        return Following(
+            prepared,
+            self.rest,
+            conditioning,
+            tracker,
+            self._setting,
+            reference=conditioning.reference,
+        )
 
     @property
     def prepared(self) -> Prepared:
@@ -149,7 +156,8 @@ class Following:
             nuisance=conditioned.nuisance,
             change=conditioned.change,
             drift=conditioned.drift,
-            since_reference=conditioned.since_reference,
+            from_rest=conditioned.from_rest,
+            excluded=conditioned.excluded,
         )
 
     def _read(
