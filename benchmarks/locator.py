@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from report import Report
 from tomoskin import Locator, Pattern, Skin
 from tomoskin.calibration import Watch
-from tomoskin.calibration.locator.kernel import squared_distances
-from tomoskin.calibration.locator.process import Process
+from tomoskin.calibration.locator.process import Process, squared_distances
 from tomoskin.core import DataError
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"

@@ -32,7 +32,7 @@ import figures
 from bodies import options_of
 from face import CONTACT, EXPRESSIONS, Bump, Face, face, movement
 from lab import report
-from tomoskin.calibration import StateClassifier
+from tomoskin.calibration import Classifier
 from tomoskin.core import ComplexArray, FloatArray
 from tomoskin.forward import ForwardModel, State
 from tomoskin.inverse import LinearProblem, Matern
@@ -158,7 +158,7 @@ def told(sessions: Sequence[Session], seed: int, *, direct: bool) -> NDArray[np.
     random = np.random.default_rng([seed, int(direct)])
     taken = [frames_of(one, random, direct=direct) for one in sessions]
     first, *more = taken[:LEARNT]
-    known = StateClassifier.fit(features(first.dv), first.label)
+    known = Classifier.fit(features(first.dv), first.label)
     for one in more:
         known = known.in_session(
             features(one.dv), known.examples.codes.flags_of(one.label.tolist())

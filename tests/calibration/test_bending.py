@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tomoskin.calibration import BendExamples, BendModel, BendReader, JointReference
-from tomoskin.calibration.bending.memory import Memory
+from tomoskin.calibration.bending.model import Memory
 from tomoskin.core import DataError
 from tomoskin.pipeline import prepare
 from tomoskin.skin import Skin

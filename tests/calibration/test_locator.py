@@ -10,9 +10,9 @@ import pytest
 from calibration.labelled import RADIUS, ROWS, Floats, held, places, presses
 from tomoskin import Locator, Pattern, Skin
 from tomoskin.calibration import Presses
-from tomoskin.calibration.locator.kernel import Basis, Likeness
 from tomoskin.calibration.locator.maps import ResponseMaps
 from tomoskin.calibration.locator.posterior import GridLikelihood, moments, pooled
+from tomoskin.calibration.locator.process import Basis, Likeness
 from tomoskin.core import DataError
 from tomoskin.touch import Region
 

@@ -8,7 +8,7 @@ import pytest
 from calibration.labelled import RADIUS, Floats, places
 from tomoskin import Locator, Pattern
 from tomoskin.calibration.locator.lone import LoneMaps
-from tomoskin.calibration.locator.turns import Turns, turned
+from tomoskin.calibration.locator.rotations import Turns, turned
 
 PATTERN = Pattern.adjacent(8)
 

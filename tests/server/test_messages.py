@@ -9,7 +9,7 @@ import pytest
 from tomoskin.core import Event
 from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline import colour_limit, prepare
-from tomoskin.pipeline.result import ReferenceState
+from tomoskin.pipeline.records import ReferenceState
 from tomoskin.run.status import Status
 from tomoskin.server import messages
 from tomoskin.signal import BaselineState, ElectrodeHealth

@@ -13,9 +13,7 @@ from tomoskin.calibration.channel_mapping.solve import WiringAnswer, solve_wirin
 from tomoskin.calibration.channel_mapping.wiring import Wiring, ring_of
 from tomoskin.calibration.classes import CLASSES, ClassReading, FrameClassifier
 from tomoskin.calibration.classifier.classifier import Answers, Classifier
-from tomoskin.calibration.classifier.codes import Codes
-from tomoskin.calibration.classifier.examples import Examples
-from tomoskin.calibration.classifier.rest import against_rest
+from tomoskin.calibration.classifier.examples import Codes, Examples, against_rest
 from tomoskin.calibration.kind import Calibration, Kind
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses

@@ -15,8 +15,7 @@ import numpy as np
 
 from tomoskin.calibration.applied import Applied, Conditions, Observation
 from tomoskin.calibration.classifier.classifier import Classifier
-from tomoskin.calibration.classifier.codes import Codes
-from tomoskin.calibration.classifier.examples import Examples
+from tomoskin.calibration.classifier.examples import Codes, Examples
 from tomoskin.calibration.kind import Calibration, Kind, Progress, located
 from tomoskin.core import (
     Arrays,

@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.calibration.locator import Locator
-from tomoskin.calibration.locator.features import Features
-from tomoskin.calibration.locator.kernel import squared_distances
 from tomoskin.calibration.locator.maps import ResponseMaps
 from tomoskin.calibration.locator.posterior import moments
-from tomoskin.calibration.locator.presses import frames
+from tomoskin.calibration.locator.presses import Features, frames
+from tomoskin.calibration.locator.process import squared_distances
 from tomoskin.core import FloatArray, IntArray, Reading
 
 _PLACES = 160

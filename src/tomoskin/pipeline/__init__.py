@@ -1,12 +1,11 @@
 """The one frame flow, pure: a reference is collected, then frames are followed to touches."""
 
 from tomoskin.pipeline.finding import voltage_covariance
-from tomoskin.pipeline.measured import Measured
 from tomoskin.pipeline.offline import Reconstruction, reconstruct
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.pipeline.prepare import Prepared, prepare
 from tomoskin.pipeline.recorded import DOUBTED, Idle, RecordedFrames, recorded_frames
-from tomoskin.pipeline.result import ReferenceState, Result
+from tomoskin.pipeline.records import Measured, ReferenceState, Result
 from tomoskin.pipeline.scale import colour_limit
 from tomoskin.pipeline.tune import tuned
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
-from tomoskin.pipeline.measured import Measured
+from tomoskin.pipeline.records import Measured
 from tomoskin.signal import Reference
 
 

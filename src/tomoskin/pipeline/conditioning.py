@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.pattern import Scan
-from tomoskin.pipeline.measured import Measured
 from tomoskin.pipeline.nuisance import Drift, Nuisance
 from tomoskin.pipeline.prepare import Prepared
+from tomoskin.pipeline.records import Measured
 from tomoskin.signal import (
     Baseline,
     BaselineState,

@@ -20,9 +20,8 @@ from tomoskin.pipeline.conditioning import (
 )
 from tomoskin.pipeline.finding import Finder, Fitting, finding
 from tomoskin.pipeline.imaging import Filtered, SingleFrame, imaging
-from tomoskin.pipeline.measured import Measured
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.result import Result
+from tomoskin.pipeline.records import Measured, Result
 from tomoskin.pipeline.tune import tune
 from tomoskin.signal import Reference
 from tomoskin.touch import WHOLE, Pace, Tracker

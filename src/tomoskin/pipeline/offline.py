@@ -13,9 +13,9 @@ from tomoskin.core import DataError, FloatArray, IntArray, Touch
 from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline.collecting import Rest
 from tomoskin.pipeline.following import Following, Setting
-from tomoskin.pipeline.measured import Measured
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
+from tomoskin.pipeline.records import Measured
 from tomoskin.pipeline.tune import tuned, tuned_by_rule
 from tomoskin.signal import Recording
 from tomoskin.touch import STILL, Tracker

@@ -8,9 +8,8 @@ from tomoskin.core import Frame
 from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline.collecting import Collecting
 from tomoskin.pipeline.following import Following, Setting
-from tomoskin.pipeline.measured import Measured
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.result import ReferenceState, Result
+from tomoskin.pipeline.records import Measured, ReferenceState, Result
 from tomoskin.signal import Reference
 from tomoskin.touch import LIVE, Tracker, TrackSettings
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import t as student
 
-from tomoskin.calibration.classifier.codes import Codes
-from tomoskin.calibration.classifier.examples import Examples
+from tomoskin.calibration.classifier.examples import Codes, Examples
 from tomoskin.calibration.classifier.mixture import Mixture, entropy, posterior
 from tomoskin.calibration.classifier.subspace import Subspace, session_mean
 from tomoskin.calibration.locator.presses import frames

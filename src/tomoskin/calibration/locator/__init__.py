@@ -2,7 +2,7 @@
 
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
-from tomoskin.calibration.locator.review import Remark
+from tomoskin.calibration.locator.stacking import Remark
 from tomoskin.calibration.locator.watch import Watch
 from tomoskin.touch import Region
 

@@ -9,11 +9,11 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.calibration.locator.kernel import LENGTHS, Likeness
 from tomoskin.calibration.locator.lone import LoneLikelihood, LoneMaps
 from tomoskin.calibration.locator.maps import ResponseMaps
 from tomoskin.calibration.locator.posterior import GridLikelihood, moments, pooled, powers_of
-from tomoskin.calibration.locator.turns import Turns
+from tomoskin.calibration.locator.process import LENGTHS, Likeness
+from tomoskin.calibration.locator.rotations import Turns
 from tomoskin.core import FloatArray
 
 FEW = 80

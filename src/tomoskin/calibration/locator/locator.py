@@ -10,14 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from tomoskin.calibration.locator.doubt import NINE_IN_TEN, Doubt, dispute_of, squared_lengths
-from tomoskin.calibration.locator.features import Features
 from tomoskin.calibration.locator.held_out import FEW, Estimates
-from tomoskin.calibration.locator.presses import Presses, frames
-from tomoskin.calibration.locator.review import Remark, outliers, twins
-from tomoskin.calibration.locator.stack import Stack
-from tomoskin.calibration.locator.strength import Strength
-from tomoskin.calibration.locator.turns import Turns
+from tomoskin.calibration.locator.presses import Features, Presses, Strength, frames
+from tomoskin.calibration.locator.rotations import Turns
+from tomoskin.calibration.locator.stacking import (
+    NINE_IN_TEN,
+    Doubt,
+    Remark,
+    Stack,
+    dispute_of,
+    outliers,
+    squared_lengths,
+    twins,
+)
 from tomoskin.core import DataError, FloatArray
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin

@@ -9,9 +9,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.calibration.locator.kernel import LENGTHS, Likeness
-from tomoskin.calibration.locator.orbit import Modes, OrbitMaps
-from tomoskin.calibration.locator.turns import Turns
+from tomoskin.calibration.locator.process import LENGTHS, Likeness
+from tomoskin.calibration.locator.rotations import Modes, OrbitMaps, Turns
 from tomoskin.core import FloatArray, IntArray
 
 _SHARES = (0.0, 0.3, 0.6, 0.85)

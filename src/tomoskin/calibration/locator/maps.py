@@ -1,4 +1,4 @@
-"""Response maps: what every row of the pattern answers to a press at every place."""
+"""Response maps: likeness among measurements, and what each answers to a press anywhere."""
 
 from __future__ import annotations
 
@@ -7,10 +7,103 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from scipy.linalg import eigh
 
-from tomoskin.calibration.locator.coregion import Coregion, Projected
-from tomoskin.calibration.locator.kernel import Basis, Likeness
+from tomoskin.calibration.locator.process import Basis, Likeness
 from tomoskin.core import FloatArray
+
+_PSEUDO_ROWS = 60.0
+"""Weight of the prior of both covariances, which is their own diagonal."""
+
+_SIGNAL_AT_FIRST = 0.7
+_ITERATIONS, _ENOUGH, _LEAST = 30, 2e-3, 1.0
+_FLOOR = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Projected:
+    """Presses in coordinates in which a response's prior is diagonal.
+
+    ``weights`` (m,) prior variance of each coordinate; ``rows`` (m, k) the features there;
+    ``rest`` (k, k) scatter of the ``n_rest`` coordinates that hold noise only.
+    """
+
+    weights: FloatArray
+    rows: FloatArray
+    rest: FloatArray
+    n_rest: int
+
+    @property
+    def n(self) -> int:
+        """Number of presses."""
+        return len(self.weights) + self.n_rest
+
+
+@dataclass(frozen=True, eq=False)
+class Coregion:
+    """Signal A = S Q diag(gain) Qᵀ S and noise S with QᵀSQ = 1: a feature's Q coordinates are
+    independent, with noise of variance 1 and signal of variance ``gain`` (k,).
+
+    ``evidence`` is the log marginal likelihood of the presses, up to a constant.
+    """
+
+    gain: FloatArray
+    whiten: FloatArray
+    evidence: float
+
+    @classmethod
+    def of(cls, data: Projected) -> Self:
+        """Fit A and S by expectation maximisation.
+
+        Row j of the data is Gaussian with covariance weights[j] A + S (the linear model of
+        coregionalisation, Bonilla, Chai & Williams 2008). The eigenvectors of (A, S) make the
+        expectation diagonal (as in Rakitsch et al. 2013); an inverse-Wishart prior draws both
+        covariances to their diagonals.
+        """
+        m, k = data.rows.shape
+        total = ((data.rows**2).sum(axis=0) + np.diag(data.rest)) / data.n
+        total = total + _FLOOR * total.mean()
+        signal = np.diag(_SIGNAL_AT_FIRST * total * data.n / data.weights.sum())
+        noise = np.diag((1 - _SIGNAL_AT_FIRST) * total)
+        last = -np.inf
+        for step in range(_ITERATIONS):
+            gain, q = _modes(signal, noise)
+            rows = data.rows @ q
+            evidence = _evidence(data, gain, q, rows)
+            if step > 5 and evidence - last < max(_ENOUGH * data.n, _LEAST):
+                break
+            last = evidence
+            ratio = data.weights[:, None] * gain
+            part = ratio / (1 + ratio)
+            seen, left = part * rows, rows - part * rows
+            weighed = part / data.weights[:, None]
+            back = noise @ q
+            signal = _back(back, (seen / data.weights[:, None]).T @ seen, weighed.sum(axis=0))
+            noise = _back(back, left.T @ left, part.sum(axis=0)) + data.rest
+            signal, noise = _shrunk(signal, m), _shrunk(noise, data.n)
+            noise[np.diag_indices(k)] += _FLOOR * np.diag(noise).mean()
+        return cls(gain, q, evidence)
+
+
+def _modes(signal: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    gain, q = eigh(signal, noise)
+    return np.maximum(gain, 0.0), q
+
+
+def _evidence(data: Projected, gain: FloatArray, q: FloatArray, rows: FloatArray) -> float:
+    ratio = 1 + data.weights[:, None] * gain
+    quadratic = (np.log(ratio) + rows**2 / ratio).sum() + (q * (data.rest @ q)).sum()
+    return float(data.n * np.linalg.slogdet(q)[1] - 0.5 * quadratic)
+
+
+def _back(back: FloatArray, scatter: FloatArray, variance: FloatArray) -> FloatArray:
+    return np.asarray(back @ (scatter + np.diag(variance)) @ back.T)
+
+
+def _shrunk(scatter: FloatArray, n: int) -> FloatArray:
+    target = _PSEUDO_ROWS * np.diag(np.diag(scatter)) / n
+    return np.asarray((scatter + target) / (n + _PSEUDO_ROWS))
+
 
 _ROUNDING = 1e-9
 

@@ -9,8 +9,8 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.calibration.locator.kernel import squared_distances
 from tomoskin.calibration.locator.maps import ResponseMaps
+from tomoskin.calibration.locator.process import squared_distances
 from tomoskin.core import FloatArray
 
 POWERS = 1 / np.array([1, 1.5, 2, 3, 4, 6, 9, 14, 20, 30, 45, 70])
