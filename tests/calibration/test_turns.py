@@ -7,8 +7,8 @@ import pytest
 
 from calibration.labelled import RADIUS, Floats, places
 from tomoskin import Locator, Pattern
-from tomoskin.calibration.locator.lone import LoneMaps
-from tomoskin.calibration.locator.rotations import Turns, turned
+from tomoskin.calibration.locator.per_channel import ChannelMaps
+from tomoskin.calibration.locator.rotations import Rotations, turned
 
 PATTERN = Pattern.adjacent(8)
 
@@ -17,7 +17,7 @@ def alike(
     n: int, seed: int, way: int, uneven: float = 0.0, noise: float = 0.1
 ) -> tuple[Floats, Floats]:
     """Presses on a skin whose rows answer alike when it is turned, and a part that is uneven."""
-    xy, turns = places(n, seed), Turns.of(PATTERN)
+    xy, turns = places(n, seed), Rotations.of(PATTERN)
     rng = np.random.default_rng(99)
     shared = {k: rng.normal(size=(4, 3)) for k in np.unique(turns.orbit).tolist()}
     dv = np.empty((n, PATTERN.n_meas))
@@ -33,16 +33,16 @@ def _bumps(xy: Floats, table: Floats) -> Floats:
     return np.asarray(np.exp(-2 * (away**2).sum(axis=2)) @ table[:, 2])
 
 
-def missed(n: int, way: int, turns: Turns, uneven: float = 0.0) -> float:
+def missed(n: int, way: int, turns: Rotations, uneven: float = 0.0) -> float:
     """Root mean square by which maps from ``n`` presses miss what other presses answer."""
     dv, xy = alike(n, 0, way, uneven)
     others, there = alike(300, 5, way, uneven, noise=0.0)
-    told, _ = LoneMaps.of(xy / RADIUS, dv, turns).at(there / RADIUS)
+    told, _ = ChannelMaps.of(xy / RADIUS, dv, turns).at(there / RADIUS)
     return float(np.sqrt(((told - others) ** 2).mean()))
 
 
 def test_rows_of_an_orbit_are_turned_copies() -> None:
-    turns = Turns.of(PATTERN)
+    turns = Rotations.of(PATTERN)
     assert np.bincount(turns.orbit)[np.unique(turns.orbit)].tolist() == [8] * 5
     table = np.hstack([PATTERN.drive, PATTERN.measure])
     steps = np.round(turns.angle * 8 / (2 * np.pi)).astype(int)
@@ -51,9 +51,9 @@ def test_rows_of_an_orbit_are_turned_copies() -> None:
 
 def test_a_pattern_with_one_drive_has_no_copies() -> None:
     some = Pattern.from_tables([[0, 4], [0, 4]], [[1, 2], [3, 2]], 8)
-    assert not Turns.of(some).any
-    assert Turns.of(PATTERN).any
-    assert not Turns.none(40).any
+    assert not Rotations.of(some).any
+    assert Rotations.of(PATTERN).any
+    assert not Rotations.none(40).any
 
 
 def test_turning_back_undoes_a_turn() -> None:
@@ -63,26 +63,28 @@ def test_turning_back_undoes_a_turn() -> None:
 
 @pytest.mark.parametrize("way", [1, -1])
 def test_few_presses_tell_more_of_rows_that_are_alike_all_round(way: int) -> None:
-    apart, shared = (missed(8, way, turns) for turns in (Turns.none(40), Turns.of(PATTERN)))
+    apart, shared = (missed(8, way, turns) for turns in (Rotations.none(40), Rotations.of(PATTERN)))
     assert shared < 0.8 * apart
 
 
 def test_which_way_round_the_electrodes_go_is_found() -> None:
-    turns = Turns.of(PATTERN)
+    turns = Rotations.of(PATTERN)
     for way, angle in ((1, turns.angle), (-1, turns.reversed().angle)):
         dv, xy = alike(12, 0, way)
-        np.testing.assert_array_equal(LoneMaps.of(xy / RADIUS, dv, turns).turns.angle, angle)
+        np.testing.assert_array_equal(ChannelMaps.of(xy / RADIUS, dv, turns).turns.angle, angle)
 
 
 def test_rows_that_are_not_alike_all_round_lose_little() -> None:
-    apart, shared = (missed(25, 1, turns, 1.0) for turns in (Turns.none(40), Turns.of(PATTERN)))
+    apart, shared = (
+        missed(25, 1, turns, 1.0) for turns in (Rotations.none(40), Rotations.of(PATTERN))
+    )
     assert shared < 1.1 * apart
 
 
 def test_maps_of_shared_rows_know_how_far_they_may_be_off() -> None:
     dv, xy = alike(40, 0, 1, uneven=0.4)
     others, there = alike(300, 5, 1, uneven=0.4)
-    told, variance = LoneMaps.of(xy / RADIUS, dv, Turns.of(PATTERN)).at(there / RADIUS)
+    told, variance = ChannelMaps.of(xy / RADIUS, dv, Rotations.of(PATTERN)).at(there / RADIUS)
     assert 0.7 < float(((told - others) ** 2 / variance).mean()) < 1.4
 
 

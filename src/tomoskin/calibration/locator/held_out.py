@@ -9,11 +9,11 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.calibration.locator.lone import LoneLikelihood, LoneMaps
 from tomoskin.calibration.locator.maps import ResponseMaps
+from tomoskin.calibration.locator.per_channel import ChannelLikelihood, ChannelMaps
 from tomoskin.calibration.locator.posterior import GridLikelihood, moments, pooled, powers_of
 from tomoskin.calibration.locator.process import LENGTHS, Likeness
-from tomoskin.calibration.locator.rotations import Turns
+from tomoskin.calibration.locator.rotations import Rotations
 from tomoskin.core import FloatArray
 
 FEW = 80
@@ -34,14 +34,15 @@ Likelihood = Callable[[FloatArray], FloatArray]
 class Estimates:
     """Posterior mean and covariance of a place.
 
-    ``powers`` weigh the log-likelihoods of ``likelihood``, and of ``lone`` where there is one.
+    ``powers`` weigh the log-likelihoods of ``likelihood``, and of ``per_channel`` where that
+    stands.
     ``left_out`` (n, 2) and ``left_out_spread`` (n, 2, 2) are those of the presses themselves,
     each from maps learnt without it and some others.
     """
 
     grid: FloatArray
     likelihood: GridLikelihood
-    lone: LoneLikelihood | None
+    per_channel: ChannelLikelihood | None
     powers: FloatArray
     left_out: FloatArray
     left_out_spread: FloatArray
@@ -52,7 +53,7 @@ class Estimates:
         features: FloatArray,
         places: FloatArray,
         grid: FloatArray,
-        turns: Turns,
+        turns: Rotations,
         like: ResponseMaps | None = None,
     ) -> Self:
         """Learn the maps; length scales by evidence, powers by left-out presses.
@@ -73,22 +74,22 @@ class Estimates:
         parts = [_left_out(joint, places, features)]
         alone = None
         if len(places) < FEW:
-            alone = found = LoneMaps.of(places, features, turns)
+            alone = found = ChannelMaps.of(places, features, turns)
 
-            def single(some: FloatArray, theirs: FloatArray) -> LoneLikelihood:
-                return LoneLikelihood.of(found.again(some, theirs), grid)
+            def single(some: FloatArray, theirs: FloatArray) -> ChannelLikelihood:
+                return ChannelLikelihood.of(found.again(some, theirs), grid)
 
             parts.append(_left_out(single, places, features))
         powers = powers_of(parts, grid, places)
         left_out = moments(pooled(parts, powers), grid)
-        lone = LoneLikelihood.of(alone, grid) if alone and powers[1] else None
-        return cls(grid, GridLikelihood.of(maps, grid), lone, powers, *left_out)
+        per_channel = ChannelLikelihood.of(alone, grid) if alone and powers[1] else None
+        return cls(grid, GridLikelihood.of(maps, grid), per_channel, powers, *left_out)
 
     def __call__(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean (n, 2) and covariance (n, 2, 2) for frames (n, k)."""
         parts = [self.likelihood(features)]
-        if self.lone is not None:
-            parts.append(self.lone(features))
+        if self.per_channel is not None:
+            parts.append(self.per_channel(features))
         return moments(pooled(parts, self.powers), self.grid)
 
     @cached_property

@@ -12,13 +12,13 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.calibration.locator.held_out import FEW, Estimates
 from tomoskin.calibration.locator.presses import Features, Presses, Strength, frames
-from tomoskin.calibration.locator.rotations import Turns
+from tomoskin.calibration.locator.rotations import Rotations
 from tomoskin.calibration.locator.stacking import (
     NINE_IN_TEN,
-    Doubt,
+    CalibratedCovariance,
     Remark,
-    Stack,
-    dispute_of,
+    Stacking,
+    disagreement_of,
     outliers,
     squared_lengths,
     twins,
@@ -75,8 +75,8 @@ class Locator:
     skin_id: str
     features: Features
     estimates: Estimates
-    stack: Stack
-    doubt: Doubt
+    stacking: Stacking
+    calibrated: CalibratedCovariance
     power: Strength
     held: float
     remarks: tuple[Remark, ...]
@@ -149,22 +149,24 @@ class Locator:
         data = features(presses.dv)
         progress(0, _STEPS)
         maps = like.estimates.likelihood.maps if like else None
-        turns = Turns.of(known[0]) if known[0] else Turns.none(presses.dv.shape[1])
+        turns = Rotations.of(known[0]) if known[0] else Rotations.none(presses.dv.shape[1])
         grid = region.lattice(_COARSE) if len(presses) < FEW else region.grid
         estimates = Estimates.of(data, places, grid, turns.of_rows(features.rows), maps)
         progress(1, _STEPS)
-        stack = Stack.of(data, estimates.left_out, places, like.stack if like else None)
+        stacking = Stacking.of(data, estimates.left_out, places, like.stacking if like else None)
         progress(2, _STEPS)
-        dispute = dispute_of(stack.left_out_told, stack.left_out)
-        doubt = Doubt.of(stack.left_out - places, estimates.left_out_spread, dispute)
-        covariance = doubt(estimates.left_out_spread, dispute)
-        held = float(np.mean(squared_lengths(stack.left_out - places, covariance) < NINE_IN_TEN))
+        disagreement = disagreement_of(stacking.left_out_told, stacking.left_out)
+        calibrated = CalibratedCovariance.of(
+            stacking.left_out - places, estimates.left_out_spread, disagreement
+        )
+        covariance = calibrated(estimates.left_out_spread, disagreement)
+        held = float(np.mean(squared_lengths(stacking.left_out - places, covariance) < NINE_IN_TEN))
         remarks = (
             *twins(data, places, region.unit),
-            *outliers(stack.left_out, places, covariance, region.unit),
+            *outliers(stacking.left_out, places, covariance, region.unit),
         )
         progress(3, _STEPS)
-        power = Strength.of(presses, stack.left_out)
+        power = Strength.of(presses, stacking.left_out)
         progress(_STEPS, _STEPS)
         settled = like.settled if like else len(presses)
         return cls(
@@ -173,8 +175,8 @@ class Locator:
             *known,
             features,
             estimates,
-            stack,
-            doubt,
+            stacking,
+            calibrated,
             power,
             held,
             remarks,
@@ -189,9 +191,9 @@ class Locator:
         """
         data = self.features(frames(dv, self.presses.dv.shape[1]))
         guess, spread = self.estimates(data)
-        told = self.stack.told(data, guess)
-        answer = self.stack.combined(told)
-        covariance = self.doubt(spread, dispute_of(told, answer))
+        told = self.stacking.told(data, guess)
+        answer = self.stacking.combined(told)
+        covariance = self.calibrated(spread, disagreement_of(told, answer))
         return self.region.metres(answer), self.region.unit**2 * covariance
 
     def strength(self, dv: ArrayLike) -> FloatArray:
@@ -238,7 +240,7 @@ class Locator:
         """(n,) m by which each press is missed when it is left out."""
         return np.asarray(
             self.region.unit
-            * np.linalg.norm(self.stack.left_out - self.region.scaled(self.presses.xy), axis=1)
+            * np.linalg.norm(self.stacking.left_out - self.region.scaled(self.presses.xy), axis=1)
         )
 
     @property

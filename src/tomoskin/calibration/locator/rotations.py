@@ -16,7 +16,7 @@ _DECIMALS = 9
 
 
 @dataclass(frozen=True, eq=False)
-class Turns:
+class Rotations:
     """Which rows are alike on a uniform round skin whose electrodes stand evenly around it.
 
     ``orbit`` (k,): rows of one number become each other when all electrodes move on by some;
@@ -73,7 +73,7 @@ _FLOOR = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Alone:
+class ModeFeatures:
     """Features in the modes of the presses: ``rows`` (n, k) about their ``mean`` (k,), and the
     ``size`` (k,) of each row's signal and its ``noise`` over that, likeliest for the row alone.
     """
@@ -108,7 +108,7 @@ class Modes:
         seen = {angle: axes.T @ common(copy) for angle, copy in copies.items()}
         return cls(likeness, places, np.maximum(weights, 0.0), axes, common, seen)
 
-    def alone(self, features: FloatArray) -> Alone:
+    def alone(self, features: FloatArray) -> ModeFeatures:
         """What each row of ``features`` (n, k) tells by itself (Rasmussen & Williams 2006, 5.8)."""
         n, mean = features.shape[0], features.mean(axis=0)
         rows = self.axes.T @ (features - mean)
@@ -116,7 +116,7 @@ class Modes:
         size = (1 / spread).T @ rows**2 / n + _FLOOR
         log = -0.5 * n * np.log(size) - 0.5 * np.log(spread).sum(axis=0)[:, None]
         best = log.argmax(axis=0)
-        return Alone(mean, rows, size[best, np.arange(len(mean))], _RATIOS[best])
+        return ModeFeatures(mean, rows, size[best, np.arange(len(mean))], _RATIOS[best])
 
     def at(self, places: FloatArray) -> tuple[FloatArray, dict[float, FloatArray]]:
         """(g, n) of the likeness and, for each angle, (g, m) of what is common."""
@@ -147,7 +147,7 @@ class OrbitMaps:
     evidence: float
 
     @classmethod
-    def of(cls, modes: Modes, alone: Alone, angles: FloatArray, share: float) -> Self:
+    def of(cls, modes: Modes, alone: ModeFeatures, angles: FloatArray, share: float) -> Self:
         """From rows that have been looked at alone, turned by ``angles``."""
         rows = alone.rows / np.sqrt(alone.size)
         spread = (1 - share) * modes.weights[:, None] + alone.noise

@@ -33,17 +33,17 @@ _SPENT = 5
 
 
 @dataclass(frozen=True)
-class Doubt:
-    """Covariance of an answer: parts of the posterior's own, of the experts' dispute, and the same
-    for all, with a factor by which nine ellipses in ten hold their press.
+class CalibratedCovariance:
+    """Covariance of an answer: parts of the posterior's own, of the experts' disagreement, and
+    the same for all, with a factor by which nine ellipses in ten hold their press.
     """
 
     posterior: float
-    dispute: float
+    disagreement: float
     everywhere: float
 
     @classmethod
-    def of(cls, errors: FloatArray, posterior: FloatArray, dispute: FloatArray) -> Self:
+    def of(cls, errors: FloatArray, posterior: FloatArray, disagreement: FloatArray) -> Self:
         """Learn from left-out ``errors`` (n, 2), and (n, 2, 2) of both kinds.
 
         The parts are those at which the errors are likeliest (a Student density); the common
@@ -53,26 +53,26 @@ class Doubt:
         size = float((errors**2).mean()) + _SPREAD**2
 
         def cost(logs: FloatArray) -> float:
-            cov = cls(*np.exp(logs))(posterior, dispute)
+            cov = cls(*np.exp(logs))(posterior, disagreement)
             far = squared_lengths(errors, cov)
             heavy = (_FREEDOM + 2) * np.log1p(far / _FREEDOM)
             return float((np.log(np.linalg.det(cov)) + heavy).sum()) + 0.05 * float(logs @ logs)
 
         start = np.array([-1.0, -1.0, np.log(0.3 * size)])
         found = np.exp(minimize(cost, start, method="Nelder-Mead", options={"maxiter": 150}).x)
-        far = squared_lengths(errors, cls(*found)(posterior, dispute))
+        far = squared_lengths(errors, cls(*found)(posterior, disagreement))
         last = far[-max(len(far) // _RECENT, _FEWEST) :]
         factor = max(_high(far), _high(last) / _CHANCE) / NINE_IN_TEN
         spent = (len(errors) + _SPENT) / max(len(errors) - _SPENT, 1)
         return cls(*(float(x) for x in factor * spent * found))
 
-    def __call__(self, posterior: FloatArray, dispute: FloatArray) -> FloatArray:
+    def __call__(self, posterior: FloatArray, disagreement: FloatArray) -> FloatArray:
         """(n, 2, 2) covariance."""
         common = (self.everywhere + _SPREAD**2) * np.eye(2)
-        return np.asarray(self.posterior * posterior + self.dispute * dispute + common)
+        return np.asarray(self.posterior * posterior + self.disagreement * disagreement + common)
 
 
-def dispute_of(told: FloatArray, answer: FloatArray) -> FloatArray:
+def disagreement_of(told: FloatArray, answer: FloatArray) -> FloatArray:
     """(n, 2, 2) scatter of what the experts say, (experts, n, 2), about the answer (n, 2)."""
     away = told - answer
     return np.asarray(np.einsum("eni,enj->nij", away, away) / len(told))
@@ -149,7 +149,7 @@ class Expert:
 
 
 @dataclass(frozen=True, eq=False)
-class Stack:
+class Stacking:
     """The weighted mean of the maps' estimate and of processes on features and estimate.
 
     Stacked generalisation (Wolpert 1992; weights not negative as in Breiman 1996): the estimates
@@ -169,7 +169,7 @@ class Stack:
         features: FloatArray,
         estimates: FloatArray,
         xy: FloatArray,
-        like: Stack | None = None,
+        like: Stacking | None = None,
     ) -> Self:
         """Learn from ``features`` (n, k), held-out ``estimates`` (n, 2) and places ``xy``.
 

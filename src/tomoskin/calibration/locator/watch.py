@@ -39,7 +39,7 @@ class Watch:
 
     def __init__(self, locator: Locator) -> None:
         self._locator = locator
-        told = locator.stack.left_out
+        told = locator.stacking.left_out
         off = np.abs(self._surprise(locator.presses.dv, told))
         self._usual = np.median(off, axis=0) + np.finfo(float).tiny
         self._limit = np.maximum(_OFF, _GUARD * _worst(self._clipped(off)))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.calibration.locator.process import LENGTHS, Likeness
-from tomoskin.calibration.locator.rotations import Modes, OrbitMaps, Turns
+from tomoskin.calibration.locator.rotations import Modes, OrbitMaps, Rotations
 from tomoskin.core import FloatArray, IntArray
 
 _SHARES = (0.0, 0.3, 0.6, 0.85)
@@ -26,7 +26,7 @@ _SINGLE = np.float32
 
 
 @dataclass(frozen=True, eq=False)
-class LoneMaps:
+class ChannelMaps:
     """A Gaussian process for each row, with a noise of its own and a share in its turned copies.
 
     The matrix-variate process knows more, but must learn two covariances of all rows: from some
@@ -35,12 +35,12 @@ class LoneMaps:
     ``groups`` are the rows of each group, whose maps are ``orbits``.
     """
 
-    turns: Turns
+    turns: Rotations
     groups: tuple[IntArray, ...]
     orbits: tuple[OrbitMaps, ...]
 
     @classmethod
-    def of(cls, places: FloatArray, features: FloatArray, turns: Turns) -> Self:
+    def of(cls, places: FloatArray, features: FloatArray, turns: Rotations) -> Self:
         """Maps for ``features`` (n, k) of presses at ``places`` (n, 2).
 
         Of each group of rows the length scale and the share, and the way round of all, are those
@@ -52,7 +52,7 @@ class LoneMaps:
         return max((cls._of(modes, features, way) for way in ways), key=lambda m: m.evidence)
 
     @classmethod
-    def _of(cls, modes: Sequence[Modes], features: FloatArray, turns: Turns) -> Self:
+    def _of(cls, modes: Sequence[Modes], features: FloatArray, turns: Rotations) -> Self:
         groups = tuple(np.flatnonzero(turns.orbit == orbit) for orbit in np.unique(turns.orbit))
         shares = _SHARES if turns.any else (0.0,)
         orbits = (
@@ -95,7 +95,7 @@ class LoneMaps:
 
 
 @dataclass(frozen=True, eq=False)
-class LoneLikelihood:
+class ChannelLikelihood:
     """The maps read at the places of a grid: a Student density for each row, so that a row that
     is told wrong costs little.
 
@@ -107,7 +107,7 @@ class LoneLikelihood:
     volume: FloatArray
 
     @classmethod
-    def of(cls, maps: LoneMaps, grid: FloatArray) -> Self:
+    def of(cls, maps: ChannelMaps, grid: FloatArray) -> Self:
         """For the places ``grid`` (g, 2)."""
         mean, variance = maps.at(grid)
         short = -mean.shape[1] % _TOGETHER
