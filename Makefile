@@ -1,7 +1,7 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: set-up checks programs style types page-check page-test engine-check help soak live test test-all firmware-test fuzz bench bench-docs docs gallery lint lock native wheel release clean page dev
+.PHONY: set-up together checks programs style types page-check page-test engine-check help soak live test test-all firmware-test fuzz bench bench-docs docs gallery lint lock native wheel release clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -14,8 +14,14 @@ PYTEST := $(PY) -m pytest -n auto --maxprocesses 8 --dist loadfile
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1	/p' Makefile
 
-live: $(VENV)/.installed page  ## the live page of a simulated skin
+live: together  ## the live page of a simulated skin
 	@$(VENV)/bin/tomoskin live $(ARGS)
+
+together: $(VENV)/.uv  # two cores have two things to do: Python packages and the page
+	@$(MAKE) --no-print-directory page & page=$$!; \
+		$(MAKE) --no-print-directory $(VENV)/.runtime; packages=$$?; \
+		wait $$page && exit $$packages
+	@$(MAKE) --no-print-directory $(VENV)/.installed
 
 test: set-up  ## lint, documentation, page tests and the test suite, without what is slow
 	@$(MAKE) --no-print-directory -j2 --output-sync=target checks programs
@@ -76,7 +82,7 @@ checks: lint page-test docs  # side by side: two cores have two things to do
 programs: $(VENV)/.dev
 	@for thing in chromium mosquitto firmware ngspice; do sh scripts/$$thing.sh || exit 1; done
 
-set-up: dev page $(VENV)/.docs
+set-up: together dev $(VENV)/.docs
 	@mkdir -p build && rm -f build/left-out.txt
 	@echo "checks: style, types, page, documentation, native engine, side by side; two to four minutes"
 
@@ -102,7 +108,11 @@ $(VENV)/.made: scripts/venv.sh requirements/uv.txt
 	@sh scripts/venv.sh $(VENV)
 	@touch $@
 
-$(VENV)/.runtime: requirements/runtime.txt $(VENV)/.made
+$(VENV)/.uv: $(VENV)/.made
+	@sh $(PINNED) requirements/uv.txt
+	@touch $@
+
+$(VENV)/.runtime: requirements/runtime.txt $(VENV)/.uv
 	@echo "set-up: Python packages"
 	@sh $(PINNED) $<
 	@touch $@
@@ -125,7 +135,7 @@ $(VENV)/.installed: pyproject.toml hatch_build.py $(VENV)/.runtime | page
 dev: $(VENV)/.dev $(VENV)/.installed
 	@$(PY) scripts/page.py has-node || sh $(PINNED) requirements/node.txt
 
-page: $(VENV)/.runtime
+page: $(VENV)/.uv
 	@$(PY) scripts/page.py fresh || { echo "set-up: the page"; \
 		{ $(PY) scripts/page.py has-node || sh $(PINNED) requirements/node.txt; } \
 		&& $(PY) scripts/page.py build; }
