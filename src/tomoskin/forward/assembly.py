@@ -22,7 +22,7 @@ from scipy.sparse import coo_array, csr_array
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.forward.element import Element
-from tomoskin.forward.factor import Compressed
+from tomoskin.forward.engine import Compressed
 
 
 @dataclass(frozen=True, eq=False)
