@@ -15,6 +15,9 @@ from tomoskin.mesh.topology import boundary_facets
 
 _NUMBERED = re.compile(r"(?:e|el|elec|electrode)[\s_-]*(\d+)", re.IGNORECASE)
 
+Chooser = Callable[[FloatArray], ArrayLike]
+"""(n, d) centroids of boundary facets → (n,) electrode of each, −1 for none."""
+
 
 @dataclass(frozen=True, eq=False)
 class Places:
@@ -26,9 +29,6 @@ class Places:
     points: ArrayLike
     radius: float
 
-
-Chooser = Callable[[FloatArray], ArrayLike]
-"""(n, d) centroids of boundary facets → (n,) electrode of each, −1 for none."""
 
 Electrodes = Sequence[str] | Sequence[ArrayLike] | Chooser | Places | None
 """How electrodes are given: names of groups in the file, in their order; facet arrays in the

@@ -13,12 +13,11 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
 from tomoskin.mesh.check import check_cells
-from tomoskin.mesh.crossing import check_crossings
-from tomoskin.mesh.files import MeshFile
 from tomoskin.mesh.flatten import flattened, rim_of, same_turn
-from tomoskin.mesh.nearest import barycentric, closest
+from tomoskin.mesh.mesh import MeshFile
 from tomoskin.mesh.polygon import Polygon
 from tomoskin.mesh.surface import Surface, rows_of
+from tomoskin.mesh.triangles import barycentric, check_crossings, closest
 
 _NEAREST = 16
 """Triangles that are looked at for each point."""
