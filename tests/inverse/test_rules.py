@@ -24,9 +24,8 @@ from tomoskin.inverse import (
     choose,
     noise_figure,
 )
-from tomoskin.inverse.corner import corner
-from tomoskin.inverse.rule_of_figure import in_the_middle, noise_figure_rule
-from tomoskin.inverse.search import Level, Told, crossing
+from tomoskin.inverse.choice.criteria import corner, in_the_middle, noise_figure_rule
+from tomoskin.inverse.choice.evidence import Level, Told, crossing
 from tomoskin.pattern import Pattern
 
 SIGMA = 1e-5

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tomoskin.core import ComplexArray, DataError, Image, ModelError
 from tomoskin.forward import ForwardModel
-from tomoskin.inverse.one_step import OneStep
-from tomoskin.inverse.priors import PriorLike
+from tomoskin.inverse.linear.one_step import OneStep
+from tomoskin.inverse.priors.named import PriorLike
 
 
 def simple_change(voltages: NDArray[Any], reference: NDArray[Any]) -> ComplexArray:
