@@ -26,7 +26,7 @@ from tomoskin.forward.engine import Compressed
 
 
 @dataclass(frozen=True, eq=False)
-class Assembly:
+class SystemAssembly:
     """Sparsity structure of the system and the maps that fill it.
 
     Attributes

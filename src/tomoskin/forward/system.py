@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
 from tomoskin.core import FloatArray, IntArray, ModelError
-from tomoskin.forward.assembly import Assembly, gradient_operator
+from tomoskin.forward.assembly import SystemAssembly, gradient_operator
 from tomoskin.forward.conductivity import number_type, numbers
 from tomoskin.forward.element import Element
 from tomoskin.forward.engine import Factorise
@@ -43,7 +43,7 @@ class System:
         self.most_current = float(np.abs(self.current).max())
         self.order = order
         self.engine = choose_engine()
-        self.assembly = Assembly.of(Element.of(mesh, order))
+        self.assembly = SystemAssembly.of(Element.of(mesh, order))
 
     @cached_property
     def gradient(self) -> csr_array:

@@ -9,10 +9,10 @@ from tomoskin.inverse.frequency_difference import (
     simple_change,
     weighted_change,
 )
-from tomoskin.inverse.greit.desired import Desired
 from tomoskin.inverse.greit.merit import Merit, figures, noise_figure
 from tomoskin.inverse.greit.operator import Greit
 from tomoskin.inverse.greit.targets import Targets, along
+from tomoskin.inverse.greit.trainer import Desired
 from tomoskin.inverse.iterative.absolute import Absolute, AbsoluteImaging, homogeneous
 from tomoskin.inverse.iterative.field import RandomField
 from tomoskin.inverse.iterative.observation import Observation

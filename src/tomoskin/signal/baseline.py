@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.signal.health import Mask
 from tomoskin.signal.idle import Idle
 from tomoskin.signal.reference import Reference
-from tomoskin.signal.roles import Mask
 
 SLOWEST = 60.0
 """Time constant with which the baseline follows where no drift has been seen, s."""

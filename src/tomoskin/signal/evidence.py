@@ -15,7 +15,7 @@ from scipy.optimize import nnls
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.pattern import Pattern
-from tomoskin.signal.roles import Mask, Roles
+from tomoskin.signal.health import Mask, Roles
 
 SIGMAS = 6.0
 """A Gaussian value goes beyond so many deviations once in 10⁹ (one side): with 208 rows at 20

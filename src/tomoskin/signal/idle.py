@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.signal.roles import Mask
+from tomoskin.signal.health import Mask
 
 BLOCK = 32
 """Idle frames in a row that are looked at together."""

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.signal.evidence import Groups, Reciprocity, sign_limit, unchanged
-from tomoskin.signal.health import ElectrodeHealth, Health
+from tomoskin.signal.health import ElectrodeHealth, Health, Mask, Roles
 from tomoskin.signal.reference import Reference
-from tomoskin.signal.roles import Mask, Roles
 
 ENTER = 2
 """Frames in a row that must blame an electrode before it is called sick."""

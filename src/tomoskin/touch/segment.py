@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 from tomoskin.core import DataError, FloatArray, Image, IntArray, Reading
 from tomoskin.mesh import Mesh
 from tomoskin.skin import TouchSettings
-from tomoskin.touch.blur import REACH, Blur
-from tomoskin.touch.centroid import centroid, centroid_sd
-from tomoskin.touch.connect import connected, neighbour_table
-from tomoskin.touch.floor import NoiseFloor
+from tomoskin.touch.cells import REACH, Blur, connected, neighbour_table
+from tomoskin.touch.image_noise import NoiseFloor, centroid, centroid_sd
 from tomoskin.touch.tracking import HELD
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.calibration.locator.kernel import LENGTHS, Likeness
-from tomoskin.calibration.locator.orbit import Modes, OrbitMaps
+from tomoskin.calibration.locator.orbit import LikenessModes, OrbitMaps
 from tomoskin.calibration.locator.turns import Turns
 from tomoskin.core import FloatArray, IntArray
 
@@ -49,11 +49,11 @@ class LoneMaps:
         """
         ways = (turns, turns.reversed()) if turns.any else (turns,)
         angles = np.concatenate([way.angle for way in ways])
-        modes = [Modes.of(Likeness(length), places, angles) for length in LENGTHS]
+        modes = [LikenessModes.of(Likeness(length), places, angles) for length in LENGTHS]
         return max((cls._of(modes, features, way) for way in ways), key=lambda m: m.evidence)
 
     @classmethod
-    def _of(cls, modes: Sequence[Modes], features: FloatArray, turns: Turns) -> Self:
+    def _of(cls, modes: Sequence[LikenessModes], features: FloatArray, turns: Turns) -> Self:
         groups = tuple(np.flatnonzero(turns.orbit == orbit) for orbit in np.unique(turns.orbit))
         shares = _SHARES if turns.any else (0.0,)
         orbits = (
@@ -72,7 +72,7 @@ class LoneMaps:
     def again(self, places: FloatArray, features: FloatArray) -> Self:
         """Maps of other presses with the same settings."""
         angle, lengths = self.turns.angle, {maps.modes.likeness for maps in self.orbits}
-        modes = {likeness: Modes.of(likeness, places, angle) for likeness in lengths}
+        modes = {likeness: LikenessModes.of(likeness, places, angle) for likeness in lengths}
         orbits = []
         for rows, maps in zip(self.groups, self.orbits, strict=True):
             theirs = modes[maps.modes.likeness]

@@ -11,9 +11,9 @@ from tomoskin.inverse.choice.evidence import (
     AlphaChoice,
     Curve,
     Evidence,
+    Explanation,
     Level,
     Locate,
-    Told,
     crossing,
     least,
 )
@@ -37,7 +37,7 @@ _PER_DECADE = 8
 _MISSED = 0.25
 """A press that is not found counts as this part of the mesh's largest extent."""
 
-Rule = Callable[[Spectrum, Evidence], AlphaChoice]
+Criterion = Callable[[Spectrum, Evidence], AlphaChoice]
 
 
 def corner(t: FloatArray, x: FloatArray, y: FloatArray) -> int:
@@ -103,11 +103,11 @@ def gcv(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
     m = len(spectrum.values)
 
     def error(alpha: float) -> float:
-        left = 1.0 - spectrum.freedom(alpha) / m
-        return float(np.mean(spectrum.residual(alpha, frames) ** 2)) / (m * left**2)
+        unused = 1.0 - spectrum.freedom(alpha) / m
+        return float(np.mean(spectrum.residual(alpha, frames) ** 2)) / (m * unused**2)
 
     reason = f"{_frames(frames)} predict each row best from the others here"
-    return least(spectrum, error, Told("gcv", reason, "mean square error of prediction"))
+    return least(spectrum, error, Explanation("gcv", reason, "mean square error of prediction"))
 
 
 def likelihood(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
@@ -127,7 +127,7 @@ def likelihood(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
         return float(np.mean(own)) + float(np.log(variance).mean())
 
     reason = f"{_frames(frames)} of {m} coefficients are likeliest here"
-    return least(spectrum, unlikely, Told("likelihood", reason, "−2 log likelihood per row"))
+    return least(spectrum, unlikely, Explanation("likelihood", reason, "−2 log likelihood per row"))
 
 
 def discrepancy(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
@@ -147,17 +147,15 @@ def discrepancy(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
         "there is hardly more than noise in these frames; give some with touches",
     )
     reason = f"the residual of {_frames(frames)} is as large as the noise"
-    told = Told("discrepancy", reason, "residual / noise")
-    return crossing(spectrum, excess, Level(1.0, "rising", hints), told)
+    explanation = Explanation("discrepancy", reason, "residual / noise")
+    return crossing(spectrum, excess, Level(1.0, "rising", hints), explanation)
 
 
 def _frames(frames: FloatArray) -> str:
     return "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
 
 
-def noise_figure_rule(
-    spectrum: Spectrum, evidence: Evidence, target: float = TARGET
-) -> AlphaChoice:
+def by_noise_figure(spectrum: Spectrum, evidence: Evidence, target: float = TARGET) -> AlphaChoice:
     """The alpha whose noise figure is ``target``, for a contrast in the middle of the mesh.
 
     The noise's size does not count, only how it is spread over the rows: all alike where the
@@ -178,8 +176,8 @@ def noise_figure_rule(
         "aim at a larger noise figure, or choose another rule",
         "aim at a smaller noise figure, or choose another rule",
     )
-    told = Told("noise-figure", reason, "noise figure")
-    return crossing(spectrum, figure, Level(target, "falling", hints), told)
+    explanation = Explanation("noise-figure", reason, "noise figure")
+    return crossing(spectrum, figure, Level(target, "falling", hints), explanation)
 
 
 def in_the_middle(spectrum: Spectrum) -> FloatArray:
@@ -195,13 +193,13 @@ def labelled(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
     """Least mean distance between presses and the touches found, in log alpha averaged over folds.
 
     In each of five folds alpha is chosen without the fold's presses, and the error stated is
-    that on them. Needs frames, their places and a function that finds touches in an image.
+    that on them. Needs frames, their positions and a function that finds touches in an image.
     """
-    frames, places = evidence.labelled(len(spectrum.values))
+    frames, positions = evidence.labelled(len(spectrum.values))
     if evidence.locate is None:
         raise DataError("nothing says how touches are found in an image", where="rule labelled")
     alphas = spectrum.alphas[:: _step(spectrum)]
-    errors = np.array([_errors(spectrum, a, frames, places, evidence.locate) for a in alphas])
+    errors = np.array([_errors(spectrum, a, frames, positions, evidence.locate) for a in alphas])
     chosen, held_out = _folded(errors)
     alpha = float(np.exp(np.log(alphas[chosen]).mean()))
     at = int(np.abs(np.log(alphas / alpha)).argmin())
@@ -220,56 +218,59 @@ def _step(spectrum: Spectrum) -> int:
 
 
 def _errors(
-    spectrum: Spectrum, alpha: float, frames: FloatArray, places: FloatArray, locate: Locate
+    spectrum: Spectrum, alpha: float, frames: FloatArray, positions: FloatArray, locate: Locate
 ) -> FloatArray:
     """(n,) m: distance of each press to the nearest touch; more touches than one cost as well."""
     images = (spectrum.coefficients(frames) * spectrum.gains(alpha)) @ spectrum.modes.T
     missed = _MISSED * float(np.ptp(spectrum.problem.model.mesh.points, axis=0).max())
     return np.array(
-        [_error(locate(x), place, missed) for x, place in zip(images, places, strict=True)]
+        [_error(locate(x), at, missed) for x, at in zip(images, positions, strict=True)]
     )
 
 
-def _error(found: FloatArray, place: FloatArray, missed: float) -> float:
-    if not len(found):
+def _error(touches: FloatArray, position: FloatArray, missed: float) -> float:
+    if not len(touches):
         return missed
-    nearest = float(np.linalg.norm(found - place, axis=1).min())
-    return (min(nearest, missed) + missed * (len(found) - 1)) / len(found)
+    nearest = float(np.linalg.norm(touches - position, axis=1).min())
+    return (min(nearest, missed) + missed * (len(touches) - 1)) / len(touches)
 
 
 def _folded(errors: FloatArray) -> tuple[IntArray, float]:
-    """Index chosen in each fold, and the mean error of presses that were left out of it."""
+    """Index chosen in each fold, and the mean error of its held-out presses."""
     n = errors.shape[1]
     fold = np.arange(n) % min(FOLDS, n)
-    chosen, left_out = [], np.empty(n)
+    chosen, held_out = [], np.empty(n)
     for k in range(int(fold.max()) + 1):
         best = int(errors[:, fold != k].mean(axis=1).argmin())
-        left_out[fold == k] = errors[best, fold == k]
+        held_out[fold == k] = errors[best, fold == k]
         chosen.append(best)
-    return np.array(chosen), float(left_out.mean())
+    return np.array(chosen), float(held_out.mean())
 
 
-RULES: dict[str, Rule] = {
+RULES: dict[str, Criterion] = {
     "light-touch": light_touch,
-    "noise-figure": noise_figure_rule,
+    "noise-figure": by_noise_figure,
     "l-curve": l_curve,
     "gcv": gcv,
     "likelihood": likelihood,
     "discrepancy": discrepancy,
     "labelled": labelled,
 }
-"""Rules by name. The first needs nothing but the noise; ``alpha = "auto"`` is decided by it."""
+"""Parameter-choice criteria by name.
+
+The first needs nothing but the noise; ``alpha = "auto"`` is decided by it.
+"""
 
 
 def choose(spectrum: Spectrum, rule: str, evidence: Evidence) -> AlphaChoice:
-    """The choice of the named rule.
+    """The choice by the criterion that is named ``rule``.
 
     Raises
     ------
     ModelError
-        For an unknown name, or where the rule finds no alpha.
+        For an unknown name, or where the criterion finds no alpha.
     DataError
-        When the evidence lacks what the rule needs.
+        When the evidence lacks what the criterion needs.
     """
     if rule not in RULES:
         raise ModelError(f'expected a rule among {", ".join(RULES)}, got "{rule}"')

@@ -24,7 +24,7 @@ _STRIDE = 8
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """What a rule looked at: ``y`` over ``x``, and the index that it chose."""
+    """What a criterion looked at: ``y`` over ``x``, and the index that it chose."""
 
     x: FloatArray
     y: FloatArray
@@ -35,7 +35,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class AlphaChoice:
-    """An alpha, the rule that chose it, why in a sentence, and the curve it was read from."""
+    """An alpha, the criterion (``rule``) that chose it, the reason, and the curve it is from."""
 
     alpha: float
     rule: str
@@ -45,7 +45,7 @@ class AlphaChoice:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What is known beside the model; each rule says what it needs.
+    """What is known beside the model; each criterion says what it needs.
 
     Attributes
     ----------
@@ -138,8 +138,8 @@ def _refuse_not_finite(values: FloatArray, name: str) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """What a choice says of itself: its rule, its reason, and what its curve shows."""
+class Explanation:
+    """What a choice says of itself: its criterion, its reason, and what its curve shows."""
 
     rule: str
     reason: str
@@ -159,7 +159,7 @@ class Level:
     hints: tuple[str, str]
 
 
-def least(spectrum: Spectrum, quantity: Quantity, told: Told) -> AlphaChoice:
+def least(spectrum: Spectrum, quantity: Quantity, why: Explanation) -> AlphaChoice:
     """Where ``quantity`` is least: on the grid first, as there may be several, then between."""
     alphas = spectrum.alphas
     values = np.array([quantity(float(a)) for a in alphas])
@@ -167,11 +167,11 @@ def least(spectrum: Spectrum, quantity: Quantity, told: Told) -> AlphaChoice:
     low, high = np.log(alphas[[max(at - 1, 0), min(at + 1, len(alphas) - 1)]])
     found = minimize_scalar(lambda t: quantity(float(np.exp(t))), bounds=(low, high))
     end = ", at the end of the range" if at in (0, len(alphas) - 1) else ""
-    curve = Curve(alphas, values, "alpha", told.quantity, at)
-    return AlphaChoice(float(np.exp(found.x)), told.rule, told.reason + end, curve)
+    curve = Curve(alphas, values, "alpha", why.quantity, at)
+    return AlphaChoice(float(np.exp(found.x)), why.rule, why.reason + end, curve)
 
 
-def crossing(spectrum: Spectrum, quantity: Quantity, level: Level, told: Told) -> AlphaChoice:
+def crossing(spectrum: Spectrum, quantity: Quantity, level: Level, why: Explanation) -> AlphaChoice:
     """The largest alpha at which ``quantity`` comes to ``level`` the way that it should.
 
     Raises ModelError where it never does, with one of the level's hints.
@@ -184,14 +184,14 @@ def crossing(spectrum: Spectrum, quantity: Quantity, level: Level, told: Told) -
     if not len(crossed):
         where, hint = ("above", level.hints[0]) if above[0] else ("below", level.hints[1])
         raise ModelError(
-            f"{told.quantity} {'starts' if steps.any() else 'stays'} {where} {level.value:g}: "
+            f"{why.quantity} {'starts' if steps.any() else 'stays'} {where} {level.value:g}: "
             f"{values.min():.3g} to {values.max():.3g}",
-            where=f"rule {told.rule}",
+            where=f"rule {why.rule}",
             hint=hint,
         )
     at = int(crossed[-1])
     low, high = (float(np.log(a)) for a in alphas[[at, at + 1]])
     root = float(np.exp(brentq(lambda t: quantity(float(np.exp(t))) - level.value, low, high)))
     nearest = int(np.abs(np.log(alphas / root)).argmin())
-    curve = Curve(alphas, values, "alpha", told.quantity, nearest)
-    return AlphaChoice(root, told.rule, told.reason, curve)
+    curve = Curve(alphas, values, "alpha", why.quantity, nearest)
+    return AlphaChoice(root, why.rule, why.reason, curve)

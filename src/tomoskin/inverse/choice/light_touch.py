@@ -1,4 +1,4 @@
-"""The rule that needs nothing but the noise: what a light touch would look like on the model."""
+"""The criterion that needs nothing but the noise: how a light touch would look on the model."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ class LightTouch:
         touches = _touches(mesh) * (DEPTH * np.abs(spectrum.problem.conductivity[:, None]))
         size = mesh.volumes @ touches**2
         seen = spectrum.analysis @ (spectrum.problem.jacobian @ touches)
-        told = spectrum.modes.conj().T @ (mesh.volumes[:, None] * touches)
-        blur = np.array([np.mean(_blur(spectrum, a, seen, told) / size) for a in alphas])
+        projected = spectrum.modes.conj().T @ (mesh.volumes[:, None] * touches)
+        blur = np.array([np.mean(_blur(spectrum, a, seen, projected) / size) for a in alphas])
         return cls(spectrum, alphas, 1.0 + blur, float(1.0 / np.mean(1.0 / size)))
 
     def __call__(self, noise: FloatArray) -> AlphaChoice:
@@ -98,11 +98,13 @@ def _touches(mesh: Mesh) -> FloatArray:
     return np.asarray(distance <= radius, dtype=np.float64)
 
 
-def _blur(spectrum: Spectrum, alpha: float, seen: NDArray[Any], told: NDArray[Any]) -> FloatArray:
+def _blur(
+    spectrum: Spectrum, alpha: float, seen: NDArray[Any], projected: NDArray[Any]
+) -> FloatArray:
     """(k,) ∫x̂² − 2∫x̂x of each touch."""
     image = spectrum.gains(alpha)[:, None] * seen
     square = np.einsum("mt,mt->t", image.conj(), spectrum.overlap @ image)
-    return np.asarray(np.real(square - 2.0 * np.einsum("mt,mt->t", told.conj(), image)))
+    return np.asarray(np.real(square - 2.0 * np.einsum("mt,mt->t", projected.conj(), image)))
 
 
 def _least_between(alphas: FloatArray, error: FloatArray, at: int) -> float:

@@ -2,19 +2,45 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.forward import ForwardModel
-from tomoskin.inverse.greit.desired import Desired
 from tomoskin.inverse.greit.targets import Targets, centre_of
-from tomoskin.inverse.greit.trainer import Trainer
+from tomoskin.inverse.greit.trainer import Desired, Trainer
 from tomoskin.inverse.linear.operator import Operator
 from tomoskin.mesh import Mesh
 
 TARGET_RADIUS = 0.025
 """Of a training target, as a part of the sheet's largest extent."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingSettings:
+    """What an operator is trained for.
+
+    Attributes
+    ----------
+    desired
+        The response that is aimed at; without it, the default one.
+    noise
+        Standard deviation of the difference data, one number or (n_meas,): only its spread
+        over the rows counts.
+    noise_figure
+        Chooses the weight of the noise; see :func:`tomoskin.inverse.noise_figure`, with the
+        training target nearest to the centre.
+    count
+        Number of training targets, evenly spread over the sheet.
+    """
+
+    desired: Desired | None = None
+    noise: ArrayLike = 1.0
+    noise_figure: float = 1.0
+    count: int = 500
 
 
 class Greit(Operator):
@@ -31,30 +57,22 @@ class Greit(Operator):
         Of the untouched sheet, one number, S or S/m.
     difference
         "plain" or "normalised".
-    desired
-        The response that is aimed at.
-    noise
-        Standard deviation of the difference data, one number or (n_meas,): only its spread
-        over the rows counts.
-    noise_figure
-        Chooses the weight of the noise; see :func:`tomoskin.inverse.greit.merit`, with the
-        training target nearest to the centre.
-    count
-        Number of training targets, evenly spread over the sheet.
+    settings
+        Fields of :class:`TrainingSettings`: ``desired``, ``noise``, ``noise_figure``, ``count``.
 
     Attributes
     ----------
     desired, noise_figure
         As given.
     noise_weight
-        μ that was found, where signal and noise are of equal power at 1.
+        μ that has this noise figure, where signal and noise are of equal power at 1.
     training
         The targets.
 
     Notes
     -----
-    ``without`` fills rows that are left out as training targets and noise lead one to expect
-    them; the operator is not trained again.
+    ``without`` fills excluded rows as training targets and noise lead one to expect them; the
+    operator is not trained again.
 
     Raises
     ------
@@ -70,25 +88,22 @@ class Greit(Operator):
         simulated_on: ForwardModel | None = None,
         conductivity: float = 1.0,
         difference: str = "plain",
-        desired: Desired | None = None,
-        noise: ArrayLike = 1.0,
-        noise_figure: float = 1.0,
-        count: int = 500,
+        **settings: Any,
     ) -> None:
+        training = TrainingSettings(**settings)
         simulator = model if simulated_on is None else simulated_on
         if simulator.pattern.identity != model.pattern.identity:
             raise ModelError("expected training targets of the same pattern, got another one")
-        self.desired = Desired() if desired is None else desired
-        self.noise_figure = noise_figure
+        self.desired, self.noise_figure = training.desired or Desired(), training.noise_figure
         self.training = Targets.simulate(
             simulator,
-            spread_over(simulator.mesh, count),
+            spread_over(simulator.mesh, training.count),
             radius=_target_radius(simulator.mesh),
             conductivity=conductivity,
             difference=difference,
         )
-        trainer = Trainer.of(model.mesh, self.training, self.desired, noise)
-        self.noise_weight = trainer.weight_for(noise_figure)
+        trainer = Trainer.of(model.mesh, self.training, self.desired, training.noise)
+        self.noise_weight = trainer.weight_for(self.noise_figure)
         matrix, precision = trainer.matrix(self.noise_weight)
         super().__init__(
             model,
@@ -112,10 +127,10 @@ def spread_over(mesh: Mesh, count: int) -> FloatArray:
     """
     if not 10 <= count <= len(mesh.cells):
         raise ModelError(f"expected 10 to {len(mesh.cells)} training targets, got {count}")
-    places = mesh.centroids
-    chosen = [int(np.linalg.norm(places - centre_of(mesh), axis=1).argmin())]
-    gap = np.full(len(places), np.inf)
+    centroids = mesh.centroids
+    chosen = [int(np.linalg.norm(centroids - centre_of(mesh), axis=1).argmin())]
+    gap = np.full(len(centroids), np.inf)
     for _ in range(count - 1):
-        gap = np.minimum(gap, np.linalg.norm(places - places[chosen[-1]], axis=1))
+        gap = np.minimum(gap, np.linalg.norm(centroids - centroids[chosen[-1]], axis=1))
         chosen.append(int(gap.argmax()))
-    return np.asarray(places[chosen])
+    return np.asarray(centroids[chosen])

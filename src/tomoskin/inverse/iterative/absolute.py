@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, Image, ModelError
 from tomoskin.forward import ForwardModel
-from tomoskin.inverse.iterative.newton import Descent, Goal, Step, descend, table
+from tomoskin.inverse.iterative.newton import Descent, Goal, Iteration, descend, table
 from tomoskin.inverse.iterative.observation import Observation, Whitened
 from tomoskin.inverse.iterative.unknowns import (
     Cells,
@@ -64,7 +64,7 @@ class Absolute:
     contact_impedance: FloatArray
     voltages: FloatArray
     n_values: int
-    steps: tuple[Step, ...] = field(repr=False)
+    steps: tuple[Iteration, ...] = field(repr=False)
     reason: str
     converged: bool
 

@@ -52,7 +52,7 @@ class Regulariser(Protocol):
 
 
 @dataclass(frozen=True)
-class Step:
+class Iteration:
     """One iteration: sums of squares after it, and the part of the full step that was taken."""
 
     misfit: float
@@ -83,7 +83,7 @@ class Descent:
 
     unknowns: FloatArray
     force: FloatArray
-    steps: tuple[Step, ...]
+    steps: tuple[Iteration, ...]
     reason: str
     converged: bool
 
@@ -146,13 +146,13 @@ class _Here:
     force: FloatArray
     point: Point
 
-    def step(self, goal: Goal, length: float) -> Step:
+    def step(self, goal: Goal, length: float) -> Iteration:
         residual = goal.target - self.point.predicted
         energy = goal.regulariser.energy(self.unknowns, self.force)
-        return Step(float(residual @ residual), energy, length)
+        return Iteration(float(residual @ residual), energy, length)
 
 
-def _moved(here: _Here, goal: Goal, reach: float) -> tuple[_Here, Step] | None:
+def _moved(here: _Here, goal: Goal, reach: float) -> tuple[_Here, Iteration] | None:
     """As far along one Gauss–Newton step as lowers the objective; None if nothing does."""
     x, jacobian = here.unknowns, here.point.jacobian
     rhs = goal.target - here.point.predicted + jacobian @ x
@@ -195,7 +195,7 @@ def minimiser(
     return spread @ dual + free @ part, jacobian.T @ dual
 
 
-def table(steps: Sequence[Step]) -> str:
+def table(steps: Sequence[Iteration]) -> str:
     """Steps as lines of text: number, objective, misfit, energy and length."""
     lines = ["step  objective     misfit     energy  length"]
     lines += [

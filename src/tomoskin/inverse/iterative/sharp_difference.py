@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from tomoskin.core import FloatArray, Image, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse.iterative.absolute import STEPS, TOLERANCE, Sharp
-from tomoskin.inverse.iterative.newton import Descent, Goal, Step, descend, table
+from tomoskin.inverse.iterative.newton import Descent, Goal, Iteration, descend, table
 from tomoskin.inverse.iterative.observation import Observation
 from tomoskin.inverse.priors.penalty import Diagonal
 from tomoskin.inverse.priors.sharp import SharpPrior
@@ -21,7 +21,7 @@ class SharpImage:
     """An image, and how it was found; see :class:`Absolute` for the fields."""
 
     image: Image
-    steps: tuple[Step, ...] = field(repr=False)
+    steps: tuple[Iteration, ...] = field(repr=False)
     reason: str
     converged: bool
 

@@ -111,7 +111,7 @@ class Spectrum:
 
     def filters(self, alpha: float) -> FloatArray:
         """(n_meas,) filter factors λ/(λ + α²): the part of each coefficient that is believed."""
-        return 1.0 - self._remainder(alpha)
+        return 1.0 - _remainder(self, alpha)
 
     def freedom(self, alpha: float) -> float:
         """Effective degrees of freedom: the sum of the filter factors."""
@@ -119,24 +119,7 @@ class Spectrum:
 
     def operator(self, alpha: float) -> Operator:
         """The operator of ``alpha``, the same as ``problem.operator(alpha)``, by one product."""
-        return self.operator_of(alpha, np.asarray(self.modes @ self.filtered(alpha)))
-
-    def filtered(self, alpha: float) -> NDArray[Any]:
-        """(n_meas, n_meas) difference data → filtered coefficients; modes times it is R."""
-        return np.asarray(self.gains(alpha)[:, None] * self.analysis)
-
-    def operator_of(self, alpha: float, matrix: NDArray[Any]) -> Operator:
-        """The operator of ``alpha``, whose ``matrix`` is known."""
-        weighed = np.isfinite(self.values)
-        precision = self.analysis[weighed].conj().T @ self.filtered(alpha)[weighed]
-        p = self.problem
-        return Operator(
-            p.model,
-            matrix,
-            precision=precision,
-            reference=p.reference,
-            difference=p.difference,
-        )
+        return _operator(self, alpha, np.asarray(self.modes @ _filtered(self, alpha)))
 
     def coefficients(self, dv: NDArray[Any]) -> NDArray[Any]:
         """(…, n_meas) β of difference data (…, n_meas)."""
@@ -144,8 +127,8 @@ class Spectrum:
 
     def residual(self, alpha: float, dv: NDArray[Any]) -> FloatArray:
         """(…,) ‖dv − Jx‖_W of the images x of data (…, n_meas)."""
-        left_over = self._remainder(alpha) * self.coefficients(dv)
-        return np.asarray(np.linalg.norm(left_over, axis=-1))
+        unexplained = _remainder(self, alpha) * self.coefficients(dv)
+        return np.asarray(np.linalg.norm(unexplained, axis=-1))
 
     def seminorm(self, alpha: float, dv: NDArray[Any]) -> FloatArray:
         """(…,) √(xᴴQx) of the images x of data (…, n_meas)."""
@@ -179,9 +162,25 @@ class Spectrum:
         volumes = self.problem.model.mesh.volumes
         return np.asarray((self.modes.conj().T * volumes) @ self.modes)
 
-    def _remainder(self, alpha: float) -> FloatArray:
-        """1 − filter factor, without loss of digits."""
-        return np.where(np.isfinite(self.values), alpha**2 * self.gains(alpha), 0.0)
+
+def _remainder(spectrum: Spectrum, alpha: float) -> FloatArray:
+    """1 − filter factor, without loss of digits."""
+    return np.where(np.isfinite(spectrum.values), alpha**2 * spectrum.gains(alpha), 0.0)
+
+
+def _filtered(spectrum: Spectrum, alpha: float) -> NDArray[Any]:
+    """(n_meas, n_meas) difference data → filtered coefficients; modes times it is R."""
+    return np.asarray(spectrum.gains(alpha)[:, None] * spectrum.analysis)
+
+
+def _operator(spectrum: Spectrum, alpha: float, matrix: NDArray[Any]) -> Operator:
+    """The operator of ``alpha``, given its ``matrix``."""
+    weighed = np.isfinite(spectrum.values)
+    precision = spectrum.analysis[weighed].conj().T @ _filtered(spectrum, alpha)[weighed]
+    p = spectrum.problem
+    return Operator(
+        p.model, matrix, precision=precision, reference=p.reference, difference=p.difference
+    )
 
 
 def _eigen(system: NDArray[Any]) -> tuple[FloatArray, NDArray[Any]]:
@@ -210,7 +209,7 @@ class Assembly:
     def __init__(self, spectrum: Spectrum, alpha: float) -> None:
         self._spectrum = spectrum
         self._alpha = alpha
-        self._filtered = spectrum.filtered(alpha)
+        self._filtered = _filtered(spectrum, alpha)
         self._matrix = np.empty_like(spectrum.modes)
         self._made = 0
 
@@ -227,4 +226,4 @@ class Assembly:
 
     def operator(self) -> Operator:
         """The operator, once it is :attr:`done`."""
-        return self._spectrum.operator_of(self._alpha, self._matrix)
+        return _operator(self._spectrum, self._alpha, self._matrix)

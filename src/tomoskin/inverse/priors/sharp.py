@@ -12,10 +12,10 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.inverse.priors.penalty import Diagonal, Penalty, sparse_penalty
+from tomoskin.inverse.priors.smooth import graph_laplacian
 from tomoskin.mesh import Mesh
 
 
@@ -57,7 +57,9 @@ class TotalVariation:
     def touching(self, mesh: Mesh, image: FloatArray) -> Penalty:
         """Weighted graph Laplacian."""
         jump = self._jumps(mesh, image)
-        return sparse_penalty(_laplacian(mesh, _edges(mesh) / np.sqrt(jump**2 + self._beta**2)))
+        return sparse_penalty(
+            graph_laplacian(mesh, _edges(mesh) / np.sqrt(jump**2 + self._beta**2))
+        )
 
     def energy(self, mesh: Mesh, image: FloatArray) -> float:
         """The cost of ``image``; zero for a constant."""
@@ -122,13 +124,3 @@ def _shared_facets(mesh: Mesh) -> NDArray[np.int64]:
     first, second = (mesh.cells[cells] for cells in mesh.neighbours.T)
     common = (first[:, :, None] == second[:, None, :]).any(axis=2)
     return np.asarray(first[common].reshape(len(first), -1))
-
-
-def _laplacian(mesh: Mesh, coupling: FloatArray) -> csr_array:
-    """(n_cells, n_cells): Σ coupling (xᵢ − xⱼ)² as a quadratic form."""
-    first, second = mesh.neighbours.T
-    n = len(mesh.cells)
-    rows = np.concatenate([first, second, first, second])
-    cols = np.concatenate([second, first, first, second])
-    values = np.concatenate([-coupling, -coupling, coupling, coupling])
-    return csr_array(coo_array((values, (rows, cols)), shape=(n, n)))

@@ -47,7 +47,7 @@ class Laplace:
     def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
         """Return Q on ``mesh``."""
         del jacobian
-        return sparse_penalty(_laplacian(mesh, np.full(len(mesh.neighbours), 2.0)))
+        return sparse_penalty(graph_laplacian(mesh, np.full(len(mesh.neighbours), 2.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,11 +85,16 @@ class Structural:
                 where="coupling of the structural prior",
             )
         first, second = labels[mesh.neighbours].T
-        return sparse_penalty(_laplacian(mesh, np.where(first == second, 2.0, 2.0 * self.coupling)))
+        return sparse_penalty(
+            graph_laplacian(mesh, np.where(first == second, 2.0, 2.0 * self.coupling))
+        )
 
 
-def _laplacian(mesh: Mesh, coupling: FloatArray) -> csr_array:
-    """(n_cells, n_cells) with −``coupling`` (n_pairs,) for neighbours; rows sum to zero."""
+def graph_laplacian(mesh: Mesh, coupling: FloatArray) -> csr_array:
+    """(n_cells, n_cells): Σ coupling (xᵢ − xⱼ)² over neighbours, ``coupling`` (n_pairs,).
+
+    Off its diagonal it is −coupling, and its rows sum to zero.
+    """
     first, second = mesh.neighbours.T
     n = len(mesh.cells)
     ends = np.concatenate([first, second])

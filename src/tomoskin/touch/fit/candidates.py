@@ -10,7 +10,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.noise import Whitener
-from tomoskin.touch.fit.prior import Prior
+from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Weigh
 from tomoskin.touch.fit.spot import CONTENT, Response, spots_of
 
@@ -40,7 +40,7 @@ class Candidates:
     signatures: FloatArray
 
     @classmethod
-    def of(cls, response: Response, prior: Prior) -> Self:
+    def of(cls, response: Response, prior: SpotPrior) -> Self:
         """On a hexagonal grid, in three sizes."""
         mesh = response.spots.mesh
         places = _places(mesh.centroids, _SPACING * prior.radius)

@@ -13,13 +13,13 @@ from tomoskin.core import FloatArray, Reading, SkinError
 from tomoskin.forward import ForwardModel, State
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
+from tomoskin.touch.fit.anisotropy import grained
 from tomoskin.touch.fit.candidates import Candidates, Matched
-from tomoskin.touch.fit.grain import grained
 from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.pace import WHOLE, Pace
-from tomoskin.touch.fit.prior import Prior
-from tomoskin.touch.fit.refine import Problem, Sheet, Weigh
-from tomoskin.touch.fit.search import Found, Search, joined
+from tomoskin.touch.fit.prior import SpotPrior
+from tomoskin.touch.fit.refine import Problem, SheetDomain, Weigh
+from tomoskin.touch.fit.search import Search, SpotDetections, joined
 from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
 from tomoskin.touch.fit.trail import Trail
 
@@ -57,8 +57,8 @@ class SpotModel:
     """
 
     response: Response
-    prior: Prior
-    sheet: Sheet
+    prior: SpotPrior
+    sheet: SheetDomain
     candidates: Candidates
     scale: FloatArray
 
@@ -77,14 +77,14 @@ class SpotModel:
     @classmethod
     def _of(cls, state: State, normalised: bool) -> Self:
         response, mesh = Response(state), state.model.mesh
-        prior, n_meas = Prior.of(mesh), state.model.pattern.n_meas
+        prior, n_meas = SpotPrior.of(mesh), state.model.pattern.n_meas
         scale = 1 / np.abs(response.reference) if normalised else np.ones(n_meas)
-        return cls(response, prior, Sheet(mesh), Candidates.of(response, prior), scale)
+        return cls(response, prior, SheetDomain(mesh), Candidates.of(response, prior), scale)
 
     def as_told(self, reference: FloatArray) -> SpotModel:
         """The model of a sheet that conducts by direction as its ``reference`` (n_meas,) V tells.
 
-        Itself where the reference tells of no direction; see :mod:`tomoskin.touch.fit.grain`.
+        Itself where the reference tells of no direction; see :mod:`tomoskin.touch.fit.anisotropy`.
         """
         state = grained(self.response.state, reference)
         if state is self.response.state:
@@ -192,12 +192,12 @@ class SpotFinder:
         weigh = Weigh.of(whiten(self._trail.directions.T).T)
         return Whitener(weigh(whiten.matrix)), matched.weighed(weigh)
 
-    def _readings(self, found: Found) -> list[Reading]:
+    def _readings(self, found: SpotDetections) -> list[Reading]:
         spots = found.fit.spots
         depth = self._unit * np.expm1(depth_of(spots)) if len(spots) else np.zeros(0)
         return [self._reading(spots[k], float(depth[k]), found, k) for k in range(len(spots))]
 
-    def _reading(self, spot: FloatArray, peak: float, found: Found, k: int) -> Reading:
+    def _reading(self, spot: FloatArray, peak: float, found: SpotDetections, k: int) -> Reading:
         place = found.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
         radius = float(np.exp(spot[LOG_RADIUS]))
         apart = np.linalg.norm(self._mesh.centroids - spot[:2], axis=1)

@@ -26,7 +26,7 @@ _MOST_DEPTH = 3.0
 
 
 @dataclass(frozen=True)
-class Prior:
+class SpotPrior:
     """Each spot alone: its place even over the sheet, radius log-normal, content normal.
 
     Attributes

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from tomoskin.core import FloatArray
 from tomoskin.mesh import Mesh
 from tomoskin.touch.fit.noise import Whitener
-from tomoskin.touch.fit.prior import Prior
+from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.spot import CONTENT, N_PARAMETERS, Response, X, Y
 
 _SETTLED = 0.02
@@ -102,7 +102,7 @@ class Fit:
         """Squares of the residual: about as many as it has entries where the model is right."""
         return float(self.residual @ self.residual)
 
-    def log_evidence(self, prior: Prior) -> float:
+    def log_evidence(self, prior: SpotPrior) -> float:
         """Logarithm of ∫ likelihood · prior by Laplace's method (MacKay 2003, eq. 28.5).
 
         Up to what all fits of the same data have in common.
@@ -124,8 +124,8 @@ class Problem:
 
     response: Response
     whiten: Whitener
-    prior: Prior
-    sheet: Sheet
+    prior: SpotPrior
+    sheet: SheetDomain
     sign: str
     reach: float
     grows: float
@@ -192,7 +192,7 @@ class Problem:
         return self.prior.held(self.sheet.held(spots), self.sign)
 
 
-class Sheet:
+class SheetDomain:
     """Where a touch may be: what leaves the mesh is brought back to its nearest cell."""
 
     def __init__(self, mesh: Mesh) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from tomoskin.core import FloatArray
-from tomoskin.touch.tracking.assign import region_radius
+from tomoskin.touch.tracking.motion import region_radius
 from tomoskin.touch.tracking.trace import Apart, Trace, content
 
 _REACH = 2.0

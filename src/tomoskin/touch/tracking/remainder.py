@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.core import Reading
-from tomoskin.touch.tracking.assign import region_radius
+from tomoskin.touch.tracking.motion import region_radius
 from tomoskin.touch.tracking.trace import Footprint, Trace, sign_of, size_of
 
 _PART = 0.25

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from tomoskin.core import FloatArray, Reading, Touch
-from tomoskin.touch.tracking.assign import region_radius
-from tomoskin.touch.tracking.motion import States
+from tomoskin.touch.tracking.motion import States, region_radius
 
 _STEP = 0.012
 """A touch that slides leaves a footprint every so many metres."""

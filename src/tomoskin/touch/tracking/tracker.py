@@ -1,25 +1,65 @@
-"""Readings of successive frames → touches that keep their identity."""
+"""Detections of successive frames → touches that keep their identity, and what happens to them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from tomoskin.core import FloatArray, Reading, Touch
 from tomoskin.touch.tracking import motion
-from tomoskin.touch.tracking.assign import assigned
 from tomoskin.touch.tracking.merging import left_by, merge, split, taken_up_by
+from tomoskin.touch.tracking.motion import assigned
 from tomoskin.touch.tracking.remainder import Remainders, has_become_one
 from tomoskin.touch.tracking.settings import TrackSettings
 from tomoskin.touch.tracking.trace import Apart, Trace
-from tomoskin.touch.tracking.words import Happening, TouchEvent
+
+Happening = Literal["onset", "move", "release", "merge", "split"]
 
 _ROUNDING = 1e-9
+
 _MOVED, _BY_DEVIATIONS = 0.003, 3.0
 """A touch is said to move when it is so many metres, and deviations, from where it was said."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TouchEvent:
+    """One thing that happened to one touch.
+
+    Attributes
+    ----------
+    kind
+        "onset"; "move", by more than noise since the last event; "release"; "merge", where it
+        can no longer be told from others; "split", where it can again.
+    touch
+        As it is after it; at a release, as it was last.
+    host_time
+        Of the frame in which it was noticed, host monotonic s.
+    """
+
+    kind: Happening
+    touch: Touch
+    host_time: float
+
+    @property
+    def text(self) -> str:
+        """A sentence for people."""
+        r = self.touch.reading
+        place = f"{1e3 * r.x:.0f}, {1e3 * r.y:.0f} mm"
+        others = [str(number) for number in self.touch.merged if number != self.touch.id]
+        return (
+            f"touch {self.touch.id}: "
+            + {
+                "onset": f"begins at {place}",
+                "move": f"is at {place}",
+                "release": f"ends at {place}",
+                "merge": f"and {' and '.join(others)} are too close to separate, at {place}",
+                "split": f"is apart again, at {place}",
+            }[self.kind]
+        )
 
 
 class Tracker:

@@ -1,16 +1,16 @@
-"""The best that any method can do on a skin: bounds of a press's place, and the faintest press."""
+"""What a skin can resolve before it is built: bounds of a press, other electrodes and patterns."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.stats import norm
 
-from tomoskin.core import FloatArray, ModelError
+from tomoskin.core import FloatArray, ModelError, TomoskinError
 from tomoskin.forward import ForwardModel
 from tomoskin.mesh import Mesh, triangulate
 from tomoskin.pattern import Scan
@@ -42,6 +42,8 @@ _FAINT = 0.05
 """Depth of the press from which the faintest is reckoned, linearly in its content."""
 
 _AT_ONCE = 10
+
+_MM = 1e3
 
 
 @dataclass(frozen=True)
@@ -173,3 +175,40 @@ def _noise(skin: Skin) -> FloatArray:
 def _inside(skin: Skin, places: FloatArray) -> FloatArray:
     region = Region.of(skin)
     return np.asarray(region.holds(region.centre + (places - region.centre) / _REACH))
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """A skin with another number of electrodes or another pattern, or why there is none."""
+
+    electrodes: int
+    pattern: str
+    skin: Skin | None
+    fault: str = ""
+
+
+def variants(skin: Skin, electrodes: Sequence[int], patterns: Sequence[str]) -> Iterator[Variant]:
+    """Every combination, on the same sheet with the same read-out and current.
+
+    Electrodes are spread evenly and cover together as much of the rim as those of ``skin``.
+    """
+    cover = skin.n_electrodes * _width(skin)
+    evenly = {"first": "90 deg", "order": "clockwise"}
+    kept = {key: skin.document["electrodes"].get(key, word) for key, word in evenly.items()}
+    for count in electrodes:
+        layout = kept | {
+            "count": count,
+            "positions": None,
+            "width": f"{_MM * cover / count:.6g} mm",
+            "contact_impedance": f"{float(skin.contact_impedance.mean()):.9g} ohm*m",
+        }
+        for pattern in patterns:
+            drive = {"pattern": pattern, "drive": None, "measure": None}
+            try:
+                yield Variant(count, pattern, skin.altered({"electrodes": layout, "drive": drive}))
+            except TomoskinError as error:
+                yield Variant(count, pattern, None, error.message)
+
+
+def _width(skin: Skin) -> float:
+    return float(skin.arcs[0].width(skin.outline))
