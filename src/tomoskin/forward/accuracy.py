@@ -1,6 +1,6 @@
 """Whether the voltages of a solve can be believed.
 
-A current that is left over at a node shifts a voltage by the field of the measured pair there (the
+The residual current at a node shifts a voltage by the field of the measured pair there (the
 adjoint), however small the current is: where an electrode is all but cut off, that is many volts.
 """
 

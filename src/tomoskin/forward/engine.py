@@ -105,7 +105,7 @@ class Patches(Protocol):
 
 
 class Engine(Protocol):
-    """The arithmetic that both ways do alike.
+    """The arithmetic that both engines do.
 
     Attributes
     ----------

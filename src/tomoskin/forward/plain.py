@@ -35,8 +35,8 @@ class Scipy:
         self, matrix: Compressed, rhs: NDArray[Any], solution: NDArray[Any]
     ) -> tuple[NDArray[Any], float]:
         """See :class:`Engine`."""
-        left = rhs - matrix.matrix @ solution
-        return solution.T @ left, float(np.abs(left).max())
+        residual = rhs - matrix.matrix @ solution
+        return solution.T @ residual, float(np.abs(residual).max())
 
     def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
         """See :class:`Engine`."""
@@ -128,13 +128,13 @@ class PlainPatches:
     def _condensed(self, index: IntArray, sigma: NDArray[Any]) -> tuple[IntArray, NDArray[Any]]:
         """Nodes of the patch's rim (m,), and the change of the system seen from there (m, m)."""
         base = self._base
-        nodes, place, touched = np.unique(
+        nodes, position, touched = np.unique(
             base.cells[index], return_inverse=True, return_counts=True
         )
         inside = touched == self._valence[nodes]
-        place = place.reshape(-1, base.cells.shape[1])
+        position = position.reshape(-1, base.cells.shape[1])
         before, after = (
-            _condensed(_block(base.local[index], place, unit, len(nodes)), inside)
+            _condensed(_block(base.local[index], position, unit, len(nodes)), inside)
             for unit in (base.conductivity[index], sigma)
         )
         return nodes[~inside], after - before
@@ -154,10 +154,12 @@ class PlainPatches:
         return fields.T @ current, changed.T @ residual
 
 
-def _block(local: FloatArray, place: IntArray, conductivity: NDArray[Any], n: int) -> NDArray[Any]:
+def _block(
+    local: FloatArray, position: IntArray, conductivity: NDArray[Any], n: int
+) -> NDArray[Any]:
     """(n, n): the sum of the cells' matrices."""
     entries = (local * conductivity[:, None, None]).ravel()
-    keys = (place[:, :, None] * n + place[:, None, :]).ravel()
+    keys = (position[:, :, None] * n + position[:, None, :]).ravel()
     block = np.bincount(keys, entries.real, n * n).astype(entries.dtype)
     if np.iscomplexobj(entries):
         block += 1j * np.bincount(keys, entries.imag, n * n)

@@ -10,7 +10,7 @@ dense system (Woodbury 1950):
 
 where C = (K⁻¹) between them and U the basis fields on them. A constant changes nothing, so all
 three are taken against the first node: what the nodes have in common would cost digits, and does
-not enter. How many are left shows in the residual, and in the current that a constant drives
+not enter. How many digits remain shows in the residual, and in the current that a constant drives
 through A, which should be none.
 """
 

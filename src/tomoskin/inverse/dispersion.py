@@ -30,8 +30,8 @@ _MOST_ALPHA = 0.99
 _DECADES = 3.0
 """The relaxation may lie so far beyond the measured frequencies."""
 
-_BLIND = 1e-12
-"""Directions of the parameters that the data move less than this do not tell anything."""
+_UNDETERMINED = 1e-12
+"""Directions of the parameters that move the data less than this are not determined."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Regions:
         (n_regions, n_regions) of ``values``, Hermitian; from the misfit, which includes what is
         wrong with the model.
     misfit
-        Root of the mean square of what is left of the voltages, V.
+        Root of the mean square of the residual voltages, V.
     """
 
     values: NDArray[Any]
@@ -179,9 +179,9 @@ class Cole:
     alpha
         α, from 0 (a single relaxation) towards 1 (spread out).
     covariance
-        (4, 4) of low, high, time constant and alpha; infinite where the data do not tell.
+        (4, 4) of low, high, time constant and alpha; infinite where the data do not determine it.
     misfit
-        Root mean square of what is left, S or S/m.
+        Root mean square of the residuals, S or S/m.
     """
 
     low: float
@@ -213,7 +213,7 @@ class Cole:
             (n,) σ + jωε, S or S/m.
         sd
             (n,) standard deviation of its real and of its imaginary part. Without it, all are
-            alike and their size is taken from the misfit.
+            equal and their size is taken from the misfit.
 
         Raises
         ------
@@ -230,8 +230,8 @@ class Cole:
         alpha = float(best.x[3])
         by_natural = np.array([sigma0, sigma1, tau, 1.0])
         covariance = _inverse(np.asarray(best.jac)) * np.outer(by_natural, by_natural)
-        left = cole(f, sigma0, sigma1, tau, alpha) - gamma
-        misfit = float(np.sqrt((np.abs(left) ** 2).mean()))
+        residual = cole(f, sigma0, sigma1, tau, alpha) - gamma
+        misfit = float(np.sqrt((np.abs(residual) ** 2).mean()))
         return cls(sigma0, sigma1, tau, alpha, scale * covariance, misfit)
 
 
@@ -269,9 +269,9 @@ def cole_of_regions(
     values = np.stack([fit.values for fit in fits])
     # what a complex value may be off by is shared by its two parts
     sd = np.sqrt(np.stack([np.diag(fit.covariance).real for fit in fits]) / 2.0)
-    known = np.asarray((sd > 0).all(axis=0))
+    weighted = np.asarray((sd > 0).all(axis=0))
     return tuple(
-        Cole.fit(list(models), values[:, r], sd[:, r] if known[r] else None)
+        Cole.fit(list(models), values[:, r], sd[:, r] if weighted[r] else None)
         for r in range(values.shape[1])
     )
 
@@ -280,8 +280,8 @@ def _residual(
     parameters: FloatArray, frequency: FloatArray, gamma: ComplexArray, weight: FloatArray
 ) -> FloatArray:
     low, high, time_constant = np.exp(parameters[:3])
-    left = weight * (cole(frequency, low, high, time_constant, parameters[3]) - gamma)
-    return np.concatenate([left.real, left.imag])
+    residual = weight * (cole(frequency, low, high, time_constant, parameters[3]) - gamma)
+    return np.concatenate([residual.real, residual.imag])
 
 
 def _fits(frequency: FloatArray, gamma: ComplexArray, weight: FloatArray) -> Iterator[Any]:
@@ -310,12 +310,12 @@ def _bounds(frequency: FloatArray, gamma: ComplexArray) -> tuple[list[float], li
 
 
 def _inverse(jacobian: FloatArray) -> FloatArray:
-    """(JᵀJ)⁻¹; infinite where no data tell."""
+    """(JᵀJ)⁻¹; infinite where the data do not determine it."""
     _, size, axes = np.linalg.svd(jacobian, full_matrices=False)
-    told = size > np.sqrt(_BLIND) * size.max()
-    covariance = (axes[told].T / size[told] ** 2) @ axes[told]
-    blind = (np.abs(axes[~told]) > 1e-6).any(axis=0)
-    covariance[blind] = covariance[:, blind] = np.inf
+    determined = size > np.sqrt(_UNDETERMINED) * size.max()
+    covariance = (axes[determined].T / size[determined] ** 2) @ axes[determined]
+    free = (np.abs(axes[~determined]) > 1e-6).any(axis=0)
+    covariance[free] = covariance[:, free] = np.inf
     return np.asarray(covariance)
 
 

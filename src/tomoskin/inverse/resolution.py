@@ -31,7 +31,7 @@ def resolution_matrix(operator: Operator, problem: LinearProblem) -> NDArray[Any
 
 
 def resolved(operator: Operator, problem: LinearProblem) -> NDArray[Any]:
-    """(n_cells,) diagonal of RJ: the part of a change in a cell that its own place shows.
+    """(n_cells,) diagonal of RJ: the part of a change in a cell that its own position shows.
 
     Of a one-step operator the sum is the number of degrees of freedom that the data decide.
     """
@@ -40,13 +40,13 @@ def resolved(operator: Operator, problem: LinearProblem) -> NDArray[Any]:
 
 
 def point_spread(operator: Operator, problem: LinearProblem, cells: ArrayLike) -> NDArray[Any]:
-    """(n_cells, k) pictures of a change of 1 in each of ``cells``: columns of RJ."""
+    """(n_cells, k) images of a change of 1 in each of ``cells``: columns of RJ."""
     _check_pair(operator, problem)
     return np.asarray(operator.matrix @ problem.jacobian[:, np.asarray(cells)])
 
 
 def averaging(operator: Operator, problem: LinearProblem, cells: ArrayLike) -> NDArray[Any]:
-    """(k, n_cells) weights with which changes enter the picture of each of ``cells``."""
+    """(k, n_cells) weights with which changes enter the image of each of ``cells``."""
     _check_pair(operator, problem)
     return np.asarray(operator.matrix[np.asarray(cells)] @ problem.jacobian)
 

@@ -1,4 +1,4 @@
-"""The source's four metrics of an image, its section 4.4.1."""
+"""The thesis's four metrics of an image, its section 4.4.1."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class SourceMetrics:
         1 − √((elements over 50 % (75 %) of the maximum − 1) / elements), equation (4.1).
     shape_angle
         β = atan(25 % of the maximum / ((res75 − res50) / 2)), rad, equation (4.2): π/2 for a
-        sharp edge (res75 = res50). It depends on the image's unit, as in the source.
+        sharp edge (res75 = res50). It depends on the image's unit, as in the thesis.
     error75
         Distance, m, of the true centroid from that of the elements over 75 %, equation (4.3);
         NaN where the truth is not known.
@@ -45,7 +45,7 @@ class SourceMetrics:
         ------
         DataError
             When the image belongs to another mesh, is complex, holds values that are not finite
-            or no change at all, or the truth is not a place.
+            or no change at all, or the truth is not a position.
         """
         values = _checked(image, mesh)
         peak = float(values[np.abs(values).argmax()])
@@ -66,12 +66,12 @@ def _resolution(over: int, total: int) -> float:
 
 
 def _error(mesh: Mesh, cells: IntArray, truth: ArrayLike) -> float:
-    place = np.asarray(truth, dtype=np.float64)
+    position = np.asarray(truth, dtype=np.float64)
     d = mesh.points.shape[1]
-    if place.shape != (d,) or not np.isfinite(place).all():
+    if position.shape != (d,) or not np.isfinite(position).all():
         raise DataError(f"expected the true centroid as {d} finite coordinates, got {truth!r}")
     weight = mesh.volumes[cells]
-    return float(np.linalg.norm(weight @ mesh.centroids[cells] / weight.sum() - place))
+    return float(np.linalg.norm(weight @ mesh.centroids[cells] / weight.sum() - position))
 
 
 def _checked(image: Image, mesh: Mesh) -> FloatArray:

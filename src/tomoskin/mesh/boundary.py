@@ -125,7 +125,7 @@ def _rim_sizes(
 def _graded(
     outline: Outline, start: float, span: float, field: SizeField, least: int
 ) -> FloatArray:
-    """Arclengths from ``start`` (included) to its end (left out), spaced as the field asks."""
+    """Arclengths from ``start`` (included) to its end (excluded), spaced as the field asks."""
     samples = 1 + max(16, math.ceil(3 * span / field.sizes.min()))
     s = np.linspace(0.0, span, min(samples, 20_001))
     density = 1.0 / field(outline.point(start + s))
@@ -142,7 +142,7 @@ def _split_encroached(
     """Halve edges until no node lies in another edge's diametral circle.
 
     Next to a corner the cut is made at a power-of-two distance from it, so that the two
-    sides of a sharp corner are cut alike and the splitting ends.
+    sides of a sharp corner are cut the same way and the splitting ends.
     """
     for _ in range(60):
         rim = Boundary(s, outline.point(s), owner)

@@ -1,4 +1,4 @@
-"""Electrodes of a mesh that comes from elsewhere: by name, facets, a function or places."""
+"""Electrodes of a mesh that comes from elsewhere: by name, facets, a function or positions."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Places:
 
 Electrodes = Sequence[str] | Sequence[ArrayLike] | Chooser | Places | None
 """How electrodes are given: names of groups in the file, in their order; facet arrays in the
-file's own point numbers; a function of centroids; places; None for the groups named E1, E2, …"""
+file's own point numbers; a function of centroids; positions; None for the groups named E1, E2, …"""
 
 
 def choose(

@@ -23,7 +23,7 @@ _NEAREST = 16
 """Triangles that are looked at for each point."""
 
 _ON = 0.5
-"""A place that is further off the surface than this many typical edges is not meant on it."""
+"""A point that is further off the surface than this many typical edges is not meant on it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,7 @@ class Draped(Surface):
         return flat
 
     def _nearest(self, xyz: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Flat place and distance of the nearest point among those of the nearest triangles."""
+        """Flat position and distance of the nearest point among those of the nearest triangles."""
         k = min(_NEAREST, len(self.cells))
         near = cKDTree(self.points[self.cells].mean(axis=1)).query(xyz, k=k)[1].reshape(-1, k)
         corner = self.points[self.cells[near]]

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.mesh.layers import check_height, grid_lines
+from tomoskin.mesh.layers import grid_lines
 from tomoskin.mesh.mesh import Mesh
-from tomoskin.mesh.outline import Disc, Outline
+from tomoskin.mesh.outline import Disc, Outline, check_size
 from tomoskin.mesh.patch import FacePatch, Patch, WallPatch, check_patches, footprint, ring
 from tomoskin.mesh.topology import boundary_facets
 from tomoskin.mesh.triangulate import triangulate
@@ -41,7 +41,7 @@ def extrude(
         When an electrode does not fit, overlaps another one or has no facet, or when the
         outline cannot be met with so few cells.
     """
-    check_height(height)
+    check_size("height", height)
     check_patches(outline, height, patches)
     _check_planes(planes, height)
     arcs, marks = footprint(outline, patches)

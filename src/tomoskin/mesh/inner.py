@@ -149,7 +149,7 @@ def _mended(rim: Boundary, inner: FloatArray, cells: IntArray, field: SizeField)
     corner, owner = cells.ravel(), np.repeat(np.arange(len(cells)), 3)
     order = np.lexsort((size[owner], corner))
     last = np.flatnonzero(np.append(np.diff(corner[order]) != 0, True))
-    largest = owner[order[last]]  # for each point, the triangle that is largest for its place
+    largest = owner[order[last]]  # for each point, the triangle that is largest for its position
     added = middle[np.unique(largest[many])]
     return np.concatenate([inner[~few[first:]], added[keeps_clear(rim, added)]])
 

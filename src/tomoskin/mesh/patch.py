@@ -137,8 +137,8 @@ def footprint(outline: Outline, patches: Sequence[Patch]) -> tuple[list[Electrod
     """Arcs that stand apart, and arclengths that must be nodes beside them, for ``triangulate``.
 
     Arcs of patches at different heights may coincide or overlap; together they are one arc,
-    and their ends inside it are marks. ``triangulate`` wants an arc, and one that is not the
-    whole rim: the longest stretch is left out where patches cover the rim, and a short
+    and their ends inside it are marks. ``triangulate`` wants an arc, and one that is not all
+    of the rim: the longest stretch is omitted where patches cover the rim, and a short
     stretch at its start stands in where no patch has an arc.
     """
     length = outline.length
@@ -151,7 +151,7 @@ def footprint(outline: Outline, patches: Sequence[Patch]) -> tuple[list[Electrod
     span = np.append(ends[1:], ends[0] + length) - ends
     middle = ends + span / 2
     covered = ((middle[:, None] - start) % length < width).any(axis=1)
-    covered |= span < MIN_GAP * length  # no gap is left that check_arcs could refuse
+    covered |= span < MIN_GAP * length  # leave no gap that check_arcs could refuse
     if covered.all():
         covered[np.argmax(span)] = False
     marks = _clear_of(outline.corners, ends[covered & np.roll(covered, 1)], length)

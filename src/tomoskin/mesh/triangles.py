@@ -17,24 +17,24 @@ _CLEAR = 1e-9
 _BLOCK = 200_000
 
 
-def barycentric(corner: FloatArray, place: FloatArray) -> FloatArray:
-    """(…, 3) shares of the corners (…, 3, 2) at ``place`` (…, 2)."""
+def barycentric(corner: FloatArray, position: FloatArray) -> FloatArray:
+    """(…, 3) shares of the corners (…, 3, 2) at ``position`` (…, 2)."""
     u, v = corner[..., 1, :] - corner[..., 0, :], corner[..., 2, :] - corner[..., 0, :]
-    w = place - corner[..., 0, :]
+    w = position - corner[..., 0, :]
     area = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
     p = (w[..., 0] * v[..., 1] - w[..., 1] * v[..., 0]) / area
     q = (u[..., 0] * w[..., 1] - u[..., 1] * w[..., 0]) / area
     return np.stack([1.0 - p - q, p, q], axis=-1)
 
 
-def closest(corner: FloatArray, place: FloatArray) -> FloatArray:
-    """(…, 3) shares of the point of each triangle (…, 3, 3) that is nearest to ``place`` (…, 3).
+def closest(corner: FloatArray, position: FloatArray) -> FloatArray:
+    """(…, 3) shares of the point of each triangle (…, 3, 3) that is nearest to ``position`` (…, 3).
 
     The foot on the plane where it lies inside, else the best foot on the three sides.
     """
-    place = np.broadcast_to(place, (*corner.shape[:-2], 3))
+    position = np.broadcast_to(position, (*corner.shape[:-2], 3))
     u, v = corner[..., 1, :] - corner[..., 0, :], corner[..., 2, :] - corner[..., 0, :]
-    w = place - corner[..., 0, :]
+    w = position - corner[..., 0, :]
     gram = np.stack(
         [
             np.stack([(u * u).sum(-1), (u * v).sum(-1)], -1),
@@ -48,13 +48,13 @@ def closest(corner: FloatArray, place: FloatArray) -> FloatArray:
     shares = [foot]
     for a, b in ((0, 1), (1, 2), (2, 0)):
         side = corner[..., b, :] - corner[..., a, :]
-        t = ((place - corner[..., a, :]) * side).sum(-1) / (side * side).sum(-1)
+        t = ((position - corner[..., a, :]) * side).sum(-1) / (side * side).sum(-1)
         t = np.clip(t, 0.0, 1.0)
         share = np.zeros(corner.shape[:-1])
         share[..., a], share[..., b] = 1.0 - t, t
         shares.append(share)
     table = np.stack(shares)
-    gap = np.linalg.norm(np.einsum("...k,...kd->...d", table, corner) - place, axis=-1)
+    gap = np.linalg.norm(np.einsum("...k,...kd->...d", table, corner) - position, axis=-1)
     gap[0][foot.min(axis=-1) < 0] = np.inf
     best = gap.argmin(axis=0)
     return np.asarray(np.take_along_axis(table, best[None, ..., None], axis=0)[0])
@@ -63,16 +63,16 @@ def closest(corner: FloatArray, place: FloatArray) -> FloatArray:
 def check_crossings(points: FloatArray, cells: IntArray) -> None:
     """Raise GeometryError naming two triangles that cut through each other.
 
-    Neighbours may meet at what they share; two triangles in one plane are not told apart.
+    Neighbours may meet at what they share; two triangles in one plane are not distinguished.
     """
     for pairs in _near(points, cells):
         for one, other in ((0, 1), (1, 0)):
             cut = _cuts(points, cells[pairs[:, one]], cells[pairs[:, other]])
             if cut.any():
                 a, b = pairs[int(np.argmax(cut))]
-                place = ", ".join(f"{1e3 * x:.4g}" for x in points[cells[a]].mean(axis=0))
+                middle = ", ".join(f"{1e3 * x:.4g}" for x in points[cells[a]].mean(axis=0))
                 raise GeometryError(
-                    f"the surface runs through itself near ({place}) mm",
+                    f"the surface runs through itself near ({middle}) mm",
                     where=f"cells {min(a, b)} and {max(a, b)}",
                     hint="mend it in a mesh program: remove self-intersections",
                 )
@@ -89,9 +89,9 @@ def _near(points: FloatArray, cells: IntArray) -> list[IntArray]:
     # small ones look for large ones nowhere: each looks as far as itself and its equals reach
     order = np.argsort(reach)
     for part in np.array_split(order, max(1, len(order) // 4096)):
-        found = tree.query_ball_point(middle[part], 2 * reach[part])
-        first = np.repeat(part, [len(f) for f in found])
-        second = np.concatenate([np.asarray(f, dtype=np.int64) for f in found])
+        near = tree.query_ball_point(middle[part], 2 * reach[part])
+        first = np.repeat(part, [len(cells) for cells in near])
+        second = np.concatenate([np.asarray(cells, dtype=np.int64) for cells in near])
         smaller = (reach[second] < reach[first]) | (
             (reach[second] == reach[first]) & (second < first)
         )

@@ -1,4 +1,4 @@
-"""Drive and measurement tables: THE order of the rows, for firmware, decoder and Jacobian alike."""
+"""Drive and measurement tables: THE order of the rows, shared by firmware, decoder and Jacobian."""
 
 from tomoskin.pattern.match import RowMatch, match_rows
 from tomoskin.pattern.pattern import NAMED, Pattern, named

@@ -109,7 +109,7 @@ class Pattern:
     ) -> Self:
         """Every measuring pair under every drive, drive by drive.
 
-        Rows whose pair touches a driven electrode are left out unless ``include_driven``.
+        Rows whose pair touches a driven electrode are omitted unless ``include_driven``.
         """
         drive_table, pair_table = _table(drives, "drive"), _table(pairs, "measure")
         index = np.repeat(np.arange(len(drive_table)), len(pair_table))
@@ -276,7 +276,7 @@ def named(name: str, n: int) -> Pattern:
     Raises
     ------
     PatternError
-        When the name is not known; the message lists those that are.
+        For another name; the message lists those that there are.
     """
     parts = [_one(part.strip(), n) for part in name.split("+")]
     pattern = parts[0]

@@ -27,7 +27,7 @@ def difference(values: FloatArray, reference: FloatArray, kind: str) -> FloatArr
     Raises
     ------
     DataError
-        When shapes differ, the kind is not known, or a reference of zero would divide.
+        When shapes differ, the kind is unknown, or a reference of zero would divide.
     """
     if kind not in DIFFERENCES:
         raise DataError(f'expected a difference among {", ".join(DIFFERENCES)}, got "{kind}"')

@@ -90,14 +90,14 @@ class Roles:
         """
         offers = self._offers(bad)
         chosen: dict[int, str] = {}
-        left = bad.copy()
+        unexplained = bad.copy()
         while offers:
-            best = max(offers, key=lambda e: int((offers[e][1] & left).sum()))
+            best = max(offers, key=lambda e: int((offers[e][1] & unexplained).sum()))
             state, rows = offers.pop(best)
-            if not (rows & left).any():
+            if not (rows & unexplained).any():
                 break
             chosen[best] = state
-            left &= ~rows
+            unexplained &= ~rows
         for electrode in list(chosen):
             others = [self.rows(e, s) for e, s in chosen.items() if e != electrode]
             mine = bad & self.rows(electrode, chosen[electrode])
@@ -125,7 +125,7 @@ def _share(rows: Mask, bad: Mask) -> FloatArray:
 
 
 def lost_directions(pattern: Pattern, lost: Mask, floating: Mask) -> FloatArray:
-    """(n_meas, k) directions of the data that say nothing.
+    """(n_meas, k) nuisance directions of the data.
 
     A ``lost`` row, (n_meas,) bool, is one. A reading of a ``floating`` electrode,
     (n_electrodes,) bool, is an unknown number that the rows of its drive share: their sum, the

@@ -91,7 +91,7 @@ class Readout:
 
     @classmethod
     def of(cls, scan: Scan, settings: ReadoutSettings) -> Self:
-        """Read-out of a skin; one count of each summed reading is left as margin at the rails."""
+        """Read-out of a skin; one count of each summed reading is kept as margin at the rails."""
         levels = 1 << settings.adc_bits
         n = settings.oversampling
         volts = settings.reference_voltage / (levels * settings.gain * n)

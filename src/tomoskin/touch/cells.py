@@ -29,7 +29,7 @@ class Blur:
     Cells far smaller than the filter are averaged block by block first, and each block stands at
     its centroid: otherwise a mesh twice as fine would have four times as many neighbours per
     cell. For a round touch cut off at Γ1, on 49,112 cells, that moves the average by 1.2 % of
-    its largest at most (blocks at the edge are in or out as a whole), and reads a sixth.
+    its largest at most (a block at the edge is all in or all out), and reads a sixth.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ class Blur:
 def _blocks(mesh: Mesh, width: float) -> IntArray:
     """(n_cells,) the block of each cell; larger cells are blocks of their own."""
     small = np.flatnonzero(np.sqrt(mesh.volumes) < _SMALL * width)
-    places = np.floor(mesh.centroids[small] / (_BLOCK * width)).astype(np.int64)
-    shared = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
+    blocks = np.floor(mesh.centroids[small] / (_BLOCK * width)).astype(np.int64)
+    shared = np.unique(blocks, axis=0, return_inverse=True)[1].reshape(-1)
     alone = np.setdiff1d(np.arange(len(mesh.cells)), small)
     block = np.empty(len(mesh.cells), np.int64)
     block[alone] = np.arange(len(alone))
@@ -67,10 +67,10 @@ def _blocks(mesh: Mesh, width: float) -> IntArray:
 
 
 def _gaussian(
-    places: FloatArray, blocks: FloatArray, volumes: FloatArray, width: float
+    centroids: FloatArray, blocks: FloatArray, volumes: FloatArray, width: float
 ) -> csr_array:
     """(n_cells, n_blocks) weights of the average; rows sum to one."""
-    near = cKDTree(places).sparse_distance_matrix(
+    near = cKDTree(centroids).sparse_distance_matrix(
         cKDTree(blocks), REACH * width, output_type="coo_matrix"
     )
     weights = np.exp(-0.5 * (near.data / width) ** 2) * volumes[near.col]
@@ -81,7 +81,7 @@ def _gaussian(
 def _single(
     data: FloatArray, at: tuple[NDArray[np.integer], ...], shape: tuple[int, int]
 ) -> csr_array:
-    """Sparse, in single precision: it is read whole for each frame."""
+    """Sparse, in single precision: all of it is read for each frame."""
     return csr_array(coo_array((data.astype(np.float32), at), shape=shape))
 
 
@@ -92,9 +92,9 @@ def neighbour_table(mesh: Mesh) -> IntArray:
     order = np.argsort(cell, kind="stable")
     cell, other = cell[order], other[order]
     count = np.bincount(cell, minlength=len(mesh.cells))
-    place = np.arange(len(cell)) - np.repeat(np.cumsum(count) - count, count)
+    column = np.arange(len(cell)) - np.repeat(np.cumsum(count) - count, count)
     table = np.full((len(mesh.cells), mesh.cells.shape[1]), -1)
-    table[cell, place] = other
+    table[cell, column] = other
     return table
 
 
@@ -106,15 +106,15 @@ def connected(kept: IntArray, positive: NDArray[np.bool_], neighbours: IntArray)
     the number of rounds grows with the logarithm of a region's size.
     """
     n = len(kept)
-    place = np.full(len(neighbours) + 1, n)
-    place[kept] = np.arange(n)
+    number = np.full(len(neighbours) + 1, n)
+    number[kept] = np.arange(n)
     around = neighbours[kept].T
-    around_place = place[around]
-    around_place[positive[around] != positive[kept]] = n
+    near = number[around]
+    near[positive[around] != positive[kept]] = n
     label = np.arange(n + 1)
     while True:
         least = label[:n].copy()
-        for column in around_place:
+        for column in near:
             np.minimum(least, label[column], out=least)
         least = least[least]
         if (least == label[:n]).all():

@@ -57,7 +57,7 @@ class Demand:
     depth
         Part of the conductivity that it takes.
     false_alarm
-        Chance that noise alone is taken for a press at a given place in one frame.
+        Chance that noise alone is taken for a press at a given position in one frame.
     found
         Chance that a press is found in one frame.
     """
@@ -100,7 +100,7 @@ class Promise:
     mesh
         Coarse; its first electrode only is real.
     bound
-        (n_cells, 2, 2) m², Cramér–Rao bound of the place of the press, size and strength unknown.
+        (n_cells, 2, 2) m², Cramér–Rao bound of the press's position, size and strength unknown.
     faintest
         (n_cells,) part of the conductivity that the faintest noticeable press takes, 1 where a
         hole would not be noticed.
@@ -133,7 +133,7 @@ class Promise:
 def promise(
     skin: Skin, demand: Demand, places: int = 500, progress: Advance = lambda _done, _total: None
 ) -> Promise:
-    """Bounds of a press at about so many places on a skin, from one frame of its read-out.
+    """Bounds of a press at about so many ``places`` on a skin, from one frame of its read-out.
 
     The noise is that of the converter (:data:`~tomoskin.signal.readout.CONVERSION_NOISE` and
     rounding, summed readings), shared by the rows that share a sample, and that of a reference
@@ -172,9 +172,9 @@ def _noise(skin: Skin) -> FloatArray:
     return row_covariance(scan, sample) * (1 + 1 / REFERENCE_FRAMES)
 
 
-def _inside(skin: Skin, places: FloatArray) -> FloatArray:
+def _inside(skin: Skin, positions: FloatArray) -> FloatArray:
     region = Region.of(skin)
-    return np.asarray(region.holds(region.centre + (places - region.centre) / _REACH))
+    return np.asarray(region.holds(region.centre + (positions - region.centre) / _REACH))
 
 
 @dataclass(frozen=True, eq=False)

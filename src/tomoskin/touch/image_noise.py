@@ -12,7 +12,7 @@ from tomoskin.core import FloatArray, IntArray
 from tomoskin.mesh import Mesh
 
 _BAND = 0.2
-"""Cells within this fraction of a region's lowest value stand for its edge."""
+"""Cells within this fraction of a region's lowest value count as its edge."""
 
 
 @dataclass(frozen=True, eq=False)

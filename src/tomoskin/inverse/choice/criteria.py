@@ -1,4 +1,4 @@
-"""Parameter-choice criteria: alpha from the spectrum, and from what is known beside it."""
+"""Parameter-choice criteria: alpha from the spectrum, and from evidence beside it."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def _frames(frames: FloatArray) -> str:
 def by_noise_figure(spectrum: Spectrum, evidence: Evidence, target: float = TARGET) -> AlphaChoice:
     """The alpha whose noise figure is ``target``, for a contrast in the middle of the mesh.
 
-    The noise's size does not count, only how it is spread over the rows: all alike where the
+    The noise's size does not count, only how it is spread over the measurements: evenly where the
     evidence does not say. The figure falls as alpha grows; at large alphas it may rise again,
     where the image is no better for being smoother. Raises ModelError when no alpha has that
     figure before.

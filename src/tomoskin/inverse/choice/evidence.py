@@ -13,7 +13,7 @@ from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.inverse.linear.spectrum import Spectrum
 
 Locate = Callable[[FloatArray], FloatArray]
-"""Image (n_cells,) → places (k, 2) of the touches in it, m."""
+"""Image (n_cells,) → positions (k, 2) of the touches in it, m."""
 
 Quantity = Callable[[float], float]
 """Something of alpha."""
@@ -45,7 +45,7 @@ class AlphaChoice:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What is known beside the model; each criterion says what it needs.
+    """What there is beside the model; each criterion says what it needs.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Evidence:
         return frames
 
     def labelled(self, n_meas: int) -> tuple[FloatArray, FloatArray]:
-        """Frames with a known place, (k, n_meas) and (k, 2).
+        """Frames with a label, (k, n_meas), and their positions (k, 2).
 
         Raises DataError when there are fewer than two.
         """
@@ -119,27 +119,27 @@ class Evidence:
             )
         if self.places.shape != (len(frames), 2):
             raise DataError(f"expected places ({len(frames)}, 2), got {self.places.shape}")
-        known = np.isfinite(self.places).all(axis=1) & frames.any(axis=1)
-        if np.count_nonzero(known) < 2:
+        labelled = np.isfinite(self.places).all(axis=1) & frames.any(axis=1)
+        if np.count_nonzero(labelled) < 2:
             raise DataError(
-                f"expected two labelled presses at least, got {np.count_nonzero(known)}"
+                f"expected two labelled presses at least, got {np.count_nonzero(labelled)}"
             )
-        return frames[known], self.places[known]
+        return frames[labelled], self.places[labelled]
 
 
 def _refuse_not_finite(values: FloatArray, name: str) -> None:
     finite = np.isfinite(values)
     if not finite.all():
-        place = np.argwhere(~finite)[0].tolist()
+        index = np.argwhere(~finite)[0].tolist()
         raise DataError(
-            f"expected finite numbers, got {values[tuple(place)]}",
-            where=f"{name}, row {place[-1]}",
+            f"expected finite numbers, got {values[tuple(index)]}",
+            where=f"{name}, row {index[-1]}",
         )
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """What a choice says of itself: its criterion, its reason, and what its curve shows."""
+    """What a choice reports: its criterion, its reason, and what its curve shows."""
 
     rule: str
     reason: str

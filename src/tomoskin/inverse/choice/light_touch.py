@@ -21,8 +21,8 @@ RADIUS = 0.055
 DEPTH = 0.25
 """Its relative change of conductivity."""
 
-_PLACES = 80
-"""Places that are tried, evenly over the cells."""
+_POSITIONS = 80
+"""Positions that are tried, evenly over the cells."""
 
 _STRIDE = 4
 """One alpha in so many of the fine grid is tried."""
@@ -32,7 +32,7 @@ _STRIDE = 4
 class LightTouch:
     """Expected error of the image of a light touch: lost sharpness, plus the noise's part.
 
-    The mean over places on the sheet of ∫(x̂ − x)²/∫x², the image's mean square error, is
+    The mean over positions on the sheet of ∫(x̂ − x)²/∫x², the image's mean square error, is
     quadratic in the data, so it is exact: no noise is drawn. Prepared once for a skin, a choice
     for another noise takes a few milliseconds.
 
@@ -92,7 +92,7 @@ def _touches(mesh: Mesh) -> FloatArray:
     inside = np.flatnonzero(apart > radius)
     if not len(inside):
         inside = np.arange(len(mesh.cells))
-    chosen = inside[np.unique(np.linspace(0, len(inside) - 1, _PLACES).astype(int))]
+    chosen = inside[np.unique(np.linspace(0, len(inside) - 1, _POSITIONS).astype(int))]
     distance = cdist(mesh.centroids, mesh.centroids[chosen])
     distance[chosen, np.arange(len(chosen))] = 0.0
     return np.asarray(distance <= radius, dtype=np.float64)

@@ -124,8 +124,8 @@ def figures(operator: Operator, targets: Targets, noise: ArrayLike = 1.0) -> Mer
     images = targets.dv @ operator.matrix.T
     table = np.array(
         [
-            _of_image(image, balls, place, float(amount), centre)
-            for image, place, amount in zip(images, targets.places, targets.amount, strict=True)
+            _of_image(image, balls, position, float(amount), centre)
+            for image, position, amount in zip(images, targets.places, targets.amount, strict=True)
         ]
     )
     middle = targets.dv[int(distance.argmin())]
@@ -135,7 +135,7 @@ def figures(operator: Operator, targets: Targets, noise: ArrayLike = 1.0) -> Mer
 
 
 def _of_image(
-    image: FloatArray, balls: Balls, place: FloatArray, amount: float, centre: FloatArray
+    image: FloatArray, balls: Balls, position: FloatArray, amount: float, centre: FloatArray
 ) -> tuple[float, ...]:
     """The figures of one image, in the record's order."""
     mesh = balls.mesh
@@ -151,8 +151,8 @@ def _of_image(
     wrong = np.minimum(content, 0.0) @ (1.0 - share)
     return (
         content.sum() / abs(amount),
-        float(np.linalg.norm(place - centre) - np.linalg.norm(middle - centre)),
-        float(np.linalg.norm(place - middle)),
+        float(np.linalg.norm(position - centre) - np.linalg.norm(middle - centre)),
+        float(np.linalg.norm(position - middle)),
         float((size / mesh.volumes.sum()) ** (1.0 / mesh.dimension)),
         float(in_set @ (1.0 - share) / size),
         float(-wrong / (content @ share)),

@@ -115,7 +115,7 @@ class Greit(Operator):
 
 
 def _target_radius(mesh: Mesh) -> float:
-    """Small, but not so small that it falls between the points that stand for a cell."""
+    """Small, but not so small that it falls between the points that sample a cell."""
     cell = float(mesh.volumes.max()) ** (1.0 / mesh.dimension)
     return float(max(TARGET_RADIUS * np.ptp(mesh.points, axis=0).max(), cell))
 

@@ -21,7 +21,7 @@ _PER_EDGE = 4
 class Balls:
     """Discs on a sheet, or balls in a volume, as shares of the cells of ``mesh``.
 
-    Each cell stands for points of equal weight (10 in a triangle, 20 in a tetrahedron).
+    Each cell is sampled at points of equal weight (10 in a triangle, 20 in a tetrahedron).
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -34,17 +34,17 @@ class Balls:
     def _tree(self) -> cKDTree:
         return cKDTree(self._points.reshape(-1, self._points.shape[2]))
 
-    def each(self, places: FloatArray, radius: float) -> Iterator[tuple[IntArray, FloatArray]]:
-        """Cells (k,) and their share (k,) within ``radius`` m of each place, (n, d)."""
-        for found in self._tree.query_ball_point(places, radius):
+    def each(self, positions: FloatArray, radius: float) -> Iterator[tuple[IntArray, FloatArray]]:
+        """Cells (k,) and their share (k,) within ``radius`` m of each position, (n, d)."""
+        for within in self._tree.query_ball_point(positions, radius):
             cells, count = np.unique(
-                np.asarray(found, dtype=np.int64) // self._points_per_cell, return_counts=True
+                np.asarray(within, dtype=np.int64) // self._points_per_cell, return_counts=True
             )
             yield cells, count / self._points_per_cell
 
-    def share(self, place: FloatArray, radius: float) -> FloatArray:
-        """(n_cells,) share of each cell within ``radius`` m of ``place`` (d,)."""
-        within = np.einsum("cqd,cqd->cq", *(2 * [self._points - place])) <= radius**2
+    def share(self, position: FloatArray, radius: float) -> FloatArray:
+        """(n_cells,) share of each cell within ``radius`` m of ``position`` (d,)."""
+        within = np.einsum("cqd,cqd->cq", *(2 * [self._points - position])) <= radius**2
         return np.asarray(within.mean(axis=1))
 
 
@@ -108,7 +108,7 @@ class Targets:
             For a radius that is not above 0, a contrast that is 0 or not above −1, a difference
             that is not known, or complex voltages.
         DataError
-            For a place that has no cell within the radius, naming it.
+            For a position that has no cell within the radius, naming it.
         """
         table = _checked(places, model.mesh, radius, contrast, difference)
         state = model.at(conductivity)
@@ -144,7 +144,7 @@ def _refuse_empty(shares: list[tuple[IntArray, FloatArray]]) -> None:
 
 
 def along(mesh: Mesh, end: ArrayLike, count: int) -> FloatArray:
-    """(count, d) places from the sheet's centroid towards ``end`` (d,) m, both included."""
+    """(count, d) positions from the sheet's centroid towards ``end`` (d,) m, both included."""
     if count < 1:
         raise DataError(f"expected at least 1 place, got {count}")
     start = centre_of(mesh)
@@ -157,9 +157,9 @@ def centre_of(mesh: Mesh) -> FloatArray:
 
 
 def _checked(
-    places: ArrayLike, mesh: Mesh, radius: float, contrast: float, difference: str
+    positions: ArrayLike, mesh: Mesh, radius: float, contrast: float, difference: str
 ) -> FloatArray:
-    table = np.asarray(places, dtype=np.float64)
+    table = np.asarray(positions, dtype=np.float64)
     d = mesh.points.shape[1]
     if table.ndim != 2 or table.shape[1] != d or not len(table):
         raise DataError(f"expected places (n, {d}), got shape {table.shape}")

@@ -65,8 +65,8 @@ class Desired:
                 bound = "above 0" if low else "of 0 or more"
                 raise ModelError(f"expected {name} {bound}, got {value}", where="desired response")
 
-    def on(self, mesh: Mesh, places: FloatArray) -> tuple[csr_array, csr_array]:
-        """Weights and weighted images for unit targets at ``places`` (n, d).
+    def on(self, mesh: Mesh, positions: FloatArray) -> tuple[csr_array, csr_array]:
+        """Weights and weighted images for unit targets at ``positions`` (n, d).
 
         Returns
         -------
@@ -75,8 +75,8 @@ class Desired:
         """
         extent = float(np.ptp(mesh.points, axis=0).max())
         balls = Balls(mesh)
-        disc = _shares(balls, places, self.radius * extent)
-        ring = _shares(balls, places, (self.radius + self.edge) * extent)
+        disc = _shares(balls, positions, self.radius * extent)
+        ring = _shares(balls, positions, (self.radius + self.edge) * extent)
         size = mesh.volumes @ disc
         if not (size > 0).all():
             raise ModelError(
@@ -87,14 +87,14 @@ class Desired:
         return csr_array(self.inside * disc - self.outside * ring), csr_array(self.inside * scaled)
 
 
-def _shares(balls: Balls, places: FloatArray, radius: float) -> csr_array:
+def _shares(balls: Balls, positions: FloatArray, radius: float) -> csr_array:
     cells, shares, columns = [], [], []
-    for number, (cell, share) in enumerate(balls.each(places, radius)):
+    for number, (cell, share) in enumerate(balls.each(positions, radius)):
         cells.append(cell)
         shares.append(share)
         columns.append(np.full(len(cell), number))
     where = (np.concatenate(cells), np.concatenate(columns))
-    shape = (len(balls.mesh.cells), len(places))
+    shape = (len(balls.mesh.cells), len(positions))
     return csr_array((np.concatenate(shares), where), shape=shape)
 
 

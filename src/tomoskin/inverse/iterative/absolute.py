@@ -17,7 +17,7 @@ from tomoskin.inverse.iterative.unknowns import (
     Contacts,
     ImageMap,
     Joint,
-    Place,
+    ModelPoint,
     Unknowns,
     others,
 )
@@ -29,7 +29,7 @@ STEPS = 20
 """Most iterations."""
 
 REACH = 2.0
-"""No logarithm changes by more in one iteration: beyond, the linearised problem says little."""
+"""No logarithm changes by more in one iteration: beyond, the linearised problem is no guide."""
 
 TOLERANCE = 1e-4
 """An iteration that lowers the objective by less than this part of it is the last."""
@@ -69,16 +69,16 @@ class Absolute:
     converged: bool
 
     @classmethod
-    def of(cls, place: Place, descent: Descent) -> Absolute:
+    def of(cls, point: ModelPoint, descent: Descent) -> Absolute:
         """What an iteration came to."""
-        mesh = place.of.model.mesh
+        mesh = point.of.model.mesh
         unit = "S" if mesh.dimension == 2 else "S/m"
         return cls(
-            conductivity=Image(place.conductivity, unit, mesh.identity),
-            background=place.background,
-            contact_impedance=place.contact_impedance,
-            voltages=place.state.voltages,
-            n_values=len(place.of.rows),
+            conductivity=Image(point.conductivity, unit, mesh.identity),
+            background=point.background,
+            contact_impedance=point.contact_impedance,
+            voltages=point.state.voltages,
+            n_values=len(point.of.rows),
             steps=descent.steps,
             reason=descent.reason,
             converged=descent.converged,

@@ -10,12 +10,12 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
 
-from tomoskin.core import FloatArray, IntArray, ModelError
-from tomoskin.inverse.priors.smooth import CORRELATIONS
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.inverse.priors.smooth import matern_correlation
 from tomoskin.mesh import Mesh
 
 LEFT_OUT = 0.02
-"""Part of the field's variance that the modes may leave out, at the worst place."""
+"""Part of the field's variance that the modes may lack, at the worst point."""
 
 _ROOM = 128
 """Modes for which there is room at first."""
@@ -26,8 +26,8 @@ class RandomField:
     """A Matérn field of unit variance on a mesh: image = basis @ independent normal numbers.
 
     The basis is the pivoted Cholesky factor of the covariance (Harbrecht, Peters & Schneider
-    2012): its columns stand for as few places as leave no more than a part of the variance out
-    anywhere.
+    2012): it has a column for each of the few places that leave no more than a part of
+    the variance unexplained anywhere.
 
     Attributes
     ----------
@@ -54,19 +54,14 @@ class RandomField:
     def on(
         cls, mesh: Mesh, length: float, smoothness: float = 2.5, left_out: float = LEFT_OUT
     ) -> Self:
-        """Field that is alike over ``length`` m.
+        """Field that is correlated over ``length`` m.
 
         Raises
         ------
         ModelError
             For a length that is not positive, or a smoothness that is not 0.5, 1.5 or 2.5.
         """
-        if not (np.isfinite(length) and length > 0):
-            raise ModelError(f"expected a correlation length above 0 m, got {length}")
-        if smoothness not in CORRELATIONS:
-            known = ", ".join(map(str, CORRELATIONS))
-            raise ModelError(f"expected a smoothness among {known}, got {smoothness}")
-        correlation, scale = CORRELATIONS[smoothness], np.sqrt(2.0 * smoothness) / length
+        correlation, scale = matern_correlation(length, smoothness)
 
         def column(cell: int) -> FloatArray:
             gap = cdist(mesh.centroids, mesh.centroids[cell][None])[:, 0]
@@ -74,7 +69,7 @@ class RandomField:
 
         basis, pivots = _pivoted(column, len(mesh.cells), left_out)
         places, none = mesh.centroids[pivots], np.zeros(len(pivots))
-        return cls(basis, places, basis[pivots], correlation, float(scale), none)
+        return cls(basis, places, basis[pivots], correlation, scale, none)
 
     def centred(self, mesh: Mesh) -> Self:
         """The field less its mean over ``mesh``, for images that stand on a background."""
@@ -103,8 +98,8 @@ def _pivoted(
         pivot, k = int(rest.argmax()), len(pivots)
         if k == basis.shape[1]:
             basis = np.hstack([basis, np.zeros_like(basis)])
-        known = basis[:, :k] @ basis[pivot, :k]
-        basis[:, k] = (column(pivot) - known) / np.sqrt(rest[pivot])
+        explained = basis[:, :k] @ basis[pivot, :k]
+        basis[:, k] = (column(pivot) - explained) / np.sqrt(rest[pivot])
         basis[pivots, k] = 0.0
         pivots.append(pivot)
         rest -= basis[:, k] ** 2

@@ -23,11 +23,11 @@ class Observation:
     values
         (k,) V.
     noise
-        (k,) V, standard deviation of each value; infinite for one that does not count.
+        (k,) V, standard deviation of each value; infinite for an excluded one.
     combine
         (k, n_meas): what each value is of the pattern's voltages. Without it, value i is
         voltage i. With it the currents of a drive may be spread over many electrodes, rows may
-        stand twice, and errors of the read-out that are known may be told.
+        stand twice, and known errors of the read-out may enter.
     """
 
     values: FloatArray

@@ -3,7 +3,7 @@
 A level set of a smooth random field: where the field is below −1 the medium conducts far less,
 above +1 far more, between them as the background (two interfaces of one field, as in the
 thresholded fields of Iglesias, Lu & Stuart 2016). The field is found by Gauss–Newton through the
-complete forward model; its edges are soft at first, so that far places feel them, then sharper.
+complete forward model; its edges are soft at first, so that distant cells feel them, then sharper.
 """
 
 from __future__ import annotations
@@ -170,5 +170,5 @@ class ShapeImaging:
             unknowns = replace(unknowns, image=phase)
             goal = Goal(unknowns, cost, seen.target)
             descent = descend(goal, descent, most=1, tolerance=0.0)
-        place = unknowns.at(descent.unknowns)
-        return Segmented(Absolute.of(place, descent), self.field, place.latent)
+        point = unknowns.at(descent.unknowns)
+        return Segmented(Absolute.of(point, descent), self.field, point.latent)

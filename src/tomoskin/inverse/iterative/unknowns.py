@@ -59,8 +59,8 @@ class Cells:
 class Unknowns:
     """The vector of unknowns: latent image, log background, log contact impedances.
 
-    The last two count from where they start. Every conductivity and impedance that they stand for
-    is positive.
+    The last two count from where they start. Every conductivity and impedance that follows
+    from them is positive.
 
     Attributes
     ----------
@@ -101,13 +101,13 @@ class Unknowns:
         """Number of unknowns."""
         return self.image.size + 1 + self.n_contacts
 
-    def at(self, unknowns: FloatArray) -> Place:
+    def at(self, unknowns: FloatArray) -> ModelPoint:
         """The forward problem at ``unknowns`` (size,)."""
-        return Place(self, unknowns)
+        return ModelPoint(self, unknowns)
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class ModelPoint:
     """One vector of unknowns, and what follows from it."""
 
     of: Unknowns

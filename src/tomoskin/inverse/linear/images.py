@@ -1,4 +1,4 @@
-"""Many frames at once: what can be used becomes images, what cannot is left out and named."""
+"""Many frames at once: usable measurements become images, the rest is excluded and named."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tomoskin.inverse.linear.operator import Operator
 from tomoskin.pattern import Pattern
 
 MOST_LEFT_OUT = 0.25
-"""Above this fraction of unusable rows a frame gives no image: it would be mostly prior."""
+"""Above this fraction of excluded measurements a frame gives no image: mostly prior."""
 
 _LISTED = 5
 
@@ -29,9 +29,9 @@ class Pictures:
     frames
         (n_pictured,) the frames that gave them.
     dropped
-        (n_dropped,) rows that were unusable in most frames and left out of all.
+        (n_dropped,) measurements excluded in most frames, and so in all.
     left_out
-        (n_frames, n_meas) bool: every row of every frame that was not used.
+        (n_frames, n_meas) bool: the measurements of each frame that were excluded.
     pattern
         Whose rows these are.
     unit, mesh_id
@@ -52,7 +52,7 @@ class Pictures:
 
     @property
     def report(self) -> str:
-        """What was left out, in words; empty where everything was used."""
+        """What was excluded, in words; empty where everything was used."""
         parts = []
         if len(self.dropped):
             listed = "; ".join(self.pattern.row_text(row) for row in self.dropped[:_LISTED])
@@ -76,7 +76,7 @@ def pictures(
     """Images of ``changes``, (n_frames, n_meas) difference data in the order of ``pattern``.
 
     A row that is not finite or ``railed``, (n_frames, n_meas) bool, in most frames leaves the
-    operator; one that is so now and then is filled in. Either way it does not count.
+    operator; one that is so now and then is filled in. Either way it is excluded.
 
     Raises
     ------
@@ -86,24 +86,24 @@ def pictures(
     operator.accept(pattern)
     if changes.ndim != 2 or changes.shape[1] != pattern.n_meas or not len(changes):
         raise DataError(f"expected changes (n_frames, {pattern.n_meas}), got {changes.shape}")
-    unusable = ~np.isfinite(changes)
+    excluded = ~np.isfinite(changes)
     if railed is not None:
-        unusable |= railed
-    dropped = np.flatnonzero(unusable.mean(axis=0) > 0.5)
-    unusable[:, dropped] = True
-    frames = np.flatnonzero(unusable.mean(axis=1) <= MOST_LEFT_OUT)
+        excluded |= railed
+    dropped = np.flatnonzero(excluded.mean(axis=0) > 0.5)
+    excluded[:, dropped] = True
+    frames = np.flatnonzero(excluded.mean(axis=1) <= MOST_LEFT_OUT)
     if not len(frames):
         raise DataError(
             f"no frame has {1 - MOST_LEFT_OUT:.0%} of its rows; most lack "
             + "; ".join(pattern.row_text(row) for row in dropped[:_LISTED])
         )
     fewer = operator.without(dropped)
-    used = [fewer.check(fewer.filled(changes[f], unusable[f])) for f in frames]
+    used = [fewer.check(fewer.filled(changes[f], excluded[f])) for f in frames]
     return Pictures(
         values=np.stack(used) @ fewer.matrix.T,
         frames=frames,
         dropped=dropped,
-        left_out=unusable,
+        left_out=excluded,
         pattern=pattern,
         unit=operator.unit,
         mesh_id=operator.model.mesh.identity,

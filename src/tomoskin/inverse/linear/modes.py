@@ -16,7 +16,7 @@ from tomoskin.inverse.linear.problem import LinearProblem
 from tomoskin.inverse.linear.spectrum import Spectrum
 
 _NOTHING = 1e-12
-"""A mode whose picture is this far below the strongest one is none: half of them when every row
+"""A mode whose image is this far below the strongest one is none: half of them when every row
 has a reciprocal."""
 
 _SKEW = 1e-6
@@ -70,7 +70,7 @@ class Modes:
 
     @classmethod
     def of_spectrum(cls, spectrum: Spectrum, alpha: float, operator: Operator) -> Modes:
-        """The same of ``spectrum.operator(alpha)``, whose modes are known: no eigenvalues."""
+        """The same of ``spectrum.operator(alpha)``, by its modes: no eigenvalue problem."""
         picture = spectrum.modes * spectrum.gains(alpha)
         return cls._without_nothing(operator, spectrum.analysis, picture, spectrum.filters(alpha))
 

@@ -11,7 +11,7 @@ from tomoskin.inverse.priors.named import PriorLike
 
 
 class OneStep(Operator):
-    """Linear difference imaging: x = (JᵀWJ + α²Q)⁻¹JᵀW dv, the source's (3.54) and (3.55).
+    """Linear difference imaging: x = (JᵀWJ + α²Q)⁻¹JᵀW dv, the thesis's (3.54) and (3.55).
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ def expected(
     missing
         (n_meas,) bool.
     ignored
-        (n_meas,) bool: rows that the operator leaves out itself.
+        (n_meas,) bool: rows that the operator excludes itself.
     precision
         (n_meas, n_meas) P.
     """
@@ -47,15 +47,15 @@ def downdated(
     matrix: NDArray[Any],
     precision: NDArray[Any],
     lost: NDArray[np.bool_],
-    left_out: NDArray[np.bool_],
+    excluded: NDArray[np.bool_],
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Matrix and precision without the ``lost`` rows, zero in all that are ``left_out``."""
+    """Matrix and precision without the ``lost`` rows, zero in all that are ``excluded``."""
     replaced = _solved(precision, lost, precision[lost])
     smaller = matrix - matrix[:, lost] @ replaced
-    smaller[:, left_out] = 0.0
+    smaller[:, excluded] = 0.0
     inner = precision - precision[:, lost] @ replaced
-    inner[left_out] = 0.0
-    inner[:, left_out] = 0.0
+    inner[excluded] = 0.0
+    inner[:, excluded] = 0.0
     return smaller, inner
 
 
@@ -81,14 +81,14 @@ class Operator:
     precision
         (n_meas, n_meas) P, Hermitian: the inverse of the covariance, up to a factor, that image
         and noise together give the data. An operator is its data's covariance with the image
-        times P; by P rows are left out of it.
+        times P; by P measurements are excluded from it.
     reference
         (n_meas,) V: the model's voltages where it was linearised.
     difference
         The data's kind, "plain" or "normalised".
     left_out
-        (n_meas,) bool: rows that do not count; their columns of ``matrix`` are zero. Without
-        it, every row counts.
+        (n_meas,) bool: excluded measurements; their columns of ``matrix`` are zero. Without it,
+        every one counts.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class Operator:
     def quick(self, dv: NDArray[Any]) -> Image:
         """As a call, from the matrix in single precision: half the bytes, for the frame flow.
 
-        The product reads the whole matrix once, so its time is that of the memory.
+        The product reads all of the matrix once, so its time is that of the memory.
         """
         checked = self.check(dv)
         single = checked.astype(np.complex64 if np.iscomplexobj(checked) else np.float32)
@@ -144,7 +144,7 @@ class Operator:
         return self._image(values.astype(np.result_type(values, np.float64)))
 
     def check(self, dv: NDArray[Any]) -> NDArray[Any]:
-        """``dv`` with zeros in rows that are left out; see :meth:`__call__` for what is refused."""
+        """``dv`` with zeros in excluded rows; see :meth:`__call__` for what is refused."""
         n = self.matrix.shape[1]
         if dv.shape != (n,):
             raise DataError(f"expected difference data of shape ({n},), got {dv.shape}")
@@ -173,14 +173,14 @@ class Operator:
             )
 
     def without(self, rows: Sequence[int] | NDArray[Any]) -> Operator:
-        """The operator that would have been made without ``rows``, which then do not count.
+        """The operator that would have been made without ``rows``, which are then excluded.
 
         A low-rank downdate, exact. Data keep their shape; what stands in those rows is ignored.
 
         Raises
         ------
         DataError
-            When a row does not exist, or what is left tells too little.
+            When a row does not exist, or too few remain.
         """
         lost = np.zeros(len(self.left_out), bool)
         index = np.asarray(rows, dtype=np.int64)
@@ -205,7 +205,7 @@ class Operator:
         )
 
     def filled(self, dv: NDArray[Any], missing: NDArray[np.bool_]) -> NDArray[Any]:
-        """``dv`` with its ``missing`` rows, (n_meas,) bool, set so that they do not count.
+        """``dv`` with its ``missing`` rows, (n_meas,) bool, set as if they were excluded.
 
         Its image is the one of the operator :meth:`without` these rows: for rows that are
         missing in a frame or two, where a new operator would not pay.

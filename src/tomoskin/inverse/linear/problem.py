@@ -133,16 +133,16 @@ class LinearProblem:
         kept = np.delete(np.arange(len(self.weights)), rows)
         if not len(kept):
             raise DataError("no row is left")
-        whole = self.model
+        full = self.model
         pattern = Pattern.from_tables(
-            whole.pattern.drive[kept], whole.pattern.measure[kept], whole.pattern.n_electrodes
+            full.pattern.drive[kept], full.pattern.measure[kept], full.pattern.n_electrodes
         )
         current = np.empty(pattern.n_drive)
-        current[pattern.drive_index] = whole.current[whole.pattern.drive_index[kept]]
+        current[pattern.drive_index] = full.current[full.pattern.drive_index[kept]]
         return replace(
             self,
             model=ForwardModel(
-                whole.mesh, pattern, whole.contact_impedance, current, order=whole.order
+                full.mesh, pattern, full.contact_impedance, current, order=full.order
             ),
             jacobian=self.jacobian[kept],
             weights=self.weights[kept],
@@ -153,7 +153,7 @@ class LinearProblem:
         """Minimiser of the problem as a matrix, made in the space of the measurements.
 
         With K = JQ⁻¹Jᴴ + α²W⁻¹ it is Q⁻¹JᴴK⁻¹. Free images N are fitted first, by generalised
-        least squares with B = JN: they get C = (BᴴK⁻¹B)⁻¹BᴴK⁻¹, the rest what is left over
+        least squares with B = JN: they get C = (BᴴK⁻¹B)⁻¹BᴴK⁻¹, the rest gets the residual
         (universal kriging; Rasmussen & Williams 2006, equations 2.41 and 2.42).
 
         Raises
@@ -185,7 +185,7 @@ class LinearProblem:
 
 
 def _fitted(precision: NDArray[Any], seen: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """What is left of K⁻¹ beside the free images, and C (k, n_meas); ``seen`` is B."""
+    """K⁻¹ less the part of the free images, and C (k, n_meas); ``seen`` is B."""
     half = precision @ seen
     fitted = _inverse(seen.conj().T @ half) @ half.conj().T
     return precision - half @ fitted, fitted

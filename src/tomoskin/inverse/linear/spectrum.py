@@ -83,7 +83,7 @@ class Spectrum:
 
     @cached_property
     def singular_values(self) -> FloatArray:
-        """σ = √λ of the modes that the prior weighs, rounding left out, in descending order."""
+        """σ = √λ of the modes that the prior weighs, none of mere rounding, in descending order."""
         values = self.values[np.isfinite(self.values)]
         return np.asarray(np.sqrt(values[values > _ROUNDING * values.max()]))
 
@@ -198,7 +198,7 @@ def _seen(
     if least <= _UNSEEN * np.linalg.norm(jacobian) * np.linalg.norm(free):
         raise ModelError(
             "the data do not tell an image that the prior leaves free",
-            hint="choose another prior, or a pattern that sees the whole mesh",
+            hint="choose another prior, or a pattern that sees all of the mesh",
         )
     return basis[:, :k], basis[:, k:], upper[:k]
 
@@ -219,7 +219,7 @@ class Assembly:
         return self._made == len(self._matrix)
 
     def advance(self, rows: int) -> None:
-        """Make the next ``rows`` rows, or as many as are left."""
+        """Make the next ``rows`` rows, or as many as there are still to make."""
         piece = slice(self._made, min(self._made + rows, len(self._matrix)))
         np.matmul(self._spectrum.modes[piece], self._filtered, out=self._matrix[piece])
         self._made = piece.stop

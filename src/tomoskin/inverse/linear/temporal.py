@@ -28,7 +28,7 @@ from tomoskin.inverse.linear.one_step import OneStep
 
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """What is known after a frame.
+    """The state of the filter after a frame.
 
     ``time`` s; ``mean`` (k,) the modes as the operator would have had to measure them;
     ``variance`` (k,) as a part of the prior's, and ``expected`` (k,) the same before the frame;
@@ -91,7 +91,7 @@ class Temporal:
             it was.
         """
         self.belief = advance(self.modes, self.time_constant, self.belief, dv, time)
-        return picture(self.modes, self.belief.mean)
+        return image_of(self.modes, self.belief.mean)
 
     def reset(self) -> None:
         """Forget every frame, for instance with a new reference."""
@@ -149,7 +149,7 @@ def advance(
     return _updated(Belief(time, kept * last.mean, expected, expected, kept), data, modes.trust)
 
 
-def picture(modes: Modes, mean: NDArray[Any]) -> Image:
+def image_of(modes: Modes, mean: NDArray[Any]) -> Image:
     """The image of ``mean`` (k,)."""
     values = modes.quick_picture @ mean.astype(modes.quick_picture.dtype)
     values = values.astype(np.result_type(values, np.float64))
@@ -228,7 +228,7 @@ class Smoother:
         return self._shown(oldest)
 
     def finish(self) -> tuple[Smoothed, ...]:
-        """Images of the frames that are still waiting, oldest first; then it starts anew."""
+        """Images of the frames that are still waiting, oldest first; then it starts afresh."""
         waiting = list(self._backwards())[::-1]
         if len(self._beliefs) > self.lag:
             del waiting[0]
@@ -236,20 +236,25 @@ class Smoother:
         return tuple(self._shown(belief) for belief in waiting)
 
     def _shown(self, belief: Belief) -> Smoothed:
-        return Smoothed(belief.time, picture(self.modes, belief.mean), belief.variance)
+        return Smoothed(belief.time, image_of(self.modes, belief.mean), belief.variance)
 
     def _backwards(self) -> Iterator[Belief]:
         """Every frame in the window given all of them, newest first."""
-        known: Belief | None = None
+        smoothed: Belief | None = None
         later: Belief | None = None
         for belief in reversed(self._beliefs):
-            known = belief if known is None or later is None else _given(belief, later, known)
+            smoothed = (
+                belief if smoothed is None or later is None else _given(belief, later, smoothed)
+            )
             later = belief
-            yield known
+            yield smoothed
 
 
-def _given(belief: Belief, later: Belief, known: Belief) -> Belief:
-    """``belief``, when ``known`` is all that is known of the frame after it, ``later``."""
+def _given(belief: Belief, later: Belief, smoothed: Belief) -> Belief:
+    """``belief``, given ``smoothed``: that of the frame after it in the light of all later ones.
+
+    ``later`` is that belief as the filter had it.
+    """
     share = np.divide(
         later.kept * belief.variance,
         later.expected,
@@ -258,6 +263,6 @@ def _given(belief: Belief, later: Belief, known: Belief) -> Belief:
     )
     return replace(
         belief,
-        mean=belief.mean + share * (known.mean - later.kept * belief.mean),
-        variance=belief.variance + share**2 * (known.variance - later.expected),
+        mean=belief.mean + share * (smoothed.mean - later.kept * belief.mean),
+        variance=belief.variance + share**2 * (smoothed.variance - later.expected),
     )

@@ -1,7 +1,7 @@
 """Priors: what is held to be likely before there are data.
 
 A prior is a small frozen object; on a mesh, with the Jacobian of the difference data, it becomes a
-penalty xᵀQx. The names in a skin file stand for the priors in ``PRIORS``.
+penalty xᵀQx. A skin file names the priors in ``PRIORS``.
 """
 
 from __future__ import annotations

@@ -113,7 +113,7 @@ def _positive(smoothing: float) -> float:
 
 
 def _edges(mesh: Mesh) -> FloatArray:
-    """(n_pairs,) size of the facet that two neighbours share, over that of the whole domain."""
+    """(n_pairs,) size of the facet that two neighbours share, over that of the domain."""
     shared = _shared_facets(mesh)
     d = mesh.dimension
     return np.asarray(mesh.facet_sizes(shared) / mesh.volumes.sum() ** ((d - 1) / d))

@@ -55,7 +55,7 @@ class Structural:
     """Laplace with weaker couplings between regions: an image may jump along their edges.
 
     As EIDORS and others take anatomy or a design into account (Kaipio et al. 1999): smooth
-    within a region, nearly free between two. Where a region is, not what it holds, is said.
+    within a region, nearly free between two. The labels say where a region is, not what it holds.
 
     Attributes
     ----------
@@ -162,7 +162,7 @@ class GaussianHighPass:
 class Matern:
     """Q⁻¹ = C, the Matérn covariance of the cells' centres (Rasmussen & Williams 2006, 4.16, 4.17).
 
-    An image is held to be a random field of unit deviation that is alike over ``length``. In the
+    An image is held to be a random field of unit deviation, correlated over ``length``. In the
     space of the measurements C is used as it is, never inverted. Distances are taken in space,
     on a curved sheet too.
 
@@ -183,37 +183,50 @@ class Matern:
         length = self.length
         if length is None:
             length = DEFAULT_LENGTH * float(np.ptp(mesh.points, axis=0).max())
-        if not (np.isfinite(length) and length > 0):
-            raise ModelError(f"expected a correlation length above 0 m, got {length}")
-        if self.smoothness not in CORRELATIONS:
-            known = ", ".join(map(str, CORRELATIONS))
-            raise ModelError(f"expected a smoothness among {known}, got {self.smoothness}")
-        scale = np.sqrt(2.0 * self.smoothness) / length
-        return _Covariance(scale * mesh.centroids, CORRELATIONS[self.smoothness])
+        correlation, scale = matern_correlation(length, self.smoothness)
+        return _Covariance(scale * mesh.centroids, correlation)
+
+
+def matern_correlation(
+    length: float, smoothness: float
+) -> tuple[Callable[[FloatArray], FloatArray], float]:
+    """The correlation, a function of ``scale · distance``, and that scale, 1/m.
+
+    Raises
+    ------
+    ModelError
+        For a ``length`` m that is not positive, or a smoothness that is not 0.5, 1.5 or 2.5.
+    """
+    if not (np.isfinite(length) and length > 0):
+        raise ModelError(f"expected a correlation length above 0 m, got {length}")
+    if smoothness not in CORRELATIONS:
+        names = ", ".join(map(str, CORRELATIONS))
+        raise ModelError(f"expected a smoothness among {names}, got {smoothness}")
+    return CORRELATIONS[smoothness], float(np.sqrt(2.0 * smoothness) / length)
 
 
 @dataclass(frozen=True, eq=False)
 class _Covariance:
-    """A covariance that is a function of distance between ``places`` (n_cells, d)."""
+    """A covariance that is a function of distance between ``positions`` (n_cells, d)."""
 
-    places: FloatArray
+    positions: FloatArray
     correlation: Callable[[FloatArray], FloatArray]
 
     @property
     def free(self) -> FloatArray:
         """No image is free."""
-        return np.empty((len(self.places), 0))
+        return np.empty((len(self.positions), 0))
 
     @property
     def matrix(self) -> FloatArray:
         """Q = C⁻¹, dense."""
-        return np.asarray(inv(self.correlation(cdist(self.places, self.places))))
+        return np.asarray(inv(self.correlation(cdist(self.positions, self.positions))))
 
     def carry(self, jacobian: NDArray[Any]) -> Carried:
         """CJᴴ and JCJᴴ, a block of rows at a time: C itself would be the largest array of all."""
         columns = jacobian.conj().T
         spread = np.empty(columns.shape, columns.dtype, order="F")
-        for start in range(0, len(self.places), _BLOCK):
+        for start in range(0, len(self.positions), _BLOCK):
             rows = slice(start, start + _BLOCK)
-            spread[rows] = self.correlation(cdist(self.places[rows], self.places)) @ columns
+            spread[rows] = self.correlation(cdist(self.positions[rows], self.positions)) @ columns
         return spread, jacobian @ spread

@@ -1,8 +1,8 @@
-"""A sheet that conducts otherwise along than across, as its reference tells.
+"""Anisotropy of a sheet: its conductivity differs by direction, and its reference shows it.
 
-Knits do, and so does any sheet that is wrapped round something: its layer is strained one way.
+Knits are so, and any sheet that is wrapped round something: its layer is strained one way.
 With one tensor exp(D) all over, D symmetric and without a trace, its voltages are those of the
-same sheet with the metric exp(−D) in the place of none, up to a factor.
+same sheet with the metric exp(−D) instead of none, up to a factor.
 """
 
 from __future__ import annotations
@@ -16,41 +16,41 @@ from tomoskin.forward import ForwardModel, State
 from tomoskin.mesh import Mesh
 
 _LEAST = 0.03
-"""Size of D below which a sheet is taken to conduct alike in all directions."""
+"""Size of D below which a sheet counts as isotropic."""
 
 _BETTER = 0.8
-"""What is left of a reference falls to this part of it at least, or D explains nothing."""
+"""The residual of a reference falls to this part of it at least, or D explains nothing."""
 
 _STEPS = 4
 
 
-def grained(state: State, reference: FloatArray) -> State:
+def with_anisotropy(state: State, reference: FloatArray) -> State:
     """The sheet with the D with which it explains a ``reference`` (n_meas,) V best.
 
     ``state`` itself where there is no such D: it is small, or explains nothing.
     """
     total, now = np.zeros(2), state
-    first = left = np.inf
+    first = residual = np.inf
     for step in range(_STEPS):
-        found, left = _explained(now, reference)
-        first = left if step == 0 else first
-        total = total + found
+        change, residual = _explained(now, reference)
+        first = residual if step == 0 else first
+        total = total + change
         if not _LEAST < np.hypot(*total) < 1.0:
             return state
-        now = _with_grain(state, total)
-    _, left = _explained(now, reference)
-    return now if left < _BETTER * first else state
+        now = _with_metric(state, total)
+    _, residual = _explained(now, reference)
+    return now if residual < _BETTER * first else state
 
 
 def _explained(state: State, reference: FloatArray) -> tuple[FloatArray, float]:
-    """(2,) xx and xy by which D is to change, beside a common factor; and what is left, V, of
+    """(2,) xx and xy by which D is to change, beside a common factor; and the residual, V, of
     the reference with the factor alone."""
-    known = np.isfinite(reference)
-    columns = np.column_stack([state.voltages, *_slopes(state)])[known]
-    data, own = reference[known], columns[:, 0]
-    found, *_ = np.linalg.lstsq(columns, data, rcond=None)
+    finite = np.isfinite(reference)
+    columns = np.column_stack([state.voltages, *_slopes(state)])[finite]
+    data, own = reference[finite], columns[:, 0]
+    parts, *_ = np.linalg.lstsq(columns, data, rcond=None)
     alone = data - own * (own @ data) / (own @ own)
-    return found[1:] / found[0], float(np.linalg.norm(alone))
+    return parts[1:] / parts[0], float(np.linalg.norm(alone))
 
 
 def _slopes(state: State) -> tuple[FloatArray, FloatArray]:
@@ -62,17 +62,21 @@ def _slopes(state: State) -> tuple[FloatArray, FloatArray]:
     return one, other
 
 
-def _with_grain(state: State, grain: FloatArray) -> State:
+def _with_metric(state: State, anisotropy: FloatArray) -> State:
     model = state.model
-    mesh = _directed(model.mesh, grain)
+    mesh = _directed(model.mesh, anisotropy)
     own = ForwardModel(mesh, model.pattern, model.contact_impedance, model.current)
     return own.at(state.conductivity)
 
 
-def _directed(mesh: Mesh, grain: FloatArray) -> Mesh:
+def _directed(mesh: Mesh, anisotropy: FloatArray) -> Mesh:
     """The mesh whose metric is exp(−D) in the frame of its own."""
-    size = float(np.hypot(*grain))
-    part = np.sinh(size) / size * np.array([[grain[0], grain[1]], [grain[1], -grain[0]]])
+    size = float(np.hypot(*anisotropy))
+    part = (
+        np.sinh(size)
+        / size
+        * np.array([[anisotropy[0], anisotropy[1]], [anisotropy[1], -anisotropy[0]]])
+    )
     within = np.cosh(size) * np.eye(2) - part
     if mesh.metric is None:
         return replace(mesh, metric=np.tile(within, (len(mesh.cells), 1, 1)))

@@ -14,7 +14,7 @@ class Pace:
     warm
         Steps from the touches of the frame before.
     glance, cold
-        Steps from each of the places where a new touch may begin, and then from the best one.
+        Steps from each of the positions where a new touch may begin, and then from the best one.
     tries
         New touches that are tried in a frame.
     anew
@@ -22,7 +22,7 @@ class Pace:
     speed
         Of touches along each axis, standard deviation, m/s; 0 where they are taken to stand still.
     fading
-        Seconds for which what touches have left behind them counts as noise; 0 where frames do
+        Seconds for which residual responses of touches count as noise; 0 where frames do
         not follow each other.
     """
 

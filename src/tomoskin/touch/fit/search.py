@@ -70,8 +70,8 @@ class Search:
     pace
         How much is tried.
     quiet
-        What makes data white where nothing has been: by that noise readings say how far they stand
-        out, while by the problem's it is decided whether they are touches.
+        What makes data white where nothing has been: by that noise detections state how far they
+        stand out; by the problem's it is decided whether they are touches.
     """
 
     problem: Problem
@@ -89,8 +89,8 @@ class Search:
         if tries > tried == 0:
             fit = self._fewer(fit)
         if self.pace.anew and len(before) and (len(fit.spots) != len(before) or not fit.settled):
-            anew, _ = self._more(self.problem.nothing(), self.pace.tries)
-            fit = max(anew, fit, key=self._evidence)
+            fresh, _ = self._more(self.problem.nothing(), self.pace.tries)
+            fit = max(fresh, fit, key=self._evidence)
         return self._judged(fit)
 
     def _evidence(self, fit: Fit) -> float:
@@ -112,8 +112,7 @@ class Search:
         return fit
 
     def _without(self, fit: Fit, number: int) -> Fit:
-        left = np.delete(fit.spots, number, axis=0)
-        return self._started(left)
+        return self._started(np.delete(fit.spots, number, axis=0))
 
     def _fewer(self, fit: Fit) -> Fit:
         """Without the weakest of several spots, where that explains the frame as well."""
@@ -141,8 +140,8 @@ class Search:
 
     def _threshold(self, fit: Fit, part: float) -> float:
         """What a wrong profile may leave adds to the noise."""
-        left = _MISSHAPEN * float(np.linalg.norm(fit.seen))
-        return part * self.least * float(np.hypot(1.0, left / self.least))
+        misshapen = _MISSHAPEN * float(np.linalg.norm(fit.seen))
+        return part * self.least * float(np.hypot(1.0, misshapen / self.least))
 
     def _standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
         return self.matched.ratios(fit.residual, fit.jacobian, self.problem.sign)
@@ -221,19 +220,19 @@ def _covariance(problem: Problem, fit: Fit) -> FloatArray:
 def _uneven(problem: Problem, fit: Fit) -> FloatArray:
     """What rows that answer more or less than they should add to the covariance.
 
-    By how much is told by what the residual has beyond noise, where that is more than a sheet
+    How much, is what the residual has beyond noise, where that is more than a sheet
     is uneven as a rule: E[rᵀr] = degrees + u²‖(1 − JΣJᵀ)E‖², E the rows' answers one by one.
     """
     answers = problem.response.changes([fit.spots])[0]
     each = fit.weigh(problem.whiten.matrix * answers)
     moved = fit.covariance @ (fit.jacobian.T @ each)
-    left = float(np.sum((each - fit.jacobian @ moved) ** 2))
-    beyond = max(fit.misfit - fit.degrees, 0.0) / left if left else 0.0
+    unexplained = float(np.sum((each - fit.jacobian @ moved) ** 2))
+    beyond = max(fit.misfit - fit.degrees, 0.0) / unexplained if unexplained else 0.0
     return np.asarray(max(beyond, _UNEVEN**2) * (moved @ moved.T))
 
 
 def joined(found: SpotDetections) -> SpotDetections:
-    """The same with each two touches as one whose places cannot be told apart (2 deviations)."""
+    """The same with each two touches as one whose positions are not distinct (2 deviations)."""
     spots, k = found.fit.spots, len(found.fit.spots)
     for i in range(k):
         for j in range(i + 1, k):

@@ -1,7 +1,7 @@
-"""What touches may leave where they have been: noise along what they did to the rows there.
+"""Residual responses of touches: noise along what each did to the rows where it has been.
 
 Textiles and gels do not come back at once, and some not before the next press (play, Prandtl 1928).
-What is left is no touch, and must not move the place of one.
+A residual response is no touch, and must not move the position of one.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ _STEP = 0.012
 """A touch that slides leaves a footprint every so many metres."""
 
 _LEFT = 0.05
-"""Deviation of what is left of a touch, in parts of it: a quarter stands out by five."""
+"""Deviation of the residual response of a touch, in parts of it: a quarter stands out by five."""
 
 _STRONGER = 1.25
-"""A footprint is made anew where a touch is by so much stronger than when it was made."""
+"""A footprint is replaced where a touch is by so much stronger than when it was made."""
 
 _MOST = 16
 """Footprints that are kept, the newest."""
 
 
 @dataclass(frozen=True, eq=False)
-class Trail:
+class ResidualResponse:
     """Where touches have been since there was none for some time.
 
     Attributes
@@ -63,11 +63,11 @@ class Trail:
                 return self.none(self.changes.shape[1])
             return replace(self, quiet=self.quiet + 1)
         near = np.linalg.norm(self.spots[:, None, :2] - spots[:, :2], axis=2) < _STEP
-        known = near & (_STRONGER * _size(self.spots)[:, None] >= _size(spots))
-        fresh = spots[~known.any(axis=0)]
+        held = near & (_STRONGER * _size(self.spots)[:, None] >= _size(spots))
+        fresh = spots[~held.any(axis=0)]
         if not len(fresh):
             return self if not self.quiet else replace(self, quiet=0)
-        kept = ~near[:, ~known.any(axis=0)].any(axis=1)
+        kept = ~near[:, ~held.any(axis=0)].any(axis=1)
         changes = response.changes([spot[None] for spot in fresh])
         return type(self)(
             np.concatenate([self.spots[kept], fresh])[-_MOST:],

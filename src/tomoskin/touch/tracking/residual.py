@@ -1,7 +1,7 @@
-"""What a press leaves behind: told from a touch by place, sign, size and by not growing.
+"""Residual responses: told from a touch by position, sign, size and by not growing.
 
 Textiles, foams and gels do not come back at once, and some not before the next press (play,
-Prandtl 1928). What is left is of the press's sign, a fraction of its size, and it fades.
+Prandtl 1928). The residual response has the press's sign, a fraction of its size, and fades.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from tomoskin.touch.tracking.motion import region_radius
 from tomoskin.touch.tracking.trace import Footprint, Trace, sign_of, size_of
 
 _PART = 0.25
-"""A remainder is at most this part of its press."""
+"""A residual is at most this part of its press."""
 
 _FALL = 1.0
 """A press that is lifted falls from half its size to that part within so many seconds."""
@@ -29,20 +29,20 @@ _CREEP = 10.0
 """A level that rises slower than over so many seconds is the sheet's drift."""
 
 _BESIDE = 1.25
-"""A remainder lies within this many radii of its region, or of its press's."""
+"""A residual lies within this many radii of its region, or of its press's."""
 
 _GONE = 0.5
-"""Seconds without any reading after which nothing is left: a finder loses what is faint for a few
-frames."""
+"""Seconds without any reading after which there is no residual response: a finder loses what is
+faint for a few frames."""
 
 _MOST = 64
 
 
 @dataclass(slots=True, eq=False)
-class Scar:
-    """A place where something was: sign and size of the press, its radius, what is left of it.
+class Residual:
+    """Where a press was: its sign and size, its radius, and the level of its residual response.
 
-    ``unseen`` says that nothing was left above the noise since it was last looked for.
+    ``unseen``: there was nothing above the noise since it was last looked for.
     """
 
     x: float
@@ -55,8 +55,8 @@ class Scar:
     unseen: bool = False
 
     def is_under(self, reading: Reading) -> bool:
-        """Whether the reading lies here, with this sign, and no larger than a remainder."""
-        return sign_of(reading) == self.sign and _may_be_left(
+        """Whether the reading lies here, with this sign, and no larger than a residual."""
+        return sign_of(reading) == self.sign and _may_be_residual(
             reading, Footprint(self.x, self.y, self.press), self.radius
         )
 
@@ -73,7 +73,7 @@ class Scar:
         return not grown
 
 
-class Remainders:
+class ResidualResponses:
     """Memory of where touches were.
 
     Parameters
@@ -84,60 +84,60 @@ class Remainders:
 
     def __init__(self, least_snr: float) -> None:
         self._least_snr = least_snr
-        self._scars: list[Scar] = []
+        self._residuals: list[Residual] = []
         self._quiet_since: float | None = None
 
     def forget(self) -> None:
-        """Begin anew, as with a new reference."""
-        self._scars, self._quiet_since = [], None
+        """Forget all, as with a new reference."""
+        self._residuals, self._quiet_since = [], None
 
     def leave(self, trace: Trace, time: float) -> None:
         """Remember where a touch was that has ended."""
         radius = region_radius(trace.reading)
         for foot in trace.footprints:
-            self._scars.append(
-                Scar(foot.x, foot.y, trace.sign, foot.top, radius, _PART * foot.top, time)
+            self._residuals.append(
+                Residual(foot.x, foot.y, trace.sign, foot.top, radius, _PART * foot.top, time)
             )
-        del self._scars[:-_MOST]
+        del self._residuals[:-_MOST]
 
     def note(self, time: float, *, quiet: bool) -> None:
-        """Follow whether frames are ``quiet``, without any reading: where they stay so, what is
-        left is below the noise."""
+        """Follow whether frames are ``quiet``, without any reading: where they stay so, the
+        residual responses are below the noise."""
         if not quiet:
             self._quiet_since = None
             return
         if self._quiet_since is None:
             self._quiet_since = time
         if time - self._quiet_since >= _GONE:
-            for scar in self._scars:
-                scar.unseen = True
+            for residual in self._residuals:
+                residual.unseen = True
 
     def explain(self, reading: Reading, time: float, traces: Iterable[Trace]) -> bool:
-        """Whether the reading is what an earlier touch has left, or one of ``traces`` leaves
+        """Whether the reading is the residual response of an earlier touch, or of one of ``traces``
         behind or beside it while it still stands."""
-        if any(_is_on_trail(reading, trace) for trace in traces):
+        if any(_is_on_track(reading, trace) for trace in traces):
             return True
-        under = [scar for scar in self._scars if scar.is_under(reading)]
-        told = [scar.explains(reading, time, self._least_snr) for scar in under]
-        return any(told)  # each of them follows the level
+        under = [residual for residual in self._residuals if residual.is_under(reading)]
+        answers = [residual.explains(reading, time, self._least_snr) for residual in under]
+        return any(answers)  # each of them follows the level
 
 
-def _is_on_trail(reading: Reading, trace: Trace) -> bool:
+def _is_on_track(reading: Reading, trace: Trace) -> bool:
     if not trace.number or sign_of(reading) != trace.sign:
         return False
     radius = region_radius(trace.reading)
-    return any(_may_be_left(reading, foot, radius) for foot in trace.footprints)
+    return any(_may_be_residual(reading, foot, radius) for foot in trace.footprints)
 
 
-def _may_be_left(reading: Reading, foot: Footprint, radius: float) -> bool:
-    """Whether it lies where something was, and is no larger than a remainder of that."""
+def _may_be_residual(reading: Reading, foot: Footprint, radius: float) -> bool:
+    """Whether it lies where something was, and is no larger than a residual of that."""
     reach = _BESIDE * max(radius, region_radius(reading))
     near = (reading.x - foot.x) ** 2 + (reading.y - foot.y) ** 2 <= reach**2
     return near and size_of(reading) <= _PART * foot.top
 
 
-def has_become_one(trace: Trace, time: float, lasting: float) -> bool:
-    """Whether a touch has ended and only its remainder is seen, for ``lasting`` s.
+def is_residual(trace: Trace, time: float, lasting: float) -> bool:
+    """Whether a touch has ended and only its residual response is seen, for ``lasting`` s.
 
     It must have fallen fast and not grown since.
     """
