@@ -37,7 +37,7 @@ class Modes:
         As given.
     analysis
         (k, n_meas) Uᴴ√W: difference data → modes.
-    picture
+    synthesis
         (n_cells, k) B √W⁻¹U: modes → image.
     trust
         (k,) e, from 0 (only noise) to 1 (no noise).
@@ -45,7 +45,7 @@ class Modes:
 
     operator: Operator
     analysis: NDArray[Any]
-    picture: NDArray[Any]
+    synthesis: NDArray[Any]
     trust: FloatArray
 
     @classmethod
@@ -71,23 +71,23 @@ class Modes:
     @classmethod
     def of_spectrum(cls, spectrum: Spectrum, alpha: float, operator: Operator) -> Modes:
         """The same of ``spectrum.operator(alpha)``, by its modes: no eigenvalue problem."""
-        picture = spectrum.modes * spectrum.gains(alpha)
-        return cls._without_nothing(operator, spectrum.analysis, picture, spectrum.filters(alpha))
+        synthesis = spectrum.modes * spectrum.gains(alpha)
+        return cls._without_nothing(operator, spectrum.analysis, synthesis, spectrum.filters(alpha))
 
     @classmethod
     def _without_nothing(
         cls,
         operator: Operator,
         analysis: NDArray[Any],
-        picture: NDArray[Any],
+        synthesis: NDArray[Any],
         trust: FloatArray,
     ) -> Modes:
-        size = np.linalg.norm(picture, axis=0)
+        size = np.linalg.norm(synthesis, axis=0)
         kept = size > _NOTHING * size.max()
         return cls(
             operator,
             np.ascontiguousarray(analysis[kept]),
-            np.ascontiguousarray(picture[:, kept]),
+            np.ascontiguousarray(synthesis[:, kept]),
             np.clip(trust[kept], 0.0, 1.0),
         )
 
@@ -97,10 +97,10 @@ class Modes:
         return source if isinstance(source, Modes) else cls.of(source.problem, source)
 
     @cached_property
-    def quick_picture(self) -> NDArray[Any]:
-        """``picture`` in single precision: half the bytes per frame."""
-        kind = np.complex64 if np.iscomplexobj(self.picture) else np.float32
-        return self.picture.astype(kind)
+    def quick_synthesis(self) -> NDArray[Any]:
+        """``synthesis`` in single precision: half the bytes per frame."""
+        kind = np.complex64 if np.iscomplexobj(self.synthesis) else np.float32
+        return self.synthesis.astype(kind)
 
 
 def _foreign() -> ModelError:

@@ -109,7 +109,7 @@ class Temporal:
 
     def noise_left(self, interval: float) -> FloatArray:
         """(n_cells,) deviation of each cell under white noise, as a part of the operator's."""
-        power = np.abs(self.modes.picture) ** 2
+        power = np.abs(self.modes.synthesis) ** 2
         return np.asarray(np.sqrt(power @ self.steady(interval).noise / power.sum(axis=1)))
 
     def spread(self, noise: FloatArray, interval: float) -> FloatArray:
@@ -125,7 +125,7 @@ class Temporal:
         analysis = self.modes.analysis @ root
         shared = (analysis @ analysis.conj().T) / (1.0 - np.outer(steady.pole, steady.pole))
         values, vectors = np.linalg.eigh(shared * np.outer(steady.gain, steady.gain))
-        return np.asarray(self.modes.picture @ (vectors * np.sqrt(np.maximum(values, 0.0))))
+        return np.asarray(self.modes.synthesis @ (vectors * np.sqrt(np.maximum(values, 0.0))))
 
 
 def advance(
@@ -151,7 +151,7 @@ def advance(
 
 def image_of(modes: Modes, mean: NDArray[Any]) -> Image:
     """The image of ``mean`` (k,)."""
-    values = modes.quick_picture @ mean.astype(modes.quick_picture.dtype)
+    values = modes.quick_synthesis @ mean.astype(modes.quick_synthesis.dtype)
     values = values.astype(np.result_type(values, np.float64))
     return Image(values, modes.operator.unit, modes.operator.model.mesh.identity)
 

@@ -88,7 +88,7 @@ class Search:
         fit, tried = self._more(kept, tries)
         if tries > tried == 0:
             fit = self._fewer(fit)
-        if self.pace.anew and len(before) and (len(fit.spots) != len(before) or not fit.settled):
+        if self.pace.restart and len(before) and (len(fit.spots) != len(before) or not fit.settled):
             fresh, _ = self._more(self.problem.nothing(), self.pace.tries)
             fit = max(fresh, fit, key=self._evidence)
         return self._judged(fit)
