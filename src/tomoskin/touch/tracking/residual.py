@@ -113,8 +113,10 @@ class ResidualResponses:
                 residual.unseen = True
 
     def explain(self, reading: Reading, time: float, traces: Iterable[Trace]) -> bool:
-        """Whether the reading is the residual response of an earlier touch, or of one of ``traces``
-        behind or beside it while it still stands."""
+        """Whether the reading is the residual response of an earlier touch.
+
+        Or of one of ``traces``, behind or beside it while it still stands.
+        """
         if any(_is_on_track(reading, trace) for trace in traces):
             return True
         under = [residual for residual in self._residuals if residual.is_under(reading)]
