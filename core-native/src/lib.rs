@@ -1,5 +1,7 @@
 //! Sparse Cholesky factors and Jacobian rows for tomoskin.
 
+#[cfg(feature = "python")]
+mod arrays;
 #[cfg(target_arch = "x86_64")]
 mod assembly;
 pub mod dense;

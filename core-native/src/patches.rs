@@ -5,8 +5,8 @@ use std::sync::{Mutex, PoisonError, RwLock};
 use numpy::{Element, Ix1, Ix2, Ix3, PyArray1, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
+use crate::arrays::{Any, array, contiguous, invalid, is_complex, same};
 use crate::patch::{Base, Cells, Changed, Lift, Refusal, Touch, Workspace};
-use crate::python::{Any, array, contiguous, invalid, is_complex, same};
 use crate::scalar::{Scalar, c64};
 use crate::threads::{self, Shared, split};
 

@@ -10,8 +10,8 @@ use faer::{Conj, MatMut, Par, Side, Spec};
 use numpy::{Ix1, Ix2, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
+use crate::arrays::{Any, array, contiguous, invalid, same, unsigned};
 use crate::ordering::check;
-use crate::python::{Any, array, contiguous, invalid, same, unsigned};
 
 /// A structure as faer analyses it by itself: minimum degree, simplicial or by panels as it finds
 /// better, one thread; with the memory that its calls need.

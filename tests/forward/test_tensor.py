@@ -158,7 +158,7 @@ def test_each_cells_matrix_is_that_of_all_components(mesh: Mesh, order: int) -> 
     sigma, model = tensors(mesh), ForwardModel(mesh, Pattern.adjacent(4), Z, order=order)
     assembly, g = model.assembly, model.assembly.element.gradients
     values = np.array(model.contacts)
-    np.add.at(values, assembly.place, np.einsum("nqia,nab,nqjb->nij", g, sigma, g))
+    np.add.at(values, assembly.position, np.einsum("nqia,nab,nqjb->nij", g, sigma, g))
     assert mismatch(assembly.matrix(sigma, model.contacts).values, values) < 1e-14
 
 

@@ -20,10 +20,10 @@ from tomoskin.inverse import (
     TotalVariation,
     homogeneous,
 )
-from tomoskin.inverse.absolute import Quadratic
-from tomoskin.inverse.newton import Descent, Goal, descend, minimiser
-from tomoskin.inverse.penalty import Diagonal
-from tomoskin.inverse.unknowns import Cells, Joint, Unknowns, others
+from tomoskin.inverse.iterative.absolute import Quadratic
+from tomoskin.inverse.iterative.newton import Descent, Goal, descend, minimiser
+from tomoskin.inverse.iterative.unknowns import Cells, Joint, Unknowns, others
+from tomoskin.inverse.priors.penalty import Diagonal
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern
 

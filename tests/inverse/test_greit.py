@@ -14,7 +14,7 @@ from shapes import box, disc, patched
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import Desired, Greit, Merit, OneStep, Targets, along, figures
-from tomoskin.inverse.ball import Balls
+from tomoskin.inverse.greit.targets import Balls
 from tomoskin.mesh import ElectrodeArc, Mesh, Rectangle, triangulate
 from tomoskin.pattern import Pattern
 

@@ -15,7 +15,7 @@ from shapes import box, disc, mapped
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import Merit, OneStep, Operator, Targets, along, figures, noise_figure
-from tomoskin.inverse.ball import Balls
+from tomoskin.inverse.greit.targets import Balls
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern
 

@@ -25,7 +25,7 @@ from tomoskin.inverse import (
     simple_change,
     weighted_change,
 )
-from tomoskin.inverse.cole import cole
+from tomoskin.inverse.dispersion import cole
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern
 

@@ -15,7 +15,7 @@ from shapes import disc
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import PRIORS, LinearProblem, Matern, OneStep, Structural
-from tomoskin.inverse.penalty import Penalty, dense_penalty, sparse_penalty
+from tomoskin.inverse.priors.penalty import Penalty, dense_penalty, sparse_penalty
 from tomoskin.pattern import Pattern
 
 MODEL = ForwardModel(disc(8), Pattern.adjacent(8), 0.01)

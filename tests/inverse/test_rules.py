@@ -24,9 +24,8 @@ from tomoskin.inverse import (
     choose,
     noise_figure,
 )
-from tomoskin.inverse.corner import corner
-from tomoskin.inverse.rule_of_figure import in_the_middle, noise_figure_rule
-from tomoskin.inverse.search import Level, Told, crossing
+from tomoskin.inverse.choice.criteria import by_noise_figure, corner, in_the_middle
+from tomoskin.inverse.choice.evidence import Explanation, Level, crossing
 from tomoskin.pattern import Pattern
 
 SIGMA = 1e-5
@@ -151,14 +150,14 @@ def test_noise_figure_falls_with_alpha_and_is_the_one_aimed_at() -> None:
     figures = [noise_figure(s.operator(float(a)).matrix, volumes, change) for a in alphas]
     assert (np.diff(figures) < 0).all()
     for target in (0.5, 1.0, 2.0):
-        choice = noise_figure_rule(s, Evidence(), target)
+        choice = by_noise_figure(s, Evidence(), target)
         got = noise_figure(s.operator(choice.alpha).matrix, volumes, change)
         assert got == pytest.approx(target, rel=1e-4)
 
 
 def test_noise_figure_that_no_alpha_has() -> None:
     with pytest.raises(ModelError, match=r"noise figure stays above 0.001.*larger"):
-        noise_figure_rule(spectrum(), Evidence(), 1e-3)
+        by_noise_figure(spectrum(), Evidence(), 1e-3)
 
 
 def test_noise_figure_is_taken_where_it_falls_not_where_it_rises_again() -> None:
@@ -168,17 +167,17 @@ def test_noise_figure_is_taken_where_it_falls_not_where_it_rises_again() -> None
     figures = [noise_figure(s.operator(float(a)).matrix, volumes, change) for a in s.alphas[::8]]
     turn, target = int(np.argmin(figures)), 0.5 * (min(figures) + figures[-1])
     assert figures[-1] > 1.2 * min(figures)  # it does rise again, far beyond the target
-    choice = noise_figure_rule(s, Evidence(), target)
+    choice = by_noise_figure(s, Evidence(), target)
     assert choice.alpha < s.alphas[8 * turn]
     got = noise_figure(s.operator(choice.alpha).matrix, volumes, change)
     assert got == pytest.approx(target, rel=1e-4)
     with pytest.raises(ModelError, match=r"stays above .*larger noise figure, or choose another"):
-        noise_figure_rule(s, Evidence(), 0.9 * min(figures))
+        by_noise_figure(s, Evidence(), 0.9 * min(figures))
 
 
 def test_a_figure_that_only_rises_to_the_level_is_not_taken() -> None:
     """From 0 up to 1 and never down: the end of the range is not where it falls to 1/2."""
-    s, told = spectrum(), Told("noise-figure", "", "noise figure")
+    s, told = spectrum(), Explanation("noise-figure", "", "noise figure")
     middle = float(np.median(s.alphas))
     level = Level(0.5, "falling", ("larger", "smaller"))
     with pytest.raises(ModelError, match=r"starts below 0.5: .*smaller"):

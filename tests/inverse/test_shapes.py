@@ -13,8 +13,8 @@ from shapes import box, disc
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import Observation, RandomField, Segmented, ShapeImaging
-from tomoskin.inverse.matern import CORRELATIONS
-from tomoskin.inverse.shapes import BACKGROUND, LESS, MORE, Phases
+from tomoskin.inverse.iterative.shapes import BACKGROUND, LESS, MORE, Phases
+from tomoskin.inverse.priors.smooth import CORRELATIONS
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern
 

@@ -113,7 +113,7 @@ def test_a_constant_input_converges() -> None:
     steps = [np.linalg.norm(b - a) for a, b in pairwise(images)]
     assert steps[-1] < 1e-5 * np.linalg.norm(images[-1])
     steady = temporal.steady(0.1)
-    expected = temporal.modes.picture @ (
+    expected = temporal.modes.synthesis @ (
         steady.gain / (1 - steady.pole) * (temporal.modes.analysis @ dv)
     )
     assert mismatch(images[-1], expected) < 1e-5

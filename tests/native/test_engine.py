@@ -11,8 +11,7 @@ import pytest
 import shapes
 from conftest import NO_ENGINE
 from tomoskin.core import ModelError
-from tomoskin.forward import ForwardModel, choose_engine
-from tomoskin.forward import engine as engines
+from tomoskin.forward import ForwardModel, choose_engine, engine_choice
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern
 
@@ -21,10 +20,10 @@ TOLERANCE = 1e-12
 
 @pytest.fixture(autouse=True)
 def _fresh_choice(monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.delenv(engines.VARIABLE, raising=False)
-    engines._native.cache_clear()
+    monkeypatch.delenv(engine_choice.VARIABLE, raising=False)
+    engine_choice._native.cache_clear()
     yield
-    engines._native.cache_clear()
+    engine_choice._native.cache_clear()
 
 
 def body() -> tuple[Mesh, Pattern]:
@@ -51,7 +50,7 @@ def models(
     pytest.importorskip("tomoskin_core", reason=NO_ENGINE)
     both = []
     for name in ("native", "scipy"):
-        monkeypatch.setenv(engines.VARIABLE, name)
+        monkeypatch.setenv(engine_choice.VARIABLE, name)
         both.append(ForwardModel(mesh, pattern, **settings))
         assert both[-1].engine.name == name
     return both
@@ -117,7 +116,7 @@ def test_scipy_runs_where_the_extension_is_missing(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(importlib, "import_module", missing)
     engine = choose_engine()
     assert (engine.name, engine.reason) == ("scipy", "tomoskin_core is not installed")
-    monkeypatch.setenv(engines.VARIABLE, "native")
+    monkeypatch.setenv(engine_choice.VARIABLE, "native")
     with pytest.raises(ModelError, match="not installed"):
         choose_engine()
 
@@ -133,9 +132,9 @@ def test_scipy_runs_where_the_extension_does_not_work(monkeypatch: pytest.Monkey
 
 
 def test_the_variable_chooses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(engines.VARIABLE, "scipy")
+    monkeypatch.setenv(engine_choice.VARIABLE, "scipy")
     assert choose_engine().name == "scipy"
-    monkeypatch.setenv(engines.VARIABLE, "fast")
+    monkeypatch.setenv(engine_choice.VARIABLE, "fast")
     with pytest.raises(ModelError, match="fast"):
         choose_engine()
 

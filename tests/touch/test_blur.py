@@ -10,7 +10,7 @@ import pytest
 from shapes import disc
 from tomoskin.core import FloatArray
 from tomoskin.mesh import Mesh
-from tomoskin.touch.blur import REACH, Blur
+from tomoskin.touch.cells import REACH, Blur
 
 COARSE, FINE = 800, 6000
 

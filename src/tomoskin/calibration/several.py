@@ -38,7 +38,7 @@ _USUAL = 0.99
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class TouchHypotheses:
     """Log-likelihoods of a frame: one touch, two close together, two apart; and the latter two.
 
     ``places`` (2, 2) and ``spread`` (2, 2, 2) are m and m²; ``gains`` (2,).
@@ -120,7 +120,7 @@ class Several:
                 found.append((_reading(places[k], covariance[k], float(strength[k]), close),))
         return found
 
-    def evidence(self, frame: FloatArray) -> Evidence:
+    def evidence(self, frame: FloatArray) -> TouchHypotheses:
         """What the features (k,) of one frame say."""
         single = self._single(frame)
         best = {False: (-np.inf, 0, 0), True: (-np.inf, 0, 0)}
@@ -135,7 +135,7 @@ class Several:
                 fixed = int(given.argmax())
         close, apart = best[False], best[True]
         pair = [self._about(frame, apart[2], apart[1]), self._about(frame, apart[1], apart[2])]
-        return Evidence(
+        return TouchHypotheses(
             one=float(single.max()),
             close=close[0],
             apart=apart[0],

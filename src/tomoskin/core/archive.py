@@ -24,7 +24,7 @@ _UNREADABLE = (
     KeyError,
     OverflowError,
     MemoryError,  # a header may claim any size
-    RuntimeError,  # encrypted, or compressed in a way that is not known
+    RuntimeError,  # encrypted, or compressed in an unknown way
     SyntaxError,
     tokenize.TokenError,
     zlib.error,

@@ -11,7 +11,7 @@ class TomoskinError(Exception):
     message
         What was expected and what was found.
     where
-        The place: file, section and key, row, cell, electrode or port.
+        Where: file, section and key, row, cell, electrode or port.
     hint
         What to do about it.
     """
@@ -24,9 +24,9 @@ class TomoskinError(Exception):
 
     def __str__(self) -> str:
         """One line: ``where: message (hint)``."""
-        place = f"{self.where}: " if self.where else ""
+        where = f"{self.where}: " if self.where else ""
         advice = f" ({self.hint})" if self.hint else ""
-        return f"{place}{self.message}{advice}"
+        return f"{where}{self.message}{advice}"
 
 
 class SkinError(TomoskinError):

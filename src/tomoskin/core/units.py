@@ -40,15 +40,15 @@ def parse_quantity(text: str, dimension: str) -> float:
         the message names the units that would do.
     """
     units = DIMENSIONS[dimension]
-    known = ", ".join(u or "no unit" for u in units)
+    choices = ", ".join(u or "no unit" for u in units)
     found = _QUANTITY.match(text)
     if not found:
-        raise ValueError(f'expected a number with a unit of {dimension} ({known}), got "{text}"')
+        raise ValueError(f'expected a number with a unit of {dimension} ({choices}), got "{text}"')
     number, unit = found.groups()
     unit = unit.replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
     if unit not in units:
         got = f'unit "{unit}"' if unit else "no unit"
-        raise ValueError(f"expected a unit of {dimension} ({known}), got {got}")
+        raise ValueError(f"expected a unit of {dimension} ({choices}), got {got}")
     if not math.isfinite(float(number)):
         raise ValueError(f'expected a finite number, got "{text}"')
     return float(number) * units[unit]

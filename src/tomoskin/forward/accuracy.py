@@ -1,30 +1,48 @@
 """Whether the voltages of a solve can be believed.
 
-A current that is left over at a node shifts a voltage by the field of the measured pair there (the
+The residual current at a node shifts a voltage by the field of the measured pair there (the
 adjoint), however small the current is: where an electrode is all but cut off, that is many volts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.forward.factor import MOST_RESIDUAL, singular
-from tomoskin.forward.pairs import padded
+from tomoskin.forward.engine import Compressed, Engine, Factor, singular
+from tomoskin.forward.solution import padded
+from tomoskin.forward.system import System
 
-if TYPE_CHECKING:
-    from tomoskin.forward.model import ForwardModel
+MOST_RESIDUAL = 1e-6
+"""A relative residual above this means that the matrix was singular to working precision."""
 
 _FLOOR = 1e-12
 """Voltages that are zero by symmetry are right to this part of √(R_drive · R_measure)."""
 
 
+def solve_checked(
+    engine: Engine, matrix: Compressed, factor: Factor, rhs: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any], float]:
+    """Solution X (n_unknowns, n_rhs), what the residual costs Xᵀ (B − A X), and its largest entry.
+
+    Raises
+    ------
+    ModelError
+        When the residual shows that the matrix is singular to working precision.
+    """
+    solution = factor.solve(rhs)
+    lost, largest = engine.residual(matrix, rhs, solution)
+    if not largest < MOST_RESIDUAL * rhs.real.max():
+        raise singular()
+    return solution, lost, largest
+
+
 def checked_voltages(
-    model: ForwardModel,
+    model: System,
     grounded: NDArray[Any],
     lost: NDArray[Any],
     sharper: Callable[[], NDArray[Any]] | None = None,
@@ -53,20 +71,20 @@ def checked_voltages(
     least = MOST_RESIDUAL * largest.min(axis=-1)
     most = 4.0 * model.most_current * np.abs(lost).max(axis=(-2, -1), initial=0.0)
     if not (most <= least).all():
-        for place in np.argwhere(~(most <= least)):
-            at = tuple(place)
+        for index in np.argwhere(~(most <= least)):
+            at = tuple(index)
             _confirm(model, resistance[at], voltages[at], lost[at], sharper)
     return voltages
 
 
 def _confirm(
-    model: ForwardModel,
+    model: System,
     resistance: NDArray[Any],
     voltages: NDArray[Any],
     lost: NDArray[Any],
     sharper: Callable[[], NDArray[Any]] | None,
 ) -> None:
-    """Refuse voltages (n_meas,) that the residual may have spoilt, row by row."""
+    """Refuse voltages (n_meas,) that the residual may have spoilt, one by one."""
     pattern = model.pattern
     largest = np.zeros(pattern.n_drive)
     np.maximum.at(largest, pattern.drive_index, np.abs(voltages))
@@ -79,7 +97,7 @@ def _confirm(
         raise singular()
 
 
-def _inner(model: ForwardModel, resistance: NDArray[Any], pairs: IntArray) -> FloatArray:
+def _inner(model: System, resistance: NDArray[Any], pairs: IntArray) -> FloatArray:
     """(n_pairs,) Ω between the electrodes of each pair, without what the contacts have at least."""
     (a, b), r = pairs.T, resistance
     sizes = np.array([size.sum() for size in model.assembly.element.facet_sizes])
@@ -88,7 +106,7 @@ def _inner(model: ForwardModel, resistance: NDArray[Any], pairs: IntArray) -> Fl
     return np.asarray(np.maximum(between - contact[a] - contact[b], 0.0))
 
 
-def error_of_drives(model: ForwardModel, matrix: Any, basis: NDArray[Any]) -> NDArray[Any]:
+def error_of_drives(model: System, matrix: Any, basis: NDArray[Any]) -> NDArray[Any]:
     """(n_meas,) V that the residual of each drive's own field may cost.
 
     Sharper, and dearer, where all fields of the basis share the large potential of a bad ground

@@ -22,11 +22,11 @@ from scipy.sparse import coo_array, csr_array
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.forward.element import Element
-from tomoskin.forward.factor import Compressed
+from tomoskin.forward.engine import Compressed
 
 
 @dataclass(frozen=True, eq=False)
-class Assembly:
+class SystemAssembly:
     """Sparsity structure of the system and the maps that fill it.
 
     Attributes
@@ -35,8 +35,8 @@ class Assembly:
         Shape functions.
     indices, indptr
         Compressed-column structure of the symmetric matrix.
-    place
-        (n_cells, k, k) where each entry of a cell's matrix goes.
+    position
+        (n_cells, k, k) which value each entry of a cell's matrix adds to.
     contact
         (n_values, n_electrodes): values per unit of 1/z.
     """
@@ -44,7 +44,7 @@ class Assembly:
     element: Element
     indices: NDArray[np.int32]
     indptr: NDArray[np.int32]
-    place: IntArray
+    position: IntArray
     contact: csr_array
 
     @classmethod
@@ -54,13 +54,13 @@ class Assembly:
         rows, cols, values, owner = _contact_entries(element)
         numbers = _numbered(cells, (rows, cols), element.n_nodes + n_electrodes - 1)
         k = cells.shape[1]
-        place = numbers[np.tile(cells, k).ravel(), np.repeat(cells, k)]
+        position = numbers[np.tile(cells, k).ravel(), np.repeat(cells, k)]
         maps = coo_array((values, (numbers[cols, rows], owner)), shape=(numbers.nnz, n_electrodes))
         return cls(
             element=element,
             indices=numbers.indices,
             indptr=numbers.indptr,
-            place=np.asarray(place).reshape(len(cells), k, k),
+            position=np.asarray(position).reshape(len(cells), k, k),
             contact=csr_array(maps),
         )
 
@@ -114,7 +114,7 @@ class Assembly:
     def _stiffness_map(self, local: FloatArray) -> csr_array:
         """``local`` (n_cells, k, k, c) → (n_values, c·n_cells)."""
         n_cells, _, _, c = local.shape
-        rows = np.broadcast_to(self.place[..., None], local.shape)
+        rows = np.broadcast_to(self.position[..., None], local.shape)
         cols = np.arange(c * n_cells, dtype=np.int32).reshape(c, n_cells).T[:, None, None]
         entries = (local.ravel(), (rows.ravel(), np.broadcast_to(cols, local.shape).ravel()))
         return csr_array(coo_array(entries, shape=(len(self.indices), c * n_cells)))

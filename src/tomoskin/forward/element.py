@@ -16,6 +16,25 @@ import numpy as np
 from tomoskin.core import FloatArray, IntArray, ModelError
 from tomoskin.mesh import Mesh
 
+_FACET_MASS = {
+    (2, 1): np.array([[2, 1], [1, 2]]) / 6,
+    (2, 2): np.array([[4, -1, 2], [-1, 4, 2], [2, 2, 16]]) / 30,
+    (3, 1): np.array([[2, 1, 1], [1, 2, 1], [1, 1, 2]]) / 12,
+    (3, 2): np.array(
+        [
+            [6, -1, -1, 0, 0, -4],
+            [-1, 6, -1, 0, -4, 0],
+            [-1, -1, 6, -4, 0, 0],
+            [0, 0, -4, 32, 16, 16],
+            [0, -4, 0, 16, 32, 16],
+            [-4, 0, 0, 16, 16, 32],
+        ]
+    )
+    / 180,
+}
+"""∫ φᵢφⱼ over a facet of size 1, by the mesh's dimension and the order: corners, then edges in the
+order of their corners."""
+
 
 @dataclass(frozen=True, eq=False)
 class Element:
@@ -51,7 +70,7 @@ class Element:
         """Elements of ``order`` 1 (linear) or 2 (quadratic) on ``mesh``."""
         if order not in (1, 2):
             raise ModelError(f"expected elements of order 1 or 2, got {order}")
-        mass, load = _facet_integrals(mesh.dimension, order)
+        mass = _FACET_MASS[mesh.dimension, order]
         n_nodes, cells, facets = len(mesh.points), mesh.cells, mesh.electrodes
         if order == 2:
             edges = _Edges.of(mesh)
@@ -64,7 +83,7 @@ class Element:
             facets=facets,
             facet_sizes=tuple(mesh.facet_sizes(e) for e in mesh.electrodes),
             facet_mass=mass,
-            facet_load=load,
+            facet_load=mass.sum(axis=1),  # the shape functions add up to one
         )
 
 
@@ -133,43 +152,3 @@ def _quadratic_derivatives(points: FloatArray) -> FloatArray:
         shape[:, number, i] = 4.0 * points[:, j]
         shape[:, number, j] = 4.0 * points[:, i]
     return shape
-
-
-Polynomial = dict[tuple[int, ...], float]
-
-
-def _facet_integrals(dimension: int, order: int) -> tuple[FloatArray, FloatArray]:
-    shape = _polynomials(dimension, order)
-    mass = [[_integral(_product(a, b)) for b in shape] for a in shape]
-    return np.array(mass), np.array([_integral(a) for a in shape])
-
-
-def _polynomials(corners: int, order: int) -> list[Polynomial]:
-    """Shape functions of a facet as polynomials of its barycentric coordinates."""
-
-    def monomial(*factors: int) -> tuple[int, ...]:
-        return tuple(factors.count(i) for i in range(corners))
-
-    if order == 1:
-        return [{monomial(i): 1.0} for i in range(corners)]
-    vertices: list[Polynomial] = [{monomial(i, i): 2.0, monomial(i): -1.0} for i in range(corners)]
-    return vertices + [{monomial(i, j): 4.0} for i, j in combinations(range(corners), 2)]
-
-
-def _product(a: Polynomial, b: Polynomial) -> Polynomial:
-    out: Polynomial = {}
-    for p, u in a.items():
-        for q, v in b.items():
-            power = tuple(i + j for i, j in zip(p, q, strict=True))
-            out[power] = out.get(power, 0.0) + u * v
-    return out
-
-
-def _integral(polynomial: Polynomial) -> float:
-    """Over a simplex of size 1: Σ c · d! Π aᵢ! / (d + Σ aᵢ)!."""
-    total = 0.0
-    for power, factor in polynomial.items():
-        d = len(power) - 1
-        above = math.factorial(d) * math.prod(math.factorial(a) for a in power)
-        total += factor * above / math.factorial(d + sum(power))
-    return total

@@ -1,29 +1,111 @@
-"""Who does the heavy arithmetic: tomoskin_core where it works, else scipy and numpy."""
+"""What an engine of the heavy arithmetic is given, and what is asked of it."""
 
 from __future__ import annotations
 
-import importlib
-import os
-from functools import cache
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array, csr_array
 
-from tomoskin.core import FloatArray, ModelError
-from tomoskin.forward.factor import Compressed, Factorise
-from tomoskin.forward.native import Native
-from tomoskin.forward.patches import BaseState, Patches
-from tomoskin.forward.plain import Scipy
+from tomoskin.core import FloatArray, IntArray, ModelError
 from tomoskin.pattern import Pattern
 
-VARIABLE = "TOMOSKIN_ENGINE"
-"""Environment variable that asks for one engine: scipy or native."""
+
+@dataclass(frozen=True, eq=False)
+class Compressed:
+    """A symmetric matrix by columns: values on a fixed structure."""
+
+    values: NDArray[Any]
+    indices: NDArray[np.int32]
+    indptr: NDArray[np.int32]
+
+    @cached_property
+    def matrix(self) -> csc_array:
+        """The same as scipy has it."""
+        n = len(self.indptr) - 1
+        return csc_array((self.values, self.indices, self.indptr), shape=(n, n))
+
+
+class Factor(Protocol):
+    """A factorised symmetric matrix."""
+
+    def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
+        """Solution of shape (n_unknowns, n_rhs)."""
+        ...
+
+
+Factorise = Callable[[NDArray[Any]], Factor]
+"""From the values of a matrix, whose structure is known, to its factor."""
+
+
+@dataclass(frozen=True, eq=False)
+class BaseState:
+    """A state that touches change.
+
+    Attributes
+    ----------
+    cells
+        (n_cells, k) nodes.
+    local
+        (n_cells, k, k) matrix of each cell for a conductivity of one.
+    held
+        (n_nodes,) whether a node belongs to an electrode.
+    conductivity
+        (n_cells,) S or S/m.
+    fields
+        (n_nodes, width) V/A of 1 A into each electrode but the last.
+    grounded
+        (width, width) Ω, their potentials at these electrodes.
+    """
+
+    cells: IntArray
+    local: FloatArray
+    held: NDArray[np.bool_]
+    conductivity: NDArray[Any]
+    fields: NDArray[Any]
+    grounded: NDArray[Any]
+
+
+class Patches(Protocol):
+    """Changes of a base state by touches."""
+
+    def keep(self, nodes: IntArray, columns: NDArray[Any]) -> None:
+        """Store columns (n_nodes, n) of the base system's inverse, those of ``nodes`` (n,)."""
+        ...
+
+    def forget(self) -> None:
+        """Drop all that were stored."""
+        ...
+
+    def change(
+        self, starts: IntArray, cells: IntArray, conductivity: NDArray[Any]
+    ) -> tuple[NDArray[Any], NDArray[Any], IntArray]:
+        """Results of touches, of which number t has ``cells[starts[t]:starts[t + 1]]``.
+
+        Returns
+        -------
+        grounded
+            (n_touches, width, width) Ω.
+        lost
+            (n_touches, width, width) Ω, how far rounding may have shifted them.
+        missing
+            Nodes whose columns must be stored first; unless empty, nothing else counts.
+
+        Raises
+        ------
+        ValueError
+            For a cell that does not exist or stands twice in a touch, a conductivity that is not
+            positive, or a singular system.
+        """
+        ...
 
 
 class Engine(Protocol):
-    """The arithmetic that both ways do alike.
+    """The arithmetic that both engines do.
 
     Attributes
     ----------
@@ -64,37 +146,9 @@ class Engine(Protocol):
         ...
 
 
-def choose_engine() -> Engine:
-    """Return the engine that TOMOSKIN_ENGINE asks for; without it the native one if it works.
-
-    Raises
-    ------
-    ModelError
-        When the variable names no engine, or the native one, and that does not work.
-    """
-    wanted = os.environ.get(VARIABLE, "")
-    if wanted not in ("", "scipy", "native"):
-        raise ModelError(f"expected {VARIABLE} to be scipy or native, got {wanted!r}")
-    if wanted == "scipy":
-        return Scipy(f"{VARIABLE} asks for it")
-    engine = _native()
-    if wanted == "native" and not isinstance(engine, Native):
-        raise ModelError(
-            f"{VARIABLE} asks for the native engine, but {engine.reason}",
-            hint="install tomoskin-core (pip install ./core-native), or unset the variable",
-        )
-    return engine
-
-
-@cache
-def _native() -> Engine:
-    """Return the native engine after a trial, else scipy's with what went wrong as its reason."""
-    try:
-        core = importlib.import_module("tomoskin_core")
-        engine = Native(core, f"tomoskin_core {core.__version__} is installed")
-        engine.check()
-    except ModuleNotFoundError:
-        return Scipy("tomoskin_core is not installed")
-    except Exception as error:
-        return Scipy(f"tomoskin_core does not work here: {error}")
-    return engine
+def singular() -> ModelError:
+    """Return the error for a system that no factorisation solves."""
+    return ModelError(
+        "the system is singular to working precision",
+        hint="conductivities or contact impedances span too many orders of magnitude",
+    )

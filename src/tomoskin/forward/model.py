@@ -1,27 +1,24 @@
-"""The forward model: prepared once per mesh and pattern."""
+"""The forward model, and its states: one conductivity each, factorised once, asked many things."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array
 
-from tomoskin.core import FloatArray, IntArray, ModelError
-from tomoskin.forward.assembly import Assembly, gradient_operator
-from tomoskin.forward.conductivity import checked_conductivity, number_type, numbers
-from tomoskin.forward.element import Element
-from tomoskin.forward.engine import choose_engine
-from tomoskin.forward.factor import Factorise
+from tomoskin.forward import derivatives
+from tomoskin.forward.accuracy import checked_voltages, error_of_drives, solve_checked
+from tomoskin.forward.conductivity import checked_conductivity
+from tomoskin.forward.engine import Compressed, Factor
 from tomoskin.forward.solution import Solution
-from tomoskin.forward.state import State
-from tomoskin.mesh import Mesh
-from tomoskin.pattern import Pattern
+from tomoskin.forward.system import System
+from tomoskin.forward.update import LocalUpdate
 
 
-class ForwardModel:
+class ForwardModel(System):
     """Complete electrode model (Somersalo, Cheney & Isaacson 1992) by finite elements.
 
     Parameters
@@ -43,59 +40,6 @@ class ForwardModel:
         When mesh and pattern have different electrodes, or z or the current is impossible.
     """
 
-    def __init__(
-        self,
-        mesh: Mesh,
-        pattern: Pattern,
-        contact_impedance: ArrayLike,
-        current: ArrayLike = 1.0,
-        *,
-        order: int = 1,
-    ) -> None:
-        if len(mesh.electrodes) != pattern.n_electrodes:
-            raise ModelError(
-                f"the mesh has {len(mesh.electrodes)} electrodes and "
-                f"the pattern {pattern.n_electrodes}"
-            )
-        self.mesh = mesh
-        self.pattern = pattern
-        self.contact_impedance = _impedance(contact_impedance, pattern.n_electrodes)
-        self.current = _current(current, pattern.n_drive)
-        self.most_current = float(np.abs(self.current).max())
-        self.order = order
-        self.engine = choose_engine()
-        self.assembly = Assembly.of(Element.of(mesh, order))
-
-    @cached_property
-    def gradient(self) -> csr_array:
-        """Nodal potentials → scaled gradients, (d·q·n_cells, n_nodes); see Element."""
-        return gradient_operator(self.assembly.element)
-
-    @cached_property
-    def factorise(self) -> Factorise:
-        """Factorises system matrices; their structure is analysed once."""
-        return self.engine.analyse(self.assembly.indptr, self.assembly.indices)
-
-    @cached_property
-    def contacts(self) -> NDArray[Any]:
-        """What the contacts add to the values of the system matrix."""
-        return self.assembly.contacts(self.contact_impedance)
-
-    @cached_property
-    def _rows(self) -> tuple[IntArray, FloatArray]:
-        """(4, n_meas) entries of a flat transfer resistance, and the current of each row."""
-        (source, sink), (plus, minus) = self.pattern.drive.T, self.pattern.measure.T
-        n = self.pattern.n_electrodes
-        entries = [plus * n + source, plus * n + sink, minus * n + source, minus * n + sink]
-        return np.stack(entries), self.current[self.pattern.drive_index]
-
-    @cached_property
-    def by_drive(self) -> tuple[IntArray, IntArray]:
-        """Rows in the order of their drives, and where in it each drive that is read begins."""
-        index = self.pattern.drive_index
-        order = np.argsort(index, kind="stable")
-        return order, np.flatnonzero(np.diff(index[order], prepend=-1))
-
     def at(self, conductivity: ArrayLike) -> State:
         """Return the model at a conductivity, S or S/m.
 
@@ -104,15 +48,6 @@ class ForwardModel:
         factorisation is shared between them.
         """
         return State(self, checked_conductivity(conductivity, self.mesh))
-
-    def voltages(self, transfer_resistance: NDArray[Any]) -> NDArray[Any]:
-        """(…, n_meas) V of the pattern, from (…, n_electrodes, n_electrodes) Ω."""
-        entries, current = self._rows
-        *many, n, _ = transfer_resistance.shape
-        r = transfer_resistance.reshape(*many, n * n).take(entries, axis=-1)
-        driven_plus = r[..., 0, :] - r[..., 1, :]
-        driven_minus = r[..., 2, :] - r[..., 3, :]
-        return np.asarray(current * (driven_plus - driven_minus))
 
     def solve(self, conductivity: ArrayLike) -> Solution:
         """Voltages and potentials; see :meth:`at`."""
@@ -127,27 +62,96 @@ class ForwardModel:
         return self.at(conductivity).transfer_resistance
 
 
-def _impedance(value: ArrayLike, n: int) -> NDArray[Any]:
-    raw = numbers(value, "contact impedance")
-    if raw.shape not in ((), (n,)):
-        raise ModelError(f"expected one contact impedance or {n}, got shape {raw.shape}")
-    z = np.broadcast_to(raw, (n,)).astype(number_type(raw))
-    good = np.isfinite(z) & (z.real > 0)
-    if not good.all():
-        electrode = int(np.argmin(good))
-        raise ModelError(
-            f"expected a positive contact impedance, got {z[electrode]}",
-            where=f"electrode {electrode}",
+@dataclass(frozen=True, eq=False)
+class State:
+    """A forward model at a conductivity, (n_cells,) or a tensor per cell (n_cells, d, d).
+
+    Everything follows from one basis: the fields of 1 A into each electrode and out at the last.
+    """
+
+    model: ForwardModel
+    conductivity: NDArray[Any]
+
+    @cached_property
+    def factor(self) -> Factor:
+        """The factorised system."""
+        return self.model.factorise(self._matrix.values)
+
+    @cached_property
+    def _matrix(self) -> Compressed:
+        return self.model.assembly.matrix(self.conductivity, self.model.contacts)
+
+    @cached_property
+    def solution(self) -> Solution:
+        """Voltages and potentials for every drive of the pattern."""
+        model, matrix, assembly = self.model, self._matrix, self.model.assembly
+        n_basis = assembly.n_electrodes - 1
+        rhs = np.zeros((assembly.n_unknowns, n_basis), dtype=matrix.values.dtype)
+        rhs[assembly.n_points :].flat[:: n_basis + 1] = 1.0
+        basis, lost, largest = solve_checked(model.engine, matrix, self.factor, rhs)
+        voltages = checked_voltages(
+            model,
+            basis[assembly.n_points :],
+            lost,
+            sharper=lambda: error_of_drives(model, matrix.matrix, basis),
         )
-    return z
+        return Solution(model, self.conductivity, basis, voltages, largest)
 
+    @property
+    def basis(self) -> NDArray[Any]:
+        """(n_unknowns, n_electrodes − 1) V/A: the last electrode is at zero."""
+        return self.solution.basis
 
-def _current(value: ArrayLike, n_drive: int) -> FloatArray:
-    raw = numbers(value, "current")
-    if raw.shape not in ((), (n_drive,)):
-        raise ModelError(f"expected one current or {n_drive}, got shape {raw.shape}")
-    if raw.dtype.kind == "c":
-        raise ModelError("expected real currents, got complex ones")
-    if not (np.isfinite(raw).all() and (raw != 0).all()):
-        raise ModelError(f"expected currents other than zero, got {raw.tolist()}")
-    return np.array(np.broadcast_to(raw, (n_drive,)), dtype=np.float64)
+    @property
+    def voltages(self) -> NDArray[Any]:
+        """(n_meas,) V of the pattern."""
+        return self.solution.voltages
+
+    @property
+    def transfer_resistance(self) -> NDArray[Any]:
+        """(n_electrodes, n_electrodes) Ω; see :attr:`Solution.transfer_resistance`."""
+        return self.solution.transfer_resistance
+
+    @property
+    def gradient(self) -> NDArray[Any]:
+        """(n_electrodes, d·q, n_cells): scaled gradient of each basis field, see Element."""
+        return self.solution.gradient
+
+    @property
+    def power(self) -> NDArray[Any]:
+        """(n_drive, n_cells) W: power turned to heat in each cell, its real part."""
+        return self.solution.power
+
+    @cached_property
+    def jacobian(self) -> NDArray[Any]:
+        """(n_meas, n_cells) V/S; for a tensor (n_meas, n_cells, d, d), by each component.
+
+        −I ∫ ∇u_drive · ∇u_measure over each cell (Polydorides & Lionheart 2002): the fields of
+        1 A through the driven and the measured pair.
+        """
+        return derivatives.by_conductivity(self.solution)
+
+    @cached_property
+    def contact_jacobian(self) -> NDArray[Any]:
+        """(n_meas, n_electrodes): derivative by each contact impedance, V per Ω·m (or Ω·m²)."""
+        return derivatives.by_contact_impedance(self.solution)
+
+    @cached_property
+    def movement_jacobian(self) -> NDArray[Any]:
+        """(n_meas, n_electrodes, n_coordinates) V/m: derivative by each electrode's position.
+
+        The electrode's points move with it, also those that it shares with another electrode,
+        and all others stay (Soleimani, Gómez-Laberge & Adler 2006); only for scalar
+        conductivity and elements of order 1.
+        """
+        return derivatives.by_movement(self.solution)
+
+    @cached_property
+    def local(self) -> LocalUpdate:
+        """Exact voltages when few cells change, without a new factorisation."""
+        model = self.model
+        return LocalUpdate(
+            self.solution,
+            solve=self.factor.solve,
+            factorise=lambda changed: State(model, changed).basis,
+        )

@@ -10,8 +10,14 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.forward.factor import Compressed, Factor, Factorise, singular
-from tomoskin.forward.patches import BaseState, Patches
+from tomoskin.forward.engine import (
+    BaseState,
+    Compressed,
+    Factor,
+    Factorise,
+    Patches,
+    singular,
+)
 from tomoskin.pattern import Pattern
 
 

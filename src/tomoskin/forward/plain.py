@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array, csr_array
+from scipy.sparse.linalg import splu
 
-from tomoskin.core import FloatArray
-from tomoskin.forward.factor import Compressed, Factorise, factorise
-from tomoskin.forward.patches import BaseState, Patches
-from tomoskin.forward.plain_patches import PlainPatches
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.forward.engine import BaseState, Compressed, Factor, Factorise, Patches, singular
+from tomoskin.forward.touches import Touches
 from tomoskin.pattern import Pattern
 
 
@@ -29,14 +29,14 @@ class Scipy:
         indices: NDArray[np.int32],
     ) -> Factorise:
         """See :class:`Engine`; SuperLU keeps no analysis."""
-        return lambda values: factorise(Compressed(values, indices, indptr).matrix)
+        return lambda values: _factorise(Compressed(values, indices, indptr).matrix)
 
     def residual(
         self, matrix: Compressed, rhs: NDArray[Any], solution: NDArray[Any]
     ) -> tuple[NDArray[Any], float]:
         """See :class:`Engine`."""
-        left = rhs - matrix.matrix @ solution
-        return solution.T @ left, float(np.abs(left).max())
+        residual = rhs - matrix.matrix @ solution
+        return solution.T @ residual, float(np.abs(residual).max())
 
     def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
         """See :class:`Engine`."""
@@ -58,3 +58,119 @@ class Scipy:
     def patches(self, base: BaseState) -> Patches:
         """See :class:`Engine`."""
         return PlainPatches(base)
+
+
+def _factorise(matrix: csc_array) -> Factor:
+    """Factorise a symmetric matrix, real or complex, by scipy's SuperLU.
+
+    Minimum degree on AᵀA+A keeps the symmetric structure's fill low; the diagonal is a safe
+    pivot, as the real part is positive definite.
+
+    Raises
+    ------
+    ModelError
+        When the matrix is singular.
+    """
+    try:
+        factor: Factor = splu(
+            matrix,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError as error:
+        raise singular() from error
+    return factor
+
+
+class PlainPatches:
+    """See :class:`~tomoskin.forward.engine.Patches`."""
+
+    def __init__(self, base: BaseState) -> None:
+        """Prepare for touches of ``base``."""
+        n = len(base.held)
+        self._base = base
+        self._valence = np.bincount(base.cells.ravel(), minlength=n) + base.cells.size * base.held
+        self._slot = np.full(n, -1)
+        self._columns: NDArray[Any] = np.empty((0, n), base.fields.dtype)
+
+    def keep(self, nodes: IntArray, columns: NDArray[Any]) -> None:
+        """See the protocol."""
+        self._slot[nodes] = len(self._columns) + np.arange(len(nodes))
+        self._columns = np.vstack([self._columns, columns.T])
+
+    def forget(self) -> None:
+        """See the protocol."""
+        self._slot[:] = -1
+        self._columns = self._columns[:0]
+
+    def change(
+        self, starts: IntArray, cells: IntArray, conductivity: NDArray[Any]
+    ) -> tuple[NDArray[Any], NDArray[Any], IntArray]:
+        """See the protocol."""
+        touches, base = Touches(starts, cells, conductivity), self._base
+        if touches.fault(len(base.cells)) is not None:
+            raise ValueError("a cell or conductivity that cannot be")
+        shape = (len(touches), *base.grounded.shape)
+        kind = np.result_type(base.fields, conductivity)
+        grounded, lost = np.empty(shape, kind), np.zeros(shape, kind)
+        grounded[:] = base.grounded
+        missing: list[IntArray] = []
+        for number in range(len(touches)):
+            index, sigma = touches[number]
+            rim, change = self._condensed(index, sigma)
+            missing.append(rim[self._slot[rim] < 0])
+            if len(rim) > 1 and not len(missing[-1]):
+                less, lost[number] = self._woodbury(rim, change)
+                grounded[number] -= less
+        return grounded, lost, np.unique(np.concatenate([starts[:0], *missing]))
+
+    def _condensed(self, index: IntArray, sigma: NDArray[Any]) -> tuple[IntArray, NDArray[Any]]:
+        """Nodes of the patch's rim (m,), and the change of the system seen from there (m, m)."""
+        base = self._base
+        nodes, position, touched = np.unique(
+            base.cells[index], return_inverse=True, return_counts=True
+        )
+        inside = touched == self._valence[nodes]
+        position = position.reshape(-1, base.cells.shape[1])
+        before, after = (
+            _condensed(_block(base.local[index], position, unit, len(nodes)), inside)
+            for unit in (base.conductivity[index], sigma)
+        )
+        return nodes[~inside], after - before
+
+    def _woodbury(self, rim: IntArray, change: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Uᵀ (I + A C)⁻¹ A U, and what rounding may cost it."""
+        between = self._columns[self._slot[rim][:, None], rim]
+        between = between[1:] - between[:1]
+        between = between[:, 1:] - between[:, :1]
+        fields = self._base.fields[rim[1:]] - self._base.fields[rim[:1]]
+        leak, change = change[1:].sum(axis=1, keepdims=True), change[1:, 1:]
+        system = change @ between
+        system[np.diag_indices_from(system)] += 1.0
+        current = np.linalg.solve(system, change @ fields)
+        changed = fields - between @ current
+        residual = change @ changed - current + leak * changed
+        return fields.T @ current, changed.T @ residual
+
+
+def _block(
+    local: FloatArray, position: IntArray, conductivity: NDArray[Any], n: int
+) -> NDArray[Any]:
+    """(n, n): the sum of the cells' matrices."""
+    entries = (local * conductivity[:, None, None]).ravel()
+    keys = (position[:, :, None] * n + position[:, None, :]).ravel()
+    block = np.bincount(keys, entries.real, n * n).astype(entries.dtype)
+    if np.iscomplexobj(entries):
+        block += 1j * np.bincount(keys, entries.imag, n * n)
+    return block.reshape(n, n)
+
+
+def _condensed(block: NDArray[Any], inside: NDArray[np.bool_]) -> NDArray[Any]:
+    """``block`` without the nodes inside, which no current enters (Schur complement)."""
+    outer, across, inner = (
+        block[~inside][:, ~inside],
+        block[inside][:, ~inside],
+        block[inside][:, inside],
+    )
+    return np.asarray(outer - across.T @ np.linalg.solve(inner, across))

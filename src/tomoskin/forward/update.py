@@ -10,7 +10,7 @@ dense system (Woodbury 1950):
 
 where C = (K⁻¹) between them and U the basis fields on them. A constant changes nothing, so all
 three are taken against the first node: what the nodes have in common would cost digits, and does
-not enter. How many are left shows in the residual, and in the current that a constant drives
+not enter. How many digits remain shows in the residual, and in the current that a constant drives
 through A, which should be none.
 """
 
@@ -18,54 +18,53 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import IntArray, ModelError
 from tomoskin.forward.accuracy import checked_voltages
-from tomoskin.forward.factor import singular
-from tomoskin.forward.pairs import centred
-from tomoskin.forward.patches import BaseState, Patches
+from tomoskin.forward.engine import BaseState, Patches, singular
+from tomoskin.forward.solution import Solution, centred
 from tomoskin.forward.touches import Touch, Touches
 
-if TYPE_CHECKING:
-    from tomoskin.forward.model import ForwardModel
+Solve = Callable[[NDArray[Any]], NDArray[Any]]
 
 MOST_BYTES = 1 << 30
 """Columns of the inverse are kept up to this size, then they go."""
 
 MOST_CELLS = 4000
-"""A larger patch is no local change: the changed sheet is factorised anew."""
+"""A larger patch is no local change: the changed sheet is factorised."""
 
 
 class LocalUpdate:
     """Exact transfer resistance and voltages of a state with some cells changed.
 
     Columns of the inverse are computed as nodes are first needed, and kept: the first touch at
-    a place costs a solve with as many right-hand sides as its rim has nodes, later ones do not.
+    a position costs a solve with as many right-hand sides as its rim has nodes, later ones do not.
+
+    Parameters
+    ----------
+    base
+        The state that changes; nothing is computed yet.
+    solve
+        Right-hand sides (n_unknowns, n) → solutions, by the factor of the base.
+    factorise
+        The basis of another conductivity, (n_cells,), by a factor of its own.
     """
 
-    def __init__(
-        self,
-        model: ForwardModel,
-        conductivity: NDArray[Any],
-        *,
-        basis: NDArray[Any],
-        solve: Callable[[NDArray[Any]], NDArray[Any]],
-    ) -> None:
-        """Prepare for changes of a state; nothing is computed yet."""
-        self._model, self._conductivity = model, conductivity
-        self._basis, self._solve = basis, solve
-        self._known = np.zeros(model.assembly.n_points, dtype=bool)
+    def __init__(self, base: Solution, *, solve: Solve, factorise: Solve) -> None:
+        self._model, self._conductivity, self._basis = base.model, base.conductivity, base.basis
+        self._solve, self._factorise = solve, factorise
+        self._stored = np.zeros(base.model.assembly.n_points, dtype=bool)
 
     def warm_up(self, cells: ArrayLike | None = None) -> None:
         """Compute the columns for ``cells`` (all of them without an argument) beforehand."""
         all_cells = self._model.assembly.element.cells
         chosen = all_cells if cells is None else all_cells[np.asarray(cells)]
         nodes = np.unique(chosen)
-        while len(missing := nodes[~self._known[nodes]]):
+        while len(missing := nodes[~self._stored[nodes]]):
             self._need(missing)
 
     def transfer_resistance(self, cells: ArrayLike, conductivity: ArrayLike) -> NDArray[Any]:
@@ -110,16 +109,16 @@ class LocalUpdate:
             single = [self._changed([joined[number]]) for number in range(len(joined))]
             grounded, lost = zip(*single, strict=True)
             return np.concatenate(grounded), np.concatenate(lost)
-        return self._anew(joined)
+        return self._factorised(joined)
 
-    def _anew(self, touch: Touches) -> tuple[NDArray[Any], NDArray[Any]]:
+    def _factorised(self, touch: Touches) -> tuple[NDArray[Any], NDArray[Any]]:
         """Results of a large patch; the new state checks its own voltages."""
         if fault := touch.fault(len(self._conductivity)):
             raise fault
         kind = np.result_type(self._conductivity, touch.conductivity)
         changed = self._conductivity.astype(kind)
         changed[touch.cells] = touch.conductivity
-        grounded = self._model.at(changed).basis[self._model.assembly.n_points :]
+        grounded = self._factorise(changed)[self._model.assembly.n_points :]
         return grounded[None], np.zeros_like(grounded)[None]
 
     def _by_patches(self, touches: Touches) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -163,12 +162,12 @@ class LocalUpdate:
 
     def _need(self, missing: IntArray) -> None:
         """Compute the columns of nodes; where the store is full, empty it for the next attempt."""
-        known = int(np.count_nonzero(self._known))
-        if known and self._size(known + len(missing)) > MOST_BYTES:
+        stored = int(np.count_nonzero(self._stored))
+        if stored and self._size(stored + len(missing)) > MOST_BYTES:
             self._patches.forget()
-            self._known[:] = False
+            self._stored[:] = False
             return
         rhs = np.zeros((len(self._basis), len(missing)), self._basis.dtype)
         rhs[missing, np.arange(len(missing))] = 1.0
         self._patches.keep(missing, self._solve(rhs)[: self._model.assembly.n_points])
-        self._known[missing] = True
+        self._stored[missing] = True

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tomoskin.core import ComplexArray, DataError, Image, ModelError
 from tomoskin.forward import ForwardModel
-from tomoskin.inverse.one_step import OneStep
-from tomoskin.inverse.priors import PriorLike
+from tomoskin.inverse.linear.one_step import OneStep
+from tomoskin.inverse.priors.named import PriorLike
 
 
 def simple_change(voltages: NDArray[Any], reference: NDArray[Any]) -> ComplexArray:
@@ -23,7 +23,7 @@ def weighted_change(voltages: NDArray[Any], reference: NDArray[Any]) -> ComplexA
     """v(f) − a v(f₀), with a = ⟨v(f), v(f₀)⟩ / ⟨v(f₀), v(f₀)⟩ (Jun, Lee, Woo & Seo 2009).
 
     What changes as the background does drops out, and with it most of what is wrong with the
-    model's shape: left is what has another spectrum than the background.
+    model's shape: what remains has another spectrum than the background.
     """
     power = np.vdot(reference, reference)
     if not power:

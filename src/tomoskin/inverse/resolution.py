@@ -1,11 +1,8 @@
-"""What an operator can tell: resolution, point spread and sensitivity, without an SVD.
-
-The image of a small change x is RJx (Menke 2018, chapter 4): a column of RJ is the picture of a
-change in one cell, a row the changes that add up to one cell of the picture.
-"""
+"""What an operator can tell: resolution, point spread, sensitivity, and the Picard plot."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eigvalsh
 
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.inverse.operator import Operator
-from tomoskin.inverse.problem import LinearProblem
+from tomoskin.inverse.linear.operator import Operator
+from tomoskin.inverse.linear.problem import LinearProblem
+from tomoskin.inverse.linear.spectrum import Spectrum
 
 _ROUNDING = 1e-14
 """An eigenvalue of RᴴR below this part of the largest is rounding."""
@@ -33,7 +31,7 @@ def resolution_matrix(operator: Operator, problem: LinearProblem) -> NDArray[Any
 
 
 def resolved(operator: Operator, problem: LinearProblem) -> NDArray[Any]:
-    """(n_cells,) diagonal of RJ: the part of a change in a cell that its own place shows.
+    """(n_cells,) diagonal of RJ: the part of a change in a cell that its own position shows.
 
     Of a one-step operator the sum is the number of degrees of freedom that the data decide.
     """
@@ -42,13 +40,13 @@ def resolved(operator: Operator, problem: LinearProblem) -> NDArray[Any]:
 
 
 def point_spread(operator: Operator, problem: LinearProblem, cells: ArrayLike) -> NDArray[Any]:
-    """(n_cells, k) pictures of a change of 1 in each of ``cells``: columns of RJ."""
+    """(n_cells, k) images of a change of 1 in each of ``cells``: columns of RJ."""
     _check_pair(operator, problem)
     return np.asarray(operator.matrix @ problem.jacobian[:, np.asarray(cells)])
 
 
 def averaging(operator: Operator, problem: LinearProblem, cells: ArrayLike) -> NDArray[Any]:
-    """(k, n_cells) weights with which changes enter the picture of each of ``cells``."""
+    """(k, n_cells) weights with which changes enter the image of each of ``cells``."""
     _check_pair(operator, problem)
     return np.asarray(operator.matrix[np.asarray(cells)] @ problem.jacobian)
 
@@ -86,3 +84,48 @@ def _check_pair(operator: Operator, problem: LinearProblem) -> None:
             f"{one.mesh.identity}, {one.pattern.identity}, {operator.difference} and "
             f"{other.mesh.identity}, {other.pattern.identity}, {problem.difference}"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Picard:
+    """Coefficients of data against the singular values (discrete Picard condition, Hansen 1990).
+
+    Attributes
+    ----------
+    singular_values
+        (r,) σ, descending.
+    coefficients
+        (r,) root mean square over the frames of |uᴴW^½dv|.
+    solution
+        (r,) coefficients / σ: what they would add to the image without regularisation.
+    noise
+        (r,) standard deviation of the coefficients that noise alone causes; NaN where unknown.
+    """
+
+    singular_values: FloatArray
+    coefficients: FloatArray
+    solution: FloatArray
+    noise: FloatArray
+
+    @property
+    def above_noise(self) -> int:
+        """Number of coefficients that are more than noise: above three deviations."""
+        return int(np.count_nonzero(self.coefficients > 3.0 * self.noise))
+
+
+def picard(spectrum: Spectrum, dv: NDArray[Any], noise: FloatArray | None = None) -> Picard:
+    """Picard data of difference data ``dv``, (n_meas,) or (n_frames, n_meas).
+
+    ``noise`` is (n_meas,), the standard deviation of one frame. Images that the prior leaves
+    free have no singular value and are not among the coefficients.
+    """
+    frames = np.atleast_2d(dv)
+    sigma = spectrum.singular_values
+    first = int(np.isinf(spectrum.values).sum())
+    kept = slice(first, first + len(sigma))
+    size = np.sqrt(np.mean(np.abs(spectrum.coefficients(frames)[:, kept]) ** 2, axis=0))
+    spread = np.full(len(sigma), np.nan)
+    if noise is not None:
+        variance = np.real(np.diag(spectrum.noise_coefficients(noise)))[kept]
+        spread = np.sqrt(variance)
+    return Picard(sigma, size, size / sigma, spread)

@@ -3,19 +3,16 @@
 from tomoskin.mesh.arcs import ElectrodeArc, check_arcs
 from tomoskin.mesh.box import BoxPatch, box
 from tomoskin.mesh.choose import Places
-from tomoskin.mesh.cylinder import cylinder
 from tomoskin.mesh.domed import Cap, Saddle
 from tomoskin.mesh.draped import Draped
-from tomoskin.mesh.extrude import extrude, extrude_mesh
-from tomoskin.mesh.files import MeshFile, read_mesh
-from tomoskin.mesh.mesh import Mesh
+from tomoskin.mesh.extrude import cylinder, extrude, extrude_mesh
+from tomoskin.mesh.mesh import Mesh, MeshFile, read_mesh
 from tomoskin.mesh.outline import Disc, Ellipse, Outline
 from tomoskin.mesh.patch import FacePatch, Patch, WallPatch, ring
 from tomoskin.mesh.polygon import Polygon, Rectangle
-from tomoskin.mesh.quality import Quality, quality
 from tomoskin.mesh.surface import Plane, Surface, laid_on
 from tomoskin.mesh.topology import simplex_measure
-from tomoskin.mesh.triangulate import triangulate
+from tomoskin.mesh.triangulate import Quality, quality, triangulate
 from tomoskin.mesh.wrapped import Arm, Cylinder, Hinge
 
 __all__ = [

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from tomoskin.core import FloatArray, GeometryError, IntArray
 from tomoskin.mesh.arcs import ElectrodeArc
 from tomoskin.mesh.outline import Outline
+from tomoskin.mesh.polygon import inside
 from tomoskin.mesh.sizing import SizeField
 
 AT_ELECTRODE = 0.4
@@ -26,6 +27,9 @@ _MOST_NODES = 300_000
 
 _SAME = 1e-7
 """Nodes nearer than this fraction of the outline's length are one."""
+
+_MARGIN = 1.02
+"""Circles are taken so much larger than they are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +61,14 @@ class Boundary:
         return np.asarray(np.linalg.norm(np.roll(self.points, -1, axis=0) - self.points, axis=1))
 
 
-def breakpoints(outline: Outline, arcs: Sequence[ElectrodeArc]) -> tuple[FloatArray, IntArray]:
+def breakpoints(
+    outline: Outline, arcs: Sequence[ElectrodeArc], corners: FloatArray
+) -> tuple[FloatArray, IntArray]:
     """Arclengths that must be nodes, ascending, and the electrode that follows each (or −1)."""
     length = outline.length
     ends = [(a.start % length, (a.start + a.width(outline)) % length) for a in arcs]
     exact = np.array(ends).ravel()
-    corners = outline.corners % length
+    corners = corners % length
     if len(corners):  # an electrode that ends at a corner ends exactly there
         gap = np.abs(corners[:, None] - exact[None])
         corners = corners[np.minimum(gap, length - gap).min(axis=1) > _SAME * length]
@@ -75,14 +81,20 @@ def breakpoints(outline: Outline, arcs: Sequence[ElectrodeArc]) -> tuple[FloatAr
 
 
 def discretise(
-    outline: Outline, arcs: Sequence[ElectrodeArc], coarse: float, growth: float
+    outline: Outline,
+    arcs: Sequence[ElectrodeArc],
+    corners: FloatArray,
+    coarse: float,
+    growth: float,
 ) -> Boundary:
     """Rim nodes for cells of edge length ``coarse`` m far from the electrodes.
+
+    ``corners``, arclengths in m, are nodes too.
 
     Every edge's diametral circle is free of other nodes, so that each edge is in every
     Delaunay triangulation whose inner points keep out of those circles too.
     """
-    nodes, owner = breakpoints(outline, arcs)
+    nodes, owner = breakpoints(outline, arcs, corners)
     spans = np.diff(nodes, append=nodes[0] + outline.length)
     field = _rim_sizes(outline, nodes, owner, coarse, growth)
     pieces, owners = [], []
@@ -92,7 +104,7 @@ def discretise(
         pieces.append(piece)
         owners.append(np.full(len(piece), electrode))
     s, who = np.concatenate(pieces), np.concatenate(owners)
-    return _split_encroached(outline, s, who)
+    return _split_encroached(outline, corners, s, who)
 
 
 def _rim_sizes(
@@ -113,7 +125,7 @@ def _rim_sizes(
 def _graded(
     outline: Outline, start: float, span: float, field: SizeField, least: int
 ) -> FloatArray:
-    """Arclengths from ``start`` (included) to its end (left out), spaced as the field asks."""
+    """Arclengths from ``start`` (included) to its end (excluded), spaced as the field asks."""
     samples = 1 + max(16, math.ceil(3 * span / field.sizes.min()))
     s = np.linspace(0.0, span, min(samples, 20_001))
     density = 1.0 / field(outline.point(start + s))
@@ -124,13 +136,14 @@ def _graded(
     return np.asarray(start + np.interp(wanted, count, s))
 
 
-def _split_encroached(outline: Outline, s: FloatArray, owner: IntArray) -> Boundary:
+def _split_encroached(
+    outline: Outline, corners: FloatArray, s: FloatArray, owner: IntArray
+) -> Boundary:
     """Halve edges until no node lies in another edge's diametral circle.
 
     Next to a corner the cut is made at a power-of-two distance from it, so that the two
-    sides of a sharp corner are cut alike and the splitting ends.
+    sides of a sharp corner are cut the same way and the splitting ends.
     """
-    corners = outline.corners
     for _ in range(60):
         rim = Boundary(s, outline.point(s), owner)
         tree = cKDTree(rim.points)
@@ -169,3 +182,27 @@ def _among(s: FloatArray, corners: FloatArray, length: float) -> NDArray[np.bool
         return np.zeros(len(s), dtype=bool)
     gap = np.abs((s[:, None] - corners[None] + length / 2) % length - length / 2)
     return np.asarray(gap.min(axis=1) <= _SAME * length)
+
+
+def rim_distance(rim: Boundary, xy: FloatArray) -> FloatArray:
+    """(n,) distance to the rim edges that touch the three nearest nodes, m."""
+    if not len(xy):
+        return np.zeros(0)
+    count = len(rim.points)
+    _, node = cKDTree(rim.points).query(xy, k=3)
+    edge = np.concatenate([node, (node - 1) % count], axis=1)
+    step = np.roll(rim.points, -1, axis=0) - rim.points
+    offset = xy[:, None] - rim.points[edge]
+    along = (offset * step[edge]).sum(axis=2) / (step[edge] ** 2).sum(axis=2)
+    foot = offset - np.clip(along, 0, 1)[:, :, None] * step[edge]
+    return np.asarray(np.linalg.norm(foot, axis=2).min(axis=1))
+
+
+def keeps_clear(rim: Boundary, xy: FloatArray) -> NDArray[np.bool_]:
+    """(n,) True where a point is inside the rim and outside every edge's diametral circle."""
+    if not len(xy):
+        return np.zeros(0, dtype=bool)
+    result = inside(rim.points, xy)
+    held = cKDTree(xy).query_ball_point(rim.midpoints, rim.lengths / 2 * _MARGIN)
+    result[np.concatenate(held).astype(np.int64)] = False
+    return result

@@ -71,8 +71,8 @@ def box(
 def _ranges(patch: BoxPatch, extent: FloatArray, where: str) -> dict[int, tuple[float, float]]:
     """Axis → from, to of the two axes in which the patch extends, m."""
     if patch.side not in get_args(Side):
-        known = ", ".join(get_args(Side))
-        raise GeometryError(f'expected a side among {known}, got "{patch.side}"', where=where)
+        sides = ", ".join(get_args(Side))
+        raise GeometryError(f'expected a side among {sides}, got "{patch.side}"', where=where)
     axes = [i for i in range(3) if i != patch.axis]
     lows = patch.low or extent[axes, 0].tolist()
     highs = patch.high or extent[axes, 1].tolist()

@@ -84,9 +84,9 @@ def _check_facets(cells: IntArray, pairs: IntArray, boundary: IntArray) -> None:
     if len(boundary) + 2 * len(pairs) == cells.size:
         return
     facet, owner = facets(cells)
-    unique, place, counts = np.unique(facet, axis=0, return_inverse=True, return_counts=True)
+    unique, which, counts = np.unique(facet, axis=0, return_inverse=True, return_counts=True)
     worst = int(np.argmax(counts))
-    shared = owner[place.reshape(-1) == worst].tolist()
+    shared = owner[which.reshape(-1) == worst].tolist()
     raise GeometryError(
         f"expected a facet in one or two cells, got {unique[worst].tolist()} in {len(shared)}",
         where=f"cells {', '.join(map(str, shared))}",
@@ -132,21 +132,21 @@ def checked_metric(metric: FloatArray, points: FloatArray, cells: IntArray) -> F
     where it is not."""
     if points.shape[1] != 2 or cells.shape[1] != 3:
         raise GeometryError("only a flat sheet of triangles has a metric", where="metric")
-    found = np.array(metric, dtype=np.float64)
-    if found.shape != (len(cells), 2, 2):
+    checked = np.array(metric, dtype=np.float64)
+    if checked.shape != (len(cells), 2, 2):
         raise GeometryError(
-            f"expected shape ({len(cells)}, 2, 2), got {found.shape}", where="metric"
+            f"expected shape ({len(cells)}, 2, 2), got {checked.shape}", where="metric"
         )
     with np.errstate(invalid="ignore", over="ignore"):
-        skew = np.abs(found[:, 0, 1] - found[:, 1, 0])
-        size = found[:, 0, 0] + found[:, 1, 1]
-        definite = np.linalg.det(found) > _FLAT * size**2
-    good = np.isfinite(found).all(axis=(1, 2)) & definite & (size > 0) & (skew <= _FLAT * size)
+        skew = np.abs(checked[:, 0, 1] - checked[:, 1, 0])
+        size = checked[:, 0, 0] + checked[:, 1, 1]
+        definite = np.linalg.det(checked) > _FLAT * size**2
+    good = np.isfinite(checked).all(axis=(1, 2)) & definite & (size > 0) & (skew <= _FLAT * size)
     if not good.all():
         cell = int(np.argmin(good))
         raise GeometryError(
-            f"expected a symmetric positive definite metric, got {found[cell].tolist()}",
+            f"expected a symmetric positive definite metric, got {checked[cell].tolist()}",
             where=f"cell {cell}",
         )
-    found.flags.writeable = False
-    return found
+    checked.flags.writeable = False
+    return checked

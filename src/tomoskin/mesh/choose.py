@@ -1,4 +1,4 @@
-"""Electrodes of a mesh that comes from elsewhere: by name, facets, a function or places."""
+"""Electrodes of a mesh that comes from elsewhere: by name, facets, a function or positions."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ from tomoskin.mesh.topology import boundary_facets
 
 _NUMBERED = re.compile(r"(?:e|el|elec|electrode)[\s_-]*(\d+)", re.IGNORECASE)
 
+Chooser = Callable[[FloatArray], ArrayLike]
+"""(n, d) centroids of boundary facets → (n,) electrode of each, −1 for none."""
+
 
 @dataclass(frozen=True, eq=False)
 class Places:
@@ -27,12 +30,9 @@ class Places:
     radius: float
 
 
-Chooser = Callable[[FloatArray], ArrayLike]
-"""(n, d) centroids of boundary facets → (n,) electrode of each, −1 for none."""
-
 Electrodes = Sequence[str] | Sequence[ArrayLike] | Chooser | Places | None
 """How electrodes are given: names of groups in the file, in their order; facet arrays in the
-file's own point numbers; a function of centroids; places; None for the groups named E1, E2, …"""
+file's own point numbers; a function of centroids; positions; None for the groups named E1, E2, …"""
 
 
 def choose(

@@ -13,18 +13,17 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
 from tomoskin.mesh.check import check_cells
-from tomoskin.mesh.crossing import check_crossings
-from tomoskin.mesh.files import MeshFile
 from tomoskin.mesh.flatten import flattened, rim_of, same_turn
-from tomoskin.mesh.nearest import barycentric, closest
+from tomoskin.mesh.mesh import MeshFile
 from tomoskin.mesh.polygon import Polygon
 from tomoskin.mesh.surface import Surface, rows_of
+from tomoskin.mesh.triangles import barycentric, check_crossings, closest
 
 _NEAREST = 16
 """Triangles that are looked at for each point."""
 
 _ON = 0.5
-"""A place that is further off the surface than this many typical edges is not meant on it."""
+"""A point that is further off the surface than this many typical edges is not meant on it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +124,7 @@ class Draped(Surface):
         return flat
 
     def _nearest(self, xyz: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Flat place and distance of the nearest point among those of the nearest triangles."""
+        """Flat position and distance of the nearest point among those of the nearest triangles."""
         k = min(_NEAREST, len(self.cells))
         near = cKDTree(self.points[self.cells].mean(axis=1)).query(xyz, k=k)[1].reshape(-1, k)
         corner = self.points[self.cells[near]]

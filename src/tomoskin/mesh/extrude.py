@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.mesh.footprint import footprint
-from tomoskin.mesh.layers import check_height, grid_lines
+from tomoskin.mesh.layers import grid_lines
 from tomoskin.mesh.mesh import Mesh
-from tomoskin.mesh.outline import Outline
-from tomoskin.mesh.patch import FacePatch, Patch, WallPatch, check_patches
+from tomoskin.mesh.outline import Disc, Outline, check_size
+from tomoskin.mesh.patch import FacePatch, Patch, WallPatch, check_patches, footprint, ring
 from tomoskin.mesh.topology import boundary_facets
 from tomoskin.mesh.triangulate import triangulate
 
@@ -42,14 +41,14 @@ def extrude(
         When an electrode does not fit, overlaps another one or has no facet, or when the
         outline cannot be met with so few cells.
     """
-    check_height(height)
+    check_size("height", height)
     check_patches(outline, height, patches)
     _check_planes(planes, height)
-    marked, arcs = footprint(outline, patches)
-    flat = triangulate(marked, arcs, cells, seed=seed)
+    arcs, marks = footprint(outline, patches)
+    flat = triangulate(outline, arcs, cells, seed=seed, marks=marks)
     walls = [p for p in patches if isinstance(p, WallPatch)]
-    marks = [*planes, *(z for p in walls for z in (p.bottom, p.top))]
-    body = Body(flat.points, flat.cells, grid_lines(0.0, height, marks, layers))
+    heights = [*planes, *(z for p in walls for z in (p.bottom, p.top))]
+    body = Body(flat.points, flat.cells, grid_lines(0.0, height, heights, layers))
     return body.mesh(_facets(body, outline, patches))
 
 
@@ -164,3 +163,29 @@ def _check_planes(planes: Sequence[float], height: float) -> None:
                 f"expected a height from 0 to {height * 1e3:.4g} mm, got {z * 1e3:.4g} mm",
                 where=f"plane {number}",
             )
+
+
+def cylinder(
+    radius: float,
+    height: float,
+    *,
+    count: int,
+    width: float,
+    bottom: float,
+    top: float,
+    cells: int = 1600,
+    layers: int = 12,
+) -> Mesh:
+    """Cylinder from z = 0 to ``height`` with ``count`` equal electrodes in one plane; lengths in m.
+
+    They have the arclength ``width``, reach from ``bottom`` to ``top``, and are numbered as
+    :func:`ring` does. For other electrodes, give :func:`extrude` a ``Disc`` and their patches.
+
+    Raises
+    ------
+    GeometryError
+        When the electrodes do not fit.
+    """
+    disc = Disc(radius)
+    patches = ring(disc, count, width, bottom, top)
+    return extrude(disc, height, patches, cells=cells, layers=layers)

@@ -1,93 +1,36 @@
-"""Meshes from files: .msh, .vtu, .stl, .obj, .ply, by meshio (extra ``mesh``)."""
+"""What mesh files hold, by meshio (extra ``mesh``): cells, points and groups of facets."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.mesh.choose import Electrodes, choose
-from tomoskin.mesh.content import cells_of, groups_of, points_of
-from tomoskin.mesh.mesh import Mesh
 
 READERS = {".msh": "gmsh", ".vtu": "vtu", ".stl": "stl", ".obj": "obj", ".ply": "ply"}
 """meshio's reader for each ending."""
 
+TOO_LARGE = 10.0
+"""A body that extends further than this, m, is taken for one in millimetres."""
 
-def read_mesh(path: str | Path, electrodes: Electrodes = None, *, scale: float = 1.0) -> Mesh:
-    """Read a mesh; see :class:`MeshFile` for what is read and :data:`Electrodes` for the choice.
+MARKER = "electrode"
+"""Cell data of this name number facets: n > 0 belongs to the group En."""
 
-    Raises
-    ------
-    GeometryError
-        When meshio is not installed, the file cannot be read or holds no usable cells, it seems
-        to be in millimetres, a cell repeats another one, or an electrode has no facet.
-    """
-    return MeshFile.read(path, scale=scale).mesh(electrodes)
+_CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "tetra": 4}
 
 
-@dataclass(frozen=True, eq=False)
-class MeshFile:
-    """What a mesh file holds.
-
-    Triangles all in one plane z = const lose that coordinate. Points that belong to no cell are
-    dropped when the mesh is made.
-
-    Attributes
-    ----------
-    points
-        (n, d) m.
-    cells
-        (n_cells, k) triangles or tetrahedra.
-    groups
-        Name → (n, k − 1) facets: gmsh's physical groups, cell sets, and numbers in cell data
-        named "electrode".
-    source
-        The path, for messages.
-    """
-
-    points: FloatArray
-    cells: IntArray
-    groups: dict[str, IntArray]
-    source: str
-
-    @classmethod
-    def read(cls, path: str | Path, *, scale: float = 1.0) -> Self:
-        """Read ``path``; its coordinates times ``scale`` are m. Raises GeometryError."""
-        file = Path(path)
-        raw = _parsed(file)
-        try:
-            cells = cells_of(raw)
-            points = points_of(raw, cells, scale)
-            groups = groups_of(raw, cells.shape[1] - 1)
-        except GeometryError as error:
-            raise _at(error, str(file)) from error
-        return cls(points, cells, groups, str(file))
-
-    def mesh(self, electrodes: Electrodes = None) -> Mesh:
-        """Return the mesh with those electrodes. Raises GeometryError."""
-        try:
-            _check_repeats(self.cells)
-            facets = choose(self.points, self.cells, self.groups, electrodes)
-            used, compact = np.unique(self.cells, return_inverse=True)
-            place = np.full(len(self.points), -1)
-            place[used] = np.arange(len(used))
-            moved = [_renumbered(place, f, f"electrode {i}") for i, f in enumerate(facets)]
-            return Mesh(self.points[used], compact.reshape(self.cells.shape), tuple(moved))
-        except GeometryError as error:
-            raise _at(error, self.source) from error
-
-
-def _at(error: GeometryError, source: str) -> GeometryError:
+def at_source(error: GeometryError, source: str) -> GeometryError:
+    """The error with the file that it is about."""
     where = f"{source}, {error.where}" if error.where else source
     return GeometryError(error.message, where=where, hint=error.hint)
 
 
-def _parsed(file: Path) -> Any:
+def parsed(file: Path) -> Any:
     """What meshio makes of the file."""
     name = READERS.get(file.suffix.lower())
     if name is None:
@@ -113,23 +56,110 @@ def _parsed(file: Path) -> Any:
         ) from error
 
 
-def _check_repeats(cells: IntArray) -> None:
+def check_repeats(cells: IntArray) -> None:
     """Raise GeometryError that names a cell with the corners of an earlier one."""
     ordered = np.sort(cells, axis=1)
-    _, first, place = np.unique(ordered, axis=0, return_index=True, return_inverse=True)
-    earlier = first[place.reshape(-1)]
+    _, first, which = np.unique(ordered, axis=0, return_index=True, return_inverse=True)
+    earlier = first[which.reshape(-1)]
     again = earlier < np.arange(len(cells))
     if again.any():
         cell = int(np.argmax(again))
         raise GeometryError(f"repeats cell {earlier[cell]}", where=f"cell {cell}")
 
 
-def _renumbered(place: IntArray, facets: IntArray, where: str) -> IntArray:
-    """Facets in the mesh's numbers; −1, which the mesh refuses, for points of no cell."""
+def renumbered(number: IntArray, facets: IntArray, where: str) -> IntArray:
+    """Facets by each point's new ``number``; −1, which the mesh refuses, for points of no cell."""
     if facets.dtype.kind not in "iu" or facets.ndim != 2:
         raise GeometryError(
             f"expected facets as rows of point numbers, got {facets.dtype} of shape {facets.shape}",
             where=where,
         )
-    outside = (facets < 0) | (facets >= len(place))
-    return np.where(outside, -1, place[np.where(outside, 0, facets)])
+    outside = (facets < 0) | (facets >= len(number))
+    return np.where(outside, -1, number[np.where(outside, 0, facets)])
+
+
+def cells_of(raw: Any) -> IntArray:
+    """(n, k) cells of the highest dimension, which must be all triangles or all tetrahedra."""
+    kinds = {block.type for block in raw.cells if len(block.data)}
+    strange = sorted(kinds - set(_CORNERS))
+    if strange:
+        raise GeometryError(
+            f"expected triangles or tetrahedra of straight edges, got {', '.join(strange)}",
+            hint="cut them into triangles or tetrahedra of first order before saving",
+        )
+    most = max((_CORNERS[kind] for kind in kinds), default=0)
+    if most < 3:
+        raise GeometryError("expected triangles or tetrahedra, got no cells")
+    tables = [block.data for block in raw.cells if _CORNERS.get(block.type) == most]
+    return np.concatenate(tables).astype(np.int64)
+
+
+def points_of(raw: Any, cells: IntArray, scale: float) -> FloatArray:
+    """(n, d) points in m; those of a flat mesh with two coordinates."""
+    if not (math.isfinite(scale) and scale > 0):
+        raise GeometryError(f"expected a scale above 0, got {scale:g}")
+    points = np.asarray(raw.points, dtype=np.float64) * scale
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise GeometryError(f"expected points of 2 or 3 coordinates, got shape {points.shape}")
+    if cells.min() < 0 or cells.max() >= len(points):
+        raise GeometryError(
+            f"cells refer to points {cells.min()} to {cells.max()}, the file has {len(points)}"
+        )
+    extent = np.ptp(points[np.unique(cells)], axis=0)
+    if extent.max() > TOO_LARGE:
+        raise GeometryError(
+            f"extends over {extent.max():.4g} m",
+            hint='if the file is in millimetres, say so: unit "mm", or scale=1e-3',
+        )
+    flat = cells.shape[1] == 3 and points.shape[1] == 3 and extent[2] == 0
+    return points[:, :2] if flat else points
+
+
+def groups_of(raw: Any, corners: int) -> dict[str, IntArray]:
+    """Name → (n, corners) facets, for all groups that hold any."""
+    parts: dict[str, list[IntArray]] = {}
+    for source in (_sets, _physical, _marked):
+        found: dict[str, list[IntArray]] = {}
+        for name, facets in source(raw, corners):
+            found.setdefault(name, []).append(facets)
+        parts = {**found, **parts}  # what is a set already is not read twice
+    joined = {name: np.concatenate(tables).astype(np.int64) for name, tables in parts.items()}
+    return {name: facets for name, facets in joined.items() if len(facets)}
+
+
+def _sets(raw: Any, corners: int) -> Iterator[tuple[str, IntArray]]:
+    """Cell sets; gmsh 4.1 has its named physical groups here."""
+    for name, members in raw.cell_sets.items():
+        for block, chosen in zip(raw.cells, members, strict=True):
+            if not name.startswith("gmsh:") and chosen is not None and _fits(block, corners):
+                yield name, block.data[np.asarray(chosen, dtype=np.int64)]
+
+
+def _physical(raw: Any, corners: int) -> Iterator[tuple[str, IntArray]]:
+    """gmsh's physical groups, by name, or by number where they have none."""
+    names = {
+        int(number): name
+        for name, (number, dimension) in raw.field_data.items()
+        if dimension == corners - 1
+    }
+    for number, facets in _by_number(raw, "gmsh:physical", corners):
+        yield names.get(number, str(number)), facets
+
+
+def _marked(raw: Any, corners: int) -> Iterator[tuple[str, IntArray]]:
+    for number, facets in _by_number(raw, MARKER, corners):
+        yield f"E{number}", facets
+
+
+def _by_number(raw: Any, key: str, corners: int) -> Iterator[tuple[int, IntArray]]:
+    if key not in raw.cell_data:
+        return
+    for block, values in zip(raw.cells, raw.cell_data[key], strict=True):
+        if _fits(block, corners):
+            numbers = np.asarray(values).reshape(-1)
+            for number in np.unique(numbers[numbers > 0]).tolist():
+                yield int(number), block.data[numbers == number]
+
+
+def _fits(block: Any, corners: int) -> bool:
+    return len(block.data) > 0 and block.data.shape[1] == corners

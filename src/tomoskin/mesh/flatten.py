@@ -102,11 +102,11 @@ def same_turn(cells: IntArray) -> IntArray:
 def _turn_alike(cells: IntArray, pairs: IntArray) -> FloatArray:
     """(n_pairs,) whether two neighbours run along their common edge in opposite senses."""
     one, other = cells[pairs[:, 0]], cells[pairs[:, 1]]
-    alike = np.zeros(len(pairs), dtype=bool)
+    opposed = np.zeros(len(pairs), dtype=bool)
     for a, b in _TURNS:
         for c, d in _TURNS:
-            alike |= (one[:, a] == other[:, d]) & (one[:, b] == other[:, c])
-    return alike
+            opposed |= (one[:, a] == other[:, d]) & (one[:, b] == other[:, c])
+    return opposed
 
 
 def _on_disc(points: FloatArray, cells: IntArray, rim: IntArray) -> FloatArray:

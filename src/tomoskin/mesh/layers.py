@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -51,7 +50,7 @@ def grid_lines(low: float, high: float, marks: Sequence[float], count: int) -> F
 
 
 def _stops(low: float, high: float, marks: Sequence[float]) -> FloatArray:
-    """The ends and the marks, ascending, each place once."""
+    """The ends and the marks, ascending, each height once."""
     near = _SAME * (high - low)
     inner = sorted(m for m in marks if low + near < m < high - near)
     kept = [m for i, m in enumerate(inner) if i == 0 or m - inner[i - 1] > near]
@@ -87,9 +86,3 @@ def _piece(stops: FloatArray, i: int, coarse: float, parts: int) -> FloatArray:
     lines = np.interp(np.arange(parts) * (running[-1] / parts), running, z)
     lines[0] = stops[i]
     return np.asarray(lines)
-
-
-def check_height(height: float) -> None:
-    """Raise GeometryError unless ``height`` is a finite length above 0."""
-    if not (math.isfinite(height) and height > 0):
-        raise GeometryError(f"expected a height above 0 m, got {height:g} m")

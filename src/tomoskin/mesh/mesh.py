@@ -6,18 +6,25 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap
 from tomoskin.mesh.check import check_mesh, checked_metric
+from tomoskin.mesh.choose import Electrodes, choose
+from tomoskin.mesh.files import (
+    at_source,
+    cells_of,
+    check_repeats,
+    groups_of,
+    parsed,
+    points_of,
+    renumbered,
+)
 from tomoskin.mesh.pixels import pixel_map, step_for
 from tomoskin.mesh.topology import boundary_facets, neighbour_pairs, owners, simplex_measure
-
-if TYPE_CHECKING:
-    from tomoskin.mesh.choose import Electrodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +71,6 @@ class Mesh:
     @classmethod
     def read(cls, path: str | Path, electrodes: Electrodes = None, *, scale: float = 1.0) -> Mesh:
         """Read a .msh, .vtu, .stl or .obj file; see :func:`read_mesh`. Raises GeometryError."""
-        from tomoskin.mesh.files import read_mesh  # noqa: PLC0415 - it makes meshes itself
-
         return read_mesh(path, electrodes, scale=scale)
 
     @property
@@ -133,6 +138,70 @@ class Mesh:
         """
         side = step_for(self.points, self.cells, count) if step is None else step
         return pixel_map(self.points, self.cells, self.identity, step=side, height=z)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshFile:
+    """What a mesh file holds.
+
+    Triangles all in one plane z = const lose that coordinate. Points that belong to no cell are
+    dropped when the mesh is made.
+
+    Attributes
+    ----------
+    points
+        (n, d) m.
+    cells
+        (n_cells, k) triangles or tetrahedra.
+    groups
+        Name → (n, k − 1) facets: gmsh's physical groups, cell sets, and numbers in cell data
+        named "electrode".
+    source
+        The path, for messages.
+    """
+
+    points: FloatArray
+    cells: IntArray
+    groups: dict[str, IntArray]
+    source: str
+
+    @classmethod
+    def read(cls, path: str | Path, *, scale: float = 1.0) -> Self:
+        """Read ``path``; its coordinates times ``scale`` are m. Raises GeometryError."""
+        file = Path(path)
+        raw = parsed(file)
+        try:
+            cells = cells_of(raw)
+            points = points_of(raw, cells, scale)
+            groups = groups_of(raw, cells.shape[1] - 1)
+        except GeometryError as error:
+            raise at_source(error, str(file)) from error
+        return cls(points, cells, groups, str(file))
+
+    def mesh(self, electrodes: Electrodes = None) -> Mesh:
+        """Return the mesh with those electrodes. Raises GeometryError."""
+        try:
+            check_repeats(self.cells)
+            facets = choose(self.points, self.cells, self.groups, electrodes)
+            used, compact = np.unique(self.cells, return_inverse=True)
+            number = np.full(len(self.points), -1)
+            number[used] = np.arange(len(used))
+            tables = [renumbered(number, f, f"electrode {i}") for i, f in enumerate(facets)]
+            return Mesh(self.points[used], compact.reshape(self.cells.shape), tuple(tables))
+        except GeometryError as error:
+            raise at_source(error, self.source) from error
+
+
+def read_mesh(path: str | Path, electrodes: Electrodes = None, *, scale: float = 1.0) -> Mesh:
+    """Read a mesh; see :class:`MeshFile` for what is read and :data:`Electrodes` for the choice.
+
+    Raises
+    ------
+    GeometryError
+        When meshio is not installed, the file cannot be read or holds no usable cells, it seems
+        to be in millimetres, a cell repeats another one, or an electrode has no facet.
+    """
+    return MeshFile.read(path, scale=scale).mesh(electrodes)
 
 
 def _frozen(value: object, dtype: DTypeLike, where: str) -> NDArray[Any]:

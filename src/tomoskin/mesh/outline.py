@@ -147,10 +147,10 @@ class Ellipse(Outline):
     def _parameter(self, s: FloatArray) -> FloatArray:
         """Invert the arclength: table, then Newton held inside the table's bracket."""
         grid = np.linspace(0, 2 * math.pi, 1025)
-        known = self._arclength(grid)
-        place = np.clip(np.searchsorted(known, s, side="right") - 1, 0, len(grid) - 2)
-        low, high = grid[place], grid[place + 1]
-        t = np.interp(s, known, grid)
+        table = self._arclength(grid)
+        piece = np.clip(np.searchsorted(table, s, side="right") - 1, 0, len(grid) - 2)
+        low, high = grid[piece], grid[piece + 1]
+        t = np.interp(s, table, grid)
         for _ in range(20):
             speed = np.hypot(self.semi_x * np.sin(t), self.semi_y * np.cos(t))
             step = (self._arclength(t) - s) / speed

@@ -15,6 +15,9 @@ from tomoskin.core import FloatArray, GeometryError
 from tomoskin.mesh.arcs import MIN_GAP, ElectrodeArc, check_arcs
 from tomoskin.mesh.outline import Outline
 
+_SAME = 1e-7
+"""Places nearer than this fraction of the outline's length are one."""
+
 
 @dataclass(frozen=True, slots=True)
 class WallPatch:
@@ -128,3 +131,57 @@ def _gap(outline: Outline, one: WallPatch, other: WallPatch) -> float:
     ahead = (other.arc.start - one.arc.start) % outline.length - one.width(outline)
     behind = (one.arc.start - other.arc.start) % outline.length - other.width(outline)
     return min(ahead, behind)
+
+
+def footprint(outline: Outline, patches: Sequence[Patch]) -> tuple[list[ElectrodeArc], FloatArray]:
+    """Arcs that stand apart, and arclengths that must be nodes beside them, for ``triangulate``.
+
+    Arcs of patches at different heights may coincide or overlap; together they are one arc,
+    and their ends inside it are marks. ``triangulate`` wants an arc, and one that is not all
+    of the rim: the longest stretch is omitted where patches cover the rim, and a short
+    stretch at its start stands in where no patch has an arc.
+    """
+    length = outline.length
+    arcs = [p.arc for p in patches if isinstance(p, WallPatch) and p.arc is not None]
+    if not arcs:
+        return [ElectrodeArc.around(0.0, length / 64)], np.zeros(0)
+    start = np.array([a.start % length for a in arcs])
+    width = np.array([a.width(outline) for a in arcs])
+    ends = _distinct(np.concatenate([start, start + width]) % length, length)
+    span = np.append(ends[1:], ends[0] + length) - ends
+    middle = ends + span / 2
+    covered = ((middle[:, None] - start) % length < width).any(axis=1)
+    covered |= span < MIN_GAP * length  # leave no gap that check_arcs could refuse
+    if covered.all():
+        covered[np.argmax(span)] = False
+    marks = _clear_of(outline.corners, ends[covered & np.roll(covered, 1)], length)
+    return _runs(ends, span, covered), marks
+
+
+def _distinct(s: FloatArray, length: float) -> FloatArray:
+    """Ascending arclengths without those that rounding alone tells apart."""
+    order = np.sort(s)
+    gap = np.append(np.diff(order), order[0] + length - order[-1])
+    return np.asarray(order[gap > _SAME * length])
+
+
+def _clear_of(corners: FloatArray, marks: FloatArray, length: float) -> FloatArray:
+    """Marks that are not at a corner."""
+    if not len(corners):
+        return marks
+    gap = np.abs((marks[:, None] - corners + length / 2) % length - length / 2)
+    return np.asarray(marks[gap.min(axis=1) > _SAME * length])
+
+
+def _runs(ends: FloatArray, span: FloatArray, covered: NDArray[np.bool_]) -> list[ElectrodeArc]:
+    """Arcs over neighbouring stretches that are covered."""
+    first = int(np.argmin(covered)) + 1  # begin behind a stretch that is not
+    runs: list[ElectrodeArc] = []
+    joined = False
+    for i in np.roll(np.arange(len(ends)), -first):
+        if covered[i] and joined:
+            runs[-1] = ElectrodeArc(runs[-1].start, runs[-1].end + float(span[i]))
+        elif covered[i]:
+            runs.append(ElectrodeArc(float(ends[i]), float(ends[i] + span[i])))
+        joined = bool(covered[i])
+    return runs

@@ -42,10 +42,10 @@ def pixel_map(
         touched = np.flatnonzero((span.min(axis=1) <= height) & (span.max(axis=1) >= height))
         corner = corner[touched]
     cell, column, row = _candidates(corner[:, :, :2], x, y, step)
-    place = np.column_stack([x[column], y[row]])
+    position = np.column_stack([x[column], y[row]])
     if height is not None:
-        place = np.column_stack([place, np.full(len(place), height)])
-    inside = _inside(corner, cell, place)
+        position = np.column_stack([position, np.full(len(position), height)])
+    inside = _inside(corner, cell, position)
     owner = np.full((len(y), len(x)), len(cells))
     np.minimum.at(owner, (row[inside], column[inside]), touched[cell[inside]])
     owner[owner == len(cells)] = -1
@@ -110,9 +110,9 @@ def _candidates(
     return cell, left[cell] + across, top[cell] + down
 
 
-def _inside(corner: FloatArray, cell: IntArray, place: FloatArray) -> NDArray[np.bool_]:
-    """(n,) bool: whether ``place`` (n, d) lies in its ``cell``, by barycentric coordinates."""
+def _inside(corner: FloatArray, cell: IntArray, position: FloatArray) -> NDArray[np.bool_]:
+    """(n,) bool: whether ``position`` (n, d) lies in its ``cell``, by barycentric coordinates."""
     edges = (corner[:, 1:] - corner[:, :1]).swapaxes(1, 2)
     to_barycentric = np.linalg.inv(edges)
-    share = np.einsum("nij,nj->ni", to_barycentric[cell], place - corner[cell, 0])
+    share = np.einsum("nij,nj->ni", to_barycentric[cell], position - corner[cell, 0])
     return np.asarray((share >= -_EDGE).all(axis=1) & (share.sum(axis=1) <= 1 + _EDGE))

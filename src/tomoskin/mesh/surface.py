@@ -1,6 +1,6 @@
 """Surfaces that a sheet is laid on: where its points come to lie, and how it is stretched there.
 
-A sheet keeps its flat coordinates (u, v) on every surface: mesh, electrodes, pictures and touches
+A sheet keeps its flat coordinates (u, v) on every surface: mesh, electrodes, images and touches
 stay as they are, and what the surface does to lengths enters as the mesh's metric, the first
 fundamental form of the map (do Carmo, Differential Geometry of Curves and Surfaces, 2.5).
 """
@@ -102,15 +102,15 @@ def _of_lengths(mesh: Mesh, surface: Surface) -> FloatArray:
     for a, b in _SIDES:
         step, middle = corner[:, b] - corner[:, a], (corner[:, a] + corner[:, b]) / 2
         length = np.zeros(len(corner))
-        for place, weight in zip(*_GAUSS, strict=True):
-            metric = surface.metric(middle + place / 2 * step)
+        for node, weight in zip(*_GAUSS, strict=True):
+            metric = surface.metric(middle + node / 2 * step)
             length += weight / 2 * np.sqrt(np.einsum("ni,nij,nj->n", step, metric, step))
         squares.append(length**2)
         x, y = step.T
         terms.append(np.column_stack([x * x, 2 * x * y, y * y]))
     sides = np.stack(squares, axis=1)[..., None]
-    found = np.linalg.solve(np.stack(terms, axis=1), sides)[..., 0]
-    return np.asarray(found[:, [[0, 1], [1, 2]]])
+    entries = np.linalg.solve(np.stack(terms, axis=1), sides)[..., 0]
+    return np.asarray(entries[:, [[0, 1], [1, 2]]])
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ def _content(edges: FloatArray) -> FloatArray:
 def facets(cells: IntArray) -> tuple[IntArray, IntArray]:
     """All facets with sorted corners, (n_cells·k, k − 1), and the cell that owns each."""
     k = cells.shape[1]
-    corners = [[c for c in range(k) if c != left_out] for left_out in range(k)]
+    corners = [[c for c in range(k) if c != opposite] for opposite in range(k)]
     facet = np.sort(np.concatenate([cells[:, c] for c in corners]), axis=1)
     return facet, np.tile(np.arange(len(cells)), k)
 

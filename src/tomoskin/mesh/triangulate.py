@@ -1,4 +1,4 @@
-"""The mesher: an outline and electrodes in, a graded mesh of the wanted size out."""
+"""The mesher: an outline and electrodes in, a graded mesh of the wanted size out; its quality."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
 from tomoskin.mesh.arcs import ElectrodeArc, check_arcs
 from tomoskin.mesh.boundary import Boundary, discretise
+from tomoskin.mesh.inner import inner_points, smoothed, triangles
 from tomoskin.mesh.mesh import Mesh
 from tomoskin.mesh.outline import Outline
-from tomoskin.mesh.seed import inner_points
 from tomoskin.mesh.sizing import SizeField
-from tomoskin.mesh.smooth import smoothed, triangles
 
 TOLERANCE = 0.10
 """Accepted relative miss of the wanted number of cells."""
@@ -37,13 +37,19 @@ _ADDED = 0.02
 
 
 def triangulate(
-    outline: Outline, arcs: Sequence[ElectrodeArc], cells: int, *, seed: int = 0
+    outline: Outline,
+    arcs: Sequence[ElectrodeArc],
+    cells: int,
+    *,
+    seed: int = 0,
+    marks: ArrayLike = (),
 ) -> Mesh:
     """Triangles inside ``outline``, about ``cells`` of them, finer towards the electrodes.
 
     Electrode ends and corners are nodes, every rim node lies on the outline, and the rim
-    nodes come first, in counter-clockwise order. Another ``seed`` places the inner points
-    elsewhere; the same arguments give the same mesh.
+    nodes come first, in counter-clockwise order. Another ``seed`` puts the inner points
+    elsewhere; the same arguments give the same mesh. ``marks`` are further arclengths, m, at
+    which the rim has a node.
 
     Raises
     ------
@@ -54,11 +60,13 @@ def triangulate(
     if cells < 1:
         raise GeometryError(f"expected at least 1 cell, got {cells}")
     check_arcs(outline, arcs)
+    breaks = np.append(outline.corners, np.asarray(marks, dtype=np.float64) % outline.length)
+    corners = np.unique(breaks)
     fewest = math.inf
     for growth in GROWTHS:
         wanted = float(cells)
         for _ in range(_RETRIES):
-            plan = _sized(outline, arcs, wanted, growth, seed)
+            plan = _sized(outline, arcs, corners, wanted, growth=growth, seed=seed)
             inner = smoothed(plan.rim, plan.inner, plan.field)
             table = triangles(plan.rim, inner)
             if abs(len(table) / cells - 1) <= TOLERANCE:
@@ -85,7 +93,13 @@ class _Plan:
 
 
 def _sized(
-    outline: Outline, arcs: Sequence[ElectrodeArc], cells: float, growth: float, seed: int
+    outline: Outline,
+    arcs: Sequence[ElectrodeArc],
+    corners: FloatArray,
+    cells: float,
+    *,
+    growth: float,
+    seed: int,
 ) -> _Plan:
     """Points whose triangulation has about the wanted number of cells.
 
@@ -96,7 +110,7 @@ def _sized(
     plans: list[_Plan] = []
     last = math.inf
     for turn in range(_SEARCH):
-        rim = discretise(outline, arcs, coarse, growth)
+        rim = discretise(outline, arcs, corners, coarse, growth)
         field = SizeField(coarse, rim.midpoints, np.minimum(rim.lengths, coarse), growth)
         inner = inner_points(rim, field, np.random.default_rng(seed))
         count = (2 * len(inner) + len(rim.points) - 2) * (1 + _ADDED)
@@ -120,3 +134,28 @@ def _facets(rim: Boundary, n_electrodes: int) -> tuple[IntArray, ...]:
         jump = np.flatnonzero(np.diff(own) > 1)  # where the arc runs through the first node
         result.append(edges[np.roll(own, -1 - jump[0]) if len(jump) else own])
     return tuple(result)
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """Shape of a mesh's triangles: 2·inradius/circumradius, 1 for equilateral ones."""
+
+    minimum: float
+    mean: float
+    n_cells: int
+    n_points: int
+
+
+def quality(mesh: Mesh) -> Quality:
+    """Smallest and mean triangle quality of ``mesh``; raises GeometryError for tetrahedra."""
+    if mesh.dimension != 2:
+        raise GeometryError(f"expected triangles, got cells of dimension {mesh.dimension}")
+    each = triangle_quality(mesh.points[mesh.cells])
+    return Quality(float(each.min()), float(each.mean()), len(mesh.cells), len(mesh.points))
+
+
+def triangle_quality(corners: FloatArray) -> FloatArray:
+    """(n,) 2·inradius/circumradius = (b+c−a)(c+a−b)(a+b−c)/(abc) of triangles (n, 3, d)."""
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    a, b, c = sides.T
+    return np.asarray((b + c - a) * (c + a - b) * (a + b - c) / (a * b * c))

@@ -128,7 +128,7 @@ class Hinge(Surface):
     angle
         Between the two sides, rad; positive where the front is convex.
     length
-        Width of the strip across the axis, m; over the whole sheet, take its size.
+        Width of the strip across the axis, m; over all of the sheet, take its size.
     axis
         Direction of the axis in the sheet, rad from u.
     at
@@ -152,8 +152,8 @@ class Hinge(Surface):
     def point(self, uv: ArrayLike) -> FloatArray:
         """(n, 3) m."""
         across, along = (rows_of(uv) @ self._frame).T
-        _, place = _middle_line(across - self.at, self.angle, self.length)
-        x, height = place.T
+        _, position = _middle_line(across - self.at, self.angle, self.length)
+        x, height = position.T
         return np.column_stack([x + self.at, along, height]) @ _into_space(self._frame)
 
     def jacobian(self, uv: ArrayLike) -> FloatArray:
@@ -179,15 +179,15 @@ class Hinge(Surface):
 
 
 def _middle_line(v: FloatArray, angle: float, joint: float) -> tuple[FloatArray, FloatArray]:
-    """(n,) direction, rad, 0 in the middle of the joint, and (n, 2) place (y, z), m."""
+    """(n,) direction, rad, 0 in the middle of the joint, and (n, 2) position (y, z), m."""
     half = joint / 2
     inside = np.clip(v, -half, half)
     turn = angle * inside / joint
     # ∫ (cos, −sin) of the turning direction, by the chord of the arc
     chord = np.sinc(turn / (2 * np.pi)) * inside
-    place = chord[:, None] * np.column_stack([np.cos(turn / 2), -np.sin(turn / 2)])
+    position = chord[:, None] * np.column_stack([np.cos(turn / 2), -np.sin(turn / 2)])
     beyond = (v - inside)[:, None] * np.column_stack([np.cos(turn), -np.sin(turn)])
-    return turn, place + beyond
+    return turn, position + beyond
 
 
 def _across_and_along(axis: float) -> FloatArray:

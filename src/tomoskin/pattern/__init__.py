@@ -1,8 +1,7 @@
-"""Drive and measurement tables: THE order of the rows, for firmware, decoder and Jacobian alike."""
+"""Drive and measurement tables: THE order of the rows, shared by firmware, decoder and Jacobian."""
 
 from tomoskin.pattern.match import RowMatch, match_rows
-from tomoskin.pattern.named import NAMED, named
-from tomoskin.pattern.pattern import Pattern
+from tomoskin.pattern.pattern import NAMED, Pattern, named
 from tomoskin.pattern.scan import Scan
 
 __all__ = ["NAMED", "Pattern", "RowMatch", "Scan", "match_rows", "named"]

@@ -36,7 +36,7 @@ def match_rows(pattern: Pattern, drive: ArrayLike, measure: ArrayLike) -> RowMat
 
     A row is found as it stands, with a pair reversed (sign changes), or as its reciprocal,
     drive and measuring pair exchanged (Geselowitz 1971). A row that stands as itself wins over
-    one that is reversed, and that over its reciprocal; of rows that are alike the first is taken.
+    one that is reversed, and that over its reciprocal; of equal rows the first is taken.
 
     Raises
     ------

@@ -1,8 +1,9 @@
-"""The pattern: which pair is driven, and which pair is read, row by row."""
+"""The pattern: which pair is driven, and which pair is read, row by row; patterns by name."""
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -108,7 +109,7 @@ class Pattern:
     ) -> Self:
         """Every measuring pair under every drive, drive by drive.
 
-        Rows whose pair touches a driven electrode are left out unless ``include_driven``.
+        Rows whose pair touches a driven electrode are omitted unless ``include_driven``.
         """
         drive_table, pair_table = _table(drives, "drive"), _table(pairs, "measure")
         index = np.repeat(np.arange(len(drive_table)), len(pair_table))
@@ -259,3 +260,37 @@ def _check_unique(pattern: Pattern) -> None:
             f"rows {twice[0]} and {twice[1]} measure the same pair under the same drive",
             hint="leave one of them out",
         )
+
+
+NAMED: dict[str, Callable[[int], Pattern]] = {
+    "adjacent": Pattern.adjacent,
+    "opposite": Pattern.opposite,
+    "all_pairs": Pattern.all_pairs,
+}
+"""Patterns by name; ``skip:k`` is understood beside them."""
+
+
+def named(name: str, n: int) -> Pattern:
+    """Pattern of that name on ``n`` electrodes; ``a+b`` joins two of them.
+
+    Raises
+    ------
+    PatternError
+        For another name; the message lists those that there are.
+    """
+    parts = [_one(part.strip(), n) for part in name.split("+")]
+    pattern = parts[0]
+    for part in parts[1:]:
+        pattern = pattern.joined(part)
+    return pattern
+
+
+def _one(name: str, n: int) -> Pattern:
+    if name in NAMED:
+        return NAMED[name](n)
+    kind, _, k = name.partition(":")
+    if kind == "skip" and k.isdigit():
+        return Pattern.skip(n, int(k))
+    raise PatternError(
+        f'expected a pattern among {", ".join(NAMED)}, skip:K, or several joined by +, got "{name}"'
+    )

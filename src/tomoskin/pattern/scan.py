@@ -52,16 +52,16 @@ class Scan:
         read = np.zeros((pattern.n_drive, n), dtype=bool)
         read[pattern.drive_index[:, None], pattern.measure] = True
         sample_drive, sample_electrode = np.nonzero(read)
-        place = np.full(read.shape, -1)
-        place[read] = np.arange(len(sample_drive))
+        number = np.full(read.shape, -1)
+        number[read] = np.arange(len(sample_drive))
         masks = (read * (np.uint32(1) << np.arange(n, dtype=np.uint32))).sum(axis=1)
         return cls(
             drives=pattern.drives,
             masks=masks.astype(np.uint32),
             sample_drive=sample_drive,
             sample_electrode=sample_electrode,
-            plus=place[pattern.drive_index, pattern.measure[:, 0]],
-            minus=place[pattern.drive_index, pattern.measure[:, 1]],
+            plus=number[pattern.drive_index, pattern.measure[:, 0]],
+            minus=number[pattern.drive_index, pattern.measure[:, 1]],
         )
 
     @property

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.signal.health import Mask
 from tomoskin.signal.idle import Idle
 from tomoskin.signal.reference import Reference
-from tomoskin.signal.roles import Mask
 
 SLOWEST = 60.0
 """Time constant with which the baseline follows where no drift has been seen, s."""
@@ -19,7 +19,7 @@ _LINGER = 10
 """Frames after a touch for which the baseline still holds."""
 
 _FADING = 10.0
-"""Seconds after a release in which what the touch has left fades into the baseline."""
+"""Seconds after a release in which the residual response fades into the baseline."""
 
 _FADE = 1.0
 """Time constant of that, s."""
@@ -31,13 +31,13 @@ _DOUBT = 3.0
 """Deviations of a frame's noise that a held baseline may have drifted before it is called stale."""
 
 _DELAY = 3
-"""Frames after which a frame is learnt: a touch is known only when it has stood for some."""
+"""Frames after which a frame is learnt: a touch is noticed only when it has stood for some."""
 
 _LONGEST_STEP = 60.0
 _ROUNDING = 1e-9
 
 _TREND = 30.0
-"""Seconds that the skin must have been followed before a trend is told."""
+"""Seconds that the skin must have been followed before a trend is estimated."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Directions of the data that do not count, taken out exactly: lost rows, floats, drift."""
+"""The nuisance subspace of the data, projected out exactly: lost rows, floats, drift."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _DEPENDENT = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Blind:
-    """Noise of endless variance along ``directions`` N, (n_meas, k).
+    """Noise of unbounded variance along ``directions`` N, (n_meas, k).
 
     Data of covariance P⁻¹ with that noise have P − PN(NᵀPN)⁻¹NᵀP for their inverse covariance
     (the limit of Woodbury's identity; Rasmussen & Williams 2006, equation 2.41 with its vague
     limit, 2.42). An operator is a covariance times it, so data less N(NᵀPN)⁻¹NᵀP·data give the
-    picture of the operator that was made with that noise. ``weights`` (k, n_meas) is the
+    image of the operator that was made with that noise. ``weights`` (k, n_meas) is the
     (NᵀPN)⁻¹NᵀP. A lost row is a direction with a single one in it.
     """
 
@@ -35,7 +35,7 @@ class Blind:
         Raises
         ------
         DataError
-            When what is left tells too little.
+            When too few measurements remain.
         """
         basis = _independent(directions)
         carried = precision @ basis
@@ -48,10 +48,11 @@ class Blind:
         return cls(basis, cho_solve(factor, carried.T, check_finite=False))
 
     def without_free(self, seen: FloatArray, fitted: FloatArray) -> Self:
-        """The same, and images that the operator's prior leaves free are left out.
+        """The same, and without the images in the null space of the operator's prior.
 
         Such an image, as Laplace's constant, is fitted whatever it costs, and nothing in P tells
-        of it: along what it does to the data P is zero, so that it cannot be told from noise there.
+        of it: along what it does to the data P is zero, so that it cannot be distinguished from
+        noise there.
 
         Parameters
         ----------
@@ -60,8 +61,10 @@ class Blind:
         fitted
             (k, n_meas): how large the operator makes each of them.
         """
-        known = fitted - (fitted @ self.directions) @ self.weights
-        return type(self)(np.hstack([self.directions, seen]), np.concatenate([self.weights, known]))
+        weights = fitted - (fitted @ self.directions) @ self.weights
+        return type(self)(
+            np.hstack([self.directions, seen]), np.concatenate([self.weights, weights])
+        )
 
     @property
     def count(self) -> int:

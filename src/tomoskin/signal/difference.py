@@ -1,10 +1,13 @@
-"""Difference data: what the linear operators are fed with."""
+"""Difference data: what the linear operators are fed with; between frames, and in phase."""
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
-from tomoskin.core import DataError, FloatArray
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import DataError, FloatArray, IntArray
 
 DIFFERENCES = ("plain", "normalised")
 
@@ -24,7 +27,7 @@ def difference(values: FloatArray, reference: FloatArray, kind: str) -> FloatArr
     Raises
     ------
     DataError
-        When shapes differ, the kind is not known, or a reference of zero would divide.
+        When shapes differ, the kind is unknown, or a reference of zero would divide.
     """
     if kind not in DIFFERENCES:
         raise DataError(f'expected a difference among {", ".join(DIFFERENCES)}, got "{kind}"')
@@ -53,3 +56,77 @@ def difference_noise(noise: FloatArray, reference: FloatArray, kind: str) -> Flo
     ``noise`` and ``reference`` are (n_meas,) V; the result is V, or a ratio when normalised.
     """
     return noise if kind == "plain" else np.asarray(noise / np.abs(reference))
+
+
+class Consecutive:
+    """Differences between consecutive frames, for fast changes; no reference is needed.
+
+    ``kind`` is "plain" or "normalised" (by the frame before). Raises DataError for another one.
+    """
+
+    def __init__(self, kind: str = "plain") -> None:
+        if kind not in DIFFERENCES:
+            raise DataError(f'expected a difference among {", ".join(DIFFERENCES)}, got "{kind}"')
+        self.kind = kind
+        self._last: FloatArray | None = None
+
+    def push(self, values: FloatArray) -> FloatArray | None:
+        """(n_meas,) change since the last frame of ``values`` (n_meas,) V; None for the first.
+
+        Raises
+        ------
+        DataError
+            As :func:`difference`, or when a value is not finite; the last frame then stays.
+        """
+        finite = np.isfinite(values)
+        if not finite.all():
+            raise DataError(f"expected finite voltages; rows {np.flatnonzero(~finite)} are not")
+        change = None if self._last is None else difference(values, self._last, self.kind)
+        self._last = np.array(values)
+        return change
+
+
+def at_one_time(previous: FloatArray, current: FloatArray, drive_index: IntArray) -> FloatArray:
+    """Rows of a scan as they would have been read together, when its first drive was.
+
+    Drives follow each other while the sheet moves; each row is interpolated linearly between
+    the two scans (Yerworth & Bayford 2013).
+
+    Parameters
+    ----------
+    previous, current
+        (n_meas,) V of two consecutive scans.
+    drive_index
+        (n_meas,) drive of each row, ``Pattern.drive_index``.
+
+    Raises
+    ------
+    DataError
+        When the shapes differ.
+    """
+    if not previous.shape == current.shape == drive_index.shape:
+        raise DataError(
+            f"expected two scans of {drive_index.shape}, got {previous.shape} and {current.shape}"
+        )
+    late = drive_index / (drive_index.max() + 1)
+    return np.asarray(current - late * (current - previous))
+
+
+def in_phase(
+    values: NDArray[Any], reference: NDArray[Any], model: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Rotate by the instrument's phase and keep the real part.
+
+    The phase is one for all rows: that of Σ model · reference, so that each row keeps its sign.
+
+    Parameters
+    ----------
+    values, reference
+        (n_frames, n_meas) and (n_meas,), complex or real (then they pass unchanged).
+    model
+        (n_meas,) V, what a real model expects of the reference.
+    """
+    if not (np.iscomplexobj(values) or np.iscomplexobj(reference)):
+        return values, reference
+    phase = np.exp(-1j * np.angle(np.nansum(model * reference)))
+    return (values * phase).real, (reference * phase).real

@@ -15,7 +15,7 @@ from scipy.optimize import nnls
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.pattern import Pattern
-from tomoskin.signal.roles import Mask, Roles
+from tomoskin.signal.health import Mask, Roles
 
 SIGMAS = 6.0
 """A Gaussian value goes beyond so many deviations once in 10⁹ (one side): with 208 rows at 20
@@ -26,7 +26,7 @@ _DEAD_DRIVE, _DEAD_PAIR = 0.45, 0.05
 silent drive live, of 13 or of 5; nothing that is pressed makes half of them silent."""
 
 _FEWEST = 3
-"""Rows that a group must have to be told dead."""
+"""Rows that a group must have to be called dead."""
 
 _LEAK = 0.03
 """Part of its voltage at rest that a dead group may still show: an amplifier's common mode."""
@@ -50,7 +50,7 @@ class Groups:
     shares
         (n_groups, n_meas): averages over the rows of a group that live at rest; drives first.
     dead_below
-        (n_groups,) part of these that must live; 0 where a group cannot be told.
+        (n_groups,) part of these that must live; 0 where a group cannot be judged.
     limit
         (n_meas,) V under which a row does not live: noise, or what leaks.
     n_drives, pairs
@@ -119,10 +119,10 @@ class Reciprocity:
     @classmethod
     def of(cls, pattern: Pattern) -> Reciprocity:
         """All pairs of a pattern; there may be none."""
-        place = {}
+        number_of = {}
         rows = np.hstack([pattern.drive, pattern.measure])
         for number, row in enumerate(rows.tolist()):
-            place[tuple(row)] = number
+            number_of[tuple(row)] = number
         found = []
         for number, (source, sink, plus, minus) in enumerate(rows.tolist()):
             for a, b, c, d, sign in (
@@ -131,7 +131,7 @@ class Reciprocity:
                 (plus, minus, sink, source, -1.0),
                 (minus, plus, sink, source, 1.0),
             ):
-                other = place.get((a, b, c, d), -1)
+                other = number_of.get((a, b, c, d), -1)
                 if other > number:
                     found.append((number, other, sign))
         table = np.array(found, dtype=float).reshape(-1, 3)

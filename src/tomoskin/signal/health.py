@@ -1,15 +1,25 @@
-"""What is wrong with electrodes, in records that a person and a program can read."""
+"""Electrode health, in records; the measurements of each electrode, and which are lost by it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tomoskin.core import FloatArray
+from tomoskin.pattern import Pattern
+
 STATES = ("good", "open", "short", "railed", "stuck", "noisy", "inconsistent")
 """States of an electrode. open: no current and no reading; railed: cannot be read, but drives;
 inconsistent: violates reciprocity."""
+
+_ALL = 0.9
+"""An electrode explains bad rows when at least this part of its own are bad: the rest may look
+well by chance."""
+
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,3 +67,75 @@ class Health:
         """What is wrong, in a sentence, or None."""
         sick = self.sick
         return "; ".join(e.text for e in sick) if sick else None
+
+
+@dataclass(frozen=True, eq=False)
+class Roles:
+    """(n_electrodes, n_meas) bool: rows in which each electrode is driven, and is read."""
+
+    drives: Mask
+    reads: Mask
+
+    @classmethod
+    def of(cls, pattern: Pattern) -> Self:
+        """Of a pattern's rows."""
+        each = np.arange(pattern.n_electrodes)[:, None, None]
+        return cls((pattern.drive == each).any(axis=2), (pattern.measure == each).any(axis=2))
+
+    def blamed(self, bad: Mask) -> dict[int, str]:
+        """Electrode → "open" or "railed": the fewest that explain the ``bad`` rows, (n_meas,).
+
+        Greedy cover, then without those that the others make superfluous: between two broken
+        electrodes stands a good one whose every row is bad.
+        """
+        offers = self._offers(bad)
+        chosen: dict[int, str] = {}
+        unexplained = bad.copy()
+        while offers:
+            best = max(offers, key=lambda e: int((offers[e][1] & unexplained).sum()))
+            state, rows = offers.pop(best)
+            if not (rows & unexplained).any():
+                break
+            chosen[best] = state
+            unexplained &= ~rows
+        for electrode in list(chosen):
+            others = [self.rows(e, s) for e, s in chosen.items() if e != electrode]
+            mine = bad & self.rows(electrode, chosen[electrode])
+            if others and not (mine & ~np.any(others, axis=0)).any():
+                del chosen[electrode]
+        return chosen
+
+    def rows(self, electrode: int, state: str) -> Mask:
+        """(n_meas,) rows that an electrode in that state takes with it."""
+        reads = self.reads[electrode]
+        return np.asarray(reads if state in ("railed", "stuck") else reads | self.drives[electrode])
+
+    def _offers(self, bad: Mask) -> dict[int, tuple[str, Mask]]:
+        driven, read = _share(self.drives, bad), _share(self.reads, bad)
+        offers = {}
+        for electrode in np.flatnonzero((driven >= _ALL) | (read >= _ALL)).tolist():
+            state = "open" if driven[electrode] >= _ALL else "railed"
+            offers[electrode] = (state, self.rows(electrode, state))
+        return offers
+
+
+def _share(rows: Mask, bad: Mask) -> FloatArray:
+    count = rows.sum(axis=1)
+    return np.asarray((rows & bad).sum(axis=1) / np.maximum(count, 1) * (count > 0))
+
+
+def lost_directions(pattern: Pattern, lost: Mask, floating: Mask) -> FloatArray:
+    """(n_meas, k) nuisance directions of the data.
+
+    A ``lost`` row, (n_meas,) bool, is one. A reading of a ``floating`` electrode,
+    (n_electrodes,) bool, is an unknown number that the rows of its drive share: their sum, the
+    voltage between its neighbours, still counts.
+    """
+    single = np.eye(pattern.n_meas)[:, lost]
+    shared = []
+    for electrode in np.flatnonzero(floating).tolist():
+        plus, minus = (pattern.measure == electrode).T.astype(float)
+        sign = np.where(lost, 0.0, plus - minus)
+        for drive in np.unique(pattern.drive_index[sign != 0]):
+            shared.append(np.where(pattern.drive_index == drive, sign, 0.0))
+    return np.column_stack([single, *shared])

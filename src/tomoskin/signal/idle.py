@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.signal.roles import Mask
+from tomoskin.signal.health import Mask
 
 BLOCK = 32
 """Idle frames in a row that are looked at together."""
@@ -46,7 +46,7 @@ class Idle:
     drift
         (n_meas,) V²/s: variance that the skin at rest gains per second, as a random walk.
     blocks
-        Whole blocks until now.
+        Full blocks until now.
     """
 
     def __init__(
@@ -64,15 +64,15 @@ class Idle:
         self._levels: list[tuple[int, FloatArray]] = []
         self._stretch, self._stride, self._since = 0, 1, 0
         self.drift = self._drift()
-        self._begin_anew()
+        self._start_block()
 
     def interrupt(self) -> None:
         """Something touched: the next block does not follow upon the last."""
         if self._count or self._last_mean is not None:
             self._stretch += 1
-            self._begin_anew()
+            self._start_block()
 
-    def _begin_anew(self) -> None:
+    def _start_block(self) -> None:
         self._count = 0
         self._sum = np.zeros_like(self.noise)
         self._squares = np.zeros_like(self.noise)
@@ -91,7 +91,7 @@ class Idle:
     def push(self, values: FloatArray, time: float, lost: Mask) -> bool:
         """Take an idle frame, (n_meas,) V at ``time`` s; True where it ended a block.
 
-        ``lost`` rows, (n_meas,) bool, say nothing; a block with other lost rows begins anew.
+        ``lost`` rows, (n_meas,) bool, do not count; with other lost rows the block starts again.
         """
         if self._lost is not None and lost is not self._lost and (lost != self._lost).any():
             self.interrupt()
@@ -126,17 +126,17 @@ class Idle:
 
     def _learn_noise(self, variance: FloatArray, lost: Mask) -> None:
         total = self._weight + BLOCK
-        known = (self._weight * self.noise**2 + BLOCK * variance) / total
-        known = np.where(lost, self.noise**2, known)
-        floor = (_QUIET * np.median(np.sqrt(known))) ** 2
-        self.noise = np.sqrt(np.maximum(known, np.maximum(floor, self._least)))
+        learnt = (self._weight * self.noise**2 + BLOCK * variance) / total
+        learnt = np.where(lost, self.noise**2, learnt)
+        quietest = (_QUIET * np.median(np.sqrt(learnt))) ** 2
+        self.noise = np.sqrt(np.maximum(learnt, np.maximum(quietest, self._least)))
         self._weight = min(total, float(_MEMORY))
 
     def _learn_drift(self, step: FloatArray) -> None:
         self._span = BLOCK * self.interval
         excess = step**2 - 2.0 * self.noise**2 / BLOCK
         common = self.noise**2 * float(np.mean(excess / self.noise**2))
-        fresh = (excess + common) / 2.0  # a row's own is known badly, the mean of all is not
+        fresh = (excess + common) / 2.0  # a row's own is uncertain, the mean of all is not
         self._steps = fresh if self._steps is None else self._steps + (fresh - self._steps) / 8.0
 
     def _keep(self, level: FloatArray) -> None:
@@ -165,8 +165,8 @@ class Idle:
         beyond = directions[:MODES][singular[:MODES] > _EDGE * edge]
         whitened = signatures / self.noise[:, None]
         whitened /= np.maximum(np.linalg.norm(whitened, axis=0), 1e-300)
-        alike = np.abs(beyond @ whitened).max(axis=1)
-        return np.asarray((beyond[alike < _TOUCHLIKE] * self.noise).T)
+        cosine = np.abs(beyond @ whitened).max(axis=1)
+        return np.asarray((beyond[cosine < _TOUCHLIKE] * self.noise).T)
 
     def _centred(self) -> FloatArray:
         """(m, n_meas) levels in deviations of a frame, each about the mean of its stretch."""

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.signal.evidence import Groups, Reciprocity, sign_limit, unchanged
-from tomoskin.signal.health import ElectrodeHealth, Health
+from tomoskin.signal.health import ElectrodeHealth, Health, Mask, Roles
 from tomoskin.signal.reference import Reference
-from tomoskin.signal.roles import Mask, Roles
 
 ENTER = 2
 """Frames in a row that must blame an electrode before it is called sick."""
@@ -36,7 +35,7 @@ rather than noisy."""
 
 _BIASED = 9.0
 """The same for an error that stands still: three times the noise. Channels differ by that much
-where the noise is low, and less harms a picture no more than noise."""
+where the noise is low, and less harms an image no more than noise."""
 
 _FROZEN = 1e-9
 """Chance under which samples that do not change are called stuck, given how many others do."""
@@ -64,7 +63,7 @@ class Monitor:
     scan
         The samples that rows are made of; without it samples are not looked at.
     rank
-        (n_electrodes,) place of each electrode along the rim; None for their order.
+        (n_electrodes,) rank of each electrode along the rim; None for their order.
     """
 
     def __init__(
@@ -164,8 +163,8 @@ class Monitor:
             self._blamed[e] = self._blamed[e] + 1 if here else 0
             self._cleared[e] = 0 if here else self._cleared[e] + 1
             if here and self._blamed[e] >= ENTER:
-                now, known = found[e], self._sick.get(e)
-                if known is None or known.state != now.state:
+                now, before = found[e], self._sick.get(e)
+                if before is None or before.state != now.state:
                     self._sick[e] = replace(now, since=time)
             elif e in self._sick and self._cleared[e] >= LEAVE:
                 del self._sick[e]
@@ -265,7 +264,7 @@ def _short_text(other: int) -> str:
 
 
 def _known(reference: Reference, model: FloatArray) -> FloatArray:
-    """(n_meas,) V of noise, above zero; endless where it is not known, which blames nobody."""
+    """(n_meas,) V of noise, above zero; infinite where it is unknown, which blames no electrode."""
     if not (reference.noise_is_known and reference.noise.all()):
         return np.full(len(model), np.inf)
     return np.maximum(reference.noise, 1e-6 * float(np.sqrt(np.mean(model**2))))

@@ -1,16 +1,63 @@
-"""Raw counts of a frame → volts in the pattern's order."""
+"""Raw counts of a frame → volts in the pattern's order; figures of the simulated board."""
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass
+from importlib.resources import files
 from typing import Self
 
 import numpy as np
 
 from tomoskin.core import DataError, Frame, Voltages
 from tomoskin.pattern import Scan
-from tomoskin.signal.board import FIGURES
 from tomoskin.skin import ReadoutSettings
+
+
+@dataclass(frozen=True, slots=True)
+class BoardFigures:
+    """The board as simulated.
+
+    Attributes
+    ----------
+    noise
+        Standard deviation of one conversion before it is rounded, LSB.
+    input_noise, amplifier_noise
+        The same at the amplifier's input, V; that of amplifier and current alone, V.
+    compliance
+        Most that the current source drives its load with, V.
+    output_resistance, switch_resistance
+        Across the current source; of a switch, the mean of high and low side, Ω.
+    low_rail, high_rail
+        Least and largest output of the amplifier, V.
+    time_constant, settling
+        Of a channel after a switch of the drive; until it is within half an LSB, s.
+    current_error
+        Largest relative error into 0.5 to 20 Ω.
+    peak
+        Largest current into the skin at a switch over the nominal one.
+    """
+
+    noise: float
+    input_noise: float
+    amplifier_noise: float
+    compliance: float
+    output_resistance: float
+    switch_resistance: float
+    low_rail: float
+    high_rail: float
+    time_constant: float
+    settling: float
+    current_error: float
+    peak: float
+
+
+FIGURES = BoardFigures(
+    **tomllib.loads(files("tomoskin.signal").joinpath("board.toml").read_text(encoding="utf-8"))[
+        "board"
+    ]
+)
+
 
 CONVERSION_NOISE = FIGURES.noise
 """Standard deviation of one conversion before it is rounded, in LSB, of the simulated board;
@@ -44,7 +91,7 @@ class Readout:
 
     @classmethod
     def of(cls, scan: Scan, settings: ReadoutSettings) -> Self:
-        """Read-out of a skin; one count of each summed reading is left as margin at the rails."""
+        """Read-out of a skin; one count of each summed reading is kept as margin at the rails."""
         levels = 1 << settings.adc_bits
         n = settings.oversampling
         volts = settings.reference_voltage / (levels * settings.gain * n)

@@ -1,4 +1,4 @@
-"""A recording that is whole in memory: frames of voltages with their own table of rows."""
+"""A recording in memory: frames of voltages with their own table of rows."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ class Recording:
     reference
         (n_rows,) the file's own reference, or None.
     labels
-        (n_frames, 2) m, known places of a single touch, or None.
+        (n_frames, 2) m, positions of a single touch, or None.
     is_change
         True when the file holds differences (``dv``) rather than voltages.
     source
         Where it came from, for messages.
     notes
-        What of the file was left out, in sentences.
+        What of the file was omitted, in sentences.
     idle
-        Frames at the beginning that are known to be of the untouched skin; 1 where it is assumed.
+        Frames at the beginning that show the untouched skin; 1 where that is assumed.
     """
 
     voltages: NDArray[Any]

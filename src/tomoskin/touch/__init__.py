@@ -3,18 +3,16 @@
 from typing import Any
 
 from tomoskin._moved import moved
-from tomoskin.touch.design.compare import Variant, variants
-from tomoskin.touch.design.promise import Demand, Promise, promise
+from tomoskin.touch.design import Demand, Promise, Variant, promise, variants
 from tomoskin.touch.fit.finder import SpotFinder, SpotModel
 from tomoskin.touch.fit.noise import Whitener, measured_covariance
 from tomoskin.touch.fit.pace import LIVE, WHOLE, Pace
 from tomoskin.touch.fit.spot import Response, Spots, spots_of
-from tomoskin.touch.floor import NoiseFloor
+from tomoskin.touch.image_noise import NoiseFloor
 from tomoskin.touch.region import Region
 from tomoskin.touch.segment import Segmenter
 from tomoskin.touch.tracking.settings import STILL, TrackSettings
-from tomoskin.touch.tracking.tracker import Tracker
-from tomoskin.touch.tracking.words import TouchEvent
+from tomoskin.touch.tracking.tracker import TouchEvent, Tracker
 
 __all__ = [
     "LIVE",

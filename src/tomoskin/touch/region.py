@@ -1,4 +1,4 @@
-"""Where a touch may be: a polygon, its own unit of length, and a grid of places in it."""
+"""Where a touch may be: a polygon, its own unit of length, and a grid of positions in it."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from scipy.spatial import ConvexHull, QhullError
 from tomoskin.core import DataError, FloatArray
 from tomoskin.skin import Skin
 
-_PLACES = 1500
-"""Places in the grid, unless another number is asked for."""
+_POSITIONS = 1500
+"""Positions in the grid, unless another number is asked for."""
 
 _CORNERS = 120
 """Corners of a round outline."""
@@ -27,8 +27,8 @@ _BEYOND = 1.5
 class Region:
     """A polygon with the corners ``outline`` (k, 2) m.
 
-    Inside the locator a place is measured from ``centre`` in units of ``unit``, the radius of the
-    disc of the same area.
+    Inside the locator a position is measured from ``centre`` in units of ``unit``, the radius of
+    the disc of the same area.
     """
 
     outline: FloatArray
@@ -75,24 +75,24 @@ class Region:
         return float(np.sqrt(abs(_area(self.outline)) / np.pi))
 
     def scaled(self, xy: FloatArray) -> FloatArray:
-        """Places (n, 2) m in the locator's own unit."""
+        """Positions (n, 2) m in the locator's own unit."""
         return np.asarray((xy - self.centre) / self.unit)
 
-    def metres(self, places: FloatArray) -> FloatArray:
+    def metres(self, positions: FloatArray) -> FloatArray:
         """The reverse."""
-        return np.asarray(self.centre + self.unit * places)
+        return np.asarray(self.centre + self.unit * positions)
 
     def holds(self, xy: FloatArray) -> NDArray[np.bool_]:
-        """(n,) whether the places (n, 2) m are inside, by the even-odd rule."""
+        """(n,) whether the positions (n, 2) m are inside, by the even-odd rule."""
         a, b = self.outline, np.roll(self.outline, -1, axis=0)
         x, y = xy[:, 0, None], xy[:, 1, None]
         crosses = (a[:, 1] > y) != (b[:, 1] > y)
         rise = np.where(crosses, b[:, 1] - a[:, 1], 1.0)
-        left = x < (b[:, 0] - a[:, 0]) * (y - a[:, 1]) / rise + a[:, 0]
-        return np.asarray((crosses & left).sum(axis=1) % 2 == 1)
+        beside = x < (b[:, 0] - a[:, 0]) * (y - a[:, 1]) / rise + a[:, 0]
+        return np.asarray((crosses & beside).sum(axis=1) % 2 == 1)
 
     def beyond(self, xy: FloatArray) -> FloatArray:
-        """(n,) m by which the places (n, 2) m lie outside the outline; 0 for those inside."""
+        """(n,) m by which the positions (n, 2) m lie outside the outline; 0 for those inside."""
         start = self.outline
         side = np.roll(start, -1, axis=0) - start
         away = xy[:, None] - start
@@ -103,11 +103,11 @@ class Region:
 
     @cached_property
     def grid(self) -> FloatArray:
-        """(g, 2) places in the locator's unit, on a hexagonal lattice."""
-        return self.lattice(_PLACES)
+        """(g, 2) positions in the locator's unit, on a hexagonal lattice."""
+        return self.lattice(_POSITIONS)
 
     def lattice(self, n_places: int) -> FloatArray:
-        """The same with about so many places."""
+        """The same with about so many positions."""
         step = np.sqrt(2 * np.pi / (np.sqrt(3) * n_places))
         corners = self.scaled(self.outline)
         low, high = corners.min(axis=0), corners.max(axis=0)
@@ -115,8 +115,8 @@ class Region:
         y = np.arange(low[1], high[1] + step, step * np.sqrt(3) / 2)
         across, up = np.meshgrid(x, y)
         across[1::2] += step / 2
-        places = np.column_stack([across.ravel(), up.ravel()])
-        return places[self.holds(self.metres(places))]
+        positions = np.column_stack([across.ravel(), up.ravel()])
+        return positions[self.holds(self.metres(positions))]
 
 
 def _area(corners: FloatArray) -> float:

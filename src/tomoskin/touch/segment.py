@@ -1,4 +1,4 @@
-"""Finding touches in an image, as the source does (section 4.4.2, figure 4.6).
+"""Finding touches in an image, as the thesis does (section 4.4.2, figure 4.6).
 
 Threshold Γ1 of the extreme, Gaussian filter, threshold Γ2 of Γ1, connected regions; then the
 weighted centroid of each region, or its local maxima.
@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 from tomoskin.core import DataError, FloatArray, Image, IntArray, Reading
 from tomoskin.mesh import Mesh
 from tomoskin.skin import TouchSettings
-from tomoskin.touch.blur import REACH, Blur
-from tomoskin.touch.centroid import centroid, centroid_sd
-from tomoskin.touch.connect import connected, neighbour_table
-from tomoskin.touch.floor import NoiseFloor
+from tomoskin.touch.cells import REACH, Blur, connected, neighbour_table
+from tomoskin.touch.image_noise import NoiseFloor, centroid, centroid_sd
 from tomoskin.touch.tracking import HELD
 
 
@@ -39,11 +37,11 @@ class Segmenter:
         self._filter = Blur(mesh, settings.smoothing)
         self._neighbours = neighbour_table(mesh)
 
-    def __call__(self, picture: Image, floor: NoiseFloor | None = None) -> list[Reading]:
-        """Regions of ``picture``, strongest first.
+    def __call__(self, image: Image, floor: NoiseFloor | None = None) -> list[Reading]:
+        """Regions of ``image``, strongest first.
 
         With a ``floor``, a region counts where the image exceeds ``snr`` times its noise. Down to
-        :data:`HELD` of that it is said to be weak, as is what others outshine: enough for a touch
+        :data:`HELD` of that it is called weak, as is what others outshine: enough for a touch
         to go on, if not to begin.
 
         Raises
@@ -51,15 +49,15 @@ class Segmenter:
         DataError
             When image or floor are of another mesh.
         """
-        self._accept("image", picture.mesh_id)
+        self._accept("image", image.mesh_id)
         if floor is not None:
             self._accept("noise floor", floor.mesh_id)
-        image = _of_sign(picture.values, self.settings.sign)
-        strength = np.abs(image)
+        values = _of_sign(image.values, self.settings.sign)
+        strength = np.abs(values)
         limit = self.settings.gamma1 * strength.max()
         if not limit > 0:
             return []
-        filtered = self._filter(np.where(strength >= limit, image, 0.0))
+        filtered = self._filter(np.where(strength >= limit, values, 0.0))
         kept = np.flatnonzero(np.abs(filtered) >= self.settings.gamma2 * limit)
         significant = _significant(kept, strength, floor, HELD * self.settings.snr)
         if not significant.any():
@@ -67,14 +65,16 @@ class Segmenter:
         label = connected(kept, filtered > 0, self._neighbours)
         regions = [kept[label == number] for number in np.unique(label[significant])]
         if self.settings.position == "peak":
-            found = [r for cells in regions for r in self._extremes(cells, image, filtered, floor)]
+            detections = [
+                r for cells in regions for r in self._extremes(cells, values, filtered, floor)
+            ]
         else:
-            found = [self._centroid(cells, image, floor) for cells in regions]
-        found.sort(key=lambda reading: -abs(reading.peak))
-        found = found[: self.settings.max_touches]
+            detections = [self._centroid(cells, values, floor) for cells in regions]
+        detections.sort(key=lambda reading: -abs(reading.peak))
+        detections = detections[: self.settings.max_touches]
         if floor is None or self.settings.position == "peak":
-            return found
-        return [*found, *self._weaker(regions, image, floor)][: self.settings.max_touches]
+            return detections
+        return [*detections, *self._weaker(regions, values, floor)][: self.settings.max_touches]
 
     def _weaker(
         self, regions: list[IntArray], image: FloatArray, floor: NoiseFloor
@@ -133,9 +133,9 @@ class Segmenter:
     ) -> list[Reading]:
         """One reading at each cell where the filtered image exceeds all its neighbours'.
 
-        A level region has no such cell; its first highest one stands for it.
+        A level region has no such cell; its first highest one counts.
         """
-        height = np.append(np.abs(filtered), -1.0)  # the last stands for "no neighbour"
+        height = np.append(np.abs(filtered), -1.0)  # the last is for "no neighbour"
         above = height[cells] > height[self._neighbours[cells]].max(axis=1)
         above[np.argmax(height[cells])] = True
         area, snr = float(self.mesh.volumes[cells].sum()), _snr(cells, image, floor)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tomoskin.core import Frame
@@ -165,27 +166,12 @@ class TwinDevice:
         if isinstance(command, GetInfo):
             self._last_reply = encode(self._board.info(command.request))
         elif isinstance(command, GetScan | GetPattern):
-            self._last_reply = encode(self._held(command))
+            self._last_reply = encode(_held(command, self._scan, self._drives, self._format))
         elif identity != self._last:
             result, detail = self._run(command, now)
             self._last_reply = encode(Ack(command.request, payload[0], result, detail))
         self._last = identity
         self._out += self._last_reply
-
-    def _held(self, command: GetScan | GetPattern) -> Message:
-        scan, request = self._scan, command.request
-        if scan is None:
-            return Ack(request, type_byte(type(command)), Result.WRONG_CONFIGURATION, 0)
-        if isinstance(command, GetScan):
-            return HeldScan(
-                request, scan.configuration, scan.n_drives, scan.settling, scan.dead_time,
-                scan.oversampling, scan.prescaler, scan.current_limit, self._format,
-            )  # fmt: skip
-        if command.first >= scan.n_drives:
-            return Ack(request, type_byte(GetPattern), Result.BAD_VALUE, 1)
-        some = self._drives[command.first : command.first + _TOLD]
-        drives = tuple(drive or Drive(255, 255, 0) for drive in some)
-        return HeldPattern(request, scan.configuration, command.first, drives)
 
     def _run(self, command: Command, now: float) -> Verdict:
         match command:
@@ -209,25 +195,21 @@ class TwinDevice:
         return OK
 
     def _configure(self, command: SetScan | SetPattern | SetFormat) -> Verdict:
-        if isinstance(command, SetScan):
-            return self._set_scan(command)
-        if isinstance(command, SetPattern):
-            return self._set_pattern(command)
-        verdict = self._board.check_format(command, self._scan)
-        self._format = command.format if verdict == OK else self._format
-        return verdict
-
-    def _set_scan(self, command: SetScan) -> Verdict:
-        verdict = self._board.check_scan(command)
-        if verdict == OK:
-            self._scan, self._format = command, Format.SIXTEEN
-            self._drives = [None] * command.n_drives
-        return verdict
-
-    def _set_pattern(self, command: SetPattern) -> Verdict:
-        verdict = self._board.check_drives(command, self._scan)
-        if verdict == OK:
-            self._drives[command.first : command.first + len(command.drives)] = command.drives
+        match command:
+            case SetScan():
+                verdict = self._board.check_scan(command)
+                if verdict == OK:
+                    self._scan, self._format = command, Format.SIXTEEN
+                    self._drives = [None] * command.n_drives
+            case SetPattern():
+                verdict = self._board.check_drives(command, self._scan)
+                if verdict == OK:
+                    end = command.first + len(command.drives)
+                    self._drives[command.first : end] = command.drives
+            case SetFormat():
+                verdict = self._board.check_format(command, self._scan)
+                if verdict == OK:
+                    self._format = command.format
         return verdict
 
     def _start(self, command: Start, now: float) -> Verdict:
@@ -247,3 +229,25 @@ class TwinDevice:
 
     def _say(self, message: Message) -> None:
         self._out += encode(message)
+
+
+def _held(
+    command: GetScan | GetPattern,
+    scan: SetScan | None,
+    held: Sequence[Drive | None],
+    sample_format: Format,
+) -> Message:
+    """What the device holds, as it is asked for by ``command``."""
+    request = command.request
+    if scan is None:
+        return Ack(request, type_byte(type(command)), Result.WRONG_CONFIGURATION, 0)
+    if isinstance(command, GetScan):
+        return HeldScan(
+            request, scan.configuration, scan.n_drives, scan.settling, scan.dead_time,
+            scan.oversampling, scan.prescaler, scan.current_limit, sample_format,
+        )  # fmt: skip
+    if command.first >= scan.n_drives:
+        return Ack(request, type_byte(GetPattern), Result.BAD_VALUE, 1)
+    some = held[command.first : command.first + _TOLD]
+    drives = tuple(drive or Drive(255, 255, 0) for drive in some)
+    return HeldPattern(request, scan.configuration, command.first, drives)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from tomoskin.twin.bend import BendSettings
+from tomoskin.twin.circuit import ElectronicsSettings
 from tomoskin.twin.contact import ContactSettings
 from tomoskin.twin.line import LineSettings
 from tomoskin.twin.material import MaterialSettings
 from tomoskin.twin.parameters import documented
-from tomoskin.twin.readout import ElectronicsSettings
 from tomoskin.twin.settings import PRESETS, SOURCES
 
 _STAGES = (

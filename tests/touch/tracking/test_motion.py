@@ -7,15 +7,15 @@ import pytest
 from scipy.linalg import expm, solve_continuous_lyapunov
 
 from tomoskin.touch import TrackSettings
-from tomoskin.touch.tracking.motion import States, begun, distances, observed, predicted, updated
+from tomoskin.touch.tracking.motion import States, begin, distances, observe, predict, update
 from touch.tracking.readings import reading
 
 SETTINGS = TrackSettings()
 
 
 def state() -> States:
-    place, spread = observed([reading(0.01, -0.02)], SETTINGS)
-    return begun(place[0], spread[0], SETTINGS)
+    place, spread = observe([reading(0.01, -0.02)], SETTINGS)
+    return begin(place[0], spread[0], SETTINGS)
 
 
 @pytest.mark.parametrize("seconds", [0.001, 0.02, 0.3, 5.0])
@@ -29,14 +29,14 @@ def test_noise_is_that_of_the_stochastic_equation(seconds: float) -> None:
     step = both[2:, 2:].T
     grown = step @ both[:2, 2:]
     known = States(np.array([[0.0, 0.0, 0.1, 0.0]]), np.zeros((1, 4, 4)))
-    got = predicted(known, seconds, SETTINGS)
+    got = predict(known, seconds, SETTINGS)
     assert got.mean[0, [0, 2]] == pytest.approx(step @ [0, 0.1])
     assert got.covariance[0][np.ix_([0, 2], [0, 2])] == pytest.approx(grown, rel=1e-6)
     assert not got.covariance[0][np.ix_([0, 2], [1, 3])].any()
 
 
 def test_speed_does_not_grow_over_a_gap() -> None:
-    got = predicted(state(), 100.0, SETTINGS)
+    got = predict(state(), 100.0, SETTINGS)
     assert np.sqrt(got.covariance[0, 2, 2]) == pytest.approx(SETTINGS.speed)
     drift = np.array([[-1 / SETTINGS.turning]])
     lasting = solve_continuous_lyapunov(drift, -np.array([[2 * SETTINGS.speed**2 / 0.3]]))
@@ -44,15 +44,15 @@ def test_speed_does_not_grow_over_a_gap() -> None:
 
 
 def test_two_short_steps_are_one_long_one() -> None:
-    twice = predicted(predicted(state(), 0.1, SETTINGS), 0.2, SETTINGS)
-    once = predicted(state(), 0.3, SETTINGS)
+    twice = predict(predict(state(), 0.1, SETTINGS), 0.2, SETTINGS)
+    once = predict(state(), 0.3, SETTINGS)
     assert twice.covariance == pytest.approx(once.covariance)
 
 
 def test_the_update_is_the_mean_of_two_gaussians() -> None:
-    before = predicted(state(), 0.1, SETTINGS)
-    places, spreads = observed([reading(0.03, 0.0, sd_x=0.004, cov_xy=2e-6)], SETTINGS)
-    after = updated(before, places, spreads)
+    before = predict(state(), 0.1, SETTINGS)
+    places, spreads = observe([reading(0.03, 0.0, sd_x=0.004, cov_xy=2e-6)], SETTINGS)
+    after = update(before, places, spreads)
     prior = before.covariance[0, :2, :2]
     precision = np.linalg.inv(prior) + np.linalg.inv(spreads[0])
     mean = np.linalg.solve(
@@ -65,7 +65,7 @@ def test_the_update_is_the_mean_of_two_gaussians() -> None:
 
 
 def test_distances_are_mahalanobis() -> None:
-    places, spreads = observed([reading(0.03, 0.01, cov_xy=5e-7), reading(0, 0)], SETTINGS)
+    places, spreads = observe([reading(0.03, 0.01, cov_xy=5e-7), reading(0, 0)], SETTINGS)
     before = state()
     got = distances(before, places, spreads)
     for k in (0, 1):
@@ -76,4 +76,4 @@ def test_distances_are_mahalanobis() -> None:
 
 def test_no_time_changes_nothing() -> None:
     before = state()
-    assert predicted(before, 0.0, SETTINGS) is before
+    assert predict(before, 0.0, SETTINGS) is before

@@ -27,7 +27,7 @@ _BLOCK = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class IndentationResponses:
     """What presses at some places do to the transfer resistances of a skin.
 
     ``places`` (p, 2) m; ``changes`` (size, p, n, n) Ω of a press of each size; ``rest`` (n, n) Ω.
@@ -67,7 +67,7 @@ class Sheet:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class MappingLikelihood:
     """Labelled presses, and what they say of a wiring.
 
     Rows are compared in units of the noise, and by the root of their size: so rows that shout do
@@ -91,7 +91,7 @@ class Evidence:
         Independent readings that a press is worth.
     """
 
-    sheet: Sheet
+    sheet: IndentationResponses
     dv: FloatArray
     noise: FloatArray
     reference: FloatArray | None

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tomoskin.calibration.channel_mapping.evidence import (
-    Evidence,
-    Sheet,
+    IndentationResponses,
+    MappingLikelihood,
     agreement,
     likelihood,
     quiet_noise,
@@ -137,14 +137,14 @@ def solve_wiring(
     grid = region.metres(region.grid * 0.95)
     grid = grid[:: max(len(grid) // _ASKED, 1)]
     progress(0, 3)
-    sheet = Sheet.of(skin, np.vstack([presses.xy, grid]))
+    sheet = IndentationResponses.of(skin, np.vstack([presses.xy, grid]))
     progress(1, 3)
     n = len(presses)
     here = replace(sheet, places=presses.xy, changes=sheet.changes[:, :n])
     there = replace(sheet, places=grid, changes=sheet.changes[:, n:])
     sign = {"decrease": (1.0,), "increase": (-1.0,)}.get(skin.touch.sign, (1.0, -1.0))
     known = quiet_noise(presses.dv) if noise is None else noise
-    evidence = Evidence(here, presses.dv, known, reference, sign, _WORTH)
+    evidence = MappingLikelihood(here, presses.dv, known, reference, sign, _WORTH)
     told = len(sign) == 1 or reference is not None
     found = _searched(evidence, ring_of(skin), told)
     progress(2, 3)
@@ -163,7 +163,9 @@ def _checked(presses: Presses, skin: Skin) -> Presses:
     return presses
 
 
-def _searched(evidence: Evidence, ring: tuple[int, ...], told: bool) -> dict[Wiring, float]:
+def _searched(
+    evidence: MappingLikelihood, ring: tuple[int, ...], told: bool
+) -> dict[Wiring, float]:
     """Log-probability of the wirings that were looked at, prior included, not normalised."""
     polarities = (False, True) if told else (False,)
     frontier = [replace(w, reversed=r) for w in turns(ring) for r in polarities]
@@ -181,7 +183,11 @@ def _searched(evidence: Evidence, ring: tuple[int, ...], told: bool) -> dict[Wir
 
 
 def _weighed(
-    found: dict[Wiring, float], there: Sheet, noise: FloatArray, told: bool, presses: int
+    found: dict[Wiring, float],
+    there: IndentationResponses,
+    noise: FloatArray,
+    told: bool,
+    presses: int,
 ) -> WiringAnswer:
     """The likeliest, with those that no press at all could tell from it."""
     ranked = sorted(found, key=lambda w: -found[w])
@@ -207,7 +213,7 @@ def _weighed(
 
 
 def _contradicted(
-    evidence: Evidence, there: Sheet, wiring: Wiring
+    evidence: MappingLikelihood, there: IndentationResponses, wiring: Wiring
 ) -> tuple[tuple[int, float, float], ...]:
     """Presses that fit far better at another place than at their label."""
     extent = float(np.ptp(there.places, axis=0).max())

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.calibration.locator.process import LENGTHS, Likeness
-from tomoskin.calibration.locator.rotations import Modes, OrbitMaps, Rotations
+from tomoskin.calibration.locator.rotations import LikenessModes, OrbitMaps, Rotations
 from tomoskin.core import FloatArray, IntArray
 
 _SHARES = (0.0, 0.3, 0.6, 0.85)
@@ -48,11 +48,11 @@ class ChannelMaps:
         """
         ways = (turns, turns.reversed()) if turns.any else (turns,)
         angles = np.concatenate([way.angle for way in ways])
-        modes = [Modes.of(Likeness(length), places, angles) for length in LENGTHS]
+        modes = [LikenessModes.of(Likeness(length), places, angles) for length in LENGTHS]
         return max((cls._of(modes, features, way) for way in ways), key=lambda m: m.evidence)
 
     @classmethod
-    def _of(cls, modes: Sequence[Modes], features: FloatArray, turns: Rotations) -> Self:
+    def _of(cls, modes: Sequence[LikenessModes], features: FloatArray, turns: Rotations) -> Self:
         groups = tuple(np.flatnonzero(turns.orbit == orbit) for orbit in np.unique(turns.orbit))
         shares = _SHARES if turns.any else (0.0,)
         orbits = (
@@ -71,7 +71,7 @@ class ChannelMaps:
     def again(self, places: FloatArray, features: FloatArray) -> Self:
         """Maps of other presses with the same settings."""
         angle, lengths = self.turns.angle, {maps.modes.likeness for maps in self.orbits}
-        modes = {likeness: Modes.of(likeness, places, angle) for likeness in lengths}
+        modes = {likeness: LikenessModes.of(likeness, places, angle) for likeness in lengths}
         orbits = []
         for rows, maps in zip(self.groups, self.orbits, strict=True):
             theirs = modes[maps.modes.likeness]

@@ -73,7 +73,7 @@ _FLOOR = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class ModeFeatures:
+class PerChannelFeatures:
     """Features in the modes of the presses: ``rows`` (n, k) about their ``mean`` (k,), and the
     ``size`` (k,) of each row's signal and its ``noise`` over that, likeliest for the row alone.
     """
@@ -85,7 +85,7 @@ class ModeFeatures:
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class LikenessModes:
     """Presses at ``places`` (n, 2) in the ``axes`` (n, n) of their likeness, of ``weights`` (n,).
 
     ``common`` holds what a row and its turned copies share: functions of the turned place, whose
@@ -108,7 +108,7 @@ class Modes:
         seen = {angle: axes.T @ common(copy) for angle, copy in copies.items()}
         return cls(likeness, places, np.maximum(weights, 0.0), axes, common, seen)
 
-    def alone(self, features: FloatArray) -> ModeFeatures:
+    def alone(self, features: FloatArray) -> PerChannelFeatures:
         """What each row of ``features`` (n, k) tells by itself (Rasmussen & Williams 2006, 5.8)."""
         n, mean = features.shape[0], features.mean(axis=0)
         rows = self.axes.T @ (features - mean)
@@ -116,7 +116,7 @@ class Modes:
         size = (1 / spread).T @ rows**2 / n + _FLOOR
         log = -0.5 * n * np.log(size) - 0.5 * np.log(spread).sum(axis=0)[:, None]
         best = log.argmax(axis=0)
-        return ModeFeatures(mean, rows, size[best, np.arange(len(mean))], _RATIOS[best])
+        return PerChannelFeatures(mean, rows, size[best, np.arange(len(mean))], _RATIOS[best])
 
     def at(self, places: FloatArray) -> tuple[FloatArray, dict[float, FloatArray]]:
         """(g, n) of the likeness and, for each angle, (g, m) of what is common."""
@@ -134,7 +134,7 @@ class OrbitMaps:
     ``root`` (m, m): mean of g's coefficients and a root of their covariance.
     """
 
-    modes: Modes
+    modes: LikenessModes
     angles: FloatArray
     share: float
     mean: FloatArray
@@ -147,7 +147,9 @@ class OrbitMaps:
     evidence: float
 
     @classmethod
-    def of(cls, modes: Modes, alone: ModeFeatures, angles: FloatArray, share: float) -> Self:
+    def of(
+        cls, modes: LikenessModes, alone: PerChannelFeatures, angles: FloatArray, share: float
+    ) -> Self:
         """From rows that have been looked at alone, turned by ``angles``."""
         rows = alone.rows / np.sqrt(alone.size)
         spread = (1 - share) * modes.weights[:, None] + alone.noise
@@ -171,7 +173,7 @@ class OrbitMaps:
     def at(
         self, near: FloatArray, common: dict[float, FloatArray]
     ) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance, both (g, r), where :meth:`Modes.at` gave ``near`` and ``common``."""
+        """Mean and variance, both (g, r); ``near`` and ``common`` of :meth:`LikenessModes.at`."""
         own = 1 - self.share
         mean = own * near @ self.left
         variance = own * self.modes.likeness.variance + self.noise

@@ -21,25 +21,25 @@ def fisher_information(response: Response, spots: FloatArray, noise: Whitener) -
 
 
 def position_bound(response: Response, spots: FloatArray, noise: Whitener) -> FloatArray:
-    """(n, 2, 2) m²: least covariance of an unbiased estimate of each place from one frame.
+    """(n, 2, 2) m²: least covariance of an unbiased estimate of each position from one frame.
 
     Size and strength are unknown too: they are eliminated (Schur complement of the Fisher
-    information; Kay 1993, section 3.7). Infinite where a frame says nothing about the place.
+    information; Kay 1993, section 3.7). Infinite where a frame tells nothing of the position.
     The reference's own noise belongs into ``noise``: (1 + 1/n) times that of one frame.
     """
     information = fisher_information(response, spots, noise)
-    place, nuisance, across = (
+    position, nuisance, across = (
         information[:, :2, :2],
         information[:, 2:, 2:],
         information[:, 2:, :2],
     )
     size = np.sqrt(np.maximum(np.einsum("nii->ni", nuisance), 1e-300))
     even = nuisance / size[:, :, None] / size[:, None, :]
-    told = across / size[:, :, None]
-    left = place - told.swapaxes(1, 2) @ np.linalg.pinv(even, hermitian=True) @ told
-    bound = np.full(left.shape, np.inf)
-    known = np.linalg.eigvalsh(left)[:, 0] > 1e-12 * np.trace(place, axis1=1, axis2=2)
-    bound[known] = np.linalg.inv(left[known])
+    scaled = across / size[:, :, None]
+    reduced = position - scaled.swapaxes(1, 2) @ np.linalg.pinv(even, hermitian=True) @ scaled
+    bound = np.full(reduced.shape, np.inf)
+    finite = np.linalg.eigvalsh(reduced)[:, 0] > 1e-12 * np.trace(position, axis1=1, axis2=2)
+    bound[finite] = np.linalg.inv(reduced[finite])
     return bound
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.noise import Whitener
-from tomoskin.touch.fit.prior import Prior
+from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Weigh
 from tomoskin.touch.fit.spot import CONTENT, Response, spots_of
 
@@ -40,11 +40,13 @@ class Candidates:
     signatures: FloatArray
 
     @classmethod
-    def of(cls, response: Response, prior: Prior) -> Self:
+    def of(cls, response: Response, prior: SpotPrior) -> Self:
         """On a hexagonal grid, in three sizes."""
         mesh = response.spots.mesh
-        places = _places(mesh.centroids, _SPACING * prior.radius)
-        spots = np.concatenate([spots_of(places, size * prior.radius, -_FAINT) for size in _SIZES])
+        positions = _grid(mesh.centroids, _SPACING * prior.radius)
+        spots = np.concatenate(
+            [spots_of(positions, size * prior.radius, -_FAINT) for size in _SIZES]
+        )
         found = response.changes([spot[None] for spot in spots])
         content = spots[:, CONTENT].copy()
         spots[:, CONTENT] = 1.0
@@ -69,7 +71,7 @@ class Matched:
         return cls(spots, signatures, np.einsum("nr,nr->n", signatures, signatures))
 
     def weighed(self, weigh: Weigh) -> Self:
-        """The same where some directions are not known."""
+        """The same where some directions are unknown."""
         return self.of(self.spots, weigh(self.signatures.T).T)
 
     def ratios(
@@ -100,8 +102,8 @@ class Matched:
         return np.asarray(chosen)
 
 
-def _places(inside: FloatArray, step: float) -> FloatArray:
-    """(n, 2) hexagonal grid of places near cells whose centroids are ``inside``."""
+def _grid(inside: FloatArray, step: float) -> FloatArray:
+    """(n, 2) hexagonal grid of positions near cells whose centroids are ``inside``."""
     low, high = inside.min(axis=0), inside.max(axis=0)
     rows = np.arange(low[1], high[1] + step, step * math.sqrt(3) / 2)
     x = np.arange(low[0], high[0] + step, step)

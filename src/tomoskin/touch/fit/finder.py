@@ -13,15 +13,15 @@ from tomoskin.core import FloatArray, Reading, SkinError
 from tomoskin.forward import ForwardModel, State
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
+from tomoskin.touch.fit.anisotropy import with_anisotropy
 from tomoskin.touch.fit.candidates import Candidates, Matched
-from tomoskin.touch.fit.grain import grained
 from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.pace import WHOLE, Pace
-from tomoskin.touch.fit.prior import Prior
-from tomoskin.touch.fit.refine import Problem, Sheet, Weigh
-from tomoskin.touch.fit.search import Found, Search, joined
+from tomoskin.touch.fit.prior import SpotPrior
+from tomoskin.touch.fit.refine import Problem, SheetDomain, Weigh
+from tomoskin.touch.fit.residual import ResidualResponse
+from tomoskin.touch.fit.search import Search, SpotDetections, joined
 from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
-from tomoskin.touch.fit.trail import Trail
 
 _CELLS = 1500
 """Of the mesh that spots are fitted on: their profile is smooth, and a frame is quick."""
@@ -36,7 +36,7 @@ _REST = 0.5
 """A touch that stood still in the frame before moves, and grows, by this part of that at least."""
 
 _MASKS = 8
-"""Sets of blind directions whose whitening is kept."""
+"""Nuisance subspaces whose whitening is kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +57,8 @@ class SpotModel:
     """
 
     response: Response
-    prior: Prior
-    sheet: Sheet
+    prior: SpotPrior
+    sheet: SheetDomain
     candidates: Candidates
     scale: FloatArray
 
@@ -77,16 +77,16 @@ class SpotModel:
     @classmethod
     def _of(cls, state: State, normalised: bool) -> Self:
         response, mesh = Response(state), state.model.mesh
-        prior, n_meas = Prior.of(mesh), state.model.pattern.n_meas
+        prior, n_meas = SpotPrior.of(mesh), state.model.pattern.n_meas
         scale = 1 / np.abs(response.reference) if normalised else np.ones(n_meas)
-        return cls(response, prior, Sheet(mesh), Candidates.of(response, prior), scale)
+        return cls(response, prior, SheetDomain(mesh), Candidates.of(response, prior), scale)
 
     def as_told(self, reference: FloatArray) -> SpotModel:
         """The model of a sheet that conducts by direction as its ``reference`` (n_meas,) V tells.
 
-        Itself where the reference tells of no direction; see :mod:`tomoskin.touch.fit.grain`.
+        Itself where the reference tells of no direction; see :mod:`tomoskin.touch.fit.anisotropy`.
         """
-        state = grained(self.response.state, reference)
+        state = with_anisotropy(self.response.state, reference)
         if state is self.response.state:
             return self
         return self._of(state, bool((self.scale != 1.0).any()))
@@ -100,7 +100,7 @@ class SpotFinder:
     model
         Made once for the skin.
     skin
-        Whose ``[touch]`` says sign, snr and how many.
+        Whose ``[touch]`` states sign, snr and how many.
     mesh
         Of the images: readings name its cells.
     noise
@@ -127,7 +127,7 @@ class SpotFinder:
         self._model, self._settings, self._mesh = model, skin.touch, mesh
         self._pace, self._reach, self._unrest = pace, pace.speed * scan_time, 1.0
         self._fading = math.ceil(pace.fading / scan_time) if scan_time else 0
-        self._trail = Trail.none(len(model.scale))
+        self._residual = ResidualResponse.none(len(model.scale))
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
         self._before = np.zeros((0, N_PARAMETERS))
@@ -139,14 +139,14 @@ class SpotFinder:
         self._whiten = Whitener.of(noise / self._scale[:, None] / self._scale)
         self._matched: OrderedDict[bytes, tuple[Whitener, Matched]] = OrderedDict()
 
-    def push(self, dv: FloatArray, blind: FloatArray) -> list[Reading]:
+    def push(self, dv: FloatArray, nuisance: FloatArray) -> list[Reading]:
         """Touches of ``dv`` (n_meas,), strongest first.
 
-        ``blind`` (n_meas, k) are directions along which the data say nothing: columns of one row
-        each where rows are left out. There must be more rows than that.
+        ``nuisance`` (n_meas, k) spans the directions along which the data tell nothing of a
+        touch: a unit vector for each excluded row. There must be more rows than that.
         """
-        quiet, candidates = self._whitened(blind)
-        whiten, matched = self._with_trail(quiet, candidates)
+        quiet, candidates = self._whitened(nuisance)
+        whiten, matched = self._with_residual(quiet, candidates)
         problem = Problem(
             response=self._model.response,
             whiten=whiten,
@@ -162,7 +162,7 @@ class SpotFinder:
         self._unrest = self._unrest_of(found.fit.spots)
         self._before = found.fit.spots
         if self._fading:
-            self._trail = self._trail.after(self._before, self._model.response, self._fading)
+            self._residual = self._residual.after(self._before, self._model.response, self._fading)
         readings = self._readings(joined(found))
         readings.sort(key=lambda reading: -abs(reading.peak))
         return readings
@@ -175,42 +175,42 @@ class SpotFinder:
         moved = float(np.linalg.norm((spots - self._before)[:, :2], axis=1).max())
         return min(1.0, math.hypot(_REST, moved / self._reach))
 
-    def _whitened(self, blind: FloatArray) -> tuple[Whitener, Matched]:
-        key = blind.tobytes()
+    def _whitened(self, nuisance: FloatArray) -> tuple[Whitener, Matched]:
+        key = nuisance.tobytes()
         if key not in self._matched:
-            whiten = self._whiten.without(blind / self._scale[:, None])
+            whiten = self._whiten.without(nuisance / self._scale[:, None])
             self._matched[key] = whiten, self._model.candidates.matched(whiten)
             if len(self._matched) > _MASKS:
                 self._matched.popitem(last=False)
         self._matched.move_to_end(key)
         return self._matched[key]
 
-    def _with_trail(self, whiten: Whitener, matched: Matched) -> tuple[Whitener, Matched]:
-        """The same where what touches have left behind them is noise."""
-        if not len(self._trail.spots):
+    def _with_residual(self, whiten: Whitener, matched: Matched) -> tuple[Whitener, Matched]:
+        """The same where residual responses are noise."""
+        if not len(self._residual.spots):
             return whiten, matched
-        weigh = Weigh.of(whiten(self._trail.directions.T).T)
+        weigh = Weigh.of(whiten(self._residual.directions.T).T)
         return Whitener(weigh(whiten.matrix)), matched.weighed(weigh)
 
-    def _readings(self, found: Found) -> list[Reading]:
+    def _readings(self, found: SpotDetections) -> list[Reading]:
         spots = found.fit.spots
         depth = self._unit * np.expm1(depth_of(spots)) if len(spots) else np.zeros(0)
         return [self._reading(spots[k], float(depth[k]), found, k) for k in range(len(spots))]
 
-    def _reading(self, spot: FloatArray, peak: float, found: Found, k: int) -> Reading:
-        place = found.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
+    def _reading(self, spot: FloatArray, peak: float, found: SpotDetections, k: int) -> Reading:
+        block = found.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
         radius = float(np.exp(spot[LOG_RADIUS]))
         apart = np.linalg.norm(self._mesh.centroids - spot[:2], axis=1)
         cells = np.flatnonzero(apart <= max(radius, apart.min()))
         return Reading(
             x=float(spot[0]),
             y=float(spot[1]),
-            sd_x=float(np.sqrt(place[0, 0])),
-            sd_y=float(np.sqrt(place[1, 1])),
+            sd_x=float(np.sqrt(block[0, 0])),
+            sd_y=float(np.sqrt(block[1, 1])),
             area=float(np.pi * radius**2),
             peak=peak,
             cells=cells,
-            cov_xy=float(place[0, 1]),
+            cov_xy=float(block[0, 1]),
             snr=float(found.ratio[k]),
             close=bool(found.close[k]),
         )

@@ -47,9 +47,9 @@ class Whitener:
         return cls((direction[:, kept] / np.sqrt(variance[kept])).T / scale)
 
     def without(self, directions: FloatArray) -> Whitener:
-        """The same where data along ``directions`` (n_meas, k) say nothing: endless noise there.
+        """The same where ``directions`` (n_meas, k) are a nuisance subspace: unbounded noise there.
 
-        A row that is left out is a direction with a single one in it.
+        An excluded row is a direction with a single one in it.
         """
         if not directions.shape[1]:
             return self
@@ -90,7 +90,7 @@ def measured_covariance(
     scan
         Which sample is in which row.
     sd
-        (n_meas,) V, standard deviation of each row over the idle frames; NaN where not known.
+        (n_meas,) V, standard deviation of each row over the idle frames; NaN where unknown.
     predicted
         Standard deviation of a row by the read-out alone, V: counts where nothing was measured.
     step

@@ -14,15 +14,15 @@ class Pace:
     warm
         Steps from the touches of the frame before.
     glance, cold
-        Steps from each of the places where a new touch may begin, and then from the best one.
+        Steps from each of the positions where a new touch may begin, and then from the best one.
     tries
         New touches that are tried in a frame.
-    anew
+    restart
         Whether a frame that does not go on as it was is looked at without what was there too.
     speed
         Of touches along each axis, standard deviation, m/s; 0 where they are taken to stand still.
     fading
-        Seconds for which what touches have left behind them counts as noise; 0 where frames do
+        Seconds for which residual responses of touches count as noise; 0 where frames do
         not follow each other.
     """
 
@@ -30,13 +30,13 @@ class Pace:
     glance: int
     cold: int
     tries: int
-    anew: bool
+    restart: bool
     speed: float
     fading: float
 
 
-WHOLE = Pace(warm=6, glance=15, cold=0, tries=5, anew=True, speed=0.0, fading=0.0)
+WHOLE = Pace(warm=6, glance=15, cold=0, tries=5, restart=True, speed=0.0, fading=0.0)
 """Each frame as if it were the only one, of touches that stand still."""
 
-LIVE = Pace(warm=4, glance=1, cold=4, tries=1, anew=False, speed=0.1, fading=4.0)
+LIVE = Pace(warm=4, glance=1, cold=4, tries=1, restart=False, speed=0.1, fading=4.0)
 """What is not found in this frame is found in the next: one more touch a frame."""

@@ -26,8 +26,8 @@ _MOST_DEPTH = 3.0
 
 
 @dataclass(frozen=True)
-class Prior:
-    """Each spot alone: its place even over the sheet, radius log-normal, content normal.
+class SpotPrior:
+    """Each spot alone: its position even over the sheet, radius log-normal, content normal.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Prior:
         return cls(area, radius, _SPREAD, _DEPTH * FILLING * radius**2)
 
     def away(self, spots: FloatArray) -> FloatArray:
-        """(k, 4) deviations of spots (k, 4) from the prior's middle; places have none."""
+        """(k, 4) deviations of spots (k, 4) from the prior's middle; positions have none."""
         found = np.zeros_like(spots)
         found[:, LOG_RADIUS] = (spots[:, LOG_RADIUS] - math.log(self.radius)) / self.spread
         found[:, CONTENT] = spots[:, CONTENT] / self.content
@@ -62,7 +62,7 @@ class Prior:
 
     @property
     def weights(self) -> FloatArray:
-        """(4,) 1/deviation of each column; a place is known to be on the sheet."""
+        """(4,) 1/deviation of each column; a position is on the sheet."""
         wide = 1 / math.sqrt(self.area)
         return np.array([wide, wide, 1 / self.spread, 1 / self.content])
 

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from tomoskin.core import FloatArray
 from tomoskin.mesh import Mesh
 from tomoskin.touch.fit.noise import Whitener
-from tomoskin.touch.fit.prior import Prior
+from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.spot import CONTENT, N_PARAMETERS, Response, X, Y
 
 _SETTLED = 0.02
@@ -29,7 +29,7 @@ _DIRECTED = 0.7
 
 @dataclass(frozen=True, eq=False)
 class Weigh:
-    """Unknown amplitudes along some directions D, left out by integration.
+    """Unknown amplitudes along some directions D, marginalised (integrated out).
 
     Data then have the covariance 1 + DDᵀ; the inverse of its root is 1 − U(1 − 1/√(1 + s²))Uᵀ
     with the singular vectors U and values s of D.
@@ -63,9 +63,9 @@ class Fit:
     seen
         (r,) what the spots do to the whitened data.
     residual
-        (r,) whitened data less that, weighed for directions that are not known.
+        (r,) whitened data less that, weighed for unknown directions.
     jacobian
-        (r, 4k) of the whitened model, weighed alike.
+        (r, 4k) of the whitened model, weighed in the same way.
     weigh
         What does that.
     normal
@@ -94,7 +94,7 @@ class Fit:
 
     @property
     def degrees(self) -> int:
-        """Entries of the residual that are left for chance."""
+        """Degrees of freedom of the residual."""
         return max(len(self.residual) - len(self.normal), 1)
 
     @cached_property
@@ -102,7 +102,7 @@ class Fit:
         """Squares of the residual: about as many as it has entries where the model is right."""
         return float(self.residual @ self.residual)
 
-    def log_evidence(self, prior: Prior) -> float:
+    def log_evidence(self, prior: SpotPrior) -> float:
         """Logarithm of ∫ likelihood · prior by Laplace's method (MacKay 2003, eq. 28.5).
 
         Up to what all fits of the same data have in common.
@@ -110,8 +110,8 @@ class Fit:
         n = len(self.normal)
         sign, log_det = np.linalg.slogdet(self.normal) if n else (1.0, 0.0)
         volume = (n * math.log(2 * math.pi) - log_det) / 2 if sign > 0 else -np.inf
-        known = -self.misfit / 2 - self.weigh.log_size
-        return known + prior.log_density(self.spots) + volume
+        likelihood = -self.misfit / 2 - self.weigh.log_size
+        return likelihood + prior.log_density(self.spots) + volume
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +124,8 @@ class Problem:
 
     response: Response
     whiten: Whitener
-    prior: Prior
-    sheet: Sheet
+    prior: SpotPrior
+    sheet: SheetDomain
     sign: str
     reach: float
     grows: float
@@ -192,7 +192,7 @@ class Problem:
         return self.prior.held(self.sheet.held(spots), self.sign)
 
 
-class Sheet:
+class SheetDomain:
     """Where a touch may be: what leaves the mesh is brought back to its nearest cell."""
 
     def __init__(self, mesh: Mesh) -> None:

@@ -32,7 +32,7 @@ uneven, contacts and gains differ. A standard deviation, chosen on the twin's se
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class SpotDetections:
     """What explains a frame, and how sure each touch is.
 
     Attributes
@@ -70,8 +70,8 @@ class Search:
     pace
         How much is tried.
     quiet
-        What makes data white where nothing has been: by that noise readings say how far they stand
-        out, while by the problem's it is decided whether they are touches.
+        What makes data white where nothing has been: by that noise detections state how far they
+        stand out; by the problem's it is decided whether they are touches.
     """
 
     problem: Problem
@@ -81,16 +81,16 @@ class Search:
     pace: Pace
     quiet: Whitener
 
-    def __call__(self, before: FloatArray) -> Found:
+    def __call__(self, before: FloatArray) -> SpotDetections:
         """Touches of the frame; ``before`` (k, 4) are those of the last one."""
         kept = self._pruned(self._started(before))
         tries = self.pace.tries - (len(before) - len(kept.spots) if len(kept.spots) else 0)
         fit, tried = self._more(kept, tries)
         if tries > tried == 0:
             fit = self._fewer(fit)
-        if self.pace.anew and len(before) and (len(fit.spots) != len(before) or not fit.settled):
-            anew, _ = self._more(self.problem.nothing(), self.pace.tries)
-            fit = max(anew, fit, key=self._evidence)
+        if self.pace.restart and len(before) and (len(fit.spots) != len(before) or not fit.settled):
+            fresh, _ = self._more(self.problem.nothing(), self.pace.tries)
+            fit = max(fresh, fit, key=self._evidence)
         return self._judged(fit)
 
     def _evidence(self, fit: Fit) -> float:
@@ -112,8 +112,7 @@ class Search:
         return fit
 
     def _without(self, fit: Fit, number: int) -> Fit:
-        left = np.delete(fit.spots, number, axis=0)
-        return self._started(left)
+        return self._started(np.delete(fit.spots, number, axis=0))
 
     def _fewer(self, fit: Fit) -> Fit:
         """Without the weakest of several spots, where that explains the frame as well."""
@@ -132,7 +131,7 @@ class Search:
             best = int(ratio.argmax())
             if ratio[best] < self._threshold(fit, HELD if not len(fit.spots) else _DOUBTFUL):
                 return fit, tried
-            more = self._best(self._starts(fit, self.matched.spot(best, content)))
+            more = self._best(_starts(fit, self.matched.spot(best, content)))
             worth = self._ratios(more).min() >= self._threshold(fit, 1.0)
             if not worth or self._evidence(more) <= self._evidence(fit):
                 return fit, tried + 1
@@ -141,25 +140,11 @@ class Search:
 
     def _threshold(self, fit: Fit, part: float) -> float:
         """What a wrong profile may leave adds to the noise."""
-        left = _MISSHAPEN * float(np.linalg.norm(fit.seen))
-        return part * self.least * float(np.hypot(1.0, left / self.least))
+        misshapen = _MISSHAPEN * float(np.linalg.norm(fit.seen))
+        return part * self.least * float(np.hypot(1.0, misshapen / self.least))
 
     def _standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
         return self.matched.ratios(fit.residual, fit.jacobian, self.problem.sign)
-
-    def _starts(self, fit: Fit, fresh: FloatArray) -> list[FloatArray]:
-        """The new spot beside the others; or instead of half of the nearest."""
-        starts = [np.concatenate([fit.spots, fresh[None]])]
-        if len(fit.spots):
-            near = int(np.linalg.norm(fit.spots[:, :2] - fresh[:2], axis=1).argmin())
-            away = fresh[:2] - fit.spots[near, :2]
-            halves = np.tile(fit.spots[near], (2, 1))
-            reach = 0.7 * np.exp(fit.spots[near, LOG_RADIUS]) / max(np.linalg.norm(away), 1e-9)
-            halves[:, :2] += np.outer([-reach, reach], away)
-            halves[:, CONTENT] /= 2
-            halves[:, LOG_RADIUS] -= 0.3
-            starts.append(np.concatenate([np.delete(fit.spots, near, axis=0), halves]))
-        return starts
 
     def _best(self, starts: list[FloatArray]) -> Fit:
         seen = (self.problem.refined(start, self.pace.glance) for start in starts)
@@ -179,13 +164,13 @@ class Search:
             alone[number] -= basis @ (basis.T @ alone[number])
         return np.asarray(np.linalg.norm(alone, axis=1))
 
-    def _judged(self, fit: Fit) -> Found:
+    def _judged(self, fit: Fit) -> SpotDetections:
         k = len(fit.spots)
         if not k:
             none = np.zeros(0)
-            return Found(fit, none, np.zeros((0, 0)), none.astype(bool))
-        covariance = self._covariance(fit)
-        return Found(fit, self._standing(fit), covariance, self._close(fit))
+            return SpotDetections(fit, none, np.zeros((0, 0)), none.astype(bool))
+        covariance = _covariance(self.problem, fit)
+        return SpotDetections(fit, self._standing(fit), covariance, self._close(fit))
 
     def _standing(self, fit: Fit) -> FloatArray:
         """(k,) deviations of the quiet noise by which each spot stands out."""
@@ -193,31 +178,6 @@ class Search:
             return self._ratios(fit)
         problem = replace(self.problem, whiten=self.quiet)
         return replace(self, problem=problem)._ratios(problem.at(fit.spots))
-
-    def _covariance(self, fit: Fit) -> FloatArray:
-        """Curvature, scaled where the data scatter more than they should; and the model's part.
-
-        What a bell instead of our profile would change moves the estimate by ΣJᵀd: a parameter
-        that is not fitted but considered (Schmidt 1966). So is the part by which each row is off.
-        """
-        problem, scatter = self.problem, max(1.0, fit.misfit / fit.degrees)
-        other = problem.whiten(problem.response.changes([fit.spots], bell)[0])
-        wrong = fit.weigh(other - fit.seen)
-        moved = _SHAPE_DOUBT * (fit.covariance @ (fit.jacobian.T @ wrong))
-        return np.asarray(scatter * fit.covariance + np.outer(moved, moved) + self._uneven(fit))
-
-    def _uneven(self, fit: Fit) -> FloatArray:
-        """What rows that answer more or less than they should add to the covariance.
-
-        By how much is told by what the residual has beyond noise, where that is more than a sheet
-        is uneven as a rule: E[rᵀr] = degrees + u²‖(1 − JΣJᵀ)E‖², E the rows' answers one by one.
-        """
-        answers = self.problem.response.changes([fit.spots])[0]
-        each = fit.weigh(self.problem.whiten.matrix * answers)
-        moved = fit.covariance @ (fit.jacobian.T @ each)
-        left = float(np.sum((each - fit.jacobian @ moved) ** 2))
-        beyond = max(fit.misfit - fit.degrees, 0.0) / left if left else 0.0
-        return np.asarray(max(beyond, _UNEVEN**2) * (moved @ moved.T))
 
     def _close(self, fit: Fit) -> NDArray[np.bool_]:
         """Where a candidate within a radius of a spot stands out nearly enough."""
@@ -229,8 +189,50 @@ class Search:
         return np.asarray(apart < 2 * np.exp(fit.spots[:, LOG_RADIUS]))
 
 
-def joined(found: Found) -> Found:
-    """The same with each two touches as one whose places cannot be told apart (2 deviations)."""
+def _starts(fit: Fit, fresh: FloatArray) -> list[FloatArray]:
+    """The new spot beside the others; or instead of half of the nearest."""
+    starts = [np.concatenate([fit.spots, fresh[None]])]
+    if len(fit.spots):
+        near = int(np.linalg.norm(fit.spots[:, :2] - fresh[:2], axis=1).argmin())
+        away = fresh[:2] - fit.spots[near, :2]
+        halves = np.tile(fit.spots[near], (2, 1))
+        reach = 0.7 * np.exp(fit.spots[near, LOG_RADIUS]) / max(np.linalg.norm(away), 1e-9)
+        halves[:, :2] += np.outer([-reach, reach], away)
+        halves[:, CONTENT] /= 2
+        halves[:, LOG_RADIUS] -= 0.3
+        starts.append(np.concatenate([np.delete(fit.spots, near, axis=0), halves]))
+    return starts
+
+
+def _covariance(problem: Problem, fit: Fit) -> FloatArray:
+    """Curvature, scaled where the data scatter more than they should; and the model's part.
+
+    What a bell instead of our profile would change moves the estimate by ΣJᵀd: a parameter
+    that is not fitted but considered (Schmidt 1966). So is the part by which each row is off.
+    """
+    scatter = max(1.0, fit.misfit / fit.degrees)
+    other = problem.whiten(problem.response.changes([fit.spots], bell)[0])
+    wrong = fit.weigh(other - fit.seen)
+    moved = _SHAPE_DOUBT * (fit.covariance @ (fit.jacobian.T @ wrong))
+    return np.asarray(scatter * fit.covariance + np.outer(moved, moved) + _uneven(problem, fit))
+
+
+def _uneven(problem: Problem, fit: Fit) -> FloatArray:
+    """What rows that answer more or less than they should add to the covariance.
+
+    How much, is what the residual has beyond noise, where that is more than a sheet
+    is uneven as a rule: E[rᵀr] = degrees + u²‖(1 − JΣJᵀ)E‖², E the rows' answers one by one.
+    """
+    answers = problem.response.changes([fit.spots])[0]
+    each = fit.weigh(problem.whiten.matrix * answers)
+    moved = fit.covariance @ (fit.jacobian.T @ each)
+    unexplained = float(np.sum((each - fit.jacobian @ moved) ** 2))
+    beyond = max(fit.misfit - fit.degrees, 0.0) / unexplained if unexplained else 0.0
+    return np.asarray(max(beyond, _UNEVEN**2) * (moved @ moved.T))
+
+
+def joined(found: SpotDetections) -> SpotDetections:
+    """The same with each two touches as one whose positions are not distinct (2 deviations)."""
     spots, k = found.fit.spots, len(found.fit.spots)
     for i in range(k):
         for j in range(i + 1, k):
@@ -243,7 +245,7 @@ def joined(found: Found) -> Found:
     return found
 
 
-def _merged(found: Found, i: int, j: int) -> Found:
+def _merged(found: SpotDetections, i: int, j: int) -> SpotDetections:
     """Touches i and j as one, at the middle of their contents."""
     fit, keep = found.fit, np.delete(np.arange(len(found.fit.spots)), j)
     share = np.abs(fit.spots[[i, j], CONTENT])
@@ -263,4 +265,4 @@ def _merged(found: Found, i: int, j: int) -> Found:
     ratio[i] = np.hypot(*found.ratio[[i, j]])
     close = found.close.copy()
     close[i] = True
-    return Found(replace(fit, spots=spots[keep]), ratio[keep], covariance, close[keep])
+    return SpotDetections(replace(fit, spots=spots[keep]), ratio[keep], covariance, close[keep])

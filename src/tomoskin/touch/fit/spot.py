@@ -213,12 +213,12 @@ class Response:
     def changes(self, sets: Sequence[FloatArray], shape: Shape = profile) -> FloatArray:
         """(b, n_meas) V that each of some sets of spots (k, 4) adds to the reference.
 
-        By the local update of the forward model, or solved anew where many cells change.
+        By the local update of the forward model, or by a new solve where many cells change.
         """
         pressed = [self._pressed(*self.spots.change(spots, shape)) for spots in sets]
         if max(len(cells) for cells, _ in pressed) <= _FEW:
             return np.asarray(self.state.local.voltages_of(pressed) - self.reference)
-        return np.array([self._whole(*each).voltages for each in pressed]) - self.reference
+        return np.array([self._solved(*each).voltages for each in pressed]) - self.reference
 
     def jacobian(self, spots: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Change (n_meas,) V of spots (k, 4), and its derivatives (n_meas, 4k) by each column.
@@ -241,7 +241,7 @@ class Response:
         slopes = found[:, :N_PARAMETERS].reshape(-1, found.shape[2]).T
         return pressed.voltages - self.reference, slopes, found[:, N_PARAMETERS].T
 
-    def _whole(self, cells: IntArray, sigma: FloatArray) -> State:
+    def _solved(self, cells: IntArray, sigma: FloatArray) -> State:
         conductivity = self.state.conductivity.copy()
         conductivity[cells] = sigma
         return self.state.model.at(conductivity)

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from tomoskin.core import FloatArray
-from tomoskin.touch.tracking.assign import region_radius
-from tomoskin.touch.tracking.trace import Apart, Trace, content
+from tomoskin.touch.tracking.motion import region_radius
+from tomoskin.touch.tracking.trace import Trace, Unmerged, content
 
 _REACH = 2.0
 """A touch merges into a region, and comes out of it, within so many of its radii."""
@@ -27,7 +27,7 @@ _PASSING = 1.2
 have stopped, and come out where they went in."""
 
 
-def taken_up_by(lost: Trace, traces: Sequence[Trace]) -> Trace | None:
+def carrier_of(lost: Trace, traces: Sequence[Trace]) -> Trace | None:
     """The touch in whose region the ``lost`` one has been since it went missing, or None.
 
     A touch that is lifted leaves its neighbour as it was; one that has merged makes the
@@ -46,7 +46,7 @@ def _holds(trace: Trace, lost: Trace) -> bool:
     return trace.reading.close or _change(trace, before, lost) > _CHANGED
 
 
-def _change(trace: Trace, before: Apart, lost: Trace) -> float:
+def _change(trace: Trace, before: Unmerged, lost: Trace) -> float:
     start = before.states.mean[0, :2]
     way = np.array([lost.reading.x, lost.reading.y]) - start
     moved = np.array([trace.reading.x, trace.reading.y]) - start
@@ -56,12 +56,12 @@ def _change(trace: Trace, before: Apart, lost: Trace) -> float:
 
 
 def _between(trace: Trace, lost: Trace) -> float:
-    r, (x, y) = trace.reading, lost.place.tolist()
+    r, (x, y) = trace.reading, lost.position.tolist()
     return min(math.hypot(r.x - x, r.y - y), math.hypot(r.x - lost.reading.x, r.y - lost.reading.y))
 
 
 def merge(carrier: Trace, lost: Trace) -> None:
-    """Let ``carrier`` stand for the ``lost`` touch too; both keep what they were alone."""
+    """Merge the ``lost`` touch into ``carrier``; both keep what they were alone."""
     if carrier.alone is None:
         carrier.alone = lost.beside[carrier.number]
     if lost.alone is None:
@@ -70,7 +70,7 @@ def merge(carrier: Trace, lost: Trace) -> None:
     lost.others = []
 
 
-def left_by(branch: Trace, traces: Sequence[Trace]) -> Trace | None:
+def origin_of(branch: Trace, traces: Sequence[Trace]) -> Trace | None:
     """The merged touch that a new one has come out of, or None."""
     for trace in traces:
         if trace.others and trace.sign == branch.sign:
@@ -82,9 +82,9 @@ def left_by(branch: Trace, traces: Sequence[Trace]) -> Trace | None:
 
 def _spread(carrier: Trace) -> float:
     """Twice the largest distance between the merged touches when they last were apart."""
-    seen = [member.alone.reading for member in carrier.whole if member.alone]
-    places = np.array([(reading.x, reading.y) for reading in seen])
-    return 2 * float(np.linalg.norm(places[:, None] - places, axis=2).max(initial=0.0))
+    apart = [member.alone.reading for member in carrier.members if member.alone]
+    positions = np.array([(reading.x, reading.y) for reading in apart])
+    return 2 * float(np.linalg.norm(positions[:, None] - positions, axis=2).max(initial=0.0))
 
 
 def split(carrier: Trace, branch: Trace, time: float) -> tuple[Trace, Trace]:
@@ -120,9 +120,9 @@ def _least(cost: FloatArray) -> float:
 
 def _expected(members: Sequence[Trace], time: float) -> Iterator[FloatArray]:
     """(n, 2) m about their middle: where they went in, and where their course would be by now."""
-    known = [member.alone for member in members if member.alone]
-    means = np.array([alone.states.mean[0] for alone in known])
-    since = time - max(alone.time for alone in known)
+    apart = [member.alone for member in members if member.alone]
+    means = np.array([alone.states.mean[0] for alone in apart])
+    since = time - max(alone.time for alone in apart)
     offset, velocity = (means[:, k : k + 2] - means[:, k : k + 2].mean(axis=0) for k in (0, 2))
     yield offset
     passing = 2 * np.linalg.norm(offset) / max(float(np.linalg.norm(velocity)), 1e-9)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from tomoskin.core import FloatArray, Reading
 from tomoskin.touch.tracking.settings import TrackSettings
@@ -22,7 +23,12 @@ GATE = 16.0
 """Squared Mahalanobis distance beyond which a reading is of another touch: one in 3,000."""
 
 _UNKNOWN = 0.004
-"""Deviation of a reading whose noise is not known, m."""
+"""Deviation of a reading whose noise is unknown, m."""
+
+_BEHIND = 4.0
+"""Added to the cost of what is not yet a touch, or was not seen last: one that was comes first."""
+
+_LEAST = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +39,7 @@ class States:
     covariance: FloatArray
 
 
-def predicted(states: States, seconds: float, settings: TrackSettings) -> States:
+def predict(states: States, seconds: float, settings: TrackSettings) -> States:
     """States after some seconds without a reading."""
     if not seconds > 0:
         return states
@@ -41,7 +47,7 @@ def predicted(states: States, seconds: float, settings: TrackSettings) -> States
     return States(states.mean @ step.T, step @ states.covariance @ step.T + noise)
 
 
-def begun(reading: FloatArray, spread: FloatArray, settings: TrackSettings) -> States:
+def begin(reading: FloatArray, spread: FloatArray, settings: TrackSettings) -> States:
     """State of a touch that is seen for the first time: ``reading`` (2,), ``spread`` (2, 2)."""
     covariance = np.zeros((1, 4, 4))
     covariance[0, :2, :2] = spread
@@ -49,30 +55,30 @@ def begun(reading: FloatArray, spread: FloatArray, settings: TrackSettings) -> S
     return States(np.concatenate([reading, [0.0, 0.0]])[None], covariance)
 
 
-def updated(states: States, places: FloatArray, spreads: FloatArray) -> States:
-    """States after one reading each: ``places`` (n, 2) with covariances (n, 2, 2)."""
+def update(states: States, positions: FloatArray, spreads: FloatArray) -> States:
+    """States after one reading each: ``positions`` (n, 2) with covariances (n, 2, 2)."""
     cross = states.covariance[:, :, :2]
     gain = cross @ _inverse(cross[:, :2] + spreads)
-    away = (places - states.mean[:, :2])[:, :, None]
+    away = (positions - states.mean[:, :2])[:, :, None]
     mean = states.mean + (gain @ away)[:, :, 0]
     covariance = states.covariance - gain @ cross.transpose(0, 2, 1)
     return States(mean, 0.5 * (covariance + covariance.transpose(0, 2, 1)))
 
 
-def distances(states: States, places: FloatArray, spreads: FloatArray) -> FloatArray:
+def distances(states: States, positions: FloatArray, spreads: FloatArray) -> FloatArray:
     """(n, m) squared Mahalanobis distances of m readings from n states."""
-    away = places - states.mean[:, None, :2]
+    away = positions - states.mean[:, None, :2]
     both = states.covariance[:, None, :2, :2] + spreads
     xx, xy, yy = both[..., 0, 0], both[..., 0, 1], both[..., 1, 1]
     dx, dy = away[..., 0], away[..., 1]
     return np.asarray((yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
 
 
-def observed(readings: Sequence[Reading], settings: TrackSettings) -> tuple[FloatArray, FloatArray]:
-    """Places (m, 2) of readings and their covariances (m, 2, 2), wandering included."""
-    places = np.array([(r.x, r.y) for r in readings]).reshape(-1, 2)
+def observe(readings: Sequence[Reading], settings: TrackSettings) -> tuple[FloatArray, FloatArray]:
+    """Positions (m, 2) of readings and their covariances (m, 2, 2), wandering included."""
+    positions = np.array([(r.x, r.y) for r in readings]).reshape(-1, 2)
     spreads = np.array([_spread(r, settings) for r in readings]).reshape(-1, 2, 2)
-    return places, spreads
+    return positions, spreads
 
 
 def _spread(reading: Reading, settings: TrackSettings) -> tuple[float, float, float, float]:
@@ -104,3 +110,37 @@ def _step(seconds: float, settings: TrackSettings) -> tuple[FloatArray, FloatArr
         noise[axis, axis], noise[axis + 2, axis + 2] = there, moving
         noise[axis, axis + 2] = noise[axis + 2, axis] = cross
     return step, noise
+
+
+def region_radius(reading: Reading) -> float:
+    """Radius of the disc of the reading's area, m; 0 where it has none."""
+    return math.sqrt(reading.area / math.pi) if reading.area > 0 else 0.0
+
+
+def assign(
+    states: States,
+    signs: FloatArray,
+    behind: FloatArray,
+    readings: Sequence[Reading],
+    seen: tuple[FloatArray, FloatArray],
+) -> tuple[dict[int, int], FloatArray]:
+    """Pairs {reading: trace} of least cost (Kuhn 1955), and the distances (n, m).
+
+    ``signs`` and ``behind`` are (n,), ``seen`` the readings' positions and covariances. A pair
+    costs its squared Mahalanobis distance, but no more than the gate where the trace is within the
+    reading's region: when two regions become one, its centre jumps. Beyond the gate, and between
+    signs, there are none.
+    """
+    positions, spreads = seen
+    far = distances(states, positions, spreads)
+    radii = np.array([max(region_radius(r), _LEAST) for r in readings])
+    away = (states.mean[:, None, :2] - positions) / radii[:, None]
+    share = away[..., 0] ** 2 + away[..., 1] ** 2
+    cost = np.minimum(far, np.where(share < 1, GATE * (0.5 + 0.5 * share), np.inf))
+    cost[signs[:, None] != np.sign([r.peak for r in readings])] = np.inf
+    allowed = cost <= GATE
+    limit = GATE + _BEHIND + 1
+    cost = np.where(allowed, cost + _BEHIND * behind[:, None], limit)
+    rows, columns = linear_sum_assignment(cost)
+    pairs = zip(rows.tolist(), columns.tolist(), strict=True)
+    return {column: row for row, column in pairs if allowed[row, column]}, far

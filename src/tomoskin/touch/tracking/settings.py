@@ -1,4 +1,4 @@
-"""How touches are told from noise, from each other and from what they leave behind."""
+"""How touches are told from noise, from each other and from their residual responses."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ neither begins nor ends."""
 
 @dataclass(frozen=True, slots=True)
 class TrackSettings:
-    """Times are seconds of the device, so that 10 and 1,000 frames/s are treated alike.
+    """Times are seconds of the device, so that 10 and 1,000 frames/s are treated the same.
 
     Attributes
     ----------
@@ -24,7 +24,7 @@ class TrackSettings:
         Standard deviation of a finger's speed along each axis, m/s, and the time after which it
         moves otherwise, s.
     wander
-        What the place of a reading wanders beside its noise, m.
+        What the position of a reading wanders beside its noise, m.
     """
 
     snr: float = 5.0

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from tomoskin.core import FloatArray, Reading, Touch
-from tomoskin.touch.tracking.assign import region_radius
-from tomoskin.touch.tracking.motion import States
+from tomoskin.touch.tracking.motion import States, region_radius
 
 _STEP = 0.012
 """A touch that slides leaves a footprint every so many metres."""
@@ -27,7 +26,7 @@ class Footprint:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Apart:
+class Unmerged:
     """A touch as it was last seen by itself, and expected in the frame thereafter, device s."""
 
     reading: Reading
@@ -37,12 +36,12 @@ class Apart:
 
 @dataclass(eq=False)
 class Trace:
-    """What is known of one touch, or of what may become one.
+    """One touch, or what may become one, as the tracker remembers it.
 
     Attributes
     ----------
     reading, states
-        Newest reading; place and velocity, one row.
+        Newest reading; position and velocity, one row.
     since, host_since
         Device and host time of its first frame, s.
     number
@@ -52,19 +51,19 @@ class Trace:
     missing
         Device time of the first frame without a reading since the last one, or None.
     strong, low, least
-        Device times at which it was last strong for its place, and since which it has been so
-        weak that it may be a remainder, or None; least size of its peak since then.
+        Device times at which it was last strong for its position, and since which it has been
+        so weak that it may be a residual response, or None; least size of its peak since then.
     footprints, top
         Where it has been, the newest last; and how large it has been where its reading is now,
-        for what is left of a press that slid is found anywhere along its way.
+        for a press that slid leaves a residual response anywhere along its way.
     alone
         As it was before it merged with others, or None.
     others
-        Touches that it stands for beside itself.
+        Touches that have merged into it.
     beside
         The other touches as they were when this one went missing, by number.
-    said_at
-        (2,) m where the last event put it.
+    reported_at
+        (2,) m, its position in the last event.
     """
 
     reading: Reading
@@ -79,10 +78,10 @@ class Trace:
     least: float = 0.0
     footprints: list[Footprint] = field(default_factory=list)
     top: float = 0.0
-    alone: Apart | None = None
+    alone: Unmerged | None = None
     others: list[Trace] = field(default_factory=list)
-    beside: Mapping[int, Apart] = field(default_factory=dict)
-    said_at: tuple[float, float] = (0.0, 0.0)
+    beside: Mapping[int, Unmerged] = field(default_factory=dict)
+    reported_at: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Leave the first footprint."""
@@ -90,7 +89,7 @@ class Trace:
         self._step()
 
     @property
-    def place(self) -> FloatArray:
+    def position(self) -> FloatArray:
         """(2,) m where it is expected."""
         expected: FloatArray = self.states.mean[0, :2]
         return expected
@@ -101,15 +100,15 @@ class Trace:
         return sign_of(self.reading)
 
     @property
-    def whole(self) -> tuple[Trace, ...]:
-        """Itself and those that it stands for, in the order of their numbers."""
+    def members(self) -> tuple[Trace, ...]:
+        """Itself and those that have merged into it, in the order of their numbers."""
         return tuple(sorted((self, *self.others), key=lambda trace: trace.number))
 
     @property
     def touch(self) -> Touch:
         """As it is reported: a merged one by the oldest of its numbers."""
-        first = self.whole[0]
-        merged = tuple(t.number for t in self.whole) if self.others else ()
+        first = self.members[0]
+        merged = tuple(t.number for t in self.members) if self.others else ()
         kind = "decrease" if self.sign < 0 else "increase"
         return Touch(first.number, kind, first.host_since, self.reading, merged)
 
@@ -145,8 +144,8 @@ class Trace:
 
 
 def size_of(reading: Reading) -> float:
-    """By how many deviations it stands out, or its peak where that is not known: a fit knows the
-    depth of a faint touch badly, but well what it does to the voltages."""
+    """By how many deviations it stands out, or its peak where the noise is unknown: a fit knows
+    the depth of a faint touch badly, but well what it does to the voltages."""
     return reading.snr if 0 < reading.snr < math.inf else abs(reading.peak)
 
 

@@ -1,25 +1,65 @@
-"""Readings of successive frames → touches that keep their identity."""
+"""Detections of successive frames → touches that keep their identity, and what happens to them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from tomoskin.core import FloatArray, Reading, Touch
 from tomoskin.touch.tracking import motion
-from tomoskin.touch.tracking.assign import assigned
-from tomoskin.touch.tracking.merging import left_by, merge, split, taken_up_by
-from tomoskin.touch.tracking.remainder import Remainders, has_become_one
+from tomoskin.touch.tracking.merging import carrier_of, merge, origin_of, split
+from tomoskin.touch.tracking.motion import assign
+from tomoskin.touch.tracking.residual import ResidualResponses, is_residual
 from tomoskin.touch.tracking.settings import TrackSettings
-from tomoskin.touch.tracking.trace import Apart, Trace
-from tomoskin.touch.tracking.words import Happening, TouchEvent
+from tomoskin.touch.tracking.trace import Trace, Unmerged
+
+Happening = Literal["onset", "move", "release", "merge", "split"]
 
 _ROUNDING = 1e-9
+
 _MOVED, _BY_DEVIATIONS = 0.003, 3.0
-"""A touch is said to move when it is so many metres, and deviations, from where it was said."""
+"""A touch moves when it is so many metres, and deviations, from where it was last reported."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TouchEvent:
+    """One thing that happened to one touch.
+
+    Attributes
+    ----------
+    kind
+        "onset"; "move", by more than noise since the last event; "release"; "merge", where it
+        can no longer be separated from others; "split", where it can again.
+    touch
+        As it is after it; at a release, as it was last.
+    host_time
+        Of the frame in which it was noticed, host monotonic s.
+    """
+
+    kind: Happening
+    touch: Touch
+    host_time: float
+
+    @property
+    def text(self) -> str:
+        """A sentence for people."""
+        r = self.touch.reading
+        position = f"{1e3 * r.x:.0f}, {1e3 * r.y:.0f} mm"
+        others = [str(number) for number in self.touch.merged if number != self.touch.id]
+        return (
+            f"touch {self.touch.id}: "
+            + {
+                "onset": f"begins at {position}",
+                "move": f"is at {position}",
+                "release": f"ends at {position}",
+                "merge": f"and {' and '.join(others)} are too close to separate, at {position}",
+                "split": f"is apart again, at {position}",
+            }[self.kind]
+        )
 
 
 class Tracker:
@@ -37,7 +77,7 @@ class Tracker:
         self.settings = settings or TrackSettings()
         self.events: tuple[TouchEvent, ...] = ()
         self._traces: list[Trace] = []
-        self._remainders = Remainders(self.settings.least_snr)
+        self._residuals = ResidualResponses(self.settings.least_snr)
         self.numbered = 0
         self._last: float | None = None
         self._now = 0.0
@@ -50,16 +90,16 @@ class Tracker:
         """Touches of this frame, in order of their identity.
 
         ``time`` is the device's, s; where it does not go on, as when a board starts again, the
-        host's counts. ``host_time`` is what touches and events tell.
+        host's counts. ``host_time`` is what touches and events carry.
         """
         elapsed = self._elapse(time, host_time)
         self._host = host_time
         if self.settings.still:  # what stood there before says nothing of this frame
             readings = [reading for reading in readings if not reading.weak]
-            self._remainders.forget()
+            self._residuals.forget()
         if readings or self._traces:
             self._follow(list(readings), elapsed)
-        self._remainders.note(self._now, quiet=not readings)
+        self._residuals.note(self._now, quiet=not readings)
         self.events, self._happened = tuple(self._happened), []
         shown = [trace.touch for trace in self._traces if trace.number]
         return tuple(sorted(shown, key=lambda touch: touch.id))
@@ -67,13 +107,13 @@ class Tracker:
     def reset(self) -> None:
         """Release every touch and forget all else; identities go on counting.
 
-        The next frame tells that they were released. Time begins anew: what comes is to the bit
-        what a new tracker would make of it.
+        The next frame tells that they were released. Time starts again at zero: what follows is
+        to the bit what a new tracker would make of it.
         """
         for trace in [trace for trace in self._traces if trace.number]:
             self._end(trace)
         self._traces = []
-        self._remainders.forget()
+        self._residuals.forget()
         self.events = ()
         self._last, self._now, self._host = None, 0.0, 0.0
 
@@ -87,36 +127,36 @@ class Tracker:
 
     def _follow(self, readings: list[Reading], elapsed: float) -> None:
         traces, settings = self._traces, self.settings
-        seen = motion.observed(readings, settings)
+        seen = motion.observe(readings, settings)
         states = _stacked(traces)
         pairs: dict[int, int] = {}
         if traces:
-            states = motion.predicted(states, elapsed, settings)
+            states = motion.predict(states, elapsed, settings)
         if traces and readings:
             signs = np.array([trace.sign for trace in traces])
             behind = np.array([not t.number or t.missing is not None for t in traces], float)
-            pairs, far = assigned(states, signs, behind, readings, seen)
+            pairs, far = assign(states, signs, behind, readings, seen)
             self._note_missing(set(pairs.values()), states)
             self._see(readings, pairs, seen, states, far)
         else:
             self._note_missing(set(), states)
         for index, reading in enumerate(readings):
             if index not in pairs and self._begins(reading):
-                state = motion.begun(seen[0][index], seen[1][index], settings)
+                state = motion.begin(seen[0][index], seen[1][index], settings)
                 traces.append(Trace(reading, state, self._now, self._host))
         self._settle()
 
-    def _note_missing(self, found: set[int], states: motion.States) -> None:
+    def _note_missing(self, paired: set[int], states: motion.States) -> None:
         """Of those that no reading is of: they are where they are expected."""
-        if len(found) == len(self._traces):
+        if len(paired) == len(self._traces):
             return
         for trace, state in zip(self._traces, _rows(states), strict=True):
             trace.states = state
-        lost = [trace for k, trace in enumerate(self._traces) if k not in found]
+        lost = [trace for k, trace in enumerate(self._traces) if k not in paired]
         going = [trace for trace in lost if trace.missing is None]
         if going:
-            known = [trace for trace in self._traces if trace.number]
-            now = {t.number: Apart(t.reading, t.states, self._now) for t in known}
+            reported = [trace for trace in self._traces if trace.number]
+            now = {t.number: Unmerged(t.reading, t.states, self._now) for t in reported}
             for trace in going:
                 trace.missing, trace.beside = self._now, now
 
@@ -131,21 +171,21 @@ class Tracker:
         if not pairs:
             return
         own, which = list(pairs.values()), list(pairs)
-        places, spreads = seen[0][which], seen[1][which]
+        positions, spreads = seen[0][which], seen[1][which]
         before = motion.States(states.mean[own], states.covariance[own])
-        after = _rows(motion.updated(before, places, spreads))
+        after = _rows(motion.update(before, positions, spreads))
         jumped = far[own, which] > motion.GATE
         for row, (trace, index, state) in enumerate(zip(own, which, after, strict=True)):
-            known = self._traces[trace]
-            known.see(readings[index], self._now)
-            known.states = state
+            followed = self._traces[trace]
+            followed.see(readings[index], self._now)
+            followed.states = state
             if jumped[row]:  # its region has changed: it has not moved
-                known.states = motion.begun(places[row], spreads[row], self.settings)
+                followed.states = motion.begin(positions[row], spreads[row], self.settings)
 
     def _begins(self, reading: Reading) -> bool:
         if reading.weak or reading.snr < self.settings.snr:
             return False
-        return not self._remainders.explain(reading, self._now, self._traces)
+        return not self._residuals.explain(reading, self._now, self._traces)
 
     def _settle(self) -> None:
         """Report what has stood long enough, end what has been gone long enough."""
@@ -155,11 +195,11 @@ class Tracker:
         for trace in [t for t in self._traces if t.number]:
             if trace.missing is not None and self._lasts(trace.missing, self.settings.release):
                 self._lose(trace)
-            elif trace.missing is None and has_become_one(trace, self._now, self.settings.release):
+            elif trace.missing is None and is_residual(trace, self._now, self.settings.release):
                 self._end(trace)
         for trace in self._traces:
             if trace.number and self._has_moved(trace):
-                self._say("move", trace)
+                self._report("move", trace)
 
     def _consider(self, trace: Trace) -> None:
         """Report a newcomer that has stood, forget one that has not."""
@@ -168,14 +208,14 @@ class Tracker:
             return
         if not self._lasts(trace.since, self.settings.onset):
             return
-        if self._remainders.explain(trace.reading, self._now, self._traces):
+        if self._residuals.explain(trace.reading, self._now, self._traces):
             self._traces.remove(trace)
             return
-        origin = left_by(trace, self._traces)
+        origin = origin_of(trace, self._traces)
         if origin is None:
             self.numbered += 1
             trace.number = self.numbered
-            self._say("onset", trace)
+            self._report("onset", trace)
             return
         if origin.missing is not None:  # its region is gone, and this is one of those it was
             self._traces.remove(trace)
@@ -186,36 +226,36 @@ class Tracker:
         self._traces.remove(origin)
         self._traces += both
         for one in both:
-            self._say("split", one)
+            self._report("split", one)
 
     def _lasts(self, since: float, seconds: float) -> bool:
         """Whether ``seconds`` have gone by, and a frame at least."""
         return not seconds or (self._now > since and self._now - since >= seconds - _ROUNDING)
 
     def _lose(self, trace: Trace) -> None:
-        carrier = taken_up_by(trace, self._traces)
+        carrier = carrier_of(trace, self._traces)
         if carrier is None:
             self._end(trace)
             return
         self._traces.remove(trace)
         merge(carrier, trace)
-        self._say("merge", carrier)
+        self._report("merge", carrier)
 
     def _end(self, trace: Trace) -> None:
         self._traces.remove(trace)
-        for member in trace.whole:
-            self._remainders.leave(member, self._now)
+        for member in trace.members:
+            self._residuals.leave(member, self._now)
             ended = replace(trace.touch, id=member.number, since=member.host_since, merged=())
             self._happened.append(TouchEvent("release", ended, self._host))
 
     def _has_moved(self, trace: Trace) -> bool:
         r = trace.reading
-        (x, y), sd = trace.said_at, math.hypot(r.sd_x, r.sd_y)
+        (x, y), sd = trace.reported_at, math.hypot(r.sd_x, r.sd_y)
         far = math.hypot(r.x - x, r.y - y)
         return far > _MOVED and not far < _BY_DEVIATIONS * sd
 
-    def _say(self, kind: Happening, trace: Trace) -> None:
-        trace.said_at = (trace.reading.x, trace.reading.y)
+    def _report(self, kind: Happening, trace: Trace) -> None:
+        trace.reported_at = (trace.reading.x, trace.reading.y)
         self._happened.append(TouchEvent(kind, trace.touch, self._host))
 
 

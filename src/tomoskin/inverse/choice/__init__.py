@@ -1,0 +1,1 @@
+"""Parameter choice: which alpha, by which criterion, and why."""

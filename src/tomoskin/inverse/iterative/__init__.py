@@ -1,0 +1,1 @@
+"""Imaging by iteration: absolute, segmented, and difference images with sharp edges."""

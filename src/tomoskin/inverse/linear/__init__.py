@@ -1,0 +1,1 @@
+"""Linear operators: one matrix, made once and applied per frame."""

@@ -1,0 +1,1 @@
+"""Priors: what is held to be likely of an image before there are data."""

@@ -1,0 +1,130 @@
+"""Triangles in the plane and in space: where a point lies in them; whether two cut each other."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tomoskin.core import FloatArray, GeometryError, IntArray
+
+_EDGES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+"""Ends of each edge, and the corner opposite to it."""
+
+_CLEAR = 1e-9
+"""An edge that ends this near to a triangle, as a part of its length, only touches it."""
+
+_BLOCK = 200_000
+
+
+def barycentric(corner: FloatArray, position: FloatArray) -> FloatArray:
+    """(…, 3) shares of the corners (…, 3, 2) at ``position`` (…, 2)."""
+    u, v = corner[..., 1, :] - corner[..., 0, :], corner[..., 2, :] - corner[..., 0, :]
+    w = position - corner[..., 0, :]
+    area = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    p = (w[..., 0] * v[..., 1] - w[..., 1] * v[..., 0]) / area
+    q = (u[..., 0] * w[..., 1] - u[..., 1] * w[..., 0]) / area
+    return np.stack([1.0 - p - q, p, q], axis=-1)
+
+
+def closest(corner: FloatArray, position: FloatArray) -> FloatArray:
+    """(…, 3) shares of the point of each triangle (…, 3, 3) that is nearest to ``position`` (…, 3).
+
+    The foot on the plane where it lies inside, else the best foot on the three sides.
+    """
+    position = np.broadcast_to(position, (*corner.shape[:-2], 3))
+    u, v = corner[..., 1, :] - corner[..., 0, :], corner[..., 2, :] - corner[..., 0, :]
+    w = position - corner[..., 0, :]
+    gram = np.stack(
+        [
+            np.stack([(u * u).sum(-1), (u * v).sum(-1)], -1),
+            np.stack([(u * v).sum(-1), (v * v).sum(-1)], -1),
+        ],
+        -1,
+    )
+    right = np.stack([(w * u).sum(-1), (w * v).sum(-1)], -1)
+    pq = np.linalg.solve(gram, right[..., None])[..., 0]
+    foot = np.concatenate([1.0 - pq.sum(-1, keepdims=True), pq], axis=-1)
+    shares = [foot]
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        side = corner[..., b, :] - corner[..., a, :]
+        t = ((position - corner[..., a, :]) * side).sum(-1) / (side * side).sum(-1)
+        t = np.clip(t, 0.0, 1.0)
+        share = np.zeros(corner.shape[:-1])
+        share[..., a], share[..., b] = 1.0 - t, t
+        shares.append(share)
+    table = np.stack(shares)
+    gap = np.linalg.norm(np.einsum("...k,...kd->...d", table, corner) - position, axis=-1)
+    gap[0][foot.min(axis=-1) < 0] = np.inf
+    best = gap.argmin(axis=0)
+    return np.asarray(np.take_along_axis(table, best[None, ..., None], axis=0)[0])
+
+
+def check_crossings(points: FloatArray, cells: IntArray) -> None:
+    """Raise GeometryError naming two triangles that cut through each other.
+
+    Neighbours may meet at what they share; two triangles in one plane are not distinguished.
+    """
+    for pairs in _near(points, cells):
+        for one, other in ((0, 1), (1, 0)):
+            cut = _cuts(points, cells[pairs[:, one]], cells[pairs[:, other]])
+            if cut.any():
+                a, b = pairs[int(np.argmax(cut))]
+                middle = ", ".join(f"{1e3 * x:.4g}" for x in points[cells[a]].mean(axis=0))
+                raise GeometryError(
+                    f"the surface runs through itself near ({middle}) mm",
+                    where=f"cells {min(a, b)} and {max(a, b)}",
+                    hint="mend it in a mesh program: remove self-intersections",
+                )
+
+
+def _near(points: FloatArray, cells: IntArray) -> list[IntArray]:
+    """Pairs (n, 2) of cells whose boxes overlap, in blocks."""
+    corner = points[cells]
+    middle = corner.mean(axis=1)
+    reach = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
+    tree = cKDTree(middle)
+    low, high = corner.min(axis=1), corner.max(axis=1)
+    blocks = []
+    # small ones look for large ones nowhere: each looks as far as itself and its equals reach
+    order = np.argsort(reach)
+    for part in np.array_split(order, max(1, len(order) // 4096)):
+        near = tree.query_ball_point(middle[part], 2 * reach[part])
+        first = np.repeat(part, [len(cells) for cells in near])
+        second = np.concatenate([np.asarray(cells, dtype=np.int64) for cells in near])
+        smaller = (reach[second] < reach[first]) | (
+            (reach[second] == reach[first]) & (second < first)
+        )
+        first, second = first[smaller], second[smaller]
+        boxed = ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
+        pairs = np.column_stack([first[boxed], second[boxed]])
+        blocks += [pairs[k : k + _BLOCK] for k in range(0, len(pairs), _BLOCK)]
+    return blocks
+
+
+def _cuts(points: FloatArray, one: IntArray, other: IntArray) -> NDArray[np.bool_]:
+    """(n,) whether an edge of triangle ``one`` passes through the inside of ``other``."""
+    cut = np.zeros(len(one), dtype=bool)
+    for a, b, _ in _EDGES:
+        ends = one[:, [a, b]]
+        apart = (ends[:, :, None] != other[:, None, :]).all(axis=(1, 2))
+        cut[apart] |= _pierces(points[ends[apart]], points[other[apart]])
+    return cut
+
+
+def _pierces(edge: FloatArray, triangle: FloatArray) -> NDArray[np.bool_]:
+    """Möller & Trumbore, Journal of Graphics Tools 2 (1997) 21-28."""
+    start, along = edge[:, 0], edge[:, 1] - edge[:, 0]
+    u, v = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
+    across = np.cross(along, v)
+    scale = (u * across).sum(axis=1)
+    size = np.linalg.norm(along, axis=1) * np.linalg.norm(np.cross(u, v), axis=1)
+    steep = np.abs(scale) > _CLEAR * size
+    inverse = 1.0 / np.where(steep, scale, 1.0)
+    away = start - triangle[:, 0]
+    p = (away * across).sum(axis=1) * inverse
+    turned = np.cross(away, u)
+    q = (along * turned).sum(axis=1) * inverse
+    t = (v * turned).sum(axis=1) * inverse
+    inside = np.minimum.reduce([p, q, 1.0 - p - q, t, 1.0 - t]) > _CLEAR
+    return np.asarray(steep & inside)
