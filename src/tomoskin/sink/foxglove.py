@@ -42,7 +42,7 @@ class FoxgloveSink:
         self._context = context = sdk.Context()
         for topic in _TOPICS:
             found = schema_of(topic)
-            schema = sdk.Schema(name=found.name, encoding=found.encoding, data=found.text.encode())
+            schema = sdk.Schema(name=found.name, encoding=found.encoding, data=found.data)
             self._channels[topic] = sdk.Channel(
                 topic, schema=schema, message_encoding="json", context=context
             )

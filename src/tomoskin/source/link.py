@@ -129,7 +129,7 @@ class Link:
         now = self._clock()
         if data and self._tap:
             self._tap(now, data)
-        if data and self._played and self._played.jumped():
+        if data and self._played and self._played.after_seek():
             self._decoder.forget()
             self._talk.gate.expect_any()
         found = []
