@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tomoskin.skin import Skin
 
 _SHORTEST = 1e-6
-"""Seconds before it is due that a piece is played already: no clock waits for less."""
+"""No wait is shorter, s: a piece is played so much earlier, or time would stand still."""
 
 
 class ReplayTransport:
@@ -140,7 +140,7 @@ class ReplayTransport:
 
     def read(self, timeout: float) -> bytes:
         """The next recorded read, or an answer to a command; ``b""`` if neither in time."""
-        stop = self._clock.now() + timeout
+        stop = self._clock.now() + (max(timeout, _SHORTEST) if timeout else 0.0)
         with self._condition:
             while True:
                 if self._closed:
