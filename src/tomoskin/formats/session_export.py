@@ -13,11 +13,11 @@ from tomoskin.core import DataError
 from tomoskin.formats.exports.hdf5 import write_hdf5
 from tomoskin.formats.exports.matlab import write_matlab
 from tomoskin.formats.exports.movie import FILMS
-from tomoskin.formats.exports.series import write_series
 from tomoskin.formats.exports.table import write_csv, write_parquet
 from tomoskin.formats.interchange import write_interchange
 from tomoskin.formats.picture import MOST_PANELS, Panel, rendered, write_picture
 from tomoskin.formats.touch_csv import write_touches
+from tomoskin.formats.vtu import write_series
 from tomoskin.pipeline import Prepared, colour_limit
 from tomoskin.recording import (
     Advance,
