@@ -18,7 +18,7 @@ from tomoskin import Locator, Skin
 from tomoskin.calibration import Several
 from tomoskin.core import DataError, Reading
 from tomoskin.pipeline import Pipeline, Prepared, Result, prepare
-from tomoskin.recording import SessionReader
+from tomoskin.recording import SessionReader, tick_rate
 from tomoskin.run import simulate
 from tomoskin.touch import Tracker
 from tomoskin.twin import Script
@@ -77,7 +77,7 @@ def _frames(prepared: Prepared, script: str, seed: int) -> Iterator[Frame]:
                 for item in session.truth()
             ]
             pipeline, now, begin = Pipeline(prepared), 0, None
-            pipeline.tick_rate = session.tick_rate
+            pipeline.tick_rate = tick_rate(session)
             for item in session.frames():
                 while now + 1 < len(truth) and truth[now + 1][0] <= item.frame.host_time:
                     now += 1

@@ -39,6 +39,18 @@ def test_a_name_of_a_former_room_says_where_it_is_now(room: str, name: str, now:
         _ = old.nonsense
 
 
+@pytest.mark.parametrize(
+    ("room", "name", "now"),
+    [("source", "Conversation", "ProtocolSession"), ("source", "FrameGate", "SequenceFilter")],
+)
+def test_a_name_that_is_another_now_says_so(room: str, name: str, now: str) -> None:
+    module = import_module(f"tomoskin.{room}")
+    with pytest.warns(DeprecationWarning, match=rf"\.{name} is now tomoskin\.{room}\.{now}"):
+        assert getattr(module, name) is getattr(module, now)
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = module.nonsense
+
+
 def test_the_package_alone_imports_nothing_heavy() -> None:
     code = "import sys, tomoskin; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

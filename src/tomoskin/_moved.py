@@ -11,11 +11,12 @@ ROOMS = {
     "live": ("pipeline", "run", "server", "recording", "formats", "calibration"),
     "session": ("recording", "formats", "calibration", "signal", "core"),
     "touch": ("calibration",),
-    "calibration": ("calibration",),
 }
 """Where the names of a former room are looked for."""
 
 RENAMED = {
+    "Conversation": "ProtocolSession",
+    "FrameGate": "SequenceFilter",
     "StateClassifier": "Classifier",
     "StateReading": "ClassReading",
     "Teller": "FrameClassifier",
@@ -33,7 +34,7 @@ def moved(room: str, name: str) -> Any:
     """What ``tomoskin.room.name`` is now. Raises AttributeError where there is no such name."""
     now = RENAMED.get(name, name)
     first, *rest = now.split(".")
-    for new in ROOMS[room]:
+    for new in ROOMS.get(room, (room,)):
         found = import_module(f"tomoskin.{new}")
         if first in found.__all__:
             old = f"tomoskin.{room}.{name}"

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from mcap.opcode import Opcode
 
 from recording.runs import INFO, SKIN, frame_of, put
 from tomoskin.core import DataError, Event
-from tomoskin.recording import SessionReader, SessionWriter, container_reader, mcap
+from tomoskin.recording import SessionReader, SessionWriter, tick_rate
+from tomoskin.recording.container_reader import ContainerReader
+from tomoskin.recording.mcap_records import PREFIX, Summary
 
 
 @pytest.fixture
@@ -28,45 +31,42 @@ def long_file(tmp_path):
 @pytest.fixture
 def chunks_read(monkeypatch):
     """Offsets of the chunks that were read."""
-    read, original = [], container_reader.ContainerReader._chunk
+    read, original = [], ContainerReader._messages_at
 
     def chunk(self, offset):
         read.append(offset)
         return original(self, offset)
 
-    monkeypatch.setattr(container_reader.ContainerReader, "_chunk", chunk)
+    monkeypatch.setattr(ContainerReader, "_messages_at", chunk)
     return read
 
 
-@pytest.mark.parametrize("block", [150, 1 << 20])
-def test_only_the_chunks_that_hold_it_are_read(long_file, chunks_read, monkeypatch, block):
-    monkeypatch.setattr(container_reader, "_BLOCK", block)
+def test_only_the_chunks_that_hold_it_are_read(long_file, chunks_read):
     with SessionReader(long_file) as session:
-        assert session.tick_rate == 2e6
-        assert len(chunks_read) == 2
+        assert tick_rate(session) == 2e6
+        assert len(chunks_read) == 1
         assert [event.text for event in session.events()] == [
             f"frame {number}" for number in (100, 300, 500)
         ]
-        assert len(chunks_read) == 5
+        assert len(chunks_read) == 4
         assert list(session.notes()) == []
         assert session.settings() == {}
-        assert len(chunks_read) == 5
+        assert len(chunks_read) == 4
 
 
 def test_without_an_end_it_is_found_all_the_same(long_file):
     data = long_file.read_bytes()
-    long_file.write_bytes(data[: data.rindex(mcap.PREFIX.pack(mcap.DATA_END, 4))])
+    long_file.write_bytes(data[: data.rindex(PREFIX.pack(Opcode.DATA_END, 4))])
     with SessionReader(long_file) as session:
-        assert session.tick_rate == 2e6
+        assert tick_rate(session) == 2e6
         assert len(list(session.events())) == 3
 
 
 @pytest.mark.parametrize("cut", [1, 5])
 def test_an_index_that_does_not_add_up_is_damage(long_file, cut):
     with SessionReader(long_file) as session:
-        groups = session._file._groups
-        place, length = groups[mcap.CHUNK_INDEX]
-        for wrong in ((place + cut, length - cut), (place, length - cut)):
-            groups[mcap.CHUNK_INDEX] = wrong
-            with pytest.raises(DataError, match=r"ind(ex|exes) of the chunks"):
+        index = session.container.summary
+        for wrong in (index.chunk_index[cut:], index.chunk_index[:-cut]):
+            session.container.summary = Summary(index.totals, index.attachments, wrong)
+            with pytest.raises(DataError, match="index of the chunks"):
                 session.device()

@@ -15,7 +15,7 @@ from tomoskin.cli import main
 from tomoskin.core import DataError, Frame
 from tomoskin.formats import read_recording
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
-from tomoskin.recording import SessionReader, as_recorded, replayed
+from tomoskin.recording import SessionReader, as_recorded, replayed, tick_rate
 from tomoskin.server.messages import state as message
 from tomoskin.skin import Skin
 
@@ -74,7 +74,7 @@ def test_a_replay_tells_the_same_states_to_the_bit(run):
         again = [result.state for result in replayed(as_recorded(session), session)]
         frames = [item.frame for item in session.frames()]
         pipeline = Pipeline(taught)
-        pipeline.tick_rate = session.tick_rate
+        pipeline.tick_rate = tick_rate(session)
     here = [pipeline.push(frame).state for frame in frames]
     assert again == here
     assert again[-1] == status.state

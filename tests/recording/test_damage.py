@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import signal
 import struct
@@ -11,20 +12,24 @@ import tracemalloc
 from pathlib import Path
 
 import pytest
+from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
 from recording.runs import SKIN, frame_of, same_frame, write_all, write_frames
-from tomoskin.core import DataError
+from tomoskin.core import MAGIC, DataError
 from tomoskin.formats import read_recording
-from tomoskin.recording import SessionReader, mcap, repair, session_info
+from tomoskin.recording import SessionReader, message_counts, repair, session_info
+from tomoskin.recording.mcap_records import PREFIX
 
 ROOT = Path(__file__).resolve().parents[1]
+RATE = 10.0
+"""Frames per second of the small file: a chunk holds ten."""
 
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
     """A few frames in a few chunks."""
-    return write_frames(tmp_path_factory.mktemp("small") / "small.mcap", 60)
+    return write_frames(tmp_path_factory.mktemp("small") / "small.mcap", 60, rate=RATE)
 
 
 def frames_in(path):
@@ -43,35 +48,35 @@ def assert_true(found):
     """Each of ``found`` is a frame that was written, in order."""
     sequences = [frame.sequence for frame in found]
     assert sequences == sorted(set(sequences))
-    assert all(same_frame(frame, frame_of(frame.sequence)) for frame in found)
+    assert all(same_frame(frame, frame_of(frame.sequence, rate=RATE)) for frame in found)
 
 
 def chunk_ends(data):
     """(end of each chunk's record, frames up to there)."""
-    ends, place, count = [], len(mcap.MAGIC), 0
+    ends, place, count = [], len(MAGIC), 0
     while place < len(data):
-        opcode, length = mcap.PREFIX.unpack_from(data, place)
-        place += mcap.PREFIX.size + length
-        if opcode == mcap.CHUNK:
+        opcode, length = PREFIX.unpack_from(data, place)
+        place += PREFIX.size + length
+        if opcode == Opcode.CHUNK:
             body = data[place - length : place]
-            inner = mcap.CHUNK_HEAD.size + 4 + 8
+            inner = 28 + 4 + 8  # times, size, CRC, compression and length of the records
             while inner < length:
-                kind, size = mcap.PREFIX.unpack_from(body, inner)
-                inner += mcap.PREFIX.size
-                count += kind == mcap.MESSAGE and struct.unpack_from("<H", body, inner)[0] == 2
+                kind, size = PREFIX.unpack_from(body, inner)
+                inner += PREFIX.size
+                count += kind == Opcode.MESSAGE and struct.unpack_from("<H", body, inner)[0] == 2
                 inner += size
             ends.append((place, count))
-        if opcode == mcap.DATA_END:
+        if opcode == Opcode.DATA_END:
             break
     return ends
 
 
 def record_starts(data):
     """Offset of every record."""
-    place = len(mcap.MAGIC)
-    while place < len(data) - len(mcap.MAGIC):
+    place = len(MAGIC)
+    while place < len(data) - len(MAGIC):
         yield place
-        place += mcap.PREFIX.size + mcap.PREFIX.unpack_from(data, place)[1]
+        place += PREFIX.size + PREFIX.unpack_from(data, place)[1]
 
 
 def some_sizes(data):
@@ -220,11 +225,12 @@ def test_repair_of_a_file_without_its_end_keeps_everything_else(tmp_path):
     path = write_all(tmp_path / "whole.mcap")
     data = path.read_bytes()
     cut = tmp_path / "cut.mcap"
-    cut.write_bytes(data[: data.index(b"tomoskin.seek") - 20])  # within that record's head
+    end = data.rindex(PREFIX.pack(Opcode.DATA_END, 4))
+    cut.write_bytes(data[: end + 3])  # within that record's head
     result = repair(cut, tmp_path / "mended.mcap")
     assert not result.ended
     with SessionReader(tmp_path / "mended.mcap") as mended, SessionReader(path) as original:
-        assert mended.counts() == original.counts()
+        assert message_counts(mended) == message_counts(original)
         assert mended.epoch == original.epoch
         assert mended.attachments()["calibration.json"] == b"{}"
 
@@ -277,8 +283,9 @@ def test_compressed_chunks_are_refused_before_they_are_unpacked(small, tmp_path)
         writer.add_metadata("tomoskin", about)
         skin = session.attachments()["skin.toml"]
         writer.add_attachment(0, 0, "skin.toml", "application/toml", skin)
-        schema = writer.register_schema("tomoskin_msgs/msg/Raw", "ros2msg", b"")
-        channel = writer.register_channel("/raw", "cdr", schema)
+        schema = writer.register_schema("tomoskin_msgs/msg/Frame", "ros2msg", b"")
+        writer.register_channel("/raw", "cdr", schema)
+        channel = writer.register_channel("/frames", "cdr", schema)
         writer.add_message(channel, 0, bytes(50 << 20), 0)
         writer.finish()
     tracemalloc.start()
@@ -292,7 +299,7 @@ def test_compressed_chunks_are_refused_before_they_are_unpacked(small, tmp_path)
 @pytest.mark.parametrize("length", [2**63, 2**40, (64 << 20) + 1])
 def test_an_endless_record_is_refused_without_reading_it(small, tmp_path, length):
     path = tmp_path / "endless.mcap"
-    path.write_bytes(small.read_bytes()[:39] + mcap.PREFIX.pack(mcap.CHUNK, length) + bytes(1000))
+    path.write_bytes(small.read_bytes()[:39] + PREFIX.pack(Opcode.CHUNK, length) + bytes(1000))
     with pytest.raises(DataError, match=r"damaged|no session"):
         read_recording(path)
 
@@ -337,21 +344,25 @@ with SessionWriter(Path(sys.argv[1]), SKIN) as session:
 """
 
 
-@pytest.mark.parametrize(
-    "seed", [*range(10), *(pytest.param(n, marks=pytest.mark.slow) for n in range(10, 200))]
-)
-def test_killed_at_any_moment_all_before_the_last_chunk_is_there(tmp_path, seed):
-    path = tmp_path / "killed.mcap"
-    rng = random.Random(seed)
-    wanted = rng.randint(1, 400) * 10
-    process = subprocess.Popen(
-        [sys.executable, "-c", _WRITE, str(path)],
+def start(code, path):
+    """A program of its own that writes to ``path``."""
+    return subprocess.Popen(
+        [sys.executable, "-c", code, str(path)],
         stdout=subprocess.PIPE,
         text=True,
         cwd=ROOT,
-        env={"PYTHONPATH": str(ROOT)},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])},
     )
-    with process:
+
+
+@pytest.mark.parametrize(
+    "seed", [*range(10), *(pytest.param(n, marks=pytest.mark.slow) for n in range(10, 200))]
+)
+def test_killed_at_any_moment_all_but_the_last_second_is_there(tmp_path, seed):
+    path = tmp_path / "killed.mcap"
+    rng = random.Random(seed)
+    wanted = rng.randint(1, 400) * 10
+    with start(_WRITE, path) as process:
         for line in process.stdout:
             if int(line) >= wanted:
                 break
@@ -361,7 +372,30 @@ def test_killed_at_any_moment_all_before_the_last_chunk_is_there(tmp_path, seed)
     assert error is None
     sequences = [frame.sequence for frame in found]
     assert sequences == list(range(len(sequences)))
-    assert len(found) >= written - 60  # what fits into a chunk of 8 KiB, with room
+    assert len(found) >= written - 101  # a second, and the frame that ends it
     mended = tmp_path / "mended.mcap"
     assert repair(path, mended).messages["/frames"] == len(found)
     assert len(frames_in(mended)[0]) == len(found)
+
+
+_RECORD = """
+import sys, threading
+from pathlib import Path
+from recording.runs import frame_of, SKIN
+from tomoskin.recording import Mark, Recorder, SessionWriter
+recorder = Recorder(SessionWriter(Path(sys.argv[1]), SKIN), None, print)
+for number in range(20):
+    recorder.frame(frame_of(number), Mark.NONE)
+threading.Event().wait(1.0)
+print("a second later", flush=True)
+threading.Event().wait(60)
+"""
+
+
+def test_killed_while_nothing_comes_all_older_than_a_second_is_there(tmp_path):
+    """Nothing new comes that could end the open chunk: the recorder's thread does."""
+    path = tmp_path / "killed.mcap"
+    with start(_RECORD, path) as process:
+        assert process.stdout.readline() == "a second later\n"
+        process.send_signal(signal.SIGKILL)
+    assert [frame.sequence for frame in frames_in(path)[0]] == list(range(20))

@@ -98,7 +98,7 @@ def test_the_numbers_of_kinds_are_the_sdks(image, scene):
 @pytest.mark.parametrize("topic", ["/scene", "/image", "/events"])
 def test_schemas_name_the_fields_of_the_messages(image, scene, topic):
     content = {"/scene": scene, "/image": image, "/events": log_message(Event(0, "a", "b"), 0)}
-    schema = json.loads(schema_of(topic).text)
+    schema = json.loads(schema_of(topic).data)
     assert names(content[topic]) == names_of_schema(schema)
 
 

@@ -79,7 +79,7 @@ def test_what_a_client_sees(served):
         for topic, channel in client.channels.items():
             schema = schema_of(topic)
             assert (channel["encoding"], channel["schemaName"]) == ("json", schema.name)
-            assert channel["schema"] == schema.text
+            assert channel["schema"] == schema.data.decode()
         topic, time, content = subscribed(sink, client)
         assert (topic, time) == ("/events", round((EPOCH + 0.5) * 1e9))
         assert content["message"] == EVENT.text

@@ -91,7 +91,7 @@ def test_the_first_frames_count_too(link, board):
 
 def test_the_sequence_wraps(link, board):
     top = 2**32 - 1
-    link._talk.gate._expected = top
+    link._session.frames._expected = top
     board.say(frame_of(link, top), frame_of(link, 0), frame_of(link, 1))
     items = drain(link, board)
     assert len(frames(items)) == 3

@@ -6,7 +6,6 @@ from tomoskin.formats.display import Display, circular_average
 from tomoskin.formats.exports.hdf5 import write_hdf5
 from tomoskin.formats.exports.matlab import write_matlab
 from tomoskin.formats.exports.movie import FILMS
-from tomoskin.formats.exports.series import series_files, write_series
 from tomoskin.formats.exports.table import write_csv, write_parquet
 from tomoskin.formats.interchange import write_interchange
 from tomoskin.formats.labelled_set import is_done, join_shards, shard_path, write_whole
@@ -15,7 +14,7 @@ from tomoskin.formats.picture import MOST_PANELS, Panel, plot, rendered, write_p
 from tomoskin.formats.reader import is_session, read_recording
 from tomoskin.formats.session_export import WRITERS, Export
 from tomoskin.formats.touch_csv import write_touches
-from tomoskin.formats.vtu import write_vtu
+from tomoskin.formats.vtu import series_files, write_series, write_vtu
 
 __all__ = [
     "FILMS",

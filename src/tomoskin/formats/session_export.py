@@ -13,18 +13,23 @@ from tomoskin.core import DataError
 from tomoskin.formats.exports.hdf5 import write_hdf5
 from tomoskin.formats.exports.matlab import write_matlab
 from tomoskin.formats.exports.movie import FILMS
-from tomoskin.formats.exports.series import write_series
 from tomoskin.formats.exports.table import write_csv, write_parquet
 from tomoskin.formats.interchange import write_interchange
 from tomoskin.formats.picture import MOST_PANELS, Panel, rendered, write_picture
 from tomoskin.formats.touch_csv import write_touches
+from tomoskin.formats.vtu import write_series
 from tomoskin.pipeline import Prepared, colour_limit
-from tomoskin.recording import SessionReader, as_recorded, recording_of, replayed
+from tomoskin.recording import (
+    Advance,
+    SessionReader,
+    as_recorded,
+    indexed_frames,
+    recording_of,
+    replayed,
+)
 
 if TYPE_CHECKING:
     from tomoskin.pipeline import Result
-
-Advance = Callable[[float, float], None]
 
 
 @dataclass(frozen=True)
@@ -102,7 +107,7 @@ class Export:
 
     def _images(self, prepared: Prepared) -> Iterator[Result]:
         """A result every so often; those before the reference stands are left out."""
-        total = self.session.n_frames
+        total = indexed_frames(self.session)
         due = float("-inf")
         shown = False
         for done, result in enumerate(replayed(prepared, self.session)):

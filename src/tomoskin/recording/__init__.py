@@ -1,8 +1,21 @@
 """Session files: write, read, repair, replay."""
 
-from tomoskin.recording.blocks import Advance, Block, Rows, all_blocks
+from tomoskin.recording.blocks import (
+    Advance,
+    Block,
+    Rows,
+    all_blocks,
+    read_session,
+    recording_of,
+)
 from tomoskin.recording.channels import schema_of
-from tomoskin.recording.documents import encode_json, touch_row, touches_message
+from tomoskin.recording.documents import (
+    RecordedTouches,
+    Truth,
+    encode_json,
+    touch_row,
+    touches_message,
+)
 from tomoskin.recording.foxglove import grid_message, log_message, scene_message
 from tomoskin.recording.info import SessionInfo, session_info
 from tomoskin.recording.layout import Mark, MarkedFrame
@@ -10,10 +23,16 @@ from tomoskin.recording.recorder import Recorder
 from tomoskin.recording.repair import Lost, Repaired, repair
 from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.recording.replayed import advance, as_recorded, replayed
-from tomoskin.recording.session_reader import RecordedTouches, SessionReader, Truth
+from tomoskin.recording.session_reader import (
+    SessionReader,
+    end_time,
+    indexed_frames,
+    message_counts,
+    tick_rate,
+    touches_before,
+)
+from tomoskin.recording.session_writer import SessionWriter
 from tomoskin.recording.timeline import Span, Timeline, read_timeline
-from tomoskin.recording.whole import read_session, recording_of
-from tomoskin.recording.writer import SessionWriter
 
 __all__ = [
     "Advance",
@@ -36,8 +55,11 @@ __all__ = [
     "all_blocks",
     "as_recorded",
     "encode_json",
+    "end_time",
     "grid_message",
+    "indexed_frames",
     "log_message",
+    "message_counts",
     "open_replay",
     "parse_replay",
     "read_session",
@@ -48,6 +70,8 @@ __all__ = [
     "scene_message",
     "schema_of",
     "session_info",
+    "tick_rate",
     "touch_row",
+    "touches_before",
     "touches_message",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from tomoskin.recording.mcap import Channel, Schema
+from mcap.records import Channel, Schema
 
 RAW, FRAMES, TOUCHES, SCENE, IMAGE, TRUTH, EVENTS, NOTES, DEVICE, CLOCK, SETTINGS = range(1, 12)
 """Numbers of the channels: the same in every file, so that a torn one can be read."""
@@ -147,7 +147,10 @@ _TABLE: tuple[tuple[int, str, tuple[str, str, str]], ...] = (
 
 def _schemas() -> tuple[Schema, ...]:
     names = dict.fromkeys(kind for _, _, kind in _TABLE)
-    return tuple(Schema(number, *kind) for number, kind in enumerate(names, start=1))
+    return tuple(
+        Schema(number, text.encode(), encoding, name)
+        for number, (name, encoding, text) in enumerate(names, start=1)
+    )
 
 
 SCHEMAS = _schemas()
@@ -156,7 +159,7 @@ SCHEMAS = _schemas()
 _NUMBERS = {schema.name: schema.id for schema in SCHEMAS}
 
 CHANNELS = tuple(
-    Channel(number, _NUMBERS[kind[0]], topic, "cdr" if kind[1] == "ros2msg" else "json")
+    Channel(number, topic, "cdr" if kind[1] == "ros2msg" else "json", {}, _NUMBERS[kind[0]])
     for number, topic, kind in _TABLE
 )
 """Every channel."""
@@ -167,5 +170,5 @@ TOPICS = {channel.id: channel.topic for channel in CHANNELS}
 
 def schema_of(topic: str) -> Schema:
     """Schema of the messages of a topic."""
-    numbers = {channel.topic: channel.schema for channel in CHANNELS}
+    numbers = {channel.topic: channel.schema_id for channel in CHANNELS}
     return SCHEMAS[numbers[topic] - 1]

@@ -1,38 +1,48 @@
-"""An MCAP file in the making: small chunks, each written whole, and an index at the end."""
+"""An MCAP file in the making: chunks that are each written whole, and an index at the end.
+
+The records are those of the ``mcap`` library. Its Writer is not used: it takes three times as long
+for a message, and what it holds after a failed write cannot be cut back to the last whole record.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import struct
-import tempfile
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
-from typing import IO, BinaryIO
+from collections.abc import Mapping, Sequence
+from typing import BinaryIO
+
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    MessageIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
 
 from tomoskin.core import MAGIC
-from tomoskin.recording import mcap
+from tomoskin.recording.mcap_records import encode, encode_message
 
-CHUNK_BYTES = 8192
-"""A chunk is written as soon as it is so long: what a killed program can lose."""
-
-SEEK_TABLE = "tomoskin.seek"
-"""Name of the attachment that finds a time without reading the whole index."""
-
-SEEK_ROW = struct.Struct("<QQ")
-"""A row of it: first log time of a chunk (ns) and the chunk's offset."""
-
-_SEEK_STEP = 1_000_000_000
-_SPILL = 1 << 20
-_COPY = 1 << 20
+CHUNK_BYTES = 1 << 18
+"""A chunk is written once it is so long; :meth:`ContainerWriter.flush` writes it earlier."""
 
 
 class ContainerWriter:
-    """Writes one MCAP file without compression, in memory that does not grow.
+    """Writes one MCAP file without compression.
 
-    The index of the chunks waits in a temporary file. Every chunk goes out in one write; when a
-    write fails, the file is cut back to its last whole record, the :class:`OSError` is raised,
-    and nothing more is written.
+    When a write fails, the file is cut back to its last whole record, the :class:`OSError` is
+    raised, and nothing more is written.
 
     Parameters
     ----------
@@ -41,40 +51,33 @@ class ContainerWriter:
     library
         What the file says it was written by.
     schemas, channels
-        All that the file will hold.
+        All that the file will hold; they stand in its first chunk.
+
+    Attributes
+    ----------
+    size
+        Bytes in the file so far, each of them part of a whole record.
     """
 
     def __init__(
-        self,
-        file: BinaryIO,
-        library: str,
-        schemas: Sequence[mcap.Schema],
-        channels: Sequence[mcap.Channel],
+        self, file: BinaryIO, library: str, schemas: Sequence[Schema], channels: Sequence[Channel]
     ) -> None:
-        self._file = file
-        self._size = 0
-        self._crc = 0
-        self._broken = False
-        self._schemas = b"".join(map(mcap.schema, schemas))
-        self._channels = b"".join(map(mcap.channel, channels))
-        self._kinds = (len(schemas), len(channels))
-        self._counts = {channel.id: 0 for channel in channels}
-        self._times: tuple[int, int] | None = None
-        self._chunks = 0
-        self._chunk_index: IO[bytes] = tempfile.SpooledTemporaryFile(_SPILL)  # noqa: SIM115
-        self._attachments: list[bytes] = []
-        self._metadata: list[bytes] = []
-        self._seek = bytearray()
-        self._next_seek = 0
-        self._records = bytearray(self._schemas + self._channels)
-        self._indexes: dict[int, list[tuple[int, int]]] = {}
+        self.size = 0
+        self._file, self._crc, self._broken = file, 0, False
+        counts = {channel.id: 0 for channel in channels}
+        self._totals = Statistics(0, len(channels), counts, 0, 0, 0, 0, 0, len(schemas))
+        self._summary = {
+            Opcode.SCHEMA: bytearray(encode(*schemas)),
+            Opcode.CHANNEL: bytearray(encode(*channels)),
+            Opcode.STATISTICS: bytearray(),
+            Opcode.ATTACHMENT_INDEX: bytearray(),
+            Opcode.METADATA_INDEX: bytearray(),
+            Opcode.CHUNK_INDEX: bytearray(),
+        }
+        self._records = self._summary[Opcode.SCHEMA] + self._summary[Opcode.CHANNEL]
+        self._indexes: dict[int, MessageIndex] = {}
         self._span: tuple[int, int] | None = None
-        self._write(MAGIC + mcap.header(library))
-
-    @property
-    def size(self) -> int:
-        """Bytes in the file so far, each of them part of a whole record."""
-        return self._size
+        self._write(MAGIC + encode(Header("", library)))
 
     @property
     def is_linked(self) -> bool:
@@ -87,29 +90,33 @@ class ContainerWriter:
     def attach(self, name: str, media_type: str, data: bytes, log_time: int = 0) -> None:
         """Put a whole file inside."""
         self.flush()
-        record = mcap.attachment(log_time, name, media_type, data)
-        place = (self._size, len(record))
-        self._write(record)
-        index = mcap.attachment_index(place, log_time, len(data), name, media_type)
-        self._attachments.append(index)
+        record = encode(Attachment(0, log_time, name, media_type, data))
+        index = AttachmentIndex(
+            self._write(record), len(record), log_time, 0, len(data), name, media_type
+        )
+        self._summary[Opcode.ATTACHMENT_INDEX] += encode(index)
+        self._totals.attachment_count += 1
 
     def describe(self, name: str, values: Mapping[str, str]) -> None:
         """Put named strings inside."""
         self.flush()
-        record = mcap.metadata(name, values)
-        place = (self._size, len(record))
-        self._write(record)
-        self._metadata.append(mcap.metadata_index(place, name))
+        record = encode(Metadata(name, dict(values)))
+        index = MetadataIndex(self._write(record), len(record), name)
+        self._summary[Opcode.METADATA_INDEX] += encode(index)
+        self._totals.metadata_count += 1
 
     def message(self, channel: int, log_time: int, data: bytes) -> None:
         """Add one message; the chunk is written when it is long enough."""
         if self._broken:
             raise OSError("it could not be written before")
         records = self._records
-        self._indexes.setdefault(channel, []).append((log_time, len(records)))
-        count = self._counts[channel]
-        records += mcap.message(channel, count % 2**32, log_time, data)
-        self._counts[channel] = count + 1
+        index = self._indexes.get(channel)
+        if index is None:
+            index = self._indexes[channel] = MessageIndex(channel, [])
+        index.records.append((log_time, len(records)))
+        number = self._totals.channel_message_counts[channel]
+        records += encode_message(channel, number % 2**32, log_time, data)
+        self._totals.channel_message_counts[channel] = number + 1
         first, last = self._span or (log_time, log_time)
         self._span = (min(first, log_time), max(last, log_time))
         if len(records) >= CHUNK_BYTES:
@@ -119,16 +126,22 @@ class ContainerWriter:
         """Write the open chunk."""
         if self._span is None or self._broken:
             return
-        span, place = self._span, self._size
-        chunk = mcap.chunk(*span, bytes(self._records))
-        size, offsets, indexes = len(self._records), {}, bytearray()
-        for channel, entries in self._indexes.items():
-            offsets[channel] = place + len(chunk) + len(indexes)
-            indexes += mcap.message_index(channel, entries)
+        records, (first, last), totals = bytes(self._records), self._span, self._totals
+        chunk = encode(Chunk("", records, last, first, zlib.crc32(records), len(records)))
+        begin, place = self.size, self.size + len(chunk)
+        indexes, places = bytearray(), {}
+        for channel, index in self._indexes.items():
+            places[channel] = place + len(indexes)
+            indexes += encode(index)
         self._write(chunk + indexes)
-        self._remember(mcap.chunk_index(span, (place, len(chunk)), offsets, (len(indexes), size)))
-        self._chunks += 1
-        self._note_times(span, place)
+        entry = ChunkIndex(
+            len(chunk), begin, "", len(records), last, len(indexes), places, first, len(records)
+        )
+        self._summary[Opcode.CHUNK_INDEX] += encode(entry)
+        earliest = totals.message_start_time if totals.chunk_count else first
+        totals.message_start_time = min(earliest, first)
+        totals.message_end_time = max(totals.message_end_time, last)
+        totals.chunk_count += 1
         self._records, self._indexes, self._span = bytearray(), {}, None
 
     def close(self) -> None:
@@ -144,28 +157,41 @@ class ContainerWriter:
         try:
             if not self._broken:
                 self.flush()
-                self.attach(SEEK_TABLE, "application/octet-stream", bytes(self._seek))
                 self._finish()
         finally:
-            self._chunk_index.close()
             self._file.close()
 
-    def _remember(self, index: bytes) -> None:
+    def _finish(self) -> None:
+        last_chunk = self.size
         try:
-            self._chunk_index.write(index)
+            self._write(encode(DataEnd(self._crc)))
+            self._write(self._ending(self.size))
+            os.fsync(self._file.fileno())
         except OSError:
-            self._broken = True
+            with contextlib.suppress(OSError):
+                self._file.truncate(last_chunk)
             raise
 
-    def _note_times(self, span: tuple[int, int], place: int) -> None:
-        first, last = self._times or span
-        self._times = (min(first, span[0]), max(last, span[1]))
-        if span[0] >= self._next_seek:
-            self._seek += SEEK_ROW.pack(span[0], place)
-            self._next_seek = span[0] + _SEEK_STEP
+    def _ending(self, start: int) -> bytes:
+        """The summary, its offsets, the footer and the magic, as they stand from ``start`` on."""
+        totals = self._totals
+        totals.message_count = sum(totals.channel_message_counts.values())
+        self._summary[Opcode.STATISTICS] = bytearray(encode(totals))
+        summary, offsets = bytearray(), []
+        for opcode, group in self._summary.items():
+            if group:
+                offsets.append(SummaryOffset(opcode, start + len(summary), len(group)))
+                summary += group
+        offsets_start = start + len(summary)
+        summary += encode(*offsets)
+        head = encode(Footer(start, offsets_start, 0))[:-4]
+        return bytes(summary) + head + struct.pack("<I", zlib.crc32(summary + head)) + MAGIC
 
-    def _write(self, data: bytes | bytearray) -> None:
-        """All of ``data`` or nothing."""
+    def _write(self, data: bytes | bytearray) -> int:
+        """Write all of ``data`` or nothing; where it begins."""
+        if self._broken:
+            raise OSError("it could not be written before")
+        place = self.size
         try:
             rest = memoryview(data)
             while rest:
@@ -173,45 +199,8 @@ class ContainerWriter:
         except OSError:
             self._broken = True
             with contextlib.suppress(OSError):
-                self._file.truncate(self._size)
+                self._file.truncate(place)
             raise
-        self._size += len(data)
+        self.size += len(data)
         self._crc = zlib.crc32(data, self._crc)
-
-    def _finish(self) -> None:
-        whole = self._size
-        try:
-            self._write(mcap.data_end(self._crc))
-            self._summary()
-            os.fsync(self._file.fileno())
-        except OSError:
-            with contextlib.suppress(OSError):
-                self._file.truncate(whole)
-            raise
-
-    def _summary(self) -> None:
-        start, self._crc = self._size, 0
-        offsets = []
-        others = (*self._kinds, len(self._attachments), len(self._metadata), self._chunks)
-        groups: tuple[tuple[int, Iterable[bytes]], ...] = (
-            (mcap.SCHEMA, (self._schemas,)),
-            (mcap.CHANNEL, (self._channels,)),
-            (mcap.STATISTICS, (mcap.statistics(self._counts, others, self._times or (0, 0)),)),
-            (mcap.ATTACHMENT_INDEX, self._attachments),
-            (mcap.METADATA_INDEX, self._metadata),
-            (mcap.CHUNK_INDEX, self._chunk_indexes()),
-        )
-        for opcode, parts in groups:
-            before = self._size
-            for part in parts:
-                self._write(part)
-            if self._size > before:
-                offsets.append(mcap.summary_offset(opcode, before, self._size - before))
-        offsets_start = self._size
-        self._write(b"".join(offsets))
-        self._write(mcap.ending(start, offsets_start, self._crc))
-
-    def _chunk_indexes(self) -> Iterable[bytes]:
-        self._chunk_index.seek(0)
-        while part := self._chunk_index.read(_COPY):
-            yield part
+        return place

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tomoskin.recording import channels
+from tomoskin.recording.blocks import Advance, no_report
 from tomoskin.recording.clock import ClockFit, ClockFitter
-from tomoskin.recording.container import SEEK_TABLE
 from tomoskin.recording.layout import Mark, MarkedFrame
-from tomoskin.recording.session_reader import SessionReader
-from tomoskin.recording.writer import SKIN_FILE
+from tomoskin.recording.session_reader import SessionReader, indexed_frames, message_counts
+from tomoskin.recording.session_writer import OLD_INDEX_FILE, SKIN_FILE
 
-Advance = Callable[[float, float], None]
-"""Told how much of how much is done."""
-
-_OWN = frozenset({SKIN_FILE, SEEK_TABLE})
+_OWN = frozenset({SKIN_FILE, OLD_INDEX_FILE})
 _OFTEN = 1000
 _MODULUS = 2**32
 
@@ -100,7 +96,7 @@ class _Frames:
         return (self.count - 1) / span if span > 0 else float("nan")
 
 
-def session_info(path: Path, advance: Advance = lambda _done, _total: None) -> SessionInfo:
+def session_info(path: Path, advance: Advance = no_report) -> SessionInfo:
     """Read a whole session and say what is in it.
 
     Raises
@@ -111,18 +107,15 @@ def session_info(path: Path, advance: Advance = lambda _done, _total: None) -> S
     size = path.stat().st_size if path.is_file() else 0
     frames, clock = _Frames(), ClockFitter()
     with SessionReader(path) as session:
-        total = session.totals.counts.get(channels.FRAMES, 0) if session.totals else 0
+        total = indexed_frames(session)
         for number, item in enumerate(session.frames()):
             frames.add(item)
             clock.add(item.frame.ticks, item.frame.host_time)
             if number % _OFTEN == 0:
                 advance(number, max(total, number + 1))
-        seen = (touch for item in session.touches() for touch in item.touches)
-        touches = {number for touch in seen for number in (touch.id, *touch.merged)}
-        events: dict[str, int] = {}
-        for event in session.events():
-            events[event.kind] = events.get(event.kind, 0) + 1
-        counts = session.counts()
+        every = (touch for item in session.touches() for touch in item.touches)
+        touches = {number for touch in every for number in (touch.id, *touch.merged)}
+        messages = message_counts(session)
         return SessionInfo(
             path=str(path),
             size=size,
@@ -143,10 +136,10 @@ def session_info(path: Path, advance: Advance = lambda _done, _total: None) -> S
             dropped=frames.dropped,
             touches=len(touches),
             presses=sum(1 for item in session.truth() if item.presses),
-            events=events,
+            events=dict(Counter(event.kind for event in session.events())),
             notes=sum(1 for _ in session.notes()),
             device=session.device(),
             clock=clock.fit,
-            messages=counts,
+            messages=messages,
             attached=tuple(name for name in session.attachments() if name not in _OWN),
         )

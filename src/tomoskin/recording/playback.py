@@ -1,9 +1,10 @@
-"""A recorded session as the reads of a source: the same bytes, in the same pieces."""
+"""A recorded session as the reads of a source: the same bytes, in the same pieces; where it is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import chain, islice
 
 from tomoskin.core import Frame
 from tomoskin.recording.layout import Mark, MarkedFrame
@@ -14,6 +15,9 @@ Item = RawBytes | MarkedFrame
 
 _LONGEST = 2 * SCHEMA.from_device_bytes
 """Bytes that are kept while a first frame is awaited: more than the longest message has."""
+
+_BEFORE = 1.0
+"""Seconds before a moment that are read to find the first byte of its first frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +32,15 @@ class Piece:
     follows: bool
     frames: tuple[MarkedFrame, ...]
 
+    @property
+    def is_earlier(self) -> bool:
+        """Whether it is from before the recording, or played for the sake of a reference."""
+        return any(item.mark & Mark.EARLIER for item in self.frames)
+
+    def mark(self, sequence: int) -> Mark | None:
+        """What became of a frame of it; None for one that is not in it."""
+        return next((i.mark for i in self.frames if i.frame.sequence == sequence), None)
+
 
 @dataclass
 class _Read:
@@ -35,6 +48,67 @@ class _Read:
     data: bytes
     frames: list[MarkedFrame] = field(default_factory=list)
     was_recorded: bool = True
+
+
+class Playhead:
+    """Where a replay is: the last piece, the next one, and the recorded time between them.
+
+    Parameters
+    ----------
+    items
+        The recorded items from somewhat before a host time on, as :func:`pieces` takes them.
+
+    Attributes
+    ----------
+    next
+        The piece that is played next; None at the end.
+    last
+        The piece that was played last, or None.
+    now
+        The time in the recording, host monotonic s: exactly that of the last piece when it has
+        just been played.
+    """
+
+    def __init__(self, items: Callable[[float], Iterable[Item]]) -> None:
+        self._items = items
+        self.last: Piece | None = None
+        self.now = self._reached = float("-inf")
+        self.seek(float("-inf"))
+        if self.next is not None:
+            self.now = self.next.host_time
+
+    def seek(self, host_time: float, earlier: Iterable[MarkedFrame] = ()) -> None:
+        """Go on from the first frame at ``host_time``, if there is one, after those ``earlier``."""
+        there = pieces(self._items(host_time - _BEFORE), host_time)
+        first = tuple(islice(there, 1))
+        before = pieces(earlier if first else ())
+        self._pieces = chain(before, first, there)
+        self.next: Piece | None = next(self._pieces, None)
+        self._reach_next()
+
+    def advance(self, seconds: float) -> float:
+        """Let recorded time go by; the seconds that are left until the next piece."""
+        self._reached += seconds
+        if self.next is None:
+            return float("inf")
+        self.now = max(self.now, min(self._reached, self.next.host_time))
+        return self.next.host_time - self._reached
+
+    def play(self) -> Piece:
+        """The next piece, which must be there."""
+        assert self.next is not None
+        self.last = piece = self.next
+        self.now = piece.host_time
+        self._reached = max(self._reached, piece.host_time)
+        self.next = next(self._pieces, None)
+        if piece.is_earlier:
+            self._reach_next()
+        return piece
+
+    def _reach_next(self) -> None:
+        """Recorded time goes on from the next piece, however far it is."""
+        if self.next is not None:
+            self._reached = self.next.host_time
 
 
 def pieces(items: Iterable[Item], since: float = float("-inf")) -> Iterator[Piece]:
@@ -94,8 +168,3 @@ def _from_frame(data: bytes, frame: Frame) -> bytes:
                 return data[place:]
         place = end + 1
     return data
-
-
-def marks(piece: Piece) -> dict[int, Mark]:
-    """What became of the frames of a piece, by their sequence."""
-    return {item.frame.sequence: item.mark for item in piece.frames}

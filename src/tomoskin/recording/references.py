@@ -1,4 +1,4 @@
-"""Which frames the reference of a moment was made of: what a jump in a replay begins with."""
+"""Which frames the reference of a moment was made of: what a seek in a replay begins with."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class References:
     """
 
     def __init__(self, path: Path, settings: Mapping[str, Any]) -> None:
-        said = settings.get("reference_frames")
-        self._count = _KEPT * (said if isinstance(said, int) and said > 0 else _USUAL)
+        count = settings.get("reference_frames")
+        self._count = _KEPT * (count if isinstance(count, int) and count > 0 else _USUAL)
         self._path = path
         self._begun: list[float] = []
         self._searched = float("-inf")

@@ -3,36 +3,33 @@
 from __future__ import annotations
 
 import re
-import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
+
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Chunk, DataEnd, Metadata
 
 from tomoskin.core import MAGIC, DataError, Output, SkinError, check_outputs, written
-from tomoskin.recording import channels, mcap
-from tomoskin.recording.container import SEEK_TABLE, ContainerWriter
-from tomoskin.recording.container_reader import LARGEST
-from tomoskin.recording.parts import (
-    Attachment,
-    Chunk,
-    messages_in,
-    parse_attachment,
-    parse_chunk,
-    parse_metadata,
-)
-from tomoskin.recording.writer import ABOUT, FORMAT, LIBRARY, SKIN_FILE, said_of
+from tomoskin.recording.blocks import Advance, no_report
+from tomoskin.recording.channels import CHANNELS, SCHEMAS, TOPICS
+from tomoskin.recording.container import ContainerWriter
+from tomoskin.recording.mcap_records import LARGEST, PREFIX, decode, decode_chunk, messages_in
+from tomoskin.recording.message_log import LIBRARY, errors_of
+from tomoskin.recording.session_writer import ABOUT, FORMAT, OLD_INDEX_FILE, SKIN_FILE
 from tomoskin.skin import Skin
-
-Advance = Callable[[float, float], None]
 
 _WINDOW = 1 << 20
 _BEGINNING = re.compile(rb"(?=[\x06\x09\x0c].{3}\x00{5})", re.DOTALL)
 """Kind and length of a chunk, attachment or named strings of up to 16 MiB."""
 
-_KNOWN = frozenset(range(mcap.HEADER, mcap.DATA_END + 1))
+_OPCODES = frozenset(Opcode)
+
+_DATA = (Opcode.CHUNK, Opcode.ATTACHMENT)
+"""Records that are lost where they are not whole; others are made again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +57,16 @@ class Repaired:
     ended: bool = False
 
 
+class Stretch(NamedTuple):
+    """Bytes of a file, and the record that they are; None where they are none."""
+
+    start: int
+    stop: int
+    record: Chunk | Attachment | Metadata | DataEnd | None
+
+
 def repair(
-    source: Path,
-    target: Path,
-    *,
-    skin: Skin | None = None,
-    advance: Advance = lambda _done, _total: None,
+    source: Path, target: Path, *, skin: Skin | None = None, advance: Advance = no_report
 ) -> Repaired:
     """Write every whole chunk of ``source`` to the new file ``target``, which appears at the end.
 
@@ -85,53 +86,62 @@ def repair(
     check_outputs([Output(target)], [source])
     if not source.exists():
         raise DataError("there is no such file", where=str(source))
-    found = Repaired(target)
-    with said_of(source), source.open("rb") as file:
-        scan = _Scan(file, found)
-        front = _front(scan, skin, str(source))
+    result = Repaired(target)
+    with errors_of(source), source.open("rb") as file:
+        size = file.seek(0, 2)
+        about, attachments = _front(stretches(file, size), skin, str(source))
         with written(target) as part:
-            _mend(scan, front, part, advance)
-            if not found.chunks:
+            output = part.open("wb", buffering=0)
+            with closing(ContainerWriter(output, LIBRARY, SCHEMAS, CHANNELS)) as mended:
+                mended.describe(ABOUT, about)
+                for item in attachments:
+                    mended.attach(item.name, item.media_type, item.data)
+                for stop in _copy(stretches(file, size), mended, result):
+                    advance(stop, size)
+            if not result.chunks:
                 raise DataError("holds no whole chunk: nothing can be recovered", where=str(source))
-    return found
+    return result
 
 
-Front = tuple[dict[str, str], list[Attachment]]
-"""The named strings of a file, and its attachments."""
+def stretches(file: BinaryIO, size: int) -> Iterator[Stretch]:
+    """The chunks, attachments, named strings and the DATA END of a file, and what is lost between.
+
+    It goes record by record, and where one is damaged on to the next whole one.
+    """
+    place = len(MAGIC) if _read(file, 0, len(MAGIC)) == MAGIC else 0
+    while place < size:
+        opcode, stop = _head(file, place, size)
+        record = _record(opcode, _read(file, place, stop - place))
+        lost = record is None and (stop == place or opcode in _DATA)
+        if lost:
+            stop = _next_record(file, place + 1, size)
+        if lost or record is not None:
+            yield Stretch(place, stop, record)
+        if isinstance(record, DataEnd):
+            return
+        place = stop
 
 
-def _mend(scan: _Scan, front: Front, target: Path, advance: Advance) -> None:
-    """What is whole in the file that is scanned → ``target``."""
-    about, attachments = front
-    output = target.open("wb", buffering=0)
-    with closing(ContainerWriter(output, LIBRARY, channels.SCHEMAS, channels.CHANNELS)) as mended:
-        mended.describe(ABOUT, about)
-        for item in attachments:
-            mended.attach(item.name, item.media_type, item.data)
-        for part in scan.parts():
-            if isinstance(part, Chunk):
-                _copy(part, mended, scan.found, scan.name)
-                advance(part.offset, scan.size)
-
-
-def _front(scan: _Scan, skin: Skin | None, where: str) -> Front:
+def _front(
+    found: Iterable[Stretch], skin: Skin | None, where: str
+) -> tuple[dict[str, str], list[Attachment]]:
     """The named strings and the attachments, wherever they are in the file."""
-    about: dict[str, str] = {}
+    about = {"format": str(FORMAT), "epoch_s": "0.0"}
     attachments: dict[str, Attachment] = {}
-    seen = False
-    for part in scan.parts():
-        seen = True
-        if isinstance(part, Attachment) and part.name != SEEK_TABLE:
-            attachments[part.name] = part
-        elif isinstance(part, dict):
-            about = part
-    if not seen:
+    is_session = False
+    for _, _, record in found:
+        is_session |= isinstance(record, Chunk | Attachment | Metadata)
+        if isinstance(record, Attachment) and record.name != OLD_INDEX_FILE:
+            attachments[record.name] = record
+        elif isinstance(record, Metadata) and record.name == ABOUT:
+            about = record.metadata
+    if not is_session:
         raise DataError("holds no part of a session: nothing can be recovered", where=where)
     if skin is None:
         skin = _skin_of(attachments.get(SKIN_FILE), where)
-    attachments[SKIN_FILE] = Attachment(SKIN_FILE, "application/toml", skin.to_toml().encode())
-    scan.begin()
-    return about or {"format": str(FORMAT), "epoch_s": "0.0"}, list(attachments.values())
+    data = skin.to_toml().encode()
+    attachments[SKIN_FILE] = Attachment(0, 0, SKIN_FILE, "application/toml", data)
+    return about, list(attachments.values())
 
 
 def _skin_of(attachment: Attachment | None, where: str) -> Skin:
@@ -143,101 +153,67 @@ def _skin_of(attachment: Attachment | None, where: str) -> Skin:
     raise DataError("its skin is lost", where=where, hint="name the skin: --skin")
 
 
-def _copy(chunk: Chunk, container: ContainerWriter, found: Repaired, where: str) -> None:
-    for message in messages_in(chunk, where):
-        if message.channel in channels.TOPICS:
-            container.message(message.channel, message.log_time, message.data)
-            found.messages[channels.TOPICS[message.channel]] += 1
-    found.chunks += 1
+def _copy(found: Iterable[Stretch], container: ContainerWriter, result: Repaired) -> Iterator[int]:
+    """Write the messages of every chunk, and note what is lost; how far it is, byte by byte."""
+    after = 0
+    for start, stop, record in found:
+        if record is None:
+            result.lost.append(Lost(start, stop, after, None))
+        elif isinstance(record, DataEnd):
+            result.ended = True
+        elif isinstance(record, Chunk):
+            if result.lost and result.lost[-1].before is None:
+                result.lost[-1] = replace(result.lost[-1], before=record.message_start_time)
+            for message in messages_in(record, start):
+                if message.channel in TOPICS:
+                    container.message(message.channel, message.log_time, message.data)
+                    result.messages[TOPICS[message.channel]] += 1
+            result.chunks, after = result.chunks + 1, record.message_end_time
+        yield stop
 
 
-class _Scan:
-    """Goes through a file record by record, and to the next whole one where that fails."""
+def _head(file: BinaryIO, place: int, size: int) -> tuple[int, int]:
+    """Kind and end of the record at ``place``; its end is ``place`` where there can be none."""
+    head = _read(file, place, PREFIX.size)
+    if len(head) < PREFIX.size:
+        return 0, place
+    opcode, length = PREFIX.unpack(head)
+    stop = place + PREFIX.size + int(length)
+    fits = opcode in _OPCODES and length <= LARGEST and stop <= size
+    return opcode, stop if fits else place
 
-    def __init__(self, file: BinaryIO, found: Repaired) -> None:
-        self._file, self.found = file, found
-        self.name = str(file.name)
-        self.size = file.seek(0, 2)
-        self.begin()
 
-    def begin(self) -> None:
-        """Forget what was found to be lost."""
-        self.found.lost.clear()
-        self.found.ended = False
+def _record(opcode: int, data: bytes) -> Chunk | Attachment | Metadata | DataEnd | None:
+    """What ``data`` is, when it is whole and of a kind that is kept."""
+    try:
+        match opcode:
+            case Opcode.CHUNK:
+                chunk = decode_chunk(data)
+                return None if chunk.compression else chunk
+            case Opcode.ATTACHMENT:
+                return decode(Attachment, data)
+            case Opcode.METADATA:
+                return decode(Metadata, data)
+            case Opcode.DATA_END:
+                return decode(DataEnd, data)
+    except ValueError:
+        pass
+    return None
 
-    def parts(self) -> Iterator[Chunk | Attachment | dict[str, str]]:
-        """Every whole chunk, attachment and description, in order."""
-        place = len(MAGIC) if self._read(0, len(MAGIC)) == MAGIC else 0
-        after = 0
-        while place < self.size:
-            length = self._length(place)
-            part = self._whole(place, length) if length else None
-            if part is None and (not length or self._is_data(place)):
-                after_gap = self._next(place + 1)
-                self._lose(place, after_gap, after)
-                place = after_gap
-                continue
-            if isinstance(part, Chunk):
-                after = part.last
-                self._bound(part.first)
-            if part is not None:
-                yield part
-            if self._read(place, 1)[0] == mcap.DATA_END:
-                self.found.ended = True
-                return
-            place += length
 
-    def _length(self, place: int) -> int:
-        """Bytes of the record there; 0 where there can be none."""
-        head = self._read(place, mcap.PREFIX.size)
-        if len(head) < mcap.PREFIX.size:
-            return 0
-        opcode, length = mcap.PREFIX.unpack(head)
-        whole = mcap.PREFIX.size + int(length)
-        fits = length <= LARGEST and place + whole <= self.size
-        return whole if opcode in _KNOWN and fits else 0
+def _next_record(file: BinaryIO, place: int, size: int) -> int:
+    """Where the next whole record of data begins, or the end of the file."""
+    while place < size:
+        window = _read(file, place, _WINDOW + PREFIX.size)
+        for match in _BEGINNING.finditer(window):
+            start = place + match.start()
+            opcode, stop = _head(file, start, size)
+            if _record(opcode, _read(file, start, stop - start)) is not None:
+                return start
+        place += _WINDOW
+    return size
 
-    def _is_data(self, place: int) -> bool:
-        return self._read(place, 1)[0] in (mcap.CHUNK, mcap.ATTACHMENT)
 
-    def _whole(self, place: int, length: int) -> Chunk | Attachment | dict[str, str] | None:
-        """What stands there, when it is whole and of a kind that is kept."""
-        opcode = self._read(place, 1)[0]
-        body = self._read(place + mcap.PREFIX.size, length - mcap.PREFIX.size)
-        try:
-            if opcode == mcap.CHUNK:
-                chunk = parse_chunk(body, place)
-                return chunk if zlib.crc32(chunk.records) == chunk.crc else None
-            if opcode == mcap.ATTACHMENT:
-                return parse_attachment(body)
-            if opcode == mcap.METADATA:
-                name, values = parse_metadata(body)
-                return values if name == ABOUT else None
-        except ValueError:
-            return None
-        return None
-
-    def _next(self, place: int) -> int:
-        """Where the next whole record of data begins, or the end of the file."""
-        while place < self.size:
-            window = self._read(place, _WINDOW + 9)
-            for match in _BEGINNING.finditer(window):
-                start = place + match.start()
-                length = self._length(start)
-                if length and self._whole(start, length) is not None:
-                    return start
-            place += _WINDOW
-        return self.size
-
-    def _lose(self, start: int, stop: int, after: int) -> None:
-        self.found.lost.append(Lost(start, stop, after, None))
-
-    def _bound(self, first: int) -> None:
-        """The last stretch lost ends before ``first``."""
-        lost = self.found.lost
-        if lost and lost[-1].before is None:
-            lost[-1] = Lost(lost[-1].start, lost[-1].stop, lost[-1].after, first)
-
-    def _read(self, place: int, length: int) -> bytes:
-        self._file.seek(place)
-        return self._file.read(length)
+def _read(file: BinaryIO, place: int, length: int) -> bytes:
+    file.seek(place)
+    return file.read(length)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import chain, islice
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tomoskin.core import SourceError
 from tomoskin.pattern import Scan
 from tomoskin.recording.layout import Mark, MarkedFrame
-from tomoskin.recording.playback import Item, Piece, marks, pieces
+from tomoskin.recording.playback import Item, Playhead
 from tomoskin.recording.references import References
 from tomoskin.recording.replay_board import ReplayBoard
-from tomoskin.recording.session_reader import SessionReader
+from tomoskin.recording.session_reader import SessionReader, end_time, touches_before
 from tomoskin.source import Configuration, ScanSettings
 from tomoskin.twin import Clock, WallClock
 from tomoskin.wire import OLDER, SCHEMA
@@ -24,8 +24,8 @@ from tomoskin.wire import OLDER, SCHEMA
 if TYPE_CHECKING:
     from tomoskin.skin import Skin
 
-_BEFORE = 1.0
-"""Seconds before a place that are read to find the first byte of its first frame."""
+_SHORTEST = 1e-6
+"""No wait is shorter, s: a piece is played so much earlier, or time would stand still."""
 
 
 class ReplayTransport:
@@ -40,11 +40,22 @@ class ReplayTransport:
     skin
         The skin that it will be shown with.
     speed
-        Recorded seconds per second; ``inf`` for as fast as it is read.
+        Recorded seconds per second; ``inf`` for as fast as it is read. It may be set at any time.
     loop
-        Begin again at the end.
+        Begin again at the end. It may be set at any time.
     clock
         The time to keep.
+
+    Attributes
+    ----------
+    path
+        The session.
+    start
+        Host time of its first frame, those from before the recording left out.
+    paused
+        Whether it stands still.
+    touches_before
+        The last identity that a touch had before it begins.
 
     Raises
     ------
@@ -61,90 +72,56 @@ class ReplayTransport:
         loop: bool = False,
         clock: Clock | None = None,
     ) -> None:
-        self.name = f"replay:{session.path.name}"
-        self._session = session
-        self._speed, self._loop = speed, loop
-        self._clock = clock or WallClock()
+        self.path, self.name = session.path, f"replay:{session.path.name}"
+        self.speed, self.loop, self.paused = speed, loop, False
+        self.touches_before = touches_before(session)
+        self._session, self._clock = session, clock or WallClock()
         self._condition = threading.Condition()
         self._board = ReplayBoard(skin, session.device())
-        self._restamped = _restamped(session, skin, self.name)
-        self.touches_before = session.touches_before
-        self._held = self._closed = self._jumped = self.ended = False
-        self._steps = 0
-        self._marks: dict[int, Mark] = {}
-        _ = session.totals  # read now, by one thread
+        self._stamp = _stamp_of(session, skin, self.name)
         self._references = References(session.path, session.settings())
-        self._go(float("-inf"))
-        if self._next is None:
-            raise SourceError("holds no frame", where=self.name)
-        self._now = self._next.host_time
-        own = (p for p in pieces(self._items(self._now), self._now) if not self._is_earlier(p))
-        self.start = next(own, self._next).host_time
+        self._head = Playhead(partial(_items, session, self._stamp))
+        self._end = end_time(session)
+        self._wall = self._clock.now()
+        self._steps = 0
+        self._closed = self._after_seek = False
+        own = (item.frame for item in session.frames() if not item.mark & Mark.EARLIER)
+        first = next(own, None)
+        self.start = self._head.now if first is None else first.host_time
 
     @property
-    def paused(self) -> bool:
-        """Whether it stands still."""
-        return self._held
-
-    @property
-    def path(self) -> Path:
-        """The session."""
-        return self._session.path
+    def ended(self) -> bool:
+        """Whether nothing is left to play."""
+        return self._head.next is None and not self.loop
 
     @property
     def end(self) -> float:
         """Host time of the last message; of the last frame played where there is no index."""
-        totals = self._session.totals
-        return self._now if totals is None else totals.last / 1e9 - self._session.epoch
+        return self._head.now if self._end is None else self._end
 
     def now(self) -> float:
         """The time in the recording, host monotonic s: exactly that of what was read last."""
-        return self._now
+        return self._head.now
 
-    def jumped(self) -> bool:
+    def after_seek(self) -> bool:
         """Whether what was read last does not follow what was read before it."""
-        return self._jumped
+        return self._after_seek
 
     def mark(self, sequence: int) -> Mark | None:
-        """What became of a frame of the last read when it was recorded; None: never seen."""
-        return self._marks.get(sequence)
+        """What became of a frame of the last read when it was recorded; None: never processed."""
+        last = self._head.last
+        return last.mark(sequence) if last else None
 
     def pause(self, on: bool) -> None:
         """Stand still, or go on."""
         with self._condition:
-            self._held = on
-            self._anchor(self._now)
-            self._condition.notify()
-
-    @property
-    def speed(self) -> float:
-        """Recorded seconds per second; inf for as fast as it is read."""
-        return self._speed
-
-    @speed.setter
-    def speed(self, speed: float) -> None:
-        with self._condition:
-            self._anchor(self._now)
-            self._speed = speed
-            self._condition.notify()
-
-    @property
-    def loop(self) -> bool:
-        """Whether it begins again at the end."""
-        return self._loop
-
-    @loop.setter
-    def loop(self, on: bool) -> None:
-        with self._condition:
-            self._loop = on
-            if on and self._next is None:
-                self._go(float("-inf"))
+            self.paused = on
             self._condition.notify()
 
     def step(self) -> None:
         """Play one read and stand still."""
         with self._condition:
-            self._held = True
+            self.paused = True
             self._steps += 1
             self._condition.notify()
 
@@ -152,33 +129,32 @@ class ReplayTransport:
         """Go on from the first frame at ``host_time``; beyond the last: to the end.
 
         The frames that made the reference of that moment come first, at once and marked as from
-        earlier, so that the pictures are those of the run. A replay that stands still plays the
+        earlier, so that the images are those of the run. A replay that stands still plays the
         frame there.
         """
         made_of = self._references.before(host_time)
         with self._condition:
-            self._go(host_time, made_of)
-            self._steps = int(self._held)
+            self._head.seek(host_time, map(self._stamp, made_of) if self._stamp else made_of)
+            self._steps = int(self.paused)
             self._condition.notify()
 
     def read(self, timeout: float) -> bytes:
         """The next recorded read, or an answer to a command; ``b""`` if neither in time."""
-        stop = self._clock.now() + timeout
+        stop = self._clock.now() + (max(timeout, _SHORTEST) if timeout else 0.0)
         with self._condition:
             while True:
                 if self._closed:
                     raise SourceError("the recording has been closed", where=self.name)
                 if answer := self._board.answer():
-                    self._jumped = False
+                    self._after_seek = False
                     return answer
                 now = self._clock.now()
-                due = self._due()
-                if due <= now:
+                patience = self._patience(now)
+                if patience < _SHORTEST:
                     return self._play()
                 if now >= stop:
-                    self._tell(now)
                     return b""
-                self._clock.wait(self._condition, min(due, stop) - now)
+                self._clock.wait(self._condition, min(patience, stop - now))
 
     def write(self, data: bytes) -> None:
         """Commands, which are answered as the board would."""
@@ -193,66 +169,27 @@ class ReplayTransport:
             self._session.close()
             self._condition.notify()
 
-    def _go(self, host_time: float, earlier: tuple[MarkedFrame, ...] = ()) -> None:
-        there = pieces(self._items(host_time - _BEFORE), host_time)
-        first = tuple(islice(there, 1))
-        before = pieces(map(self._stamped, earlier if first else ()))
-        self._pieces = chain(before, first, there)
-        self._next = next(self._pieces, None)
-        self.ended = self._next is None
-        if self._next is not None:
-            self._anchor(self._next.host_time)
-
-    def _items(self, since: float) -> Iterator[Item]:
-        if self._restamped is None:
-            return self._session.reads(since)
-        return map(self._stamped, self._session.frames(since))
-
-    def _stamped(self, item: MarkedFrame) -> MarkedFrame:
-        if self._restamped is None:
-            return item
-        return MarkedFrame(replace(item.frame, configuration=self._restamped), item.mark)
-
-    def _anchor(self, host_time: float) -> None:
-        self._anchored = (self._clock.now(), host_time)
-
-    def _due(self) -> float:
-        """When the next piece is to be read, by the clock; inf: not before something changes."""
-        if self._next is None or not self._board.scanning:
+    def _patience(self, now: float) -> float:
+        """Seconds until the next piece is due; inf: not before something changes."""
+        elapsed, self._wall = now - self._wall, now
+        if self._head.next is None and self.loop:
+            self._head.seek(-math.inf)
+        if self._head.next is None or not self._board.scanning:
             return math.inf
-        if self._is_earlier(self._next):
-            return -math.inf
-        if self._held:
-            return -math.inf if self._steps else math.inf
-        if math.isinf(self._speed):
-            return -math.inf
-        wall, host = self._anchored
-        return wall + (self._next.host_time - host) / self._speed
-
-    def _is_earlier(self, piece: Piece) -> bool:
-        return any(item.mark & Mark.EARLIER for item in piece.frames)
+        if self._head.next.is_earlier:
+            return 0.0
+        if self.paused:
+            return 0.0 if self._steps else math.inf
+        if math.isinf(self.speed):
+            return 0.0
+        return self._head.advance(elapsed * self.speed) / self.speed
 
     def _play(self) -> bytes:
-        piece = self._next
-        assert piece is not None
-        if not self._is_earlier(piece):
+        piece = self._head.play()
+        if not piece.is_earlier:
             self._steps = max(self._steps - 1, 0)
-        self._now, self._jumped, self._marks = piece.host_time, not piece.follows, marks(piece)
-        self._next = next(self._pieces, None)
-        if self._next is None and self._loop:
-            self._go(float("-inf"))
-        elif self._is_earlier(piece) and self._next is not None:
-            self._anchor(self._next.host_time)
-        self.ended = self._next is None
+        self._after_seek = not piece.follows
         return piece.data
-
-    def _tell(self, now: float) -> None:
-        """Let the recording's time go on while nothing is to be read."""
-        if self._next is None or self._held or not self._board.scanning or math.isinf(self._speed):
-            return
-        wall, host = self._anchored
-        reached = host + (now - wall) * self._speed
-        self._now = max(self._now, min(reached, self._next.host_time))
 
 
 def open_replay(argument: str, skin: Skin) -> ReplayTransport:
@@ -299,10 +236,13 @@ def _number(text: str) -> float:
         return math.nan
 
 
-def _restamped(session: SessionReader, skin: Skin, where: str) -> int | None:
-    """Identity that the frames must be given to be of this scan; None: they are as they stand.
+def _stamp_of(
+    session: SessionReader, skin: Skin, where: str
+) -> Callable[[MarkedFrame], MarkedFrame] | None:
+    """What makes the frames those of this scan; None: they are as they stand.
 
-    The identity covers the commands that set a board, which other versions may send otherwise.
+    The identity of a scan covers the commands that set a board, which other versions may send
+    otherwise.
     """
     first = next(session.frames(), None)
     if first is None:
@@ -312,11 +252,23 @@ def _restamped(session: SessionReader, skin: Skin, where: str) -> int | None:
     if first.frame.configuration == configuration.identity and same_wire:
         return None
     same_skin = skin.identity == session.skin.identity
-    if same_skin and len(first.frame.samples) == configuration.n_samples:
-        return configuration.identity
-    raise SourceError(
-        f"was recorded by another scan ({first.frame.configuration:04x}) than that of "
-        f"{skin.name} ({configuration.identity:04x})",
-        where=where,
-        hint="leave --skin out: the recording holds its own",
-    )
+    if not same_skin or len(first.frame.samples) != configuration.n_samples:
+        raise SourceError(
+            f"was recorded by another scan ({first.frame.configuration:04x}) than that of "
+            f"{skin.name} ({configuration.identity:04x})",
+            where=where,
+            hint="leave --skin out: the recording holds its own",
+        )
+
+    def stamp(item: MarkedFrame) -> MarkedFrame:
+        frame = replace(item.frame, configuration=configuration.identity)
+        return MarkedFrame(frame, item.mark)
+
+    return stamp
+
+
+def _items(
+    session: SessionReader, stamp: Callable[[MarkedFrame], MarkedFrame] | None, since: float
+) -> Iterator[Item]:
+    """Recorded reads with their frames; frames alone where their bytes are of another scan."""
+    return session.reads(since) if stamp is None else map(stamp, session.frames(since))

@@ -8,7 +8,7 @@ from tomoskin.calibration import KINDS
 from tomoskin.core import DataError, Frame
 from tomoskin.pipeline import Pipeline, Prepared, Result, prepare
 from tomoskin.recording.layout import Mark
-from tomoskin.recording.session_reader import SessionReader
+from tomoskin.recording.session_reader import SessionReader, tick_rate, touches_before
 
 
 def as_recorded(session: SessionReader) -> Prepared:
@@ -44,8 +44,8 @@ def replayed(prepared: Prepared, session: SessionReader) -> Iterator[Result]:
     same scan. Frames that the pipeline refused are refused again.
     """
     pipeline = Pipeline(prepared)
-    pipeline.tick_rate = session.tick_rate
-    pipeline.number_after(session.touches_before)
+    pipeline.tick_rate = tick_rate(session)
+    pipeline.number_after(touches_before(session))
     for item in session.frames():
         try:
             result = advance(pipeline, item.frame, item.mark)

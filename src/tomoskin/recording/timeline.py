@@ -8,10 +8,10 @@ from pathlib import Path
 
 from tomoskin.core import Event
 from tomoskin.recording.layout import Mark
-from tomoskin.recording.session_reader import SessionReader
+from tomoskin.recording.session_reader import SessionReader, end_time
 
 MOST_SPANS = 2000
-"""Touches that are told; later ones are left out."""
+"""Touches on it; later ones are left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +49,9 @@ def read_timeline(path: Path) -> Timeline:
         def timed(events: Iterator[Event]) -> tuple[tuple[float, Event], ...]:
             return tuple((event.host_time - start, event) for event in events)
 
-        totals = session.totals
         spans = tuple(_spans(session, start))
-        last = max((span.end for span in spans), default=0.0)
-        end = last if totals is None else totals.last / 1e9 - session.epoch - start
+        last = end_time(session)
+        end = max((span.end for span in spans), default=0.0) if last is None else last - start
         return Timeline(end, timed(session.notes()), timed(session.events()), spans)
 
 

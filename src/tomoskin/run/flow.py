@@ -79,7 +79,7 @@ class Flow:
         self.out.opened(self.prepared, self.source)
 
     def link(self, transport: Transport) -> Link:
-        """The conversation with its source, which has just been opened, maybe again."""
+        """The link to its source, which has just been opened, maybe again."""
         self._standstill, self._drops = None, 0
         self.wishes.opened(transport)
         self.hands.opened(transport)
@@ -89,7 +89,7 @@ class Flow:
         return Link(transport, self.prepared.scan, self._settings, clock=clock, tap=tap)
 
     def unlinked(self) -> None:
-        """The conversation is over; another may follow."""
+        """The link is closed; another may follow."""
         self._earlier, self._tally = self._earlier + self._tally, Tally()
 
     def adopt(self, prepared: Prepared) -> None:

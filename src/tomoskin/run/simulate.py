@@ -109,7 +109,7 @@ class _Recorded:
 
 
 class _Run:
-    """One run of a script: a clock, a twin, and the conversation with it."""
+    """One run of a script: a clock, a twin, and the link to it."""
 
     def __init__(
         self, script: Script, skin: Skin, settings: TwinSettings, writer: SessionWriter

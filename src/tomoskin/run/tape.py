@@ -107,7 +107,7 @@ class Tape:
         recorder, self._recorder = self._recorder, None
         if recorder is not None:
             recorder.stop()
-            if recorder.is_whole:
+            if recorder.is_complete:
                 self._say("recorded", f"recorded to {recorder.path}")
 
     def adopt(self, prepared: Prepared) -> None:

@@ -14,9 +14,8 @@ from tomoskin.recording import (
     schema_of,
     touches_message,
 )
-from tomoskin.sink.pace import TouchPace
 from tomoskin.sink.registry import needed, port_of
-from tomoskin.sink.sink import Item, Moment, Stream
+from tomoskin.sink.sink import Item, Moment, Stream, TouchPace
 
 DEFAULT_PORT = 8766
 """Foxglove's own default is the port of our page."""
@@ -42,7 +41,7 @@ class FoxgloveSink:
         self._context = context = sdk.Context()
         for topic in _TOPICS:
             found = schema_of(topic)
-            schema = sdk.Schema(name=found.name, encoding=found.encoding, data=found.text.encode())
+            schema = sdk.Schema(name=found.name, encoding=found.encoding, data=found.data)
             self._channels[topic] = sdk.Channel(
                 topic, schema=schema, message_encoding="json", context=context
             )

@@ -1,11 +1,14 @@
-"""Where bytes come from, and the conversation with the board behind them."""
+"""Where bytes come from, and the protocol session with the board behind them."""
 
+from typing import Any
+
+from tomoskin._moved import moved
 from tomoskin.source.configuration import Configuration
-from tomoskin.source.conversation import Conversation, Stage
-from tomoskin.source.gate import FrameCounters, FrameGate
 from tomoskin.source.link import Link
 from tomoskin.source.ports import Port, list_ports
+from tomoskin.source.protocol_session import ProtocolSession, Stage
 from tomoskin.source.registry import GROUP, open_source, read_options, source_names
+from tomoskin.source.sequence_filter import FrameCounters, SequenceFilter
 from tomoskin.source.serial import SerialTransport
 from tomoskin.source.settings import (
     PRESCALERS,
@@ -20,13 +23,13 @@ __all__ = [
     "GROUP",
     "PRESCALERS",
     "Configuration",
-    "Conversation",
     "FrameCounters",
-    "FrameGate",
     "Link",
     "Played",
     "Port",
+    "ProtocolSession",
     "ScanSettings",
+    "SequenceFilter",
     "SerialTransport",
     "Stage",
     "Timing",
@@ -38,3 +41,7 @@ __all__ = [
     "scan_time",
     "source_names",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    return moved("source", name)

@@ -1,4 +1,4 @@
-"""A board behind a transport: the conversation with it, and the frames that come of it."""
+"""A board behind a transport: the protocol session with it, and the frames that come of it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Self
 
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.pattern import Scan
-from tomoskin.source.conversation import Conversation, Stage
-from tomoskin.source.gate import FrameCounters
+from tomoskin.source.protocol_session import ProtocolSession, Stage
 from tomoskin.source.rate import LineQuality, Rated
+from tomoskin.source.sequence_filter import FrameCounters
 from tomoskin.source.settings import ScanSettings, Timing
 from tomoskin.source.transport import Played, Transport
 from tomoskin.wire import Ack, Counters, Decoder, Info
@@ -47,23 +47,23 @@ class Link:
         self._decoder = Decoder()
         self._quality = LineQuality()
         self._first_rate = transport.rate if isinstance(transport, Rated) else 0
-        self._talk = Conversation(scan, settings, self._timing, self._clock(), transport.name)
+        self._session = ProtocolSession(scan, settings, self._timing, self._clock(), transport.name)
         self._closed = False
 
     @property
     def running(self) -> bool:
         """Whether the board scans for this link."""
-        return self._talk.stage is Stage.RUNNING
+        return self._session.stage is Stage.RUNNING
 
     @property
     def info(self) -> Info | None:
         """What the board said of itself, once it has."""
-        return self._talk.info
+        return self._session.info
 
     @property
     def configuration(self) -> int:
         """Identity of this scan's configuration."""
-        return self._talk.configuration.identity
+        return self._session.configuration.identity
 
     @property
     def counters(self) -> Counters:
@@ -73,7 +73,7 @@ class Link:
     @property
     def frames(self) -> FrameCounters:
         """Frames passed, lost, foreign and stale."""
-        return self._talk.gate.counters
+        return self._session.frames.counters
 
     def poll(self, timeout: float) -> list[Frame | Event]:
         """Frames and events, waiting at most ``timeout`` s for bytes.
@@ -86,9 +86,9 @@ class Link:
             The device speaks another protocol.
         """
         now = self._clock()
-        found = self._talk.tick(now)
+        found = self._session.tick(now)
         self._flush()
-        patience = min(timeout, self._talk.deadline() - now)
+        patience = min(timeout, self._session.deadline() - now)
         found += self._listen(max(patience, 0.0))
         return found
 
@@ -105,7 +105,7 @@ class Link:
             return
         self._closed = True
         try:
-            self._say_goodbye()
+            self._stop_board()
         except SourceError:
             pass  # gone already: its heartbeat stops it
         finally:
@@ -129,23 +129,23 @@ class Link:
         now = self._clock()
         if data and self._tap:
             self._tap(now, data)
-        if data and self._played and self._played.jumped():
+        if data and self._played and self._played.after_seek():
             self._decoder.forget()
-            self._talk.gate.expect_any()
+            self._session.frames.expect_any()
         found = []
         for message in self._decoder.feed(data, now):
-            found += self._talk.receive(message, now)
-        found += self._mind_the_rate(now)
+            found += self._session.receive(message, now)
+        found += self._follow_rate(now)
         self._flush()
         return found
 
-    def _mind_the_rate(self, now: float) -> list[Event]:
+    def _follow_rate(self, now: float) -> list[Event]:
         """Follow the board to another rate; fall back to a slower one on a bad line."""
         transport = self.transport
         if not isinstance(transport, Rated):
             return []
-        rate = self._talk.take_rate()
-        if self._talk.silent and transport.rate != self._first_rate:
+        rate = self._session.take_rate()
+        if self._session.is_silent and transport.rate != self._first_rate:
             rate = self._first_rate  # what a board that was reset speaks
         if rate is not None:
             transport.use_rate(rate)
@@ -153,10 +153,10 @@ class Link:
             self._quality.forget(self.counters)
             return []
         slower = self._quality.slower(self.counters, transport.rate)
-        return [] if slower is None else [self._talk.fall_back(slower, now)]
+        return [] if slower is None else [self._session.fall_back(slower, now)]
 
-    def _say_goodbye(self) -> None:
-        request = self._talk.stop(self._clock())
+    def _stop_board(self) -> None:
+        request = self._session.stop(self._clock())
         self._flush()
         end = self._clock() + self._timing.goodbye
         while (now := self._clock()) < end:
@@ -165,6 +165,6 @@ class Link:
                     return
 
     def _flush(self) -> None:
-        data = self._talk.take()
+        data = self._session.commands.take()
         if data:
             self.transport.write(data)

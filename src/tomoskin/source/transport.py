@@ -34,10 +34,10 @@ class Transport(Protocol):
 
 @runtime_checkable
 class Played(Protocol):
-    """A transport that plays a recording: it has a time of its own, and may jump in it."""
+    """A transport that plays a recording: it has a time of its own, and can be sought in."""
 
     def now(self) -> float:
         """Monotonic seconds in the recording: exactly those of what was read last."""
 
-    def jumped(self) -> bool:
+    def after_seek(self) -> bool:
         """Whether what was read last does not follow what was read before it."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.sparse import issparse
 
 from tomoskin.core import DataError, IntArray
-from tomoskin.formats.imports.tables import pairs_of
+from tomoskin.formats.imports.tables import pairs_of, voltages_of
 from tomoskin.signal import Recording, frame_times
 
 _DATA = ("vi", "vv", "v", "data", "meas")
@@ -55,15 +55,12 @@ def parse(variables: Mapping[str, Any], source: str) -> Recording:
             where=source,
         )
     reference = _found(variables, _REFERENCE, select, len(drive), source)
-    return Recording(
-        voltages=voltages,
-        drive=drive,
-        measure=measure,
+    return voltages_of(
+        source,
+        voltages,
+        (drive, measure),
         time=_times(variables, len(voltages)),
         reference=None if reference is None else reference[0],
-        labels=None,
-        is_change=False,
-        source=source,
     )
 
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tomoskin.core import DataError
-from tomoskin.formats.imports.tables import adjacent_scan, touches_drive
+from tomoskin.formats.imports.tables import adjacent_scan, touches_drive, voltages_of
 from tomoskin.formats.imports.text_log import Skipped, numbers_in
-from tomoskin.signal import Recording, frame_times
+from tomoskin.signal import Recording
 
 _ORIGIN = "origin frame"
 _BEGINNINGS = (_ORIGIN, "origin", "frame", "framei")
@@ -57,17 +57,9 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     drive, measure = adjacent_scan(_SIZES[n_values])
     used = ~touches_drive(drive, measure)
     origin = next((np.array(block.values)[used] for block in kept if block.is_origin), None)
-    return Recording(
-        voltages=np.array(frames)[:, used],
-        drive=drive[used],
-        measure=measure[used],
-        time=frame_times(len(frames)),
-        reference=origin,
-        labels=None,
-        is_change=False,
-        source=source,
-        notes=skipped.notes(),
-    )
+    rows = drive[used], measure[used]
+    voltages = np.array(frames)[:, used]
+    return voltages_of(source, voltages, rows, reference=origin, notes=skipped.notes())
 
 
 def _blocks(lines: Iterable[str], skipped: Skipped) -> list[_Block]:

@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from tomoskin.core import Arrays, DataError, real_numbers
-from tomoskin.formats.imports.tables import clockwise, pairs_of, without_repeats
-from tomoskin.signal import Recording, frame_times
+from tomoskin.formats.imports.tables import clockwise, pairs_of, voltages_of, without_repeats
+from tomoskin.signal import Recording
 
 _NAMES = (("inj", "mpat", "U", "U_ref"), ("Inj", "Mpat", "Uel", "Uelref"))
 
@@ -47,15 +47,6 @@ def parse(arrays: Arrays, source: str) -> Recording:
         water = real_numbers(arrays, reference, source).reshape(-1)
         if len(water) != n_rows:
             raise DataError(f"expected {reference} ({n_rows},), got {len(water)}", where=source)
-    return without_repeats(
-        Recording(
-            voltages=frames,
-            drive=clockwise(np.repeat(injections, len(pairs), axis=0), n_electrodes),
-            measure=clockwise(np.tile(pairs, (len(injections), 1)), n_electrodes),
-            time=frame_times(len(frames)),
-            reference=water,
-            labels=None,
-            is_change=False,
-            source=source,
-        )
-    )
+    drive = clockwise(np.repeat(injections, len(pairs), axis=0), n_electrodes)
+    measure = clockwise(np.tile(pairs, (len(injections), 1)), n_electrodes)
+    return without_repeats(voltages_of(source, frames, (drive, measure), reference=water))

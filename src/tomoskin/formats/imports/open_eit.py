@@ -14,9 +14,14 @@ from itertools import combinations
 import numpy as np
 
 from tomoskin.core import DataError, IntArray
-from tomoskin.formats.imports.tables import for_magnitudes, touches_drive, without_repeats
+from tomoskin.formats.imports.tables import (
+    for_magnitudes,
+    touches_drive,
+    voltages_of,
+    without_repeats,
+)
 from tomoskin.formats.imports.text_log import Skipped, numbers_in
-from tomoskin.signal import Recording, frame_times
+from tomoskin.signal import Recording
 
 _WORDS = ("magnitudes", "impedances")
 _TWO_TERMINAL = 28
@@ -59,20 +64,8 @@ def parse(lines: Iterable[str], source: str) -> Recording:
             where=source,
             hint="numbers must have a decimal point, not a comma",
         )
-    drive, measure = _rows(len(frames[0]))
-    return without_repeats(
-        Recording(
-            voltages=np.array(frames),
-            drive=drive,
-            measure=measure,
-            time=frame_times(len(frames)),
-            reference=None,
-            labels=None,
-            is_change=False,
-            source=source,
-            notes=skipped.notes(),
-        )
-    )
+    rows = _rows(len(frames[0]))
+    return without_repeats(voltages_of(source, np.array(frames), rows, notes=skipped.notes()))
 
 
 def _expected(frames: list[list[float]], count: int) -> bool:

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from tomoskin.core import Arrays, DataError, IntArray, electrode_table, numbers, real_numbers
-from tomoskin.formats.imports.tables import touches_drive
-from tomoskin.signal import Recording, frame_times
+from tomoskin.formats.imports.tables import touches_drive, voltages_of
+from tomoskin.signal import Recording
 
 
 def detects(arrays: Arrays) -> bool:
@@ -28,25 +28,16 @@ def parse(arrays: Arrays, source: str) -> Recording:
     DataError
         When the shapes do not belong together.
     """
-    drive, measure = _rows(arrays, source)
+    rows = _rows(arrays, source)
+    count = len(rows[0])
     voltages = np.atleast_2d(numbers(arrays, "v" if "v" in arrays else "v1", source))
     reference = numbers(arrays, "v0", source).reshape(-1) if "v0" in arrays else None
-    if voltages.shape[-1] != len(drive):
+    if voltages.shape[-1] != count:
         raise DataError(
-            f"expected v (n_frames, {len(drive)}), got {voltages.shape}: its protocol has "
-            f"{len(drive)} rows",
+            f"expected v (n_frames, {count}), got {voltages.shape}: its protocol has {count} rows",
             where=source,
         )
-    return Recording(
-        voltages=voltages,
-        drive=drive,
-        measure=measure,
-        time=frame_times(len(voltages)),
-        reference=reference,
-        labels=None,
-        is_change=False,
-        source=source,
-    )
+    return voltages_of(source, voltages, rows, reference=reference)
 
 
 def _rows(arrays: Arrays, source: str) -> tuple[IntArray, IntArray]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.core import Arrays, DataError
-from tomoskin.formats.imports.tables import adjacent_scan, touches_drive
+from tomoskin.formats.imports.tables import adjacent_scan, touches_drive, voltages_of
 from tomoskin.formats.imports.text_log import Skipped, bytes_lines, numbers_in
 from tomoskin.signal import Recording
 
@@ -90,15 +90,11 @@ def _recording(frames: list[list[_Row]], skipped: Skipped, source: str) -> Recor
     drive, measure = adjacent_scan(_N)
     used = ~touches_drive(drive, measure)
     values = np.array([[value for row in frame for value in row.values] for frame in frames])
-    return Recording(
-        voltages=_MILLI * values[:, used],
-        drive=drive[used],
-        measure=measure[used],
+    return voltages_of(
+        source,
+        _MILLI * values[:, used],
+        (drive[used], measure[used]),
         time=np.array([frame[0].pc_time for frame in frames]),
-        reference=None,
-        labels=None,
-        is_change=False,
-        source=source,
         notes=skipped.notes(),
     )
 

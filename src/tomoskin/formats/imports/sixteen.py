@@ -28,6 +28,7 @@ from tomoskin.core import (
     numbers,
     real_numbers,
 )
+from tomoskin.formats.imports.tables import voltages_of
 from tomoskin.signal import Recording, frame_times
 
 _N = 16
@@ -60,15 +61,12 @@ def parse(arrays: Arrays, source: str) -> Recording:
     if np.nansum(values.real) < 0:
         drive = drive[:, ::-1]
     number = _numbering(arrays, source)
-    return Recording(
-        voltages=values,
-        drive=number[drive],
-        measure=number[measure],
+    return voltages_of(
+        source,
+        values,
+        (number[drive], number[measure]),
         time=frame_times(len(voltages), _rate(arrays, source)),
         reference=None if reference is None else reference[columns],
-        labels=None,
-        is_change=False,
-        source=source,
     )
 
 

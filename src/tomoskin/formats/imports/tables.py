@@ -2,14 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, IntArray
-from tomoskin.signal import Recording
+from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.signal import Recording, frame_times
+
+
+def voltages_of(
+    source: str,
+    voltages: NDArray[Any],
+    rows: tuple[IntArray, IntArray],
+    *,
+    time: FloatArray | None = None,
+    reference: NDArray[Any] | None = None,
+    notes: Sequence[str] = (),
+) -> Recording:
+    """A recording of voltages (n_frames, n_rows) without labels; ``rows``: drive and measure.
+
+    Where there is no ``time`` (n_frames,), s, the frames are numbered.
+    """
+    drive, measure = rows
+    return Recording(
+        voltages=voltages,
+        drive=drive,
+        measure=measure,
+        time=frame_times(len(voltages)) if time is None else time,
+        reference=reference,
+        labels=None,
+        is_change=False,
+        source=source,
+        notes=tuple(notes),
+    )
 
 
 def pairs_of(patterns: NDArray[Any], what: str, source: str) -> IntArray:

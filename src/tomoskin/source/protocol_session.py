@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections import deque
-from dataclasses import dataclass, replace
 from enum import Enum, auto
 
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.pattern import Scan
 from tomoskin.source.agreement import check_board, check_held, check_version
+from tomoskin.source.command_queue import CommandQueue
 from tomoskin.source.configuration import Configuration
-from tomoskin.source.gate import FrameGate
+from tomoskin.source.sequence_filter import SequenceFilter
 from tomoskin.source.settings import ScanSettings, Timing
 from tomoskin.wire import (
     SCHEMA,
     Ack,
-    Command,
     Fault,
     GetInfo,
     GetPattern,
@@ -29,31 +27,34 @@ from tomoskin.wire import (
     Result,
     SetBaud,
     Stop,
-    encode,
     type_byte,
 )
 
 
 class Stage(Enum):
-    """How far the conversation has come."""
+    """How far the session has come."""
 
     WAITING = auto()
     SETTING_UP = auto()
     RUNNING = auto()
 
 
-@dataclass
-class _Pending:
-    command: Command
-    sent: float
-    tries: int
-
-
-class Conversation:
+class ProtocolSession:
     """Waits for HELLO, asks for INFO, sets the scan, reads it back, starts it, keeps it alive.
 
-    A board that says HELLO again has been reset or has missed the heartbeat: it is set up anew,
+    A board that says HELLO again has been reset or has missed the heartbeat: it is set up again,
     as is one that answers but has stopped scanning, and one whose line is too fast.
+
+    Attributes
+    ----------
+    commands
+        What is to be sent to the board.
+    frames
+        The frames that pass, and counts of those that do not.
+    stage, info
+        How far it has come, and what the board said of itself.
+    is_silent
+        Whether a board that scans has sent no frame for too long.
 
     Raises
     ------
@@ -67,26 +68,18 @@ class Conversation:
     def __init__(
         self, scan: Scan, settings: ScanSettings, timing: Timing, now: float, where: str
     ) -> None:
-        """A conversation that has not begun."""
+        """A session that has not begun."""
         self._scan, self._settings, self._timing, self._where = scan, settings, timing, where
         self.configuration = Configuration.of(scan, settings)
-        self.gate = FrameGate(self.configuration)
+        self.frames = SequenceFilter(self.configuration)
+        self.commands = CommandQueue(timing, now, where)
         self.stage = Stage.WAITING
         self.info: Info | None = None
+        self.is_silent = False
         self._silence = max(timing.silence, 4 * self.configuration.scan_time)
-        self._since = self._last_frame = self._last_sent = now
-        self._silent = False
+        self._since = self._last_frame = now
         self._resets = 0
-        self._queue: deque[Command] = deque()
-        self._pending: _Pending | None = None
-        self._request = 0
-        self._out = bytearray()
         self._rate: int | None = None
-
-    @property
-    def silent(self) -> bool:
-        """Whether a board that scans has sent no frame for too long."""
-        return self._silent
 
     def take_rate(self) -> int | None:
         """The serial rate that the board has just changed to, once."""
@@ -94,17 +87,11 @@ class Conversation:
         return rate
 
     def fall_back(self, rate: int, now: float) -> Event:
-        """Set the board up anew at a slower ``rate``, Bd: the line damages what it carries."""
+        """Set the board up again at a slower ``rate``, Bd: the line damages what it carries."""
         self._set_up(now, at=rate)
         return Event(
             now, "rate", f"the line damages messages: the board is set up anew at {rate:,} Bd"
         )
-
-    def take(self) -> bytes:
-        """Bytes to be sent to the board, once."""
-        data = bytes(self._out)
-        self._out.clear()
-        return data
 
     def receive(self, message: Message, now: float) -> list[Frame | Event]:
         """Act on a message from the board."""
@@ -128,15 +115,14 @@ class Conversation:
         """Act on the time: ask again, keep alive, notice silence."""
         if self.stage is Stage.WAITING and now >= self._since + self._timing.hello:
             self._set_up(now)
-        if self._pending and now >= self._pending.sent + self._timing.answer:
-            self._ask_again(self._pending, now)
+        self.commands.repeat(now)
         if self.stage is not Stage.RUNNING:
             return []
-        if now >= self._last_sent + self._timing.ping:
-            self._send(replace(Ping(0), request=self._next_request()), now)
-        if self._silent or now < self._last_frame + self._silence:
+        if now >= self.commands.last_sent + self._timing.ping:
+            self.commands.send(Ping(0), now)
+        if self.is_silent or now < self._last_frame + self._silence:
             return []
-        self._silent = True
+        self.is_silent = True
         text = f"no frame for {now - self._last_frame:.1f} s: is the board powered and connected?"
         return [Event(now, "silent", text)]
 
@@ -144,77 +130,47 @@ class Conversation:
         """Time of the next ``tick`` that matters."""
         if self.stage is Stage.WAITING:
             return self._since + self._timing.hello
-        if self._pending:
-            return self._pending.sent + self._timing.answer
-        ping = self._last_sent + self._timing.ping
-        return ping if self._silent else min(ping, self._last_frame + self._silence)
+        if (repeat_time := self.commands.repeat_time) is not None:
+            return repeat_time
+        ping = self.commands.last_sent + self._timing.ping
+        return ping if self.is_silent else min(ping, self._last_frame + self._silence)
 
     def stop(self, now: float) -> int:
         """Send STOP, whatever is going on; returns its request id."""
-        self.gate.close()
-        self._queue.clear()
-        self._pending = None
-        command = Stop(self._next_request())
-        self._send(command, now)
-        return command.request
+        self.frames.close()
+        self.commands.clear()
+        return self.commands.send(Stop(0), now)
 
     def _set_up(self, now: float, at: int | None = None) -> None:
         self.stage = Stage.SETTING_UP
         self.info = None
-        self.gate.close()
+        self.frames.close()
         change = () if at is None else (Stop(0), SetBaud(0, at))
-        self._queue = deque((*change, GetInfo(0), Stop(0)))
-        self._ask(now)
-
-    def _ask(self, now: float) -> None:
-        command = replace(self._queue.popleft(), request=self._next_request())
-        self._pending = _Pending(command, now, 1)
-        self._send(command, now)
-
-    def _ask_again(self, pending: _Pending, now: float) -> None:
-        name = type(pending.command).__name__
-        if pending.tries >= self._timing.tries:
-            raise SourceError(
-                f"no answer to {name} after {pending.tries} tries",
-                where=self._where,
-                hint="is it a tomoskin board, powered, at this rate?",
-            )
-        if isinstance(pending.command, SetBaud):  # it may have gone back: do it again
-            pending.command = replace(pending.command, request=self._next_request())
-        pending.tries += 1
-        pending.sent = now
-        self._send(pending.command, now)
+        self.commands.restart((*change, GetInfo(0), Stop(0)), now)
 
     def _answered(self, now: float) -> list[Frame | Event]:
-        if self._pending and isinstance(self._pending.command, SetBaud):
-            self._rate = self._pending.command.baud
-        self._pending = None
-        if self._queue:
-            self._ask(now)
+        """The pending command has been answered: what follows."""
+        pending = self.commands.pending
+        if isinstance(pending, SetBaud):
+            self._rate = pending.baud
+        if self.commands.send_next(now):
             return []
-        self.stage, self._last_frame, self._silent = Stage.RUNNING, now, False
-        self.gate.open()
-        return [Event(now, "connected", self._introduction())]
-
-    def _introduction(self) -> str:
+        self.stage, self._last_frame, self.is_silent = Stage.RUNNING, now, False
+        self.frames.open()
         assert self.info is not None
-        firmware = ".".join(map(str, self.info.firmware))
-        return (
-            f"board {self.info.unique_id.hex()}, firmware {firmware}, "
-            f"{self.info.channels} channels, scans configuration {self.configuration.identity:04x}"
-        )
+        return [Event(now, "connected", _introduction(self.info, self.configuration))]
 
     def _frame(self, frame: Frame, now: float) -> list[Frame | Event]:
         if self.stage is Stage.WAITING:
             self._set_up(now)
-        admitted = self.gate.admit(frame)
-        if not any(isinstance(item, Frame) for item in admitted):
-            return admitted
-        quiet, was_silent = now - self._last_frame, self._silent
-        self._last_frame, self._silent = now, False
+        passed = self.frames.take(frame)
+        if not any(isinstance(item, Frame) for item in passed):
+            return passed
+        quiet, was_silent = now - self._last_frame, self.is_silent
+        self._last_frame, self.is_silent = now, False
         if was_silent:
-            admitted.insert(0, Event(now, "resumed", f"frames again after {quiet:.1f} s"))
-        return admitted
+            passed.insert(0, Event(now, "resumed", f"frames again after {quiet:.1f} s"))
+        return passed
 
     def _hello(self, hello: Hello, now: float) -> list[Frame | Event]:
         check_version(hello, self._where)
@@ -233,51 +189,47 @@ class Conversation:
         return [Event(now, "reset", text)] if was_running else []
 
     def _info(self, info: Info, now: float) -> None:
-        pending = self._pending
-        if pending and isinstance(pending.command, GetInfo):
-            if info.request != pending.command.request:
-                return
+        pending = self.commands.pending
+        if isinstance(pending, GetInfo) and info.request == pending.request:
             check_version(info, self._where)
             check_board(info, self._scan, self._settings, self._where)
             self.info = info
-            self._queue.extend(self.configuration.commands(info.minor))
+            self.commands.add(self.configuration.commands(info.minor))
             self._answered(now)
 
     def _held(self, held: HeldScan | HeldPattern, now: float) -> list[Frame | Event]:
-        pending = self._pending
+        pending = self.commands.pending
         question = GetScan if isinstance(held, HeldScan) else GetPattern
-        if pending is None or not isinstance(pending.command, question):
+        if not isinstance(pending, question) or held.request != pending.request:
             return []
-        if held.request != pending.command.request:
-            return []
-        check_held(held, self.configuration.behind(pending.command), self._where)
+        check_held(held, self.configuration.behind(pending), self._where)
         return self._answered(now)
 
     def _ack(self, ack: Ack, now: float) -> list[Frame | Event]:
-        pending = self._pending
-        if self._silent and pending is None:
+        pending = self.commands.pending
+        if self.is_silent and pending is None:
             # It hears the heartbeat but does not scan: its HELLO or FAULT was lost.
-            self._silent = False
+            self.is_silent = False
             self._set_up(now)
             return [Event(now, "reset", "the board answers but does not scan: it is set up anew")]
-        if pending is None or ack.request != pending.command.request:
+        if pending is None or ack.request != pending.request:
             return []
-        if ack.command != type_byte(type(pending.command)):
+        if ack.command != type_byte(type(pending)):
             return []
-        if ack.result is Result.OK and isinstance(pending.command, GetScan | GetPattern):
+        if ack.result is Result.OK and isinstance(pending, GetScan | GetPattern):
             return []  # no answer to a question
         if ack.result is not Result.OK:
             sentence = SCHEMA.enums["result"].sentence(ack.result)
             raise SourceError(
-                f"the board refused {type(pending.command).__name__}: {sentence} ({ack.detail})",
+                f"the board refused {type(pending).__name__}: {sentence} ({ack.detail})",
                 where=self._where,
             )
         return self._answered(now)
 
-    def _next_request(self) -> int:
-        self._request = self._request % 255 + 1
-        return self._request
 
-    def _send(self, command: Command, now: float) -> None:
-        self._last_sent = now
-        self._out += encode(command)
+def _introduction(info: Info, configuration: Configuration) -> str:
+    firmware = ".".join(map(str, info.firmware))
+    return (
+        f"board {info.unique_id.hex()}, firmware {firmware}, "
+        f"{info.channels} channels, scans configuration {configuration.identity:04x}"
+    )

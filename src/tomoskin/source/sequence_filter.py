@@ -26,11 +26,11 @@ class FrameCounters:
     stale: int = 0
 
 
-class FrameGate:
+class SequenceFilter:
     """Checks each frame against the configuration and the sequence."""
 
     def __init__(self, configuration: Configuration) -> None:
-        """A closed gate."""
+        """No frame passes yet."""
         self._configuration = configuration
         self._expected: int | None = None
         self._foreign_run = False
@@ -54,7 +54,7 @@ class FrameGate:
         """Counts so far."""
         return FrameCounters(self._passed, self._lost, self._foreign, self._stale)
 
-    def admit(self, frame: Frame) -> list[Frame | Event]:
+    def take(self, frame: Frame) -> list[Frame | Event]:
         """The frame, or nothing; and an event if frames are missing or foreign ones begin."""
         if self._expected is None:
             self._stale += 1

@@ -1,0 +1,130 @@
+"""Messages in the order that they happen, in one MCAP file; a killed program loses a second."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from tomoskin import __version__
+from tomoskin.core import DataError, Output, OutputError, check_outputs
+from tomoskin.recording.channels import CHANNELS, SCHEMAS
+from tomoskin.recording.container import ContainerWriter
+
+LIBRARY = f"tomoskin {__version__}"
+"""What a file says that it was written by."""
+
+_SECOND = 1_000_000_000
+"""An open chunk is written once it spans so many ns, however short it is."""
+
+_ADVICE: dict[type[OSError], str] = {
+    FileNotFoundError: "make the folder first",
+    IsADirectoryError: "name a file",
+    NotADirectoryError: "name a file in a folder",
+    PermissionError: "choose another place",
+}
+
+
+class MessageLog:
+    """Writes messages of :data:`~tomoskin.recording.channels.CHANNELS`; a context manager.
+
+    Parameters
+    ----------
+    path
+        A file that does not exist yet.
+    name, about
+        What the file says of itself.
+    epoch
+        What is added to a host time (monotonic s) to give seconds since 1970; 0: the log times
+        are host times.
+    start
+        Host time of what has none of its own.
+
+    Raises
+    ------
+    OutputError
+        When the file exists or cannot be made.
+    DataError
+        From every method: when the file cannot be written any further (disk full, drive gone).
+        What was written before stays readable; nothing more is written.
+    """
+
+    def __init__(
+        self, path: Path, name: str, about: Mapping[str, str], *, epoch: float, start: float
+    ) -> None:
+        self.path, self.epoch = path, epoch
+        self._now = start
+        self._flushed = 0
+        check_outputs([Output(path)])
+        with errors_of(path):
+            file = path.open("xb", buffering=0)
+            self._file = ContainerWriter(file, LIBRARY, SCHEMAS, CHANNELS)
+            self._file.describe(name, about)
+
+    def put(self, channel: int, host_time: float, data: bytes) -> None:
+        """Add a message that is logged at ``host_time``."""
+        log_time = self.log_time(host_time)
+        self._now = host_time
+        with errors_of(self.path):
+            self._file.message(channel, log_time, data)
+            if log_time - self._flushed >= _SECOND:
+                self._file.flush()
+                self._flushed = log_time
+
+    def attach(self, name: str, media_type: str, data: bytes) -> None:
+        """Put a file inside: a calibration, a photograph."""
+        with errors_of(self.path):
+            self._file.attach(name, media_type, data, self.log_time(self._now))
+
+    def settle(self) -> None:
+        """Write the open chunk, and see that the file is still in its folder."""
+        with errors_of(self.path):
+            self._file.flush()
+        self._flushed = self.log_time(self._now)
+        if not self._file.is_linked:
+            raise DataError("has been removed while it was written", where=str(self.path))
+
+    def close(self) -> None:
+        """End the file with its index; a second call does nothing."""
+        with errors_of(self.path):
+            self._file.close()
+
+    def log_time(self, host_time: float) -> int:
+        """Ns of a message; DataError for a time that is none or before the epoch."""
+        seconds = host_time + self.epoch
+        if not 0 <= seconds < 2**33:
+            raise DataError(
+                f"expected a host time of 0 s or more after the epoch, got {host_time} s",
+                where=str(self.path),
+            )
+        return round(seconds * 1e9)
+
+    def __enter__(self) -> Self:
+        """The log itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close."""
+        self.close()
+
+
+@contextmanager
+def errors_of(path: Path) -> Iterator[None]:
+    """OSError → DataError that names the file."""
+    try:
+        yield
+    except FileExistsError:  # made since it was looked for
+        raise OutputError("exists already", where=str(path), hint="choose another name") from None
+    except OSError as error:
+        raise DataError(
+            f"cannot be read or written: {error.strerror or error}",
+            where=str(path),
+            hint=_ADVICE.get(type(error), "look at the disk"),
+        ) from error

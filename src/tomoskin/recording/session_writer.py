@@ -1,0 +1,136 @@
+"""Writing a session: everything of a run in one MCAP file, in the order that it happened."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tomoskin.core import Event, Frame, Image, PixelMap, Touch
+from tomoskin.recording import channels
+from tomoskin.recording.documents import encode_json, plain, touches_message
+from tomoskin.recording.foxglove import grid_message, log_message, scene_message
+from tomoskin.recording.layout import Mark, encode_frame, encode_raw
+from tomoskin.recording.message_log import MessageLog
+
+if TYPE_CHECKING:
+    from tomoskin.skin import Skin
+    from tomoskin.wire import Info
+
+FORMAT = 1
+"""Version of the channels and their layout."""
+
+ABOUT = "tomoskin"
+"""Name of the strings that say what the file is."""
+
+SKIN_FILE = "skin.toml"
+"""Name of the attachment that holds the skin."""
+
+OLD_INDEX_FILE = "tomoskin.seek"
+"""Name of an attachment in files of 0.1: offsets in the file, which a copy must not keep."""
+
+
+class SessionWriter(MessageLog):
+    """Writes one session file; a context manager.
+
+    The same calls give the same bytes: no time of day goes in but the one given. Messages are
+    logged at their host time (monotonic s) plus ``epoch``.
+
+    Parameters
+    ----------
+    path
+        A file that does not exist yet.
+    skin
+        The skin whose frames these are; its file goes in.
+    epoch
+        What is added to a host time to give seconds since 1970; 0: the log times are host times.
+    start
+        Host time that what has no time of its own is logged at.
+
+    Raises
+    ------
+    OutputError
+        When the file exists or cannot be made.
+    DataError
+        From every method: see :class:`MessageLog`.
+    """
+
+    def __init__(self, path: Path, skin: Skin, *, epoch: float = 0.0, start: float = 0.0) -> None:
+        about = {
+            "format": str(FORMAT),
+            "epoch_s": repr(float(epoch)),
+            "skin": skin.name,
+            "skin_identity": skin.identity,
+            "electrodes": str(skin.n_electrodes),
+        }
+        super().__init__(path, ABOUT, about, epoch=epoch, start=start)
+        self._start = start
+        self.attach(SKIN_FILE, "application/toml", skin.to_toml().encode())
+
+    def raw(self, host_time: float, data: bytes) -> None:
+        """Bytes as they were read from the source at ``host_time``."""
+        self.put(channels.RAW, host_time, encode_raw(host_time, data))
+
+    def frame(self, frame: Frame, mark: Mark = Mark.NONE) -> None:
+        """One frame, and what became of it; after the raw bytes that it came in.
+
+        A frame from before ``start`` is logged at ``start``.
+        """
+        self.put(channels.FRAMES, max(frame.host_time, self._start), encode_frame(frame, mark))
+
+    def touches(self, host_time: float, sequence: int, touches: Sequence[Touch]) -> None:
+        """Touches of the frame ``sequence``; none is worth saying when there were some before."""
+        self._document(channels.TOUCHES, host_time, touches_message(host_time, sequence, touches))
+
+    def image(
+        self, host_time: float, image: Image, pixels: PixelMap, touches: Sequence[Touch] = ()
+    ) -> None:
+        """One image for tools that show it, with its touches; the frames give it exactly."""
+        log_time = self.log_time(host_time)
+        self._document(channels.IMAGE, host_time, grid_message(image, pixels, host_time, log_time))
+        self._document(channels.SCENE, host_time, scene_message(touches, log_time))
+
+    def truth(self, host_time: float, presses: Sequence[Any], bends: Sequence[Any] = ()) -> None:
+        """What presses on the twin, and how it is bent, from ``host_time`` on.
+
+        Each press is a mapping or a record with ``x``, ``y``, ``force``, ``radius`` (SI) and
+        whatever else describes it; each bend one with ``kind``, ``axis`` (rad) and ``angle``
+        (rad) or ``strain``.
+        """
+        content = {"host_time": host_time, "presses": [plain(press) for press in presses]}
+        if bends:
+            content["bends"] = [plain(bend) for bend in bends]
+        self._document(channels.TRUTH, host_time, content)
+
+    def event(self, event: Event) -> None:
+        """Something that happened."""
+        content = log_message(event, self.log_time(event.host_time))
+        self._document(channels.EVENTS, event.host_time, content)
+
+    def note(self, host_time: float, text: str) -> None:
+        """A person's remark at ``host_time``."""
+        content = log_message(Event(host_time, "note", text), self.log_time(host_time))
+        self._document(channels.NOTES, host_time, content)
+
+    def device(self, host_time: float, info: Info) -> None:
+        """What the board says that it is."""
+        content = {"host_time": host_time} | dataclasses.asdict(info)
+        content |= {
+            "firmware": ".".join(map(str, info.firmware)),
+            "unique_id": info.unique_id.hex(),
+            "reset": info.reset.name,
+        }
+        del content["request"]
+        self._document(channels.DEVICE, host_time, content)
+
+    def clock(self, host_time: float, fit: Any) -> None:
+        """A fit of the device's clock to the host's: a mapping or record, see the schema."""
+        self._document(channels.CLOCK, host_time, {"host_time": host_time} | plain(fit))
+
+    def settings(self, host_time: float, settings: Mapping[str, Any]) -> None:
+        """How the run was set: plain values by name."""
+        self._document(channels.SETTINGS, host_time, {"host_time": host_time} | dict(settings))
+
+    def _document(self, channel: int, host_time: float, content: Mapping[str, Any]) -> None:
+        self.put(channel, host_time, encode_json(content))
