@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import typer
 
+from doc_tables import examples
 from recording.runs import write_all
 from shapes import disc
 from tomoskin.cli import image as image_module
@@ -29,7 +30,6 @@ from tomoskin.core.outputs import MAGIC
 from tomoskin.formats import WRITERS as EXPORT_WRITERS
 from tomoskin.forward import ForwardModel
 from tomoskin.skin import Skin
-from tomoskin.twin.script_page import PRESSES_EXAMPLE
 
 Run = Callable[..., tuple[int, str, str]]
 COARSE = Skin.load("textile-disc-8").altered({"mesh": {"cells": 300}})
@@ -125,7 +125,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     files = {name: folder / f"{name}{ending}" for name, ending in NAMES.items()}
     files["skin"].write_text(COARSE.to_toml())
     write_all(files["session"])
-    files["population"].write_text(PRESSES_EXAMPLE)
+    files["population"].write_text(examples("simulate.md")[1])
     np.savez(files["presses"], **presses())
     np.savez(files["bends"], **bends())
     flat = np.pad(1e3 * disc(cells=300).points, ((0, 0), (0, 1)))

@@ -25,7 +25,9 @@ from tomoskin.skin import Skin
 from tomoskin.twin import COMMON_PRESSES, Population, SetPlan
 
 SKIN = Skin.load("textile-disc-8").altered({"mesh": {"cells": 300}}).to_toml()
-CROWD = Population.of({"count": 8, "size": "10 mm", "force": "1 N", "apart": "100 mm"}, "[presses]")
+CROWD = Population.read(
+    {"count": 8, "size": "10 mm", "force": "1 N", "apart": "100 mm"}, "[presses]"
+)
 
 
 def quiet(done: int, total: int) -> None:

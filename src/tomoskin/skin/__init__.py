@@ -1,8 +1,10 @@
 """The skin file: outline, electrodes, material, drive, readout, mesh and settings; strict.
 
-What reads it (:class:`Section`, :class:`Key`, kinds of values) also reads other TOML files.
+What reads it (:class:`Section`, :func:`key`, kinds of values) also reads other TOML files.
 """
 
+from tomoskin.skin.body import ReadoutSettings
+from tomoskin.skin.build import SECTIONS
 from tomoskin.skin.kinds import (
     Choice,
     Kind,
@@ -10,23 +12,18 @@ from tomoskin.skin.kinds import (
     NumberOrWord,
     OneOrEach,
     Quantity,
+    Row,
     Rows,
+    Span,
     Text,
     Whole,
-    read_entry,
+    Words,
+    literal,
     show,
 )
 from tomoskin.skin.lay import lay
-from tomoskin.skin.page import section_text, skin_file_page
-from tomoskin.skin.read import check_names, read_section, toml_tables
-from tomoskin.skin.schema import SECTIONS, Key, Section
-from tomoskin.skin.settings import (
-    InverseSettings,
-    ReadoutSettings,
-    SignalSettings,
-    TouchSettings,
-    TwinChoice,
-)
+from tomoskin.skin.section import Key, Section, check_names, key, toml_tables
+from tomoskin.skin.settings import InverseSettings, SignalSettings, TouchSettings, TwinChoice
 from tomoskin.skin.skin import Skin
 
 __all__ = [
@@ -40,20 +37,21 @@ __all__ = [
     "OneOrEach",
     "Quantity",
     "ReadoutSettings",
+    "Row",
     "Rows",
     "Section",
     "SignalSettings",
     "Skin",
+    "Span",
     "Text",
     "TouchSettings",
     "TwinChoice",
     "Whole",
+    "Words",
     "check_names",
+    "key",
     "lay",
-    "read_entry",
-    "read_section",
-    "section_text",
+    "literal",
     "show",
-    "skin_file_page",
     "toml_tables",
 ]

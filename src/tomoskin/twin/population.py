@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from tomoskin.core import FloatArray, ScriptError
 from tomoskin.mesh import Outline
-from tomoskin.skin import read_section
 from tomoskin.twin.probe import Probe
 from tomoskin.twin.script import of_script, tables_of
-from tomoskin.twin.script_schema import PRESSES
+from tomoskin.twin.script_schema import PressesSection
 from tomoskin.twin.shape import FACES
 
 _STEP = 0.5e-3
@@ -22,34 +20,11 @@ _TRIES = 2000
 """Places drawn for one probe before there is taken to be no room for it."""
 
 
-@dataclass(frozen=True)
-class Population:
-    """Ranges that presses are drawn from, evenly and independently.
+class Population(PressesSection):
+    """Ranges that presses are drawn from, evenly and independently: a script's ``[presses]``.
 
-    Attributes
-    ----------
-    count
-        Least and most presses at once.
-    shapes
-        Faces, one as likely as another; their angles are drawn too.
-    size, force
-        Least and greatest half extent, m, and force, N.
-    hold
-        s for which they have pressed.
-    margin, apart
-        Distance of a probe's middle from the rim and from others, at least, m.
-    preset
-        Name of the twin's settings; None for the skin's own.
+    Half extents ``size`` and ``margin`` and ``apart`` are in m, ``force`` in N, ``hold`` in s.
     """
-
-    count: tuple[int, int]
-    shapes: tuple[str, ...]
-    size: tuple[float, float]
-    force: tuple[float, float]
-    hold: float
-    margin: float
-    apart: float
-    preset: str | None = None
 
     @classmethod
     def from_toml(cls, text: str, *, source: str = "script") -> Self:
@@ -62,20 +37,14 @@ class Population:
         """
         with of_script():
             tables = tables_of(text, source)
-            others = [name for name in tables if name != PRESSES.name]
-            if others or PRESSES.name not in tables:
+            others = [name for name in tables if name != cls.section]
+            if others or cls.section not in tables:
                 raise ScriptError(
                     "expected the section [presses] alone",
                     where=f"{source}: [{others[0]}]" if others else source,
                     hint="labelled frames have no timeline: leave --presses out to run one",
                 )
-            return cls.of(tables[PRESSES.name], f"{source}: [{PRESSES.name}]")
-
-    @classmethod
-    def of(cls, given: object, where: str) -> Self:
-        """Population of the section's keys as written."""
-        with of_script():
-            return cls(**read_section(PRESSES, given, where))
+            return cls.read(tables[cls.section], f"{source}: {cls.heading}")
 
     def draw(self, outline: Outline, random: np.random.Generator) -> tuple[Probe, ...]:
         """Presses of one frame on a sheet of that ``outline``.

@@ -120,7 +120,7 @@ def _check_ends(script: Script) -> None:
                 hint="raise [script] duration",
             )
     last = [
-        (bend.end, f"{bend.where} {'profile' if 'profile' in bend.values else 'hold'}")
+        (bend.end, f"{bend.where} {'profile' if bend.given.profile else 'hold'}")
         for bend in script.bends
     ]
     last += [(f.end, f"{f.where} {'end' if f.end > f.start else 'start'}") for f in script.faults]
