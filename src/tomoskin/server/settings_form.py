@@ -19,8 +19,8 @@ from tomoskin.skin import (
     NumberOrWord,
     OneOrEach,
     Quantity,
-    Rows,
     Skin,
+    Table,
     Whole,
 )
 
@@ -133,7 +133,7 @@ def _form(kind: Kind[Any]) -> dict[str, Any]:
             form = {**_form(kind.number), "words": kind.words.words}
         case OneOrEach():
             form = _form(kind.inner)
-        case Rows():
+        case Table():
             names, kinds = zip(*kind.row.entries.items(), strict=True)
             form = {"form": "rows", "names": names, "inner": _form(kinds[0])}
         case _:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tomoskin.skin.kinds import Choice, Number, OneOrEach, Quantity, Row, Rows, Text, Whole
+from tomoskin.skin.kinds import Choice, Number, OneOrEach, Quantity, Row, Table, Text, Whole
 from tomoskin.skin.section import Section, key
 
 _SIZE = Quantity("length", "mm", 1, 5000)
@@ -34,7 +34,7 @@ class OutlineSection(Section, section="outline"):
     width: float | None = key(_SIZE, "Full extent along x.", shape=_SIDES)
     height: float | None = key(_SIZE, "Full extent along y.", shape=_SIDES)
     vertices: Pairs | None = key(
-        Rows(_POINT, 3),
+        Table(_POINT, 3),
         "Corners in order, either way round; the last is joined to the first.",
         shape="polygon",
     )
@@ -102,7 +102,7 @@ class ElectrodesSection(Section, section="electrodes"):
         unless="positions",
     )
     positions: Pairs | None = key(
-        Rows(_POINT, 4),
+        Table(_POINT, 4),
         "Middle of each electrode, E1 first; each must lie on the rim.",
         default=None,
     )
@@ -132,13 +132,13 @@ class DriveSection(Section, section="drive"):
         unless="drive",
     )
     drive: Pairs | None = key(
-        Rows(Row({"source": _ELECTRODE, "sink": _ELECTRODE})),
+        Table(Row({"source": _ELECTRODE, "sink": _ELECTRODE})),
         "Driven electrodes of each measurement, counted from 0.",
         default=None,
         needs="measure",
     )
     measure: Pairs | None = key(
-        Rows(Row({"plus": _ELECTRODE, "minus": _ELECTRODE})),
+        Table(Row({"plus": _ELECTRODE, "minus": _ELECTRODE})),
         "Read electrodes of each measurement, counted from 0.",
         default=None,
         needs="drive",

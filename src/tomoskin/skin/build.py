@@ -80,11 +80,11 @@ SECTIONS: dict[str, type[Section]] = get_type_hints(SkinSections)
 """Every section by its name, in that order."""
 
 BODY = frozenset({"outline", "surface", "electrodes", "drive"})
-"""Sections that a :class:`Body` is made of."""
+"""Sections that a :class:`SkinBody` is made of."""
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class SkinBody:
     """What is made of the sections :data:`BODY`.
 
     ``contact_impedance`` is (n,) per electrode, Ω·m.

@@ -176,7 +176,7 @@ class OneOrEach(Kind[tuple[Any, ...]]):
 
 
 @dataclass(frozen=True)
-class Span(Kind[tuple[Any, Any]]):
+class OneOrSpan(Kind[tuple[Any, Any]]):
     """One value, or ``[low, high]`` to draw from; comes back as (low, high)."""
 
     inner: Kind[Any]
@@ -255,7 +255,7 @@ class Row(Kind[tuple[Any, ...]]):
 
 
 @dataclass(frozen=True)
-class Rows(Kind[tuple[tuple[Any, ...], ...]]):
+class Table(Kind[tuple[tuple[Any, ...], ...]]):
     """A list of at least so many rows; comes back as a tuple. ``ascending``: by their first entry,
     a time, as a course with straight lines between has them."""
 

@@ -20,7 +20,7 @@ from tomoskin.skin.build import (
     BODY,
     FORMAT,
     SECTIONS,
-    Body,
+    SkinBody,
     SkinSections,
     check_readout,
     located,
@@ -74,7 +74,7 @@ class Skin:
     signal: SignalSettings
     touch: TouchSettings
     twin: TwinChoice
-    _body: Body = field(repr=False)
+    _body: SkinBody = field(repr=False)
     _sections: SkinSections = field(repr=False)
 
     @classmethod
@@ -97,7 +97,7 @@ class Skin:
         check_names(written, list(SECTIONS), "section", source)
         document, records = _read({name: written.get(name, {}) for name in SECTIONS}, source)
         sections = SkinSections(**records)
-        return cls._of(document, sections, Body.of(sections, source), source)
+        return cls._of(document, sections, SkinBody.of(sections, source), source)
 
     @staticmethod
     def names() -> tuple[str, ...]:
@@ -121,7 +121,7 @@ class Skin:
         )
         sections = replace(self._sections, **records)
         kept = source == self.source and not BODY & changes.keys()
-        body = self._body if kept else Body.of(sections, source)
+        body = self._body if kept else SkinBody.of(sections, source)
         return self._of({**self.document, **document}, sections, body, source)
 
     @property
@@ -179,7 +179,7 @@ class Skin:
             return laid_on(flat, self.surface)
 
     @classmethod
-    def _of(cls, document: Document, sections: SkinSections, body: Body, source: str) -> Self:
+    def _of(cls, document: Document, sections: SkinSections, body: SkinBody, source: str) -> Self:
         check_readout(sections.readout, source)
         return cls(
             source=source,

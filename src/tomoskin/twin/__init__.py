@@ -2,7 +2,7 @@
 
 from tomoskin.twin.bend import BendSettings, Bent, Deformation, Pose, Stretched, strain_of
 from tomoskin.twin.board import Board
-from tomoskin.twin.circuit import Lines, line_potentials
+from tomoskin.twin.circuit import ElectronicsSettings, Lines, line_potentials
 from tomoskin.twin.contact import ContactSettings, Dented, Grid, solve_contact
 from tomoskin.twin.dent import Load, indent
 from tomoskin.twin.device import TwinDevice
@@ -13,7 +13,7 @@ from tomoskin.twin.line import FaultyLine, Line, LineSettings
 from tomoskin.twin.material import MaterialSettings, MaterialState, advance, conductivity
 from tomoskin.twin.population import COMMON_PRESSES, Population
 from tomoskin.twin.probe import Contact, Press, Probe
-from tomoskin.twin.readout import ElectronicsSettings, TwinElectronics, convert
+from tomoskin.twin.readout import TwinElectronics, convert
 from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, sample_table, table_of
 from tomoskin.twin.script import Script
 from tomoskin.twin.script_check import check_script, check_settling

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -13,9 +12,8 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.twin.bend import Pose
-from tomoskin.twin.circuit import Lines, line_potentials, settling
+from tomoskin.twin.circuit import ElectronicsSettings, Lines, line_potentials, settling
 from tomoskin.twin.faults import Faults, check_electrodes
-from tomoskin.twin.parameters import check_numbers, parameter
 from tomoskin.twin.probe import Contact
 from tomoskin.twin.scanning import SampleTable
 from tomoskin.twin.sheet import TwinSkin
@@ -28,51 +26,6 @@ Course = Callable[[float], tuple[Contact, ...]]
 
 Bending = Callable[[float], Pose]
 """How the sheet is bent then."""
-
-
-@dataclass(frozen=True, slots=True)
-class ElectronicsSettings:
-    """A board's imperfections; the defaults are a perfect board but for the converter's noise."""
-
-    noise: float = parameter(
-        0.7, "LSB", "Standard deviation of one conversion before it is rounded.", "assumed"
-    )
-    compliance: float = parameter(
-        math.inf, "V", "Most that the current source drives its load with.", "ideal"
-    )
-    output_resistance: float = parameter(math.inf, "Ω", "Across the current source.", "ideal")
-    switch_resistance: float = parameter(0.0, "Ω", "Of each switch, when on.", "ideal")
-    contact_sd: float = parameter(
-        0.0, "Ω", "Standard deviation of each contact's resistance over time.", "ideal"
-    )
-    contact_time: float = parameter(10.0, "s", "Correlation time of that.", "assumed")
-    rejection: float = parameter(math.inf, "dB", "Common-mode rejection of the amplifier.", "ideal")
-    gain_sd: float = parameter(0.0, "", "Relative deviation of the channels' gains.", "ideal")
-    offset_sd: float = parameter(
-        0.0, "V", "Deviation of the channels' offsets, at the input.", "ideal"
-    )
-    low_rail: float = parameter(-math.inf, "V", "Least output of the amplifier.", "ideal")
-    high_rail: float = parameter(math.inf, "V", "Largest output of the amplifier.", "ideal")
-    time_constant: float = parameter(
-        0.0, "s", "With which a channel settles after a switch of the drive.", "ideal"
-    )
-    crosstalk: float = parameter(
-        0.0, "", "Part of a neighbouring channel's potential that is read too.", "ideal"
-    )
-    hum: float = parameter(0.0, "V", "Amplitude of the mains at the inputs.", "ideal")
-    hum_frequency: float = parameter(50.0, "Hz", "Of the mains.", "Europe; 60 in America")
-    nonlinearity: float = parameter(
-        0.0, "LSB", "Largest bow of the converter's line, in the middle of its range.", "ideal"
-    )
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        check_numbers(
-            self,
-            above="contact_time hum_frequency",
-            least="noise switch_resistance contact_sd gain_sd offset_sd time_constant crosstalk "
-            "hum nonlinearity",
-        )
 
 
 def convert(

@@ -23,7 +23,7 @@ from tomoskin.twin.script_schema import (
     StretchSection,
 )
 from tomoskin.twin.shape import Circle, Face, Finger, Shape, Square
-from tomoskin.twin.timeline import Mark, Rows, ScriptedBend, ScriptedPress, ramp
+from tomoskin.twin.timeline import Rows, ScriptedBend, ScriptedMark, ScriptedPress, ramp
 
 _DEFAULT_SOURCE = "script"
 
@@ -57,7 +57,7 @@ class Script:
     seed: int
     presses: tuple[ScriptedPress, ...]
     faults: tuple[ScriptedFault, ...]
-    marks: tuple[Mark, ...]
+    marks: tuple[ScriptedMark, ...]
     preset: str | None = None
     bends: tuple[ScriptedBend, ...] = ()
 
@@ -82,11 +82,18 @@ class Script:
             head = ScriptSection.read(tables.get("script", {}), f"{source}: [script]")
             presses = tuple(_press(s, w) for s, w in _each(PressSection, tables, source))
             faults = tuple(_fault(s, w) for s, w in _each(FaultSection, tables, source))
-            marks = tuple(Mark(s.at, s.text, w) for s, w in _each(MarkSection, tables, source))
+            marks = tuple(
+                ScriptedMark(s.at, s.text, w) for s, w in _each(MarkSection, tables, source)
+            )
             bends = [ScriptedBend.of(s, w) for s, w in _each(BendSection, tables, source)]
             bends += [ScriptedBend.of(s, w) for s, w in _each(StretchSection, tables, source)]
         return cls(
-            source, presses=presses, faults=faults, marks=marks, bends=tuple(bends), **vars(head)
+            source,
+            presses=presses,
+            faults=faults,
+            marks=marks,
+            bends=tuple(bends),
+            **vars(head),
         )
 
 

@@ -7,11 +7,11 @@ from typing import Any
 from tomoskin.skin import (
     Choice,
     Number,
+    OneOrSpan,
     Quantity,
     Row,
-    Rows,
     Section,
-    Span,
+    Table,
     Text,
     Whole,
     Words,
@@ -40,8 +40,8 @@ Course = tuple[tuple[Any, ...], ...]
 """Rows of a time and values, as written."""
 
 
-def _course(**values: Quantity | Number) -> Rows:
-    return Rows(Row({"time": _TIME, **values}), ascending=True)
+def _course(**values: Quantity | Number) -> Table:
+    return Table(Row({"time": _TIME, **values}), ascending=True)
 
 
 class ScriptSection(Section, section="script"):
@@ -66,7 +66,7 @@ class PressSection(Section, section="press", many=True):
     length: float = key(_SIZE, "Of the fingertip.", default="22 mm", shape="finger")
     width: float = key(_SIZE, "Of the fingertip.", default="16 mm", shape="finger")
     vertices: Course | None = key(
-        Rows(_POINT, 3), "Corners around the middle of the probe.", shape="polygon"
+        Table(_POINT, 3), "Corners around the middle of the probe.", shape="polygon"
     )
     crown: float | None = key(
         Quantity("length", "mm", 1, 100_000),
@@ -195,18 +195,18 @@ class PressesSection(Section, section="presses"):
     """Instead of a timeline: what labelled frames are drawn from, each frame on its own
     (`--presses N`). Ranges are drawn from evenly."""
 
-    count: tuple[int, int] = key(Span(Whole(0, 8)), "Presses at once.", default=1)
+    count: tuple[int, int] = key(OneOrSpan(Whole(0, 8)), "Presses at once.", default=1)
     shapes: tuple[str, ...] = key(
         Words(Choice(("circle", "square", "finger"))),
         "Faces, one as likely as another.",
         default="circle",
     )
     size: tuple[float, float] = key(
-        Span(_SIZE),
+        OneOrSpan(_SIZE),
         "Radius of a circle, half the side of a square or the length of a fingertip; "
         "rounded to 0.5 mm.",
     )
-    force: tuple[float, float] = key(Span(_FORCE), "Force of each press.")
+    force: tuple[float, float] = key(OneOrSpan(_FORCE), "Force of each press.")
     hold: float = key(
         Quantity("time", "s", 0.01, 3600),
         "How long it has been pressed: the sheet creeps.",

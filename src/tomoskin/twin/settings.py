@@ -8,11 +8,11 @@ from typing import Self
 from tomoskin.core import ModelError
 from tomoskin.signal import FIGURES
 from tomoskin.twin.bend import BendSettings
+from tomoskin.twin.circuit import ElectronicsSettings
 from tomoskin.twin.contact import ContactSettings
 from tomoskin.twin.line import LineSettings
 from tomoskin.twin.material import MaterialSettings
 from tomoskin.twin.parameters import check_numbers
-from tomoskin.twin.readout import ElectronicsSettings
 
 
 @dataclass(frozen=True)

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel, State
 from tomoskin.mesh import Outline, Plane, Surface, laid_on, triangulate
+from tomoskin.skin import Skin
 from tomoskin.twin import material
-from tomoskin.twin.bend import BendSettings, Pose, depth_of, strain_of
-from tomoskin.twin.contact import ContactSettings
+from tomoskin.twin.bend import Pose, depth_of, strain_of
 from tomoskin.twin.dent import Load, indent
-from tomoskin.twin.material import MaterialSettings, MaterialState
+from tomoskin.twin.material import MaterialState
 from tomoskin.twin.probe import Contact, check_on_skin, probes_of
-
-if TYPE_CHECKING:
-    from tomoskin.skin import Skin
-    from tomoskin.twin.settings import TwinSettings
+from tomoskin.twin.settings import TwinSettings
 
 _MESH_SEED = 7919
 """Seed of the twin's mesh; the reconstruction's is another, so no mesh is ever shared."""
@@ -44,26 +41,21 @@ class TwinSkin:
         model: ForwardModel,
         outline: Outline,
         conductivity: float,
-        *,
-        contact: ContactSettings | None = None,
-        settings: MaterialSettings | None = None,
-        bend: BendSettings | None = None,
+        settings: TwinSettings,
         rest: Surface | None = None,
-        seed: int = 0,
     ) -> None:
         """``conductivity`` of the sheet at rest, S; ``model`` on the twin's own mesh.
 
         ``rest`` is what the sheet lies on at rest, and the mesh too.
         """
         self.model = model
-        self.contact = contact or ContactSettings()
-        self.material = settings or MaterialSettings()
-        self.bend, self.rest = bend or BendSettings(), rest or Plane()
+        self.contact, self.material, self.bend = settings.contact, settings.material, settings.bend
+        self.rest = rest or Plane()
         self._outline = outline
         self._points = model.mesh.centroids
         self._blur = math.sqrt(float(model.mesh.volumes.mean())) / math.sqrt(12)
         spread, self._random = (
-            np.random.default_rng(part) for part in np.random.SeedSequence(seed).spawn(2)
+            np.random.default_rng(part) for part in np.random.SeedSequence(settings.seed).spawn(2)
         )
         factors = material.spread_over(self.material, self._points, spread)
         self._unloaded = conductivity * factors
@@ -90,16 +82,7 @@ class TwinSkin:
         model = ForwardModel(
             mesh, skin.pattern(), contact_impedance=skin.contact_impedance, current=skin.current
         )
-        return cls(
-            model,
-            skin.outline,
-            skin.conductivity,
-            contact=settings.contact,
-            settings=settings.material,
-            bend=settings.bend,
-            rest=skin.surface,
-            seed=settings.seed,
-        )
+        return cls(model, skin.outline, skin.conductivity, settings, skin.surface)
 
     @property
     def n_electrodes(self) -> int:
@@ -216,19 +199,20 @@ class TwinSkin:
             return self._resistance
         old = self._solved_for
         if old.shape != sigma.shape or np.abs(sigma - old).max() > _SAME * np.abs(sigma).min():
-            self._resistance = self._solve(sigma)
+            self._resistance = _transfer_resistance(self.model, self._base, sigma)
             self.solves += 1
             self._solved_for = sigma
         return self._resistance
 
-    def _solve(self, sigma: FloatArray) -> FloatArray:
-        """Exact either way: by the local update where few cells have changed."""
-        if sigma.ndim == 1:
-            changed = np.flatnonzero(sigma != self._base.conductivity)
-            if 0 < len(changed) <= _FEW * len(sigma):
-                return self._base.local.transfer_resistance(changed, sigma[changed])
-        # Positive and symmetric as they are made: no need of the model's check.
-        return np.asarray(State(self.model, sigma).transfer_resistance)
+
+def _transfer_resistance(model: ForwardModel, rest: State, sigma: FloatArray) -> FloatArray:
+    """Exact either way: by the local update where few cells have changed since ``rest``."""
+    if sigma.ndim == 1:
+        changed = np.flatnonzero(sigma != rest.conductivity)
+        if 0 < len(changed) <= _FEW * len(sigma):
+            return rest.local.transfer_resistance(changed, sigma[changed])
+    # Positive and symmetric as they are made: no need of the model's check.
+    return np.asarray(State(model, sigma).transfer_resistance)
 
 
 def _same(some: tuple[object, ...], others: tuple[object, ...]) -> bool:

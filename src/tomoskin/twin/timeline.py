@@ -30,7 +30,7 @@ _ON_PATH = 200
 
 
 @dataclass(frozen=True)
-class Mark:
+class ScriptedMark:
     """A note at a time, s; ``where`` it stands in the script."""
 
     at: float
