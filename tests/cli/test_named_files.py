@@ -19,9 +19,8 @@ from doc_tables import examples
 from recording.runs import write_all
 from shapes import disc
 from tomoskin.cli import image as image_module
-from tomoskin.cli.app import COMMANDS
-from tomoskin.cli.contents import Commands
-from tomoskin.cli.image_files import WRITERS as IMAGE_WRITERS
+from tomoskin.cli.app import COMMANDS, Commands
+from tomoskin.cli.image import WRITERS as IMAGE_WRITERS
 from tomoskin.cli.named_files import RECORDING, ForceFlag, Otherwise, Reads, Writes
 from tomoskin.cli.session import EXPORTS
 from tomoskin.core import RECORDING as SESSION_ENDINGS

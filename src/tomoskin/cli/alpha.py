@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.named_files import FIGURE, ForceFlag, Reads, Writes
+from tomoskin.cli.options import FramesOption, ReferenceOption, SkinArgument
 from tomoskin.cli.output import JsonFlag, emit
-from tomoskin.cli.recording import FramesOption, ReferenceOption, frame_range, idle_frames
+from tomoskin.cli.recording import frame_range, idle_frames
 from tomoskin.core import TomoskinError
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ Outcome = tuple[str, "AlphaChoice | TomoskinError"]
 
 
 def alpha(
-    skin: Annotated[str, typer.Argument(metavar="SKIN", help="Built-in name or path.")],
+    skin: SkinArgument,
     recording: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Frames that the rules may look at."),

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import typer
 
-from tomoskin.cli.bench_table import tables
 from tomoskin.cli.named_files import Otherwise, Reads
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, tables
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
@@ -46,9 +45,10 @@ def bench(
     list_: Annotated[bool, typer.Option("--list", help="List them, and measure nothing.")] = False,
     json: JsonFlag = False,
 ) -> None:
-    """Measure speed on this machine: of all in one table, or of one part.
+    """Run one benchmark and show its tables.
 
-    Two to three minutes for all; others take seconds to an hour.
+    Of all in one table, or of one part. Two to three minutes for all; others take seconds to an
+    hour.
     """
     from threadpoolctl import threadpool_limits
 

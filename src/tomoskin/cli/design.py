@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tomoskin.cli.choices import quantity
 from tomoskin.cli.named_files import FIGURE, ForceFlag, Writes
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
+from tomoskin.cli.output import JsonFlag, emit, tables
 from tomoskin.cli.progress import Bar
-from tomoskin.cli.skin_choice import DEFAULT_SKIN
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ _PLACES = 500
 
 
 def design(
-    skin: Annotated[str, typer.Option(help="Built-in name or path.")] = DEFAULT_SKIN,
+    skin: NamedSkinOption = DEFAULT_SKIN,
     out: Annotated[
         Path | None,
         typer.Option(metavar="MAP.png", help="Where the map of the skin goes."),
@@ -54,20 +55,17 @@ def design(
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Bound the error of a press's place, and the faintest press, by the skin's own read-out.
+    """Bound what a skin can resolve, and compare it with variants.
 
-    No method can do better without more knowledge (Cramér–Rao); a good one comes near.
+    Bounds the error of a press's place, and the faintest press, by the skin's own read-out. No
+    method can do better without more knowledge (Cramér–Rao); a good one comes near.
     """
-    from tomoskin.core import parse_quantity
     from tomoskin.skin import Skin
     from tomoskin.touch import Demand, promise
 
     counts = _counts(electrodes)
     chosen = Skin.load(skin)
-    try:
-        size = parse_quantity(radius, "length") if radius else None
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--radius") from None
+    size = quantity(radius, "length", "--radius") if radius else None
     _check_size(size, chosen)
     demand = Demand(size, depth, false_alarm, found)
     with Bar("bounding") as bar:
@@ -155,8 +153,6 @@ def _write(
 
 def _say(document: dict[str, Any]) -> None:
     from rich.console import Console
-
-    from tomoskin.cli.bench_table import tables
 
     press = document["press"]
     typer.echo(

@@ -32,7 +32,7 @@ class Finding:
 
 
 def doctor(json: JsonFlag = False) -> None:
-    """Look at this installation: versions, page, sources, sinks, skins, ports."""
+    """Say what was found, and exit with 1 where something is not as needed."""
     findings = [found for look in _LOOKS for found in look()]
     healthy = all(found.ok for found in findings)
     if json:

@@ -9,31 +9,50 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.alpha_option import AlphaOption, said, with_alpha
-from tomoskin.cli.bend_option import BendOption, with_bends
-from tomoskin.cli.display_option import LimitOption, PercentFlag, SmoothOption, display_of
-from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
-from tomoskin.cli.output import JsonFlag, emit
-from tomoskin.cli.progress import Bar
-from tomoskin.cli.recording import (
-    FramesOption,
-    ReferenceOption,
-    frame_range,
-    idle_frames,
-    say_notes,
+from tomoskin.cli.choices import (
+    alpha_line,
+    display_of,
+    skin_for_file,
+    with_alpha,
+    with_bends,
+    with_states,
+    with_time_constant,
 )
-from tomoskin.cli.skin_choice import SkinOption, skin_for_file
-from tomoskin.cli.states_option import StatesOption, with_states
-from tomoskin.cli.time_option import TimeConstantOption, filter_said, with_time_constant
+from tomoskin.cli.named_files import ForceFlag, Writes
+from tomoskin.cli.options import (
+    AlphaOption,
+    BendOption,
+    FramesOption,
+    LimitOption,
+    PercentFlag,
+    RecordingArgument,
+    ReferenceOption,
+    SkinOption,
+    SmoothOption,
+    StatesOption,
+    TimeConstantOption,
+    TouchesOut,
+)
+from tomoskin.cli.output import JsonFlag, emit, remark
+from tomoskin.cli.progress import Bar
+from tomoskin.cli.recording import frame_range, idle_frames, say_notes
+from tomoskin.core import DataError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from tomoskin.formats import Display
     from tomoskin.pattern import Pattern
     from tomoskin.pipeline import Prepared, Reconstruction
     from tomoskin.signal import Recording
     from tomoskin.skin import Skin
 
+
+_SHOWN = 20
+"""Frames whose touches are said."""
+
+_MOST_FIELDS = 200
+"""Frames of a .vtu file."""
 
 IMAGES = {
     ".png": "pictures of some frames",
@@ -43,9 +62,7 @@ IMAGES = {
 
 
 def image(
-    recording: Annotated[
-        Path, typer.Argument(metavar="INPUT", help="Recording or .npz file."), Reads()
-    ],
+    recording: RecordingArgument,
     skin: SkinOption = None,
     reference: ReferenceOption = None,
     frames: FramesOption = None,
@@ -58,19 +75,14 @@ def image(
         typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go."),
         Writes(IMAGES),
     ] = None,
-    touches: Annotated[
-        Path | None,
-        typer.Option(metavar="X.csv", help="Where the touches go."),
-        Writes(TABLE),
-    ] = None,
+    touches: TouchesOut = None,
     force: ForceFlag = False,
     percent: PercentFlag = False,
     limit: LimitOption = None,
     smooth: SmoothOption = None,
     json: JsonFlag = False,
 ) -> None:
-    """Reconstruct a recording: images, and the touches in them."""
-    from tomoskin.cli.image_files import WRITERS
+    """Write the images of a recording and the touches in them, or say what they are."""
     from tomoskin.formats import read_recording
     from tomoskin.pipeline import prepare, reconstruct
 
@@ -110,9 +122,10 @@ def _report(source: Path, found: Reconstruction, prepared: Prepared, *, json: bo
         emit(_document(found, prepared))
         return
     typer.echo(f"{len(found.frames)} frames, {sum(map(len, found.touches))} touches")
-    typer.echo(said(found.choice))
+    typer.echo(alpha_line(found.choice))
     if prepared.modes is not None:
-        typer.echo(filter_said(prepared.skin))
+        seconds = prepared.skin.inverse.time_constant
+        typer.echo(f"filtered over frames, time constant {seconds:g} s")
     if found.bends:
         states = Counter(reading.state for reading in found.bends if reading)
         typer.echo(", ".join(f"{state}: {count} frames" for state, count in states.items()))
@@ -136,34 +149,27 @@ def _warn(source: Path, found: Reconstruction, pattern: Pattern) -> None:
 
     if len(found.rows_left_out):
         rows = found.rows_left_out.tolist()
-        typer.echo(
-            f"tomoskin: {source}: {len(rows)} rows hold no finite values and were left out: "
-            + "; ".join(map(pattern.row_text, rows)),
-            err=True,
+        remark(
+            f"{source}: {len(rows)} rows hold no finite values and were left out: "
+            + "; ".join(map(pattern.row_text, rows))
         )
     counted = zip(found.frames.tolist(), found.rows_missing.tolist(), strict=True)
     named = [f"{frame} ({_rows(count)})" for frame, count in counted if count]
     if named:
-        typer.echo(
-            f"tomoskin: {source}: {len(named)} frames hold rows that are not finite, and were "
-            f"imaged without these: {_listed(named)}",
-            err=True,
+        remark(
+            f"{source}: {len(named)} frames hold rows that are not finite, and were "
+            f"imaged without these: {_listed(named)}"
         )
     if len(found.left_out):
-        typer.echo(
-            f"tomoskin: {source}: {len(found.left_out)} frames hold too many values that are not "
-            f"finite and were left out: {_listed(found.left_out.tolist())}",
-            err=True,
+        remark(
+            f"{source}: {len(found.left_out)} frames hold too many values that are not "
+            f"finite and were left out: {_listed(found.left_out.tolist())}"
         )
     if found.agreement < DOUBTED:
-        typer.echo(
-            f"tomoskin: {source}: the reference agrees with this skin's model by only "
-            f"{found.agreement:.2f} (1 = proportional): check --skin and the electrodes' order",
-            err=True,
+        remark(
+            f"{source}: the reference agrees with this skin's model by only "
+            f"{found.agreement:.2f} (1 = proportional): check --skin and the electrodes' order"
         )
-
-
-_SHOWN = 20
 
 
 def _document(found: Reconstruction, prepared: Prepared) -> dict[str, Any]:
@@ -202,3 +208,62 @@ def _listed(frames: Sequence[object]) -> str:
 
 def _rows(count: int) -> str:
     return "1 row" if count == 1 else f"{count} rows"
+
+
+def _png(
+    path: Path, prepared: Prepared, found: Reconstruction, display: Display, *, overwrite: bool
+) -> None:
+    """Draw all frames, or as many as fit, evenly spread over the recording."""
+    import numpy as np
+
+    from tomoskin.formats import MOST_PANELS, Panel, write_picture
+
+    n = len(found.frames)
+    chosen = np.unique(np.linspace(0, n - 1, min(n, MOST_PANELS)).round().astype(int))
+    images, unit = display.applied(found.images[chosen], prepared.mesh, found.unit)
+    panels = [
+        Panel(f"frame {found.frames[i]}", image, found.touches[i])
+        for i, image in zip(chosen, images, strict=True)
+    ]
+    write_picture(path, prepared.mesh, panels, unit, display.limit, overwrite=overwrite)
+
+
+def _npz(
+    path: Path, prepared: Prepared, found: Reconstruction, display: Display, *, overwrite: bool
+) -> None:
+    """Write images (n_frames, n_cells) with their mesh."""
+    import numpy as np
+
+    from tomoskin.core import save_arrays
+
+    images, unit = display.applied(found.images, prepared.mesh, found.unit)
+    arrays = {
+        "images": images,
+        "frames": found.frames,
+        "unit": np.array(unit),
+        "smoothing_m": np.array(display.smoothing),
+        "mesh_id": np.array(prepared.mesh.identity),
+        "points": prepared.mesh.points,
+        "cells": prepared.mesh.cells,
+    }
+    save_arrays(path, arrays, overwrite=overwrite)
+
+
+def _vtu(
+    path: Path, prepared: Prepared, found: Reconstruction, display: Display, *, overwrite: bool
+) -> None:
+    """Write one cell field a frame."""
+    from tomoskin.formats import write_vtu
+
+    if len(found.frames) > _MOST_FIELDS:
+        raise DataError(
+            f"a .vtu file takes {_MOST_FIELDS} frames, got {len(found.frames)}",
+            where=str(path),
+            hint="choose some with --frames A:B",
+        )
+    images, _ = display.applied(found.images, prepared.mesh, found.unit)
+    names = [f"frame_{frame:06d}" for frame in found.frames.tolist()]
+    write_vtu(path, prepared.mesh, dict(zip(names, images, strict=True)), overwrite=overwrite)
+
+
+WRITERS = {".png": _png, ".npz": _npz, ".vtu": _vtu}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.named_files import FIGURE, TABLE, ForceFlag, Writes
+from tomoskin.cli.options import SkinArgument
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
 
@@ -24,7 +25,7 @@ _TARGETS, _REACH, _SIZE = 10, 0.9, 0.025
 
 
 def merit(
-    skin: Annotated[str, typer.Argument(metavar="SKIN", help="Built-in name or path.")],
+    skin: SkinArgument,
     towards: Annotated[
         int, typer.Option(min=1, metavar="N", help="Targets lie from the centre to electrode N.")
     ] = 1,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import signal
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,12 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.ending import ended_by_signals
+from tomoskin.cli.choices import chosen_sinks, skin_for_source
 from tomoskin.cli.named_files import RECORDING, Writes
+from tomoskin.cli.options import SinkOption, SkinOption, SourceOption
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
-from tomoskin.cli.sink_option import SinkOption, chosen_sinks
-from tomoskin.cli.skin_choice import SkinOption, skin_for_source
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def record(
         Writes(RECORDING),
     ],
     skin: SkinOption = None,
-    source: Annotated[str, typer.Option(help="twin, serial:PORT, replay:FILE, …")] = "twin",
+    source: SourceOption = "twin",
     seconds: Annotated[
         float | None,
         typer.Option(min=0.0, help="How long; else until Ctrl-C or a replay's end."),
@@ -40,7 +40,7 @@ def record(
     sink: SinkOption = None,
     json: JsonFlag = False,
 ) -> None:
-    """Record a session: raw bytes, frames, touches and images, without a page."""
+    """Run source and pipeline into a session file until there is enough."""
     from tomoskin.pipeline import prepare
     from tomoskin.run import Runner
     from tomoskin.source import open_source
@@ -57,6 +57,17 @@ def record(
         if (problem := _problem(runner)) is not None:
             raise DataError(problem)
     _report(file, runner, json=json)
+
+
+@contextlib.contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """Ctrl-C and SIGTERM end the block, wherever it stands: that is no failure."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @contextlib.contextmanager

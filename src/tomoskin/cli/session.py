@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.contents import group
+from tomoskin.cli.app import group
 from tomoskin.cli.named_files import RECORDING, TABLE, ForceFlag, Given, Reads, Writes
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, emit, remark
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import say_notes
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tomoskin.core import Output
     from tomoskin.recording import Lost, Repaired, SessionInfo
 
-app = group("Inspect, mend and convert recorded sessions.")
+app = group("session")
 
 _A_YEAR = 3.15e7
 """Log times of less are seconds of a clock that began with the machine, not of the day."""
@@ -81,7 +81,7 @@ def info(file: _File, json: JsonFlag = False) -> None:
     for name, text in _lines(found):
         typer.echo(f"{name:<12} {text}")
     if found.torn:
-        typer.echo(f"tomoskin: {file}: {found.torn} (tomoskin session repair ends it)", err=True)
+        remark(f"{file}: {found.torn} (tomoskin session repair ends it)")
 
 
 @app.command()
@@ -146,7 +146,7 @@ def export(
         if touches is not None:
             asked.touches(touches)
         if session.torn:
-            typer.echo(f"tomoskin: {file}: {session.torn}", err=True)
+            remark(f"{file}: {session.torn}")
     series = out.with_suffix(".pvd")  # names the files of a series
     for path in dict.fromkeys((out, series, touches)):
         if path is not None and path.is_file():

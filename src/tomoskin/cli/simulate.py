@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.named_files import RECORDING, ForceFlag, Given, Reads, Writes
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
+from tomoskin.cli.output import JsonFlag, emit, remark
 from tomoskin.cli.progress import Bar
 from tomoskin.core import DataError
 
@@ -40,7 +41,7 @@ def _simulated(out: Path | None, given: Given, called: str) -> list[Output]:
 
 def simulate(
     *,
-    skin: Annotated[str, typer.Option(help="Built-in name or path.")] = "textile-disc-8",
+    skin: NamedSkinOption = DEFAULT_SKIN,
     script: Annotated[
         Path | None,
         typer.Option(metavar="X.toml", help="What happens; see docs/simulate.md."),
@@ -68,7 +69,7 @@ def simulate(
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Run a script on the twin into a session file, or draw labelled frames."""
+    """Check which of the two is asked for, and do it."""
     from tomoskin.skin import Skin
 
     chosen = Skin.load(skin)
@@ -94,9 +95,7 @@ def _timeline(skin: Skin, script: Path, out: Path, seed: int | None, *, json: bo
         with Bar("simulating") as bar:
             found = run(read, skin, out, seed=seed, advance=bar)
     except KeyboardInterrupt:
-        typer.echo(
-            f"tomoskin: stopped; {out} holds what was simulated until then, and says so", err=True
-        )
+        remark(f"stopped; {out} holds what was simulated until then, and says so")
         raise typer.Exit(1) from None
     took = time.monotonic() - begun
     if json:
@@ -130,9 +129,7 @@ def _labelled(plan: SetPlan, out: Path, workers: Workers, *, overwrite: bool, js
         with Bar("drawing presses") as bar:
             found = make_set(plan, out, workers, bar, overwrite=overwrite)
     except KeyboardInterrupt:
-        typer.echo(
-            "tomoskin: stopped; the same command goes on where this one was stopped", err=True
-        )
+        remark("stopped; the same command goes on where this one was stopped")
         raise typer.Exit(1) from None
     took = time.monotonic() - begun
     if json:

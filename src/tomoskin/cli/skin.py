@@ -1,27 +1,27 @@
-"""``tomoskin skin``: the built-in skins, and whether a skin file can be meant."""
+"""``tomoskin skin``: the built-in skins, whether a skin file can be meant, and one for a body."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tomoskin.cli.alpha import alpha
-from tomoskin.cli.contents import group
-from tomoskin.cli.lay import lay
+from tomoskin.cli.app import group
 from tomoskin.cli.merit import merit
+from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
+from tomoskin.cli.options import SkinArgument
 from tomoskin.cli.output import JsonFlag, emit
 
 if TYPE_CHECKING:
+    from tomoskin.core import FloatArray
     from tomoskin.mesh import Quality
     from tomoskin.skin import Skin
 
-app = group("List, show, check and lay skins.")
+app = group("skin")
 app.command("alpha")(alpha)
 app.command("merit")(merit)
-app.command("lay")(lay)
-
-_Name = Annotated[str, typer.Argument(metavar="SKIN", help="Built-in name or path.")]
 
 
 @app.command("list")
@@ -38,7 +38,7 @@ def list_skins(json: JsonFlag = False) -> None:
 
 
 @app.command()
-def show(name: _Name, json: JsonFlag = False) -> None:
+def show(name: SkinArgument, json: JsonFlag = False) -> None:
     """Show a skin as the file that would make it."""
     from tomoskin.skin import Skin
 
@@ -50,7 +50,7 @@ def show(name: _Name, json: JsonFlag = False) -> None:
 
 
 @app.command()
-def check(file: _Name, json: JsonFlag = False) -> None:
+def check(file: SkinArgument, json: JsonFlag = False) -> None:
     """Check a skin file, and mesh it."""
     from tomoskin.mesh import quality
     from tomoskin.skin import Skin
@@ -63,6 +63,40 @@ def check(file: _Name, json: JsonFlag = False) -> None:
     typer.echo(
         f"{skin.name}: ok; {skin.n_electrodes} electrodes, {skin.pattern().n_meas} measurements, "
         f"{found.n_cells} triangles of quality {found.minimum:.2f} (least), {found.mean:.2f} (mean)"
+    )
+
+
+@app.command()
+def lay(
+    surface: Annotated[Path, typer.Argument(help="A .stl, .obj or .ply file."), Reads()],
+    electrodes: Annotated[
+        Path,
+        typer.Option(metavar="CSV", help="x,y,z of each electrode, E1 first, in the file's unit."),
+        Reads(),
+    ],
+    out: Annotated[
+        Path, typer.Option(metavar="X.toml", help="Where the skin file goes."), Writes(SKIN)
+    ],
+    unit: Annotated[str, typer.Option(help="Of the file: mm, cm or m.")] = "mm",
+    like: Annotated[
+        str, typer.Option(metavar="SKIN", help="Skin to take material, contacts and drive from.")
+    ] = "textile-disc-16",
+    force: ForceFlag = False,
+) -> None:
+    """Write the skin file of a sheet on a scanned or drawn surface."""
+    from tomoskin.core import DIMENSIONS, DataError, write_text
+    from tomoskin.skin import Skin
+    from tomoskin.skin import lay as laid
+
+    if unit not in ("mm", "cm", "m"):
+        raise DataError(f'expected mm, cm or m, got "{unit}"', where="--unit")
+    skin = laid(surface, _places(electrodes), unit=unit, like=Skin.load(like), source=str(out))
+    mesh = skin.mesh()
+    write_text(out, skin.to_toml(), overwrite=force)
+    scale = DIMENSIONS["length"]["cm"]
+    typer.echo(
+        f"{out}: {skin.n_electrodes} electrodes on {mesh.volumes.sum() / scale**2:.4g} cm², "
+        f"{len(mesh.cells)} triangles"
     )
 
 
@@ -84,3 +118,37 @@ def _mesh(found: Quality) -> dict[str, Any]:
         "quality_minimum": found.minimum,
         "quality_mean": found.mean,
     }
+
+
+def _places(path: Path) -> FloatArray:
+    """(n, 3) numbers of a CSV file, which may have a heading."""
+    import numpy as np
+
+    from tomoskin.core import DataError
+
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"cannot be read: {error}", where=str(path)) from None
+    rows = []
+    for number, line in enumerate(lines, 1):
+        fields = [field.strip() for field in line.split(",")]
+        if line.strip() and not (number == 1 and fields[:3] == ["x", "y", "z"]):
+            rows.append(_numbers(fields, f"{path}, line {number}"))
+    if not rows:
+        raise DataError("expected lines x,y,z, got none", where=str(path))
+    return np.array(rows)
+
+
+def _numbers(fields: list[str], where: str) -> list[float]:
+    from tomoskin.core import DataError
+
+    try:
+        x, y, z = map(float, fields)
+    except ValueError:
+        raise DataError(
+            f'expected three numbers x,y,z, got "{",".join(fields)}"',
+            where=where,
+            hint="decimal points, commas between",
+        ) from None
+    return [x, y, z]
