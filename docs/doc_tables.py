@@ -6,8 +6,10 @@ Each page is written by hand down to its mark. Below stand the keys of the skin 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 from tomoskin.skin import SECTIONS, Key, Section, literal
 from tomoskin.twin import (
@@ -18,7 +20,6 @@ from tomoskin.twin import (
     LineSettings,
     MaterialSettings,
 )
-from tomoskin.twin.parameters import documented
 from tomoskin.twin.script_schema import SECTIONS as SCRIPT_SECTIONS
 from tomoskin.twin.settings import SOURCES
 
@@ -65,6 +66,12 @@ def examples(page: str) -> list[str]:
     """The TOML files that ``page`` shows."""
     _, *blocks = (FOLDER / page).read_text(encoding="utf-8").split("```toml\n")
     return [block.partition("```")[0] for block in blocks]
+
+
+def documented(record: type[Any]) -> Iterator[tuple[str, str, str, str]]:
+    """Name, unit, meaning and source of each number of a settings record."""
+    for one in fields(record):
+        yield one.name, *(one.metadata[key] for key in ("unit", "meaning", "source"))
 
 
 def _table(head: list[str], rows: Iterable[list[str]]) -> str:

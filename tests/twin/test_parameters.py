@@ -2,6 +2,7 @@
 
 import pytest
 
+from doc_tables import documented
 from tomoskin.twin import (
     BendSettings,
     ContactSettings,
@@ -9,7 +10,6 @@ from tomoskin.twin import (
     LineSettings,
     MaterialSettings,
 )
-from tomoskin.twin.parameters import documented
 from tomoskin.twin.settings import SOURCES
 
 RECORDS = (ContactSettings, MaterialSettings, ElectronicsSettings, LineSettings, BendSettings)

@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 import typer
 
 from tomoskin.cli.named_files import Otherwise, Reads
-from tomoskin.cli.output import JsonFlag, emit, tables
+from tomoskin.cli.output import JsonFlag, tables, tell
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from types import ModuleType
+
+    from rich.table import Table
 
 _FOLDER = Path(__file__).parents[3] / "benchmarks"
 
@@ -69,10 +71,7 @@ def bench(
         reports = benchmark.run(data)
     if place:
         place.write(reports)
-    if json:
-        emit(reports)
-    else:
-        _show(reports)
+    tell(reports, _lines(reports), json=json)
 
 
 def _benchmarks() -> dict[str, str]:
@@ -99,18 +98,18 @@ def _load(name: str) -> ModuleType:
         sys.path.remove(str(_FOLDER))
 
 
-def _show(reports: Sequence[Any]) -> None:
-    from rich.console import Console
-
-    console = Console()
+def _lines(reports: Sequence[Any]) -> Iterator[str | Table]:
     for report in reports:
-        for table in tables(report.title, report.columns, report.rows, console.width):
-            console.print(table, crop=False)
-            console.print()
+        for table in tables(report.title, report.columns, report.rows):
+            yield table
+            yield ""
         for note in report.notes:
-            console.print(f"  {note}", highlight=False)
-    known = ", ".join(f"{k} {v}" for k, v in reports[-1].machine.items())
-    console.print(f"  {known}", highlight=False)
+            yield f"  {note}"
+    yield f"  {_machine(reports)}"
+
+
+def _machine(reports: Sequence[Any]) -> str:
+    return ", ".join(f"{key} {value}" for key, value in reports[-1].machine.items())
 
 
 @dataclass(frozen=True)
@@ -139,8 +138,7 @@ class _Place:
         """Put tables, their notes and the machine there."""
         from tomoskin.core import write_text
 
-        machine = ", ".join(f"{key} {value}" for key, value in reports[-1].machine.items())
-        parts = [f"\n{date.today():%-d %B %Y}; {machine}.\n", *map(_markdown, reports)]
+        parts = [f"\n{date.today():%-d %B %Y}; {_machine(reports)}.\n", *map(_markdown, reports)]
         text = self.before + "\n".join(parts) + "\n" + self.after
         write_text(self.file, text, overwrite=True)
 

@@ -33,19 +33,17 @@ from tomoskin.cli.options import (
     TimeConstantOption,
     TouchesOut,
 )
-from tomoskin.cli.output import JsonFlag, emit, remark
+from tomoskin.cli.output import JsonFlag, remark, tell
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import frame_range, idle_frames, say_notes
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from tomoskin.formats import Display
     from tomoskin.pattern import Pattern
     from tomoskin.pipeline import Prepared, Reconstruction
-    from tomoskin.signal import Recording
-    from tomoskin.skin import Skin
 
 
 _SHOWN = 20
@@ -83,7 +81,7 @@ def image(
     json: JsonFlag = False,
 ) -> None:
     """Write the images of a recording and the touches in them, or say what they are."""
-    from tomoskin.formats import read_recording
+    from tomoskin.formats import read_recording, write_touches
     from tomoskin.pipeline import prepare, reconstruct
 
     told = skin_for_file(skin, recording)
@@ -100,47 +98,34 @@ def image(
         found = reconstruct(prepared, whole.part(start, stop), idle, rule=rule, advance=bar)
     found = found.numbered_from(start)
     if touches is not None:
-        _write_touches(touches, whole, found, prepared.skin, overwrite=force)
+        rows = zip(found.frames.tolist(), found.touches, strict=True)
+        timed = ((frame, float(whole.time[frame]), some) for frame, some in rows)
+        write_touches(touches, timed, prepared.skin.surface, overwrite=force)
     if out is not None:
         WRITERS[out.suffix.lower()](out, prepared, found, display, overwrite=force)
-    _report(recording, found, prepared, json=json)
+    _warn(recording, found, prepared.pattern)
+    tell(_document(found, prepared), _lines(found, prepared), json=json)
 
 
-def _write_touches(
-    path: Path, recording: Recording, found: Reconstruction, skin: Skin, *, overwrite: bool
-) -> None:
-    from tomoskin.formats import write_touches
-
-    rows = zip(found.frames.tolist(), found.touches, strict=True)
-    timed = ((f, float(recording.time[f]), t) for f, t in rows)
-    write_touches(path, timed, skin.surface, overwrite=overwrite)
-
-
-def _report(source: Path, found: Reconstruction, prepared: Prepared, *, json: bool) -> None:
-    _warn(source, found, prepared.pattern)
-    if json:
-        emit(_document(found, prepared))
-        return
-    typer.echo(f"{len(found.frames)} frames, {sum(map(len, found.touches))} touches")
-    typer.echo(alpha_line(found.choice))
+def _lines(found: Reconstruction, prepared: Prepared) -> Iterator[str]:
+    yield f"{len(found.frames)} frames, {sum(map(len, found.touches))} touches"
+    yield alpha_line(found.choice)
     if prepared.modes is not None:
         seconds = prepared.skin.inverse.time_constant
-        typer.echo(f"filtered over frames, time constant {seconds:g} s")
-    if found.bends:
-        states = Counter(reading.state for reading in found.bends if reading)
-        typer.echo(", ".join(f"{state}: {count} frames" for state, count in states.items()))
-    if found.states:
-        told = Counter("unknown" if s.unknown else s.name for s in found.states)
-        typer.echo(", ".join(f"{state}: {count} frames" for state, count in told.items()))
+        yield f"filtered over frames, time constant {seconds:g} s"
+    bends = [reading.state for reading in found.bends if reading]
+    states = ["unknown" if state.unknown else state.name for state in found.states]
+    for names in filter(None, (bends, states)):
+        yield ", ".join(f"{name}: {count} frames" for name, count in Counter(names).items())
     for frame, touches in list(zip(found.frames.tolist(), found.touches, strict=True))[:_SHOWN]:
         for t in touches:
             r = t.reading
-            typer.echo(
+            yield (
                 f"frame {frame:>4}  touch {t.id:>3}  x {1e3 * r.x:+7.1f} mm  y {1e3 * r.y:+7.1f} mm"
                 f"  area {1e6 * r.area:7.0f} mm²  peak {r.peak:+.3g} {found.unit}"
             )
     if len(found.frames) > _SHOWN:
-        typer.echo(f"… and {len(found.frames) - _SHOWN} frames more: --touches writes them all")
+        yield f"… and {len(found.frames) - _SHOWN} frames more: --touches writes them all"
 
 
 def _warn(source: Path, found: Reconstruction, pattern: Pattern) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from rich.table import Table
 
@@ -22,6 +22,20 @@ def emit(document: Any) -> None:
     import msgspec
 
     typer.echo(msgspec.json.encode(document).decode())
+
+
+def tell(document: Any, lines: Iterable[str | Table], *, json: bool) -> None:
+    """Write what a command found: the ``document`` for programs, else ``lines`` for people."""
+    if json:
+        emit(document)
+        return
+    for line in lines:
+        if isinstance(line, str):
+            typer.echo(line)
+        else:
+            from rich.console import Console
+
+            Console().print(line, crop=False)
 
 
 def remark(text: str) -> None:
@@ -42,13 +56,20 @@ class _Column:
 
 
 def tables(
-    title: str, headings: Sequence[str], rows: Sequence[Sequence[object]], width: int
+    title: str,
+    headings: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    width: int | None = None,
 ) -> list[Table]:
-    """One table, or where ``width`` is too little several, each with the columns that say what
-    a row is about: the leading ones with text in them, at least the first.
+    """One table, or where ``width`` (the terminal's) is too little several, each with the columns
+    that say what a row is about: the leading ones with text in them, at least the first.
 
     Nothing is cut off: headings break between words.
     """
+    if width is None:
+        from rich.console import Console
+
+        width = Console().width
     columns = _columns(headings, rows)
     keys = [column for column in columns if column.key]
     blocks, rest = [list(keys)], [column for column in columns if not column.key]

@@ -14,7 +14,7 @@ import typer
 from tomoskin.cli.choices import chosen_sinks, skin_for_source
 from tomoskin.cli.named_files import RECORDING, Writes
 from tomoskin.cli.options import SinkOption, SkinOption, SourceOption
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, tell
 from tomoskin.cli.progress import Bar
 from tomoskin.core import DataError
 
@@ -56,7 +56,12 @@ def record(
         _wait(runner, seconds, frames)
         if (problem := _problem(runner)) is not None:
             raise DataError(problem)
-    _report(file, runner, json=json)
+    status = runner.status()
+    size = file.stat().st_size
+    document = {"file": str(file), "bytes": size, "frames": status.frames, "lost": status.gaps,
+                "dropped": status.dropped, "corrupt": status.corrupt}  # fmt: skip
+    line = f"{file}: {status.frames} frames, {size / 1e6:.1f} MB, {status.gaps} lost"
+    tell(document, [line], json=json)
 
 
 @contextlib.contextmanager
@@ -121,13 +126,3 @@ def _problem(runner: Runner) -> str | None:
     _, events = runner.events.since(0)
     texts = [event.text for event in events if event.kind == "recording-stopped"]
     return texts[-1] if texts else "the recording has ended"
-
-
-def _report(file: Path, runner: Runner, *, json: bool) -> None:
-    status = runner.status()
-    size = file.stat().st_size
-    if json:
-        emit({"file": str(file), "bytes": size, "frames": status.frames, "lost": status.gaps,
-              "dropped": status.dropped, "corrupt": status.corrupt})  # fmt: skip
-        return
-    typer.echo(f"{file}: {status.frames} frames, {size / 1e6:.1f} MB, {status.gaps} lost")

@@ -11,7 +11,7 @@ import typer
 
 from tomoskin.cli.app import group
 from tomoskin.cli.named_files import RECORDING, TABLE, ForceFlag, Given, Reads, Writes
-from tomoskin.cli.output import JsonFlag, emit, remark
+from tomoskin.cli.output import JsonFlag, remark, tell
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import say_notes
 
@@ -74,14 +74,10 @@ def info(file: _File, json: JsonFlag = False) -> None:
     from tomoskin.recording import session_info
 
     with Bar("reading") as bar:
-        found = session_info(file, bar)
-    if json:
-        emit(asdict(found))
-        return
-    for name, text in _lines(found):
-        typer.echo(f"{name:<12} {text}")
-    if found.torn:
-        remark(f"{file}: {found.torn} (tomoskin session repair ends it)")
+        info = session_info(file, bar)
+    tell(asdict(info), (f"{name:<12} {text}" for name, text in _lines(info)), json=json)
+    if info.torn and not json:
+        remark(f"{file}: {info.torn} (tomoskin session repair ends it)")
 
 
 @app.command()
@@ -106,13 +102,9 @@ def repair(
     target = _repaired(file, out)
     with Bar("repairing") as bar:
         found = repair(file, target, skin=Skin.load(skin) if skin else None, advance=bar)
-    if json:
-        emit(asdict(found))
-        return
     frames = found.messages.get("/frames", 0)
-    typer.echo(f"{target}: {found.chunks} chunks, {frames} frames recovered; {file} is untouched")
-    for text in _losses(found):
-        typer.echo(text)
+    line = f"{target}: {found.chunks} chunks, {frames} frames recovered; {file} is untouched"
+    tell(asdict(found), [line, *_losses(found)], json=json)
 
 
 @app.command()

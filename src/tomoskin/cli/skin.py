@@ -12,11 +12,10 @@ from tomoskin.cli.app import group
 from tomoskin.cli.merit import merit
 from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
 from tomoskin.cli.options import SkinArgument
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, tell
 
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray
-    from tomoskin.mesh import Quality
     from tomoskin.skin import Skin
 
 app = group("skin")
@@ -30,11 +29,8 @@ def list_skins(json: JsonFlag = False) -> None:
     from tomoskin.skin import Skin
 
     skins = [Skin.load(name) for name in Skin.names()]
-    if json:
-        emit([_summary(skin) for skin in skins])
-        return
-    for skin in skins:
-        typer.echo(f"{skin.name:<18} {skin.n_electrodes:>3} electrodes  {skin.description}")
+    lines = (f"{s.name:<18} {s.n_electrodes:>3} electrodes  {s.description}" for s in skins)
+    tell([_summary(skin) for skin in skins], lines, json=json)
 
 
 @app.command()
@@ -43,10 +39,8 @@ def show(name: SkinArgument, json: JsonFlag = False) -> None:
     from tomoskin.skin import Skin
 
     skin = Skin.load(name)
-    if json:
-        emit(_summary(skin) | {"toml": skin.to_toml()})
-    else:
-        typer.echo(skin.to_toml().rstrip("\n"))
+    text = skin.to_toml()
+    tell(_summary(skin) | {"toml": text}, [text.rstrip("\n")], json=json)
 
 
 @app.command()
@@ -56,14 +50,18 @@ def check(file: SkinArgument, json: JsonFlag = False) -> None:
     from tomoskin.skin import Skin
 
     skin = Skin.load(file)
-    found = quality(skin.mesh())
-    if json:
-        emit(_summary(skin) | {"ok": True, "mesh": _mesh(found)})
-        return
-    typer.echo(
+    mesh = quality(skin.mesh())
+    figures = {
+        "n_cells": mesh.n_cells,
+        "n_points": mesh.n_points,
+        "quality_minimum": mesh.minimum,
+        "quality_mean": mesh.mean,
+    }
+    line = (
         f"{skin.name}: ok; {skin.n_electrodes} electrodes, {skin.pattern().n_meas} measurements, "
-        f"{found.n_cells} triangles of quality {found.minimum:.2f} (least), {found.mean:.2f} (mean)"
+        f"{mesh.n_cells} triangles of quality {mesh.minimum:.2f} (least), {mesh.mean:.2f} (mean)"
     )
+    tell(_summary(skin) | {"ok": True, "mesh": figures}, [line], json=json)
 
 
 @app.command()
@@ -111,27 +109,15 @@ def _summary(skin: Skin) -> dict[str, Any]:
     }
 
 
-def _mesh(found: Quality) -> dict[str, Any]:
-    return {
-        "n_cells": found.n_cells,
-        "n_points": found.n_points,
-        "quality_minimum": found.minimum,
-        "quality_mean": found.mean,
-    }
-
-
 def _places(path: Path) -> FloatArray:
     """(n, 3) numbers of a CSV file, which may have a heading."""
     import numpy as np
 
     from tomoskin.core import DataError
+    from tomoskin.skin import read_text
 
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"cannot be read: {error}", where=str(path)) from None
     rows = []
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(read_text(path, "a table of positions").splitlines(), 1):
         fields = [field.strip() for field in line.split(",")]
         if line.strip() and not (number == 1 and fields[:3] == ["x", "y", "z"]):
             rows.append(_numbers(fields, f"{path}, line {number}"))

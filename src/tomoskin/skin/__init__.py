@@ -5,6 +5,7 @@ What reads it (:class:`Section`, :func:`key`, kinds of values) also reads other 
 
 from tomoskin.skin.body import ReadoutSettings
 from tomoskin.skin.build import SECTIONS
+from tomoskin.skin.find import read_text
 from tomoskin.skin.kinds import (
     Choice,
     Kind,
@@ -52,6 +53,7 @@ __all__ = [
     "key",
     "lay",
     "literal",
+    "read_text",
     "show",
     "toml_tables",
 ]
