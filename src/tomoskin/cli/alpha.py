@@ -83,9 +83,9 @@ def _evidence(
 
     if recording is None:
         return prepared, Evidence(noise=prepared.predicted_noise())
-    whole = read_recording(recording).in_order_of(prepared.pattern)
-    idle = idle_frames(whole, reference, prepared.pattern)
-    changes = changes_of(prepared, whole.part(*frame_range(whole, frames)), idle)
+    recorded = read_recording(recording).in_order_of(prepared.pattern)
+    idle = idle_frames(recorded, reference, prepared.pattern)
+    changes = changes_of(prepared, recorded.part(*frame_range(recorded, frames)), idle)
     return changes.prepared, changes.evidence()
 
 

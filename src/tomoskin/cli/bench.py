@@ -54,13 +54,15 @@ def bench(
     """
     from threadpoolctl import threadpool_limits
 
-    known = _benchmarks()
+    benchmarks = _benchmarks()
     if list_:
-        for key, summary in known.items():
+        for key, summary in benchmarks.items():
             typer.echo(f"{key:<14} {summary}")
         return
-    if name not in known:
-        raise typer.BadParameter(f'expected {", ".join(known)}, got "{name}"', param_hint="NAME")
+    if name not in benchmarks:
+        raise typer.BadParameter(
+            f'expected {", ".join(benchmarks)}, got "{name}"', param_hint="NAME"
+        )
     benchmark = _load(name)
     usual: int = getattr(benchmark, "CORES", 1)
     cores = cores or usual
@@ -82,12 +84,12 @@ def _benchmarks() -> dict[str, str]:
             where="tomoskin bench",
             hint="run it from a checkout of the source",
         )
-    found = {}
+    summaries = {}
     for path in sorted(_FOLDER.glob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         if any(isinstance(node, ast.FunctionDef) and node.name == "run" for node in tree.body):
-            found[path.stem] = (ast.get_docstring(tree) or "").partition("\n")[0]
-    return found
+            summaries[path.stem] = (ast.get_docstring(tree) or "").partition("\n")[0]
+    return summaries
 
 
 def _load(name: str) -> ModuleType:

@@ -115,21 +115,21 @@ def with_bends(prepared: Prepared, path: Path | None) -> Prepared:
 
     if path is None:
         return prepared
-    known = read_bends(path)
-    known.check(prepared.pattern)
-    return prepared.that_bends(known.model)
+    calibration = read_bends(path)
+    calibration.check(prepared.pattern)
+    return prepared.that_bends(calibration.model)
 
 
 def with_states(prepared: Prepared, path: Path | None, skin: Skin) -> Prepared:
     """The skin with its states, where a calibration is named.
 
-    ``skin`` as its file says, whatever pictures are made of it. Raises DataError for states of
+    ``skin`` as its file says, whatever images are made of it. Raises DataError for states of
     another.
     """
     from tomoskin.calibration import read_states
 
     if path is None:
         return prepared
-    known = read_states(path)
-    known.classifier.check(skin_id=skin.identity)
-    return prepared.that_tells(known)
+    calibration = read_states(path)
+    calibration.classifier.check(skin_id=skin.identity)
+    return prepared.that_tells(calibration)

@@ -84,103 +84,103 @@ def image(
     from tomoskin.formats import read_recording, write_touches
     from tomoskin.pipeline import prepare, reconstruct
 
-    told = skin_for_file(skin, recording)
-    chosen, rule = with_alpha(told, alpha)
+    own = skin_for_file(skin, recording)
+    chosen, rule = with_alpha(own, alpha)
     chosen = with_time_constant(chosen, time_constant)
     display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
     with Bar("preparing"):
-        prepared = with_states(with_bends(prepare(chosen), bend), states, told)
-    whole = read_recording(recording).in_order_of(prepared.pattern)
-    say_notes(whole)
-    idle = idle_frames(whole, reference, prepared.pattern)
-    start, stop = frame_range(whole, frames)
+        prepared = with_states(with_bends(prepare(chosen), bend), states, own)
+    recorded = read_recording(recording).in_order_of(prepared.pattern)
+    say_notes(recorded)
+    idle = idle_frames(recorded, reference, prepared.pattern)
+    start, stop = frame_range(recorded, frames)
     with Bar("reconstructing") as bar:
-        found = reconstruct(prepared, whole.part(start, stop), idle, rule=rule, advance=bar)
-    found = found.numbered_from(start)
+        result = reconstruct(prepared, recorded.part(start, stop), idle, rule=rule, advance=bar)
+    result = result.numbered_from(start)
     if touches is not None:
-        rows = zip(found.frames.tolist(), found.touches, strict=True)
-        timed = ((frame, float(whole.time[frame]), some) for frame, some in rows)
+        rows = zip(result.frames.tolist(), result.touches, strict=True)
+        timed = ((frame, float(recorded.time[frame]), some) for frame, some in rows)
         write_touches(touches, timed, prepared.skin.surface, overwrite=force)
     if out is not None:
-        WRITERS[out.suffix.lower()](out, prepared, found, display, overwrite=force)
-    _warn(recording, found, prepared.pattern)
-    tell(_document(found, prepared), _lines(found, prepared), json=json)
+        WRITERS[out.suffix.lower()](out, prepared, result, display, overwrite=force)
+    _warn(recording, result, prepared.pattern)
+    tell(_document(result, prepared), _lines(result, prepared), json=json)
 
 
-def _lines(found: Reconstruction, prepared: Prepared) -> Iterator[str]:
-    yield f"{len(found.frames)} frames, {sum(map(len, found.touches))} touches"
-    yield alpha_line(found.choice)
+def _lines(result: Reconstruction, prepared: Prepared) -> Iterator[str]:
+    yield f"{len(result.frames)} frames, {sum(map(len, result.touches))} touches"
+    yield alpha_line(result.choice)
     if prepared.modes is not None:
         seconds = prepared.skin.inverse.time_constant
         yield f"filtered over frames, time constant {seconds:g} s"
-    bends = [reading.state for reading in found.bends if reading]
-    states = ["unknown" if state.unknown else state.name for state in found.states]
+    bends = [reading.state for reading in result.bends if reading]
+    states = ["unknown" if state.unknown else state.name for state in result.states]
     for names in filter(None, (bends, states)):
         yield ", ".join(f"{name}: {count} frames" for name, count in Counter(names).items())
-    for frame, touches in list(zip(found.frames.tolist(), found.touches, strict=True))[:_SHOWN]:
+    for frame, touches in list(zip(result.frames.tolist(), result.touches, strict=True))[:_SHOWN]:
         for t in touches:
             r = t.reading
             yield (
                 f"frame {frame:>4}  touch {t.id:>3}  x {1e3 * r.x:+7.1f} mm  y {1e3 * r.y:+7.1f} mm"
-                f"  area {1e6 * r.area:7.0f} mm²  peak {r.peak:+.3g} {found.unit}"
+                f"  area {1e6 * r.area:7.0f} mm²  peak {r.peak:+.3g} {result.unit}"
             )
-    if len(found.frames) > _SHOWN:
-        yield f"… and {len(found.frames) - _SHOWN} frames more: --touches writes them all"
+    if len(result.frames) > _SHOWN:
+        yield f"… and {len(result.frames) - _SHOWN} frames more: --touches writes them all"
 
 
-def _warn(source: Path, found: Reconstruction, pattern: Pattern) -> None:
+def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
     """Say on stderr what was left out, and what looks wrong."""
     from tomoskin.pipeline import DOUBTED
 
-    if len(found.rows_left_out):
-        rows = found.rows_left_out.tolist()
+    if len(result.rows_left_out):
+        rows = result.rows_left_out.tolist()
         remark(
             f"{source}: {len(rows)} rows hold no finite values and were left out: "
             + "; ".join(map(pattern.row_text, rows))
         )
-    counted = zip(found.frames.tolist(), found.rows_missing.tolist(), strict=True)
+    counted = zip(result.frames.tolist(), result.rows_missing.tolist(), strict=True)
     named = [f"{frame} ({_rows(count)})" for frame, count in counted if count]
     if named:
         remark(
             f"{source}: {len(named)} frames hold rows that are not finite, and were "
             f"imaged without these: {_listed(named)}"
         )
-    if len(found.left_out):
+    if len(result.left_out):
         remark(
-            f"{source}: {len(found.left_out)} frames hold too many values that are not "
-            f"finite and were left out: {_listed(found.left_out.tolist())}"
+            f"{source}: {len(result.left_out)} frames hold too many values that are not "
+            f"finite and were left out: {_listed(result.left_out.tolist())}"
         )
-    if found.agreement < DOUBTED:
+    if result.agreement < DOUBTED:
         remark(
             f"{source}: the reference agrees with this skin's model by only "
-            f"{found.agreement:.2f} (1 = proportional): check --skin and the electrodes' order"
+            f"{result.agreement:.2f} (1 = proportional): check --skin and the electrodes' order"
         )
 
 
-def _document(found: Reconstruction, prepared: Prepared) -> dict[str, Any]:
-    lacking = zip(found.frames.tolist(), found.rows_missing.tolist(), strict=True)
+def _document(result: Reconstruction, prepared: Prepared) -> dict[str, Any]:
+    missing = zip(result.frames.tolist(), result.rows_missing.tolist(), strict=True)
     return {
-        "frames": len(found.frames),
-        "rows_missing": {str(frame): rows for frame, rows in lacking if rows},
-        "left_out": found.left_out.tolist(),
-        "rows_left_out": found.rows_left_out.tolist(),
-        "agreement": found.agreement,
-        "unit": found.unit,
-        "alpha": found.choice.alpha,
-        "rule": found.choice.rule,
+        "frames": len(result.frames),
+        "rows_missing": {str(frame): rows for frame, rows in missing if rows},
+        "left_out": result.left_out.tolist(),
+        "rows_left_out": result.rows_left_out.tolist(),
+        "agreement": result.agreement,
+        "unit": result.unit,
+        "alpha": result.choice.alpha,
+        "rule": result.choice.rule,
         "time_constant_s": prepared.skin.inverse.time_constant,
         "bends": [
             {"frame": f, "angle_rad": b.angle, "sd_rad": b.sd, "axis_rad": b.axis, "state": b.state}
-            for f, b in zip(found.frames.tolist(), found.bends, strict=False)
+            for f, b in zip(result.frames.tolist(), result.bends, strict=False)
             if b
         ],
         "states": [
             {"frame": f, **asdict(state)}
-            for f, state in zip(found.frames.tolist(), found.states, strict=False)
+            for f, state in zip(result.frames.tolist(), result.states, strict=False)
         ],
         "touches": [
             {"frame": f, "id": t.id, "x_m": t.reading.x, "y_m": t.reading.y, "peak": t.reading.peak}
-            for f, touches in zip(found.frames.tolist(), found.touches, strict=True)
+            for f, touches in zip(result.frames.tolist(), result.touches, strict=True)
             for t in touches
         ],
     }
@@ -196,35 +196,35 @@ def _rows(count: int) -> str:
 
 
 def _png(
-    path: Path, prepared: Prepared, found: Reconstruction, display: Display, *, overwrite: bool
+    path: Path, prepared: Prepared, result: Reconstruction, display: Display, *, overwrite: bool
 ) -> None:
     """Draw all frames, or as many as fit, evenly spread over the recording."""
     import numpy as np
 
     from tomoskin.formats import MOST_PANELS, Panel, write_picture
 
-    n = len(found.frames)
+    n = len(result.frames)
     chosen = np.unique(np.linspace(0, n - 1, min(n, MOST_PANELS)).round().astype(int))
-    images, unit = display.applied(found.images[chosen], prepared.mesh, found.unit)
+    images, unit = display.applied(result.images[chosen], prepared.mesh, result.unit)
     panels = [
-        Panel(f"frame {found.frames[i]}", image, found.touches[i])
+        Panel(f"frame {result.frames[i]}", image, result.touches[i])
         for i, image in zip(chosen, images, strict=True)
     ]
     write_picture(path, prepared.mesh, panels, unit, display.limit, overwrite=overwrite)
 
 
 def _npz(
-    path: Path, prepared: Prepared, found: Reconstruction, display: Display, *, overwrite: bool
+    path: Path, prepared: Prepared, result: Reconstruction, display: Display, *, overwrite: bool
 ) -> None:
     """Write images (n_frames, n_cells) with their mesh."""
     import numpy as np
 
     from tomoskin.core import save_arrays
 
-    images, unit = display.applied(found.images, prepared.mesh, found.unit)
+    images, unit = display.applied(result.images, prepared.mesh, result.unit)
     arrays = {
         "images": images,
-        "frames": found.frames,
+        "frames": result.frames,
         "unit": np.array(unit),
         "smoothing_m": np.array(display.smoothing),
         "mesh_id": np.array(prepared.mesh.identity),
@@ -235,19 +235,19 @@ def _npz(
 
 
 def _vtu(
-    path: Path, prepared: Prepared, found: Reconstruction, display: Display, *, overwrite: bool
+    path: Path, prepared: Prepared, result: Reconstruction, display: Display, *, overwrite: bool
 ) -> None:
     """Write one cell field a frame."""
     from tomoskin.formats import write_vtu
 
-    if len(found.frames) > _MOST_FIELDS:
+    if len(result.frames) > _MOST_FIELDS:
         raise DataError(
-            f"a .vtu file takes {_MOST_FIELDS} frames, got {len(found.frames)}",
+            f"a .vtu file takes {_MOST_FIELDS} frames, got {len(result.frames)}",
             where=str(path),
             hint="choose some with --frames A:B",
         )
-    images, _ = display.applied(found.images, prepared.mesh, found.unit)
-    names = [f"frame_{frame:06d}" for frame in found.frames.tolist()]
+    images, _ = display.applied(result.images, prepared.mesh, result.unit)
+    names = [f"frame_{frame:06d}" for frame in result.frames.tolist()]
     write_vtu(path, prepared.mesh, dict(zip(names, images, strict=True)), overwrite=overwrite)
 
 

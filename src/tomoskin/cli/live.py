@@ -34,7 +34,7 @@ def live(
     ] = None,
     calibration: Annotated[
         Path | None,
-        typer.Option(metavar="C.npz", help="Places of touches by a calibration of touch."),
+        typer.Option(metavar="C.npz", help="Positions of touches by a calibration of touch."),
         Reads(),
     ] = None,
     folder: Annotated[

@@ -77,7 +77,7 @@ TimeConstantOption = Annotated[
     str | None,
     typer.Option(
         metavar="TIME",
-        help='How long a picture lasts, such as "0.2 s", instead of the skin\'s; "0 s": each frame '
+        help='How long an image lasts, such as "0.2 s", instead of the skin\'s; "0 s": each frame '
         "by itself.",
     ),
 ]

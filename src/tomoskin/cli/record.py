@@ -100,12 +100,12 @@ def _wait(runner: Runner, seconds: float | None, frames: int | None) -> None:
     with Bar("recording") as bar:
         while (status := runner.status()).recording is not None:
             shares = [(elapsed, seconds), (status.frames, frames), *_played(status)]
-            known = [(part, whole) for part, whole in shares if whole is not None]
-            for part, whole in known:
-                if part >= whole:
+            limits = [(part, limit) for part, limit in shares if limit is not None]
+            for part, limit in limits:
+                if part >= limit:
                     return
-            for part, whole in known[:1]:
-                bar(part, whole)
+            for part, limit in limits[:1]:
+                bar(part, limit)
             nothing.wait(_OFTEN if seconds is None else min(_OFTEN, seconds - elapsed))
             elapsed += _OFTEN
 

@@ -101,10 +101,10 @@ def repair(
 
     target = _repaired(file, out)
     with Bar("repairing") as bar:
-        found = repair(file, target, skin=Skin.load(skin) if skin else None, advance=bar)
-    frames = found.messages.get("/frames", 0)
-    line = f"{target}: {found.chunks} chunks, {frames} frames recovered; {file} is untouched"
-    tell(asdict(found), [line, *_losses(found)], json=json)
+        repaired = repair(file, target, skin=Skin.load(skin) if skin else None, advance=bar)
+    frames = repaired.messages.get("/frames", 0)
+    line = f"{target}: {repaired.chunks} chunks, {frames} frames recovered; {file} is untouched"
+    tell(asdict(repaired), [line, *_losses(repaired)], json=json)
 
 
 @app.command()
@@ -133,10 +133,10 @@ def export(
 
     write = WRITERS[out.suffix.lower()]
     with SessionReader(file) as session, Bar(f"writing {out}") as bar:
-        asked = Export(session, every, bar, overwrite=force)
-        write(asked, out)
+        job = Export(session, every, bar, overwrite=force)
+        write(job, out)
         if touches is not None:
-            asked.touches(touches)
+            job.touches(touches)
         if session.torn:
             remark(f"{file}: {session.torn}")
     series = out.with_suffix(".pvd")  # names the files of a series
@@ -166,34 +166,34 @@ def import_recording(
     say_notes(recording)
 
 
-def _lines(found: SessionInfo) -> list[tuple[str, str]]:
+def _lines(info: SessionInfo) -> list[tuple[str, str]]:
     begun = ""
-    if found.begun is not None:
-        begun = f", begun {datetime.fromtimestamp(found.begun, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    if info.begun is not None:
+        begun = f", begun {datetime.fromtimestamp(info.begun, UTC):%Y-%m-%d %H:%M:%S} UTC"
     lines = [
-        ("file", f"{found.path}, {found.size / 1e6:.2f} MB"),
-        ("duration", f"{found.duration:.2f} s{begun}"),
-        ("skin", f"{found.skin}: {found.electrodes} electrodes, {found.rows} measurements"),
-        ("frames", f"{found.frames}, {found.rate:.1f} frames/s, longest pause "
-                   f"{1e3 * found.longest_pause:.0f} ms"),
-        ("missing", f"{found.lost} frames in {found.gaps} gaps, {found.dropped} dropped by the "
-                    f"board, {found.skipped} skipped, {found.held} held"),
-        ("touches", str(found.touches)),
+        ("file", f"{info.path}, {info.size / 1e6:.2f} MB"),
+        ("duration", f"{info.duration:.2f} s{begun}"),
+        ("skin", f"{info.skin}: {info.electrodes} electrodes, {info.rows} measurements"),
+        ("frames", f"{info.frames}, {info.rate:.1f} frames/s, longest pause "
+                   f"{1e3 * info.longest_pause:.0f} ms"),
+        ("missing", f"{info.lost} frames in {info.gaps} gaps, {info.dropped} dropped by the "
+                    f"board, {info.skipped} skipped, {info.held} held"),
+        ("touches", str(info.touches)),
     ]  # fmt: skip
-    if found.attached:
-        lines.append(("files inside", ", ".join(found.attached)))
-    if found.device:
-        board, firmware = found.device.get("unique_id"), found.device.get("firmware")
+    if info.attached:
+        lines.append(("files inside", ", ".join(info.attached)))
+    if info.device:
+        board, firmware = info.device.get("unique_id"), info.device.get("firmware")
         lines.append(("board", f"{board}, firmware {firmware}"))
-    if found.clock:
-        rate, residual = found.clock.tick_rate, 1e3 * found.clock.residual
-        nominal = found.device.get("tick_rate")
-        drift = f", {_drift(found.clock.drift(nominal))}" if nominal else ""
+    if info.clock:
+        rate, residual = info.clock.tick_rate, 1e3 * info.clock.residual
+        nominal = info.device.get("tick_rate")
+        drift = f", {_drift(info.clock.drift(nominal))}" if nominal else ""
         lines.append(
             ("clock", f"{rate:.1f} ticks/s by this host{drift}; frames come {residual:.3f} ms late")
         )
-    if found.events:
-        counted = ", ".join(f"{kind} {count}" for kind, count in sorted(found.events.items()))
+    if info.events:
+        counted = ", ".join(f"{kind} {count}" for kind, count in sorted(info.events.items()))
         lines.append(("events", counted))
     return lines
 
@@ -205,10 +205,10 @@ def _drift(part: float) -> str:
     return f"{1e6 * part:+.1f} ppm"
 
 
-def _losses(found: Repaired) -> list[str]:
-    if not found.lost:
-        return ["nothing is lost" if found.ended else "nothing is lost but the open chunk's end"]
-    return [_loss(lost) for lost in found.lost]
+def _losses(repaired: Repaired) -> list[str]:
+    if not repaired.lost:
+        return ["nothing is lost" if repaired.ended else "nothing is lost but the open chunk's end"]
+    return [_loss(lost) for lost in repaired.lost]
 
 
 def _loss(lost: Lost) -> str:

@@ -19,8 +19,8 @@ _LARGEST = 1_000_000
 def built_in_names() -> tuple[str, ...]:
     """Names of the built-in skins, sorted."""
     folder = files("tomoskin.skin") / "builtin"
-    found = [entry.name.removesuffix(".toml") for entry in folder.iterdir()]
-    return tuple(sorted(name for name in found if not name.startswith("_")))
+    names = [entry.name.removesuffix(".toml") for entry in folder.iterdir()]
+    return tuple(sorted(name for name in names if not name.startswith("_")))
 
 
 def skin_text(skin: str | PathLike[str]) -> tuple[str, str]:
@@ -39,13 +39,13 @@ def skin_text(skin: str | PathLike[str]) -> tuple[str, str]:
 
 
 def _missing(path: Path) -> SkinError:
-    known = built_in_names()
-    close = get_close_matches(str(path), known, n=1)
+    names = built_in_names()
+    close = get_close_matches(str(path), names, n=1)
     guess = f'did you mean "{close[0]}"? ' if close else ""
     return SkinError(
         "no such file, and no built-in skin of that name",
         where=str(path),
-        hint=f"{guess}built-in skins: {', '.join(known)}",
+        hint=f"{guess}built-in skins: {', '.join(names)}",
     )
 
 

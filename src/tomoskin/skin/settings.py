@@ -9,18 +9,18 @@ _ONE_STEP = "one-step"
 
 
 class MeshSettings(Section, section="mesh"):
-    """The triangles that the picture is made of."""
+    """The triangles that the image is made of."""
 
     cells: int = key(Whole(50, 100_000), "Wanted number, met within 10 %.", default=1500)
 
 
 class InverseSettings(Section, section="inverse"):
-    """How voltages become a picture."""
+    """How voltages become an image."""
 
     method: str = key(
         Choice((_ONE_STEP, "greit")),
-        "one-step: the most likely picture under a prior. greit: an operator trained to "
-        "show small targets as a stated response; truer places, not sharper.",
+        "one-step: the most likely image under a prior. greit: an operator trained to "
+        "show small targets as a stated response; truer positions, not sharper.",
         default=_ONE_STEP,
     )
     prior: str = key(
@@ -50,7 +50,7 @@ class InverseSettings(Section, section="inverse"):
     )
     noise_figure: float = key(
         Number(0.1, 100),
-        "How much noisier the picture may be than the voltages, signal for signal.",
+        "How much noisier the image may be than the voltages, signal for signal.",
         default=1.0,
         method="greit",
     )
@@ -59,7 +59,7 @@ class InverseSettings(Section, section="inverse"):
     )
     time_constant: float = key(
         Quantity("time", "s", 0, 3600),
-        "How long a picture lasts: each rests on the frames before it too, the more the "
+        "How long an image lasts: each rests on the frames before it too, the more the "
         "longer this is (Kalman filter). 0 s: on its own frame alone.",
         default="0 s",
         method=_ONE_STEP,
@@ -78,7 +78,7 @@ class SignalSettings(Section, section="signal"):
     common_modes: str = key(
         Choice(("projected", "kept")),
         "projected: a change of all voltages in proportion, as temperature makes it, and "
-        "directions of drift learnt while idle do not show in the picture. kept: they do.",
+        "directions of drift learnt while idle do not show in the image. kept: they do.",
         default="projected",
     )
 
@@ -88,7 +88,7 @@ class TouchSettings(Section, section="touch"):
 
     method: str = key(
         Choice(("image", "fit")),
-        "image: regions of the picture, by gamma1 to position. fit: place, size and "
+        "image: regions of the image, by gamma1 to position. fit: position, size and "
         "strength of up to five touches, fitted to the voltages; truer, with honest "
         "deviations.",
         default="image",

@@ -1,4 +1,4 @@
-"""What labelled frames are drawn from: numbers, places, sizes and forces of presses."""
+"""What labelled frames are drawn from: numbers, positions, sizes and forces of presses."""
 
 from __future__ import annotations
 
@@ -55,10 +55,10 @@ class Population(PressesSection):
             When there is no room for as many, so far from each other and the rim.
         """
         number = int(random.integers(self.count[0], self.count[1] + 1))
-        places = np.empty((0, 2))
+        positions = np.empty((0, 2))
         for _ in range(number):
-            places = np.vstack([places, self._place(outline, places, random)])
-        return tuple(self._probe(place, random) for place in places)
+            positions = np.vstack([positions, self._place(outline, positions, random)])
+        return tuple(self._probe(position, random) for position in positions)
 
     def _place(
         self, outline: Outline, others: FloatArray, random: np.random.Generator
@@ -66,9 +66,9 @@ class Population(PressesSection):
         corners = outline.polyline(outline.length / 64)
         low, high = corners.min(axis=0), corners.max(axis=0)
         for _ in range(_TRIES):
-            place = np.asarray(random.uniform(low, high))
-            if self._has_room(outline, place, others):
-                return place
+            position = np.asarray(random.uniform(low, high))
+            if self._has_room(outline, position, others):
+                return position
         raise ScriptError(
             f"found no place {1e3 * self.margin:g} mm from the rim and {1e3 * self.apart:g} mm "
             f"from {len(others)} other probes",
@@ -76,20 +76,20 @@ class Population(PressesSection):
             hint="ask for fewer, or let them be closer",
         )
 
-    def _has_room(self, outline: Outline, place: FloatArray, others: FloatArray) -> bool:
-        if len(others) and np.hypot(*(others - place).T).min() < self.apart:
+    def _has_room(self, outline: Outline, position: FloatArray, others: FloatArray) -> bool:
+        if len(others) and np.hypot(*(others - position).T).min() < self.apart:
             return False
-        if not outline.contains(place[None])[0]:
+        if not outline.contains(position[None])[0]:
             return False
-        rim = outline.point(outline.nearest(place[None]))[0]
-        return bool(np.hypot(*(rim - place)) >= self.margin)
+        rim = outline.point(outline.nearest(position[None]))[0]
+        return bool(np.hypot(*(rim - position)) >= self.margin)
 
-    def _probe(self, place: FloatArray, random: np.random.Generator) -> Probe:
+    def _probe(self, position: FloatArray, random: np.random.Generator) -> Probe:
         shape = self.shapes[random.integers(len(self.shapes))]
         size = _STEP * round(random.uniform(*self.size) / _STEP)
         force, angle = random.uniform(*self.force), random.uniform(0, 2 * np.pi)
         face = FACES[shape](max(size, _STEP))
-        return Probe(face, float(place[0]), float(place[1]), float(force), float(angle))
+        return Probe(face, float(position[0]), float(position[1]), float(force), float(angle))
 
 
 COMMON_PRESSES = Population(

@@ -78,7 +78,7 @@ class PressSection(Section, section="press", many=True):
     at: tuple[Any, ...] = key(_POINT, "Where its middle stands first.")
     path: Course | None = key(
         _course(x=_LENGTH, y=_LENGTH),
-        "Sliding: places of the middle at times since `start`, from `at` on in straight lines.",
+        "Sliding: positions of the middle at times since `start`, from `at` on in straight lines.",
         default=None,
     )
     motion: str = key(

@@ -26,7 +26,7 @@ NO_FRAME = "no frame would show it: make it longer, or [readout] settling of the
 """What to do about a stage that is shorter than a frame."""
 
 _ON_PATH = 200
-"""A path is looked at in so many places when it is checked to lie on the skin."""
+"""A path is looked at in so many positions when it is checked to lie on the skin."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class ScriptedMark:
 
 @dataclass(frozen=True)
 class ScriptedPress:
-    """A probe with the courses of its force and place.
+    """A probe with the courses of its force and position.
 
     Attributes
     ----------
@@ -96,11 +96,11 @@ class ScriptedPress:
         times = np.union1d(
             self._path[:, 0], np.linspace(0.0, self.path[-1][0], _ON_PATH if self.path[1:] else 1)
         )
-        places = np.array([along(self._path, time) for time in times])
-        inside = outline.contains(places)
+        positions = np.array([along(self._path, time) for time in times])
+        inside = outline.contains(positions)
         if not inside.all():
             first = int(np.argmin(inside))
-            x, y = 1e3 * places[first]
+            x, y = 1e3 * positions[first]
             corners = 1e3 * outline.polyline(outline.length / 64)
             (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
             raise ScriptError(
