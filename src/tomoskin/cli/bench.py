@@ -6,10 +6,8 @@ import ast
 import importlib
 import os
 import sys
-from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -69,10 +67,10 @@ def bench(
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-cores:])
     os.environ["RAYON_NUM_THREADS"] = str(cores)  # the native engine reads it at each call
     with threadpool_limits(cores):
-        place = into and _Place.of(into, name)
+        part = into and _load("markdown_part").Part.of(into, name)
         reports = benchmark.run(data)
-    if place:
-        place.write(reports)
+    if part:
+        part.write(reports)
     tell(reports, _lines(reports), json=json)
 
 
@@ -107,48 +105,5 @@ def _lines(reports: Sequence[Any]) -> Iterator[str | Table]:
             yield ""
         for note in report.notes:
             yield f"  {note}"
-    yield f"  {_machine(reports)}"
-
-
-def _machine(reports: Sequence[Any]) -> str:
-    return ", ".join(f"{key} {value}" for key, value in reports[-1].machine.items())
-
-
-@dataclass(frozen=True)
-class _Place:
-    """A part of a Markdown file, between ``<!-- bench NAME -->`` and ``<!-- end NAME -->``."""
-
-    file: Path
-    before: str
-    after: str
-
-    @classmethod
-    def of(cls, file: Path, name: str) -> Self:
-        """Find it, before anything is measured."""
-        begin, end = f"<!-- bench {name} -->\n", f"<!-- end {name} -->\n"
-        text = file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
-        if text.count(begin) != 1 or text.count(end) != 1:
-            raise DataError(
-                f"expected a Markdown file with one {begin.strip()} and, below it, {end.strip()}",
-                where=str(file),
-                hint="the tables are written between these two lines",
-            )
-        before, rest = text.split(begin)
-        return cls(file, before + begin, end + rest.split(end)[1])
-
-    def write(self, reports: Sequence[Any]) -> None:
-        """Put tables, their notes and the machine there."""
-        from tomoskin.core import write_text
-
-        parts = [f"\n{date.today():%-d %B %Y}; {_machine(reports)}.\n", *map(_markdown, reports)]
-        text = self.before + "\n".join(parts) + "\n" + self.after
-        write_text(self.file, text, overwrite=True)
-
-
-def _markdown(report: Any) -> str:
-    rule = ["---"] + ["---:"] * (len(report.columns) - 1)
-    rows = (report.columns, rule, *report.rows)
-    table = "\n".join(f"| {' | '.join(map(str, row))} |" for row in rows)
-    notes = "\n".join(f"- {note}" for note in report.notes)
-    title = report.title[:1].upper() + report.title[1:]
-    return f"### {title}\n\n{table}\n" + (f"\n{notes}\n" if notes else "")
+    machine = ", ".join(f"{key} {value}" for key, value in reports[-1].machine.items())
+    yield f"  {machine}"
