@@ -137,13 +137,13 @@ def _compared(
             rows.append(row | {"fault": variant.fault})
             continue
         try:
-            found = promise(variant.skin, demand, _COARSE, _part(bar, number, jobs))
+            bound = promise(variant.skin, demand, _COARSE, _part(bar, number, jobs))
         except TomoskinError as error:
             rows.append(row | {"fault": error.message})
             continue
         pattern = variant.skin.pattern()
         samples = Scan.of(pattern).n_samples
-        rows.append(row | {"rows": pattern.n_meas, "samples": samples} | found.figures())
+        rows.append(row | {"rows": pattern.n_meas, "samples": samples} | bound.figures())
     return rows
 
 

@@ -111,13 +111,12 @@ class Section:
 
     def __init_subclass__(cls, section: str = "", *, many: bool = False) -> None:
         """Make the record, and list its keys."""
-        if "__annotations__" in vars(cls):
-            dataclass(frozen=True, kw_only=True)(cls)
-            cls.meaning = " ".join(inspect.cleandoc(cls.__doc__ or "").split())
-            cls.keys = tuple(
-                replace(one.metadata["key"], name=one.name)
-                for one in fields(cls)  # type: ignore[arg-type]
-            )
+        dataclass(frozen=True, kw_only=True)(cls)
+        cls.meaning = " ".join(inspect.cleandoc(cls.__doc__ or "").split())
+        cls.keys = tuple(
+            replace(one.metadata["key"], name=one.name)
+            for one in fields(cls)  # type: ignore[arg-type]
+        )
         if section:
             cls.section, cls.heading = section, f"[[{section}]]" if many else f"[{section}]"
 

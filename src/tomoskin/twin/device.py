@@ -147,8 +147,8 @@ class TwinDevice:
         self._next_hello = now
 
     def _refuse(self, payload: bytes) -> None:
-        known = {message.type for message in SCHEMA.messages if message.to_device}
-        result = Result.BAD_LENGTH if payload[0] in known else Result.UNKNOWN_COMMAND
+        commands = {message.type for message in SCHEMA.messages if message.to_device}
+        result = Result.BAD_LENGTH if payload[0] in commands else Result.UNKNOWN_COMMAND
         self._say(Ack(payload[1], payload[0], result, 0))
 
     def _obey(self, command: Command, payload: bytes, now: float) -> None:

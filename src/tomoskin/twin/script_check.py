@@ -72,10 +72,10 @@ def check_settling(skin: Skin, preset: str) -> None:
     waits = ScanSettings.of(skin).settling
     least = -tau * math.log(_LEFT)
     if waits < least:
-        left = math.exp(-waits / tau)
+        rest = math.exp(-waits / tau)
         raise ScriptError(
             f"expected at least {1e6 * least:.0f} us, got {1e6 * waits:.0f} us: the {preset} "
-            f"board settles with a time constant of {1e6 * tau:.0f} us, and {100 * left:.0f} % of "
+            f"board settles with a time constant of {1e6 * tau:.0f} us, and {100 * rest:.0f} % of "
             "each sample would be the drive before",
             where=f"{skin.source}: [readout] settling",
             hint="make it longer, or choose another preset",

@@ -166,7 +166,7 @@ class TwinSkin:
     def renew(self, chance: np.random.SeedSequence | None = None) -> None:
         """Forget all presses, bends and their past: a sheet that nothing has touched.
 
-        Its spread stays. ``chance``, if given, is where its temperature begins anew.
+        Its spread stays. ``chance``, if given, is where its temperature begins again.
         """
         if chance is not None:
             self._random = np.random.default_rng(chance)

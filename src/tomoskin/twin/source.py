@@ -50,8 +50,8 @@ def read_settings(options: Mapping[str, str], skin: Skin, where: str) -> TwinSet
         raise SourceError(f'expected a seed of 0 or more, got "{seed}"', where=where)
     preset = options.get("preset", skin.twin.preset)
     if preset not in PRESETS:
-        known = ", ".join(PRESETS)
-        raise SourceError(f'expected a preset of {known}, got "{preset}"', where=where)
+        names = ", ".join(PRESETS)
+        raise SourceError(f'expected a preset of {names}, got "{preset}"', where=where)
     return TwinSettings.preset(preset, int(seed))
 
 
