@@ -20,8 +20,8 @@ from tomoskin.twin import (
     LineSettings,
     MaterialSettings,
 )
+from tomoskin.twin.presets import SOURCES
 from tomoskin.twin.script_schema import SECTIONS as SCRIPT_SECTIONS
-from tomoskin.twin.settings import SOURCES
 
 MARK = "<!-- from here on written by docs/doc_tables.py -->\n\n"
 FOLDER = Path(__file__).parent

@@ -14,7 +14,7 @@ from tomoskin.cli.progress import Bar
 from tomoskin.formats import read_recording
 from tomoskin.recording import SessionReader
 from tomoskin.skin import Skin
-from tomoskin.twin.labelled import SHARD_FRAMES
+from tomoskin.twin.shards import SHARD_FRAMES
 
 EXAMPLE, PRESSES_EXAMPLE = examples("simulate.md")
 

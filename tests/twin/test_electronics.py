@@ -21,7 +21,7 @@ from tomoskin.twin import (
     convert,
     sample_table,
 )
-from tomoskin.twin.settings import BOARD
+from tomoskin.twin.presets import BOARD
 from tomoskin.wire import Drive
 
 QUIET = ElectronicsSettings(noise=0.0)

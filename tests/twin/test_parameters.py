@@ -10,7 +10,7 @@ from tomoskin.twin import (
     LineSettings,
     MaterialSettings,
 )
-from tomoskin.twin.settings import SOURCES
+from tomoskin.twin.presets import SOURCES
 
 RECORDS = (ContactSettings, MaterialSettings, ElectronicsSettings, LineSettings, BendSettings)
 

@@ -23,8 +23,8 @@ from tomoskin.skin.kinds import (
     show,
 )
 from tomoskin.skin.lay import lay
+from tomoskin.skin.processing import InverseSettings, SignalSettings, TouchSettings, TwinChoice
 from tomoskin.skin.section import Key, Section, check_names, key, toml_tables
-from tomoskin.skin.settings import InverseSettings, SignalSettings, TouchSettings, TwinChoice
 from tomoskin.skin.skin import Skin
 
 __all__ = [

@@ -37,14 +37,14 @@ from tomoskin.skin.body import (
     ReadoutSettings,
     SurfaceSection,
 )
-from tomoskin.skin.section import Section
-from tomoskin.skin.settings import (
+from tomoskin.skin.processing import (
     InverseSettings,
     MeshSettings,
     SignalSettings,
     TouchSettings,
     TwinChoice,
 )
+from tomoskin.skin.section import Section
 
 FORMAT = 1
 """Version of the file that this code reads, the top-level key ``format``."""

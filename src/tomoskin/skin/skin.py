@@ -26,8 +26,8 @@ from tomoskin.skin.build import (
     located,
 )
 from tomoskin.skin.find import built_in_names, skin_text
+from tomoskin.skin.processing import InverseSettings, SignalSettings, TouchSettings, TwinChoice
 from tomoskin.skin.section import Document, check_names, toml_tables, toml_text
-from tomoskin.skin.settings import InverseSettings, SignalSettings, TouchSettings, TwinChoice
 
 
 @dataclass(frozen=True, eq=False)

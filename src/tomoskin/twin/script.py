@@ -10,6 +10,7 @@ from typing import Any, Self, TypeVar
 
 from tomoskin.core import GeometryError, ScriptError, SkinError
 from tomoskin.skin import Section, check_names, show, toml_tables
+from tomoskin.twin.course import Rows, ScriptedBend, ScriptedMark, ScriptedPress, ramp
 from tomoskin.twin.faults import ScriptedFault
 from tomoskin.twin.script_schema import (
     FORMAT,
@@ -23,7 +24,6 @@ from tomoskin.twin.script_schema import (
     StretchSection,
 )
 from tomoskin.twin.shape import Circle, Face, Finger, Shape, Square
-from tomoskin.twin.timeline import Rows, ScriptedBend, ScriptedMark, ScriptedPress, ramp
 
 _DEFAULT_SOURCE = "script"
 

@@ -12,9 +12,9 @@ from tomoskin.pattern import Scan
 from tomoskin.skin import Skin
 from tomoskin.source import Configuration, ScanSettings
 from tomoskin.twin.bend import strain_of
+from tomoskin.twin.course import NO_FRAME, ScriptedPress, check_stages
+from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.script import Script
-from tomoskin.twin.settings import TwinSettings
-from tomoskin.twin.timeline import NO_FRAME, ScriptedPress, check_stages
 
 _LEFT = 0.01
 """Part of a step that may be left when the first sample is read: as much as the sheet's own

@@ -17,7 +17,7 @@ from tomoskin.skin import (
     Words,
     key,
 )
-from tomoskin.twin.settings import PRESETS
+from tomoskin.twin.presets import PRESETS
 
 FORMAT = 1
 """Version of the file that this code reads, the top-level key ``format``."""

@@ -16,8 +16,8 @@ from tomoskin.twin import material
 from tomoskin.twin.bend import Pose, depth_of, strain_of
 from tomoskin.twin.dent import Load, indent
 from tomoskin.twin.material import MaterialState
+from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import Contact, check_on_skin, probes_of
-from tomoskin.twin.settings import TwinSettings
 
 _MESH_SEED = 7919
 """Seed of the twin's mesh; the reconstruction's is another, so no mesh is ever shared."""

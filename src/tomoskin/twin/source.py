@@ -9,9 +9,9 @@ from tomoskin.core import SourceError
 from tomoskin.source import read_options
 from tomoskin.twin.board import Board
 from tomoskin.twin.device import TwinDevice
+from tomoskin.twin.electronics import TwinElectronics
 from tomoskin.twin.line import Line
-from tomoskin.twin.readout import TwinElectronics
-from tomoskin.twin.settings import PRESETS, TwinSettings
+from tomoskin.twin.presets import PRESETS, TwinSettings
 from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.transport import Clock, TwinTransport, WallClock
 

@@ -10,10 +10,10 @@ from typing import Protocol
 from tomoskin.core import SourceError
 from tomoskin.twin.bend import Pose
 from tomoskin.twin.device import TwinDevice
+from tomoskin.twin.electronics import TwinElectronics
 from tomoskin.twin.faults import Faults
 from tomoskin.twin.line import Line, LineSettings
 from tomoskin.twin.probe import Contact
-from tomoskin.twin.readout import TwinElectronics
 from tomoskin.twin.sheet import TwinSkin
 
 
