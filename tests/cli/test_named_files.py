@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 import typer
 
+from doc_tables import examples
 from recording.runs import write_all
 from shapes import disc
 from tomoskin.cli import image as image_module
-from tomoskin.cli.app import COMMANDS
-from tomoskin.cli.contents import Commands
-from tomoskin.cli.image_files import WRITERS as IMAGE_WRITERS
+from tomoskin.cli.app import COMMANDS, Commands
+from tomoskin.cli.image import WRITERS as IMAGE_WRITERS
 from tomoskin.cli.named_files import RECORDING, ForceFlag, Otherwise, Reads, Writes
 from tomoskin.cli.session import EXPORTS
 from tomoskin.core import RECORDING as SESSION_ENDINGS
@@ -29,7 +29,6 @@ from tomoskin.core.outputs import MAGIC
 from tomoskin.formats import WRITERS as EXPORT_WRITERS
 from tomoskin.forward import ForwardModel
 from tomoskin.skin import Skin
-from tomoskin.twin.script_page import PRESSES_EXAMPLE
 
 Run = Callable[..., tuple[int, str, str]]
 COARSE = Skin.load("textile-disc-8").altered({"mesh": {"cells": 300}})
@@ -125,7 +124,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     files = {name: folder / f"{name}{ending}" for name, ending in NAMES.items()}
     files["skin"].write_text(COARSE.to_toml())
     write_all(files["session"])
-    files["population"].write_text(PRESSES_EXAMPLE)
+    files["population"].write_text(examples("simulate.md")[1])
     np.savez(files["presses"], **presses())
     np.savez(files["bends"], **bends())
     flat = np.pad(1e3 * disc(cells=300).points, ((0, 0), (0, 1)))

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 import tomoskin.cli.simulate as tomoskin_simulate
+from doc_tables import examples
 from tomoskin.cli.progress import Bar
 from tomoskin.formats import read_recording
 from tomoskin.recording import SessionReader
 from tomoskin.skin import Skin
-from tomoskin.twin.labelled import SHARD_FRAMES
-from tomoskin.twin.script_page import EXAMPLE, PRESSES_EXAMPLE
+from tomoskin.twin.shards import SHARD_FRAMES
+
+EXAMPLE, PRESSES_EXAMPLE = examples("simulate.md")
 
 SCRIPT = """format = 1
 [script]
@@ -155,13 +157,9 @@ def test_wrong_usage(tomoskin, script, tmp_path):
     assert tomoskin("simulate", "--script", tmp_path / "none.toml", *out)[0] == 1
 
 
-def test_the_page_and_its_examples(tomoskin, script, tmp_path):
-    from pathlib import Path
+def test_the_examples_of_the_page(tomoskin, script, tmp_path):
+    from tomoskin.twin import Population
 
-    from tomoskin.twin import Population, script_page
-
-    page = Path(__file__).resolve().parents[2] / "docs" / "simulate.md"
-    assert page.read_text(encoding="utf-8") == script_page()
     Population.from_toml(PRESSES_EXAMPLE)
     script.write_text(EXAMPLE, encoding="utf-8")
     assert tomoskin("simulate", "--script", script, "--out", tmp_path / "x.mcap")[0] == 0

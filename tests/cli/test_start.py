@@ -11,7 +11,7 @@ import pytest
 from tomoskin.cli.app import COMMANDS
 
 HEAVY = ("numpy", "scipy", "rich", "msgspec", "starlette", "tomoskin.forward")
-LIGHT = {"app", "contents", "named_files"}
+LIGHT = {"app", "named_files"}
 """Modules of the command line that are there before a command is known."""
 
 MOST_MODULES = 60

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tomoskin.twin.labelled
+import tomoskin.twin.shards
 from tomoskin.core import ScriptError, SourceError
 from tomoskin.run import (
     in_processes,
@@ -25,7 +25,9 @@ from tomoskin.skin import Skin
 from tomoskin.twin import COMMON_PRESSES, Population, SetPlan
 
 SKIN = Skin.load("textile-disc-8").altered({"mesh": {"cells": 300}}).to_toml()
-CROWD = Population.of({"count": 8, "size": "10 mm", "force": "1 N", "apart": "100 mm"}, "[presses]")
+CROWD = Population.read(
+    {"count": 8, "size": "10 mm", "force": "1 N", "apart": "100 mm"}, "[presses]"
+)
 
 
 def quiet(done: int, total: int) -> None:
@@ -35,7 +37,7 @@ def quiet(done: int, total: int) -> None:
 @pytest.fixture
 def plan(monkeypatch: pytest.MonkeyPatch) -> SetPlan:
     """Seven frames in three shards."""
-    monkeypatch.setattr(tomoskin.twin.labelled, "SHARD_FRAMES", 3)
+    monkeypatch.setattr(tomoskin.twin.shards, "SHARD_FRAMES", 3)
     return SetPlan(SKIN, COMMON_PRESSES, "textile", 1, 7)
 
 

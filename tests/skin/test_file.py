@@ -213,7 +213,7 @@ ADDED = {
     "row of three": (
         "drive = [[1, 0, 2]]\nmeasure = [[2, 3]]",
         "[drive] drive",
-        "row 0: expected a pair [source, sink], got [1, 0, 2]",
+        "row 0: expected a pair [source, sink], each a whole number from 0 to 31, got [1, 0, 2]",
     ),
     "row of text": (
         'drive = [["E1", 0]]\nmeasure = [[2, 3]]',

@@ -1,19 +1,14 @@
-"""Writing a skin, changing it, its identity, and the page that documents the file."""
+"""Writing a skin, changing it, and its identity."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from doc_tables import examples
 from tomoskin.core import SkinError
-from tomoskin.skin import Skin, skin_file_page
-from tomoskin.skin.page import EXAMPLE
-from tomoskin.skin.schema import SECTIONS
-
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "skin-file.md"
+from tomoskin.skin import Skin
 
 
 @pytest.mark.parametrize("name", Skin.names())
@@ -68,25 +63,15 @@ def test_altered_values_are_checked() -> None:
         skin.altered({"meshes": {}})
 
 
-def test_page_is_what_the_schema_says() -> None:
-    """To write it: ``Path("docs/skin-file.md").write_text(skin_file_page())``."""
-    assert PAGE.read_text(encoding="utf-8") == skin_file_page()
-
-
-def test_page_lists_every_key_with_its_range() -> None:
-    page = skin_file_page()
-    for section in SECTIONS:
-        assert f"## [{section.name}]" in page
-        for key in section.keys:
-            assert f"| `{key.name}` | {key.kind.expected} |" in page
+def test_a_section_of_the_sheet_is_read_only_when_it_changes() -> None:
+    skin = Skin.load("textile-disc-8")
+    tuned = skin.altered({"inverse": {"alpha": 0.1}, "touch": {"gamma1": 0.7}})
+    assert (tuned.inverse.alpha, tuned.touch.gamma1) == (0.1, 0.7)
+    assert tuned.outline is skin.outline
+    assert tuned.pattern() is skin.pattern()
+    assert tuned.signal is skin.signal
+    assert skin.altered({"electrodes": {"width": "9 mm"}}).arcs != skin.arcs
 
 
 def test_example_of_the_page_is_a_skin() -> None:
-    assert Skin.from_toml(EXAMPLE).n_electrodes == 8
-
-
-def test_defaults_are_allowed_values() -> None:
-    for section in SECTIONS:
-        for key in section.keys:
-            if key.default is not None:
-                key.kind.read(key.default)
+    assert Skin.from_toml(examples("skin-file.md")[0]).n_electrodes == 8

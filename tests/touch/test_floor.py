@@ -31,7 +31,7 @@ class Chain:
         return self.floor_of(self.noise)
 
     def segmenter(self, snr: float, sign: str = "decrease") -> Segmenter:
-        settings = TouchSettings(0.65, 0.9, 0.005, sign, snr, "centroid", 8)
+        settings = TouchSettings(sign=sign, snr=snr)
         return Segmenter(self.operator.model.mesh, settings)
 
     def begun(self, segmenter: Segmenter, image: Image) -> list[Reading]:

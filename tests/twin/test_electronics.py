@@ -21,11 +21,11 @@ from tomoskin.twin import (
     convert,
     sample_table,
 )
-from tomoskin.twin.settings import BOARD
+from tomoskin.twin.presets import BOARD
 from tomoskin.wire import Drive
 
 QUIET = ElectronicsSettings(noise=0.0)
-FINE = ReadoutSettings(16, 5.0, 40.0, 0.5, 1, 2e-3, 250e3)
+FINE = ReadoutSettings(adc_bits=16, offset=0.5, oversampling=1)
 CLOCK = ScanClock(dead_time=2e-6, settling=2e-3, conversion=52e-6)
 
 

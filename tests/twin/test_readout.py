@@ -12,7 +12,7 @@ from tomoskin.skin import ReadoutSettings
 from tomoskin.twin import ElectronicsSettings, TwinElectronics, convert, sample_table
 from tomoskin.wire import Drive
 
-SETTINGS = ReadoutSettings(10, 5.0, 40.0, 0.5, 16, 2e-3, 250e3)
+SETTINGS = ReadoutSettings(offset=0.5)
 LSB = 5.0 / 1024
 
 

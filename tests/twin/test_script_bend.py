@@ -62,7 +62,11 @@ def test_joints_stretches_and_profiles():
             'start = "0 s"\nhold = "1 s"\n',
             "folds",
         ),
-        ('[[bend]]\nkind = "joint"\nlength = "10 mm"\nangle = "9 deg"\nstart = "0 s"\n', "radius"),
+        (
+            '[[bend]]\nkind = "joint"\nlength = "10 mm"\nangle = "9 deg"\nstart = "0 s"\n'
+            'hold = "1 s"\n',
+            "radius",
+        ),
     ],
 )
 def test_bends_that_cannot_be_are_refused_with_their_place(text, message):

@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.named_files import FIGURE, ForceFlag, Reads, Writes
-from tomoskin.cli.output import JsonFlag, emit
-from tomoskin.cli.recording import FramesOption, ReferenceOption, frame_range, idle_frames
+from tomoskin.cli.options import FramesOption, ReferenceOption, SkinArgument
+from tomoskin.cli.output import JsonFlag, tell
+from tomoskin.cli.recording import frame_range, idle_frames
 from tomoskin.core import TomoskinError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tomoskin.inverse import AlphaChoice, Evidence, Spectrum
     from tomoskin.pipeline import Prepared
 
@@ -21,7 +24,7 @@ Outcome = tuple[str, "AlphaChoice | TomoskinError"]
 
 
 def alpha(
-    skin: Annotated[str, typer.Argument(metavar="SKIN", help="Built-in name or path.")],
+    skin: SkinArgument,
     recording: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Frames that the rules may look at."),
@@ -39,7 +42,8 @@ def alpha(
     json: JsonFlag = False,
 ) -> None:
     """Show what each rule chooses for alpha; with a recording, by its noise, frames and labels."""
-    from tomoskin.inverse import RULES, Spectrum
+    from tomoskin.formats import write_choices
+    from tomoskin.inverse import RULES, AlphaChoice, Spectrum, picard
     from tomoskin.pipeline import prepare
     from tomoskin.skin import Skin
 
@@ -50,14 +54,26 @@ def alpha(
     if rule and isinstance(outcomes[0][1], TomoskinError):
         raise outcomes[0][1]
     if out is not None:
-        _draw(out, prepared, spectrum, outcomes, evidence, overwrite=force)
-    _report(prepared, spectrum, outcomes, json=json)
+        predicted = None
+        if evidence.frames is not None:
+            predicted = picard(spectrum, evidence.frames, evidence.noise)
+        choices = [choice for _, choice in outcomes if isinstance(choice, AlphaChoice)]
+        title = f"alpha of {prepared.skin.name}"
+        write_choices(out, title, choices, predicted, overwrite=force)
+    document = {
+        "skin": prepared.skin.name,
+        "alpha": prepared.choice.alpha,
+        "rule": prepared.choice.rule,
+        "condition": spectrum.condition,
+        "rules": {name: _row(choice) for name, choice in outcomes},
+    }
+    tell(document, _lines(prepared, spectrum, outcomes), json=json)
 
 
 def _evidence(
     prepared: Prepared, recording: Path | None, reference: str | None, frames: str | None
 ) -> tuple[Prepared, Evidence]:
-    """What the recording tells, and the skin without the rows that are dead in it.
+    """What the recording says, and the skin without the rows that are dead in it.
 
     Without a recording: the noise that the read-out predicts.
     """
@@ -67,9 +83,9 @@ def _evidence(
 
     if recording is None:
         return prepared, Evidence(noise=prepared.predicted_noise())
-    whole = read_recording(recording).in_order_of(prepared.pattern)
-    idle = idle_frames(whole, reference, prepared.pattern)
-    changes = recorded_frames(prepared, whole.part(*frame_range(whole, frames)), idle)
+    recorded = read_recording(recording).in_order_of(prepared.pattern)
+    idle = idle_frames(recorded, reference, prepared.pattern)
+    changes = recorded_frames(prepared, recorded.part(*frame_range(recorded, frames)), idle)
     return changes.prepared, changes.evidence()
 
 
@@ -82,51 +98,18 @@ def _outcome(spectrum: Spectrum, rule: str, evidence: Evidence) -> AlphaChoice |
         return error
 
 
-def _draw(
-    out: Path,
-    prepared: Prepared,
-    spectrum: Spectrum,
-    outcomes: list[Outcome],
-    evidence: Evidence,
-    *,
-    overwrite: bool,
-) -> None:
-    from tomoskin.formats import write_choices
-    from tomoskin.inverse import AlphaChoice, picard
-
-    choices = [found for _, found in outcomes if isinstance(found, AlphaChoice)]
-    told = None
-    if evidence.frames is not None:
-        told = picard(spectrum, evidence.frames, evidence.noise)
-    title = f"alpha of {prepared.skin.name}"
-    write_choices(out, title, choices, told, overwrite=overwrite)
+def _lines(prepared: Prepared, spectrum: Spectrum, outcomes: list[Outcome]) -> Iterator[str]:
+    in_use, values = prepared.choice, spectrum.singular_values
+    yield f"{prepared.skin.name}: alpha {in_use.alpha:.4g} by {in_use.rule}, {in_use.reason}"
+    yield f"{len(values)} singular values from {values[0]:.3g}, condition {spectrum.condition:.3g}"
+    for name, choice in outcomes:
+        if isinstance(choice, TomoskinError):
+            yield f"{name:<13} {'-':>9}  {choice.message}"
+        else:
+            yield f"{name:<13} {choice.alpha:>9.4g}  {choice.reason}"
 
 
-def _report(prepared: Prepared, spectrum: Spectrum, outcomes: list[Outcome], *, json: bool) -> None:
-    if json:
-        emit(
-            {
-                "skin": prepared.skin.name,
-                "alpha": prepared.choice.alpha,
-                "rule": prepared.choice.rule,
-                "condition": spectrum.condition,
-                "rules": {name: _row(found) for name, found in outcomes},
-            }
-        )
-        return
-    in_use = prepared.choice
-    typer.echo(f"{prepared.skin.name}: alpha {in_use.alpha:.4g} by {in_use.rule}, {in_use.reason}")
-    typer.echo(
-        f"{len(spectrum.singular_values)} singular values from {spectrum.singular_values[0]:.3g}, "
-        f"condition {spectrum.condition:.3g}"
-    )
-    for name, found in outcomes:
-        value = "-" if isinstance(found, TomoskinError) else f"{found.alpha:.4g}"
-        said = found.message if isinstance(found, TomoskinError) else found.reason
-        typer.echo(f"{name:<13} {value:>9}  {said}")
-
-
-def _row(found: AlphaChoice | TomoskinError) -> dict[str, Any]:
-    if isinstance(found, TomoskinError):
-        return {"alpha": None, "reason": str(found)}
-    return {"alpha": found.alpha, "reason": found.reason}
+def _row(choice: AlphaChoice | TomoskinError) -> dict[str, Any]:
+    if isinstance(choice, TomoskinError):
+        return {"alpha": None, "reason": str(choice)}
+    return {"alpha": choice.alpha, "reason": choice.reason}

@@ -1,20 +1,24 @@
-"""The commands, and what becomes of an error: one sentence and an exit code.
+"""The commands: a list in whole sentences, of which the one that runs is loaded; and what becomes
+of an error: one sentence and an exit code.
 
-To add a command: a module of its name with a function of its name (or a Typer of sub-commands,
-``app``) that imports heavy rooms inside, and one line in the list below.
+To add a command: a module of its name with a function of its name (or sub-commands, ``app``, made
+by :func:`group`) that imports heavy rooms inside, and its sentence in the list below.
 """
 
 from __future__ import annotations
 
+import inspect
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated, NoReturn
+from importlib import import_module
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
 from tomoskin import __version__
-from tomoskin.cli.contents import later
+from tomoskin.cli.named_files import guarded
 from tomoskin.core import OutputError, TomoskinError
 
 DEBUG = "TOMOSKIN_DEBUG"
@@ -25,8 +29,8 @@ COMMANDS = {
     "record": "Record a session without a page: raw bytes, frames, touches and images.",
     "image": "Reconstruct a recording: images, and the touches in them.",
     "calibrate": "Learn from labelled presses, states or bends.",
-    "locate": "Locate touches by a calibration.",
-    "states": "Tell the state of each frame by a calibration.",
+    "locate": "Locate touches by a calibration: one a frame, or with --several up to two.",
+    "states": "Tell the state of each frame by a calibration, or that it is none of those learnt.",
     "design": "Say what a skin can resolve before it is built.",
     "simulate": "Run a script on the twin into a session file, or draw labelled frames.",
     "bench": "Measure speed on this machine.",
@@ -35,7 +39,76 @@ COMMANDS = {
     "firmware": "Build, flash and emulate the board's firmware.",
     "doctor": "Look at this installation: versions, page, sources, sinks, skins, ports.",
 }
-"""What each command does; :func:`tomoskin.cli.contents.later` says where it is."""
+"""What each command does: a function NAME of the module ``tomoskin.cli.NAME``, or its ``app``."""
+
+
+class Commands(typer.Typer):
+    """Commands whose outputs are looked at before they run."""
+
+    def command(self, name: str | None = None, **options: Any) -> Any:
+        """Add a command, as a decorator that leaves the function as it is."""
+        register = super().command(name, **options)
+
+        def add(function: Any) -> Any:
+            register(guarded(function))
+            return function
+
+        return add
+
+
+class Contents(TyperGroup):
+    """Commands with whole sentences: too long ones go on in the next line."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write names and sentences."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, self.sentence(ctx, name)) for name in self.commands])
+
+    def sentence(self, ctx: Any, name: str) -> str:
+        """What the command does: the first paragraph of its help."""
+        command = self.get_command(ctx, name)
+        first = ((command and command.help) or "").partition("\n\n")[0]
+        return " ".join(first.split())
+
+
+class Later(Contents):
+    """The commands of :data:`COMMANDS`, each loaded when it runs."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        names: dict[str, Any] = dict.fromkeys(COMMANDS)
+        self.commands = names
+
+    def sentence(self, ctx: Any, name: str) -> str:  # noqa: ARG002
+        """What the command does, without loading it."""
+        return COMMANDS[name]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
+        """The command, or None where there is none of that name."""
+        return _loaded(cmd_name) if cmd_name in COMMANDS else None
+
+
+def _loaded(name: str) -> Any:
+    module = import_module(f"tomoskin.cli.{name}")
+    if (group := getattr(module, "app", None)) is not None:
+        return typer.main.get_command(group)
+    function = getattr(module, name)
+    _, _, more = (function.__doc__ or "").partition("\n\n")
+    single = Commands(add_completion=False, rich_markup_mode=None)
+    single.command(name, help=f"{COMMANDS[name]}\n\n{inspect.cleandoc(more)}")(function)
+    return typer.main.get_command(single)
+
+
+def group(name: str) -> typer.Typer:
+    """Make the command ``name`` of sub-commands."""
+    return Commands(
+        help=COMMANDS[name],
+        no_args_is_help=True,
+        add_completion=False,
+        rich_markup_mode=None,
+        cls=Contents,
+    )
+
 
 app = typer.Typer(
     help="Touch for soft robots by electrical impedance tomography.",
@@ -44,12 +117,12 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # rich alone takes longer to load than all the rest
     context_settings={"help_option_names": ["-h", "--help"]},
-    cls=later(COMMANDS),
+    cls=Later,
 )
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(show: bool) -> None:
+    if show:
         typer.echo(f"tomoskin {__version__}")
         raise typer.Exit
 

@@ -6,21 +6,20 @@ import ast
 import importlib
 import os
 import sys
-from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.bench_table import tables
 from tomoskin.cli.named_files import Otherwise, Reads
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, tables, tell
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from types import ModuleType
+
+    from rich.table import Table
 
 _FOLDER = Path(__file__).parents[3] / "benchmarks"
 
@@ -46,33 +45,33 @@ def bench(
     list_: Annotated[bool, typer.Option("--list", help="List them, and measure nothing.")] = False,
     json: JsonFlag = False,
 ) -> None:
-    """Measure speed on this machine: of all in one table, or of one part.
+    """Run one benchmark and show its tables.
 
-    Two to three minutes for all; others take seconds to an hour.
+    Of all in one table, or of one part. Two to three minutes for all; others take seconds to an
+    hour.
     """
     from threadpoolctl import threadpool_limits
 
-    known = _benchmarks()
+    benchmarks = _benchmarks()
     if list_:
-        for key, summary in known.items():
+        for key, summary in benchmarks.items():
             typer.echo(f"{key:<14} {summary}")
         return
-    if name not in known:
-        raise typer.BadParameter(f'expected {", ".join(known)}, got "{name}"', param_hint="NAME")
+    if name not in benchmarks:
+        raise typer.BadParameter(
+            f'expected {", ".join(benchmarks)}, got "{name}"', param_hint="NAME"
+        )
     benchmark = _load(name)
     usual: int = getattr(benchmark, "CORES", 1)
     cores = cores or usual
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-cores:])
     os.environ["RAYON_NUM_THREADS"] = str(cores)  # the native engine reads it at each call
     with threadpool_limits(cores):
-        place = into and _Place.of(into, name)
+        part = into and _load("markdown_part").Part.of(into, name)
         reports = benchmark.run(data)
-    if place:
-        place.write(reports)
-    if json:
-        emit(reports)
-    else:
-        _show(reports)
+    if part:
+        part.write(reports)
+    tell(reports, _lines(reports), json=json)
 
 
 def _benchmarks() -> dict[str, str]:
@@ -83,12 +82,12 @@ def _benchmarks() -> dict[str, str]:
             where="tomoskin bench",
             hint="run it from a checkout of the source",
         )
-    found = {}
+    summaries = {}
     for path in sorted(_FOLDER.glob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         if any(isinstance(node, ast.FunctionDef) and node.name == "run" for node in tree.body):
-            found[path.stem] = (ast.get_docstring(tree) or "").partition("\n")[0]
-    return found
+            summaries[path.stem] = (ast.get_docstring(tree) or "").partition("\n")[0]
+    return summaries
 
 
 def _load(name: str) -> ModuleType:
@@ -99,56 +98,12 @@ def _load(name: str) -> ModuleType:
         sys.path.remove(str(_FOLDER))
 
 
-def _show(reports: Sequence[Any]) -> None:
-    from rich.console import Console
-
-    console = Console()
+def _lines(reports: Sequence[Any]) -> Iterator[str | Table]:
     for report in reports:
-        for table in tables(report.title, report.columns, report.rows, console.width):
-            console.print(table, crop=False)
-            console.print()
+        for table in tables(report.title, report.columns, report.rows):
+            yield table
+            yield ""
         for note in report.notes:
-            console.print(f"  {note}", highlight=False)
-    known = ", ".join(f"{k} {v}" for k, v in reports[-1].machine.items())
-    console.print(f"  {known}", highlight=False)
-
-
-@dataclass(frozen=True)
-class _Place:
-    """A part of a Markdown file, between ``<!-- bench NAME -->`` and ``<!-- end NAME -->``."""
-
-    file: Path
-    before: str
-    after: str
-
-    @classmethod
-    def of(cls, file: Path, name: str) -> Self:
-        """Find it, before anything is measured."""
-        begin, end = f"<!-- bench {name} -->\n", f"<!-- end {name} -->\n"
-        text = file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
-        if text.count(begin) != 1 or text.count(end) != 1:
-            raise DataError(
-                f"expected a Markdown file with one {begin.strip()} and, below it, {end.strip()}",
-                where=str(file),
-                hint="the tables are written between these two lines",
-            )
-        before, rest = text.split(begin)
-        return cls(file, before + begin, end + rest.split(end)[1])
-
-    def write(self, reports: Sequence[Any]) -> None:
-        """Put tables, their notes and the machine there."""
-        from tomoskin.core import write_text
-
-        machine = ", ".join(f"{key} {value}" for key, value in reports[-1].machine.items())
-        parts = [f"\n{date.today():%-d %B %Y}; {machine}.\n", *map(_markdown, reports)]
-        text = self.before + "\n".join(parts) + "\n" + self.after
-        write_text(self.file, text, overwrite=True)
-
-
-def _markdown(report: Any) -> str:
-    rule = ["---"] + ["---:"] * (len(report.columns) - 1)
-    rows = (report.columns, rule, *report.rows)
-    table = "\n".join(f"| {' | '.join(map(str, row))} |" for row in rows)
-    notes = "\n".join(f"- {note}" for note in report.notes)
-    title = report.title[:1].upper() + report.title[1:]
-    return f"### {title}\n\n{table}\n" + (f"\n{notes}\n" if notes else "")
+            yield f"  {note}"
+    machine = ", ".join(f"{key} {value}" for key, value in reports[-1].machine.items())
+    yield f"  {machine}"

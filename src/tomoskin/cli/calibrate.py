@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tomoskin.cli.app import group
 from tomoskin.cli.calibrate_bend import calibrate_bend
 from tomoskin.cli.calibrate_states import calibrate_states
 from tomoskin.cli.calibrate_wiring import calibrate_wiring
-from tomoskin.cli.contents import group
-from tomoskin.cli.named_files import CALIBRATION, ForceFlag, Reads, Writes
+from tomoskin.cli.named_files import ForceFlag, Reads
+from tomoskin.cli.options import CalibrationOut, KnownSkinOption, LabelledArgument, ReferenceOption
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
-from tomoskin.cli.recording import ReferenceOption, say_notes
+from tomoskin.cli.recording import changes, labelled_frames, labels, say_notes
 
 if TYPE_CHECKING:
     from tomoskin.calibration import Calibration, Locator
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
     Learn = Callable[[FloatArray, FloatArray], Calibration[Locator]]
 
-app = group("Learn from labelled presses or states.")
+app = group("calibrate")
 
 _SHOWN = 10
 _DRIFTED = 2.0
@@ -39,18 +40,9 @@ app.command("wiring")(calibrate_wiring)
 
 @app.command("touch")
 def touch(
-    recording: Annotated[
-        Path, typer.Argument(metavar="INPUT", help="Frames with labels: one touch each."), Reads()
-    ],
-    out: Annotated[
-        Path,
-        typer.Option(metavar="C.npz", help="Where the calibration goes."),
-        Writes(CALIBRATION),
-    ],
-    skin: Annotated[
-        str | None,
-        typer.Option(help="Built-in name or path; without it the rows are taken as they are."),
-    ] = None,
+    recording: LabelledArgument,
+    out: CalibrationOut,
+    skin: KnownSkinOption = None,
     onto: Annotated[
         Path | None,
         typer.Option(
@@ -64,7 +56,6 @@ def touch(
     json: JsonFlag = False,
 ) -> None:
     """Learn where a touch is from presses at known places."""
-    from tomoskin.cli.labelled import changes, labelled_frames, labels
     from tomoskin.formats import read_recording
 
     whole = read_recording(recording)
@@ -99,7 +90,7 @@ def _anew(skin: Skin | None, pattern: Pattern) -> tuple[Learn, Pattern]:
 def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern]:
     """What learns from these presses and those of an older calibration of the same skin."""
     from tomoskin.calibration import TOUCH
-    from tomoskin.cli.skin_choice import known_skin
+    from tomoskin.cli.choices import known_skin
 
     old = TOUCH.read(path)
     if (skin := known_skin(name, recording)) is not None:
@@ -114,7 +105,7 @@ def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern
 
 def _what_of(name: str | None, path: Path, whole: Recording) -> tuple[Skin | None, Pattern]:
     """The skin, where there is one, and the table of rows."""
-    from tomoskin.cli.skin_choice import known_skin
+    from tomoskin.cli.choices import known_skin
     from tomoskin.pattern import Pattern
 
     skin = known_skin(name, path)

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.named_files import CALIBRATION, ForceFlag, Reads, Writes
+from tomoskin.cli.named_files import ForceFlag, Reads
+from tomoskin.cli.options import CalibrationOut, ReferenceOption
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
-from tomoskin.cli.recording import ReferenceOption, idle_frames, say_notes
+from tomoskin.cli.recording import idle_frames, say_notes
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
@@ -27,11 +28,7 @@ def calibrate_bend(
         typer.Argument(metavar="INPUT", help="Frames of known bends, nothing touching."),
         Reads(),
     ],
-    out: Annotated[
-        Path,
-        typer.Option(metavar="C.npz", help="Where the calibration goes."),
-        Writes(CALIBRATION),
-    ],
+    out: CalibrationOut,
     skin: Annotated[
         str | None, typer.Option(help="Built-in name or path; without it that of the session.")
     ] = None,
@@ -52,7 +49,7 @@ def calibrate_bend(
     import numpy as np
 
     from tomoskin.calibration import BENDS, BendExamples, BendModel
-    from tomoskin.cli.skin_choice import skin_for_file
+    from tomoskin.cli.choices import skin_for_file
     from tomoskin.formats import read_recording
     from tomoskin.pipeline import prepare, voltage_covariance
     from tomoskin.signal import Reference

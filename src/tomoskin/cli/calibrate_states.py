@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.named_files import CALIBRATION, ForceFlag, Reads, Writes
+from tomoskin.cli.named_files import ForceFlag, Reads
+from tomoskin.cli.options import CalibrationOut, KnownSkinOption, ReferenceOption
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
-from tomoskin.cli.recording import ReferenceOption, say_notes
+from tomoskin.cli.recording import changes, say_notes
 
 if TYPE_CHECKING:
     from tomoskin.calibration import Calibration, Examples, FrameClassifier
@@ -26,15 +27,8 @@ def calibrate_states(
         typer.Argument(metavar="INPUT", help="Frames, with the state of some of them."),
         Reads(),
     ],
-    out: Annotated[
-        Path,
-        typer.Option(metavar="C.npz", help="Where the calibration goes."),
-        Writes(CALIBRATION),
-    ],
-    skin: Annotated[
-        str | None,
-        typer.Option(help="Built-in name or path; without it the rows are taken as they are."),
-    ] = None,
+    out: CalibrationOut,
+    skin: KnownSkinOption = None,
     state: Annotated[
         list[str] | None,
         typer.Option(
@@ -58,7 +52,6 @@ def calibrate_states(
 ) -> None:
     """Learn the state of a frame, or flags, from a few examples of each."""
     from tomoskin.calibration import CLASSES
-    from tomoskin.cli.labelled import changes
     from tomoskin.cli.state_labels import marked
     from tomoskin.formats import read_recording
     from tomoskin.pattern import Pattern
@@ -84,7 +77,7 @@ def _what_of(
     name: str | None, path: Path, old: Calibration[FrameClassifier] | None
 ) -> tuple[Skin | None, Pattern | None]:
     """The skin, where there is one, and the table of rows where it is known beforehand."""
-    from tomoskin.cli.skin_choice import known_skin
+    from tomoskin.cli.choices import known_skin
 
     skin = known_skin(name, path)
     if old is not None:

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
+from tomoskin.cli.choices import skin_for_file
+from tomoskin.cli.named_files import SKIN, ForceFlag, Writes
+from tomoskin.cli.options import LabelledArgument, ReferenceOption, SkinOption
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
-from tomoskin.cli.recording import ReferenceOption, idle_frames, say_notes
-from tomoskin.cli.skin_choice import SkinOption, skin_for_file
+from tomoskin.cli.recording import changes, idle_frames, labelled_frames, labels, say_notes
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
@@ -23,9 +24,7 @@ if TYPE_CHECKING:
 
 
 def calibrate_wiring(
-    recording: Annotated[
-        Path, typer.Argument(metavar="INPUT", help="Frames with labels: one touch each."), Reads()
-    ],
+    recording: LabelledArgument,
     out: Annotated[
         Path,
         typer.Option(metavar="WIRED.toml", help="Where the skin file as it is wired goes."),
@@ -42,7 +41,6 @@ def calibrate_wiring(
     other command.
     """
     from tomoskin.calibration import solve_wiring
-    from tomoskin.cli.labelled import changes, labelled_frames, labels
     from tomoskin.core import write_text
     from tomoskin.formats import read_recording
 

@@ -7,17 +7,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tomoskin.cli.choices import quantity
 from tomoskin.cli.named_files import FIGURE, ForceFlag, Writes
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
+from tomoskin.cli.output import JsonFlag, tables, tell
 from tomoskin.cli.progress import Bar
-from tomoskin.cli.skin_choice import DEFAULT_SKIN
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
+
+    from rich.table import Table
 
     from tomoskin.skin import Skin
-    from tomoskin.touch import Demand, Promise
+    from tomoskin.touch import Demand
 
 _ELECTRODES = "8,16,32"
 _PATTERNS = "adjacent,skip:2,opposite"
@@ -26,9 +29,14 @@ _COARSE = 120
 
 _PLACES = 500
 
+_HEADINGS = (
+    *("pattern", "electrodes", "rows", "samples"),
+    *("best mm", "median mm", "p95 mm", "faintest % p95"),
+)
+
 
 def design(
-    skin: Annotated[str, typer.Option(help="Built-in name or path.")] = DEFAULT_SKIN,
+    skin: NamedSkinOption = DEFAULT_SKIN,
     out: Annotated[
         Path | None,
         typer.Option(metavar="MAP.png", help="Where the map of the skin goes."),
@@ -54,20 +62,18 @@ def design(
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Bound the error of a press's place, and the faintest press, by the skin's own read-out.
+    """Bound what a skin can resolve, and compare it with variants.
 
-    No method can do better without more knowledge (Cramér–Rao); a good one comes near.
+    Bounds the error of a press's place, and the faintest press, by the skin's own read-out. No
+    method can do better without more knowledge (Cramér–Rao); a good one comes near.
     """
-    from tomoskin.core import parse_quantity
+    from tomoskin.formats import write_promise
     from tomoskin.skin import Skin
     from tomoskin.touch import Demand, promise
 
     counts = _counts(electrodes)
     chosen = Skin.load(skin)
-    try:
-        size = parse_quantity(radius, "length") if radius else None
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--radius") from None
+    size = quantity(radius, "length", "--radius") if radius else None
     _check_size(size, chosen)
     demand = Demand(size, depth, false_alarm, found)
     with Bar("bounding") as bar:
@@ -76,7 +82,11 @@ def design(
         rows = _compared(chosen, demand, counts, patterns.split(","), bar)
     radius_m = demand.on(chosen.mesh())
     if out is not None:
-        _write(out, chosen, own, demand, radius_m, overwrite=force)
+        title = (
+            f"{chosen.name}: one frame, press of radius {1e3 * radius_m:.0f} mm taking "
+            f"{100 * depth:.0f} %; noticed: {100 * found:g} % found, {false_alarm:g} false alarms"
+        )
+        write_promise(out, chosen, own, title, overwrite=force)
     document = {
         "skin": chosen.name,
         "press": {"radius_m": radius_m, "depth": depth},
@@ -85,10 +95,7 @@ def design(
         **own.figures(),
         "compared": rows,
     }
-    if json:
-        emit(document)
-    else:
-        _say(document)
+    tell(document, _lines(document), json=json)
 
 
 def _check_size(radius: float | None, skin: Skin) -> None:
@@ -130,64 +137,43 @@ def _compared(
             rows.append(row | {"fault": variant.fault})
             continue
         try:
-            found = promise(variant.skin, demand, _COARSE, _part(bar, number, jobs))
+            bound = promise(variant.skin, demand, _COARSE, _part(bar, number, jobs))
         except TomoskinError as error:
             rows.append(row | {"fault": error.message})
             continue
         pattern = variant.skin.pattern()
         samples = Scan.of(pattern).n_samples
-        rows.append(row | {"rows": pattern.n_meas, "samples": samples} | found.figures())
+        rows.append(row | {"rows": pattern.n_meas, "samples": samples} | bound.figures())
     return rows
 
 
-def _write(
-    out: Path, skin: Skin, own: Promise, demand: Demand, radius: float, *, overwrite: bool
-) -> None:
-    from tomoskin.formats import write_promise
-
-    title = (
-        f"{skin.name}: one frame, press of radius {1e3 * radius:.0f} mm taking "
-        f"{100 * demand.depth:.0f} %; noticed: {100 * demand.found:g} % found, "
-        f"{demand.false_alarm:g} false alarms"
-    )
-    write_promise(out, skin, own, title, overwrite=overwrite)
-
-
-def _say(document: dict[str, Any]) -> None:
-    from rich.console import Console
-
-    from tomoskin.cli.bench_table import tables
-
+def _lines(document: dict[str, Any]) -> Iterator[str | Table]:
     press = document["press"]
-    typer.echo(
+    yield (
         f"{document['skin']}: a press of radius {1e3 * press['radius_m']:.0f} mm that takes "
         f"{100 * press['depth']:.0f} % of the conductivity, one frame, within 85 % of the way out:"
     )
-    typer.echo(
+    yield (
         f"its place is missed by {1e3 * document['least_m']:.2g} mm at best, "
         f"{1e3 * document['median_m']:.2g} mm in the median, "
         f"{1e3 * document['p95_m']:.2g} mm at the 95th percentile"
     )
-    typer.echo(
+    yield (
         f"noticed (found {100 * document['found']:g} % of the time, "
         f"{document['false_alarm']:g} false alarms) from {100 * document['faintest_median']:.2g} % "
         f"on in the median, {100 * document['faintest_p95']:.2g} % at the 95th percentile"
     )
-    good = [row for row in document["compared"] if "fault" not in row]
-    headings = ("pattern", "electrodes", "rows", "samples", "best mm", "median mm", "p95 mm")
     shown = [
         (
             *(row["pattern"], row["electrodes"], row["rows"], row["samples"]),
             *(f"{1e3 * row[key]:.2g}" for key in ("least_m", "median_m", "p95_m")),
             f"{100 * row['faintest_p95']:.2g}",
         )
-        for row in good
+        for row in document["compared"]
+        if "fault" not in row
     ]
-    console = Console()
     if shown:
-        title = "the same sheet otherwise"
-        for table in tables(title, (*headings, "faintest % p95"), shown, console.width):
-            console.print(table, crop=False)
+        yield from tables("the same sheet otherwise", _HEADINGS, shown)
     for row in document["compared"]:
         if "fault" in row:
-            typer.echo(f"{row['electrodes']} electrodes, {row['pattern']}: {row['fault']}")
+            yield f"{row['electrodes']} electrodes, {row['pattern']}: {row['fault']}"

@@ -12,7 +12,7 @@ from typing import TypeVar
 import typer
 
 from tomoskin import __version__
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, tell
 from tomoskin.core import TomoskinError
 
 _T = TypeVar("_T")
@@ -32,14 +32,12 @@ class Finding:
 
 
 def doctor(json: JsonFlag = False) -> None:
-    """Look at this installation: versions, page, sources, sinks, skins, ports."""
-    findings = [found for look in _LOOKS for found in look()]
-    healthy = all(found.ok for found in findings)
-    if json:
-        emit({"ok": healthy, "version": __version__, "findings": [asdict(f) for f in findings]})
-    else:
-        for found in findings:
-            typer.echo(f"{'ok  ' if found.ok else 'FAIL'}  {found.name:<10} {found.text}")
+    """Say what was found, and exit with 1 where something is not as needed."""
+    findings = [finding for look in _LOOKS for finding in look()]
+    healthy = all(finding.ok for finding in findings)
+    document = {"ok": healthy, "version": __version__, "findings": [asdict(f) for f in findings]}
+    lines = (f"{'ok  ' if f.ok else 'FAIL'}  {f.name:<10} {f.text}" for f in findings)
+    tell(document, lines, json=json)
     raise typer.Exit(0 if healthy else 1)
 
 

@@ -9,10 +9,11 @@ from typing import Annotated
 
 import typer
 
-from tomoskin.cli.contents import group
+from tomoskin.cli.app import group
+from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
 from tomoskin.cli.progress import Bar
 
-app = group("The board's firmware: build, flash, emulate.")
+app = group("firmware")
 
 
 def _known(channels: int) -> int:
@@ -56,9 +57,7 @@ def flash(
 
 
 @app.command()
-def emulate(
-    skin: Annotated[str, typer.Option(help="Built-in name or path.")] = "textile-disc-8",
-) -> None:
+def emulate(skin: NamedSkinOption = DEFAULT_SKIN) -> None:
     """Run the firmware on a simulated ATmega2560 until Ctrl-C; its serial port is printed."""
     from tomoskin.emulator import emulate_board
     from tomoskin.skin import Skin

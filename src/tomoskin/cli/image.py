@@ -9,31 +9,48 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.alpha_option import AlphaOption, said, with_alpha
-from tomoskin.cli.bend_option import BendOption, with_bends
-from tomoskin.cli.display_option import LimitOption, PercentFlag, SmoothOption, display_of
-from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
-from tomoskin.cli.output import JsonFlag, emit
-from tomoskin.cli.progress import Bar
-from tomoskin.cli.recording import (
-    FramesOption,
-    ReferenceOption,
-    frame_range,
-    idle_frames,
-    say_notes,
+from tomoskin.cli.choices import (
+    alpha_line,
+    display_of,
+    skin_for_file,
+    with_alpha,
+    with_bends,
+    with_states,
+    with_time_constant,
 )
-from tomoskin.cli.skin_choice import SkinOption, skin_for_file
-from tomoskin.cli.states_option import StatesOption, with_states
-from tomoskin.cli.time_option import TimeConstantOption, filter_said, with_time_constant
+from tomoskin.cli.named_files import ForceFlag, Writes
+from tomoskin.cli.options import (
+    AlphaOption,
+    BendOption,
+    FramesOption,
+    LimitOption,
+    PercentFlag,
+    RecordingArgument,
+    ReferenceOption,
+    SkinOption,
+    SmoothOption,
+    StatesOption,
+    TimeConstantOption,
+    TouchesOut,
+)
+from tomoskin.cli.output import JsonFlag, remark, tell
+from tomoskin.cli.progress import Bar
+from tomoskin.cli.recording import frame_range, idle_frames, say_notes
+from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
+    from tomoskin.formats import Display
     from tomoskin.pattern import Pattern
     from tomoskin.pipeline import Prepared, Reconstruction
-    from tomoskin.signal import Recording
-    from tomoskin.skin import Skin
 
+
+_SHOWN = 20
+"""Frames whose touches are said."""
+
+_MOST_FIELDS = 200
+"""Frames of a .vtu file."""
 
 IMAGES = {
     ".png": "pictures of some frames",
@@ -43,9 +60,7 @@ IMAGES = {
 
 
 def image(
-    recording: Annotated[
-        Path, typer.Argument(metavar="INPUT", help="Recording or .npz file."), Reads()
-    ],
+    recording: RecordingArgument,
     skin: SkinOption = None,
     reference: ReferenceOption = None,
     frames: FramesOption = None,
@@ -58,139 +73,115 @@ def image(
         typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go."),
         Writes(IMAGES),
     ] = None,
-    touches: Annotated[
-        Path | None,
-        typer.Option(metavar="X.csv", help="Where the touches go."),
-        Writes(TABLE),
-    ] = None,
+    touches: TouchesOut = None,
     force: ForceFlag = False,
     percent: PercentFlag = False,
     limit: LimitOption = None,
     smooth: SmoothOption = None,
     json: JsonFlag = False,
 ) -> None:
-    """Reconstruct a recording: images, and the touches in them."""
-    from tomoskin.cli.image_files import WRITERS
-    from tomoskin.formats import read_recording
+    """Write the images of a recording and the touches in them, or say what they are."""
+    from tomoskin.formats import read_recording, write_touches
     from tomoskin.pipeline import prepare, reconstruct
 
-    told = skin_for_file(skin, recording)
-    chosen, rule = with_alpha(told, alpha)
+    own = skin_for_file(skin, recording)
+    chosen, rule = with_alpha(own, alpha)
     chosen = with_time_constant(chosen, time_constant)
     display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
     with Bar("preparing"):
-        prepared = with_states(with_bends(prepare(chosen), bend), states, told)
-    whole = read_recording(recording).in_order_of(prepared.pattern)
-    say_notes(whole)
-    idle = idle_frames(whole, reference, prepared.pattern)
-    start, stop = frame_range(whole, frames)
+        prepared = with_states(with_bends(prepare(chosen), bend), states, own)
+    recorded = read_recording(recording).in_order_of(prepared.pattern)
+    say_notes(recorded)
+    idle = idle_frames(recorded, reference, prepared.pattern)
+    start, stop = frame_range(recorded, frames)
     with Bar("reconstructing") as bar:
-        found = reconstruct(prepared, whole.part(start, stop), idle, rule=rule, advance=bar)
-    found = found.numbered_from(start)
+        result = reconstruct(prepared, recorded.part(start, stop), idle, rule=rule, advance=bar)
+    result = result.numbered_from(start)
     if touches is not None:
-        _write_touches(touches, whole, found, prepared.skin, overwrite=force)
+        rows = zip(result.frames.tolist(), result.touches, strict=True)
+        timed = ((frame, float(recorded.time[frame]), some) for frame, some in rows)
+        write_touches(touches, timed, prepared.skin.surface, overwrite=force)
     if out is not None:
-        WRITERS[out.suffix.lower()](out, prepared, found, display, overwrite=force)
-    _report(recording, found, prepared, json=json)
+        WRITERS[out.suffix.lower()](out, prepared, result, display, overwrite=force)
+    _warn(recording, result, prepared.pattern)
+    tell(_document(result, prepared), _lines(result, prepared), json=json)
 
 
-def _write_touches(
-    path: Path, recording: Recording, found: Reconstruction, skin: Skin, *, overwrite: bool
-) -> None:
-    from tomoskin.formats import write_touches
-
-    rows = zip(found.frames.tolist(), found.touches, strict=True)
-    timed = ((f, float(recording.time[f]), t) for f, t in rows)
-    write_touches(path, timed, skin.surface, overwrite=overwrite)
-
-
-def _report(source: Path, found: Reconstruction, prepared: Prepared, *, json: bool) -> None:
-    _warn(source, found, prepared.pattern)
-    if json:
-        emit(_document(found, prepared))
-        return
-    typer.echo(f"{len(found.frames)} frames, {sum(map(len, found.touches))} touches")
-    typer.echo(said(found.choice))
+def _lines(result: Reconstruction, prepared: Prepared) -> Iterator[str]:
+    yield f"{len(result.frames)} frames, {sum(map(len, result.touches))} touches"
+    yield alpha_line(result.choice)
     if prepared.modes is not None:
-        typer.echo(filter_said(prepared.skin))
-    if found.bends:
-        states = Counter(reading.state for reading in found.bends if reading)
-        typer.echo(", ".join(f"{state}: {count} frames" for state, count in states.items()))
-    if found.states:
-        told = Counter("unknown" if s.unknown else s.name for s in found.states if s)
-        typer.echo(", ".join(f"{state}: {count} frames" for state, count in told.items()))
-    for frame, touches in list(zip(found.frames.tolist(), found.touches, strict=True))[:_SHOWN]:
+        seconds = prepared.skin.inverse.time_constant
+        yield f"filtered over frames, time constant {seconds:g} s"
+    bends = [reading.state for reading in result.bends if reading]
+    states = [("unknown" if state.unknown else state.name) for state in result.states if state]
+    for names in filter(None, (bends, states)):
+        yield ", ".join(f"{name}: {count} frames" for name, count in Counter(names).items())
+    for frame, touches in list(zip(result.frames.tolist(), result.touches, strict=True))[:_SHOWN]:
         for t in touches:
             r = t.reading
-            typer.echo(
+            yield (
                 f"frame {frame:>4}  touch {t.id:>3}  x {1e3 * r.x:+7.1f} mm  y {1e3 * r.y:+7.1f} mm"
-                f"  area {1e6 * r.area:7.0f} mm²  peak {r.peak:+.3g} {found.unit}"
+                f"  area {1e6 * r.area:7.0f} mm²  peak {r.peak:+.3g} {result.unit}"
             )
-    if len(found.frames) > _SHOWN:
-        typer.echo(f"… and {len(found.frames) - _SHOWN} frames more: --touches writes them all")
+    if len(result.frames) > _SHOWN:
+        yield f"… and {len(result.frames) - _SHOWN} frames more: --touches writes them all"
 
 
-def _warn(source: Path, found: Reconstruction, pattern: Pattern) -> None:
+def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
     """Say on stderr what was left out, and what looks wrong."""
     from tomoskin.pipeline import DOUBTED
 
-    if len(found.rows_left_out):
-        rows = found.rows_left_out.tolist()
-        typer.echo(
-            f"tomoskin: {source}: {len(rows)} rows hold no finite values and were left out: "
-            + "; ".join(map(pattern.row_text, rows)),
-            err=True,
+    if len(result.rows_left_out):
+        rows = result.rows_left_out.tolist()
+        remark(
+            f"{source}: {len(rows)} rows hold no finite values and were left out: "
+            + "; ".join(map(pattern.row_text, rows))
         )
-    counted = zip(found.frames.tolist(), found.rows_missing.tolist(), strict=True)
+    counted = zip(result.frames.tolist(), result.rows_missing.tolist(), strict=True)
     named = [f"{frame} ({_rows(count)})" for frame, count in counted if count]
     if named:
-        typer.echo(
-            f"tomoskin: {source}: {len(named)} frames hold rows that are not finite, and were "
-            f"imaged without these: {_listed(named)}",
-            err=True,
+        remark(
+            f"{source}: {len(named)} frames hold rows that are not finite, and were "
+            f"imaged without these: {_listed(named)}"
         )
-    if len(found.left_out):
-        typer.echo(
-            f"tomoskin: {source}: {len(found.left_out)} frames hold too many values that are not "
-            f"finite and were left out: {_listed(found.left_out.tolist())}",
-            err=True,
+    if len(result.left_out):
+        remark(
+            f"{source}: {len(result.left_out)} frames hold too many values that are not "
+            f"finite and were left out: {_listed(result.left_out.tolist())}"
         )
-    if found.agreement < DOUBTED:
-        typer.echo(
-            f"tomoskin: {source}: the reference agrees with this skin's model by only "
-            f"{found.agreement:.2f} (1 = proportional): check --skin and the electrodes' order",
-            err=True,
+    if result.agreement < DOUBTED:
+        remark(
+            f"{source}: the reference agrees with this skin's model by only "
+            f"{result.agreement:.2f} (1 = proportional): check --skin and the electrodes' order"
         )
 
 
-_SHOWN = 20
-
-
-def _document(found: Reconstruction, prepared: Prepared) -> dict[str, Any]:
-    lacking = zip(found.frames.tolist(), found.rows_missing.tolist(), strict=True)
+def _document(result: Reconstruction, prepared: Prepared) -> dict[str, Any]:
+    missing = zip(result.frames.tolist(), result.rows_missing.tolist(), strict=True)
     return {
-        "frames": len(found.frames),
-        "rows_missing": {str(frame): rows for frame, rows in lacking if rows},
-        "left_out": found.left_out.tolist(),
-        "rows_left_out": found.rows_left_out.tolist(),
-        "agreement": found.agreement,
-        "unit": found.unit,
-        "alpha": found.choice.alpha,
-        "rule": found.choice.rule,
+        "frames": len(result.frames),
+        "rows_missing": {str(frame): rows for frame, rows in missing if rows},
+        "left_out": result.left_out.tolist(),
+        "rows_left_out": result.rows_left_out.tolist(),
+        "agreement": result.agreement,
+        "unit": result.unit,
+        "alpha": result.choice.alpha,
+        "rule": result.choice.rule,
         "time_constant_s": prepared.skin.inverse.time_constant,
         "bends": [
             {"frame": f, "angle_rad": b.angle, "sd_rad": b.sd, "axis_rad": b.axis, "state": b.state}
-            for f, b in zip(found.frames.tolist(), found.bends, strict=False)
+            for f, b in zip(result.frames.tolist(), result.bends, strict=False)
             if b
         ],
         "states": [
             {"frame": f, **asdict(state)}
-            for f, state in zip(found.frames.tolist(), found.states, strict=False)
+            for f, state in zip(result.frames.tolist(), result.states, strict=False)
             if state
         ],
         "touches": [
             {"frame": f, "id": t.id, "x_m": t.reading.x, "y_m": t.reading.y, "peak": t.reading.peak}
-            for f, touches in zip(found.frames.tolist(), found.touches, strict=True)
+            for f, touches in zip(result.frames.tolist(), result.touches, strict=True)
             for t in touches
         ],
     }
@@ -203,3 +194,62 @@ def _listed(frames: Sequence[object]) -> str:
 
 def _rows(count: int) -> str:
     return "1 row" if count == 1 else f"{count} rows"
+
+
+def _png(
+    path: Path, prepared: Prepared, result: Reconstruction, display: Display, *, overwrite: bool
+) -> None:
+    """Draw all frames, or as many as fit, evenly spread over the recording."""
+    import numpy as np
+
+    from tomoskin.formats import MOST_PANELS, Panel, write_picture
+
+    n = len(result.frames)
+    chosen = np.unique(np.linspace(0, n - 1, min(n, MOST_PANELS)).round().astype(int))
+    images, unit = display.applied(result.images[chosen], prepared.mesh, result.unit)
+    panels = [
+        Panel(f"frame {result.frames[i]}", image, result.touches[i])
+        for i, image in zip(chosen, images, strict=True)
+    ]
+    write_picture(path, prepared.mesh, panels, unit, display.limit, overwrite=overwrite)
+
+
+def _npz(
+    path: Path, prepared: Prepared, result: Reconstruction, display: Display, *, overwrite: bool
+) -> None:
+    """Write images (n_frames, n_cells) with their mesh."""
+    import numpy as np
+
+    from tomoskin.core import save_arrays
+
+    images, unit = display.applied(result.images, prepared.mesh, result.unit)
+    arrays = {
+        "images": images,
+        "frames": result.frames,
+        "unit": np.array(unit),
+        "smoothing_m": np.array(display.smoothing),
+        "mesh_id": np.array(prepared.mesh.identity),
+        "points": prepared.mesh.points,
+        "cells": prepared.mesh.cells,
+    }
+    save_arrays(path, arrays, overwrite=overwrite)
+
+
+def _vtu(
+    path: Path, prepared: Prepared, result: Reconstruction, display: Display, *, overwrite: bool
+) -> None:
+    """Write one cell field a frame."""
+    from tomoskin.formats import write_vtu
+
+    if len(result.frames) > _MOST_FIELDS:
+        raise DataError(
+            f"a .vtu file takes {_MOST_FIELDS} frames, got {len(result.frames)}",
+            where=str(path),
+            hint="choose some with --frames A:B",
+        )
+    images, _ = display.applied(result.images, prepared.mesh, result.unit)
+    names = [f"frame_{frame:06d}" for frame in result.frames.tolist()]
+    write_vtu(path, prepared.mesh, dict(zip(names, images, strict=True)), overwrite=overwrite)
+
+
+WRITERS = {".png": _png, ".npz": _npz, ".vtu": _vtu}

@@ -10,15 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.bend_option import BendOption, with_bends
-from tomoskin.cli.ending import ended_by_signals
+from tomoskin.cli.choices import chosen_sinks, skin_for_source, with_bends, with_states
 from tomoskin.cli.named_files import RECORDING, Otherwise, Reads, Writes
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.options import BendOption, SinkOption, SkinOption, SourceOption, StatesOption
+from tomoskin.cli.output import JsonFlag, emit, remark
 from tomoskin.cli.progress import Bar
-from tomoskin.cli.record import recording_to
-from tomoskin.cli.sink_option import SinkOption, chosen_sinks
-from tomoskin.cli.skin_choice import SkinOption, skin_for_source
-from tomoskin.cli.states_option import StatesOption, with_states
+from tomoskin.cli.record import ended_by_signals, recording_to
 
 if TYPE_CHECKING:
     from tomoskin.pipeline import Prepared
@@ -29,7 +26,7 @@ if TYPE_CHECKING:
 def live(
     *,
     skin: SkinOption = None,
-    source: Annotated[str, typer.Option(help="twin, serial:PORT, replay:FILE@SPEED, …")] = "twin",
+    source: SourceOption = "twin",
     record: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Record the session to a new file, such as run.mcap."),
@@ -37,7 +34,7 @@ def live(
     ] = None,
     calibration: Annotated[
         Path | None,
-        typer.Option(metavar="C.npz", help="Places of touches by a calibration of touch."),
+        typer.Option(metavar="C.npz", help="Positions of touches by a calibration of touch."),
         Reads(),
     ] = None,
     folder: Annotated[
@@ -67,7 +64,7 @@ def live(
     ] = False,
     json: JsonFlag = False,
 ) -> None:
-    """Show a skin live on a page; without options, the twin of a textile disc."""
+    """Run source, pipeline and server until a signal comes."""
     with ended_by_signals():
         from tomoskin.pipeline import colour_limit
         from tomoskin.run import Runner
@@ -136,10 +133,9 @@ def _kept(token_file: Path | None) -> dict[str, str]:
 
 
 def _warn(host: str) -> None:
-    typer.echo(
-        f"tomoskin: warning: --host {host} lets other machines reach this page, unencrypted; "
-        "whoever has the address with its token can control it",
-        err=True,
+    remark(
+        f"warning: --host {host} lets other machines reach this page, unencrypted; "
+        "whoever has the address with its token can control it"
     )
 
 

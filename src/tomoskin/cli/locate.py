@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
+from tomoskin.cli.named_files import ForceFlag, Reads
+from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption, TouchesOut
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
-from tomoskin.cli.recording import ReferenceOption, say_notes
+from tomoskin.cli.recording import changes, say_notes
 
 if TYPE_CHECKING:
     from tomoskin.calibration import Calibration, Locator
@@ -23,21 +24,13 @@ _SHOWN = 20
 
 
 def locate(
-    recording: Annotated[
-        Path, typer.Argument(metavar="INPUT", help="Recording or .npz file."), Reads()
-    ],
+    recording: RecordingArgument,
     calibration: Annotated[
         Path, typer.Option(metavar="C.npz", help="From tomoskin calibrate touch."), Reads()
     ],
-    touches: Annotated[
-        Path | None,
-        typer.Option(metavar="X.csv", help="Where the touches go."),
-        Writes(TABLE),
-    ] = None,
+    touches: TouchesOut = None,
     force: ForceFlag = False,
-    skin: Annotated[
-        str | None, typer.Option(help="Built-in name or path: refused unless calibrated on it.")
-    ] = None,
+    skin: SameSkinOption = None,
     reference: ReferenceOption = None,
     several: Annotated[
         bool, typer.Option("--several", help="Two touches where the frame shows them; slower.")
@@ -48,7 +41,6 @@ def locate(
     import numpy as np
 
     from tomoskin.calibration import TOUCH
-    from tomoskin.cli.labelled import changes
     from tomoskin.formats import read_recording, write_touches
 
     with Bar("learning") as bar:
@@ -74,7 +66,7 @@ def locate(
 
 
 def _check_skin(known: Calibration[Locator], name: str | None, path: Path) -> None:
-    from tomoskin.cli.skin_choice import known_skin
+    from tomoskin.cli.choices import known_skin
 
     if (skin := known_skin(name, path)) is not None:
         known.model.check(skin=skin)

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.named_files import FIGURE, TABLE, ForceFlag, Writes
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.options import SkinArgument
+from tomoskin.cli.output import JsonFlag, tell
 from tomoskin.cli.progress import Bar
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tomoskin.forward import ForwardModel
     from tomoskin.inverse import Merit
     from tomoskin.pipeline import Prepared
@@ -22,9 +25,11 @@ _FINER = 4
 _TARGETS, _REACH, _SIZE = 10, 0.9, 0.025
 """Number of targets, how far out they go, and their radius as a part of the sheet's extent."""
 
+_FIGURES = ("amplitude", "position_error", "offset", "resolution", "deformation", "ringing")
+
 
 def merit(
-    skin: Annotated[str, typer.Argument(metavar="SKIN", help="Built-in name or path.")],
+    skin: SkinArgument,
     towards: Annotated[
         int, typer.Option(min=1, metavar="N", help="Targets lie from the centre to electrode N.")
     ] = 1,
@@ -41,17 +46,24 @@ def merit(
     json: JsonFlag = False,
 ) -> None:
     """Show GREIT's figures of merit and the noise figure of a skin's operator."""
+    from tomoskin.formats import write_merit, write_merit_table
     from tomoskin.pipeline import prepare
     from tomoskin.skin import Skin
 
     with Bar("working out figures"):
-        found = _found(prepare(Skin.load(skin)), towards, greit)
+        figures = _figures(prepare(Skin.load(skin)), towards, greit)
     if out is not None:
-        _write(out, found, overwrite=force)
-    _report(found, json=json)
+        write = write_merit_table if out.suffix.lower() in TABLE else write_merit
+        write(out, figures, overwrite=force)
+    document = {
+        operator: {"noise_figure": merit.noise_figure, "distance_m": merit.distance.tolist()}
+        | {name: getattr(merit, name).tolist() for name in _FIGURES}
+        for operator, merit in figures.items()
+    }
+    tell(document, _lines(figures), json=json)
 
 
-def _found(prepared: Prepared, towards: int, figure: float | None) -> dict[str, Merit]:
+def _figures(prepared: Prepared, towards: int, figure: float | None) -> dict[str, Merit]:
     """Figures by the name of the operator."""
     from tomoskin.inverse import Greit, Targets, along, figures
 
@@ -72,7 +84,7 @@ def _found(prepared: Prepared, towards: int, figure: float | None) -> dict[str, 
         difference=operator.difference,
     )
     noise = prepared.predicted_noise()
-    found = {skin.inverse.prior: figures(operator, targets, noise)}
+    merits = {skin.inverse.prior: figures(operator, targets, noise)}
     if figure is not None:
         trained = Greit(
             prepared.model,
@@ -82,8 +94,8 @@ def _found(prepared: Prepared, towards: int, figure: float | None) -> dict[str, 
             noise=noise,
             noise_figure=figure,
         )
-        found["greit"] = figures(trained, targets, noise)
-    return found
+        merits["greit"] = figures(trained, targets, noise)
+    return merits
 
 
 def _finer(prepared: Prepared) -> ForwardModel:
@@ -96,30 +108,13 @@ def _finer(prepared: Prepared) -> ForwardModel:
     )
 
 
-def _write(out: Path, found: dict[str, Merit], *, overwrite: bool) -> None:
-    from tomoskin.formats import write_merit, write_merit_table
-
-    write = write_merit_table if out.suffix.lower() in TABLE else write_merit
-    write(out, found, overwrite=overwrite)
-
-
-def _report(found: dict[str, Merit], *, json: bool) -> None:
-    names = ("amplitude", "position_error", "offset", "resolution", "deformation", "ringing")
-    if json:
-        emit(
-            {
-                operator: {"noise_figure": m.noise_figure, "distance_m": m.distance.tolist()}
-                | {name: getattr(m, name).tolist() for name in names}
-                for operator, m in found.items()
-            }
-        )
-        return
-    for operator, m in found.items():
-        typer.echo(f"{operator}: noise figure {m.noise_figure:.3g}")
-        typer.echo("centre mm  amplitude  inwards mm  off mm  resolution  deformation  ringing")
-        table = (m.distance, *(getattr(m, name) for name in names))
+def _lines(figures: dict[str, Merit]) -> Iterator[str]:
+    for operator, merit in figures.items():
+        yield f"{operator}: noise figure {merit.noise_figure:.3g}"
+        yield "centre mm  amplitude  inwards mm  off mm  resolution  deformation  ringing"
+        table = (merit.distance, *(getattr(merit, name) for name in _FIGURES))
         for r, ar, pe, off, res, sd, rng in zip(*table, strict=True):
-            typer.echo(
+            yield (
                 f"{1e3 * r:9.1f}  {ar:9.2f}  {1e3 * pe:+10.1f}  {1e3 * off:6.1f}"
                 f"  {res:10.3f}  {sd:11.3f}  {rng:7.3f}"
             )

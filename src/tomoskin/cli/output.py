@@ -1,10 +1,17 @@
-"""What all commands write alike: JSON for programs."""
+"""What all commands write alike: JSON for programs, remarks, and tables of any width."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import textwrap
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from rich.table import Table
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="Machine-readable output.")]
 """The --json option of a command."""
@@ -15,3 +22,90 @@ def emit(document: Any) -> None:
     import msgspec
 
     typer.echo(msgspec.json.encode(document).decode())
+
+
+def tell(document: Any, lines: Iterable[str | Table], *, json: bool) -> None:
+    """Write what a command found: the ``document`` for programs, else ``lines`` for people."""
+    if json:
+        emit(document)
+        return
+    for line in lines:
+        if isinstance(line, str):
+            typer.echo(line)
+        else:
+            from rich.console import Console
+
+            Console().print(line, crop=False)
+
+
+def remark(text: str) -> None:
+    """Write a line on stderr that a person should see, whatever the command is for."""
+    typer.echo(f"tomoskin: {text}", err=True)
+
+
+@dataclass(frozen=True)
+class _Column:
+    heading: str
+    values: tuple[str, ...]
+    key: bool
+
+    @property
+    def width(self) -> int:
+        """Of its widest value, or of the longest word of its heading."""
+        return max(map(len, (*self.heading.split(), *self.values)))
+
+
+def tables(
+    title: str,
+    headings: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    width: int | None = None,
+) -> list[Table]:
+    """One table, or where ``width`` (the terminal's) is too little several, each with the columns
+    that say what a row is about: the leading ones with text in them, at least the first.
+
+    Nothing is cut off: headings break between words.
+    """
+    if width is None:
+        from rich.console import Console
+
+        width = Console().width
+    columns = _columns(headings, rows)
+    keys = [column for column in columns if column.key]
+    blocks, rest = [list(keys)], [column for column in columns if not column.key]
+    for column in rest:
+        needed = sum(c.width + 1 for c in (*blocks[-1], column)) - 1
+        if needed > width and len(blocks[-1]) > len(keys):
+            blocks.append(list(keys))
+        blocks[-1].append(column)
+    return [_table(title if block is blocks[0] else "", block) for block in blocks]
+
+
+def _columns(headings: Sequence[str], rows: Sequence[Sequence[object]]) -> list[_Column]:
+    columns, key = [], True
+    for number, heading in enumerate(headings):
+        values = [row[number] for row in rows]
+        key = key and (number == 0 or any(isinstance(value, str) for value in values))
+        columns.append(_Column(heading, tuple(map(str, values)), key))
+    return columns
+
+
+def _table(title: str, columns: Sequence[_Column]) -> Table:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    style = {"box": box.SIMPLE_HEAD, "show_edge": False, "pad_edge": False, "padding": 0}
+    table = Table(title=title or None, **style)  # type: ignore[arg-type]
+    for column in columns:
+        heading = "\n".join(textwrap.wrap(column.heading, column.width))
+        table.add_column(
+            Text(heading),
+            justify="left" if column.key else "right",
+            no_wrap=True,
+            min_width=column.width,
+            vertical="bottom",
+        )
+    for row in zip(*(column.values for column in columns), strict=True):
+        table.add_row(*map(Text, row))
+    return table

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import signal
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,12 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.ending import ended_by_signals
+from tomoskin.cli.choices import chosen_sinks, skin_for_source
 from tomoskin.cli.named_files import RECORDING, Writes
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.options import SinkOption, SkinOption, SourceOption
+from tomoskin.cli.output import JsonFlag, tell
 from tomoskin.cli.progress import Bar
-from tomoskin.cli.sink_option import SinkOption, chosen_sinks
-from tomoskin.cli.skin_choice import SkinOption, skin_for_source
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def record(
         Writes(RECORDING),
     ],
     skin: SkinOption = None,
-    source: Annotated[str, typer.Option(help="twin, serial:PORT, replay:FILE, …")] = "twin",
+    source: SourceOption = "twin",
     seconds: Annotated[
         float | None,
         typer.Option(min=0.0, help="How long; else until Ctrl-C or a replay's end."),
@@ -40,7 +40,7 @@ def record(
     sink: SinkOption = None,
     json: JsonFlag = False,
 ) -> None:
-    """Record a session: raw bytes, frames, touches and images, without a page."""
+    """Run source and pipeline into a session file until there is enough."""
     from tomoskin.pipeline import prepare
     from tomoskin.run import Runner
     from tomoskin.source import open_source
@@ -56,7 +56,23 @@ def record(
         _wait(runner, seconds, frames)
         if (problem := _problem(runner)) is not None:
             raise DataError(problem)
-    _report(file, runner, json=json)
+    status = runner.status()
+    size = file.stat().st_size
+    document = {"file": str(file), "bytes": size, "frames": status.frames, "lost": status.gaps,
+                "dropped": status.dropped, "corrupt": status.corrupt}  # fmt: skip
+    line = f"{file}: {status.frames} frames, {size / 1e6:.1f} MB, {status.gaps} lost"
+    tell(document, [line], json=json)
+
+
+@contextlib.contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """Ctrl-C and SIGTERM end the block, wherever it stands: that is no failure."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @contextlib.contextmanager
@@ -84,12 +100,12 @@ def _wait(runner: Runner, seconds: float | None, frames: int | None) -> None:
     with Bar("recording") as bar:
         while (status := runner.status()).recording is not None:
             shares = [(elapsed, seconds), (status.frames, frames), *_played(status)]
-            known = [(part, whole) for part, whole in shares if whole is not None]
-            for part, whole in known:
-                if part >= whole:
+            limits = [(part, limit) for part, limit in shares if limit is not None]
+            for part, limit in limits:
+                if part >= limit:
                     return
-            for part, whole in known[:1]:
-                bar(part, whole)
+            for part, limit in limits[:1]:
+                bar(part, limit)
             nothing.wait(_OFTEN if seconds is None else min(_OFTEN, seconds - elapsed))
             elapsed += _OFTEN
 
@@ -110,13 +126,3 @@ def _problem(runner: Runner) -> str | None:
     _, events = runner.events.since(0)
     texts = [event.text for event in events if event.kind == "recording-stopped"]
     return texts[-1] if texts else "the recording has ended"
-
-
-def _report(file: Path, runner: Runner, *, json: bool) -> None:
-    status = runner.status()
-    size = file.stat().st_size
-    if json:
-        emit({"file": str(file), "bytes": size, "frames": status.frames, "lost": status.gaps,
-              "dropped": status.dropped, "corrupt": status.corrupt})  # fmt: skip
-        return
-    typer.echo(f"{file}: {status.frames} frames, {size / 1e6:.1f} MB, {status.gaps} lost")

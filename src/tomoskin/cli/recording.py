@@ -1,32 +1,22 @@
-"""Options that name parts of a recording: the untouched frames, and a range."""
+"""Parts of a recording that options name: untouched frames, a range; changes, and their labels."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from tomoskin.cli.output import remark
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from tomoskin.core import FloatArray, IntArray
     from tomoskin.pattern import Pattern
     from tomoskin.pipeline import Idle
     from tomoskin.signal import Recording
-
-ReferenceOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="first:N|frame:K|previous|FILE",
-        help="Untouched frames, or previous: each frame against the one before. Without it the "
-        "file's own reference, else its first frame (of a session those that the run took).",
-    ),
-]
-FramesOption = Annotated[
-    str | None, typer.Option(metavar="A:B", help="Only frames A to B-1 (from 0).")
-]
 
 
 def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Idle:
@@ -62,7 +52,7 @@ def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Idl
 def say_notes(recording: Recording) -> None:
     """What of the file was left out, on stderr."""
     for note in recording.notes:
-        typer.echo(f"tomoskin: {recording.source}: {note}", err=True)
+        remark(f"{recording.source}: {note}")
 
 
 def _frames_of(recording: Recording, kind: str, number: int) -> NDArray[Any]:
@@ -88,3 +78,44 @@ def frame_range(recording: Recording, spec: str | None) -> tuple[int, int]:
     if not 0 <= start < stop <= n:
         raise DataError(f"expected frames within 0:{n}, got {spec}", where="--frames")
     return start, stop
+
+
+def changes(recording: Recording, reference: str | None, pattern: Pattern) -> FloatArray:
+    """(n, n_meas) frames minus the untouched skin.
+
+    Raises
+    ------
+    DataError
+        For complex data, or a reference that is no untouched skin.
+    """
+    import numpy as np
+
+    idle = idle_frames(recording, reference, pattern)
+    if isinstance(idle, str):
+        raise DataError("expected untouched frames", where="--reference", hint="first:N or a file")
+    values = recording.voltages if idle is None else recording.voltages - idle.mean(axis=0)
+    if np.iscomplexobj(values):
+        raise DataError(
+            "holds complex voltages", where=recording.source, hint="calibrate on their magnitudes"
+        )
+    return np.asarray(values, dtype=np.float64)
+
+
+def labelled_frames(places: FloatArray) -> IntArray:
+    """(k,) frames of ``places`` (n, 2) that have a label."""
+    import numpy as np
+
+    return np.flatnonzero(np.isfinite(places).all(axis=1))
+
+
+def labels(recording: Recording) -> FloatArray:
+    """(n, 2) m, NaN where a frame has no label. Raises DataError where there is none at all."""
+    import numpy as np
+
+    if recording.labels is None or not np.isfinite(recording.labels).all(axis=1).any():
+        raise DataError(
+            "holds no labels: expected xy_m (n_frames, 2), the place of each press",
+            where=recording.source,
+            hint="docs/touch.md says how to make them",
+        )
+    return recording.labels

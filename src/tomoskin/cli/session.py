@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.contents import group
+from tomoskin.cli.app import group
 from tomoskin.cli.named_files import RECORDING, TABLE, ForceFlag, Given, Reads, Writes
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, remark, tell
 from tomoskin.cli.progress import Bar
 from tomoskin.cli.recording import say_notes
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tomoskin.core import Output
     from tomoskin.recording import Lost, Repaired, SessionInfo
 
-app = group("Inspect, mend and convert recorded sessions.")
+app = group("session")
 
 _A_YEAR = 3.15e7
 """Log times of less are seconds of a clock that began with the machine, not of the day."""
@@ -74,14 +74,10 @@ def info(file: _File, json: JsonFlag = False) -> None:
     from tomoskin.recording import session_info
 
     with Bar("reading") as bar:
-        found = session_info(file, bar)
-    if json:
-        emit(asdict(found))
-        return
-    for name, text in _lines(found):
-        typer.echo(f"{name:<12} {text}")
-    if found.torn:
-        typer.echo(f"tomoskin: {file}: {found.torn} (tomoskin session repair ends it)", err=True)
+        info = session_info(file, bar)
+    tell(asdict(info), (f"{name:<12} {text}" for name, text in _lines(info)), json=json)
+    if info.torn and not json:
+        remark(f"{file}: {info.torn} (tomoskin session repair ends it)")
 
 
 @app.command()
@@ -105,14 +101,10 @@ def repair(
 
     target = _repaired(file, out)
     with Bar("repairing") as bar:
-        found = repair(file, target, skin=Skin.load(skin) if skin else None, advance=bar)
-    if json:
-        emit(asdict(found))
-        return
-    frames = found.messages.get("/frames", 0)
-    typer.echo(f"{target}: {found.chunks} chunks, {frames} frames recovered; {file} is untouched")
-    for text in _losses(found):
-        typer.echo(text)
+        repaired = repair(file, target, skin=Skin.load(skin) if skin else None, advance=bar)
+    frames = repaired.messages.get("/frames", 0)
+    line = f"{target}: {repaired.chunks} chunks, {frames} frames recovered; {file} is untouched"
+    tell(asdict(repaired), [line, *_losses(repaired)], json=json)
 
 
 @app.command()
@@ -141,12 +133,12 @@ def export(
 
     write = WRITERS[out.suffix.lower()]
     with SessionReader(file) as session, Bar(f"writing {out}") as bar:
-        asked = Export(session, every, bar, overwrite=force)
-        write(asked, out)
+        job = Export(session, every, bar, overwrite=force)
+        write(job, out)
         if touches is not None:
-            asked.touches(touches)
+            job.touches(touches)
         if session.torn:
-            typer.echo(f"tomoskin: {file}: {session.torn}", err=True)
+            remark(f"{file}: {session.torn}")
     series = out.with_suffix(".pvd")  # names the files of a series
     for path in dict.fromkeys((out, series, touches)):
         if path is not None and path.is_file():
@@ -174,34 +166,34 @@ def import_recording(
     say_notes(recording)
 
 
-def _lines(found: SessionInfo) -> list[tuple[str, str]]:
+def _lines(info: SessionInfo) -> list[tuple[str, str]]:
     begun = ""
-    if found.begun is not None:
-        begun = f", begun {datetime.fromtimestamp(found.begun, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    if info.begun is not None:
+        begun = f", begun {datetime.fromtimestamp(info.begun, UTC):%Y-%m-%d %H:%M:%S} UTC"
     lines = [
-        ("file", f"{found.path}, {found.size / 1e6:.2f} MB"),
-        ("duration", f"{found.duration:.2f} s{begun}"),
-        ("skin", f"{found.skin}: {found.electrodes} electrodes, {found.rows} measurements"),
-        ("frames", f"{found.frames}, {found.rate:.1f} frames/s, longest pause "
-                   f"{1e3 * found.longest_pause:.0f} ms"),
-        ("missing", f"{found.lost} frames in {found.gaps} gaps, {found.dropped} dropped by the "
-                    f"board, {found.skipped} skipped, {found.held} held"),
-        ("touches", str(found.touches)),
+        ("file", f"{info.path}, {info.size / 1e6:.2f} MB"),
+        ("duration", f"{info.duration:.2f} s{begun}"),
+        ("skin", f"{info.skin}: {info.electrodes} electrodes, {info.rows} measurements"),
+        ("frames", f"{info.frames}, {info.rate:.1f} frames/s, longest pause "
+                   f"{1e3 * info.longest_pause:.0f} ms"),
+        ("missing", f"{info.lost} frames in {info.gaps} gaps, {info.dropped} dropped by the "
+                    f"board, {info.skipped} skipped, {info.held} held"),
+        ("touches", str(info.touches)),
     ]  # fmt: skip
-    if found.attached:
-        lines.append(("files inside", ", ".join(found.attached)))
-    if found.device:
-        board, firmware = found.device.get("unique_id"), found.device.get("firmware")
+    if info.attached:
+        lines.append(("files inside", ", ".join(info.attached)))
+    if info.device:
+        board, firmware = info.device.get("unique_id"), info.device.get("firmware")
         lines.append(("board", f"{board}, firmware {firmware}"))
-    if found.clock:
-        rate, residual = found.clock.tick_rate, 1e3 * found.clock.residual
-        nominal = found.device.get("tick_rate")
-        drift = f", {_drift(found.clock.drift(nominal))}" if nominal else ""
+    if info.clock:
+        rate, residual = info.clock.tick_rate, 1e3 * info.clock.residual
+        nominal = info.device.get("tick_rate")
+        drift = f", {_drift(info.clock.drift(nominal))}" if nominal else ""
         lines.append(
             ("clock", f"{rate:.1f} ticks/s by this host{drift}; frames come {residual:.3f} ms late")
         )
-    if found.events:
-        counted = ", ".join(f"{kind} {count}" for kind, count in sorted(found.events.items()))
+    if info.events:
+        counted = ", ".join(f"{kind} {count}" for kind, count in sorted(info.events.items()))
         lines.append(("events", counted))
     return lines
 
@@ -213,10 +205,10 @@ def _drift(part: float) -> str:
     return f"{1e6 * part:+.1f} ppm"
 
 
-def _losses(found: Repaired) -> list[str]:
-    if not found.lost:
-        return ["nothing is lost" if found.ended else "nothing is lost but the open chunk's end"]
-    return [_loss(lost) for lost in found.lost]
+def _losses(repaired: Repaired) -> list[str]:
+    if not repaired.lost:
+        return ["nothing is lost" if repaired.ended else "nothing is lost but the open chunk's end"]
+    return [_loss(lost) for lost in repaired.lost]
 
 
 def _loss(lost: Lost) -> str:

@@ -9,18 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.named_files import RECORDING, ForceFlag, Given, Reads, Writes
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
+from tomoskin.cli.output import JsonFlag, remark, tell
 from tomoskin.cli.progress import Bar
-from tomoskin.core import DataError
 
 if TYPE_CHECKING:
     from tomoskin.core import Output
     from tomoskin.run import Workers
     from tomoskin.skin import Skin
     from tomoskin.twin import SetPlan
-
-_LARGEST = 10_000_000
-"""A script has at most so many bytes."""
 
 ONE_FILE = {".npz": "labelled frames in one file"}
 
@@ -40,7 +37,7 @@ def _simulated(out: Path | None, given: Given, called: str) -> list[Output]:
 
 def simulate(
     *,
-    skin: Annotated[str, typer.Option(help="Built-in name or path.")] = "textile-disc-8",
+    skin: NamedSkinOption = DEFAULT_SKIN,
     script: Annotated[
         Path | None,
         typer.Option(metavar="X.toml", help="What happens; see docs/simulate.md."),
@@ -68,7 +65,7 @@ def simulate(
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Run a script on the twin into a session file, or draw labelled frames."""
+    """Check which of the two is asked for, and do it."""
     from tomoskin.skin import Skin
 
     chosen = Skin.load(skin)
@@ -86,36 +83,33 @@ def simulate(
 
 def _timeline(skin: Skin, script: Path, out: Path, seed: int | None, *, json: bool) -> None:
     from tomoskin.run import simulate as run
+    from tomoskin.skin import read_text
     from tomoskin.twin import Script
 
-    read = Script.from_toml(_text(script), source=str(script))
+    read = Script.from_toml(read_text(script, "a script"), source=str(script))
     begun = time.monotonic()
     try:
         with Bar("simulating") as bar:
-            found = run(read, skin, out, seed=seed, advance=bar)
+            made = run(read, skin, out, seed=seed, advance=bar)
     except KeyboardInterrupt:
-        typer.echo(
-            f"tomoskin: stopped; {out} holds what was simulated until then, and says so", err=True
-        )
+        remark(f"stopped; {out} holds what was simulated until then, and says so")
         raise typer.Exit(1) from None
     took = time.monotonic() - begun
-    if json:
-        emit(
-            {"out": str(out), "frames": found.frames, "lost": found.lost, "seconds": found.seconds}
-        )
-        return
-    lost = f", {found.lost} lost on the line" if found.lost else ""
-    typer.echo(
-        f"{out}: {found.frames} frames{lost}, {found.seconds:g} s of the skin in {took:.1f} s"
-    )
+    document = {
+        "out": str(out), "frames": made.frames, "lost": made.lost, "seconds": made.seconds,
+    }  # fmt: skip
+    lost = f", {made.lost} lost on the line" if made.lost else ""
+    line = f"{out}: {made.frames} frames{lost}, {made.seconds:g} s of the skin in {took:.1f} s"
+    tell(document, [line], json=json)
 
 
 def _plan(skin: Skin, script: Path | None, seed: int, n: int) -> SetPlan:
+    from tomoskin.skin import read_text
     from tomoskin.twin import COMMON_PRESSES, Population, SetPlan, check_settling
 
     population = COMMON_PRESSES
     if script is not None:
-        population = Population.from_toml(_text(script), source=str(script))
+        population = Population.from_toml(read_text(script, "a script"), source=str(script))
     preset = population.preset or skin.twin.preset
     check_settling(skin, preset)
     return SetPlan(skin.to_toml(), population, preset, seed, n)
@@ -128,19 +122,15 @@ def _labelled(plan: SetPlan, out: Path, workers: Workers, *, overwrite: bool, js
     begun = time.monotonic()
     try:
         with Bar("drawing presses") as bar:
-            found = make_set(plan, out, workers, bar, overwrite=overwrite)
+            made = make_set(plan, out, workers, bar, overwrite=overwrite)
     except KeyboardInterrupt:
-        typer.echo(
-            "tomoskin: stopped; the same command goes on where this one was stopped", err=True
-        )
+        remark("stopped; the same command goes on where this one was stopped")
         raise typer.Exit(1) from None
     took = time.monotonic() - begun
-    if json:
-        files = [str(file) for file in found.files]
-        emit({"frames": n, "made": found.made, "found": found.found, "files": files})
-        return
-    before = f"; {found.found} of {plan.n_shards} parts were there already" if found.found else ""
-    typer.echo(f"{out}: {n} labelled frames in {took:.1f} s{before}")
+    files = [str(file) for file in made.files]
+    document = {"frames": n, "made": made.made, "found": made.found, "files": files}
+    before = f"; {made.found} of {plan.n_shards} parts were there already" if made.found else ""
+    tell(document, [f"{out}: {n} labelled frames in {took:.1f} s{before}"], json=json)
 
 
 def _workers(processes: int | None, cluster: str | None) -> Workers:
@@ -152,14 +142,3 @@ def _workers(processes: int | None, cluster: str | None) -> Workers:
         return on_cluster(cluster)
     n = processes or processors()
     return in_this_process if n == 1 else in_processes(n)
-
-
-def _text(path: Path) -> str:
-    try:
-        if path.stat().st_size > _LARGEST:
-            raise DataError("is too large for a script (over 10 MB)", where=str(path))
-        return path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise DataError(f"is not text (byte {error.start} is not UTF-8)", where=str(path)) from None
-    except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror}", where=str(path)) from None

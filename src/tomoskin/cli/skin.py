@@ -1,27 +1,26 @@
-"""``tomoskin skin``: the built-in skins, and whether a skin file can be meant."""
+"""``tomoskin skin``: the built-in skins, whether a skin file can be meant, and one for a body."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tomoskin.cli.alpha import alpha
-from tomoskin.cli.contents import group
-from tomoskin.cli.lay import lay
+from tomoskin.cli.app import group
 from tomoskin.cli.merit import merit
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
+from tomoskin.cli.options import SkinArgument
+from tomoskin.cli.output import JsonFlag, tell
 
 if TYPE_CHECKING:
-    from tomoskin.mesh import Quality
+    from tomoskin.core import FloatArray
     from tomoskin.skin import Skin
 
-app = group("List, show, check and lay skins.")
+app = group("skin")
 app.command("alpha")(alpha)
 app.command("merit")(merit)
-app.command("lay")(lay)
-
-_Name = Annotated[str, typer.Argument(metavar="SKIN", help="Built-in name or path.")]
 
 
 @app.command("list")
@@ -30,39 +29,72 @@ def list_skins(json: JsonFlag = False) -> None:
     from tomoskin.skin import Skin
 
     skins = [Skin.load(name) for name in Skin.names()]
-    if json:
-        emit([_summary(skin) for skin in skins])
-        return
-    for skin in skins:
-        typer.echo(f"{skin.name:<18} {skin.n_electrodes:>3} electrodes  {skin.description}")
+    lines = (f"{s.name:<18} {s.n_electrodes:>3} electrodes  {s.description}" for s in skins)
+    tell([_summary(skin) for skin in skins], lines, json=json)
 
 
 @app.command()
-def show(name: _Name, json: JsonFlag = False) -> None:
+def show(name: SkinArgument, json: JsonFlag = False) -> None:
     """Show a skin as the file that would make it."""
     from tomoskin.skin import Skin
 
     skin = Skin.load(name)
-    if json:
-        emit(_summary(skin) | {"toml": skin.to_toml()})
-    else:
-        typer.echo(skin.to_toml().rstrip("\n"))
+    text = skin.to_toml()
+    tell(_summary(skin) | {"toml": text}, [text.rstrip("\n")], json=json)
 
 
 @app.command()
-def check(file: _Name, json: JsonFlag = False) -> None:
+def check(file: SkinArgument, json: JsonFlag = False) -> None:
     """Check a skin file, and mesh it."""
     from tomoskin.mesh import quality
     from tomoskin.skin import Skin
 
     skin = Skin.load(file)
-    found = quality(skin.mesh())
-    if json:
-        emit(_summary(skin) | {"ok": True, "mesh": _mesh(found)})
-        return
-    typer.echo(
+    mesh = quality(skin.mesh())
+    figures = {
+        "n_cells": mesh.n_cells,
+        "n_points": mesh.n_points,
+        "quality_minimum": mesh.minimum,
+        "quality_mean": mesh.mean,
+    }
+    line = (
         f"{skin.name}: ok; {skin.n_electrodes} electrodes, {skin.pattern().n_meas} measurements, "
-        f"{found.n_cells} triangles of quality {found.minimum:.2f} (least), {found.mean:.2f} (mean)"
+        f"{mesh.n_cells} triangles of quality {mesh.minimum:.2f} (least), {mesh.mean:.2f} (mean)"
+    )
+    tell(_summary(skin) | {"ok": True, "mesh": figures}, [line], json=json)
+
+
+@app.command()
+def lay(
+    surface: Annotated[Path, typer.Argument(help="A .stl, .obj or .ply file."), Reads()],
+    electrodes: Annotated[
+        Path,
+        typer.Option(metavar="CSV", help="x,y,z of each electrode, E1 first, in the file's unit."),
+        Reads(),
+    ],
+    out: Annotated[
+        Path, typer.Option(metavar="X.toml", help="Where the skin file goes."), Writes(SKIN)
+    ],
+    unit: Annotated[str, typer.Option(help="Of the file: mm, cm or m.")] = "mm",
+    like: Annotated[
+        str, typer.Option(metavar="SKIN", help="Skin to take material, contacts and drive from.")
+    ] = "textile-disc-16",
+    force: ForceFlag = False,
+) -> None:
+    """Write the skin file of a sheet on a scanned or drawn surface."""
+    from tomoskin.core import DIMENSIONS, DataError, write_text
+    from tomoskin.skin import Skin
+    from tomoskin.skin import lay as laid
+
+    if unit not in ("mm", "cm", "m"):
+        raise DataError(f'expected mm, cm or m, got "{unit}"', where="--unit")
+    skin = laid(surface, _places(electrodes), unit=unit, like=Skin.load(like), source=str(out))
+    mesh = skin.mesh()
+    write_text(out, skin.to_toml(), overwrite=force)
+    scale = DIMENSIONS["length"]["cm"]
+    typer.echo(
+        f"{out}: {skin.n_electrodes} electrodes on {mesh.volumes.sum() / scale**2:.4g} cm², "
+        f"{len(mesh.cells)} triangles"
     )
 
 
@@ -77,10 +109,32 @@ def _summary(skin: Skin) -> dict[str, Any]:
     }
 
 
-def _mesh(found: Quality) -> dict[str, Any]:
-    return {
-        "n_cells": found.n_cells,
-        "n_points": found.n_points,
-        "quality_minimum": found.minimum,
-        "quality_mean": found.mean,
-    }
+def _places(path: Path) -> FloatArray:
+    """(n, 3) numbers of a CSV file, which may have a heading."""
+    import numpy as np
+
+    from tomoskin.core import DataError
+    from tomoskin.skin import read_text
+
+    rows = []
+    for number, line in enumerate(read_text(path, "a table of positions").splitlines(), 1):
+        fields = [field.strip() for field in line.split(",")]
+        if line.strip() and not (number == 1 and fields[:3] == ["x", "y", "z"]):
+            rows.append(_numbers(fields, f"{path}, line {number}"))
+    if not rows:
+        raise DataError("expected lines x,y,z, got none", where=str(path))
+    return np.array(rows)
+
+
+def _numbers(fields: list[str], where: str) -> list[float]:
+    from tomoskin.core import DataError
+
+    try:
+        x, y, z = map(float, fields)
+    except ValueError:
+        raise DataError(
+            f'expected three numbers x,y,z, got "{",".join(fields)}"',
+            where=where,
+            hint="decimal points, commas between",
+        ) from None
+    return [x, y, z]

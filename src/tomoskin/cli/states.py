@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
+from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption
 from tomoskin.cli.output import JsonFlag, emit
 from tomoskin.cli.progress import Bar
-from tomoskin.cli.recording import ReferenceOption, say_notes
+from tomoskin.cli.recording import changes, say_notes
 
 if TYPE_CHECKING:
     from tomoskin.calibration import Answers
@@ -21,9 +22,7 @@ _SHOWN = 20
 
 
 def states(
-    recording: Annotated[
-        Path, typer.Argument(metavar="INPUT", help="Recording or .npz file."), Reads()
-    ],
+    recording: RecordingArgument,
     calibration: Annotated[
         Path, typer.Option(metavar="C.npz", help="From tomoskin calibrate states."), Reads()
     ],
@@ -33,9 +32,7 @@ def states(
         Writes(TABLE),
     ] = None,
     force: ForceFlag = False,
-    skin: Annotated[
-        str | None, typer.Option(help="Built-in name or path: refused unless calibrated on it.")
-    ] = None,
+    skin: SameSkinOption = None,
     reference: ReferenceOption = None,
     ask: Annotated[
         int, typer.Option(min=0, metavar="N", help="Name the N frames whose label tells most.")
@@ -44,8 +41,7 @@ def states(
 ) -> None:
     """Tell the state of each frame, or that it is none of those that were learnt."""
     from tomoskin.calibration import CLASSES
-    from tomoskin.cli.labelled import changes
-    from tomoskin.cli.skin_choice import known_skin
+    from tomoskin.cli.choices import known_skin
     from tomoskin.formats import read_recording
 
     with Bar("learning"):

@@ -14,6 +14,7 @@ import msgspec
 from tomoskin.core import Output, SkinError, SourceError, TomoskinError, check_outputs, write_text
 from tomoskin.inverse import LightTouch, LinearProblem, Spectrum
 from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned
+from tomoskin.run import Runner
 from tomoskin.server.hub import Hub, Listener
 from tomoskin.server.requests import (
     AskPattern,
@@ -33,6 +34,71 @@ _GESTURE = 1.0
 """Changes of the same keys within so many s are one, as of a slider that is drawn."""
 
 
+class History:
+    """Skins as they were before changes, and those that were taken back."""
+
+    def __init__(self) -> None:
+        self.past: list[Skin] = []
+        self.future: list[Skin] = []
+        self._last: tuple[object, float] = (None, 0.0)
+
+    def add(self, skin: Skin, keys: object = None, now: float = 0.0) -> None:
+        """Keep ``skin`` before a change, unless the change goes on with a gesture.
+
+        ``keys`` are those that change at ``now`` s, None where it is no gesture.
+        """
+        last, then = self._last
+        if keys is None or last != keys or now - then > _GESTURE:
+            self.past.append(skin)
+            del self.past[:-MOST_KEPT]
+            self.future.clear()
+        if keys is not None:
+            self._last = keys, now
+
+    def undo(self, present: Skin) -> Skin | None:
+        """The skin before the newest change, None where there is none."""
+        return self._move(present, self.past, self.future)
+
+    def redo(self, present: Skin) -> Skin | None:
+        """The skin that was taken back last, None where there is none."""
+        return self._move(present, self.future, self.past)
+
+    def _move(self, present: Skin, back: list[Skin], forth: list[Skin]) -> Skin | None:
+        if not back:
+            return None
+        forth.append(present)
+        self._last = None, 0.0
+        return back.pop()
+
+
+class AutomaticAlpha:
+    """The alpha that would be chosen by the noise, for the mark on the slider."""
+
+    def __init__(self) -> None:
+        self._chooser: tuple[LinearProblem, LightTouch] | None = None
+
+    def remember(self, prepared: Prepared) -> None:
+        """Make ready to choose for what is prepared; takes a moment."""
+        problem = prepared.problem
+        if prepared.light_touch is not None:
+            self._chooser = problem, prepared.light_touch
+        elif prepared.skin.inverse.method == "one-step" and (
+            self._chooser is None or self._chooser[0] is not problem
+        ):
+            self._chooser = problem, LightTouch.of(Spectrum.of(problem))
+
+    def of(self, runner: Runner) -> float | None:
+        """What would be chosen now; None where that cannot be said yet."""
+        if runner.prepared.light_touch is not None:
+            return runner.status().choice.alpha
+        if self._chooser is None or self._chooser[0] is not runner.prepared.problem:
+            return None
+        reference, noise = runner.reference, runner.prepared.predicted_noise()
+        if reference is not None and reference.noise_is_known and reference.noise.any():
+            noise = runner.prepared.difference_noise(reference)
+        return self._chooser[1](noise).alpha
+
+
 class SettingsDesk:
     """Settings of the runner's skin, the same for all pages; lives in the event loop.
 
@@ -43,20 +109,18 @@ class SettingsDesk:
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
         self._wanted: Skin = hub.runner.prepared.skin
-        self._undo: list[Skin] = []
-        self._redo: list[Skin] = []
-        self._last: tuple[object, float] = (None, 0.0)
+        self._history = History()
         self._working = False
         self._took: float | None = None
-        self._auto: tuple[LinearProblem, LightTouch] | None = None
+        self._automatic = AutomaticAlpha()
 
     @property
     def handlers(self) -> Mapping[type, Callable[[Listener, Any], None]]:
         """See :class:`~tomoskin.server.hub.Desk`."""
         return {
             SetSettings: self._set,
-            UndoSettings: lambda page, _: self._step(page, self._undo, self._redo),
-            RedoSettings: lambda page, _: self._step(page, self._redo, self._undo),
+            UndoSettings: lambda page, _: self._step(page, self._history.undo),
+            RedoSettings: lambda page, _: self._step(page, self._history.redo),
             SaveSkin: self._save,
             LoadSkin: self._load,
             AskPattern: self._pattern,
@@ -67,7 +131,6 @@ class SettingsDesk:
         return (schema(), self._told())
 
     def _set(self, page: Listener, request: SetSettings) -> None:
-        now = time.monotonic()
         keys = sorted((s, k) for s, keys in request.changes.items() for k in keys)
         try:
             skin = altered(self._present(), request.changes)
@@ -75,19 +138,13 @@ class SettingsDesk:
         except TomoskinError as error:
             page.post(refusal(error))
             return
-        if self._last[0] != keys or now - self._last[1] > _GESTURE:
-            self._keep(self._present())
-        self._last = keys, now
+        self._history.add(self._present(), keys, time.monotonic())
         self._go(page, skin)
 
-    def _step(self, page: Listener, back: list[Skin], forth: list[Skin]) -> None:
-        """Take the newest of ``back``, and remember the present in ``forth``."""
-        if not back:
-            return
-        skin = back.pop()
-        forth.append(self._present())
-        self._last = None, 0.0
-        self._go(page, skin)
+    def _step(self, page: Listener, step: Callable[[Skin], Skin | None]) -> None:
+        """Go on with what a ``step`` through the history gives, where there is one."""
+        if (skin := step(self._present())) is not None:
+            self._go(page, skin)
 
     def _load(self, page: Listener, request: LoadSkin) -> None:
         path = self._hub.folder / f"{request.name}.toml"
@@ -97,7 +154,7 @@ class SettingsDesk:
         except TomoskinError as error:
             page.post(refusal(error))
             return
-        self._keep(self._present())
+        self._history.add(self._present())
         self._go(page, skin)
 
     def _save(self, page: Listener, request: SaveSkin) -> None:
@@ -115,11 +172,6 @@ class SettingsDesk:
             page.post(table_of(request.name, self._present().n_electrodes))
         except TomoskinError as error:
             page.post(refusal(error))
-
-    def _keep(self, skin: Skin) -> None:
-        self._undo.append(skin)
-        del self._undo[:-MOST_KEPT]
-        self._redo.clear()
 
     def _present(self) -> Skin:
         """The settings as they are, or will be when what is being prepared is ready."""
@@ -151,7 +203,7 @@ class SettingsDesk:
                     self._hub.show()
                 else:
                     self._hub.rescale(*scaled)
-                await asyncio.to_thread(self._remember, self._hub.runner.prepared)
+                await asyncio.to_thread(self._automatic.remember, self._hub.runner.prepared)
             except TomoskinError as error:
                 page.post(refusal(error))
             if self._wanted is skin:
@@ -179,28 +231,6 @@ class SettingsDesk:
         self._took = time.monotonic() - start
         return None
 
-    def _remember(self, prepared: Prepared) -> None:
-        """What would choose alpha, for the mark on the slider."""
-        problem = prepared.problem
-        if prepared.light_touch is not None:
-            self._auto = problem, prepared.light_touch
-        elif prepared.skin.inverse.method == "one-step" and (
-            self._auto is None or self._auto[0] is not problem
-        ):
-            self._auto = problem, LightTouch.of(Spectrum.of(problem))
-
-    def _automatic(self) -> float | None:
-        """The alpha that would be chosen by the noise; None where that is not known yet."""
-        runner = self._hub.runner
-        if runner.prepared.light_touch is not None:
-            return runner.status().choice.alpha
-        if self._auto is None or self._auto[0] is not runner.prepared.problem:
-            return None
-        reference, noise = runner.reference, runner.prepared.predicted_noise()
-        if reference is not None and reference.noise_is_known and reference.noise.any():
-            noise = runner.prepared.difference_noise(reference)
-        return self._auto[1](noise).alpha
-
     def _told(self) -> str:
         """The settings message."""
         skin = self._present()
@@ -209,10 +239,10 @@ class SettingsDesk:
             "type": "settings",
             "document": skin.document,
             "n_electrodes": skin.n_electrodes,
-            "automatic_alpha": self._automatic(),
+            "automatic_alpha": self._automatic.of(self._hub.runner),
             "alpha": self._hub.runner.status().choice.alpha,
-            "undo": len(self._undo),
-            "redo": len(self._redo),
+            "undo": len(self._history.past),
+            "redo": len(self._history.future),
             "busy": self._working,
             "took_ms": None if self._took is None else 1e3 * self._took,
             "files": files[:200],

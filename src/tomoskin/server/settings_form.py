@@ -19,8 +19,8 @@ from tomoskin.skin import (
     NumberOrWord,
     OneOrEach,
     Quantity,
-    Rows,
     Skin,
+    Table,
     Whole,
 )
 
@@ -41,7 +41,7 @@ def schema() -> str:
     """Message with every section and key: kinds, bounds, units, meanings and conditions."""
     sections = [
         {
-            "name": section.name,
+            "name": section.section,
             "meaning": section.meaning,
             "keys": [
                 {
@@ -52,12 +52,12 @@ def schema() -> str:
                     "required": key.required,
                     "when": key.when and {"key": key.when[0], "words": key.when[1]},
                     "unless": key.unless or None,
-                    "locked": (section.name, key.name) in LOCKED,
+                    "locked": (section.section, key.name) in LOCKED,
                 }
                 for key in section.keys
             ],
         }
-        for section in SECTIONS
+        for section in SECTIONS.values()
     ]
     return msgspec.json.encode({"type": "schema", "sections": sections}).decode()
 
@@ -106,13 +106,12 @@ def altered(skin: Skin, changes: Changes) -> Skin:
 
 def _tidy(skin: Skin, name: str, changes: Mapping[str, Any]) -> dict[str, Any]:
     """``changes``, and None for every key that cannot stand beside them and is not among them."""
-    section = next((section for section in SECTIONS if section.name == name), None)
-    if section is None:
+    if name not in SECTIONS:
         return dict(changes)
     merged = {**skin.document[name], **changes}
     barred = {
         key.name: None
-        for key in section.keys
+        for key in SECTIONS[name].keys
         if key.name not in changes
         and (
             (key.when and key.when[0] in changes and merged.get(key.when[0]) not in key.when[1])
@@ -122,7 +121,7 @@ def _tidy(skin: Skin, name: str, changes: Mapping[str, Any]) -> dict[str, Any]:
     return {**barred, **changes}
 
 
-def _form(kind: Kind) -> dict[str, Any]:
+def _form(kind: Kind[Any]) -> dict[str, Any]:
     match kind:
         case Choice():
             form: dict[str, Any] = {"form": "choice", "words": kind.words}
@@ -134,8 +133,9 @@ def _form(kind: Kind) -> dict[str, Any]:
             form = {**_form(kind.number), "words": kind.words.words}
         case OneOrEach():
             form = _form(kind.inner)
-        case Rows():
-            form = {"form": "rows", "names": kind.names, "inner": _form(kind.inner)}
+        case Table():
+            names, kinds = zip(*kind.row.entries.items(), strict=True)
+            form = {"form": "rows", "names": names, "inner": _form(kinds[0])}
         case _:
             form = {"form": "text"}
     return form

@@ -1,32 +1,30 @@
 """The skin file: outline, electrodes, material, drive, readout, mesh and settings; strict.
 
-What reads it (:class:`Section`, :class:`Key`, kinds of values) also reads other TOML files.
+What reads it (:class:`Section`, :func:`key`, kinds of values) also reads other TOML files.
 """
 
+from tomoskin.skin.body import ReadoutSettings
+from tomoskin.skin.build import SECTIONS
+from tomoskin.skin.find import read_text
 from tomoskin.skin.kinds import (
     Choice,
     Kind,
     Number,
     NumberOrWord,
     OneOrEach,
+    OneOrSpan,
     Quantity,
-    Rows,
+    Row,
+    Table,
     Text,
     Whole,
-    read_entry,
+    Words,
+    literal,
     show,
 )
 from tomoskin.skin.lay import lay
-from tomoskin.skin.page import section_text, skin_file_page
-from tomoskin.skin.read import check_names, read_section, toml_tables
-from tomoskin.skin.schema import SECTIONS, Key, Section
-from tomoskin.skin.settings import (
-    InverseSettings,
-    ReadoutSettings,
-    SignalSettings,
-    TouchSettings,
-    TwinChoice,
-)
+from tomoskin.skin.processing import InverseSettings, SignalSettings, TouchSettings, TwinChoice
+from tomoskin.skin.section import Key, Section, check_names, key, toml_tables
 from tomoskin.skin.skin import Skin
 
 __all__ = [
@@ -38,22 +36,24 @@ __all__ = [
     "Number",
     "NumberOrWord",
     "OneOrEach",
+    "OneOrSpan",
     "Quantity",
     "ReadoutSettings",
-    "Rows",
+    "Row",
     "Section",
     "SignalSettings",
     "Skin",
+    "Table",
     "Text",
     "TouchSettings",
     "TwinChoice",
     "Whole",
+    "Words",
     "check_names",
+    "key",
     "lay",
-    "read_entry",
-    "read_section",
-    "section_text",
+    "literal",
+    "read_text",
     "show",
-    "skin_file_page",
     "toml_tables",
 ]

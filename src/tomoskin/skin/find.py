@@ -19,8 +19,8 @@ _LARGEST = 1_000_000
 def built_in_names() -> tuple[str, ...]:
     """Names of the built-in skins, sorted."""
     folder = files("tomoskin.skin") / "builtin"
-    found = [entry.name.removesuffix(".toml") for entry in folder.iterdir()]
-    return tuple(sorted(name for name in found if not name.startswith("_")))
+    names = [entry.name.removesuffix(".toml") for entry in folder.iterdir()]
+    return tuple(sorted(name for name in names if not name.startswith("_")))
 
 
 def skin_text(skin: str | PathLike[str]) -> tuple[str, str]:
@@ -32,34 +32,39 @@ def skin_text(skin: str | PathLike[str]) -> tuple[str, str]:
         entry = files("tomoskin.skin") / "builtin" / f"{skin}.toml"
         return entry.read_text(encoding="utf-8"), BUILT_IN
     path = Path(fspath(skin))
-    return _read(path), str(path)
+    try:
+        return read_text(path, "a skin file", _LARGEST), str(path)
+    except SkinError as error:
+        raise _missing(path) if isinstance(error.__cause__, FileNotFoundError) else error from None
 
 
 def _missing(path: Path) -> SkinError:
-    known = built_in_names()
-    close = get_close_matches(str(path), known, n=1)
+    names = built_in_names()
+    close = get_close_matches(str(path), names, n=1)
     guess = f'did you mean "{close[0]}"? ' if close else ""
     return SkinError(
         "no such file, and no built-in skin of that name",
         where=str(path),
-        hint=f"{guess}built-in skins: {', '.join(known)}",
+        hint=f"{guess}built-in skins: {', '.join(names)}",
     )
 
 
-def _read(path: Path) -> str:
+def read_text(path: Path, what: str, most: int = 10_000_000) -> str:
+    """Text of ``what`` a person has written, of at most so many bytes.
+
+    Raises SkinError for what is no such file, and what cannot be read as text.
+    """
     where = str(path)
     try:
         if path.exists() and not path.is_file():
-            raise SkinError("is a folder or device, not a skin file", where=where)
-        if path.stat().st_size > _LARGEST:
-            raise SkinError("is too large for a skin file (over 1 MB)", where=where)
+            raise SkinError(f"is a folder or device, not {what}", where=where)
+        if path.stat().st_size > most:
+            raise SkinError(f"is too large for {what} (over {most / 1e6:g} MB)", where=where)
         return path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise _missing(path) from None
     except UnicodeDecodeError as error:
         raise SkinError(
             f"is not a text file (byte {error.start} is not UTF-8)", where=where
         ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise SkinError(f"cannot be read: {reason}", where=where[:80]) from None
+        raise SkinError(f"cannot be read: {reason}", where=where[:80]) from error

@@ -1,16 +1,18 @@
-"""What a value in a skin file may be: read it, or say what was expected."""
+"""What a value in a TOML file may be: read it in SI units, or say what was expected."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Generic, TypeVar
 
 from tomoskin.core import DIMENSIONS, parse_quantity
 
+T_co = TypeVar("T_co", covariant=True)
 
-class Kind(Protocol):
+
+class Kind(ABC, Generic[T_co]):
     """One sort of value; ``expected`` is the phrase that errors and the documentation use."""
 
     @property
@@ -19,48 +21,42 @@ class Kind(Protocol):
         """What a value must be, range included."""
 
     @abstractmethod
-    def read(self, value: object) -> Any:
-        """``value`` in SI units, or ValueError with what was expected and found."""
+    def accept(self, value: object) -> T_co | None:
+        """``value`` in SI units; None, or ValueError with a finer reason, where it is another."""
+
+    def read(self, value: object) -> T_co:
+        """``value`` in SI units. Raises ValueError with what was expected and what is there."""
+        accepted = self.accept(value)
+        if accepted is None:
+            raise ValueError(f"expected {self.expected}, got {show(value)}")
+        return accepted
 
 
 @dataclass(frozen=True)
-class Text(Kind):
-    """Any text."""
+class Text(Kind[str]):
+    """Any text; with ``most``, a short one on one line that is not blank."""
+
+    most: int | None = None
 
     @property
     def expected(self) -> str:
         """The phrase."""
-        return "text"
-
-    def read(self, value: object) -> str:
-        """The text."""
-        if not isinstance(value, str):
-            raise _unexpected(self, value)
-        return value
-
-
-@dataclass(frozen=True)
-class Name(Kind):
-    """A short text on one line, as long as the name of a file may be."""
-
-    most: int = 255
-
-    @property
-    def expected(self) -> str:
-        """The phrase."""
+        if self.most is None:
+            return "text"
         return f"text of 1 to {self.most} characters on one line"
 
-    def read(self, value: object) -> str:
+    def accept(self, value: object) -> str | None:
         """The text."""
-        if not isinstance(value, str) or not value.strip():
-            raise _unexpected(self, value)
-        if len(value) > self.most or not value.isprintable():
-            raise _unexpected(self, value)
-        return value
+        if not isinstance(value, str):
+            return None
+        if self.most is None:
+            return value
+        fits = bool(value.strip()) and len(value) <= self.most and value.isprintable()
+        return value if fits else None
 
 
 @dataclass(frozen=True)
-class Choice(Kind):
+class Choice(Kind[str]):
     """One of a few words."""
 
     words: tuple[str, ...]
@@ -70,15 +66,13 @@ class Choice(Kind):
         """The phrase."""
         return " or ".join(f'"{word}"' for word in self.words)
 
-    def read(self, value: object) -> str:
+    def accept(self, value: object) -> str | None:
         """The word."""
-        if not isinstance(value, str) or value not in self.words:
-            raise _unexpected(self, value)
-        return value
+        return value if isinstance(value, str) and value in self.words else None
 
 
 @dataclass(frozen=True)
-class Whole(Kind):
+class Whole(Kind[int]):
     """A whole number in a range."""
 
     low: int
@@ -89,17 +83,15 @@ class Whole(Kind):
         """The phrase."""
         return f"a whole number from {self.low} to {self.high}"
 
-    def read(self, value: object) -> int:
+    def accept(self, value: object) -> int | None:
         """The number."""
         if isinstance(value, bool) or not isinstance(value, int):
-            raise _unexpected(self, value)
-        if not self.low <= value <= self.high:
-            raise _unexpected(self, value)
-        return value
+            return None
+        return value if self.low <= value <= self.high else None
 
 
 @dataclass(frozen=True)
-class Number(Kind):
+class Number(Kind[float]):
     """A number without unit in a range."""
 
     low: float
@@ -110,17 +102,15 @@ class Number(Kind):
         """The phrase."""
         return f"a number from {self.low:g} to {self.high:g}"
 
-    def read(self, value: object) -> float:
-        """The number."""
+    def accept(self, value: object) -> float | None:
+        """The number; NaN is none."""
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise _unexpected(self, value)
-        if not self.low <= value <= self.high:  # NaN fails too
-            raise _unexpected(self, value)
-        return float(value)
+            return None
+        return float(value) if self.low <= value <= self.high else None
 
 
 @dataclass(frozen=True)
-class NumberOrWord(Kind):
+class NumberOrWord(Kind[float | str]):
     """A number in a range, or one of a few words in its place."""
 
     number: Number
@@ -131,18 +121,13 @@ class NumberOrWord(Kind):
         """The phrase."""
         return f"{self.number.expected}, or {self.words.expected}"
 
-    def read(self, value: object) -> float | str:
+    def accept(self, value: object) -> float | str | None:
         """The number or the word."""
-        kind: Kind = self.words if isinstance(value, str) else self.number
-        try:
-            found: float | str = kind.read(value)
-        except ValueError:
-            raise _unexpected(self, value) from None
-        return found
+        return self.words.accept(value) or self.number.accept(value)
 
 
 @dataclass(frozen=True)
-class Quantity(Kind):
+class Quantity(Kind[float]):
     """A number with a unit; the range is stated in ``unit``, the value comes back in SI."""
 
     dimension: str
@@ -156,68 +141,145 @@ class Quantity(Kind):
         article = "an" if self.dimension[0] in "aeiou" else "a"
         return f"{article} {self.dimension} from {self.low:g} to {self.high:g} {self.unit}"
 
-    def read(self, value: object) -> float:
-        """The quantity in SI units."""
+    def accept(self, value: object) -> float | None:
+        """The quantity in SI units; NaN is none."""
         if isinstance(value, int | float) and not isinstance(value, bool):
-            number = show(value)
-            example = f'"{number} {self.unit}"'
-            raise ValueError(f"expected {self.expected}, got {number} without a unit; {example}?")
+            example = f'"{show(value)} {self.unit}"'
+            raise ValueError(
+                f"expected {self.expected}, got {show(value)} without a unit; {example}?"
+            )
         if not isinstance(value, str):
-            raise _unexpected(self, value)
+            return None
         result = parse_quantity(value, self.dimension)
         size = DIMENSIONS[self.dimension][self.unit]
         low, high = (end * size for end in (self.low, self.high))
-        if not low - 1e-12 * abs(low) <= result <= high + 1e-12 * abs(high):  # NaN fails too
-            raise _unexpected(self, value)
-        return result
+        fits = low - 1e-12 * abs(low) <= result <= high + 1e-12 * abs(high)
+        return result if fits else None
 
 
 @dataclass(frozen=True)
-class OneOrEach(Kind):
+class OneOrEach(Kind[tuple[Any, ...]]):
     """One value for all electrodes, or a list with one for each; comes back as a tuple."""
 
-    inner: Kind
+    inner: Kind[Any]
 
     @property
     def expected(self) -> str:
         """The phrase."""
         return f"{self.inner.expected}, or a list of these, one per electrode"
 
-    def read(self, value: object) -> tuple[Any, ...]:
+    def accept(self, value: object) -> tuple[Any, ...]:
         """A tuple: of one, or of one per electrode."""
         if not isinstance(value, list):
             return (self.inner.read(value),)
-        return tuple(read_entry(f"entry {i}", self.inner, item) for i, item in enumerate(value))
+        return tuple(_entry(f"entry {i}", self.inner, item) for i, item in enumerate(value))
 
 
 @dataclass(frozen=True)
-class Rows(Kind):
-    """A list of pairs, such as ``[["0 mm", "5 mm"], …]`` or ``[[1, 0], …]``."""
+class OneOrSpan(Kind[tuple[Any, Any]]):
+    """One value, or ``[low, high]`` to draw from; comes back as (low, high)."""
 
-    inner: Kind
-    names: tuple[str, str]
-    least: int
+    inner: Kind[Any]
 
     @property
     def expected(self) -> str:
         """The phrase."""
-        pair = ", ".join(self.names)
-        return f"a list of at least {self.least} pairs [{pair}], each {self.inner.expected}"
+        return f"{self.inner.expected}, or a pair [low, high] of these"
 
-    def read(self, value: object) -> tuple[tuple[Any, Any], ...]:
-        """The pairs."""
+    def accept(self, value: object) -> tuple[Any, Any]:
+        """Low and high; the same for one value."""
+        if not isinstance(value, list):
+            one = self.inner.read(value)
+            return one, one
+        low, high = Row({"low": self.inner, "high": self.inner}).read(value)
+        if low > high:
+            raise ValueError(f"expected low before high, got {show(value)}")
+        return low, high
+
+
+@dataclass(frozen=True)
+class Words(Kind[tuple[str, ...]]):
+    """One word out of a few, or a list of different ones; comes back as a tuple."""
+
+    words: Choice
+
+    @property
+    def expected(self) -> str:
+        """The phrase."""
+        return f"{self.words.expected}, or a list of different ones"
+
+    def accept(self, value: object) -> tuple[str, ...] | None:
+        """The words."""
+        given = value if isinstance(value, list) else [value]
+        accepted = [word for item in given if (word := self.words.accept(item))]
+        different = len(set(accepted)) == len(given) > 0
+        return tuple(accepted) if different else None
+
+
+@dataclass(frozen=True)
+class Row(Kind[tuple[Any, ...]]):
+    """A list of fixed length, each entry with a name and a kind; comes back as a tuple."""
+
+    entries: Mapping[str, Kind[Any]]
+
+    @property
+    def noun(self) -> str:
+        """What it is called: a pair holds two of one kind."""
+        return "pair" if len(self.entries) == 2 and self._same else "row"
+
+    @property
+    def layout(self) -> str:
+        """Names of the entries, and what each is."""
+        names = f"[{', '.join(self.entries)}]"
+        if self._same:
+            return f"{names}, each {next(iter(self.entries.values())).expected}"
+        kinds = ", ".join(f"{name}: {kind.expected}" for name, kind in self.entries.items())
+        return f"{names} ({kinds})"
+
+    @property
+    def expected(self) -> str:
+        """The phrase."""
+        return f"a {self.noun} {self.layout}"
+
+    def accept(self, value: object) -> tuple[Any, ...] | None:
+        """The entries."""
+        if not isinstance(value, list) or len(value) != len(self.entries):
+            return None
+        entries = zip(self.entries.items(), value, strict=True)
+        return tuple(_entry(name, kind, item) for (name, kind), item in entries)
+
+    @property
+    def _same(self) -> bool:
+        first, *others = self.entries.values()
+        return all(other == first for other in others)
+
+
+@dataclass(frozen=True)
+class Table(Kind[tuple[tuple[Any, ...], ...]]):
+    """A list of at least so many rows; comes back as a tuple. ``ascending``: by their first entry,
+    a time, as a course with straight lines between has them."""
+
+    row: Row
+    least: int = 1
+    ascending: bool = False
+
+    @property
+    def expected(self) -> str:
+        """The phrase."""
+        if self.ascending:
+            return f"a list of {self.row.noun}s {self.row.layout}, in the order of their times"
+        return f"a list of at least {self.least} {self.row.noun}s {self.row.layout}"
+
+    def accept(self, value: object) -> tuple[tuple[Any, ...], ...] | None:
+        """The rows."""
         if not isinstance(value, list) or len(value) < self.least:
-            raise _unexpected(self, value)
-        return tuple(self._pair(i, row) for i, row in enumerate(value))
-
-    def _pair(self, i: int, row: object) -> tuple[Any, Any]:
-        if not isinstance(row, list) or len(row) != 2:
-            raise ValueError(f"row {i}: expected a pair [{', '.join(self.names)}], got {show(row)}")
-        first, second = (
-            read_entry(f"row {i}, {name}", self.inner, item)
-            for name, item in zip(self.names, row, strict=True)
-        )
-        return first, second
+            return None
+        rows = tuple(_entry(f"row {i}", self.row, item) for i, item in enumerate(value))
+        for i in range(1, len(rows) if self.ascending else 0):
+            before, time = rows[i - 1][0], rows[i][0]
+            if not time > before:
+                raise ValueError(f"row {i}: expected a time after {before:g} s, got {time:g} s")
+        return rows
 
 
 def show(value: object) -> str:
@@ -241,13 +303,15 @@ _ESCAPES = {chr(code): f"\\u{code:04X}" for code in [*range(32), 127]}
 _ESCAPES |= {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t"}
 
 
-def read_entry(place: str, kind: Kind, value: object) -> Any:
-    """``value`` as ``kind`` reads it; ValueError that names its ``place`` in a list."""
+class _EntryError(ValueError):
+    """What is wrong with an entry of a list, after its place there."""
+
+
+def _entry(place: str, kind: Kind[Any], value: object) -> Any:
+    """``value`` as ``kind`` reads it; an error names its ``place`` in a list, or in several."""
     try:
         return kind.read(value)
+    except _EntryError as error:
+        raise _EntryError(f"{place}, {error}") from None
     except ValueError as error:
-        raise ValueError(f"{place}: {error}") from None
-
-
-def _unexpected(kind: Kind, value: object) -> ValueError:
-    return ValueError(f"expected {kind.expected}, got {show(value)}")
+        raise _EntryError(f"{place}: {error}") from None

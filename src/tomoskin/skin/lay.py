@@ -1,4 +1,4 @@
-"""A skin for a surface that was scanned or drawn, electrodes at places in space."""
+"""A skin for a surface that was scanned or drawn, electrodes at positions in space."""
 
 from __future__ import annotations
 
@@ -54,9 +54,9 @@ def lay(
     """
     scale = DIMENSIONS["length"][unit]
     draped = Draped.read(Path(file), scale=scale)
-    wanted = scale * np.asarray(electrodes, dtype=np.float64)
-    _check_sizes(draped.points, wanted, str(file), unit)
-    places = draped.place(wanted, "electrode")
+    middles = scale * np.asarray(electrodes, dtype=np.float64)
+    _check_sizes(draped.points, middles, str(file), unit)
+    positions = draped.place(middles, "electrode")
     rim = fewer_corners(draped.outline.vertices)
     given = like.document["electrodes"]
     from_there = path.relpath(file, Path(source).parent)
@@ -70,7 +70,7 @@ def lay(
             | {"shape": "file", "file": from_there, "unit": unit},
             "electrodes": dict.fromkeys(given)
             | {
-                "positions": _in_mm(places),
+                "positions": _in_mm(positions),
                 "width": given["width"],
                 "contact_impedance": contact if isinstance(contact, str) else contact[0],
             },

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from typing import Any, Self
@@ -15,17 +15,19 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.mesh import ElectrodeArc, Mesh, Outline, Surface, laid_on, triangulate
 from tomoskin.pattern import Pattern
-from tomoskin.skin.build import impedances, laid, located, pattern_of, placed, readout_of
-from tomoskin.skin.find import built_in_names, skin_text
-from tomoskin.skin.read import Document, complete, parse, values
-from tomoskin.skin.settings import (
-    InverseSettings,
-    ReadoutSettings,
-    SignalSettings,
-    TouchSettings,
-    TwinChoice,
+from tomoskin.skin.body import ReadoutSettings
+from tomoskin.skin.build import (
+    BODY,
+    FORMAT,
+    SECTIONS,
+    SkinBody,
+    SkinSections,
+    check_readout,
+    located,
 )
-from tomoskin.skin.write import toml
+from tomoskin.skin.find import built_in_names, skin_text
+from tomoskin.skin.processing import InverseSettings, SignalSettings, TouchSettings, TwinChoice
+from tomoskin.skin.section import Document, check_names, toml_tables, toml_text
 
 _BODY = ("outline", "surface", "electrodes", "material", "drive", "readout", "mesh", "twin")
 """Sections that sheet, mesh and scan rest on; the others only make images of it."""
@@ -75,7 +77,8 @@ class Skin:
     signal: SignalSettings
     touch: TouchSettings
     twin: TwinChoice
-    _pattern: Pattern = field(repr=False)
+    _body: SkinBody = field(repr=False)
+    _sections: SkinSections = field(repr=False)
 
     @classmethod
     def load(cls, skin: str | PathLike[str]) -> Self:
@@ -93,7 +96,11 @@ class Skin:
     @classmethod
     def from_toml(cls, text: str, *, source: str = "skin") -> Self:
         """Skin from the text of a skin file; ``source`` names it in errors."""
-        return cls._of(parse(text, source), source)
+        written = toml_tables(text, source, FORMAT)
+        check_names(written, list(SECTIONS), "section", source)
+        document, records = _read({name: written.get(name, {}) for name in SECTIONS}, source)
+        sections = SkinSections(**records)
+        return cls._of(document, sections, SkinBody.of(sections, source), source)
 
     @staticmethod
     def names() -> tuple[str, ...]:
@@ -106,11 +113,19 @@ class Skin:
         A value of None takes the key out. ``source`` is the file that it will be, if another.
         """
         source = source or self.source
-        raw: dict[str, dict[str, Any]] = {s: dict(keys) for s, keys in self.document.items()}
-        for section, keys in changes.items():
-            merged = raw.get(section, {}) | dict(keys)
-            raw[section] = {key: value for key, value in merged.items() if value is not None}
-        return self._of(complete(raw, source), source)
+        check_names(changes, list(SECTIONS), "section", source)
+        written = {name: {**self.document[name], **keys} for name, keys in changes.items()}
+        document, records = _read(
+            {
+                name: {key: value for key, value in keys.items() if value is not None}
+                for name, keys in written.items()
+            },
+            source,
+        )
+        sections = replace(self._sections, **records)
+        kept = source == self.source and not BODY & changes.keys()
+        body = self._body if kept else SkinBody.of(sections, source)
+        return self._of({**self.document, **document}, sections, body, source)
 
     @property
     def body(self) -> dict[str, Any]:
@@ -128,12 +143,12 @@ class Skin:
     @property
     def polarity(self) -> float:
         """Sign of the measured voltages: −1 where they come reversed."""
-        return -1.0 if self.document["drive"].get("polarity") == "reversed" else 1.0
+        return -1.0 if self._sections.drive.polarity == "reversed" else 1.0
 
     @property
     def is_flat(self) -> bool:
         """Whether the sheet lies flat, on no surface."""
-        return bool(self.document["surface"]["shape"] == "flat")
+        return self._sections.surface.shape == "flat"
 
     @cached_property
     def electrode_centres(self) -> FloatArray:
@@ -144,13 +159,16 @@ class Skin:
     @cached_property
     def identity(self) -> str:
         """Short hash of everything but name, description, source and twin."""
-        known = values(self.document, self.source)
-        content = {k: v for k, v in known.items() if k not in ("skin", "twin")}
+        content = {
+            name: {key: getattr(getattr(self._sections, name), key) for key in keys}
+            for name, keys in self.document.items()
+            if name not in ("skin", "twin")
+        }
         return hashlib.sha256(_canonical(content).encode()).hexdigest()[:16]
 
     def pattern(self) -> Pattern:
         """Drive and measurement table."""
-        return self._pattern
+        return self._body.pattern
 
     def mesh(self) -> Mesh:
         """Mesh of the sheet in its own coordinates, with the lengths it has on its surface; made
@@ -162,7 +180,7 @@ class Skin:
 
     def to_toml(self) -> str:
         """Text of a skin file that gives this skin again, defaults written out."""
-        return toml(self.document)
+        return toml_text(self.document, SECTIONS.values(), FORMAT)
 
     @cached_property
     def _mesh(self) -> Mesh:
@@ -172,28 +190,37 @@ class Skin:
             return laid_on(flat, self.surface)
 
     @classmethod
-    def _of(cls, document: Document, source: str) -> Self:
-        value = values(document, source)
-        outline, arcs = placed(value, source)
+    def _of(cls, document: Document, sections: SkinSections, body: SkinBody, source: str) -> Self:
+        check_readout(sections.readout, source)
         return cls(
             source=source,
             document=document,
-            name=value["skin"]["name"],
-            description=value["skin"]["description"],
-            outline=outline,
-            arcs=arcs,
-            surface=laid(value, outline, source),
-            conductivity=1.0 / value["material"]["sheet_resistance"],
-            contact_impedance=impedances(value, len(arcs), source),
-            current=value["drive"]["current"],
-            mesh_cells=value["mesh"]["cells"],
-            readout=readout_of(value, source),
-            inverse=InverseSettings(**value["inverse"]),
-            signal=SignalSettings(**value["signal"]),
-            touch=TouchSettings(**value["touch"]),
-            twin=TwinChoice(**value["twin"]),
-            _pattern=pattern_of(value, len(arcs), source),
+            name=sections.skin.name,
+            description=sections.skin.description,
+            outline=body.outline,
+            arcs=body.arcs,
+            surface=body.surface,
+            conductivity=1.0 / sections.material.sheet_resistance,
+            contact_impedance=body.contact_impedance,
+            current=sections.drive.current,
+            mesh_cells=sections.mesh.cells,
+            readout=sections.readout,
+            inverse=sections.inverse,
+            signal=sections.signal,
+            touch=sections.touch,
+            twin=sections.twin,
+            _body=body,
+            _sections=sections,
         )
+
+
+def _read(written: Mapping[str, object], source: str) -> tuple[Document, dict[str, Any]]:
+    """Sections as written with their defaults, and their records."""
+    places = {name: f"{source}: {SECTIONS[name].heading}" for name in SECTIONS if name in written}
+    document = {
+        name: SECTIONS[name].complete(written[name], place) for name, place in places.items()
+    }
+    return document, {name: SECTIONS[name].read(document[name], places[name]) for name in document}
 
 
 def _canonical(content: Document) -> str:

@@ -3,30 +3,26 @@
 from tomoskin.twin.bend import BendSettings, Bent, Deformation, Pose, Stretched, strain_of
 from tomoskin.twin.board import Board
 from tomoskin.twin.circuit import ElectronicsSettings, Lines, line_potentials
-from tomoskin.twin.clock import VirtualClock
 from tomoskin.twin.contact import ContactSettings, Dented, Grid, solve_contact
+from tomoskin.twin.course import ScriptedBend, bent, bent_truth, pressed
 from tomoskin.twin.dent import Load, indent
 from tomoskin.twin.device import TwinDevice
-from tomoskin.twin.disturbance import Disturbance, disturbed, reboots
-from tomoskin.twin.faults import FaultEvent, Faults, faults_at
-from tomoskin.twin.labelled import SetPlan, make_shard
+from tomoskin.twin.electronics import TwinElectronics, convert
+from tomoskin.twin.faults import Disturbance, FaultEvent, Faults, disturbed, faults_at, reboots
 from tomoskin.twin.layered import Inclusion, Layered, Plate
 from tomoskin.twin.line import FaultyLine, Line, LineSettings
 from tomoskin.twin.material import MaterialSettings, MaterialState, advance, conductivity
 from tomoskin.twin.population import COMMON_PRESSES, Population
+from tomoskin.twin.presets import PRESETS, TwinSettings
 from tomoskin.twin.probe import Contact, Press, Probe
-from tomoskin.twin.readout import TwinElectronics, convert
 from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, sample_table, table_of
 from tomoskin.twin.script import Script
-from tomoskin.twin.script_bend import ScriptedBend, bent, bent_truth
 from tomoskin.twin.script_check import check_script, check_settling
-from tomoskin.twin.script_page import script_page
-from tomoskin.twin.settings import PRESETS, TwinSettings
 from tomoskin.twin.shape import FACES, Circle, Face, Finger, Shape, Square
+from tomoskin.twin.shards import SetPlan, make_shard
 from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.source import make_electronics, make_twin, open_twin, read_settings
-from tomoskin.twin.timeline import pressed
-from tomoskin.twin.transport import Clock, TwinTransport, WallClock
+from tomoskin.twin.transport import Clock, TwinTransport, VirtualClock, WallClock
 
 __all__ = [
     "COMMON_PRESSES",
@@ -97,7 +93,6 @@ __all__ = [
     "read_settings",
     "reboots",
     "sample_table",
-    "script_page",
     "solve_contact",
     "strain_of",
     "table_of",

@@ -1,4 +1,4 @@
-"""The twin's board: its limits, and what it refuses."""
+"""The twin's board: its limits, what it refuses, and the scan that it holds."""
 
 from __future__ import annotations
 
@@ -8,14 +8,21 @@ from dataclasses import dataclass
 from tomoskin.source import PRESCALERS
 from tomoskin.wire import (
     SCHEMA,
+    Ack,
     Drive,
     Format,
+    GetPattern,
+    GetScan,
+    HeldPattern,
+    HeldScan,
     Info,
+    Message,
     Reset,
     Result,
     SetFormat,
     SetPattern,
     SetScan,
+    type_byte,
 )
 
 Verdict = tuple[Result, int]
@@ -24,6 +31,8 @@ Verdict = tuple[Result, int]
 OK: Verdict = (Result.OK, 0)
 _MAX_SETTLING = 100_000
 _CONVERSIONS = (1, 64)
+_DRIVES_OF_PATTERN = 9
+"""Drives that a PATTERN holds at most."""
 
 
 @dataclass(frozen=True)
@@ -107,3 +116,48 @@ class Board:
             return Result.INCOMPLETE, list(drives).index(None)
         samples = sum(drive.mask.bit_count() for drive in drives if drive)
         return OK if samples <= self.max_samples else (Result.TOO_MANY_SAMPLES, self.max_samples)
+
+
+class HeldScanning:
+    """The scan that a host has set on a ``board``, as far as it has come."""
+
+    def __init__(self, board: Board) -> None:
+        self._board = board
+        self.scan: SetScan | None = None
+        self.format = Format.SIXTEEN
+        self.drives: list[Drive | None] = []
+
+    def set(self, command: SetScan | SetPattern | SetFormat) -> Verdict:
+        """Take over what the board accepts."""
+        match command:
+            case SetScan():
+                verdict = self._board.check_scan(command)
+                if verdict == OK:
+                    self.scan, self.format = command, Format.SIXTEEN
+                    self.drives = [None] * command.n_drives
+            case SetPattern():
+                verdict = self._board.check_drives(command, self.scan)
+                if verdict == OK:
+                    end = command.first + len(command.drives)
+                    self.drives[command.first : end] = command.drives
+            case SetFormat():
+                verdict = self._board.check_format(command, self.scan)
+                if verdict == OK:
+                    self.format = command.format
+        return verdict
+
+    def answer(self, command: GetScan | GetPattern) -> Message:
+        """What is held, for a host that reads it back."""
+        scan, request = self.scan, command.request
+        if scan is None:
+            return Ack(request, type_byte(type(command)), Result.WRONG_CONFIGURATION, 0)
+        if isinstance(command, GetScan):
+            return HeldScan(
+                request, scan.configuration, scan.n_drives, scan.settling, scan.dead_time,
+                scan.oversampling, scan.prescaler, scan.current_limit, self.format,
+            )  # fmt: skip
+        if command.first >= scan.n_drives:
+            return Ack(request, type_byte(GetPattern), Result.BAD_VALUE, 1)
+        some = self.drives[command.first : command.first + _DRIVES_OF_PATTERN]
+        drives = tuple(drive or Drive(255, 255, 0) for drive in some)
+        return HeldPattern(request, scan.configuration, command.first, drives)

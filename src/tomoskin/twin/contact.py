@@ -254,9 +254,9 @@ def _faces(probes: Sequence[Probe], grid: Grid) -> list[tuple[IntArray, FloatArr
 
 
 def _spread(values: FloatArray, nodes: IntArray, shape: tuple[int, int]) -> FloatArray:
-    whole = np.zeros(shape)
-    whole.ravel()[nodes] = values
-    return whole
+    full = np.zeros(shape)
+    full.ravel()[nodes] = values
+    return full
 
 
 def _compliance(settings: ContactSettings, grid: Grid) -> Callable[[FloatArray], FloatArray]:

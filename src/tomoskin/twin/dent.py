@@ -171,9 +171,9 @@ def _blended(
     for solved_at, weight in _rungs(shape, force):
         dent = solved_dent(shape, settings, solved_at, blur)
         scale, table = force / solved_at, dent.table
-        left = settings.locked(dent.travel * scale)
-        mixed = weight * scale * left * table[:4]
-        mixed[1:] += weight * (scale * left) ** 2 * table[4:7]
+        share = settings.locked(dent.travel * scale)
+        mixed = weight * scale * share * table[:4]
+        mixed[1:] += weight * (scale * share) ** 2 * table[4:7]
         if drag != (0.0, 0.0):
             mixed[1:] += weight / solved_at * drag[0] * table[7:10]
             mixed[1:] += weight / solved_at * drag[1] * table[10:]

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tomoskin.core import Frame
 from tomoskin.source import conversion_time
-from tomoskin.twin.board import OK, Board, Verdict
+from tomoskin.twin.board import OK, Board, HeldScanning, Verdict
 from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, sample_table
 from tomoskin.wire import (
     SCHEMA,
     Ack,
     Command,
     Deframer,
-    Drive,
     Fault,
     FaultCode,
     Format,
@@ -22,8 +20,6 @@ from tomoskin.wire import (
     GetInfo,
     GetPattern,
     GetScan,
-    HeldPattern,
-    HeldScan,
     Hello,
     Message,
     PackedFrame,
@@ -41,14 +37,11 @@ from tomoskin.wire import (
     decode_payload,
     encode,
     is_command,
-    type_byte,
 )
 
 _HELLO_INTERVAL = 0.5
 _HEARTBEAT = 2.0
 _HEARTBEAT_MS = (100, 10_000)
-_TOLD = 9
-"""Drives in a PATTERN."""
 
 
 @dataclass
@@ -83,9 +76,7 @@ class TwinDevice:
         self._power_on = self._heard = now
         self._next_hello: float | None = now
         self._heartbeat = _HEARTBEAT
-        self._scan: SetScan | None = None
-        self._format = Format.SIXTEEN
-        self._drives: list[Drive | None] = []
+        self._held = HeldScanning(self._board)
         self._scanning: _Scanning | None = None
         self._last: tuple[int, int] | None = None
         self._last_reply = b""
@@ -123,7 +114,7 @@ class TwinDevice:
             self._next_hello = max(self._next_hello + _HELLO_INTERVAL, now)
         if self._scanning and now >= self._scanning.due:
             frame = self._frame(self._scanning, now)
-            self._say(PackedFrame.of(frame) if self._format is Format.PACKED else frame)
+            self._say(PackedFrame.of(frame) if self._held.format is Format.PACKED else frame)
         data = bytes(self._out)
         self._out.clear()
         return data
@@ -156,8 +147,8 @@ class TwinDevice:
         self._next_hello = now
 
     def _refuse(self, payload: bytes) -> None:
-        known = {message.type for message in SCHEMA.messages if message.to_device}
-        result = Result.BAD_LENGTH if payload[0] in known else Result.UNKNOWN_COMMAND
+        commands = {message.type for message in SCHEMA.messages if message.to_device}
+        result = Result.BAD_LENGTH if payload[0] in commands else Result.UNKNOWN_COMMAND
         self._say(Ack(payload[1], payload[0], result, 0))
 
     def _obey(self, command: Command, payload: bytes, now: float) -> None:
@@ -166,7 +157,7 @@ class TwinDevice:
         if isinstance(command, GetInfo):
             self._last_reply = encode(self._board.info(command.request))
         elif isinstance(command, GetScan | GetPattern):
-            self._last_reply = encode(_held(command, self._scan, self._drives, self._format))
+            self._last_reply = encode(self._held.answer(command))
         elif identity != self._last:
             result, detail = self._run(command, now)
             self._last_reply = encode(Ack(command.request, payload[0], result, detail))
@@ -178,7 +169,8 @@ class TwinDevice:
             case Stop():
                 self._scanning = None
             case SafeOff():
-                self._scanning, self._scan, self._drives = None, None, []
+                self._scanning = None
+                self._held = HeldScanning(self._board)
             case SetHeartbeat():
                 low, high = _HEARTBEAT_MS
                 if not low <= command.interval <= high:
@@ -187,36 +179,19 @@ class TwinDevice:
             case SetScan() | SetPattern() | SetFormat() | Start() | SetBaud() if self._scanning:
                 return Result.BUSY, 0
             case SetScan() | SetPattern() | SetFormat():
-                return self._configure(command)
+                return self._held.set(command)
             case Start():
                 return self._start(command, now)
             case SetBaud() | Ping() | GetInfo() | GetScan() | GetPattern():
                 pass
         return OK
 
-    def _configure(self, command: SetScan | SetPattern | SetFormat) -> Verdict:
-        match command:
-            case SetScan():
-                verdict = self._board.check_scan(command)
-                if verdict == OK:
-                    self._scan, self._format = command, Format.SIXTEEN
-                    self._drives = [None] * command.n_drives
-            case SetPattern():
-                verdict = self._board.check_drives(command, self._scan)
-                if verdict == OK:
-                    end = command.first + len(command.drives)
-                    self._drives[command.first : end] = command.drives
-            case SetFormat():
-                verdict = self._board.check_format(command, self._scan)
-                if verdict == OK:
-                    self._format = command.format
-        return verdict
-
     def _start(self, command: Start, now: float) -> Verdict:
-        verdict = self._board.check_start(command.configuration, self._scan, self._drives)
-        if verdict != OK or self._scan is None:
+        held = self._held
+        verdict = self._board.check_start(command.configuration, held.scan, held.drives)
+        if verdict != OK or held.scan is None:
             return verdict
-        scan, drives = self._scan, [drive for drive in self._drives if drive]
+        scan, drives = held.scan, [drive for drive in held.drives if drive]
         times = ScanClock(
             scan.dead_time * 1e-6, scan.settling * 1e-6, conversion_time(scan.prescaler)
         )
@@ -229,25 +204,3 @@ class TwinDevice:
 
     def _say(self, message: Message) -> None:
         self._out += encode(message)
-
-
-def _held(
-    command: GetScan | GetPattern,
-    scan: SetScan | None,
-    held: Sequence[Drive | None],
-    sample_format: Format,
-) -> Message:
-    """What the device holds, as it is asked for by ``command``."""
-    request = command.request
-    if scan is None:
-        return Ack(request, type_byte(type(command)), Result.WRONG_CONFIGURATION, 0)
-    if isinstance(command, GetScan):
-        return HeldScan(
-            request, scan.configuration, scan.n_drives, scan.settling, scan.dead_time,
-            scan.oversampling, scan.prescaler, scan.current_limit, sample_format,
-        )  # fmt: skip
-    if command.first >= scan.n_drives:
-        return Ack(request, type_byte(GetPattern), Result.BAD_VALUE, 1)
-    some = held[command.first : command.first + _TOLD]
-    drives = tuple(drive or Drive(255, 255, 0) for drive in some)
-    return HeldPattern(request, scan.configuration, command.first, drives)

@@ -59,8 +59,8 @@ class Line:
         chance = self._random.random((2, len(sent)))
         bit = self._random.integers(0, 8, len(sent))
         flipped = np.where(chance[0] < self.settings.corruption, sent ^ (1 << bit), sent)
-        left = flipped[chance[1] >= self.settings.loss].astype(np.uint8)
-        return bytes(left)
+        arrived = flipped[chance[1] >= self.settings.loss].astype(np.uint8)
+        return bytes(arrived)
 
 
 class FaultyLine:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import field, fields
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 from tomoskin.core import ModelError
@@ -12,21 +11,11 @@ from tomoskin.core import ModelError
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-Row = tuple[str, str, str, str]
-"""Name, unit, meaning and source."""
-
 
 def parameter(default: Any, unit: str, meaning: str, source: str) -> Any:
     """A field of a settings record that says what it is and where its default comes from."""
     metadata = {"unit": unit, "meaning": meaning, "source": source}
     return field(default=default, metadata=metadata)
-
-
-def documented(record: type[DataclassInstance]) -> Iterator[Row]:
-    """The parameters of a settings record, in their order."""
-    for one in fields(record):
-        data = one.metadata
-        yield one.name, data["unit"], data["meaning"], data["source"]
 
 
 def check_numbers(record: DataclassInstance, above: str = "", least: str = "") -> None:

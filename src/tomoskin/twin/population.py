@@ -1,18 +1,16 @@
-"""What labelled frames are drawn from: numbers, places, sizes and forces of presses."""
+"""What labelled frames are drawn from: numbers, positions, sizes and forces of presses."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from tomoskin.core import FloatArray, ScriptError
 from tomoskin.mesh import Outline
-from tomoskin.skin import read_section
 from tomoskin.twin.probe import Probe
 from tomoskin.twin.script import of_script, tables_of
-from tomoskin.twin.script_schema import PRESSES
+from tomoskin.twin.script_schema import PressesSection
 from tomoskin.twin.shape import FACES
 
 _STEP = 0.5e-3
@@ -22,34 +20,11 @@ _TRIES = 2000
 """Places drawn for one probe before there is taken to be no room for it."""
 
 
-@dataclass(frozen=True)
-class Population:
-    """Ranges that presses are drawn from, evenly and independently.
+class Population(PressesSection):
+    """Ranges that presses are drawn from, evenly and independently: a script's ``[presses]``.
 
-    Attributes
-    ----------
-    count
-        Least and most presses at once.
-    shapes
-        Faces, one as likely as another; their angles are drawn too.
-    size, force
-        Least and greatest half extent, m, and force, N.
-    hold
-        s for which they have pressed.
-    margin, apart
-        Distance of a probe's middle from the rim and from others, at least, m.
-    preset
-        Name of the twin's settings; None for the skin's own.
+    Half extents ``size`` and ``margin`` and ``apart`` are in m, ``force`` in N, ``hold`` in s.
     """
-
-    count: tuple[int, int]
-    shapes: tuple[str, ...]
-    size: tuple[float, float]
-    force: tuple[float, float]
-    hold: float
-    margin: float
-    apart: float
-    preset: str | None = None
 
     @classmethod
     def from_toml(cls, text: str, *, source: str = "script") -> Self:
@@ -62,20 +37,14 @@ class Population:
         """
         with of_script():
             tables = tables_of(text, source)
-            others = [name for name in tables if name != PRESSES.name]
-            if others or PRESSES.name not in tables:
+            others = [name for name in tables if name != cls.section]
+            if others or cls.section not in tables:
                 raise ScriptError(
                     "expected the section [presses] alone",
                     where=f"{source}: [{others[0]}]" if others else source,
                     hint="labelled frames have no timeline: leave --presses out to run one",
                 )
-            return cls.of(tables[PRESSES.name], f"{source}: [{PRESSES.name}]")
-
-    @classmethod
-    def of(cls, given: object, where: str) -> Self:
-        """Population of the section's keys as written."""
-        with of_script():
-            return cls(**read_section(PRESSES, given, where))
+            return cls.read(tables[cls.section], f"{source}: {cls.heading}")
 
     def draw(self, outline: Outline, random: np.random.Generator) -> tuple[Probe, ...]:
         """Presses of one frame on a sheet of that ``outline``.
@@ -86,10 +55,10 @@ class Population:
             When there is no room for as many, so far from each other and the rim.
         """
         number = int(random.integers(self.count[0], self.count[1] + 1))
-        places = np.empty((0, 2))
+        positions = np.empty((0, 2))
         for _ in range(number):
-            places = np.vstack([places, self._place(outline, places, random)])
-        return tuple(self._probe(place, random) for place in places)
+            positions = np.vstack([positions, self._place(outline, positions, random)])
+        return tuple(self._probe(position, random) for position in positions)
 
     def _place(
         self, outline: Outline, others: FloatArray, random: np.random.Generator
@@ -97,9 +66,9 @@ class Population:
         corners = outline.polyline(outline.length / 64)
         low, high = corners.min(axis=0), corners.max(axis=0)
         for _ in range(_TRIES):
-            place = np.asarray(random.uniform(low, high))
-            if self._has_room(outline, place, others):
-                return place
+            position = np.asarray(random.uniform(low, high))
+            if self._has_room(outline, position, others):
+                return position
         raise ScriptError(
             f"found no place {1e3 * self.margin:g} mm from the rim and {1e3 * self.apart:g} mm "
             f"from {len(others)} other probes",
@@ -107,20 +76,20 @@ class Population:
             hint="ask for fewer, or let them be closer",
         )
 
-    def _has_room(self, outline: Outline, place: FloatArray, others: FloatArray) -> bool:
-        if len(others) and np.hypot(*(others - place).T).min() < self.apart:
+    def _has_room(self, outline: Outline, position: FloatArray, others: FloatArray) -> bool:
+        if len(others) and np.hypot(*(others - position).T).min() < self.apart:
             return False
-        if not outline.contains(place[None])[0]:
+        if not outline.contains(position[None])[0]:
             return False
-        rim = outline.point(outline.nearest(place[None]))[0]
-        return bool(np.hypot(*(rim - place)) >= self.margin)
+        rim = outline.point(outline.nearest(position[None]))[0]
+        return bool(np.hypot(*(rim - position)) >= self.margin)
 
-    def _probe(self, place: FloatArray, random: np.random.Generator) -> Probe:
+    def _probe(self, position: FloatArray, random: np.random.Generator) -> Probe:
         shape = self.shapes[random.integers(len(self.shapes))]
         size = _STEP * round(random.uniform(*self.size) / _STEP)
         force, angle = random.uniform(*self.force), random.uniform(0, 2 * np.pi)
         face = FACES[shape](max(size, _STEP))
-        return Probe(face, float(place[0]), float(place[1]), float(force), float(angle))
+        return Probe(face, float(position[0]), float(position[1]), float(force), float(angle))
 
 
 COMMON_PRESSES = Population(

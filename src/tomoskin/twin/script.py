@@ -6,27 +6,28 @@ import contextlib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from tomoskin.core import GeometryError, ScriptError, SkinError
-from tomoskin.skin import check_names, read_section, show, toml_tables
-from tomoskin.twin.disturbance import ScriptedFault
-from tomoskin.twin.script_bend import ScriptedBend
+from tomoskin.skin import Section, check_names, show, toml_tables
+from tomoskin.twin.course import Rows, ScriptedBend, ScriptedMark, ScriptedPress, ramp
+from tomoskin.twin.faults import ScriptedFault
 from tomoskin.twin.script_schema import (
-    BEND,
-    FAULT,
     FORMAT,
-    MARK,
-    PRESS,
-    PRESSES,
-    SCRIPT,
     SECTIONS,
-    STRETCH,
+    BendSection,
+    FaultSection,
+    MarkSection,
+    PressesSection,
+    PressSection,
+    ScriptSection,
+    StretchSection,
 )
 from tomoskin.twin.shape import Circle, Face, Finger, Shape, Square
-from tomoskin.twin.timeline import Mark, Rows, ScriptedPress
 
 _DEFAULT_SOURCE = "script"
+
+S = TypeVar("S", bound=Section)
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Script:
     seed: int
     presses: tuple[ScriptedPress, ...]
     faults: tuple[ScriptedFault, ...]
-    marks: tuple[Mark, ...]
+    marks: tuple[ScriptedMark, ...]
     preset: str | None = None
     bends: tuple[ScriptedBend, ...] = ()
 
@@ -72,30 +73,28 @@ class Script:
         """
         with of_script():
             tables = tables_of(text, source)
-            if PRESSES.name in tables:
+            if PressesSection.section in tables:
                 raise ScriptError(
                     "describes labelled frames, not a timeline",
-                    where=f"{source}: [{PRESSES.name}]",
+                    where=f"{source}: {PressesSection.heading}",
                     hint="say how many frames: --presses N",
                 )
-            head = read_section(SCRIPT, tables.get("script", {}), f"{source}: [script]")
-            presses = tuple(_press(v, w) for v, w in _each(tables, PRESS.name, source))
-            faults = tuple(_fault(v, w) for v, w in _each(tables, FAULT.name, source))
-            marks = tuple(Mark(v["at"], v["text"], w) for v, w in _each(tables, MARK.name, source))
-            bends = [
-                ScriptedBend.of(v["kind"], "angle", v, w)
-                for v, w in _each(tables, BEND.name, source)
-            ]
-            bends += [
-                ScriptedBend.of("stretch", "strain", v, w)
-                for v, w in _each(tables, STRETCH.name, source)
-            ]
+            head = ScriptSection.read(tables.get("script", {}), f"{source}: [script]")
+            presses = tuple(_press(s, w) for s, w in _each(PressSection, tables, source))
+            faults = tuple(_fault(s, w) for s, w in _each(FaultSection, tables, source))
+            marks = tuple(
+                ScriptedMark(s.at, s.text, w) for s, w in _each(MarkSection, tables, source)
+            )
+            bends = [ScriptedBend.of(s, w) for s, w in _each(BendSection, tables, source)]
+            bends += [ScriptedBend.of(s, w) for s, w in _each(StretchSection, tables, source)]
         return cls(
-            source=source, presses=presses, faults=faults, marks=marks, bends=tuple(bends), **head
+            source,
+            presses=presses,
+            faults=faults,
+            marks=marks,
+            bends=tuple(bends),
+            **vars(head),
         )
-
-
-_MANY = {section.name: section for section in SECTIONS if section.many}
 
 
 @contextlib.contextmanager
@@ -110,97 +109,92 @@ def of_script() -> Iterator[None]:
 def tables_of(text: str, source: str) -> dict[str, Any]:
     """Sections of a script as written, known ones only."""
     tables = toml_tables(text, source, FORMAT)
-    check_names(tables, [section.name for section in SECTIONS], "section", source)
+    check_names(tables, list(SECTIONS), "section", source)
     return tables
 
 
-def _each(
-    tables: Mapping[str, Any], name: str, source: str
-) -> Iterator[tuple[dict[str, Any], str]]:
-    """Values and place of each table of a list."""
-    section = _MANY[name]
-    given = tables.get(name, [])
+def _each(section: type[S], tables: Mapping[str, Any], source: str) -> Iterator[tuple[S, str]]:
+    """Record and place of each table of a list."""
+    given = tables.get(section.section, [])
     if not isinstance(given, list):
         raise ScriptError(
             f"expected a list of tables, got {show(given)}",
-            where=f"{source}: [{name}]",
+            where=f"{source}: [{section.section}]",
             hint=f"write {section.heading}, as there may be several",
         )
     for number, table in enumerate(given, start=1):
         title = table.get("id") if isinstance(table, Mapping) else None
-        called = f' "{title}"' if isinstance(title, str) else ""
-        where = f"{source}: {section.heading} {number}{called}"
-        yield read_section(section, table, where), where
+        name = f' "{title}"' if isinstance(title, str) else ""
+        where = f"{source}: {section.heading} {number}{name}"
+        yield section.read(table, where), where
 
 
-def _press(value: Mapping[str, Any], where: str) -> ScriptedPress:
-    if "profile" in value:
-        force, key = _course((0.0, 0.0), value["profile"], f"{where} profile"), "profile"
+def _press(given: PressSection, where: str) -> ScriptedPress:
+    if given.force is not None and given.hold is not None:
+        force, key = ramp(given.force, given.rise, given.hold, given.fall), "hold"
+    else:
+        force, key = _course((0.0, 0.0), given.profile, f"{where} profile"), "profile"
         if force[-1][1] != 0.0:
             raise ScriptError(
                 f"expected 0 N last, got {force[-1][1]:g} N",
                 where=f"{where} profile",
                 hint="add a row with the time at which the probe has left the sheet",
             )
-    else:
-        force, key = _ramps(value), "hold"
     return ScriptedPress(
-        id=value["id"],
-        shape=_shape(value, where),
-        angle=value["angle"],
-        motion=value["motion"],
-        start=value["start"],
+        id=given.id,
+        shape=_shape(given, where),
+        angle=given.angle,
+        motion=given.motion,
+        start=given.start,
         force=force,
-        path=_course((0.0, *value["at"]), value.get("path", ()), f"{where} path"),
+        path=_course((0.0, *given.at), given.path, f"{where} path"),
         force_key=key,
         where=where,
     )
 
 
-def _shape(value: Mapping[str, Any], where: str) -> Shape:
-    crown = value.get("crown", math.inf)
-    match value["shape"]:
-        case "circle":
-            return Circle(value["radius"], crown)
-        case "square":
-            return Square(value["side"], crown)
-        case "finger":
-            return Finger(value["length"], value["width"])
+def _shape(given: PressSection, where: str) -> Shape:
+    crown = given.crown or math.inf
+    match given:
+        case PressSection(radius=float(radius)):
+            return Circle(radius, crown)
+        case PressSection(side=float(side)):
+            return Square(side, crown)
+        case PressSection(vertices=None):
+            return Finger(given.length, given.width)
     try:
-        return Face(value["vertices"], crown)
+        return Face(given.vertices or (), crown)
     except GeometryError as error:
         raise ScriptError(error.message, where=f"{where} vertices", hint=error.hint) from None
 
 
-def _fault(value: Mapping[str, Any], where: str) -> ScriptedFault:
-    start, end = value["start"], value.get("end", value["start"])
-    if "end" in value and not end > start:
+def _fault(given: FaultSection, where: str) -> ScriptedFault:
+    start = given.start
+    if given.end is not None and not given.end > start:
         raise ScriptError(
-            f"expected a time after start, {start:g} s, got {end:g} s",
+            f"expected a time after start, {start:g} s, got {given.end:g} s",
             where=f"{where} end",
             hint="times count from the end of the lead-in, not from start",
         )
-    electrode, other = value.get("electrode", -1), value.get("other", -1)
-    if other >= 0 and other == electrode:
+    if given.other is not None and given.other == given.electrode:
         raise ScriptError(
-            f"expected an electrode other than {electrode}, got {other}",
+            f"expected an electrode other than {given.electrode}, got {given.other}",
             where=f"{where} other",
             hint="an electrode always touches itself",
         )
-    amount = next((value[key] for key in ("lsb", "probability", "kelvin") if key in value), 0.0)
-    return ScriptedFault(value["kind"], start, end, electrode, other, amount, where)
+    return ScriptedFault(
+        kind=given.kind,
+        start=start,
+        end=start if given.end is None else given.end,
+        electrode=-1 if given.electrode is None else given.electrode,
+        other=-1 if given.other is None else given.other,
+        amount=given.lsb or given.probability or given.kelvin or 0.0,
+        where=where,
+    )
 
 
-def _ramps(value: Mapping[str, Any]) -> Rows:
-    """Up, hold, down."""
-    top = value["rise"]
-    held = top + value["hold"]
-    force = value["force"]
-    return ((0.0, 0.0), (top, force), (held, force), (held + value["fall"], 0.0))
-
-
-def _course(first: tuple[float, ...], rows: Rows, where: str) -> Rows:
+def _course(first: tuple[float, ...], rows: Rows | None, where: str) -> Rows:
     """``rows`` after the ``first`` one, which stands at time 0."""
     if rows and not rows[0][0] > 0:
         raise ScriptError("row 0: expected a time above 0 s, got 0 s", where=where)
-    return (first, *rows)
+    return (first, *(rows or ()))

@@ -12,9 +12,9 @@ from tomoskin.pattern import Scan
 from tomoskin.skin import Skin
 from tomoskin.source import Configuration, ScanSettings
 from tomoskin.twin.bend import strain_of
+from tomoskin.twin.course import NO_FRAME, ScriptedPress, check_stages
+from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.script import Script
-from tomoskin.twin.settings import TwinSettings
-from tomoskin.twin.timeline import NO_FRAME, ScriptedPress, check_stages
 
 _LEFT = 0.01
 """Part of a step that may be left when the first sample is read: as much as the sheet's own
@@ -72,10 +72,10 @@ def check_settling(skin: Skin, preset: str) -> None:
     waits = ScanSettings.of(skin).settling
     least = -tau * math.log(_LEFT)
     if waits < least:
-        left = math.exp(-waits / tau)
+        rest = math.exp(-waits / tau)
         raise ScriptError(
             f"expected at least {1e6 * least:.0f} us, got {1e6 * waits:.0f} us: the {preset} "
-            f"board settles with a time constant of {1e6 * tau:.0f} us, and {100 * left:.0f} % of "
+            f"board settles with a time constant of {1e6 * tau:.0f} us, and {100 * rest:.0f} % of "
             "each sample would be the drive before",
             where=f"{skin.source}: [readout] settling",
             hint="make it longer, or choose another preset",
@@ -120,7 +120,7 @@ def _check_ends(script: Script) -> None:
                 hint="raise [script] duration",
             )
     last = [
-        (bend.end, f"{bend.where} {'profile' if 'profile' in bend.values else 'hold'}")
+        (bend.end, f"{bend.where} {'profile' if bend.given.profile else 'hold'}")
         for bend in script.bends
     ]
     last += [(f.end, f"{f.where} {'end' if f.end > f.start else 'start'}") for f in script.faults]

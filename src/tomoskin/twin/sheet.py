@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel, State
-from tomoskin.mesh import Outline, Surface, laid_on, triangulate
+from tomoskin.mesh import Outline, Plane, Surface, laid_on, triangulate
+from tomoskin.skin import Skin
 from tomoskin.twin import material
 from tomoskin.twin.bend import Pose, depth_of, strain_of
 from tomoskin.twin.dent import Load, indent
 from tomoskin.twin.material import MaterialState
+from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import Contact, check_on_skin, probes_of
-from tomoskin.twin.settings import TwinSettings
-
-if TYPE_CHECKING:
-    from tomoskin.skin import Skin
 
 _MESH_SEED = 7919
 """Seed of the twin's mesh; the reconstruction's is another, so no mesh is ever shared."""
@@ -44,7 +42,7 @@ class TwinSkin:
         outline: Outline,
         conductivity: float,
         settings: TwinSettings,
-        rest: Surface,
+        rest: Surface | None = None,
     ) -> None:
         """``conductivity`` of the sheet at rest, S; ``model`` on the twin's own mesh.
 
@@ -52,7 +50,7 @@ class TwinSkin:
         """
         self.model = model
         self.contact, self.material, self.bend = settings.contact, settings.material, settings.bend
-        self.rest = rest
+        self.rest = rest or Plane()
         self._outline = outline
         self._points = model.mesh.centroids
         self._blur = math.sqrt(float(model.mesh.volumes.mean())) / math.sqrt(12)
@@ -168,7 +166,7 @@ class TwinSkin:
     def renew(self, chance: np.random.SeedSequence | None = None) -> None:
         """Forget all presses, bends and their past: a sheet that nothing has touched.
 
-        Its spread stays. ``chance``, if given, is where its temperature begins anew.
+        Its spread stays. ``chance``, if given, is where its temperature begins again.
         """
         if chance is not None:
             self._random = np.random.default_rng(chance)
@@ -201,20 +199,20 @@ class TwinSkin:
             return self._resistance
         old = self._solved_for
         if old.shape != sigma.shape or np.abs(sigma - old).max() > _SAME * np.abs(sigma).min():
-            self._resistance = _resistance(self._base, sigma)
+            self._resistance = _transfer_resistance(self.model, self._base, sigma)
             self.solves += 1
             self._solved_for = sigma
         return self._resistance
 
 
-def _resistance(base: State, sigma: FloatArray) -> FloatArray:
-    """Transfer resistance at ``sigma``, exact: by the local update where few cells have changed."""
+def _transfer_resistance(model: ForwardModel, rest: State, sigma: FloatArray) -> FloatArray:
+    """Exact either way: by the local update where few cells have changed since ``rest``."""
     if sigma.ndim == 1:
-        changed = np.flatnonzero(sigma != base.conductivity)
+        changed = np.flatnonzero(sigma != rest.conductivity)
         if 0 < len(changed) <= _FEW * len(sigma):
-            return base.local.transfer_resistance(changed, sigma[changed])
+            return rest.local.transfer_resistance(changed, sigma[changed])
     # Positive and symmetric as they are made: no need of the model's check.
-    return np.asarray(State(base.model, sigma).transfer_resistance)
+    return np.asarray(State(model, sigma).transfer_resistance)
 
 
 def _same(some: tuple[object, ...], others: tuple[object, ...]) -> bool:

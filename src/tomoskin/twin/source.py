@@ -9,9 +9,9 @@ from tomoskin.core import SourceError
 from tomoskin.source import read_options
 from tomoskin.twin.board import Board
 from tomoskin.twin.device import TwinDevice
+from tomoskin.twin.electronics import TwinElectronics
 from tomoskin.twin.line import Line
-from tomoskin.twin.readout import TwinElectronics
-from tomoskin.twin.settings import PRESETS, TwinSettings
+from tomoskin.twin.presets import PRESETS, TwinSettings
 from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.transport import Clock, TwinTransport, WallClock
 
@@ -50,8 +50,8 @@ def read_settings(options: Mapping[str, str], skin: Skin, where: str) -> TwinSet
         raise SourceError(f'expected a seed of 0 or more, got "{seed}"', where=where)
     preset = options.get("preset", skin.twin.preset)
     if preset not in PRESETS:
-        known = ", ".join(PRESETS)
-        raise SourceError(f'expected a preset of {known}, got "{preset}"', where=where)
+        names = ", ".join(PRESETS)
+        raise SourceError(f'expected a preset of {names}, got "{preset}"', where=where)
     return TwinSettings.preset(preset, int(seed))
 
 

@@ -10,10 +10,10 @@ from typing import Protocol
 from tomoskin.core import SourceError
 from tomoskin.twin.bend import Pose
 from tomoskin.twin.device import TwinDevice
+from tomoskin.twin.electronics import TwinElectronics
 from tomoskin.twin.faults import Faults
 from tomoskin.twin.line import Line, LineSettings
 from tomoskin.twin.probe import Contact
-from tomoskin.twin.readout import TwinElectronics
 from tomoskin.twin.sheet import TwinSkin
 
 
@@ -37,6 +37,22 @@ class WallClock:
     def wait(self, condition: threading.Condition, seconds: float) -> None:
         """Wait for ``condition`` (held) at most that long."""
         condition.wait(seconds)
+
+
+class VirtualClock:
+    """Time that passes only by being waited for, from 0 s: faster than real, the same each time."""
+
+    def __init__(self) -> None:
+        self.time = 0.0
+
+    def now(self) -> float:
+        """Seconds since the start."""
+        return self.time
+
+    def wait(self, condition: threading.Condition, seconds: float) -> None:
+        """Let the time pass at once; nothing else can happen meanwhile."""
+        del condition
+        self.time += seconds
 
 
 class TwinTransport:

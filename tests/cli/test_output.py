@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from tomoskin.cli.bench_table import tables
+from tomoskin.cli.output import tables
 
 HEADINGS = ("skin", "preset", "triangles", "whole frame ms", "times real time")
 ROWS = (("textile-disc-16", "ideal", 2982, 1.645, 58.6), ("tank-16", "tank", 2952, 1.7, 126.1))

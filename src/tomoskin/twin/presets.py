@@ -25,7 +25,7 @@ class TwinSettings:
         Of noise, spread and faults of the line: the same seed gives the same bytes.
     mesh_ratio
         Cells of the twin's mesh per cell of the reconstruction's. The twin's mesh is finer and
-        from another seed, so that no picture is made with the model that made its data.
+        from another seed, so that no image is made with the model that made its data.
     contact, material, electronics, line, bend
         The stages; and where the layer that conducts lies in what is bent.
     """
@@ -102,7 +102,7 @@ SOURCES = {
     "temperature_coefficient": "silver 0.38 %/K; salt water about −2 %/K (handbooks)",
     "modulus": "foam and gel assumed; tank: ρg · thickness (Archimedes)",
     "tension": "sheet assumed; gel: its shear modulus · thickness / 3 (Pasternak)",
-    "lock": "textile: chosen so that wider probes change more, as in the source's figure 5.7",
+    "lock": "textile: chosen so that wider probes change more, as in the thesis's figure 5.7",
     "height": "textile: thickness of the foam, glued to what bends; gel: half of it, as all of it "
     "conducts; a tank does not bend",
     "compression": "gel and tank: −1, the layer that conducts gets thinner",

@@ -85,7 +85,7 @@ class TwinElectronics:
         self._course: Course | None = None
         self._bending: Bending | None = None
         self._before = np.zeros(n)
-        self._known: tuple[object, ...] = ()
+        self._lines_of: tuple[object, ...] = ()
         self._lines = Lines(np.zeros((0, n)), np.zeros((0, n), dtype=bool))
 
     @property
@@ -172,10 +172,10 @@ class TwinElectronics:
         settings, drive, channel = self.settings, table.drive, table.channel
         volts = lines.read[drive, channel]
         if settings.time_constant > 0:
-            carried, left = _settling(table, settings.time_constant)
+            carried, remaining = _settling(table, settings.time_constant)
             start = carried @ np.concatenate([self._before[None], lines.read])
             self._before = start[-1]
-            volts = volts + (start[:-1][drive, channel] - volts) * left
+            volts = volts + (start[:-1][drive, channel] - volts) * remaining
         if settings.hum > 0:
             sine, cosine = _turning(table, settings.hum_frequency)
             turn = 2 * np.pi * settings.hum_frequency * time + self._phase
@@ -192,11 +192,11 @@ class TwinElectronics:
         resistance = self.sheet.resistance()
         faults = self._faults
         key = (resistance, table, faults, self._contact)
-        if len(self._known) != len(key) or any(
-            a is not b for a, b in zip(self._known, key, strict=True)
+        if len(self._lines_of) != len(key) or any(
+            a is not b for a, b in zip(self._lines_of, key, strict=True)
         ):
             self._lines = self._under(table.drives, resistance)
-            self._known = key
+            self._lines_of = key
         return self._lines
 
     def _under(self, drives: IntArray, resistance: FloatArray) -> Lines:
@@ -222,8 +222,8 @@ class TwinElectronics:
 @lru_cache(maxsize=16)
 def _settling(table: SampleTable, time_constant: float) -> tuple[FloatArray, FloatArray]:
     """What :func:`settling` gives, and (oversampling, n_samples) how much of it is left to go."""
-    left = np.exp(-(table.since + _within(table)) / time_constant)
-    return settling(table.length, time_constant), left
+    remaining = np.exp(-(table.since + _within(table)) / time_constant)
+    return settling(table.length, time_constant), remaining
 
 
 @lru_cache(maxsize=16)

@@ -1,16 +1,19 @@
-"""What a script does at a moment: forces and places between the rows of their courses."""
+"""What a script does at a moment: forces, positions and bends between the rows of their courses."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
-from tomoskin.core import FloatArray, ScriptError
-from tomoskin.mesh import Outline
+from tomoskin.core import FloatArray, GeometryError, ScriptError
+from tomoskin.mesh import Arm, Hinge, Outline
+from tomoskin.twin.bend import Bent, Deformation, Pose, Stretched
 from tomoskin.twin.probe import Probe
+from tomoskin.twin.script_schema import BendSection, StretchSection
 from tomoskin.twin.shape import Shape
 
 Rows = tuple[tuple[float, ...], ...]
@@ -23,11 +26,11 @@ NO_FRAME = "no frame would show it: make it longer, or [readout] settling of the
 """What to do about a stage that is shorter than a frame."""
 
 _ON_PATH = 200
-"""A path is looked at in so many places when it is checked to lie on the skin."""
+"""A path is looked at in so many positions when it is checked to lie on the skin."""
 
 
 @dataclass(frozen=True)
-class Mark:
+class ScriptedMark:
     """A note at a time, s; ``where`` it stands in the script."""
 
     at: float
@@ -37,7 +40,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class ScriptedPress:
-    """A probe with the courses of its force and place.
+    """A probe with the courses of its force and position.
 
     Attributes
     ----------
@@ -93,11 +96,11 @@ class ScriptedPress:
         times = np.union1d(
             self._path[:, 0], np.linspace(0.0, self.path[-1][0], _ON_PATH if self.path[1:] else 1)
         )
-        places = np.array([along(self._path, time) for time in times])
-        inside = outline.contains(places)
+        positions = np.array([along(self._path, time) for time in times])
+        inside = outline.contains(positions)
         if not inside.all():
             first = int(np.argmin(inside))
-            x, y = 1e3 * places[first]
+            x, y = 1e3 * positions[first]
             corners = 1e3 * outline.polyline(outline.length / 64)
             (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
             raise ScriptError(
@@ -116,9 +119,106 @@ class ScriptedPress:
         return np.array(self.path)
 
 
+@dataclass(frozen=True)
+class ScriptedBend:
+    """A bend or stretch with the course of its amount.
+
+    Attributes
+    ----------
+    given
+        Its section of the script.
+    course
+        Rows of (s since its start, rad or elongation), from 0 to 0.
+    where
+        Place in the script, for messages.
+    """
+
+    given: BendSection | StretchSection
+    course: Rows
+    where: str
+
+    @classmethod
+    def of(cls, given: BendSection | StretchSection, where: str) -> Self:
+        """Raises ScriptError for a profile that does not end at 0, and impossible shapes."""
+        most = given.strain if isinstance(given, StretchSection) else given.angle
+        if most is not None and given.hold is not None:
+            course = ramp(most, given.rise, given.hold, given.fall)
+        else:
+            rows = given.profile or ()
+            if not rows[0][0] > 0 or rows[-1][1] != 0.0:
+                raise ScriptError(
+                    "expected times above 0 s, and nothing left in the last row",
+                    where=f"{where} profile",
+                    hint="it begins with nothing at 0 s by itself",
+                )
+            course = ((0.0, 0.0), *rows)
+        made = cls(given, course, where)
+        try:
+            for _, amount in course:
+                made.shape(amount)
+        except GeometryError as error:
+            raise ScriptError(error.message, where=where, hint=error.hint) from None
+        return made
+
+    @property
+    def start(self) -> float:
+        """When it begins, s since the end of the lead-in."""
+        return self.given.start
+
+    @property
+    def end(self) -> float:
+        """When nothing is left, s."""
+        return self.start + self.course[-1][0]
+
+    def amount(self, time: float) -> float:
+        """Rad or elongation at ``time`` s."""
+        return float(along(self._course, time - self.start)[0])
+
+    def shape(self, amount: float) -> Deformation:
+        """What the sheet does at an ``amount``."""
+        match self.given:
+            case StretchSection(across=across, axis=axis):
+                return Stretched(amount, across * amount, axis)
+            case BendSection(radius=float(radius), length=length):
+                return Bent(Arm(radius, amount, length))
+            case BendSection(length=length, axis=axis, offset=offset):
+                return Bent(Hinge(amount, length, axis, offset))
+
+    def truth(self, time: float) -> dict[str, float | str]:
+        """The truth at ``time`` s, for the file."""
+        amount = self.amount(time)
+        match self.given:
+            case StretchSection(axis=axis):
+                return {"kind": "stretch", "strain": amount, "axis": axis}
+            case BendSection(kind="joint"):
+                return {"kind": "joint", "angle": amount, "axis": 0.0}
+            case BendSection(kind=kind, axis=axis):
+                return {"kind": kind, "angle": amount, "axis": axis}
+
+    @cached_property
+    def _course(self) -> FloatArray:
+        return np.array(self.course)
+
+
+def bent(bends: Iterable[ScriptedBend], time: float) -> Pose:
+    """How the sheet is bent and stretched at ``time`` s."""
+    return tuple(bend.shape(bend.amount(time)) for bend in bends if bend.amount(time) != 0.0)
+
+
+def bent_truth(bends: Iterable[ScriptedBend], time: float) -> list[dict[str, float | str]]:
+    """The same in words, for the file."""
+    return [bend.truth(time) for bend in bends if bend.amount(time) != 0.0]
+
+
+def ramp(most: float, rise: float, hold: float, fall: float) -> Rows:
+    """Course that rises to ``most``, stays and falls to 0; the times are s."""
+    held = rise + hold
+    return ((0.0, 0.0), (rise, most), (held, most), (held + fall, 0.0))
+
+
 def pressed(presses: Iterable[ScriptedPress], time: float, friction: Friction) -> tuple[Probe, ...]:
     """What presses on the sheet at ``time`` s."""
-    return tuple(found for press in presses if (found := press.at(time, friction)) is not None)
+    return tuple(probe for press in presses if (probe := press.at(time, friction)) is not None)
 
 
 def check_stages(presses: Iterable[ScriptedPress], frame_time: float) -> None:

@@ -1,9 +1,8 @@
 """The documented numbers are those that run, and each says what it is."""
 
-from pathlib import Path
-
 import pytest
 
+from doc_tables import documented
 from tomoskin.twin import (
     BendSettings,
     ContactSettings,
@@ -11,19 +10,9 @@ from tomoskin.twin import (
     LineSettings,
     MaterialSettings,
 )
-from tomoskin.twin.page import parameter_tables
-from tomoskin.twin.parameters import documented
-from tomoskin.twin.settings import SOURCES
+from tomoskin.twin.presets import SOURCES
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "twin.md"
-MARK = "<!-- from here on written by tomoskin.twin.page.parameter_tables() -->\n\n"
 RECORDS = (ContactSettings, MaterialSettings, ElectronicsSettings, LineSettings, BendSettings)
-
-
-def test_the_page_holds_the_records_numbers():
-    """To write it: the text up to MARK, MARK, then ``parameter_tables()``."""
-    _, tables = PAGE.read_text(encoding="utf-8").split(MARK)
-    assert tables == parameter_tables()
 
 
 @pytest.mark.parametrize("record", RECORDS)

@@ -18,11 +18,11 @@ from tomoskin.pattern import Scan
 from tomoskin.signal import Readout
 from tomoskin.skin import Skin
 from tomoskin.source import ScanSettings
+from tomoskin.twin.electronics import TwinElectronics
 from tomoskin.twin.population import Population
+from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import Probe
-from tomoskin.twin.readout import TwinElectronics
 from tomoskin.twin.scanning import table_of
-from tomoskin.twin.settings import TwinSettings
 from tomoskin.twin.sheet import TwinSkin
 
 REFERENCE_FRAMES = 20

@@ -1,0 +1,131 @@
+"""Write the tables of the documentation that follow from declarations: `python docs/doc_tables.py`.
+
+Each page is written by hand down to its mark. Below stand the keys of the skin file
+(skin-file.md) and of a script (simulate.md), and the numbers of the twin (twin.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from tomoskin.skin import SECTIONS, Key, Section, literal
+from tomoskin.twin import (
+    PRESETS,
+    BendSettings,
+    ContactSettings,
+    ElectronicsSettings,
+    LineSettings,
+    MaterialSettings,
+)
+from tomoskin.twin.presets import SOURCES
+from tomoskin.twin.script_schema import SECTIONS as SCRIPT_SECTIONS
+
+MARK = "<!-- from here on written by docs/doc_tables.py -->\n\n"
+FOLDER = Path(__file__).parent
+
+_STAGES = {
+    "Contact": ContactSettings,
+    "Material": MaterialSettings,
+    "Electronics": ElectronicsSettings,
+    "Bending": BendSettings,
+}
+"""Settings of the twin, in the order of a preset."""
+
+
+def tables(sections: Iterable[type[Section]]) -> str:
+    """Heading, meaning and table of keys of each section."""
+    return "\n".join(
+        f"## {section.heading}\n\n{section.meaning}\n\n"
+        + _table(["key", "value", "default", "meaning"], map(_key_row, section.keys))
+        for section in sections
+    )
+
+
+def parameter_tables() -> str:
+    """A table for each stage of the twin, with a column for each preset; and the line's."""
+    return "\n".join([*(_stage(*named) for named in enumerate(_STAGES)), _line()])
+
+
+PAGES: dict[str, Callable[[], str]] = {
+    "skin-file.md": lambda: tables(SECTIONS.values()),
+    "simulate.md": lambda: tables(SCRIPT_SECTIONS.values()),
+    "twin.md": parameter_tables,
+}
+
+
+def written(page: str) -> str:
+    """Text that ``page`` should have, with its own words above the mark."""
+    above, _ = (FOLDER / page).read_text(encoding="utf-8").split(MARK)
+    return above + MARK + PAGES[page]()
+
+
+def examples(page: str) -> list[str]:
+    """The TOML files that ``page`` shows."""
+    _, *blocks = (FOLDER / page).read_text(encoding="utf-8").split("```toml\n")
+    return [block.partition("```")[0] for block in blocks]
+
+
+def documented(record: type[Any]) -> Iterator[tuple[str, str, str, str]]:
+    """Name, unit, meaning and source of each number of a settings record."""
+    for one in fields(record):
+        yield one.name, *(one.metadata[key] for key in ("unit", "meaning", "source"))
+
+
+def _table(head: list[str], rows: Iterable[list[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines).replace(" --- ", "---")
+
+
+def _key_row(key: Key) -> list[str]:
+    cells = [f"`{key.name}`", key.kind.expected, _default(key), key.meaning]
+    return [cell.replace("|", "\\|") for cell in cells]
+
+
+def _default(key: Key) -> str:
+    if key.default is not None:
+        text = f"`{literal(key.default)}`"
+    else:
+        text = "required" if key.required else "none"
+    if key.when:
+        text += f" for {' and '.join(key.when[1])}"
+    if key.unless:
+        text += f", unless `{key.unless}` is there"
+    return text
+
+
+def _stage(place: int, title: str) -> str:
+    rows = (
+        [f"`{name}`", unit]
+        + [_shown(getattr(parts[place], name)) for parts in PRESETS.values()]
+        + [meaning, SOURCES.get(name, _assumed(source))]
+        for name, unit, meaning, source in documented(_STAGES[title])
+    )
+    head = ["number", "unit", *PRESETS, "meaning", "source"]
+    return f"### {title}: `{_STAGES[title].__name__}`\n\n{_table(head, rows)}"
+
+
+def _line() -> str:
+    rows = (
+        [f"`{name}`", _shown(getattr(LineSettings(), name)), meaning]
+        for name, _, meaning, _ in documented(LineSettings)
+    )
+    return f"### Line: `LineSettings`\n\n{_table(['number', 'default', 'meaning'], rows)}"
+
+
+def _assumed(source: str) -> str:
+    """What the defaults have as ideal, the presets assume."""
+    return "assumed" if source == "ideal" else source
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, tuple):
+        return ", ".join(map(_shown, value)) or "none"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+if __name__ == "__main__":
+    for page in PAGES:
+        (FOLDER / page).write_text(written(page), encoding="utf-8")

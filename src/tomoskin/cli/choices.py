@@ -1,0 +1,131 @@
+"""What the shared options mean: the skin, what of it is changed, what it is prepared with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from tomoskin.cli.options import DEFAULT_SKIN
+
+if TYPE_CHECKING:
+    from tomoskin.formats import Display
+    from tomoskin.inverse import AlphaChoice
+    from tomoskin.pipeline import Prepared
+    from tomoskin.sink import Sink
+    from tomoskin.skin import Skin
+
+
+def skin_for_source(skin: str | None, source: str) -> Skin:
+    """The skin named, or the one in the session that ``source`` replays, or the default."""
+    from tomoskin.recording import parse_replay
+    from tomoskin.skin import Skin
+
+    name, _, argument = source.partition(":")
+    if skin is None and name == "replay":
+        return skin_for_file(None, parse_replay(argument)[0])
+    return Skin.load(DEFAULT_SKIN if skin is None else skin)
+
+
+def known_skin(skin: str | None, path: Path) -> Skin | None:
+    """The skin named, or the one in the session ``path``; None where neither says one."""
+    from tomoskin.formats import is_session
+
+    return skin_for_file(skin, path) if skin is not None or is_session(path) else None
+
+
+def skin_for_file(skin: str | None, path: Path) -> Skin:
+    """The skin named, or the one in the session ``path``, or the default."""
+    from tomoskin.formats import is_session
+    from tomoskin.recording import SessionReader
+    from tomoskin.skin import Skin
+
+    if skin is None and is_session(path):
+        with SessionReader(path) as session:
+            return session.skin
+    return Skin.load(DEFAULT_SKIN if skin is None else skin)
+
+
+def with_alpha(skin: Skin, given: str | None) -> tuple[Skin, str | None]:
+    """The skin with the alpha of the option, and the rule that is to choose it, if one is."""
+    from tomoskin.inverse import RULES
+
+    if given is None or given in RULES:
+        return skin, given
+    alpha: str | float = "auto"
+    if given != "auto":
+        try:
+            alpha = float(given)
+        except ValueError:
+            alpha = -1.0
+        if not 1e-9 <= alpha <= 1e9:
+            rules = ", ".join(RULES)
+            raise typer.BadParameter(
+                f'expected a number above 0, auto or a rule among {rules}; got "{given}"',
+                param_hint="--alpha",
+            )
+    return skin.altered({"inverse": {"alpha": alpha}}), None
+
+
+def alpha_line(choice: AlphaChoice) -> str:
+    """One line about a choice."""
+    return f"alpha {choice.alpha:.4g} ({choice.rule}: {choice.reason})"
+
+
+def with_time_constant(skin: Skin, given: str | None) -> Skin:
+    """The skin with the time constant of the option."""
+    if given is None:
+        return skin
+    quantity(given, "time", "--time-constant")
+    return skin.altered({"inverse": {"time_constant": given}})
+
+
+def display_of(skin: Skin, *, percent: bool, limit: float | None, smooth: str | None) -> Display:
+    """How images of ``skin`` are shown. Raises DataError for what cannot be."""
+    from tomoskin.formats import Display
+
+    return Display(
+        conductivity=skin.conductivity if percent else None,
+        smoothing=0.0 if smooth is None else quantity(smooth, "length", "--smooth"),
+        limit=limit / 100.0 if percent and limit is not None else limit,
+    )
+
+
+def quantity(text: str, dimension: str, option: str) -> float:
+    """The value of an ``option`` in SI units."""
+    from tomoskin.core import parse_quantity
+
+    try:
+        return parse_quantity(text, dimension)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint=option) from None
+
+
+def chosen_sinks(specs: list[str] | None) -> tuple[Sink, ...]:
+    """The sinks that were asked for, not opened; SinkError for one that cannot be meant."""
+    from tomoskin.sink import make_sink
+
+    return tuple(make_sink(spec) for spec in specs or ())
+
+
+def with_bends(prepared: Prepared, path: Path | None) -> Prepared:
+    """The skin with its bends, where a calibration is named. Raises DataError for others."""
+    from tomoskin.calibration import BENDS
+
+    return prepared if path is None else prepared.calibrated(BENDS.read(path))
+
+
+def with_states(prepared: Prepared, path: Path | None, skin: Skin) -> Prepared:
+    """The skin with its states, where a calibration is named.
+
+    ``skin`` as its file says, whatever images are made of it. Raises DataError for states of
+    another.
+    """
+    from tomoskin.calibration import CLASSES
+
+    if path is None:
+        return prepared
+    calibration = CLASSES.read(path)
+    calibration.model.classifier.check(skin_id=skin.identity)
+    return prepared.calibrated(calibration)

@@ -1,0 +1,136 @@
+"""The skin file: what the host makes of the voltages; a page may change most of it live."""
+
+from __future__ import annotations
+
+from tomoskin.skin.kinds import Choice, Number, NumberOrWord, Quantity, Whole
+from tomoskin.skin.section import Section, key
+
+_ONE_STEP = "one-step"
+
+
+class MeshSettings(Section, section="mesh"):
+    """The triangles that the image is made of."""
+
+    cells: int = key(Whole(50, 100_000), "Wanted number, met within 10 %.", default=1500)
+
+
+class InverseSettings(Section, section="inverse"):
+    """How voltages become an image."""
+
+    method: str = key(
+        Choice((_ONE_STEP, "greit")),
+        "one-step: the most likely image under a prior. greit: an operator trained to "
+        "show small targets as a stated response; truer positions, not sharper.",
+        default=_ONE_STEP,
+    )
+    prior: str = key(
+        Choice(("identity", "laplace", "gaussian", "noser", "exponential", "matern")),
+        "What is held to be likely.",
+        default="noser",
+        method=_ONE_STEP,
+    )
+    exponent: float = key(
+        Number(0, 2),
+        "With noser: the power of a cell's sensitivity that weighs it down.",
+        default=0.5,
+        method=_ONE_STEP,
+    )
+    correlation_length: float | None = key(
+        Quantity("length", "mm", 0.1, 5000),
+        "With exponential and matern: how far a change is alike; without it a tenth of "
+        "the sheet's extent.",
+        default=None,
+        method=_ONE_STEP,
+    )
+    alpha: float | str = key(
+        NumberOrWord(Number(1e-9, 1e9), Choice(("auto",))),
+        "Weight of the prior; it enters squared. auto: chosen by the noise, for a light touch.",
+        default="auto",
+        method=_ONE_STEP,
+    )
+    noise_figure: float = key(
+        Number(0.1, 100),
+        "How much noisier the image may be than the voltages, signal for signal.",
+        default=1.0,
+        method="greit",
+    )
+    difference: str = key(
+        Choice(("plain", "normalised")), "v − v_ref, or (v − v_ref)/|v_ref|.", default="plain"
+    )
+    time_constant: float = key(
+        Quantity("time", "s", 0, 3600),
+        "How long an image lasts: each rests on the frames before it too, the more the "
+        "longer this is (Kalman filter). 0 s: on its own frame alone.",
+        default="0 s",
+        method=_ONE_STEP,
+    )
+
+
+class SignalSettings(Section, section="signal"):
+    """What becomes of the reference while time goes by."""
+
+    baseline: str = key(
+        Choice(("follow", "hold")),
+        "follow: the reference follows the skin's drift while nothing touches, and holds "
+        "under a touch. hold: it stays as it was taken.",
+        default="follow",
+    )
+    common_modes: str = key(
+        Choice(("projected", "kept")),
+        "projected: a change of all voltages in proportion, as temperature makes it, and "
+        "directions of drift learnt while idle do not show in the image. kept: they do.",
+        default="projected",
+    )
+
+
+class TouchSettings(Section, section="touch"):
+    """How data become touches."""
+
+    method: str = key(
+        Choice(("image", "fit")),
+        "image: regions of the image, by gamma1 to position. fit: position, size and "
+        "strength of up to five touches, fitted to the voltages; truer, with honest "
+        "deviations.",
+        default="image",
+    )
+    gamma1: float = key(
+        Number(0.1, 0.99),
+        "First threshold, as a part of the extreme value; 0.6 to 0.7 is usual.",
+        default=0.65,
+    )
+    gamma2: float = key(
+        Number(0.1, 1),
+        "Second threshold, after smoothing, as a part of the first.",
+        default=0.9,
+    )
+    smoothing: float = key(
+        Quantity("length", "mm", 0, 1000),
+        "Standard deviation of the Gaussian between the two thresholds.",
+        default="5 mm",
+    )
+    sign: str = key(
+        Choice(("decrease", "increase", "both")),
+        "Change of conductivity that counts as a touch.",
+        default="decrease",
+    )
+    snr: float = key(
+        Number(0, 1000),
+        "Extreme value that a touch needs, in standard deviations of the noise.",
+        default=5,
+    )
+    position: str = key(
+        Choice(("centroid", "peak")),
+        "One touch a region, at its weighted centroid; or one at each local extreme.",
+        default="centroid",
+    )
+    max_touches: int = key(Whole(1, 50), "Most touches reported at once.", default=8)
+
+
+class TwinChoice(Section, section="twin"):
+    """The simulated skin that stands in for this one; a real skin does not read it."""
+
+    preset: str = key(
+        Choice(("ideal", "textile", "hydrogel", "tank")),
+        "Material and board: without vices and memory, or as measured or assumed.",
+        default="ideal",
+    )
