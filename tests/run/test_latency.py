@@ -26,7 +26,7 @@ def test_nothing_is_known_at_first():
 def test_scans_are_timed_by_the_device_where_none_is_lost():
     latency = Latency()
     for number, ticks in [(0, 0), (1, 100), (2, 200), (5, 900), (6, 1010), (0, 20), (1, 110)]:
-        latency.sampled(frame(number, ticks), 1000.0)
+        latency.add_frame(frame(number, ticks), 1000.0)
     (sample, *_) = latency.stages()
     assert sample.p50 == pytest.approx(0.1)
     assert 0.1 < sample.p99 <= 0.11
@@ -34,10 +34,10 @@ def test_scans_are_timed_by_the_device_where_none_is_lost():
 
 def test_of_several_pages_the_slowest_counts_until_it_goes():
     latency = Latency()
-    latency.painted("a", 0.001, 0.002)
-    latency.painted("b", 0.004, 0.02)
+    latency.set_paint("a", 0.001, 0.002)
+    latency.set_paint("b", 0.004, 0.02)
     assert latency.stages()[-1].p99 == 0.02
-    latency.gone("b")
+    latency.forget("b")
     assert latency.stages()[-1].p99 == 0.002
 
 

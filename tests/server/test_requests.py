@@ -5,19 +5,9 @@ import json
 import pytest
 
 from tomoskin.core import WireError
-from tomoskin.run.twin_requests import PressRequest, SetPresses
-from tomoskin.server.requests import (
-    MAX_REQUEST,
-    Note,
-    Seek,
-    SetLoop,
-    SetPause,
-    SetRecording,
-    SetSpeed,
-    Step,
-    TakeReference,
-    decode_request,
-)
+from tomoskin.run import Note, Seek, SetLoop, SetPause, SetPresses, SetSpeed, Step, TakeReference
+from tomoskin.run.twin_requests import PressRequest
+from tomoskin.server.requests import MAX_REQUEST, SetRecording, decode_request
 
 PRESS = {"x": 0.01, "y": -0.02, "force": 3.0, "radius": 0.015}
 

@@ -10,6 +10,13 @@ from tomoskin.recording.recorder import Recorder
 from tomoskin.recording.repair import Lost, Repaired, repair
 from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.recording.replayed import advance, as_recorded, replayed
+from tomoskin.recording.run_messages import (
+    BoardInfo,
+    RawRead,
+    RunMessage,
+    RunSettings,
+    event_of,
+)
 from tomoskin.recording.session_reader import RecordedTouches, SessionReader, Truth
 from tomoskin.recording.timeline import Span, Timeline, read_timeline
 from tomoskin.recording.whole import read_session, recording_of
@@ -18,14 +25,18 @@ from tomoskin.recording.writer import SessionWriter
 __all__ = [
     "Advance",
     "Block",
+    "BoardInfo",
     "Lost",
     "Mark",
     "MarkedFrame",
+    "RawRead",
     "RecordedTouches",
     "Recorder",
     "Repaired",
     "ReplayTransport",
     "Rows",
+    "RunMessage",
+    "RunSettings",
     "SessionInfo",
     "SessionReader",
     "SessionWriter",
@@ -36,6 +47,7 @@ __all__ = [
     "all_blocks",
     "as_recorded",
     "encode_json",
+    "event_of",
     "grid_message",
     "log_message",
     "open_replay",

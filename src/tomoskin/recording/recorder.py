@@ -1,22 +1,25 @@
-"""Recording beside a running pipeline: a queue of bounded size, and a thread that empties it."""
+"""What a run says, written to a session file as it comes."""
 
 from __future__ import annotations
 
-import contextlib
 import logging
-import queue
-import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
-from tomoskin.core import DataError, Event, Frame, Image, PixelMap, Touch
+from tomoskin.core import DataError, Event, Image, PixelMap, Touch
+from tomoskin.pipeline import Result
 from tomoskin.recording.clock import ClockFitter
-from tomoskin.recording.layout import Mark
+from tomoskin.recording.layout import Mark, MarkedFrame
+from tomoskin.recording.run_messages import (
+    BoardInfo,
+    RawRead,
+    RunMessage,
+    RunSettings,
+    event_of,
+)
+from tomoskin.recording.session_reader import Truth
 from tomoskin.recording.writer import SessionWriter
-
-MOST_WAITING = 64 << 20
-"""Bytes that may wait for the disk: about a minute of the fastest board."""
 
 IMAGE_PERIOD = 0.2
 """Seconds between two images in the file, by host time."""
@@ -24,189 +27,172 @@ IMAGE_PERIOD = 0.2
 CLOCK_PERIOD = 10.0
 """Seconds between two fits of the device's clock."""
 
-_ROUTINE = 1.0
-"""Seconds after which the thread looks after the file though nothing came."""
-
 _OBJECT = 256
 """Bytes that a waiting message is taken for, beside its data."""
-
 
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
-class _Task:
-    size: int
-    write: Callable[..., None]
-    arguments: tuple[Any, ...]
+@dataclass(frozen=True, slots=True, eq=False)
+class _Outcome:
+    """What is kept of a result; None: not worth a message."""
+
+    host_time: float
+    sequence: int
+    touches: tuple[Touch, ...] | None
+    image: Image | None
+    events: tuple[Event, ...]
+    shown: tuple[Touch, ...]
 
 
 class Recorder:
-    """Records to ``session`` from a thread of its own; no call waits for the disk.
+    """Takes the messages of a run into a session file; a consumer of a worker of its own.
 
-    When the disk cannot keep up, messages are left out, counted and said. When the file cannot be
-    written any further the recording ends, which is said too; the file stays readable.
+    When the file cannot be written any further the recording ends, which is said; the file stays
+    readable.
 
     Parameters
     ----------
-    session
-        An open session; closed by :meth:`stop`, or when writing fails.
+    path
+        The file.
+    make
+        Opens the session at ``path``; called once, by the worker's thread. DataError when the
+        file cannot be made.
     pixels
         For the images; None where the skin has none (a curved sheet): then there are no images.
     say
-        Called with the kind and text of an event, from either thread.
+        Called with the kind and text of an event.
     """
+
+    kind = "recording"
+    slow = "the disk is too slow, messages are lost"
 
     def __init__(
         self,
-        session: SessionWriter,
+        path: Path,
+        make: Callable[[], SessionWriter],
         pixels: PixelMap | None,
         say: Callable[[str, str], None],
-        *,
-        most_waiting: int = MOST_WAITING,
     ) -> None:
-        self.path = session.path
-        self.left_out = 0
-        self._session, self._pixels, self._say = session, pixels, say
-        self._limit = most_waiting
-        self._queue: queue.SimpleQueue[_Task | None] = queue.SimpleQueue()
-        self._put_lock = threading.Lock()
-        self._came = self._went = 0
-        self._behind = 0
+        self.path, self.name = path, f"{path}:"
+        self._make, self._pixels, self._say = make, pixels, say
+        self._session: SessionWriter | None = None
+        self._broken = False
         self._last_image = float("-inf")
         self._had_touches = False
         self._clock, self._next_fit = ClockFitter(), float("-inf")
-        self._failed = False
-        self._thread = threading.Thread(target=self._run, name="tomoskin-recorder", daemon=True)
-        self._thread.start()
+
+    def admit(self, message: RunMessage) -> RunMessage | _Outcome | None:
+        """What of ``message`` is to be written; by the thread that puts it."""
+        if not isinstance(message, Result):
+            return message
+        touches, image = None, None
+        if message.ready:
+            touches = message.touches if message.touches or self._had_touches else None
+            self._had_touches = bool(message.touches)
+            image = message.image if self._image_is_due(message.host_time) else None
+        events = tuple(map(event_of, message.events))
+        if touches is None and image is None and not events:
+            return None
+        return _Outcome(
+            message.host_time, message.sequence, touches, image, events, message.touches
+        )
+
+    def size(self, item: RunMessage | _Outcome) -> int:
+        """Bytes that it takes while it waits."""
+        match item:
+            case RawRead():
+                return _OBJECT + len(item.data)
+            case MarkedFrame():
+                return _OBJECT + item.frame.samples.nbytes
+            case _Outcome():
+                image = item.image.values.nbytes if item.image is not None else 0
+                return _OBJECT + image + 200 * len(item.shown)
+            case Truth():
+                return _OBJECT + 100 * (len(item.presses) + len(item.bends))
+            case _:
+                return _OBJECT
+
+    def durable(self, item: object) -> bool:
+        """All is written, what came before the file was open too."""
+        del item
+        return True
+
+    def open(self) -> None:
+        """Make the file. Raises DataError."""
+        self._session = self._make()
+
+    def take(self, item: RunMessage | _Outcome) -> None:
+        """Write one message. Raises DataError."""
+        session = self._open_session
+        match item:
+            case RawRead():
+                session.raw(item.host_time, item.data)
+            case MarkedFrame():
+                self._fit_clock(item)
+                session.frame(item.frame, item.mark)
+            case _Outcome():
+                self._write_outcome(item)
+            case Event(kind="note"):
+                session.note(item.host_time, item.text)
+            case Event():
+                session.event(item)
+            case Truth():
+                session.truth(item.host_time, item.presses, item.bends)
+            case BoardInfo():
+                session.device(item.host_time, item.info)
+            case RunSettings():
+                session.settings(item.host_time, item.values)
+
+    def idle(self) -> None:
+        """Nothing came for a while: look after the file. Raises DataError."""
+        self._open_session.settle()
+
+    def close(self) -> None:
+        """End the file. Raises DataError."""
+        if self._session is not None:
+            self._session.close()
+            if not self._broken:
+                self._say("recorded", f"recorded to {self.path}")
+
+    def failed(self, error: Exception) -> None:
+        """The recording ends here; what could be written is in the file."""
+        self._broken = True
+        if self._session is None:
+            return  # whoever asked for it is told
+        why = str(error)
+        if not isinstance(error, DataError):
+            _log.exception("the recording thread ended", exc_info=error)
+            why = f"internal error, {type(error).__name__}: {error}"
+        self._say("recording-stopped", f"the recording has ended: {why}")
 
     @property
-    def running(self) -> bool:
-        """Whether what comes is still written."""
-        return self._thread.is_alive() and not self._failed
+    def _open_session(self) -> SessionWriter:
+        assert self._session is not None
+        return self._session
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether it was stopped, and not by the disk."""
-        return not self._thread.is_alive() and not self._failed
+    def _write_outcome(self, item: _Outcome) -> None:
+        session = self._open_session
+        if item.touches is not None:
+            session.touches(item.host_time, item.sequence, item.touches)
+        if item.image is not None and self._pixels is not None:
+            session.image(item.host_time, item.image, self._pixels, item.shown)
+        for event in item.events:
+            session.event(event)
 
-    def raw(self, host_time: float, data: bytes) -> None:
-        """Bytes as they were read."""
-        self._put(len(data), self._session.raw, host_time, data)
-
-    def frame(self, frame: Frame, mark: Mark) -> None:
-        """One frame, and what becomes of it; after the raw bytes that it came in."""
-        if not mark & Mark.EARLIER:
-            self._clock.add(frame.ticks, frame.host_time)
-            self._fit_clock(frame.host_time)
-        self._put(frame.samples.nbytes, self._session.frame, frame, mark)
-
-    def result(
-        self, host_time: float, sequence: int, image: Image, touches: Sequence[Touch]
-    ) -> None:
-        """What was made of a frame: its touches, and now and then its image."""
-        if touches or self._had_touches:
-            self._put(200 * len(touches), self._session.touches, host_time, sequence, touches)
-        self._had_touches = bool(touches)
-        if self._pixels is None or not self._image_is_due(host_time):
-            return
-        size = image.values.nbytes
-        self._put(size, self._session.image, host_time, image, self._pixels, touches)
-
-    def event(self, event: Event) -> None:
-        """Something that happened."""
-        self._put(len(event.text), self._session.event, event)
-
-    def note(self, host_time: float, text: str) -> None:
-        """A person's remark."""
-        self._put(len(text), self._session.note, host_time, text)
-
-    def truth(self, host_time: float, presses: Sequence[Any], bends: Sequence[Any] = ()) -> None:
-        """What presses on the twin, and how it is bent, from now on."""
-        size = 100 * (len(presses) + len(bends))
-        self._put(size, self._session.truth, host_time, presses, bends)
-
-    def device(self, host_time: float, info: Any) -> None:
-        """What the board is."""
-        self._put(0, self._session.device, host_time, info)
-
-    def settings(self, host_time: float, settings: Mapping[str, Any]) -> None:
-        """How the run is set."""
-        self._put(0, self._session.settings, host_time, settings)
-
-    def stop(self) -> None:
-        """Write what waits, end the file and return; a second call does nothing."""
-        self._queue.put(None)
-        self._thread.join()
-
-    def _fit_clock(self, host_time: float) -> None:
+    def _fit_clock(self, item: MarkedFrame) -> None:
         """Now and then a fit of the device's clock."""
-        if host_time >= self._next_fit and (fit := self._clock.fit) is not None:
-            self._put(0, self._session.clock, host_time, fit)
-            self._next_fit = host_time + CLOCK_PERIOD
+        frame = item.frame
+        if item.mark & Mark.EARLIER:
+            return
+        self._clock.add(frame.ticks, frame.host_time)
+        if frame.host_time >= self._next_fit and (fit := self._clock.fit) is not None:
+            self._open_session.clock(frame.host_time, fit)
+            self._next_fit = frame.host_time + CLOCK_PERIOD
 
     def _image_is_due(self, host_time: float) -> bool:
         """Whether a period has gone by, or the time has been set back."""
-        if 0 <= host_time - self._last_image < IMAGE_PERIOD:
+        if self._pixels is None or 0 <= host_time - self._last_image < IMAGE_PERIOD:
             return False
         self._last_image = host_time
         return True
-
-    def wait_until_written(self) -> None:
-        """Return when nothing waits for the disk any more."""
-        done = threading.Event()
-        self._put(0, done.set)
-        while not done.wait(_ROUTINE) and self.running:
-            pass
-
-    def _put(self, size: int, write: Callable[..., None], *arguments: Any) -> None:
-        with self._put_lock:
-            if self._failed:
-                return
-            size += _OBJECT
-            if self._came - self._went + size > self._limit:
-                self._leave_out()
-                return
-            self._came += size
-            self._queue.put(_Task(size, write, arguments))
-
-    def _leave_out(self) -> None:
-        self.left_out += 1
-        self._behind += 1
-        if self._behind == 1:
-            self._say("recording-behind", f"{self.path}: the disk is too slow, messages are lost")
-
-    def _run(self) -> None:
-        try:
-            while (task := self._next()) is not None:
-                task.write(*task.arguments)
-                self._went += task.size
-                if self._behind and self._came == self._went:
-                    self._caught_up()
-            self._session.close()
-        except DataError as error:
-            self._fail(str(error))
-        except Exception as error:
-            _log.exception("the recording thread ended")
-            self._fail(f"internal error, {type(error).__name__}: {error}")
-
-    def _next(self) -> _Task | None:
-        while True:
-            try:
-                return self._queue.get(timeout=_ROUTINE)
-            except queue.Empty:
-                self._session.settle()
-
-    def _caught_up(self) -> None:
-        with self._put_lock:
-            count, self._behind = self._behind, 0
-        self._say("recording-gap", f"{self.path}: {count} messages were not recorded")
-
-    def _fail(self, why: str) -> None:
-        with self._put_lock:
-            self._failed = True
-        with contextlib.suppress(DataError):  # what could be written is in the file
-            self._session.close()
-        while not self._queue.empty():
-            self._queue.get()
-        self._say("recording-stopped", f"the recording has ended: {why}")

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from tomoskin.core import Frame
-from tomoskin.run.meter import Ring
+from tomoskin.run.counters import Ring
 
 Timed = Literal["sample", "decode", "reconstruct", "publish"]
 
@@ -36,28 +36,28 @@ class Latency:
     """Durations of each stage over the last frames; each is written by one thread."""
 
     def __init__(self) -> None:
-        """Nothing is known."""
+        """Nothing has been timed."""
         self._rings: dict[Timed, Ring] = {
             name: Ring() for name in ("sample", "decode", "reconstruct", "publish")
         }
         self._painted: dict[object, tuple[float, float]] = {}
         self._last: Frame | None = None
 
-    def took(self, stage: Timed, seconds: float) -> None:
+    def add(self, stage: Timed, seconds: float) -> None:
         """Note how long a stage took."""
         self._rings[stage].add(seconds)
 
-    def sampled(self, frame: Frame, tick_rate: float) -> None:
+    def add_frame(self, frame: Frame, tick_rate: float) -> None:
         """Note a frame's scan; ``tick_rate`` in Hz."""
         last, self._last = self._last, frame
         if last is not None and frame.sequence == last.sequence + 1 and frame.ticks > last.ticks:
-            self.took("sample", (frame.ticks - last.ticks) / tick_rate)
+            self.add("sample", (frame.ticks - last.ticks) / tick_rate)
 
-    def painted(self, page: object, p50: float, p99: float) -> None:
+    def set_paint(self, page: object, p50: float, p99: float) -> None:
         """What a page says of its own drawing, s."""
         self._painted[page] = p50, p99
 
-    def gone(self, page: object) -> None:
+    def forget(self, page: object) -> None:
         """A page draws no longer."""
         self._painted.pop(page, None)
 
@@ -66,5 +66,5 @@ class Latency:
         slowest = max(
             self._painted.copy().values(), key=lambda p: p[1], default=(float("nan"),) * 2
         )
-        known = (Stage(name, *ring.percentiles()) for name, ring in self._rings.items())
-        return *known, Stage("paint", *slowest)
+        timed = (Stage(name, *ring.percentiles()) for name, ring in self._rings.items())
+        return *timed, Stage("paint", *slowest)

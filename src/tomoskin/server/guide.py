@@ -1,12 +1,11 @@
-"""The desk of the flows in which someone presses where the dot is."""
+"""Requests of the flows in which someone presses where the dot is."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 from tomoskin.calibration import (
     Calibration,
@@ -16,8 +15,13 @@ from tomoskin.calibration import (
     write_calibration,
 )
 from tomoskin.core import FloatArray, TomoskinError, WireError, write_text
-from tomoskin.pipeline import Prepared, prepare
-from tomoskin.server.flow_requests import (
+from tomoskin.pipeline import Prepared, Result, prepare
+from tomoskin.run import Adopt, Change
+from tomoskin.server.folder import Folder
+from tomoskin.server.hub import Hub
+from tomoskin.server.lessons import Dots, Lesson, Thought, touch_thought, wiring_thought
+from tomoskin.server.messages import text_of
+from tomoskin.server.requests import (
     BeginFlow,
     EndFlow,
     FlowKind,
@@ -25,18 +29,15 @@ from tomoskin.server.flow_requests import (
     UndoPress,
     UseCalibration,
 )
-from tomoskin.server.folder import Folder
-from tomoskin.server.hub import Hub, Listener
-from tomoskin.server.lessons import Dots, Lesson, Thought, touch_thought, wiring_thought
 from tomoskin.server.taking import Taker
-from tomoskin.server.task import run_errand, text_of
+from tomoskin.server.task import Listener
 
 _LEAST = 0.5
 """Noise is never taken for less than this part of what the read-out predicts."""
 
 
 class _Flow:
-    """One flow from its first dot to its end; the taker belongs to the runner's thread."""
+    """One flow from its first dot to its end; the taker belongs to a thread of its own."""
 
     def __init__(self, kind: FlowKind, prepared: Prepared) -> None:
         self.kind, self.prepared = kind, prepared
@@ -55,7 +56,7 @@ class _Flow:
         return wiring_thought(self.prepared, lessons, self.taker.untouched)
 
 
-class GuideDesk:
+class GuideHandlers:
     """Shows a dot, takes the press when it stands still, and says what the presses tell.
 
     One flow for all pages: whoever stands at the skin presses.
@@ -68,17 +69,16 @@ class GuideDesk:
         self._using: str | None = None  # the calibration's file; "": its name is not known
         self._used_on = ""
         self._watching = contextlib.ExitStack()
-
-    @property
-    def handlers(self) -> Mapping[type, Callable[[Listener, Any], None]]:
-        """See :class:`~tomoskin.server.hub.Desk`."""
-        return {
-            BeginFlow: lambda _, request: self._begin(request.kind),
-            UndoPress: lambda _, __: self._undo(),
-            EndFlow: lambda _, __: self._end(),
-            KeepFlow: self._keep,
-            UseCalibration: self._use,
-        }
+        hub.serve(
+            {
+                BeginFlow: lambda _, request: self._begin(request.kind),
+                UndoPress: lambda _, __: self._undo(),
+                EndFlow: lambda _, __: self._end(),
+                KeepFlow: self._keep,
+                UseCalibration: self._use,
+            },
+            self.greeting,
+        )
 
     def greeting(self) -> Sequence[str]:
         """Where the flow is."""
@@ -87,7 +87,7 @@ class GuideDesk:
             self._leave()
         if self._used_on != mesh.identity:
             self._look_again()
-        return (self._told(),)
+        return (self._message(),)
 
     def _begin(self, kind: FlowKind) -> None:
         if self._hub.runner.replay is not None:
@@ -95,7 +95,8 @@ class GuideDesk:
         self._leave()
         flow = self._flow = _Flow(kind, self._hub.runner.prepared)
         loop = asyncio.get_running_loop()
-        self._watching.enter_context(self._hub.runner.watched_by(partial(self._look, flow, loop)))
+        look = partial(self._look, flow, loop)
+        self._watching.enter_context(self._hub.runner.subscribe("guide", look))
         self._tell()
 
     def _leave(self) -> None:
@@ -106,13 +107,10 @@ class GuideDesk:
         self._leave()
         self._tell()
 
-    def _look(self, flow: _Flow, loop: asyncio.AbstractEventLoop) -> None:
-        """A frame has come; in the runner's thread."""
-        newest = self._hub.runner.newest
-        if newest is None:
-            return
+    def _look(self, flow: _Flow, loop: asyncio.AbstractEventLoop, result: Result) -> None:
+        """A frame has come; in a thread of its own."""
         before = flow.taker.phase
-        dv = flow.taker.push(newest.result.host_time, newest.result.voltages)
+        dv = flow.taker.push(result.host_time, result.voltages)
         if dv is not None or flow.taker.phase != before:
             with contextlib.suppress(RuntimeError):  # the loop has ended
                 loop.call_soon_threadsafe(self._moved, flow, dv)
@@ -141,7 +139,7 @@ class GuideDesk:
     def _think(self, flow: _Flow) -> None:
         if not flow.thinking:
             flow.thinking = True
-            self._hub.keep(self._thinking(flow))
+            self._hub.tasks.keep(self._thinking(flow))
 
     async def _thinking(self, flow: _Flow) -> None:
         """Think until nothing newer is to be thought of."""
@@ -167,9 +165,9 @@ class GuideDesk:
 
         def work() -> str:
             if isinstance(answer, Locator):
-                return self._calibrated(flow, answer, request.name)
+                return self._keep_calibration(flow, answer, request.name)
             assert isinstance(answer, WiringAnswer)
-            return self._wired(flow, answer, request.name)
+            return self._keep_skin(flow, answer, request.name)
 
         def done(name: str) -> None:
             if flow.kind == "touch":
@@ -180,22 +178,22 @@ class GuideDesk:
                 self._hub.show()
             self._tell()
 
-        run_errand(self._hub, page, work, done)
+        self._hub.tasks.run(page, work, done)
 
-    def _calibrated(self, flow: _Flow, locator: Locator, name: str) -> str:
+    def _keep_calibration(self, flow: _Flow, locator: Locator, name: str) -> str:
         """Save a calibration and switch it on; in a thread."""
         path = self._folder.free(name, ".npz")
         prepared = flow.prepared
         write_calibration(path, Calibration(locator, prepared.pattern, prepared.skin.name))
-        self._hub.runner.adopt(self._hub.runner.prepared.located_by(locator))
+        self._hub.runner.ask(Adopt(self._hub.runner.prepared.located_by(locator)))
         return path.name
 
-    def _wired(self, flow: _Flow, answer: WiringAnswer, name: str) -> str:
+    def _keep_skin(self, flow: _Flow, answer: WiringAnswer, name: str) -> str:
         """Save the skin as it is wired, and go on with it; in a thread."""
         path = self._folder.free(name, ".toml")
         wired = answer.wiring.applied(flow.prepared.skin)
         write_text(path, wired.to_toml())
-        self._hub.runner.change(prepare(wired), self._hub.runner.opening)
+        self._hub.runner.ask(Change(prepare(wired)))
         return path.name
 
     def _use(self, page: Listener, request: UseCalibration) -> None:
@@ -203,13 +201,13 @@ class GuideDesk:
             runner, locator = self._hub.runner, None
             if request.name is not None:
                 locator = read_calibration(self._folder.existing(request.name, ".npz")).locator
-            runner.adopt(runner.prepared.located_by(locator))
+            runner.ask(Adopt(runner.prepared.located_by(locator)))
 
         def done(_: None) -> None:
             self._using = request.name
             self._tell()
 
-        run_errand(self._hub, page, work, done)
+        self._hub.tasks.run(page, work, done)
 
     def _look_again(self) -> None:
         """Another skin is there, with a calibration whose name is not known, or without."""
@@ -218,9 +216,9 @@ class GuideDesk:
         self._used_on = prepared.mesh.identity
 
     def _tell(self) -> None:
-        self._hub.tell([self._told()])
+        self._hub.tell([self._message()])
 
-    def _told(self) -> str:
+    def _message(self) -> str:
         flow = self._flow
         if flow is None:
             return text_of(type="flow", kind=None, calibration=self._using)

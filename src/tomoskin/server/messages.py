@@ -35,7 +35,7 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
     from E1. ``solid``: where the points lie in space, x0, y0, z0, …, of a sheet on a surface.
     """
     skin, mesh, pattern = prepared.skin, prepared.mesh, prepared.pattern
-    return _text(
+    return text_of(
         type="scene",
         skin={"name": skin.name, "description": skin.description, "source": str(skin.source)},
         unit=prepared.operator.unit,
@@ -61,13 +61,13 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
 
 def scale(prepared: Prepared, limit: float) -> str:
     """The end of the colour scale, and its unit, where nothing else of the scene is new."""
-    return _text(type="scale", limit=limit, unit=prepared.operator.unit)
+    return text_of(type="scale", limit=limit, unit=prepared.operator.unit)
 
 
 def state(status: Status) -> str:
     """One look at the runner; numbers that are not known yet are null."""
     reference = status.reference
-    return _text(
+    return text_of(
         type="state",
         running=status.running,
         paused=status.paused,
@@ -152,12 +152,12 @@ def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
 
 def event(happened: Event) -> str:
     """Something that a person should know."""
-    return _text(type="event", time_s=happened.host_time, kind=happened.kind, text=happened.text)
+    return text_of(type="event", time_s=happened.host_time, kind=happened.kind, text=happened.text)
 
 
 def timeline(found: Timeline) -> str:
     """What happened in the recording that is played; times in s from its first frame."""
-    return _text(
+    return text_of(
         type="timeline",
         end_s=found.end,
         notes=[{"time_s": time, "text": event.text} for time, event in found.notes],
@@ -173,7 +173,7 @@ def timeline(found: Timeline) -> str:
 
 def error(message: str) -> str:
     """Answer to a request that was not understood."""
-    return _text(type="error", message=message)
+    return text_of(type="error", message=message)
 
 
 def _electrodes(prepared: Prepared) -> list[dict[str, Any]]:
@@ -215,5 +215,6 @@ def _flat(table: FloatArray | IntArray) -> list[float]:
     return flat
 
 
-def _text(**fields: Any) -> str:
+def text_of(**fields: Any) -> str:
+    """A message to a page."""
     return msgspec.json.encode(fields).decode()

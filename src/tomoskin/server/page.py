@@ -48,10 +48,9 @@ class Page:
     async def run(self) -> None:
         """Serve until either side ends it."""
         await self._socket.accept()
-        if self._hub.full:
+        if not self._hub.join(self):
             await self._socket.close(_TRY_AGAIN_LATER, "too many pages are open")
             return
-        self._hub.join(self)
         reason = ""
         tasks = {asyncio.create_task(self._read()), asyncio.create_task(self._write())}
         try:
@@ -96,7 +95,7 @@ class Page:
         if frame is not None and frame is not self._sent:
             await self._socket.send_bytes(frame)
             self._sent = frame
-            self._hub.sent(frame)
+            self._hub.frame.note_sent(frame)
 
 
 def _reason(done: set[asyncio.Task[None]]) -> str:

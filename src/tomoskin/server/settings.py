@@ -1,20 +1,19 @@
-"""The desk that changes the skin's settings while it runs, takes changes back, saves and loads."""
+"""Requests that change the skin's settings while it runs, take changes back, save and load."""
 
 from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
-
-import msgspec
 
 from tomoskin.core import Output, SkinError, SourceError, TomoskinError, check_outputs, write_text
 from tomoskin.inverse import LightTouch, LinearProblem, Spectrum
 from tomoskin.pipeline import Prepared, colour_limit, prepare_again, same_body, tuned
-from tomoskin.server.hub import Hub, Listener
+from tomoskin.run import Adopt, Change
+from tomoskin.server.hub import Hub
+from tomoskin.server.messages import text_of
 from tomoskin.server.requests import (
     AskPattern,
     LoadSkin,
@@ -24,6 +23,7 @@ from tomoskin.server.requests import (
     UndoSettings,
 )
 from tomoskin.server.settings_form import altered, refusal, schema, table_of
+from tomoskin.server.task import Listener
 from tomoskin.skin import Skin
 
 MOST_KEPT = 100
@@ -33,7 +33,7 @@ _GESTURE = 1.0
 """Changes of the same keys within so many s are one, as of a slider that is drawn."""
 
 
-class SettingsDesk:
+class SettingsHandlers:
     """Settings of the runner's skin, the same for all pages; lives in the event loop.
 
     What the picture alone rests on is prepared in a thread and taken over between two frames;
@@ -49,22 +49,21 @@ class SettingsDesk:
         self._working = False
         self._took: float | None = None
         self._auto: tuple[LinearProblem, LightTouch] | None = None
-
-    @property
-    def handlers(self) -> Mapping[type, Callable[[Listener, Any], None]]:
-        """See :class:`~tomoskin.server.hub.Desk`."""
-        return {
-            SetSettings: self._set,
-            UndoSettings: lambda page, _: self._step(page, self._undo, self._redo),
-            RedoSettings: lambda page, _: self._step(page, self._redo, self._undo),
-            SaveSkin: self._save,
-            LoadSkin: self._load,
-            AskPattern: self._pattern,
-        }
+        hub.serve(
+            {
+                SetSettings: self._set,
+                UndoSettings: lambda page, _: self._step(page, self._undo, self._redo),
+                RedoSettings: lambda page, _: self._step(page, self._redo, self._undo),
+                SaveSkin: self._save,
+                LoadSkin: self._load,
+                AskPattern: self._pattern,
+            },
+            self.greeting,
+        )
 
     def greeting(self) -> Sequence[str]:
         """The schema, and the settings as they are."""
-        return (schema(), self._told())
+        return (schema(), self._message())
 
     def _set(self, page: Listener, request: SetSettings) -> None:
         now = time.monotonic()
@@ -108,7 +107,7 @@ class SettingsDesk:
             page.post(refusal(type(error)(error.message, where=name, hint=error.hint)))
             return
         self._hub.runner.say("saved", f"settings saved as {name}")
-        self._hub.tell([self._told()])
+        self._hub.tell([self._message()])
 
     def _pattern(self, page: Listener, request: AskPattern) -> None:
         try:
@@ -138,8 +137,8 @@ class SettingsDesk:
         self._wanted = skin
         if not self._working:
             self._working = True
-            self._hub.keep(self._work(page))
-        self._hub.tell([self._told()])
+            self._hub.tasks.keep(self._work(page))
+        self._hub.tell([self._message()])
 
     async def _work(self, page: Listener) -> None:
         """Prepare what is wanted until nothing newer is; what fails is taken back."""
@@ -157,7 +156,7 @@ class SettingsDesk:
             if self._wanted is skin:
                 break
         self._working = False
-        self._hub.tell([self._told()])
+        self._hub.tell([self._message()])
 
     def _bring(self, skin: Skin) -> tuple[Prepared, float] | None:
         """Prepare ``skin`` and have the runner go on with it; in a thread.
@@ -171,11 +170,11 @@ class SettingsDesk:
                 prepared = tuned(prepared, runner.reference)
             scaled = prepared, colour_limit(prepared)
             self._took = time.monotonic() - start
-            runner.adopt(prepared)
+            runner.ask(Adopt(prepared))
             return scaled
         if opener is None:
             raise SourceError("the source cannot be set to another sheet or scan while it runs")
-        runner.change(prepared, partial(opener, skin))
+        runner.ask(Change(prepared, partial(opener, skin)))
         self._took = time.monotonic() - start
         return None
 
@@ -201,24 +200,23 @@ class SettingsDesk:
             noise = runner.prepared.difference_noise(reference)
         return self._auto[1](noise).alpha
 
-    def _told(self) -> str:
+    def _message(self) -> str:
         """The settings message."""
         skin = self._present()
         files = sorted(path.stem for path in self._hub.folder.glob("*.toml"))
-        fields = {
-            "type": "settings",
-            "document": skin.document,
-            "n_electrodes": skin.n_electrodes,
-            "automatic_alpha": self._automatic(),
-            "alpha": self._hub.runner.status().choice.alpha,
-            "undo": len(self._undo),
-            "redo": len(self._redo),
-            "busy": self._working,
-            "took_ms": None if self._took is None else 1e3 * self._took,
-            "files": files[:200],
-            "builtin": Skin.names(),
-        }
-        return msgspec.json.encode(fields).decode()
+        return text_of(
+            type="settings",
+            document=skin.document,
+            n_electrodes=skin.n_electrodes,
+            automatic_alpha=self._automatic(),
+            alpha=self._hub.runner.status().choice.alpha,
+            undo=len(self._undo),
+            redo=len(self._redo),
+            busy=self._working,
+            took_ms=None if self._took is None else 1e3 * self._took,
+            files=files[:200],
+            builtin=Skin.names(),
+        )
 
 
 def _save(path: Path, skin: Skin, *, replace: bool) -> None:

@@ -1,57 +1,127 @@
-"""The desk that lists what can be connected, says what the board is, and connects."""
+"""Requests about the source: what can be connected, what the board is, another source."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
-from tomoskin.server.flow_requests import Connect, ListSources
-from tomoskin.server.hub import Hub, Listener
-from tomoskin.server.stage import Offer, Stage
-from tomoskin.server.task import run_errand, text_of
+from tomoskin.core import SourceError
+from tomoskin.pipeline import Prepared
+from tomoskin.recording import ReplayTransport, SessionReader, as_recorded, parse_replay
+from tomoskin.run import Change
+from tomoskin.server.hub import Hub
+from tomoskin.server.messages import text_of
+from tomoskin.server.requests import Connect, ListSources
+from tomoskin.server.task import Listener
+from tomoskin.skin import Skin
+from tomoskin.source import Transport, list_ports, open_source
 from tomoskin.wire import SCHEMA
 
 
-class SourcesDesk:
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """A source that a page may choose: what opens it, and in words what it is."""
+
+    id: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Live:
+    spec: str
+    prepared: Prepared
+
+
+class SourceSwitch:
+    """Changes the runner's source; everything but :attr:`spec` belongs in a thread.
+
+    Parameters
+    ----------
+    hub
+        Whose runner; :meth:`Hub.show` is the caller's to call.
+    spec
+        The source at the start.
+    """
+
+    def __init__(self, hub: Hub, spec: str) -> None:
+        self._hub = hub
+        self._home = spec
+        name, _, argument = spec.partition(":")
+        self.spec = f"replay:{parse_replay(argument)[0].name}" if name == "replay" else spec
+        """The source of the moment; a recording by the name of its file."""
+        self._live: _Live | None = None
+
+    def offers(self) -> list[Offer]:
+        """What may be connected: the first source, the twin, the emulator, the ports here."""
+        offers = {"twin": "Simulated skin (twin)", "emulator": "Real firmware, simulated board"}
+        offers |= {f"serial:{port.device}": str(port) for port in list_ports()}
+        if not self._home.startswith("replay:"):
+            offers = {self._home: offers.get(self._home, self._home)} | offers
+        return [Offer(id, text) for id, text in offers.items()]
+
+    def connect(self, spec: str) -> None:
+        """Go on with one of :meth:`offers`. Raises SourceError."""
+        if spec not in {offer.id for offer in self.offers()}:
+            raise SourceError("expected one of the sources that are listed", where=spec[:80])
+        prepared = self._live.prepared if self._live else self._hub.runner.prepared
+        self._go(_Live(spec, prepared))
+
+    def play(self, path: Path) -> None:
+        """Play a recording with its own skin. Raises DataError, SourceError."""
+        runner = self._hub.runner
+        with SessionReader(path) as session:
+            prepared = as_recorded(session)
+        live = self._live or _Live(self.spec, runner.prepared)
+        runner.ask(Change(prepared, partial(_replay, path, prepared.skin)))
+        self._live, self.spec, self._hub.opener = live, f"replay:{path.name}", None
+
+    def back(self) -> None:
+        """From a recording to the source before it. Raises SourceError."""
+        if self._live is None:
+            raise SourceError("no recording is being played")
+        if self._live.spec.startswith("replay:"):
+            raise SourceError("there is no live source to go back to: connect one")
+        self._go(self._live)
+
+    def _go(self, live: _Live) -> None:
+        opener = partial(open_source, live.spec, live.prepared.skin)
+        self._hub.runner.ask(Change(live.prepared, opener))
+        self._live, self.spec = None, live.spec
+        self._hub.opener = partial(open_source, live.spec)
+
+
+def _replay(path: Path, skin: Skin) -> Transport:
+    return ReplayTransport(SessionReader(path), skin)
+
+
+class SourceHandlers:
     """Connects the sources of a list, and no others: a page gives no path and no address."""
 
-    def __init__(self, hub: Hub, stage: Stage) -> None:
-        self._hub, self._stage = hub, stage
-
-    @property
-    def handlers(self) -> Mapping[type, Callable[[Listener, Any], None]]:
-        """See :class:`~tomoskin.server.hub.Desk`."""
-        return {ListSources: self._list, Connect: self._connect}
-
-    def greeting(self) -> Sequence[str]:
-        """Nothing: ports are looked for when someone asks."""
-        return ()
+    def __init__(self, hub: Hub, switch: SourceSwitch) -> None:
+        self._hub, self._switch = hub, switch
+        hub.serve({ListSources: self._list, Connect: self._connect})
 
     def _list(self, page: Listener, _: ListSources) -> None:
         def answer(offers: list[Offer]) -> None:
-            page.post(self._told(offers))
+            page.post(self._message(offers))
 
-        run_errand(self._hub, page, self._stage.offers, answer)
+        self._hub.tasks.run(page, self._switch.offers, answer)
 
     def _connect(self, page: Listener, request: Connect) -> None:
-        run_errand(
-            self._hub,
-            page,
-            partial(self._stage.connect, request.source),
-            lambda _: self._hub.show(),
-        )
+        work = partial(self._switch.connect, request.source)
+        self._hub.tasks.run(page, work, lambda _: self._hub.show())
 
-    def _told(self, offers: list[Offer]) -> str:
-        runner = self._hub.runner
+    def _message(self, offers: list[Offer]) -> str:
+        status = self._hub.runner.status()
         return text_of(
             type="sources",
             sources=[asdict(offer) for offer in offers],
-            current=self._stage.spec,
+            current=self._switch.spec,
             host_protocol=f"{SCHEMA.major}.{SCHEMA.minor}",
-            board=_board(runner.board),
-            problem=runner.status().problem,
+            board=_board(status.board),
+            problem=status.problem,
         )
 
 

@@ -14,9 +14,8 @@ from tomoskin.recording import (
     schema_of,
     touches_message,
 )
-from tomoskin.sink.pace import TouchPace
 from tomoskin.sink.registry import needed, port_of
-from tomoskin.sink.sink import Item, Moment, Stream
+from tomoskin.sink.sink import Item, Moment, Stream, TouchPace
 
 DEFAULT_PORT = 8766
 """Foxglove's own default is the port of our page."""

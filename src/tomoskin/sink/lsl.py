@@ -11,9 +11,8 @@ import numpy as np
 
 from tomoskin.core import Event, FloatArray, SinkError
 from tomoskin.pattern import Pattern
-from tomoskin.sink.pace import TouchPace
 from tomoskin.sink.registry import needed
-from tomoskin.sink.sink import Item, Moment, Stream
+from tomoskin.sink.sink import Item, Moment, Stream, TouchPace
 
 MOST_TOUCHES = 5
 """Touches that a sample has room for, the strongest first."""

@@ -8,9 +8,8 @@ from urllib.parse import SplitResult, unquote, urlsplit
 
 from tomoskin.core import Event, SinkError
 from tomoskin.recording import encode_json, touch_row, touches_message
-from tomoskin.sink.pace import TouchPace
 from tomoskin.sink.registry import needed
-from tomoskin.sink.sink import Item, Stream
+from tomoskin.sink.sink import Item, Stream, TouchPace
 
 DEFAULT_PORT = 1883
 

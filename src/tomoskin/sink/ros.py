@@ -11,8 +11,7 @@ import numpy as np
 
 from tomoskin.core import Event, Image, PixelMap, Touch
 from tomoskin.recording import touches_message
-from tomoskin.sink.pace import TouchPace
-from tomoskin.sink.sink import Item, Moment, Stream
+from tomoskin.sink.sink import Item, Moment, Stream, TouchPace
 
 FRAME = "skin"
 """Name of the sheet's own frame of coordinates: x right, y up, seen from the front; m."""
