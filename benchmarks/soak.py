@@ -17,7 +17,7 @@ from tomoskin.core import Frame, SourceError
 from tomoskin.pattern import Scan
 from tomoskin.pipeline import colour_limit, prepare
 from tomoskin.recording import session_info
-from tomoskin.run import Record, Runner
+from tomoskin.run import Runner, commands
 from tomoskin.server import AccessPolicy, Hub, Server, application, listen
 from tomoskin.skin import Skin
 from tomoskin.source import Configuration, ScanSettings
@@ -177,7 +177,7 @@ def soak(minutes: float, folder: Path) -> Outcome:
         prepared, lambda: BadDay(skin, account, minutes, period), sinks=[sink := Hanging()]
     )
     memory, begun, file = [], time.monotonic(), folder / "soak.mcap"
-    runner.ask(Record(file))  # from the first byte on
+    runner.ask(commands.Record(file))  # from the first byte on
     runner.start()
     try:
         with sleeping_page(runner):

@@ -17,7 +17,7 @@ from tomoskin.emulator import Programs, SkinMemory
 from tomoskin.emulator.source import front_of
 from tomoskin.pipeline import prepare
 from tomoskin.recording import SessionReader
-from tomoskin.run import Record, Runner
+from tomoskin.run import Runner, commands
 from tomoskin.skin import Skin
 from tomoskin.source import Link, SerialTransport, open_source
 from tomoskin.twin import TwinSettings, TwinSkin
@@ -95,7 +95,7 @@ def test_unplugged_and_plugged_in_again_the_session_goes_on(
     with runner.watch(came.release):
         with running(programs.emulator, port, *options) as board:
             runner.start()
-            runner.ask(Record(path))
+            runner.ask(commands.Record(path))
             _await(came, 20)
             board.kill()
         with running(programs.emulator, port, *options):

@@ -96,7 +96,7 @@ def start(said):
         make = make or (lambda: SessionWriter(path, SKIN))
         worker = Worker(Recorder(path, make, pixels, said), Capacity(most, "oldest"), said)
         worker.start()
-        worker.opened.result(PATIENCE)
+        worker.opening.result(PATIENCE)
         workers.append(worker)
         return worker
 
@@ -107,7 +107,7 @@ def start(said):
 
 def end(worker):
     worker.end()
-    worker.ended.result(PATIENCE)
+    worker.ending.result(PATIENCE)
 
 
 def record(worker, count, start=0):
@@ -179,7 +179,7 @@ def test_a_full_disk_ends_the_recording_and_leaves_it_readable(tmp_path, said, s
     text = said.wait_for("recording-stopped")
     assert "No space left" in text
     assert str(path) in text
-    worker.ended.result(PATIENCE)
+    worker.ending.result(PATIENCE)
     record(worker, 10, start=500)  # goes nowhere, and hurts nobody
     assert "recorded" not in dict(said.events)
     frames = frames_in(path)

@@ -10,7 +10,7 @@ from run.board import Board
 from tomoskin.core import DataError, SourceError
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.recording import session_info
-from tomoskin.run import HoldPresses, Record, Runner, SetPause, StopRecording, TakeReference
+from tomoskin.run import Runner, commands
 from tomoskin.run.flow import MOST_AT_ONCE
 from tomoskin.run.publisher import EventLog
 from tomoskin.twin import Press
@@ -114,24 +114,24 @@ def test_pause_and_reference(runner, until):
     runner.start()
     until(lambda: runner.newest and runner.newest.result.ready)
     first = runner.status().reference.since
-    runner.ask(TakeReference())
+    runner.ask(commands.TakeReference())
     until(lambda: runner.newest.result.ready and runner.status().reference.since != first)
-    runner.ask(SetPause(True))
+    runner.ask(commands.SetPause(True))
     assert runner.status().paused
     frames = runner.status().frames
-    runner.ask(SetPause(False))
+    runner.ask(commands.SetPause(False))
     until(lambda: runner.status().frames > frames)
 
 
 def test_presses_of_all_owners_reach_the_source(runner, board, until):
     one, two = Press(0, 0, 1, 0.01), Press(0.01, 0, 2, 0.01)
     runner.start()
-    runner.ask(HoldPresses("a", (one,)))
-    runner.ask(HoldPresses("b", (two,)))
+    runner.ask(commands.HoldPresses("a", (one,)))
+    runner.ask(commands.HoldPresses("b", (two,)))
     until(lambda: set(board.presses) == {one, two} == set(runner.newest.truth))
-    runner.ask(HoldPresses("a", ()))
+    runner.ask(commands.HoldPresses("a", ()))
     until(lambda: board.presses == (two,))
-    runner.ask(HoldPresses("b", ()))
+    runner.ask(commands.HoldPresses("b", ()))
     until(lambda: board.presses == () and runner.newest.truth == ())
 
 
@@ -225,7 +225,7 @@ class NoRoom:
 
 def test_a_full_disk_ends_the_recording_but_not_the_run(runner, until, tmp_path):
     path = FullPath(tmp_path / "x.mcap")
-    runner.ask(Record(path))
+    runner.ask(commands.Record(path))
     assert runner.status().recording == path
     runner.start()
     until(lambda: runner.status().recording is None)
@@ -241,11 +241,11 @@ def test_a_full_disk_ends_the_recording_but_not_the_run(runner, until, tmp_path)
 def test_a_recording_can_be_ended_and_another_begun(runner, until, tmp_path):
     runner.start()
     until(lambda: runner.newest)
-    runner.ask(Record(tmp_path / "one.mcap"))
+    runner.ask(commands.Record(tmp_path / "one.mcap"))
     until(lambda: runner.status().frames > 30)
-    runner.ask(Record(tmp_path / "two.mcap"))
+    runner.ask(commands.Record(tmp_path / "two.mcap"))
     until(lambda: runner.status().frames > 60)
-    runner.ask(StopRecording())
+    runner.ask(commands.StopRecording())
     assert runner.status().recording is None
     for name in ("one.mcap", "two.mcap"):
         assert session_info(tmp_path / name).torn == ""
@@ -254,4 +254,4 @@ def test_a_recording_can_be_ended_and_another_begun(runner, until, tmp_path):
 
 def test_a_recording_that_cannot_begin_is_said(runner, tmp_path):
     with pytest.raises(DataError, match="cannot be"):
-        runner.ask(Record(tmp_path / "none" / "x.mcap"))
+        runner.ask(commands.Record(tmp_path / "none" / "x.mcap"))

@@ -56,7 +56,7 @@ def still_site(folder):
     until(lambda: runner.newest.result.touches)
     board.period = 0.3  # nothing moves, and drawing it costs time
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tomoskin.server.sources.list_ports", lambda: ())
+        patch.setattr("tomoskin.server.source_handlers.list_ports", lambda: ())
         site = Site(runner, folder=folder, take=serve_page)
         yield site
         site.stop()

@@ -12,9 +12,9 @@ from server.flowing import flowing
 from tomoskin.calibration import Wiring, read_calibration
 from tomoskin.core import DataError
 from tomoskin.recording import SessionReader, as_recorded, replayed
-from tomoskin.run import HoldPresses, Record, StopRecording
+from tomoskin.run import commands
 from tomoskin.server.folder import Folder
-from tomoskin.server.sources import SourceSwitch
+from tomoskin.server.source_handlers import SourceSwitch
 from tomoskin.skin import Skin
 from tomoskin.source import open_source
 from tomoskin.twin import Press
@@ -57,9 +57,9 @@ def press_dots(site, page, count):
 
 def press_dot(site, page, done):
     told = page.told("flow", lambda m: m.get("phase") == "press" and len(m["presses"]) == done)
-    site.runner.ask(HoldPresses(page, (Press(*told["dot"], FORCE, RADIUS),)))
+    site.runner.ask(commands.HoldPresses(page, (Press(*told["dot"], FORCE, RADIUS),)))
     page.told("flow", lambda m: len(m.get("presses", ())) == done + 1)
-    site.runner.ask(HoldPresses(page, ()))
+    site.runner.ask(commands.HoldPresses(page, ()))
 
 
 # the folder
@@ -180,14 +180,14 @@ def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
     until = Watch(runner).until
     until(lambda: runner.newest and runner.newest.result.ready)
     path = tmp_path / "sessions" / "run.mcap"
-    runner.ask(Record(path))
+    runner.ask(commands.Record(path))
     page.ask("open", name="run.mcap")
     assert "still being recorded" in page.told("error")["message"]
-    runner.ask(HoldPresses(page, (Press(0.03, 0.02, 5.0, 0.015),)))
+    runner.ask(commands.HoldPresses(page, (Press(0.03, 0.02, 5.0, 0.015),)))
     until(lambda: runner.newest.result.touches)
-    runner.ask(HoldPresses(page, ()))
+    runner.ask(commands.HoldPresses(page, ()))
     until(lambda: not runner.newest.result.touches)
-    runner.ask(StopRecording())
+    runner.ask(commands.StopRecording())
     for form, name in (("touches", "run-touches.csv"), ("npz", "run.npz"), ("npz", "run-2.npz")):
         page.ask("export", name="run.mcap", format=form)
         assert page.told("exported")["name"] == name
@@ -258,13 +258,13 @@ def taught(prepared, tmp_path_factory):
         page.ask("flow_keep", name="finger")
         page.told("flow", lambda m: m["kind"] is None and m["calibration"] == "finger.npz")
         until(lambda: runner.prepared.locator is not None)
-        runner.ask(Record(folder / "run.mcap"))
-        runner.ask(HoldPresses(page, (Press(*told["presses"][0], FORCE, RADIUS),)))
+        runner.ask(commands.Record(folder / "run.mcap"))
+        runner.ask(commands.HoldPresses(page, (Press(*told["presses"][0], FORCE, RADIUS),)))
         until(lambda: runner.newest.result.touches)
         begun = runner.newest.result.sequence
         until(lambda: runner.newest.result.sequence > begun + 6)
         last = runner.newest.result.touches
-        runner.ask(StopRecording())
+        runner.ask(commands.StopRecording())
     return folder, told, last
 
 
@@ -357,7 +357,7 @@ def test_scrambled_wires_are_found_kept_and_applied(prepared, tmp_path):
         saved = Skin.load(tmp_path / "wired.toml")
         assert saved.electrode_centres == pytest.approx(scrambled.electrode_centres, abs=1e-5)
         until(lambda: runner.newest and runner.newest.result.ready)
-        runner.ask(HoldPresses(page, (Press(0.03, 0.05, 5.0, 0.015),)))
+        runner.ask(commands.HoldPresses(page, (Press(0.03, 0.05, 5.0, 0.015),)))
         until(lambda: runner.newest.result.touches)
         until(lambda: runner.newest.result.touches[0].reading.snr > 8)
         reading = runner.newest.result.touches[0].reading

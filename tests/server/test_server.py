@@ -27,7 +27,7 @@ from tomoskin.server import (
     application,
     check_page,
     listen,
-    page,
+    page_connection,
 )
 
 
@@ -355,8 +355,8 @@ def deaf(site):
 
 
 def test_a_page_that_does_not_read_delays_nobody_and_is_let_go(site, monkeypatch):
-    monkeypatch.setattr(page, "PATIENCE", 0.3)
-    monkeypatch.setattr(page, "FRAME_PERIOD", 0.001)
+    monkeypatch.setattr(page_connection, "PATIENCE", 0.3)
+    monkeypatch.setattr(page_connection, "FRAME_PERIOD", 0.001)
     with deaf(site), site.connect() as other:
         seen = []
         while True:
@@ -374,7 +374,7 @@ def test_a_page_that_does_not_read_delays_nobody_and_is_let_go(site, monkeypatch
 
 def test_a_page_that_does_not_read_leaves_no_connection_behind(runner, static, monkeypatch):
     """What it was to be sent would be waited for without end."""
-    monkeypatch.setattr(page, "FRAME_PERIOD", 0.001)
+    monkeypatch.setattr(page_connection, "FRAME_PERIOD", 0.001)
     runner.start()
     site = Site(runner, static)
     with deaf(site), site.connect() as other:

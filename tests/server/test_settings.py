@@ -16,7 +16,7 @@ from tomoskin.core.outputs import MAGIC
 from tomoskin.pattern import named
 from tomoskin.pipeline import colour_limit, prepare, prepare_again
 from tomoskin.recording import SessionReader, replayed
-from tomoskin.run import Adopt, Record, Runner
+from tomoskin.run import Runner, commands
 from tomoskin.server import Hub, SettingsHandlers
 from tomoskin.server.requests import decode_request
 from tomoskin.server.settings_form import table_of
@@ -194,7 +194,7 @@ def test_a_recording_ends_and_what_it_holds_replays_to_the_bit(prepared, board, 
     seen = []
     runner = Runner(prepared, lambda: board)
     path = tmp_path / "before.mcap"
-    runner.ask(Record(path))
+    runner.ask(commands.Record(path))
     runner.start()
     with (
         contextlib.closing(_Stopped(runner)),
@@ -203,7 +203,7 @@ def test_a_recording_ends_and_what_it_holds_replays_to_the_bit(prepared, board, 
         until = Watch(runner).until
         until(lambda: len(seen) > 60)
         again = prepare_again(prepared, prepared.skin.altered({"inverse": {"alpha": 0.3}}))
-        runner.ask(Adopt(again))
+        runner.ask(commands.Adopt(again))
         until(lambda: runner.prepared is again)
     assert runner.status().recording is None
     with SessionReader(path) as session:

@@ -12,12 +12,12 @@ from server.test_settings import Heard
 from tomoskin.core import GeometryError, WireError
 from tomoskin.mesh import Arm, Cap, Hinge
 from tomoskin.recording import SessionReader
-from tomoskin.run import Record, Runner, StopRecording
+from tomoskin.run import Runner, commands
 from tomoskin.run.posing import sheet_pose, way_to_bend
 from tomoskin.run.twin_requests import BendRequest, SetPose, StretchRequest
 from tomoskin.server import Hub
 from tomoskin.server.requests import decode_request
-from tomoskin.server.twin import TwinHandlers
+from tomoskin.server.twin_handlers import TwinHandlers
 from tomoskin.source import open_source
 from tomoskin.twin import FACES, Bent, Face, Press, Probe, Square, Stretched
 
@@ -154,12 +154,12 @@ def test_the_truth_of_a_recording_knows_bends_and_faces(twin, tmp_path):
     runner, page = hub.runner, Heard()
     until = Watch(runner).until
     until(lambda: runner.newest is not None)
-    runner.ask(Record(tmp_path / "bent.mcap"))
+    runner.ask(commands.Record(tmp_path / "bent.mcap"))
     posed(hub, page, posing(bend=BEND))
     hub.obey(page, pressing(shape="polygon", vertices=CORNERS, angle=1.0))
     until(lambda: bool(runner.newest.truth))
     assert transport.presses == runner.newest.truth
-    runner.ask(StopRecording())
+    runner.ask(commands.StopRecording())
     with SessionReader(tmp_path / "bent.mcap") as session:
         last = list(session.truth())[-1]
     assert last.bends == ({"kind": "hinge", "angle": 0.8, "axis": 0.5},)

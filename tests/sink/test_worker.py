@@ -213,7 +213,7 @@ def test_of_too_much_the_oldest_or_the_newest_stays(news, keeps, kept):
     jar = Jar()
     worker = Worker(jar, Capacity(3, keeps), news)
     worker.start()
-    worker.opened.result(PATIENCE)
+    worker.opening.result(PATIENCE)
     worker.put(0)
     while not worker.silent:  # it has the first in hand
         pass
@@ -221,9 +221,8 @@ def test_of_too_much_the_oldest_or_the_newest_stays(news, keeps, kept):
         worker.put(number)
     assert worker.left_out == 6
     jar.go.release(10)
-    worker.wait_until_taken()
     worker.end()
-    worker.ended.result(PATIENCE)
+    worker.ending.result(PATIENCE)
     assert jar.items == kept
     assert news.said == [
         ("jar-behind", "the jar is slow"),
@@ -240,7 +239,7 @@ def test_what_is_said_of_a_worker_may_go_to_that_worker():
         worker.put(number)
     jar.go.release(10)
     worker.end()
-    worker.ended.result(PATIENCE)
+    worker.ending.result(PATIENCE)
     assert jar.items[0] == 0
 
 
@@ -252,7 +251,7 @@ def test_a_consumer_that_fails_for_good_ends(news):
     worker = Worker(Broken(), Capacity(3, "oldest"), news)
     worker.start()
     worker.put(1)
-    worker.ended.result(PATIENCE)
+    worker.ending.result(PATIENCE)
     worker.put(2)
     worker.join()
     assert (worker.taken, worker.left_out) == (0, 0)

@@ -62,10 +62,10 @@ def record(
 @contextlib.contextmanager
 def recording_to(runner: Runner, file: Path | None) -> Iterator[None]:
     """The runner runs while the block lasts, and records from its first byte to ``file``."""
-    from tomoskin.run import Record
+    from tomoskin.run import commands
 
     if file is not None:
-        runner.ask(Record(file))
+        runner.ask(commands.Record(file))
     try:
         runner.start()
     except BaseException:

@@ -155,7 +155,7 @@ class Recorder:
             if not self._broken:
                 self._say("recorded", f"recorded to {self.path}")
 
-    def failed(self, error: Exception) -> None:
+    def handle_failure(self, error: Exception) -> None:
         """The recording ends here; what could be written is in the file."""
         self._broken = True
         if self._session is None:

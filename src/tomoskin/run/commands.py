@@ -53,7 +53,7 @@ class Seek(StrictRequest, frozen=True, tag="seek"):
     at_s: Annotated[float, Meta(ge=0, le=1e9)]
 
 
-class Step(StrictRequest, frozen=True, tag="step"):
+class StepReplay(StrictRequest, frozen=True, tag="step"):
     """Play one read of the recording and stand still."""
 
 
@@ -120,7 +120,7 @@ class Change:
     open: Opener | None = None
 
 
-ReplayCommand = Seek | Step | SetSpeed | SetLoop
+ReplayCommand = Seek | StepReplay | SetSpeed | SetLoop
 """What only a replay can do; WireError where the source is another."""
 
 DirectCommand = Note | SetPose | SetTwin | ReplayCommand
@@ -140,6 +140,11 @@ class CommandQueue:
     """Commands put by any thread and taken by one.
 
     While no thread takes them, whoever puts one carries it out.
+
+    Attributes
+    ----------
+    taken
+        Whether a thread takes them.
     """
 
     def __init__(self, handle: Handle) -> None:
@@ -147,14 +152,14 @@ class CommandQueue:
         self._waiting: deque[tuple[QueuedCommand, Future[None]]] = deque()
         self._lock = threading.RLock()
         self._nudge = threading.Event()
-        self._taken = False
+        self.taken = False
 
     def put(self, command: QueuedCommand) -> Future[None]:
         """Have ``command`` carried out soon."""
         future: Future[None] = Future()
         with self._lock:
             self._waiting.append((command, future))
-            if not self._taken:
+            if not self.taken:
                 self.carry_out()
         self._nudge.set()
         return future
@@ -162,12 +167,12 @@ class CommandQueue:
     def begin(self) -> None:
         """A thread takes commands from here on."""
         with self._lock:
-            self._taken = True
+            self.taken = True
 
     def end(self) -> None:
         """It takes no more; those that wait are carried out now."""
         with self._lock:
-            self._taken = False
+            self.taken = False
             self.carry_out()
 
     def carry_out(self) -> None:

@@ -79,7 +79,7 @@ class Flow:
         self.twin.attach(transport)
         skin, name = self.prepared.skin.name, transport.name
         self.source = f"{name} of {skin}" if self.twin.pressable else f"{skin} on {name}"
-        self.out.opened(self.prepared, self.source)
+        self.out.begin(self.prepared, self.source)
 
     def link(self, transport: Transport) -> Link:
         """The protocol session with its source, which has just been opened, maybe again."""

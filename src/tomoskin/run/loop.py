@@ -10,18 +10,8 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.core import SourceError, TomoskinError
 from tomoskin.pipeline import Prepared
-from tomoskin.run.commands import (
-    Adopt,
-    Change,
-    CommandQueue,
-    HoldPresses,
-    Opener,
-    QueuedCommand,
-    Record,
-    SetPause,
-    StopRecording,
-    TakeReference,
-)
+from tomoskin.run import commands
+from tomoskin.run.commands import CommandQueue, Opener
 from tomoskin.run.flow import Flow
 from tomoskin.run.publisher import Audience
 from tomoskin.source import Transport
@@ -53,8 +43,8 @@ class Loop:
         self.trouble: str | None = "not started"
         self.commands = CommandQueue(self._handle)
         self._audience = audience
-        self._change: tuple[Change, Future[None]] | None = None
-        self._running = self._stopping = False
+        self._change: tuple[commands.Change, Future[None]] | None = None
+        self._stopping = False
 
     def stop(self) -> None:
         """Let :meth:`run` end soon; from any thread."""
@@ -63,8 +53,6 @@ class Loop:
 
     def run(self, transport: Transport | None) -> None:
         """Follow ``transport``, and what comes after it; returns at the end."""
-        self.commands.begin()
-        self._running = True
         try:
             # a frame's products are small: more threads would only wait for each other
             with threadpool_limits(1):
@@ -76,7 +64,6 @@ class Loop:
             self.trouble = f"internal error, {type(error).__name__}: {error}; start again"
             self.flow.out.say("internal", self.trouble)
         finally:
-            self._running = False
             self._refuse("it is not running")
             self.commands.end()
 
@@ -106,7 +93,7 @@ class Loop:
         delay, due = _FIRST_DELAY, time.monotonic() + _FIRST_DELAY
         while not self._stopping:
             self.commands.carry_out()
-            if (transport := self._changed()) is not None:
+            if (transport := self._change_over()) is not None:
                 return transport
             if self.commands.wait(due - time.monotonic()):
                 continue
@@ -118,28 +105,28 @@ class Loop:
                 due = time.monotonic() + delay
         return None
 
-    def _handle(self, command: QueuedCommand) -> Future[None] | None:
+    def _handle(self, command: commands.QueuedCommand) -> Future[None] | None:
         """Carry out a command; what it returns is done when the command is."""
         flow = self.flow
         match command:
-            case TakeReference():
+            case commands.TakeReference():
                 flow.marker.take_reference()
-            case SetPause():
+            case commands.SetPause():
                 flow.marker.hold(command.on)
-            case HoldPresses():
+            case commands.HoldPresses():
                 flow.twin.hold(command.owner, command.presses)
-            case Record():
+            case commands.Record():
                 return flow.out.recordings.begin(command.path)
-            case StopRecording():
+            case commands.StopRecording():
                 return flow.out.recordings.end()
-            case Adopt():
+            case commands.Adopt():
                 return flow.adopt(command.prepared)
-            case Change():
+            case commands.Change():
                 return self._ask_change(command)
         return None
 
-    def _ask_change(self, change: Change) -> Future[None]:
-        if not self._running:
+    def _ask_change(self, change: commands.Change) -> Future[None]:
+        if not self.commands.taken:
             raise SourceError("it is not running")
         self._refuse("something else has been chosen meanwhile")
         future: Future[None] = Future()
@@ -152,7 +139,7 @@ class Loop:
         if change is not None:
             change[1].set_exception(SourceError(why))
 
-    def _changed(self) -> Transport | None:
+    def _change_over(self) -> Transport | None:
         """Change to what was asked, if anything was; None where it cannot be opened."""
         if self._change is None:
             return None

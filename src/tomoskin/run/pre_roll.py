@@ -63,7 +63,7 @@ class PreRoll:
         if len(self._waiting) > _DELAY:
             self._untouched.append(self._waiting.popleft())
 
-    def changed(self) -> None:
+    def invalidate(self) -> None:
         """The pipeline is no longer what these frames would make of a new one."""
         self._complete = False
 

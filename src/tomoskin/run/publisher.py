@@ -148,9 +148,9 @@ class Publisher:
         self._sinks: tuple[Worker[SinkConsumer], ...] = ()
         self.recordings = Recordings(prepared, self.say, audience.clock, numbered)
 
-    def opened(self, prepared: Prepared, source: str) -> None:
+    def begin(self, prepared: Prepared, source: str) -> None:
         """A source has been opened, and this is what it is called."""
-        self.recordings.opened(source)
+        self.recordings.name_source(source)
         stream = Stream.of(prepared, source)
         self._sinks = tuple(sink_worker(sink, stream, self.say) for sink in self._audience.sinks)
         for worker in self._sinks:

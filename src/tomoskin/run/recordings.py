@@ -75,7 +75,7 @@ class Recordings:
     def path(self) -> Path | None:
         """The file that is being written, or None."""
         worker = self._awaiting or self._current
-        return None if worker is None or worker.ended.done() else worker.consumer.path
+        return None if worker is None or worker.ending.done() else worker.consumer.path
 
     def begin(self, path: Path) -> Future[None]:
         """Record from the next bytes on, and end what was being recorded.
@@ -85,7 +85,7 @@ class Recordings:
         self.end()
         worker = self._awaiting = _worker(path, self._prepared, self._clock(), self._say)
         worker.start()
-        return worker.opened
+        return worker.opening
 
     def end(self) -> Future[None] | None:
         """End the recording; done when the file is complete. None where there is none."""
@@ -95,16 +95,16 @@ class Recordings:
         if worker is None:
             return None
         worker.end()
-        return worker.ended
+        return worker.ending
 
     def adopt(self, prepared: Prepared) -> Future[None] | None:
         """Other settings from here on; a recording ends, since it holds those of one skin."""
         ended = self.end()
         self._prepared = prepared
-        self._pre_roll.changed()
+        self._pre_roll.invalidate()
         return ended
 
-    def opened(self, source: str) -> None:
+    def name_source(self, source: str) -> None:
         """A source has been opened, and this is what it is called."""
         self._source = source
         if self._current:
@@ -134,10 +134,10 @@ class Recordings:
     def _head(self) -> None:
         """The recorder whose file has been made gets what a replay begins with."""
         worker = self._awaiting
-        if worker is None or not worker.opened.done():
+        if worker is None or not worker.opening.done():
             return
         self._awaiting = None
-        if worker.opened.exception() is not None:
+        if worker.opening.exception() is not None:
             return
         now = self._clock()
         frames, self._touches_before, again = self._pre_roll.begin(self._numbered())

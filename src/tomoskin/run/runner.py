@@ -67,6 +67,7 @@ class Runner:
         """
         transport = self._loop.open()
         self._loop.flow.begin(transport)
+        self._loop.commands.begin()
         self._thread = threading.Thread(
             target=self._loop.run, args=(transport,), name="tomoskin-runner", daemon=True
         )

@@ -3,7 +3,7 @@
 from tomoskin.server.access_policy import AccessPolicy, is_loopback, load_token
 from tomoskin.server.handlers import serve_requests
 from tomoskin.server.hub import Hub
-from tomoskin.server.messages import readings, stages
+from tomoskin.server.page_messages import readings, stages
 from tomoskin.server.server import (
     DEFAULT_PORT,
     STATIC,
@@ -13,8 +13,8 @@ from tomoskin.server.server import (
     check_page,
     listen,
 )
-from tomoskin.server.settings import SettingsHandlers
-from tomoskin.server.twin import TwinHandlers
+from tomoskin.server.settings_handlers import SettingsHandlers
+from tomoskin.server.twin_handlers import TwinHandlers
 
 __all__ = [
     "DEFAULT_PORT",

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from tomoskin.server.files import FileHandlers
-from tomoskin.server.guide import GuideHandlers
+from tomoskin.server.file_handlers import FileHandlers
+from tomoskin.server.guide_handlers import GuideHandlers
 from tomoskin.server.hub import Hub
-from tomoskin.server.settings import SettingsHandlers
-from tomoskin.server.sources import SourceHandlers, SourceSwitch
-from tomoskin.server.twin import TwinHandlers
+from tomoskin.server.settings_handlers import SettingsHandlers
+from tomoskin.server.source_handlers import SourceHandlers, SourceSwitch
+from tomoskin.server.twin_handlers import TwinHandlers
 
 
 def serve_requests(hub: Hub, source: str) -> None:

@@ -11,8 +11,8 @@ from pathlib import Path
 from tomoskin.core import DataError, WireError
 from tomoskin.pipeline import Prepared, colour_limit
 from tomoskin.recording import read_timeline
-from tomoskin.run import HoldPresses, Runner
-from tomoskin.server import messages
+from tomoskin.run import Runner, commands
+from tomoskin.server import page_messages
 from tomoskin.server.frames import NewestFrame
 from tomoskin.server.requests import Request
 from tomoskin.server.run_handlers import run_handlers
@@ -98,7 +98,7 @@ class Hub:
             return False
         self._pages.add(page)
         timeline = [self._timeline] if self._timeline else []
-        now = messages.state(self.runner.status())
+        now = page_messages.state(self.runner.status())
         for text in (self._scene_text(), now, *timeline, *self._greeting(), *self._past):
             page.post(text)
         return True
@@ -106,7 +106,7 @@ class Hub:
     def leave(self, page: Listener, why: str = "") -> None:
         """Serve ``page`` no longer, and lift what it pressed."""
         self._pages.discard(page)
-        self.runner.submit(HoldPresses(page, ()))
+        self.runner.submit(commands.HoldPresses(page, ()))
         self.runner.latency.forget(page)
         if why:
             self.runner.say("page-dropped", why)
@@ -128,14 +128,14 @@ class Hub:
         """Tell every page that the runner has another skin or source."""
         self._limit, self._scene = colour_limit(self.runner.prepared), ""
         self._timeline = ""
-        now = messages.state(self.runner.status())
+        now = page_messages.state(self.runner.status())
         self.tell([self._scene_text(), now, *self._greeting()])
         self._read_timeline()
 
     def rescale(self, prepared: Prepared, limit: float) -> None:
         """Tell every page that pictures have another scale and unit from now on."""
         self._limit, self._scene = limit, ""
-        self.tell([messages.scale(prepared, limit)])
+        self.tell([page_messages.scale(prepared, limit)])
 
     def _greeting(self) -> list[str]:
         return [text for greeting in self._greetings for text in greeting()]
@@ -145,7 +145,7 @@ class Hub:
         if not self._scene:
             runner = self.runner
             source, pressable = runner.status().source, runner.twin.pressable
-            self._scene = messages.scene(
+            self._scene = page_messages.scene(
                 runner.prepared, source, limit=self._limit, pressable=pressable
             )
         return self._scene
@@ -161,7 +161,7 @@ class Hub:
         except DataError as error:
             self.runner.say("no-timeline", f"what happened in the recording is not known: {error}")
             return
-        self._timeline = messages.timeline(timeline)
+        self._timeline = page_messages.timeline(timeline)
         self.tell([self._timeline])
 
     def _wake(self) -> None:
@@ -172,7 +172,7 @@ class Hub:
     async def _tick(self) -> None:
         while True:
             self._next_event, happened = self.runner.events.since(self._next_event)
-            news = [messages.event(event) for event in happened]
+            news = [page_messages.event(event) for event in happened]
             self._past.extend(news)
-            self.tell([*news, messages.state(self.runner.status())])
+            self.tell([*news, page_messages.state(self.runner.status())])
             await asyncio.sleep(_STATE_PERIOD)

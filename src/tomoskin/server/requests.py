@@ -11,16 +11,7 @@ import msgspec
 from msgspec import Meta
 
 from tomoskin.core import WireError
-from tomoskin.run import (
-    Note,
-    ReplayCommand,
-    SetPause,
-    SetPose,
-    SetPresses,
-    SetTwin,
-    StrictRequest,
-    TakeReference,
-)
+from tomoskin.run import SetPose, SetPresses, SetTwin, StrictRequest, commands
 
 MAX_REQUEST = 32_768
 """Longest request, bytes: a pattern of some thousand rows, written out."""
@@ -152,15 +143,15 @@ class UseCalibration(StrictRequest, frozen=True, tag="calibration"):
 
 
 RunRequest = (
-    TakeReference
-    | SetPause
+    commands.TakeReference
+    | commands.SetPause
     | SetRecording
-    | Note
+    | commands.Note
     | Painted
     | SetPresses
     | SetTwin
     | SetPose
-    | ReplayCommand
+    | commands.ReplayCommand
 )
 
 SettingsRequest = SetSettings | UndoSettings | RedoSettings | SaveSkin | LoadSkin | AskPattern

@@ -11,18 +11,7 @@ from typing import get_args
 import numpy as np
 
 from tomoskin.core import DataError, GeometryError, WireError
-from tomoskin.run import (
-    Command,
-    HoldPresses,
-    Note,
-    Record,
-    ReplayCommand,
-    Runner,
-    SetPause,
-    SetPresses,
-    StopRecording,
-    TakeReference,
-)
+from tomoskin.run import Runner, SetPresses, commands
 from tomoskin.server.requests import Painted, SetRecording
 from tomoskin.server.task import Handlers, Listener, Tasks
 from tomoskin.skin import Skin
@@ -34,11 +23,11 @@ _FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"
 def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
     """Handlers of a run whose recordings go to ``folder``, under names of their own."""
 
-    def submit(_: Listener, request: Command) -> None:
+    def submit(_: Listener, request: commands.Command) -> None:
         runner.submit(request)
 
     def press(page: Listener, request: SetPresses) -> None:
-        runner.submit(HoldPresses(page, _on_skin(request, runner.prepared.skin)))
+        runner.submit(commands.HoldPresses(page, _on_skin(request, runner.prepared.skin)))
 
     def paint(page: Listener, request: Painted) -> None:
         runner.latency.set_paint(page, request.p50_s, request.p99_s)
@@ -46,24 +35,24 @@ def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
     def record(_: Listener, request: SetRecording) -> None:
         tasks.keep(_record(runner, folder, on=request.on))
 
-    def play(page: Listener, request: ReplayCommand) -> None:
+    def play(page: Listener, request: commands.ReplayCommand) -> None:
         tasks.run(page, partial(runner.ask, request), lambda _: None)  # a seek may read a file
 
     return {
-        TakeReference: submit,
-        SetPause: submit,
-        Note: submit,
+        commands.TakeReference: submit,
+        commands.SetPause: submit,
+        commands.Note: submit,
         SetPresses: press,
         Painted: paint,
         SetRecording: record,
-        **dict.fromkeys(get_args(ReplayCommand), play),
+        **dict.fromkeys(get_args(commands.ReplayCommand), play),
     }
 
 
 async def _record(runner: Runner, folder: Path, *, on: bool) -> None:
-    command = Record(folder / time.strftime(_FILE_NAME)) if on else StopRecording()
+    begin = commands.Record(folder / time.strftime(_FILE_NAME))
     try:
-        await asyncio.wrap_future(runner.submit(command))
+        await asyncio.wrap_future(runner.submit(begin if on else commands.StopRecording()))
     except DataError as error:
         runner.say("recording-stopped", f"nothing is recorded: {error}")
 

@@ -22,12 +22,12 @@ from starlette.websockets import WebSocket
 from websockets.exceptions import InvalidState
 
 from tomoskin.core import DataError, TomoskinError
-from tomoskin.server import messages
+from tomoskin.server import page_messages
 from tomoskin.server.access import AccessControl
 from tomoskin.server.access_policy import AccessPolicy
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
-from tomoskin.server.page import PATIENCE, Page
+from tomoskin.server.page_connection import PATIENCE, Page
 
 STATIC = Path(__file__).parent / "static"
 """Where the built page lies."""
@@ -93,7 +93,7 @@ def application(hub: Hub, policy: AccessPolicy, static: Path = STATIC) -> ASGIAp
         return Response(status_code=204)
 
     async def status(_: Request) -> Response:
-        return Response(messages.state(hub.runner.status()), media_type="application/json")
+        return Response(page_messages.state(hub.runner.status()), media_type="application/json")
 
     async def download(request: Request) -> Response:
         name = request.path_params["name"]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Coroutine, Mapping
 from typing import Any, Protocol, TypeVar
 
 from tomoskin.core import TomoskinError
-from tomoskin.server import messages
+from tomoskin.server import page_messages
 
 _T = TypeVar("_T")
 
@@ -49,7 +49,7 @@ class Tasks:
             try:
                 outcome = await asyncio.to_thread(work)
             except TomoskinError as error:
-                page.post(messages.error(str(error)))
+                page.post(page_messages.error(str(error)))
             else:
                 then(outcome)
 

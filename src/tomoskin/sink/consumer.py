@@ -89,7 +89,7 @@ class SinkConsumer(Consumer):
         with contextlib.suppress(Exception):
             self._sink.close()
 
-    def failed(self, error: Exception) -> float:
+    def handle_failure(self, error: Exception) -> float:
         """Say so once; it is opened again after a pause that doubles."""
         before, self.trouble = self.trouble, f"is away: {_why(error)}"
         if self.trouble != before:

@@ -72,7 +72,7 @@ class Consumer(Protocol):
         """Let go of everything; also after an :meth:`open` that failed half-way."""
         return
 
-    def failed(self, error: Exception) -> float | None:
+    def handle_failure(self, error: Exception) -> float | None:
         """It has raised: seconds until it is opened again; None: it ends here."""
         del error
         return None
@@ -105,7 +105,7 @@ class Worker(Generic[C]):
     ----------
     taken, left_out
         Messages that the consumer took, and that it could not be given.
-    opened, ended
+    opening, ending
         Done when the consumer was opened for the first time (or has its error), and when the
         thread has ended.
     """
@@ -113,8 +113,8 @@ class Worker(Generic[C]):
     def __init__(self, consumer: C, capacity: Capacity, say: Say) -> None:
         self.consumer = consumer
         self.taken = self.left_out = 0
-        self.opened: Future[None] = Future()
-        self.ended: Future[None] = Future()
+        self.opening: Future[None] = Future()
+        self.ending: Future[None] = Future()
         self._capacity, self._say = capacity, say
         self._waiting: deque[tuple[int, Any]] = deque()
         self._size = self._behind = 0
@@ -136,7 +136,7 @@ class Worker(Generic[C]):
         if item is None:
             return
         with self._news:
-            if self.ended.done() or self._deadline is not None:
+            if self.ending.done() or self._deadline is not None:
                 return
             if not self._ready and not self.consumer.durable(item):
                 self.left_out += 1
@@ -153,7 +153,7 @@ class Worker(Generic[C]):
         """Take no more, and stop when all that waits was taken or the grace is over."""
         with self._news:
             self._deadline = time.monotonic() + self._capacity.grace
-            self._news.notify_all()
+            self._news.notify()
 
     def join(self) -> None:
         """Return when it has ended, or leave it to itself when it does not."""
@@ -163,13 +163,6 @@ class Worker(Generic[C]):
         self._thread.join(None if math.isinf(left) else max(left, 0.0))
         if self._thread.is_alive():
             self._tell("stuck", "does not answer, and is left to itself")
-
-    def wait_until_taken(self) -> None:
-        """Return when nothing waits any more, or it has ended."""
-        with self._news:
-            self._news.wait_for(
-                lambda: (not self._waiting and self._asked is None) or self.ended.done()
-            )
 
     @property
     def silent(self) -> float:
@@ -198,10 +191,9 @@ class Worker(Generic[C]):
         finally:
             with self._news:
                 self._waiting.clear()
-                self.ended.set_result(None)
-                self._news.notify_all()
-            if not self.opened.done():
-                self.opened.set_exception(SinkError("was never opened", where=self.consumer.name))
+                self.ending.set_result(None)
+            if not self.opening.done():
+                self.opening.set_exception(SinkError("was never opened", where=self.consumer.name))
 
     def _serve(self) -> float | None:
         """Until the end, or until it fails: seconds until the next attempt."""
@@ -209,37 +201,37 @@ class Worker(Generic[C]):
         try:
             with self._in_time():
                 consumer.open()
-            self._is_open()
+            self._note_open()
             while (item := self._next()) is not None:
                 with self._in_time():
                     consumer.take(item)
                 self.taken += 1
-                self._caught_up()
+                self._report_gap()
             with self._in_time():
                 consumer.close()
         except Exception as error:
-            pause = self._failed(error)
+            pause = self._recover(error)
             with contextlib.suppress(Exception), self._in_time():  # it may be what has failed
                 consumer.close()
             return pause
         return None
 
-    def _is_open(self) -> None:
+    def _note_open(self) -> None:
         with self._news:
             self._ready = True
-        if not self.opened.done():
-            self.opened.set_result(None)
+        if not self.opening.done():
+            self.opening.set_result(None)
 
-    def _failed(self, error: Exception) -> float | None:
+    def _recover(self, error: Exception) -> float | None:
         """What waits and is of no worth later is left out."""
         with self._news:
             self._ready = False
             kept = [(size, item) for size, item in self._waiting if self.consumer.durable(item)]
             self.left_out += len(self._waiting) - len(kept)
             self._waiting, self._size = deque(kept), sum(size for size, _ in kept)
-        pause = self.consumer.failed(error)
-        if pause is None and not self.opened.done():
-            self.opened.set_exception(error)
+        pause = self.consumer.handle_failure(error)
+        if pause is None and not self.opening.done():
+            self.opening.set_exception(error)
         return pause
 
     @contextlib.contextmanager
@@ -255,18 +247,16 @@ class Worker(Generic[C]):
         """What is to be taken now; None: no more."""
         while True:
             with self._news:
-                self._news.notify_all()
                 if self._news.wait_for(lambda: self._waiting or self._deadline is not None, _IDLE):
                     late = self._deadline is not None and time.monotonic() > self._deadline
                     if late or not self._waiting:
                         return None
                     size, item = self._waiting.popleft()
                     self._size -= size
-                    self._asked = time.monotonic()
                     return item
             self.consumer.idle()
 
-    def _caught_up(self) -> None:
+    def _report_gap(self) -> None:
         with self._news:
             count = 0 if self._waiting else self._behind
             self._behind -= count

@@ -10,9 +10,9 @@ from tomoskin.formats import WRITERS, Export
 from tomoskin.recording import SessionReader
 from tomoskin.server.folder import FileEntry, Folder
 from tomoskin.server.hub import Hub
-from tomoskin.server.messages import text_of
+from tomoskin.server.page_messages import text_of
 from tomoskin.server.requests import ExportSession, GoLive, ListFiles, OpenSession
-from tomoskin.server.sources import SourceSwitch
+from tomoskin.server.source_handlers import SourceSwitch
 from tomoskin.server.task import Listener
 
 _EVERY = 0.1

@@ -9,7 +9,7 @@ from collections import deque
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from tomoskin.core import WireError
-from tomoskin.server import messages
+from tomoskin.server import page_messages
 from tomoskin.server.hub import Hub
 from tomoskin.server.requests import decode_request
 
@@ -75,7 +75,7 @@ class Page:
                 raise WireError("expected text, got a binary message")
             self._hub.obey(self, decode_request(text))
         except WireError as error:
-            self.post(messages.error(str(error)))
+            self.post(page_messages.error(str(error)))
 
     async def _write(self) -> None:
         loop = asyncio.get_running_loop()

@@ -10,9 +10,9 @@ from typing import Any
 from tomoskin.core import SourceError
 from tomoskin.pipeline import Prepared
 from tomoskin.recording import ReplayTransport, SessionReader, as_recorded, parse_replay
-from tomoskin.run import Change
+from tomoskin.run import commands
 from tomoskin.server.hub import Hub
-from tomoskin.server.messages import text_of
+from tomoskin.server.page_messages import text_of
 from tomoskin.server.requests import Connect, ListSources
 from tomoskin.server.task import Listener
 from tomoskin.skin import Skin
@@ -74,7 +74,7 @@ class SourceSwitch:
         with SessionReader(path) as session:
             prepared = as_recorded(session)
         live = self._live or _Live(self.spec, runner.prepared)
-        runner.ask(Change(prepared, partial(_replay, path, prepared.skin)))
+        runner.ask(commands.Change(prepared, partial(_replay, path, prepared.skin)))
         self._live, self.spec, self._hub.opener = live, f"replay:{path.name}", None
 
     def back(self) -> None:
@@ -87,7 +87,7 @@ class SourceSwitch:
 
     def _go(self, live: _Live) -> None:
         opener = partial(open_source, live.spec, live.prepared.skin)
-        self._hub.runner.ask(Change(live.prepared, opener))
+        self._hub.runner.ask(commands.Change(live.prepared, opener))
         self._live, self.spec = None, live.spec
         self._hub.opener = partial(open_source, live.spec)
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from tomoskin.core import Output, SkinError, SourceError, TomoskinError, check_outputs, write_text
 from tomoskin.inverse import LightTouch, LinearProblem, Spectrum
 from tomoskin.pipeline import Prepared, colour_limit, prepare_again, same_body, tuned
-from tomoskin.run import Adopt, Change
+from tomoskin.run import commands
 from tomoskin.server.hub import Hub
-from tomoskin.server.messages import text_of
+from tomoskin.server.page_messages import text_of
 from tomoskin.server.requests import (
     AskPattern,
     LoadSkin,
@@ -170,11 +170,11 @@ class SettingsHandlers:
                 prepared = tuned(prepared, runner.reference)
             scaled = prepared, colour_limit(prepared)
             self._took = time.monotonic() - start
-            runner.ask(Adopt(prepared))
+            runner.ask(commands.Adopt(prepared))
             return scaled
         if opener is None:
             raise SourceError("the source cannot be set to another sheet or scan while it runs")
-        runner.ask(Change(prepared, partial(opener, skin)))
+        runner.ask(commands.Change(prepared, partial(opener, skin)))
         self._took = time.monotonic() - start
         return None
 

@@ -10,7 +10,7 @@ import numpy as np
 from tomoskin.core import GeometryError, WireError
 from tomoskin.run import SetPose, SetTwin, way_to_bend
 from tomoskin.server.hub import Hub
-from tomoskin.server.messages import text_of
+from tomoskin.server.page_messages import text_of
 from tomoskin.server.task import Listener
 
 

@@ -7,20 +7,14 @@ import contextlib
 from collections.abc import Sequence
 from functools import partial
 
-from tomoskin.calibration import (
-    Calibration,
-    Locator,
-    WiringAnswer,
-    read_calibration,
-    write_calibration,
-)
-from tomoskin.core import FloatArray, TomoskinError, WireError, write_text
-from tomoskin.pipeline import Prepared, Result, prepare
-from tomoskin.run import Adopt, Change
+from tomoskin.calibration import read_calibration
+from tomoskin.core import FloatArray, TomoskinError, WireError
+from tomoskin.pipeline import Result
+from tomoskin.run import commands
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
-from tomoskin.server.lessons import Dots, Lesson, Thought, touch_thought, wiring_thought
-from tomoskin.server.messages import text_of
+from tomoskin.server.page_messages import text_of
+from tomoskin.server.press_flow import PressFlow, keep
 from tomoskin.server.requests import (
     BeginFlow,
     EndFlow,
@@ -29,31 +23,7 @@ from tomoskin.server.requests import (
     UndoPress,
     UseCalibration,
 )
-from tomoskin.server.taking import Taker
 from tomoskin.server.task import Listener
-
-_LEAST = 0.5
-"""Noise is never taken for less than this part of what the read-out predicts."""
-
-
-class _Flow:
-    """One flow from its first dot to its end; the taker belongs to a thread of its own."""
-
-    def __init__(self, kind: FlowKind, prepared: Prepared) -> None:
-        self.kind, self.prepared = kind, prepared
-        self.taker = Taker(_LEAST * prepared.readout.noise)
-        self.dots = Dots(prepared)
-        self.lessons: list[Lesson] = []
-        self.thought: Thought | None = None
-        self.trouble = ""
-        self.thinking = False
-        self.dot = self.dots.next((), None)
-
-    def think(self, lessons: Sequence[Lesson]) -> Thought:
-        """What these presses tell; in a thread."""
-        if self.kind == "touch":
-            return touch_thought(self.prepared, lessons)
-        return wiring_thought(self.prepared, lessons, self.taker.untouched)
 
 
 class GuideHandlers:
@@ -65,7 +35,7 @@ class GuideHandlers:
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
         self._folder = Folder(hub.folder)
-        self._flow: _Flow | None = None
+        self._flow: PressFlow | None = None
         self._using: str | None = None  # the calibration's file; "": its name is not known
         self._used_on = ""
         self._watching = contextlib.ExitStack()
@@ -93,7 +63,7 @@ class GuideHandlers:
         if self._hub.runner.replay is not None:
             raise WireError("nobody can press a recording: go back to live first")
         self._leave()
-        flow = self._flow = _Flow(kind, self._hub.runner.prepared)
+        flow = self._flow = PressFlow(kind, self._hub.runner.prepared)
         loop = asyncio.get_running_loop()
         look = partial(self._look, flow, loop)
         self._watching.enter_context(self._hub.runner.subscribe("guide", look))
@@ -107,41 +77,36 @@ class GuideHandlers:
         self._leave()
         self._tell()
 
-    def _look(self, flow: _Flow, loop: asyncio.AbstractEventLoop, result: Result) -> None:
+    def _look(self, flow: PressFlow, loop: asyncio.AbstractEventLoop, result: Result) -> None:
         """A frame has come; in a thread of its own."""
         before = flow.taker.phase
         dv = flow.taker.push(result.host_time, result.voltages)
         if dv is not None or flow.taker.phase != before:
             with contextlib.suppress(RuntimeError):  # the loop has ended
-                loop.call_soon_threadsafe(self._moved, flow, dv)
+                loop.call_soon_threadsafe(self._advance, flow, dv)
 
-    def _moved(self, flow: _Flow, dv: FloatArray | None) -> None:
+    def _advance(self, flow: PressFlow, dv: FloatArray | None) -> None:
         if flow is not self._flow:
             return
         if dv is not None:
-            flow.lessons.append(Lesson(flow.dot, dv))
-            self._turn(flow)
+            flow.add(dv)
+            self._think(flow)
         self._tell()
 
     def _undo(self) -> None:
         flow = self._flow
-        if flow is None or not flow.lessons:
+        if flow is None:
             raise WireError("there is no press to take back")
-        flow.dot = flow.lessons.pop().place
-        flow.thought = None
+        flow.undo()
         self._think(flow)
         self._tell()
 
-    def _turn(self, flow: _Flow) -> None:
-        flow.dot = flow.dots.next(flow.lessons, flow.thought)
-        self._think(flow)
-
-    def _think(self, flow: _Flow) -> None:
+    def _think(self, flow: PressFlow) -> None:
         if not flow.thinking:
             flow.thinking = True
             self._hub.tasks.keep(self._thinking(flow))
 
-    async def _thinking(self, flow: _Flow) -> None:
+    async def _thinking(self, flow: PressFlow) -> None:
         """Think until nothing newer is to be thought of."""
         while flow is self._flow:
             lessons = tuple(flow.lessons)
@@ -159,15 +124,7 @@ class GuideHandlers:
         flow = self._flow
         if flow is None:
             raise WireError("nothing has been pressed")
-        if flow.thinking or flow.thought is None or not flow.thought.ready:
-            raise WireError("the presses do not tell enough yet")
-        answer = flow.thought.answer
-
-        def work() -> str:
-            if isinstance(answer, Locator):
-                return self._keep_calibration(flow, answer, request.name)
-            assert isinstance(answer, WiringAnswer)
-            return self._keep_skin(flow, answer, request.name)
+        work = partial(keep, flow, flow.answer(), self._folder, request.name, self._hub.runner)
 
         def done(name: str) -> None:
             if flow.kind == "touch":
@@ -180,28 +137,12 @@ class GuideHandlers:
 
         self._hub.tasks.run(page, work, done)
 
-    def _keep_calibration(self, flow: _Flow, locator: Locator, name: str) -> str:
-        """Save a calibration and switch it on; in a thread."""
-        path = self._folder.free(name, ".npz")
-        prepared = flow.prepared
-        write_calibration(path, Calibration(locator, prepared.pattern, prepared.skin.name))
-        self._hub.runner.ask(Adopt(self._hub.runner.prepared.located_by(locator)))
-        return path.name
-
-    def _keep_skin(self, flow: _Flow, answer: WiringAnswer, name: str) -> str:
-        """Save the skin as it is wired, and go on with it; in a thread."""
-        path = self._folder.free(name, ".toml")
-        wired = answer.wiring.applied(flow.prepared.skin)
-        write_text(path, wired.to_toml())
-        self._hub.runner.ask(Change(prepare(wired)))
-        return path.name
-
     def _use(self, page: Listener, request: UseCalibration) -> None:
         def work() -> None:
             runner, locator = self._hub.runner, None
             if request.name is not None:
                 locator = read_calibration(self._folder.existing(request.name, ".npz")).locator
-            runner.ask(Adopt(runner.prepared.located_by(locator)))
+            runner.ask(commands.Adopt(runner.prepared.located_by(locator)))
 
         def done(_: None) -> None:
             self._using = request.name
@@ -222,16 +163,4 @@ class GuideHandlers:
         flow = self._flow
         if flow is None:
             return text_of(type="flow", kind=None, calibration=self._using)
-        thought = flow.thought or Thought("")
-        return text_of(
-            type="flow",
-            kind=flow.kind,
-            phase=flow.taker.phase,
-            dot=flow.dot,
-            presses=[lesson.place for lesson in flow.lessons],
-            thinking=flow.thinking,
-            text=flow.trouble or thought.text,
-            ready=thought.ready and not flow.thinking,
-            figures=thought.figures,
-            calibration=self._using,
-        )
+        return text_of(type="flow", **flow.fields(), calibration=self._using)
