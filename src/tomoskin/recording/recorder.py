@@ -65,7 +65,7 @@ class Recorder:
     """
 
     kind = "recording"
-    slow = "the disk is too slow, messages are lost"
+    slow, ready = "the disk is too slow, messages are lost", ""
 
     def __init__(
         self,

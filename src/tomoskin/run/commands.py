@@ -111,7 +111,7 @@ class Adopt:
 class Change:
     """Go on with another skin or source; None: the source of the moment, opened again.
 
-    A recording ends, and the reference is taken anew. The old source is closed before the new one
+    A recording ends, and the reference is taken again. The old source is closed before the new one
     is opened, since both may be the same port. SourceError (or any error of its kind) when it
     cannot be opened: the old one goes on.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -27,6 +28,8 @@ from tomoskin.sink import (
 
 MOST_WAITING = 256
 """Results that may wait for a subscriber; the oldest make room."""
+
+_log = logging.getLogger(__name__)
 
 
 class EventLog:
@@ -65,6 +68,10 @@ class Subscriber(Consumer):
         """Call the function."""
         self._call(item)
 
+    def handle_failure(self, error: Exception) -> None:
+        """A fault of our own: it is given no more."""
+        _log.error("%s is given no more results", self.name, exc_info=error)
+
 
 class Audience:
     """Who listens, whatever skin or source there is.
@@ -74,7 +81,7 @@ class Audience:
     clock
         Host monotonic seconds.
     sinks
-        Where results go; each run opens them anew.
+        Where results go; each run opens them again.
     events
         What happened, for any number of readers at their own pace.
     """

@@ -90,7 +90,7 @@ class GuideHandlers:
             return
         if dv is not None:
             flow.add(dv)
-            self._think(flow)
+            self._estimate(flow)
         self._tell()
 
     def _undo(self) -> None:
@@ -98,25 +98,26 @@ class GuideHandlers:
         if flow is None:
             raise WireError("there is no press to take back")
         flow.undo()
-        self._think(flow)
+        self._estimate(flow)
         self._tell()
 
-    def _think(self, flow: PressFlow) -> None:
-        if not flow.thinking:
-            flow.thinking = True
-            self._hub.tasks.keep(self._thinking(flow))
+    def _estimate(self, flow: PressFlow) -> None:
+        if not flow.estimating:
+            flow.estimating = True
+            self._hub.tasks.keep(self._estimating(flow))
 
-    async def _thinking(self, flow: PressFlow) -> None:
-        """Think until nothing newer is to be thought of."""
+    async def _estimating(self, flow: PressFlow) -> None:
+        """Estimate until there is no newer press."""
         while flow is self._flow:
-            lessons = tuple(flow.lessons)
+            presses = tuple(flow.presses)
             try:
-                flow.thought, flow.trouble = await asyncio.to_thread(flow.think, lessons), ""
+                flow.estimate = await asyncio.to_thread(flow.estimate_from, presses)
+                flow.trouble = ""
             except TomoskinError as error:
-                flow.thought, flow.trouble = None, str(error)
-            if tuple(flow.lessons) == lessons:
+                flow.estimate, flow.trouble = None, str(error)
+            if tuple(flow.presses) == presses:
                 break
-        flow.thinking = False
+        flow.estimating = False
         if flow is self._flow:
             self._tell()
 

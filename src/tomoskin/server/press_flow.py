@@ -10,7 +10,13 @@ from tomoskin.core import FloatArray, WireError, write_text
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
-from tomoskin.server.lessons import Dots, Lesson, Thought, touch_thought, wiring_thought
+from tomoskin.server.guided_presses import (
+    Dots,
+    Estimate,
+    GuidedPress,
+    estimate_touch,
+    estimate_wiring,
+)
 from tomoskin.server.requests import FlowKind
 from tomoskin.server.taking import Taker
 
@@ -25,61 +31,61 @@ class PressFlow:
     ----------
     taker
         Takes the presses; belongs to a thread of its own.
-    lessons
+    presses
         Presses so far.
-    thought, trouble
+    estimate, trouble
         What they tell, or why that is not known.
-    thinking
-        Whether something newer is being thought of.
+    estimating
+        Whether something newer is being estimated.
     """
 
     def __init__(self, kind: FlowKind, prepared: Prepared) -> None:
         self.kind, self.prepared = kind, prepared
         self.taker = Taker(_LEAST * prepared.readout.noise)
-        self.lessons: list[Lesson] = []
-        self.thought: Thought | None = None
+        self.presses: list[GuidedPress] = []
+        self.estimate: Estimate | None = None
         self.trouble = ""
-        self.thinking = False
+        self.estimating = False
         self._dots = Dots(prepared)
         self._dot = self._dots.next((), None)
 
     def add(self, dv: FloatArray) -> None:
         """A press on the dot made the change ``dv`` (n_meas,) V; the dot moves on."""
-        self.lessons.append(Lesson(self._dot, dv))
-        self._dot = self._dots.next(self.lessons, self.thought)
+        self.presses.append(GuidedPress(self._dot, dv))
+        self._dot = self._dots.next(self.presses, self.estimate)
 
     def undo(self) -> None:
         """Take the last press back."""
-        if not self.lessons:
+        if not self.presses:
             raise WireError("there is no press to take back")
-        self._dot = self.lessons.pop().place
-        self.thought = None
+        self._dot = self.presses.pop().place
+        self.estimate = None
 
-    def think(self, lessons: Sequence[Lesson]) -> Thought:
+    def estimate_from(self, presses: Sequence[GuidedPress]) -> Estimate:
         """What these presses tell; in a thread. Raises DataError."""
         if self.kind == "touch":
-            return touch_thought(self.prepared, lessons)
-        return wiring_thought(self.prepared, lessons, self.taker.untouched)
+            return estimate_touch(self.prepared, presses)
+        return estimate_wiring(self.prepared, presses, self.taker.untouched)
 
     def answer(self) -> Locator | WiringAnswer:
         """What can be kept. Raises WireError where the presses do not tell enough."""
-        thought = self.thought
-        if self.thinking or thought is None or not thought.ready or thought.answer is None:
+        estimate = self.estimate
+        if self.estimating or estimate is None or not estimate.ready or estimate.answer is None:
             raise WireError("the presses do not tell enough yet")
-        return thought.answer
+        return estimate.answer
 
     def fields(self) -> dict[str, Any]:
         """What a page shows of it."""
-        thought = self.thought or Thought("")
+        estimate = self.estimate or Estimate("")
         return {
             "kind": self.kind,
             "phase": self.taker.phase,
             "dot": self._dot,
-            "presses": [lesson.place for lesson in self.lessons],
-            "thinking": self.thinking,
-            "text": self.trouble or thought.text,
-            "ready": thought.ready and not self.thinking,
-            "figures": thought.figures,
+            "presses": [press.place for press in self.presses],
+            "thinking": self.estimating,
+            "text": self.trouble or estimate.text,
+            "ready": estimate.ready and not self.estimating,
+            "figures": estimate.figures,
         }
 
 

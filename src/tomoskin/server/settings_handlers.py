@@ -37,12 +37,12 @@ class SettingsHandlers:
     """Settings of the runner's skin, the same for all pages; lives in the event loop.
 
     What the picture alone rests on is prepared in a thread and taken over between two frames;
-    for anything else the source is opened anew, as the twin and a board must follow it.
+    for anything else the source is opened again, as the twin and a board must follow it.
     """
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
-        self._wanted: Skin = hub.runner.prepared.skin
+        self._asked: Skin = hub.runner.prepared.skin
         self._undo: list[Skin] = []
         self._redo: list[Skin] = []
         self._last: tuple[object, float] = (None, 0.0)
@@ -122,7 +122,7 @@ class SettingsHandlers:
 
     def _present(self) -> Skin:
         """The settings as they are, or will be when what is being prepared is ready."""
-        return self._wanted if self._working else self._hub.runner.prepared.skin
+        return self._asked if self._working else self._hub.runner.prepared.skin
 
     def _check(self, skin: Skin) -> None:
         """Raise SourceError where the source cannot follow ``skin``."""
@@ -134,7 +134,7 @@ class SettingsHandlers:
             raise SourceError("the source cannot be set to another sheet or scan while it runs")
 
     def _go(self, page: Listener, skin: Skin) -> None:
-        self._wanted = skin
+        self._asked = skin
         if not self._working:
             self._working = True
             self._hub.tasks.keep(self._work(page))
@@ -143,7 +143,7 @@ class SettingsHandlers:
     async def _work(self, page: Listener) -> None:
         """Prepare what is wanted until nothing newer is; what fails is taken back."""
         while True:
-            skin = self._wanted
+            skin = self._asked
             try:
                 scaled = await asyncio.to_thread(self._bring, skin)
                 if scaled is None:
@@ -153,7 +153,7 @@ class SettingsHandlers:
                 await asyncio.to_thread(self._remember, self._hub.runner.prepared)
             except TomoskinError as error:
                 page.post(refusal(error))
-            if self._wanted is skin:
+            if self._asked is skin:
                 break
         self._working = False
         self._hub.tell([self._message()])
@@ -161,7 +161,7 @@ class SettingsHandlers:
     def _bring(self, skin: Skin) -> tuple[Prepared, float] | None:
         """Prepare ``skin`` and have the runner go on with it; in a thread.
 
-        What it was prepared to and the end of its scale; None where the source was opened anew.
+        What it was prepared to and the end of its scale; None where the source was opened again.
         """
         start, runner, opener = time.monotonic(), self._hub.runner, self._hub.opener
         prepared = prepare_again(runner.prepared, skin)

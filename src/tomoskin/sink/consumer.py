@@ -52,7 +52,7 @@ class SinkConsumer(Consumer):
     """
 
     kind = "sink"
-    slow = "does not keep up, and results are left out"
+    slow, ready = "does not keep up, and results are left out", "takes results"
 
     def __init__(self, sink: Sink, stream: Stream, say: Say) -> None:
         self.name = sink.name
@@ -77,7 +77,6 @@ class SinkConsumer(Consumer):
         """Open the sink."""
         self._sink.open(self._stream)
         self.trouble = ""
-        self._tell("sink-open", "takes results")
 
     def take(self, item: Result | Event) -> None:
         """Send it."""
@@ -93,7 +92,9 @@ class SinkConsumer(Consumer):
         """Say so once; it is opened again after a pause that doubles."""
         before, self.trouble = self.trouble, f"is away: {_why(error)}"
         if self.trouble != before:
-            self._tell("sink-away", self.trouble)
+            text = f"{self.name} {self.trouble}"
+            _log.warning("%s", text)
+            self._say("sink-away", text)
         delay = self._delay
         self._delay = min(2 * delay, _LONGEST_DELAY)
         return delay
@@ -106,11 +107,6 @@ class SinkConsumer(Consumer):
         if due:
             self._last_image = item.host_time
         return Moment.of(item, with_image=due)
-
-    def _tell(self, kind: str, text: str) -> None:
-        level = logging.INFO if kind == "sink-open" else logging.WARNING
-        _log.log(level, "%s %s", self.name, text)
-        self._say(kind, f"{self.name} {text}")
 
 
 def sink_worker(sink: Sink, stream: Stream, say: Say) -> Worker[SinkConsumer]:

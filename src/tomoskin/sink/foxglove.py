@@ -40,8 +40,8 @@ class FoxgloveSink:
         # kept: with its last reference the SDK lets go of the channels too
         self._context = context = sdk.Context()
         for topic in _TOPICS:
-            found = schema_of(topic)
-            schema = sdk.Schema(name=found.name, encoding=found.encoding, data=found.text.encode())
+            own = schema_of(topic)
+            schema = sdk.Schema(name=own.name, encoding=own.encoding, data=own.text.encode())
             self._channels[topic] = sdk.Channel(
                 topic, schema=schema, message_encoding="json", context=context
             )

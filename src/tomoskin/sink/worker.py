@@ -8,7 +8,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, Protocol, TypeVar
@@ -43,6 +43,9 @@ class Consumer(Protocol):
 
     slow: str
     """What is said when it does not keep up."""
+
+    ready: str = ""
+    """What is said when it has been opened; "": nothing."""
 
     def admit(self, message: Any) -> Any:
         """What of ``message`` is to wait for it; None: it is not meant for it."""
@@ -199,20 +202,17 @@ class Worker(Generic[C]):
         """Until the end, or until it fails: seconds until the next attempt."""
         consumer = self.consumer
         try:
-            with self._in_time():
-                consumer.open()
+            self._call(consumer.open)
             self._note_open()
             while (item := self._next()) is not None:
-                with self._in_time():
-                    consumer.take(item)
+                self._call(consumer.take, item)
                 self.taken += 1
                 self._report_gap()
-            with self._in_time():
-                consumer.close()
+            self._call(consumer.close)
         except Exception as error:
             pause = self._recover(error)
-            with contextlib.suppress(Exception), self._in_time():  # it may be what has failed
-                consumer.close()
+            with contextlib.suppress(Exception):  # it may be what has failed
+                self._call(consumer.close)
             return pause
         return None
 
@@ -221,6 +221,8 @@ class Worker(Generic[C]):
             self._ready = True
         if not self.opening.done():
             self.opening.set_result(None)
+        if self.consumer.ready:
+            self._tell("open", self.consumer.ready)
 
     def _recover(self, error: Exception) -> float | None:
         """What waits and is of no worth later is left out."""
@@ -234,12 +236,11 @@ class Worker(Generic[C]):
             self.opening.set_exception(error)
         return pause
 
-    @contextlib.contextmanager
-    def _in_time(self) -> Iterator[None]:
-        """Notes since when the consumer has been asked for something."""
+    def _call(self, function: Callable[..., None], *arguments: Any) -> None:
+        """Ask the consumer for something, and note since when."""
         self._asked = time.monotonic()
         try:
-            yield
+            function(*arguments)
         finally:
             self._asked = None
 
@@ -265,7 +266,7 @@ class Worker(Generic[C]):
 
     def _tell(self, kind: str, text: str) -> None:
         text = f"{self.consumer.name} {text}"
-        _log.warning("%s", text)
+        _log.log(logging.INFO if kind == "open" else logging.WARNING, "%s", text)
         self._say(f"{self.consumer.kind}-{kind}", text)
 
 
