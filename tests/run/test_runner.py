@@ -128,7 +128,7 @@ def test_presses_of_all_owners_reach_the_source(runner, board, until):
     runner.start()
     runner.ask(commands.HoldPresses("a", (one,)))
     runner.ask(commands.HoldPresses("b", (two,)))
-    until(lambda: set(board.presses) == {one, two} == set(runner.newest.truth))
+    until(lambda: runner.newest and set(board.presses) == {one, two} == set(runner.newest.truth))
     runner.ask(commands.HoldPresses("a", ()))
     until(lambda: board.presses == (two,))
     runner.ask(commands.HoldPresses("b", ()))

@@ -76,8 +76,8 @@ class Recorder:
     ) -> None:
         self.path, self.name = path, f"{path}:"
         self._make, self._pixels, self._say = make, pixels, say
-        self._session: SessionWriter | None = None
-        self._broken = False
+        self._session: SessionWriter
+        self._made = self._broken = False
         self._last_image = float("-inf")
         self._had_touches = False
         self._clock, self._next_fit = ClockFitter(), float("-inf")
@@ -120,11 +120,11 @@ class Recorder:
 
     def open(self) -> None:
         """Make the file. Raises DataError."""
-        self._session = self._make()
+        self._session, self._made = self._make(), True
 
     def take(self, item: RunMessage | _Outcome) -> None:
         """Write one message. Raises DataError."""
-        session = self._open_session
+        session = self._session
         match item:
             case RawRead():
                 session.raw(item.host_time, item.data)
@@ -146,11 +146,11 @@ class Recorder:
 
     def idle(self) -> None:
         """Nothing came for a while: look after the file. Raises DataError."""
-        self._open_session.settle()
+        self._session.settle()
 
     def close(self) -> None:
         """End the file. Raises DataError."""
-        if self._session is not None:
+        if self._made:
             self._session.close()
             if not self._broken:
                 self._say("recorded", f"recorded to {self.path}")
@@ -158,7 +158,7 @@ class Recorder:
     def handle_failure(self, error: Exception) -> None:
         """The recording ends here; what could be written is in the file."""
         self._broken = True
-        if self._session is None:
+        if not self._made:
             return  # whoever asked for it is told
         why = str(error)
         if not isinstance(error, DataError):
@@ -166,13 +166,8 @@ class Recorder:
             why = f"internal error, {type(error).__name__}: {error}"
         self._say("recording-stopped", f"the recording has ended: {why}")
 
-    @property
-    def _open_session(self) -> SessionWriter:
-        assert self._session is not None
-        return self._session
-
     def _write_outcome(self, item: _Outcome) -> None:
-        session = self._open_session
+        session = self._session
         if item.touches is not None:
             session.touches(item.host_time, item.sequence, item.touches)
         if item.image is not None and self._pixels is not None:
@@ -187,7 +182,7 @@ class Recorder:
             return
         self._clock.add(frame.ticks, frame.host_time)
         if frame.host_time >= self._next_fit and (fit := self._clock.fit) is not None:
-            self._open_session.clock(frame.host_time, fit)
+            self._session.clock(frame.host_time, fit)
             self._next_fit = frame.host_time + CLOCK_PERIOD
 
     def _image_is_due(self, host_time: float) -> bool:

@@ -1,20 +1,45 @@
-"""What was lost on the way, and how fast frames came, in bounded memory."""
+"""What was lost on the way, how fast frames came, and where the age of a picture comes from.
+
+How long each stage takes, from the sample to the page:
+
+========================  ====================================================================
+sample                    between the scans of two frames that follow each other, by the device
+decode                    from a frame's last byte to the pipeline, waiting for others included
+reconstruct               the pipeline: voltages, picture, touches
+publish                   from the touches to the last byte given to a page's connection
+paint                     from its arrival at a page to the end of drawing it, as pages say
+========================  ====================================================================
+
+The way through the network lies between the last two and is not known; on the loopback it is
+far less than a millisecond.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, Frame
 from tomoskin.source import Link
 
 _WINDOW = 512
-"""Frames whose latency is kept: some seconds of a real board."""
+"""Frames whose times are kept: some seconds of a real board."""
 
 _RECENT = 1.0
 """Seconds over which the rate is counted."""
+
+Timed = Literal["sample", "decode", "reconstruct", "publish"]
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """How long one stage took of late, s: median and 99th percentile; NaN: not known."""
+
+    name: str
+    p50: float
+    p99: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,29 +95,49 @@ class Ring:
         return float(p50), float(p99)
 
 
-class FrameCounter:
-    """When frames came and how long each took, s; written by one thread, read by any."""
+class Latency:
+    """Times of the last frames, in bounded memory; each is written by one thread, read by any."""
 
     def __init__(self, window: int = _WINDOW) -> None:
-        self._arrivals = Ring(window)
-        self._latencies = Ring(window)
-
-    def add_arrival(self, host_time: float) -> None:
-        """Note a frame by the host time of its last byte."""
-        self._arrivals.add(host_time)
-
-    def add_latency(self, latency: float) -> None:
-        """Note the seconds from a frame's last byte to its touches."""
-        self._latencies.add(latency)
+        """Nothing has been timed."""
+        self._rings: dict[Timed, Ring] = {
+            name: Ring(window) for name in ("sample", "decode", "reconstruct", "publish")
+        }
+        self._arrivals, self._ages = Ring(window), Ring(window)
+        self._painted: dict[object, tuple[float, float]] = {}
+        self._last: Frame | None = None
 
     @property
     def frames(self) -> int:
         """Frames since the start."""
         return self._arrivals.count
 
-    def latency(self) -> tuple[float, float]:
-        """(p50, p99) of the latency, s; NaN before the first frame."""
-        return self._latencies.percentiles()
+    def add_frame(self, frame: Frame, read: float, tick_rate: float) -> None:
+        """Note a frame whose last byte was read at ``read``, s; ``tick_rate`` in Hz."""
+        self._arrivals.add(read)
+        last, self._last = self._last, frame
+        if last is not None and frame.sequence == last.sequence + 1 and frame.ticks > last.ticks:
+            self.add("sample", (frame.ticks - last.ticks) / tick_rate)
+
+    def add(self, stage: Timed, seconds: float) -> None:
+        """Note how long a stage took."""
+        self._rings[stage].add(seconds)
+
+    def add_age(self, seconds: float) -> None:
+        """Note the time from a frame's last byte to its touches."""
+        self._ages.add(seconds)
+
+    def set_paint(self, page: object, p50: float, p99: float) -> None:
+        """What a page says of its own drawing, s."""
+        self._painted[page] = p50, p99
+
+    def forget(self, page: object) -> None:
+        """A page draws no longer."""
+        self._painted.pop(page, None)
+
+    def age(self) -> tuple[float, float]:
+        """(p50, p99) from a frame's last byte to its touches, s; NaN before the first."""
+        return self._ages.percentiles()
 
     def rate(self, now: float) -> float:
         """Frames per second over the last second; 0 where fewer than two came."""
@@ -100,3 +145,11 @@ class FrameCounter:
         recent = arrivals[arrivals > now - _RECENT]
         span = float(np.ptp(recent)) if len(recent) else 0.0
         return (len(recent) - 1) / span if span > 0 else 0.0
+
+    def stages(self) -> tuple[Stage, ...]:
+        """All stages, in the order of the flow; of the pages the one that is slowest."""
+        slowest = max(
+            self._painted.copy().values(), key=lambda p: p[1], default=(float("nan"),) * 2
+        )
+        timed = (Stage(name, *ring.percentiles()) for name, ring in self._rings.items())
+        return *timed, Stage("paint", *slowest)

@@ -10,8 +10,7 @@ from tomoskin.core import DataError, Event, Frame, ModelError, WireError
 from tomoskin.pipeline import Pipeline, Prepared, Result, same_body
 from tomoskin.recording import BoardInfo, Mark, MarkedFrame, RawRead, Truth, advance
 from tomoskin.run.commands import DirectCommand, Note, ReplayCommand
-from tomoskin.run.counters import FrameCounter, Losses
-from tomoskin.run.latency import Latency
+from tomoskin.run.counters import Latency, Losses
 from tomoskin.run.marker import Marker, play, replay_status
 from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.status import Status
@@ -67,7 +66,6 @@ class Flow:
         self.latency = Latency()
         self._clock = audience.clock
         self._settings = ScanSettings.of(prepared.skin)
-        self._counter = FrameCounter()
         self._losses, self._earlier, self._skipped = Losses(), Losses(), 0
         self._drops, self._polled = 0, 0.0
         self._standstill: str | None = None
@@ -152,7 +150,7 @@ class Flow:
     def status(self, trouble: str | None) -> Status:
         """How it is doing now; ``trouble``: why there is no source, or None."""
         now, replay = self._clock(), self.marker.replay
-        p50, p99 = self._counter.latency()
+        p50, p99 = self.latency.age()
         reference = self.pipeline.reference_state
         result = self.newest.result if self.newest else None
         total = self._earlier + self._losses
@@ -164,8 +162,8 @@ class Flow:
             recording=self.out.recordings.path,
             sinks=self.out.sink_reports(),
             replay=replay_status(replay, ended=self._ended) if replay else None,
-            frames=self._counter.frames,
-            fps=self._counter.rate(now),
+            frames=self.latency.frames,
+            fps=self.latency.rate(now),
             dropped=total.dropped + self._skipped + self.pipeline.refused,
             corrupt=total.corrupt,
             gaps=total.gaps,
@@ -232,8 +230,7 @@ class Flow:
         self._standstill = None
         # the times in a replay are the recording's
         read, begun = self._polled if self.marker.replay else frame.host_time, self._clock()
-        self._counter.add_arrival(read)
-        self.latency.add_frame(frame, self.pipeline.tick_rate)
+        self.latency.add_frame(frame, read, self.pipeline.tick_rate)
         self.latency.add("decode", begun - read)
         try:
             result = advance(self.pipeline, frame, mark)
@@ -244,7 +241,7 @@ class Flow:
         if result is None:
             return
         ready = self._clock()
-        self._counter.add_latency(ready - read)
+        self.latency.add_age(ready - read)
         self.latency.add("reconstruct", ready - begun)
         self.newest = Snapshot(result, self.twin.truth, ready - read, ready)
         self.out.put(result)

@@ -122,13 +122,15 @@ class Audience:
         self.events.add(Event(self.clock(), kind, text))
 
     def put(self, message: RunMessage) -> None:
-        """Give ``message`` to those who subscribe, and keep it if it is an event."""
+        """Give ``message`` to those who subscribe; keep an event, and wake others at a result."""
         if isinstance(message, Event):
             self.events.add(message)
         with self._lock:
             subscribers = tuple(self._subscribers)
         for worker in subscribers:
             worker.put(message)
+        if isinstance(message, Result):
+            self.wake()
 
     def wake(self) -> None:
         """There is something new to look at."""
@@ -169,8 +171,6 @@ class Publisher:
         for worker in self._sinks:
             worker.put(message)
         self._audience.put(message)
-        if isinstance(message, Result):
-            self.wake()
 
     def say(self, kind: str, text: str) -> None:
         """Publish an event of this moment; from any thread."""

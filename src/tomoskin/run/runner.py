@@ -10,8 +10,8 @@ from contextlib import AbstractContextManager
 
 from tomoskin.pipeline import Prepared, Result
 from tomoskin.run.commands import Command, DirectCommand, Opener
+from tomoskin.run.counters import Latency
 from tomoskin.run.flow import Snapshot
-from tomoskin.run.latency import Latency
 from tomoskin.run.loop import Loop
 from tomoskin.run.marker import ReplaySource
 from tomoskin.run.publisher import Audience

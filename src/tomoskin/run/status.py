@@ -9,7 +9,7 @@ from pathlib import Path
 from tomoskin.calibration import BendReading, StateReading
 from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline import ReferenceState
-from tomoskin.run.latency import Stage
+from tomoskin.run.counters import Stage
 from tomoskin.signal import ElectrodeHealth
 from tomoskin.sink import SinkReport
 from tomoskin.wire import Info
