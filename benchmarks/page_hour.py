@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-import tomoskin.server.page
+import tomoskin.server.page_connection
 from page_stream import chromium, heap, opened, streaming
 from report import Report
 from tomoskin.pipeline import prepare
@@ -32,7 +32,7 @@ HOUR = 3600 * 60
 def run(data: Path | None, minutes: float = MINUTES) -> tuple[Report, ...]:
     """Measure on the loopback; ``data`` is not needed."""
     del data
-    tomoskin.server.page.FRAME_PERIOD = PERIOD
+    tomoskin.server.page_connection.FRAME_PERIOD = PERIOD
     prepared = prepare(Skin.load("textile-disc-8").altered({"mesh": {"cells": 3000}}))
     with (
         chromium() as browser,

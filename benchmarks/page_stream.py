@@ -16,7 +16,7 @@ import numpy as np
 from tomoskin.core import Image, Reading, Touch
 from tomoskin.pipeline import Prepared, Result, colour_limit
 from tomoskin.run import Runner, Snapshot
-from tomoskin.server import Door, Hub, Server, SettingsDesk, application, listen
+from tomoskin.server import AccessPolicy, Hub, Server, SettingsHandlers, application, listen
 
 _FLAGS = Path(__file__).resolve().parents[1] / "scripts" / "chromium.flags"
 ARGUMENTS = tuple(_FLAGS.read_text(encoding="utf-8").split())
@@ -26,8 +26,6 @@ STEPS = 64
 
 class Stream(Runner):
     """Results as fast as asked: two touches that go round in noise."""
-
-    source = "a bench"
 
     def __init__(self, prepared: Prepared, rate: float) -> None:
         """``rate`` in results per second; nothing is opened."""
@@ -46,7 +44,7 @@ class Stream(Runner):
         return self._shown
 
     @contextmanager
-    def watched_by(self, announce: Callable[[], None]) -> Iterator[None]:
+    def watch(self, announce: Callable[[], None]) -> Iterator[None]:
         """Call it at each result."""
         self._announces.append(announce)
         yield
@@ -105,14 +103,14 @@ def streaming(prepared: Prepared, rate: float) -> Iterator[tuple[Stream, str]]:
     """A stream and its page's address while the block lasts."""
     stream = Stream(prepared, rate)
     hub = Hub(stream, limit=colour_limit(prepared))
-    hub.take(SettingsDesk(hub))
+    SettingsHandlers(hub)
     with listen("127.0.0.1", 0) as listener:
-        door = Door(listener.getsockname()[1])
-        server = Server.of(application(hub, door))
+        policy = AccessPolicy(listener.getsockname()[1])
+        server = Server.of(application(hub, policy))
         thread = threading.Thread(target=server.run_on, args=(listener,))
         thread.start()
         try:
-            yield stream, door.address
+            yield stream, policy.address
         finally:
             server.stop()
             thread.join()

@@ -16,7 +16,8 @@ from report import Report
 from tomoskin.core import Frame
 from tomoskin.formats import write_parquet
 from tomoskin.pattern import Scan
-from tomoskin.recording import Mark, Recorder, SessionReader, SessionWriter
+from tomoskin.recording import Mark, MarkedFrame, RawRead, Recorder, SessionReader, SessionWriter
+from tomoskin.sink import Capacity, Worker
 from tomoskin.skin import Skin
 from tomoskin.wire import encode
 
@@ -27,6 +28,8 @@ LONG, PACED = 600, 20
 
 HOUR, HOUR_RATE = 3600, 100.0
 SEED, SEEKS = 1, 40
+MOST_WAITING = 64 << 20
+"""Bytes that may wait for the disk, as in a run."""
 RECORDED = ("seconds", "frames/s", "MB", "% of a core", "growth MB", "left out")
 OPENED = ("frames", "MB", "open ms", "open and seek ms", "worst ms")
 _BATCH = 200
@@ -90,31 +93,35 @@ def recorded(
     """Values under ``RECORDED``; ``paced``: as the frames come, not as fast as they are written."""
     raw = [encode(frame) for frame in frames]
     nothing = threading.Event()
-    recorder = Recorder(SessionWriter(path, skin), None, lambda *_: None)
-    _feed(recorder, frames, raw, range(_BATCH))  # warm
+    recorder = Recorder(path, lambda: SessionWriter(path, skin), None, lambda *_: None)
+    worker = Worker(recorder, Capacity(MOST_WAITING, "oldest"), lambda *_: None)
+    worker.start()
+    _feed(worker, frames, raw, range(_BATCH))  # warm
     memory, processor, begun = _resident(), time.process_time(), time.monotonic()
     for start in range(_BATCH, int(seconds * RATE), _BATCH if not paced else 1):
         count = _BATCH if not paced else 1
-        _feed(recorder, frames, raw, range(start, start + count))
+        _feed(worker, frames, raw, range(start, start + count))
         if paced:
             ahead = start / RATE - (time.monotonic() - begun)
             if ahead > 0:
                 nothing.wait(ahead)
         else:
-            recorder.wait_until_written()
+            while worker.taken < 2 * (start + count):
+                nothing.wait(1e-4)
     used = time.process_time() - processor
     grown = _resident() - memory
-    recorder.stop()
+    worker.end()
+    worker.join()
     size = path.stat().st_size / 1e6
     share = round(100 * used / seconds, 1)
-    return seconds, round(RATE), round(size), share, round(grown, 1), recorder.left_out
+    return seconds, round(RATE), round(size), share, round(grown, 1), worker.left_out
 
 
-def _feed(recorder: Recorder, frames: list[Frame], raw: list[bytes], numbers: range) -> None:
+def _feed(worker: Worker[Recorder], frames: list[Frame], raw: list[bytes], numbers: range) -> None:
     for number in numbers:
         frame = _at(frames, number, RATE)
-        recorder.raw(frame.host_time, raw[number % _KINDS])
-        recorder.frame(frame, Mark.NONE)
+        worker.put(RawRead(frame.host_time, raw[number % _KINDS]))
+        worker.put(MarkedFrame(frame, Mark.NONE))
 
 
 def of_length(path: Path, skin: Skin, frames: list[Frame], seconds: int) -> Path:

@@ -17,8 +17,8 @@ from tomoskin.core import Frame, SourceError
 from tomoskin.pattern import Scan
 from tomoskin.pipeline import colour_limit, prepare
 from tomoskin.recording import session_info
-from tomoskin.run import Runner
-from tomoskin.server import Door, Hub, Server, application, listen
+from tomoskin.run import Runner, commands
+from tomoskin.server import AccessPolicy, Hub, Server, application, listen
 from tomoskin.skin import Skin
 from tomoskin.source import Configuration, ScanSettings
 from tomoskin.twin import (
@@ -177,7 +177,7 @@ def soak(minutes: float, folder: Path) -> Outcome:
         prepared, lambda: BadDay(skin, account, minutes, period), sinks=[sink := Hanging()]
     )
     memory, begun, file = [], time.monotonic(), folder / "soak.mcap"
-    runner.record(file)  # from the first byte on
+    runner.ask(commands.Record(file))  # from the first byte on
     runner.start()
     try:
         with sleeping_page(runner):
@@ -209,15 +209,15 @@ def sleeping_page(runner: Runner) -> Iterator[None]:
     """The server, with a page that opens and then reads nothing."""
     listener = listen("127.0.0.1", 0)
     port = listener.getsockname()[1]
-    door = Door(port)
-    server = Server.of(application(Hub(runner, limit=colour_limit(runner.prepared)), door))
+    policy = AccessPolicy(port)
+    server = Server.of(application(Hub(runner, limit=colour_limit(runner.prepared)), policy))
     thread = threading.Thread(target=server.run_on, args=(listener,))
     thread.start()
     with socket.socket() as page:
         page.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         page.connect(("127.0.0.1", port))
         page.sendall(
-            f"GET /ws?token={door.token} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
+            f"GET /ws?token={policy.token} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
             "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
             "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
         )

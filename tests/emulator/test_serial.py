@@ -17,7 +17,7 @@ from tomoskin.emulator import Programs, SkinMemory
 from tomoskin.emulator.source import front_of
 from tomoskin.pipeline import prepare
 from tomoskin.recording import SessionReader
-from tomoskin.run import Runner
+from tomoskin.run import Runner, commands
 from tomoskin.skin import Skin
 from tomoskin.source import Link, SerialTransport, open_source
 from tomoskin.twin import TwinSettings, TwinSkin
@@ -92,10 +92,10 @@ def test_unplugged_and_plugged_in_again_the_session_goes_on(
     options = ("-s", str(tmp_path / "skin"), str(programs.elf))
     came = threading.Semaphore(0)
     runner = Runner(prepare(skin), lambda: open_source(f"serial:{port}", skin))
-    with runner.watched_by(came.release):
+    with runner.watch(came.release):
         with running(programs.emulator, port, *options) as board:
             runner.start()
-            runner.record(path)
+            runner.ask(commands.Record(path))
             _await(came, 20)
             board.kill()
         with running(programs.emulator, port, *options):

@@ -13,7 +13,7 @@ from tomoskin.core import Touch
 from tomoskin.emulator import Programs
 from tomoskin.emulator.source import open_emulator
 from tomoskin.pipeline import Result, prepare
-from tomoskin.run import Runner
+from tomoskin.run import Runner, commands
 from tomoskin.skin import Skin
 from tomoskin.twin import Press
 
@@ -38,12 +38,12 @@ def test_a_press_is_found_where_it_is(
     monkeypatch.setattr("tomoskin.emulator.source.build_programs", lambda: programs)
     skin = Skin.load(name)
     runner, came = Runner(prepare(skin), lambda: open_emulator("seed=1", skin)), threading.Event()
-    with runner.watched_by(came.set):
+    with runner.watch(came.set):
         runner.start()
         try:
             before = _wait(runner, came, lambda result: result.ready)
             assert before.touches == ()
-            runner.set_presses(object(), (Press(*place, FORCE, RADIUS),))
+            runner.ask(commands.HoldPresses(object(), (Press(*place, FORCE, RADIUS),)))
             _wait(runner, came, lambda result: len(result.touches) == 1)
             touch = _after(runner, came, 15)
         finally:

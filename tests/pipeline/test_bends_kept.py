@@ -26,7 +26,7 @@ from tomoskin.core import Frame
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.recording import Mark, SessionReader, as_recorded, replayed, session_info
-from tomoskin.run.beginning import Beginning
+from tomoskin.run.pre_roll import PreRoll
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ def test_what_a_session_holds_is_said(run):
 
 
 def test_a_recording_begun_late_begins_with_frames_of_a_straight_sheet(prepared):
-    pipeline, beginning = Pipeline(prepared), Beginning()
+    pipeline, pre_roll = Pipeline(prepared), PreRoll()
     samples = np.full(prepared.scan.n_samples, 300, dtype=np.uint16)
     result = pipeline.push(Frame(0, 0, 0.0, 1, 0, 0, samples))
     bent = BendReading(0.5, 0.01, 0.0, "bend", np.zeros(prepared.pattern.n_meas))
@@ -88,10 +88,10 @@ def test_a_recording_begun_late_begins_with_frames_of_a_straight_sheet(prepared)
     for number in range(300):
         state = "bend" if number > 200 else "idle"
         frame = Frame(number, number, 0.01 * number, 1, 0, 0, samples)
-        beginning.frame(frame, Mark.NONE if number else Mark.REFERENCE, 0)
+        pre_roll.frame(frame, Mark.NONE if number else Mark.REFERENCE, 0)
         readings = {BENDS.name: states[state]}
-        beginning.result(replace(result, ready=True, pictured=True, readings=readings))
-    frames, _, again = beginning.begin(0)
+        pre_roll.result(replace(result, ready=True, pictured=True, readings=readings))
+    frames, _, again = pre_roll.begin(0)
     assert again
     assert len(frames) == 3 * REFERENCE_FRAMES
     assert frames[0][1] == Mark.REFERENCE

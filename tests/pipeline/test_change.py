@@ -9,7 +9,7 @@ from run.test_runner import Watch
 from tomoskin.core import SourceError
 from tomoskin.pipeline import prepare
 from tomoskin.recording import session_info
-from tomoskin.run import Runner
+from tomoskin.run import Runner, commands
 from tomoskin.skin import Skin
 
 
@@ -24,14 +24,14 @@ def refuse():
 
 def test_another_skin_and_source(runner, board, other, tmp_path):
     until = Watch(runner).until
-    runner.record(tmp_path / "first.mcap")
+    runner.ask(commands.Record(tmp_path / "first.mcap"))
     runner.start()
     until(lambda: runner.newest and runner.newest.result.ready)
     second = Board(free=samples_of(other))
-    runner.change(other, lambda: second)
+    runner.ask(commands.Change(other, lambda: second))
     assert board.closed
     assert runner.prepared is other
-    assert runner.source == f"board on the table of {other.skin.name}"
+    assert runner.status().source == f"board on the table of {other.skin.name}"
     assert runner.status().recording is None
     assert session_info(tmp_path / "first.mcap").frames > 0
     until(lambda: runner.newest and runner.newest.result.ready)
@@ -45,7 +45,7 @@ def test_what_cannot_be_opened_leaves_the_old_one(prepared, idle, other):
     runner.start()
     until(lambda: runner.newest and runner.newest.result.ready)
     with pytest.raises(SourceError, match="no such port"):
-        runner.change(other, refuse)
+        runner.ask(commands.Change(other, refuse))
     before = runner.newest
     until(lambda: runner.newest is not before)
     assert runner.prepared is prepared
@@ -68,7 +68,7 @@ def test_a_lost_source_is_left_for_another(prepared, idle):
     runner.start()
     until(lambda: runner.newest)
     lost.lose()
-    runner.change(prepared, lambda: found)
+    runner.ask(commands.Change(prepared, lambda: found))
     until(lambda: runner.newest and runner.newest.result.ready)
     assert runner.status().problem is None
     runner.stop()
@@ -76,4 +76,4 @@ def test_a_lost_source_is_left_for_another(prepared, idle):
 
 def test_nothing_is_changed_in_what_does_not_run(runner, prepared, board):
     with pytest.raises(SourceError, match="not running"):
-        runner.change(prepared, lambda: board)
+        runner.ask(commands.Change(prepared, lambda: board))

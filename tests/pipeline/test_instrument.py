@@ -11,7 +11,7 @@ from server.serving import Site
 from server.watching import Watched, axe_finds
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
-from tomoskin.server import STATIC, SettingsDesk, TwinDesk
+from tomoskin.server import STATIC, SettingsHandlers, TwinHandlers
 from tomoskin.skin import Skin
 from tomoskin.source import open_source
 
@@ -21,17 +21,17 @@ MOST_GZIPPED = 120_000
 DRAWERS = ("twin", "signals", "settings")
 
 
-def take_desks(hub):
+def serve_page(hub):
     hub.opener = partial(open_source, "twin")
-    hub.take(SettingsDesk(hub))
-    hub.take(TwinDesk(hub))
+    SettingsHandlers(hub)
+    TwinHandlers(hub)
 
 
 @pytest.fixture(scope="module")
 def site(prepared, tmp_path_factory):
     runner = Runner(prepared, lambda: open_source("twin", prepared.skin))
     runner.start()
-    site = Site(runner, folder=tmp_path_factory.mktemp("session"), take=take_desks)
+    site = Site(runner, folder=tmp_path_factory.mktemp("session"), take=serve_page)
     yield site
     site.stop()
     runner.stop()

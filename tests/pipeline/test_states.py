@@ -16,7 +16,7 @@ from tomoskin.core import DataError, Frame
 from tomoskin.formats import read_recording
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
 from tomoskin.recording import SessionReader, as_recorded, replayed, tick_rate
-from tomoskin.server.messages import state as message
+from tomoskin.server.page_messages import state as message
 from tomoskin.skin import Skin
 
 NAMES = ("idle", "left", "right")

@@ -382,10 +382,15 @@ _RECORD = """
 import sys, threading
 from pathlib import Path
 from recording.runs import frame_of, SKIN
-from tomoskin.recording import Mark, Recorder, SessionWriter
-recorder = Recorder(SessionWriter(Path(sys.argv[1]), SKIN), None, print)
+from tomoskin.recording import Mark, MarkedFrame, Recorder, SessionWriter
+from tomoskin.sink import Capacity, Worker
+path = Path(sys.argv[1])
+recorder = Recorder(path, lambda: SessionWriter(path, SKIN), None, print)
+worker = Worker(recorder, Capacity(1 << 20, "oldest"), print)
+worker.start()
+worker.opening.result()
 for number in range(20):
-    recorder.frame(frame_of(number), Mark.NONE)
+    worker.put(MarkedFrame(frame_of(number), Mark.NONE))
 threading.Event().wait(1.0)
 print("a second later", flush=True)
 threading.Event().wait(60)

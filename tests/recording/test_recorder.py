@@ -1,4 +1,4 @@
-"""Recording beside a pipeline: nothing waits for the disk, and what goes wrong with it is said."""
+"""Recording beside a run: what comes is written, and what goes wrong with the disk is said."""
 
 from __future__ import annotations
 
@@ -15,8 +15,21 @@ import pytest
 
 from recording.runs import INFO, SKIN, TOUCH, frame_of, same_frame
 from tomoskin.core import DataError, Event, Image
-from tomoskin.recording import Mark, Recorder, SessionReader, SessionWriter, message_counts
+from tomoskin.pipeline import Result
+from tomoskin.recording import (
+    BoardInfo,
+    Mark,
+    MarkedFrame,
+    RawRead,
+    Recorder,
+    RunSettings,
+    SessionReader,
+    SessionWriter,
+    Truth,
+    message_counts,
+)
 from tomoskin.recording.recorder import IMAGE_PERIOD
+from tomoskin.sink import Capacity, Worker
 from tomoskin.wire import encode
 
 PATIENCE = 60
@@ -75,11 +88,40 @@ def said():
     return Said()
 
 
-def record(recorder, count, start=0):
+@pytest.fixture
+def start(said):
+    """Start a recorder and its worker; ended after the test."""
+    workers = []
+
+    def start(path, pixels=None, *, make=None, most=1 << 30):
+        make = make or (lambda: SessionWriter(path, SKIN))
+        worker = Worker(Recorder(path, make, pixels, said), Capacity(most, "oldest"), said)
+        worker.start()
+        worker.opening.result(PATIENCE)
+        workers.append(worker)
+        return worker
+
+    yield start
+    for worker in workers:
+        end(worker)
+
+
+def end(worker):
+    worker.end()
+    worker.ending.result(PATIENCE)
+
+
+def record(worker, count, start=0):
     for number in range(start, start + count):
         frame = frame_of(number)
-        recorder.raw(frame.host_time, encode(frame))
-        recorder.frame(frame, Mark.NONE)
+        worker.put(RawRead(frame.host_time, encode(frame)))
+        worker.put(MarkedFrame(frame, Mark.NONE))
+
+
+def result_of(number, image, *touches):
+    """A result of the frame ``number``, a hundred a second."""
+    none = np.zeros(1)
+    return Result(number, number / 100, True, True, image, none, none, touches, 0)
 
 
 def frames_in(path):
@@ -87,19 +129,17 @@ def frames_in(path):
         return [item.frame for item in session.frames()]
 
 
-def test_everything_is_written(tmp_path, said):
+def test_everything_is_written(tmp_path, said, start):
     path = tmp_path / "x.mcap"
-    pixels = SKIN.mesh().pixels(16)
-    recorder = Recorder(SessionWriter(path, SKIN), pixels, said)
-    recorder.device(0.0, INFO)
-    recorder.truth(0.0, ())
-    recorder.event(Event(0.0, "lost", "two"))
-    recorder.note(0.0, "mark")
-    recorder.settings(0.0, {"source": "test"})
-    record(recorder, 3000)
-    recorder.stop()
-    recorder.stop()
-    assert not said.events
+    worker = start(path, SKIN.mesh().pixels(16))
+    worker.put(BoardInfo(0.0, INFO))
+    worker.put(Truth(0.0, ()))
+    worker.put(Event(0.0, "lost", "two"))
+    worker.put(Event(0.0, "note", "mark"))
+    worker.put(RunSettings(0.0, {"source": "test"}))
+    record(worker, 3000)
+    end(worker)
+    assert said.events == [("recorded", f"recorded to {path}")]
     with SessionReader(path) as session:
         frames = [item.frame for item in session.frames()]
         assert all(same_frame(f, frame_of(n)) for n, f in enumerate(frames))
@@ -110,88 +150,90 @@ def test_everything_is_written(tmp_path, said):
     assert counts["/events"] == counts["/notes"] == counts["/device"] == counts["/truth"] == 1
 
 
-def test_touches_until_there_are_none_and_images_now_and_then(tmp_path, said):
+def test_touches_until_there_are_none_and_images_now_and_then(tmp_path, start):
     path = tmp_path / "x.mcap"
     mesh = SKIN.mesh()
     image = Image(np.zeros(len(mesh.cells)), "S", mesh.identity)
-    recorder = Recorder(SessionWriter(path, SKIN), mesh.pixels(16), said)
+    worker = start(path, mesh.pixels(16))
     for number in range(100):
-        touches = (TOUCH,) if 20 <= number < 30 else ()
-        recorder.result(number / 100, number, image, touches)
-    recorder.stop()
+        worker.put(result_of(number, image, *((TOUCH,) if 20 <= number < 30 else ())))
+    end(worker)
     with SessionReader(path) as session:
-        found = [(item.sequence, len(item.touches)) for item in session.touches()]
+        rows = [(item.sequence, len(item.touches)) for item in session.touches()]
         counts = message_counts(session)
-    assert found == [*((n, 1) for n in range(20, 30)), (30, 0)]
+    assert rows == [*((n, 1) for n in range(20, 30)), (30, 0)]
     assert counts["/image"] == counts["/scene"] == round(1 / IMAGE_PERIOD)
 
 
-def test_a_curved_sheet_has_no_images(tmp_path, said):
-    image = Image(np.zeros(3), "S", "")
-    recorder = Recorder(SessionWriter(tmp_path / "x.mcap", SKIN), None, said)
-    recorder.result(0.0, 0, image, ())
-    recorder.stop()
+def test_a_curved_sheet_has_no_images(tmp_path, start):
+    worker = start(tmp_path / "x.mcap")
+    worker.put(result_of(0, Image(np.zeros(3), "S", "")))
+    end(worker)
     with SessionReader(tmp_path / "x.mcap") as session:
         assert message_counts(session)["/image"] == 0
 
 
-def test_a_full_disk_ends_the_recording_and_leaves_it_readable(tmp_path, said):
+def test_a_full_disk_ends_the_recording_and_leaves_it_readable(tmp_path, said, start):
     path = FailingPath(tmp_path / "x.mcap")
-    recorder = Recorder(SessionWriter(path, SKIN), None, said)
-    record(recorder, 500)
+    worker = start(path)
+    record(worker, 500)
     text = said.wait_for("recording-stopped")
     assert "No space left" in text
     assert str(path) in text
-    assert not recorder.running
-    record(recorder, 10, start=500)  # goes nowhere, and hurts nobody
-    recorder.stop()
-    found = frames_in(path)
-    assert len(found) > 30
-    assert all(same_frame(frame, frame_of(n)) for n, frame in enumerate(found))
+    worker.ending.result(PATIENCE)
+    record(worker, 10, start=500)  # goes nowhere, and hurts nobody
+    assert "recorded" not in dict(said.events)
+    frames = frames_in(path)
+    assert len(frames) > 30
+    assert all(same_frame(frame, frame_of(n)) for n, frame in enumerate(frames))
     with SessionReader(path) as session:
         list(session.frames())
         assert path.stat().st_size <= Failing.room
         assert "cut" not in session.torn  # it ends with a whole record
 
 
-def test_a_file_that_is_taken_away_ends_the_recording(tmp_path, said):
+def test_a_file_that_is_taken_away_ends_the_recording(tmp_path, said, start):
     path = tmp_path / "x.mcap"
-    recorder = Recorder(SessionWriter(path, SKIN), None, said)
-    record(recorder, 50)
+    record(start(path), 50)
     path.unlink()
     assert "has been removed" in said.wait_for("recording-stopped")
-    recorder.stop()
 
 
-def test_a_slow_disk_loses_messages_but_delays_nobody(tmp_path, said, monkeypatch):
+def test_a_slow_disk_loses_messages_but_delays_nobody(tmp_path, said, start, monkeypatch):
     path = tmp_path / "x.mcap"
     Slow.go.set()
     monkeypatch.setattr(Path, "open", lambda self, *_, **__: Slow(str(self), "x"))
     session = SessionWriter(path, SKIN)
     monkeypatch.undo()
-    recorder = Recorder(session, None, said, most_waiting=50_000)
+    worker = start(path, make=lambda: session, most=50_000)
     Slow.go.clear()
-    record(recorder, 2000)  # returns although nothing can be written
-    said.wait_for("recording-behind")
+    record(worker, 2000)  # returns although nothing can be written
+    assert "the disk is too slow" in said.wait_for("recording-behind")
     Slow.go.set()
     text = said.wait_for("recording-gap")
-    record(recorder, 20, start=2000)
-    recorder.stop()
-    assert f"{recorder.left_out} messages" in text
-    found = frames_in(path)
-    assert [f.sequence for f in found[-20:]] == list(range(2000, 2020))
-    assert len(found) < 2020
+    record(worker, 20, start=2000)
+    end(worker)
+    assert f"{worker.left_out} messages" in text
+    frames = frames_in(path)
+    assert [f.sequence for f in frames[-20:]] == list(range(2000, 2020))
+    assert len(frames) < 2020
 
 
-def test_a_fault_of_our_own_ends_the_recording_and_is_said(tmp_path, said, caplog):
+def test_a_fault_of_our_own_ends_the_recording_and_is_said(tmp_path, said, start, caplog):
     path = tmp_path / "x.mcap"
-    recorder = Recorder(SessionWriter(path, SKIN), None, said)
-    record(recorder, 50)
-    recorder.truth(0.0, [object()])
+    worker = start(path)
+    record(worker, 50)
+    worker.put(Truth(0.0, (object(),)))
     assert "internal error" in said.wait_for("recording-stopped")
-    recorder.stop()
+    end(worker)
     assert "the recording thread ended" in caplog.text
     assert len(frames_in(path)) == 50
+
+
+def test_a_file_that_cannot_be_made_is_an_error_for_who_asked(tmp_path, said, start):
+    with pytest.raises(DataError, match="cannot be"):
+        start(tmp_path / "none" / "x.mcap")
+    assert said.events == []
 
 
 @pytest.mark.parametrize("name", ["none/x.mcap", "file/x.mcap"])

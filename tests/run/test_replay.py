@@ -15,7 +15,7 @@ from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.recording import Mark, SessionReader, advance, replayed
 from tomoskin.recording.replay import ReplayTransport, open_replay
-from tomoskin.run import Runner
+from tomoskin.run import Runner, commands
 from tomoskin.run.flow import MOST_AT_ONCE
 from tomoskin.skin import Skin
 from tomoskin.source import Link, ScanSettings
@@ -39,7 +39,7 @@ class Recorded:
         self.sent = 0
 
     def __enter__(self):
-        self.runner.record(self.path)
+        self.runner.ask(commands.Record(self.path))
         self.runner.start()
         assert self.board.scanning.wait(PATIENCE)
         return self
@@ -74,7 +74,7 @@ def run(prepared, tmp_path_factory):
     with Recorded(prepared, path) as live:
         live.idle(REFERENCE_FRAMES + 5)
         live.touch(0, 8)
-        live.runner.take_reference()
+        live.runner.ask(commands.TakeReference())
         live.touch(1, REFERENCE_FRAMES + 4)
         live.idle(6)
         live.board.raw(b"\x05torn")
@@ -170,7 +170,7 @@ def test_replayed_as_a_source_the_touches_are_the_same_to_the_bit(run, prepared,
         return transports[-1]
 
     runner = Runner(prepared, reopen)
-    runner.record(again)
+    runner.ask(commands.Record(again))
     until = Watch(runner).until
     runner.start()
     until(lambda: runner.status().replay.ended)
@@ -295,7 +295,7 @@ def test_a_recording_begun_later_has_the_reference(prepared, tmp_path):
     path = tmp_path / "later.mcap"
     with Recorded(prepared, tmp_path / "whole.mcap") as live:
         live.idle(REFERENCE_FRAMES + 5)
-        live.runner.record(path)
+        live.runner.ask(commands.Record(path))
         live.touch(0, 8)
     with SessionReader(path) as session:
         early = [item for item in session.frames() if item.mark & Mark.EARLIER]
@@ -324,7 +324,7 @@ def late(live, path):
         live.touch(0, 6)
         live.idle(20)
     live.touch(1, 4)
-    live.runner.record(path)
+    live.runner.ask(commands.Record(path))
     live.touch(1, 6)
     live.idle(25)
     live.drift(drift + 2)
@@ -363,7 +363,7 @@ def test_a_recording_begun_late_is_replayed_to_the_bit(tmp_path, method):
         transport = ReplayTransport(session, prepared.skin, speed=math.inf)
         runner = Runner(prepared, lambda: transport)
         until = Watch(runner).until
-        runner.record(tmp_path / "again.mcap")
+        runner.ask(commands.Record(tmp_path / "again.mcap"))
         runner.start()
         until(lambda: runner.newest and runner.newest.result.sequence == live.sent - 1)
         runner.stop()
@@ -375,9 +375,9 @@ def test_two_recordings_begun_late_one_after_the_other(prepared, tmp_path):
     first, second = tmp_path / "first.mcap", tmp_path / "second.mcap"
     with Recorded(prepared, tmp_path / "whole.mcap") as live:
         live.idle(4 * REFERENCE_FRAMES)
-        live.runner.record(first)
+        live.runner.ask(commands.Record(first))
         live.touch(0, 6)
-        live.runner.record(second)
+        live.runner.ask(commands.Record(second))
         live.touch(0, 6)
     for path in (first, second):
         with SessionReader(path) as session:
@@ -391,11 +391,11 @@ def test_a_held_picture_is_held_in_the_replay_too(prepared, tmp_path):
     path = tmp_path / "held.mcap"
     with Recorded(prepared, path) as live:
         live.idle(REFERENCE_FRAMES + 2)
-        live.runner.pause(True)
+        live.runner.ask(commands.SetPause(True))
         live.touch(0, 3)
         while live.runner.status().frames < live.sent:  # a held picture announces nothing
             threading.Event().wait(0.001)
-        live.runner.pause(False)
+        live.runner.ask(commands.SetPause(False))
         live.touch(0, 3)
     with SessionReader(path) as session:
         marks = {item.frame.sequence: item.mark for item in session.frames()}
@@ -455,10 +455,10 @@ def test_pausing_the_runner_of_a_replay_stops_the_replay(run, prepared):
     until = Watch(runner).until
     runner.start()
     until(lambda: runner.newest)
-    runner.pause(True)
+    runner.ask(commands.SetPause(True))
     assert transports[0].paused
     assert runner.status().paused
-    runner.pause(False)
+    runner.ask(commands.SetPause(False))
     assert not transports[0].paused
     runner.stop()
 

@@ -10,9 +10,9 @@ from run.board import Board
 from tomoskin.core import DataError, SourceError
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.recording import session_info
-from tomoskin.run import Runner
-from tomoskin.run.events import EventLog
+from tomoskin.run import Runner, commands
 from tomoskin.run.flow import MOST_AT_ONCE
+from tomoskin.run.publisher import EventLog
 from tomoskin.twin import Press
 from tomoskin.wire import Start, Stop
 
@@ -31,7 +31,7 @@ class Watch:
             self._news.notify_all()
 
     def until(self, true):
-        with self._runner.watched_by(self), self._news:
+        with self._runner.watch(self), self._news:
             assert self._news.wait_for(true, PATIENCE)
 
 
@@ -114,24 +114,24 @@ def test_pause_and_reference(runner, until):
     runner.start()
     until(lambda: runner.newest and runner.newest.result.ready)
     first = runner.status().reference.since
-    runner.take_reference()
+    runner.ask(commands.TakeReference())
     until(lambda: runner.newest.result.ready and runner.status().reference.since != first)
-    runner.pause(True)
+    runner.ask(commands.SetPause(True))
     assert runner.status().paused
     frames = runner.status().frames
-    runner.pause(False)
+    runner.ask(commands.SetPause(False))
     until(lambda: runner.status().frames > frames)
 
 
 def test_presses_of_all_owners_reach_the_source(runner, board, until):
     one, two = Press(0, 0, 1, 0.01), Press(0.01, 0, 2, 0.01)
     runner.start()
-    runner.set_presses("a", (one,))
-    runner.set_presses("b", (two,))
-    until(lambda: set(board.presses) == {one, two} == set(runner.newest.truth))
-    runner.set_presses("a", ())
+    runner.ask(commands.HoldPresses("a", (one,)))
+    runner.ask(commands.HoldPresses("b", (two,)))
+    until(lambda: runner.newest and set(board.presses) == {one, two} == set(runner.newest.truth))
+    runner.ask(commands.HoldPresses("a", ()))
     until(lambda: board.presses == (two,))
-    runner.set_presses("b", ())
+    runner.ask(commands.HoldPresses("b", ()))
     until(lambda: board.presses == () and runner.newest.truth == ())
 
 
@@ -225,7 +225,7 @@ class NoRoom:
 
 def test_a_full_disk_ends_the_recording_but_not_the_run(runner, until, tmp_path):
     path = FullPath(tmp_path / "x.mcap")
-    runner.record(path)
+    runner.ask(commands.Record(path))
     assert runner.status().recording == path
     runner.start()
     until(lambda: runner.status().recording is None)
@@ -241,11 +241,11 @@ def test_a_full_disk_ends_the_recording_but_not_the_run(runner, until, tmp_path)
 def test_a_recording_can_be_ended_and_another_begun(runner, until, tmp_path):
     runner.start()
     until(lambda: runner.newest)
-    runner.record(tmp_path / "one.mcap")
+    runner.ask(commands.Record(tmp_path / "one.mcap"))
     until(lambda: runner.status().frames > 30)
-    runner.record(tmp_path / "two.mcap")
+    runner.ask(commands.Record(tmp_path / "two.mcap"))
     until(lambda: runner.status().frames > 60)
-    runner.stop_recording()
+    runner.ask(commands.StopRecording())
     assert runner.status().recording is None
     for name in ("one.mcap", "two.mcap"):
         assert session_info(tmp_path / name).torn == ""
@@ -254,4 +254,4 @@ def test_a_recording_can_be_ended_and_another_begun(runner, until, tmp_path):
 
 def test_a_recording_that_cannot_begin_is_said(runner, tmp_path):
     with pytest.raises(DataError, match="cannot be"):
-        runner.record(tmp_path / "none" / "x.mcap")
+        runner.ask(commands.Record(tmp_path / "none" / "x.mcap"))

@@ -58,7 +58,7 @@ def sinks(gate):
 
 @pytest.fixture
 def runner(prepared, board, sinks, monkeypatch):
-    monkeypatch.setattr("tomoskin.sink.outlet.GRACE", 0.1)
+    monkeypatch.setattr("tomoskin.sink.consumer.GRACE", 0.1)
     runner = Runner(prepared, lambda: board, sinks=tuple(sinks.values()))
     yield runner
     runner.stop()

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from server.serving import Site
 from server.test_play import Page
 from tomoskin.run import Runner
-from tomoskin.server import take_flows
+from tomoskin.server import serve_requests
 from tomoskin.source import open_source
 
 
@@ -16,7 +16,7 @@ def flowing(prepared, folder, spec="twin", opening=None):
     """(site, page) of a runner with the flows' desks, its files in ``folder``."""
     runner = Runner(prepared, opening or (lambda: open_source(spec, prepared.skin)))
     runner.start()
-    site = Site(runner, folder=folder, take=lambda hub: take_flows(hub, spec))
+    site = Site(runner, folder=folder, take=lambda hub: serve_requests(hub, spec))
     try:
         with site.connect() as socket:
             yield site, Page(socket)

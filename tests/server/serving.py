@@ -8,7 +8,7 @@ import httpx
 from websockets.sync.client import connect
 
 from tomoskin.pipeline import colour_limit
-from tomoskin.server import STATIC, Door, Hub, Server, application, listen
+from tomoskin.server import STATIC, AccessPolicy, Hub, Server, application, listen
 
 PATIENCE = 60
 
@@ -22,11 +22,13 @@ class Site:
         self.runner = runner
         self._listener = listen("127.0.0.1", port)
         self.port = self._listener.getsockname()[1]
-        self.door = Door(self.port) if token is None else Door(self.port, token=token)
+        self.policy = (
+            AccessPolicy(self.port) if token is None else AccessPolicy(self.port, token=token)
+        )
         self.origin = f"http://127.0.0.1:{self.port}"
         hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
         take(hub)
-        self._server = Server.of(application(hub, self.door, static))
+        self._server = Server.of(application(hub, self.policy, static))
         self._thread = threading.Thread(target=self._server.run_on, args=(self._listener,))
         self._thread.start()
 
@@ -39,13 +41,13 @@ class Site:
     def client(self, *, entered=True):
         with httpx.Client(base_url=self.origin, trust_env=False) as client:
             if entered:
-                client.get("/", params={"token": self.door.token})
+                client.get("/", params={"token": self.policy.token})
             yield client
 
     @contextmanager
     def connect(self, *, token=None, host="127.0.0.1", cookie=None, origin="own"):
         """WebSocket as a browser would open it, from that origin and to that name."""
-        query = self.door.token if token is None else token
+        query = self.policy.token if token is None else token
         with (
             socket.create_connection(("127.0.0.1", self.port)) as plain,
             connect(

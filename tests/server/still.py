@@ -11,7 +11,7 @@ from run.test_runner import Watch
 from server.serving import Site
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
-from tomoskin.server import SettingsDesk, TwinDesk, take_flows
+from tomoskin.server import serve_requests
 from tomoskin.skin import Skin
 
 PANELS = {
@@ -38,11 +38,9 @@ class Bench(Board):
         """It stays as it is."""
 
 
-def take_desks(hub):
+def serve_page(hub):
     hub.opener = lambda skin: Bench(free=samples_of(prepare(skin)))
-    hub.take(SettingsDesk(hub))
-    hub.take(TwinDesk(hub))
-    take_flows(hub, "twin")
+    serve_requests(hub, "twin")
 
 
 @contextmanager
@@ -58,8 +56,8 @@ def still_site(folder):
     until(lambda: runner.newest.result.touches)
     board.period = 0.3  # nothing moves, and drawing it costs time
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tomoskin.server.stage.list_ports", lambda: ())
-        site = Site(runner, folder=folder, take=take_desks)
+        patch.setattr("tomoskin.server.source_handlers.list_ports", lambda: ())
+        site = Site(runner, folder=folder, take=serve_page)
         yield site
         site.stop()
     runner.stop()

@@ -9,7 +9,7 @@ from server.serving import Site
 from server.watching import distance
 from tomoskin.emulator.source import open_emulator
 from tomoskin.run import Runner
-from tomoskin.server import TwinDesk
+from tomoskin.server import TwinHandlers
 
 __all__ = ["programs"]
 
@@ -23,7 +23,7 @@ def site(programs, prepared, monkeypatch):
     monkeypatch.setattr("tomoskin.emulator.source.build_programs", lambda: programs)
     runner = Runner(prepared, lambda: open_emulator("seed=1", prepared.skin))
     runner.start()
-    site = Site(runner, take=lambda hub: hub.take(TwinDesk(hub)))
+    site = Site(runner, take=TwinHandlers)
     yield site
     site.stop()
     runner.stop()

@@ -12,8 +12,9 @@ from server.flowing import flowing
 from tomoskin.calibration import TOUCH, Wiring
 from tomoskin.core import DataError
 from tomoskin.recording import SessionReader, as_recorded, replayed
+from tomoskin.run import commands
 from tomoskin.server.folder import Folder
-from tomoskin.server.stage import Stage
+from tomoskin.server.source_handlers import SourceSwitch
 from tomoskin.skin import Skin
 from tomoskin.source import open_source
 from tomoskin.twin import Press
@@ -56,9 +57,9 @@ def press_dots(site, page, count):
 
 def press_dot(site, page, done):
     told = page.told("flow", lambda m: m.get("phase") == "press" and len(m["presses"]) == done)
-    site.runner.set_presses(page, (Press(*told["dot"], FORCE, RADIUS),))
+    site.runner.ask(commands.HoldPresses(page, (Press(*told["dot"], FORCE, RADIUS),)))
     page.told("flow", lambda m: len(m.get("presses", ())) == done + 1)
-    site.runner.set_presses(page, ())
+    site.runner.ask(commands.HoldPresses(page, ()))
 
 
 # the folder
@@ -84,7 +85,7 @@ def test_links_and_folders_are_no_files(tmp_path):
     (inside / "run.mcap").write_bytes(b"run")
     (inside / "notes.txt").write_bytes(b"not listed")
     folder = Folder(inside)
-    assert [file.name for file in folder.listed()] == ["run.mcap"]
+    assert [file.name for file in folder.list_files()] == ["run.mcap"]
     for name in ("link.npz", "folder.npz", "none.npz"):
         with pytest.raises(DataError, match="no such file"):
             folder.existing(name)
@@ -103,7 +104,7 @@ def test_a_name_that_is_taken_gets_a_number(tmp_path):
 
 def test_a_folder_that_is_gone_is_said(tmp_path):
     with pytest.raises(DataError, match="cannot be read"):
-        Folder(tmp_path / "gone").listed()
+        Folder(tmp_path / "gone").list_files()
 
 
 # security
@@ -165,7 +166,7 @@ def test_malformed_and_oversized_requests_leave_the_connection(flows):
     for source in ("serial:/dev/null", "replay:/etc/passwd", "twin:seed=1", "tcp:evil.example"):
         page.ask("connect", source=source)
         assert "sources that are listed" in page.told("error")["message"]
-    assert site.runner.source.startswith("twin")
+    assert site.runner.status().source.startswith("twin")
     page.ask("files")
     page.told("files")
 
@@ -179,14 +180,14 @@ def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
     until = Watch(runner).until
     until(lambda: runner.newest and runner.newest.result.ready)
     path = tmp_path / "sessions" / "run.mcap"
-    runner.record(path)
+    runner.ask(commands.Record(path))
     page.ask("open", name="run.mcap")
     assert "still being recorded" in page.told("error")["message"]
-    runner.set_presses(page, (Press(0.03, 0.02, 5.0, 0.015),))
+    runner.ask(commands.HoldPresses(page, (Press(0.03, 0.02, 5.0, 0.015),)))
     until(lambda: runner.newest.result.touches)
-    runner.set_presses(page, ())
+    runner.ask(commands.HoldPresses(page, ()))
     until(lambda: not runner.newest.result.touches)
-    runner.stop_recording()
+    runner.ask(commands.StopRecording())
     for form, name in (("touches", "run-touches.csv"), ("npz", "run.npz"), ("npz", "run-2.npz")):
         page.ask("export", name="run.mcap", format=form)
         assert page.told("exported")["name"] == name
@@ -207,7 +208,7 @@ def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
 
 
 def test_a_recording_that_was_named_by_its_path_is_named_by_its_file():
-    assert Stage(None, "replay:/some/where/run.mcap@2,loop").spec == "replay:run.mcap"
+    assert SourceSwitch(None, "replay:/some/where/run.mcap@2,loop").spec == "replay:run.mcap"
 
 
 def test_what_is_no_session_is_said_and_the_source_goes_on(flows, tmp_path):
@@ -218,7 +219,7 @@ def test_what_is_no_session_is_said_and_the_source_goes_on(flows, tmp_path):
         assert "bad.mcap" in page.told("error")["message"]
     page.ask("live")
     assert "no recording is being played" in page.told("error")["message"]
-    assert site.runner.source.startswith("twin")
+    assert site.runner.status().source.startswith("twin")
 
 
 # sources
@@ -257,13 +258,13 @@ def taught(prepared, tmp_path_factory):
         page.ask("flow_keep", name="finger")
         page.told("flow", lambda m: m["kind"] is None and m["calibration"] == "finger.npz")
         until(lambda: TOUCH.name in runner.prepared.calibrations)
-        runner.record(folder / "run.mcap")
-        runner.set_presses(page, (Press(*told["presses"][0], FORCE, RADIUS),))
+        runner.ask(commands.Record(folder / "run.mcap"))
+        runner.ask(commands.HoldPresses(page, (Press(*told["presses"][0], FORCE, RADIUS),)))
         until(lambda: runner.newest.result.touches)
         begun = runner.newest.result.sequence
         until(lambda: runner.newest.result.sequence > begun + 6)
         last = runner.newest.result.touches
-        runner.stop_recording()
+        runner.ask(commands.StopRecording())
     return folder, told, last
 
 
@@ -356,7 +357,7 @@ def test_scrambled_wires_are_found_kept_and_applied(prepared, tmp_path):
         saved = Skin.load(tmp_path / "wired.toml")
         assert saved.electrode_centres == pytest.approx(scrambled.electrode_centres, abs=1e-5)
         until(lambda: runner.newest and runner.newest.result.ready)
-        runner.set_presses(page, (Press(0.03, 0.05, 5.0, 0.015),))
+        runner.ask(commands.HoldPresses(page, (Press(0.03, 0.05, 5.0, 0.015),)))
         until(lambda: runner.newest.result.touches)
         until(lambda: runner.newest.result.touches[0].reading.snr > 8)
         reading = runner.newest.result.touches[0].reading

@@ -11,7 +11,7 @@ from server.serving import Site
 from server.watching import Watched
 from tomoskin.calibration import TOUCH
 from tomoskin.run import Runner
-from tomoskin.server import kept_token, take_flows
+from tomoskin.server import load_token, serve_requests
 from tomoskin.skin import Skin
 from tomoskin.source import open_source
 
@@ -27,7 +27,7 @@ def folder(tmp_path_factory):
 def site(prepared, folder):
     runner = Runner(prepared, lambda: open_source("twin", prepared.skin))
     runner.start()
-    site = Site(runner, folder=folder, take=lambda hub: take_flows(hub, "twin"))
+    site = Site(runner, folder=folder, take=lambda hub: serve_requests(hub, "twin"))
     yield site
     site.stop()
     runner.stop()
@@ -161,13 +161,13 @@ def test_the_wires_are_found_by_pressing_dots(opened, folder):
 def test_a_page_finds_a_server_that_was_started_again_with_its_token(
     browser, site, prepared, tmp_path
 ):
-    token = kept_token(tmp_path / "token")
+    token = load_token(tmp_path / "token")
     first = Site(site.runner, token=token)
     watched = Watched(browser, first, prepared.mesh)
     watched.open()
     first.stop()
     watched.test_id("state").filter(has_text="Connection lost").wait_for()
-    second = Site(site.runner, token=kept_token(tmp_path / "token"), port=first.port)
+    second = Site(site.runner, token=load_token(tmp_path / "token"), port=first.port)
     try:
         watched.test_id("state").filter(has_text="Live").wait_for()
     finally:

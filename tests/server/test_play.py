@@ -16,7 +16,7 @@ from server.serving import Site
 from tomoskin.core import DataError
 from tomoskin.recording import Mark, SessionReader, read_timeline, replayed
 from tomoskin.recording.replay import open_replay
-from tomoskin.run import Runner
+from tomoskin.run import Runner, commands
 
 __all__ = ["run"]
 
@@ -146,7 +146,7 @@ def test_only_a_replay_can_be_steered(prepared, idle):
 def test_a_note_is_told_and_recorded_at_the_picture_that_was_shown(prepared, idle, tmp_path):
     runner = Runner(prepared, lambda: Board(free=idle))
     path = tmp_path / "noted.mcap"
-    runner.record(path)
+    runner.ask(commands.Record(path))
     with page_of(runner) as page:
         Watch(runner).until(lambda: runner.newest and runner.newest.result.ready)
         page.ask("note", text="a wet cloth")

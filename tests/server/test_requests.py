@@ -5,32 +5,22 @@ import json
 import pytest
 
 from tomoskin.core import WireError
-from tomoskin.run.twin_requests import PressRequest, SetPresses
-from tomoskin.server.requests import (
-    MAX_REQUEST,
-    Note,
-    Seek,
-    SetLoop,
-    SetPause,
-    SetRecording,
-    SetSpeed,
-    Step,
-    TakeReference,
-    decode_request,
-)
+from tomoskin.run import SetPresses, commands
+from tomoskin.run.twin_requests import PressRequest
+from tomoskin.server.requests import MAX_REQUEST, SetRecording, decode_request
 
 PRESS = {"x": 0.01, "y": -0.02, "force": 3.0, "radius": 0.015}
 
 
 def test_requests():
-    assert decode_request('{"type":"reference"}') == TakeReference()
-    assert decode_request('{"type":"pause","on":true}') == SetPause(True)
+    assert decode_request('{"type":"reference"}') == commands.TakeReference()
+    assert decode_request('{"type":"pause","on":true}') == commands.SetPause(True)
     assert decode_request('{"type":"record","on":false}') == SetRecording(False)
-    assert decode_request('{"type":"note","text":"wet"}') == Note("wet")
-    assert decode_request('{"type":"seek","at_s":1.5}') == Seek(1.5)
-    assert decode_request('{"type":"step"}') == Step()
-    assert decode_request('{"type":"speed","speed":null}') == SetSpeed(None)
-    assert decode_request('{"type":"loop","on":true}') == SetLoop(True)
+    assert decode_request('{"type":"note","text":"wet"}') == commands.Note("wet")
+    assert decode_request('{"type":"seek","at_s":1.5}') == commands.Seek(1.5)
+    assert decode_request('{"type":"step"}') == commands.StepReplay()
+    assert decode_request('{"type":"speed","speed":null}') == commands.SetSpeed(None)
+    assert decode_request('{"type":"loop","on":true}') == commands.SetLoop(True)
     asked = decode_request(json.dumps({"type": "presses", "presses": [PRESS]}))
     assert asked == SetPresses((PressRequest(**PRESS),))
 

@@ -19,7 +19,16 @@ from server.serving import PATIENCE, Site
 from server.test_frames import decode
 from tomoskin.recording import session_info
 from tomoskin.run import Runner
-from tomoskin.server import Door, Hub, Server, ServerError, application, check_page, listen, page
+from tomoskin.server import (
+    AccessPolicy,
+    Hub,
+    Server,
+    ServerError,
+    application,
+    check_page,
+    listen,
+    page_connection,
+)
 
 
 @pytest.fixture
@@ -79,7 +88,7 @@ def ready(frame):
 
 def test_the_token_becomes_a_cookie_and_opens_the_page(site):
     with site.client(entered=False) as client:
-        answer = client.get("/", params={"token": site.door.token})
+        answer = client.get("/", params={"token": site.policy.token})
         assert answer.status_code == 303
         assert answer.headers["location"] == "/"
         cookie = answer.headers["set-cookie"]
@@ -163,7 +172,7 @@ def test_a_websocket_of_another_site_is_refused(site, wrong):
 
 
 def test_a_cross_site_websocket_is_refused_even_with_the_cookie(site):
-    cookie = site.door.set_cookie().partition(";")[0]
+    cookie = site.policy.set_cookie().partition(";")[0]
     wrong = site.connect(token="", cookie=cookie, origin="http://evil.example")
     with pytest.raises(InvalidStatus), wrong:
         pass
@@ -338,7 +347,7 @@ def deaf(site):
         stuck.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         stuck.connect(("127.0.0.1", site.port))
         stuck.sendall(
-            f"GET /ws?token={site.door.token} HTTP/1.1\r\nHost: 127.0.0.1:{site.port}\r\n"
+            f"GET /ws?token={site.policy.token} HTTP/1.1\r\nHost: 127.0.0.1:{site.port}\r\n"
             "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
             "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
         )
@@ -346,8 +355,8 @@ def deaf(site):
 
 
 def test_a_page_that_does_not_read_delays_nobody_and_is_let_go(site, monkeypatch):
-    monkeypatch.setattr(page, "PATIENCE", 0.3)
-    monkeypatch.setattr(page, "FRAME_PERIOD", 0.001)
+    monkeypatch.setattr(page_connection, "PATIENCE", 0.3)
+    monkeypatch.setattr(page_connection, "FRAME_PERIOD", 0.001)
     with deaf(site), site.connect() as other:
         seen = []
         while True:
@@ -365,7 +374,7 @@ def test_a_page_that_does_not_read_delays_nobody_and_is_let_go(site, monkeypatch
 
 def test_a_page_that_does_not_read_leaves_no_connection_behind(runner, static, monkeypatch):
     """What it was to be sent would be waited for without end."""
-    monkeypatch.setattr(page, "FRAME_PERIOD", 0.001)
+    monkeypatch.setattr(page_connection, "FRAME_PERIOD", 0.001)
     runner.start()
     site = Site(runner, static)
     with deaf(site), site.connect() as other:
@@ -391,8 +400,8 @@ def test_stopping_with_a_page_open_is_quick(runner, static):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_before_it_begins_ends_it_at_once(runner, static, number):
     listener = listen("127.0.0.1", 0)
-    door = Door(listener.getsockname()[1])
-    server = Server.of(application(Hub(runner, limit=1.0), door, static))
+    policy = AccessPolicy(listener.getsockname()[1])
+    server = Server.of(application(Hub(runner, limit=1.0), policy, static))
     before = signal.getsignal(number)
     with server.stopped_by_signals():
         os.kill(os.getpid(), number)

@@ -16,8 +16,8 @@ from tomoskin.core.outputs import MAGIC
 from tomoskin.pattern import named
 from tomoskin.pipeline import colour_limit, prepare
 from tomoskin.recording import SessionReader, replayed
-from tomoskin.run import Runner
-from tomoskin.server import Hub, SettingsDesk
+from tomoskin.run import Runner, commands
+from tomoskin.server import Hub, SettingsHandlers
 from tomoskin.server.requests import decode_request
 from tomoskin.server.settings_form import table_of
 
@@ -63,7 +63,7 @@ class Office:
     def __init__(self, runner, folder):
         self.runner, self.page = runner, Heard()
         self.hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
-        self.hub.take(SettingsDesk(self.hub))
+        SettingsHandlers(self.hub)
 
     def ask(self, *requests):
         """Make requests one after the other, each when the one before is done."""
@@ -194,16 +194,16 @@ def test_a_recording_ends_and_what_it_holds_replays_to_the_bit(prepared, board, 
     seen = []
     runner = Runner(prepared, lambda: board)
     path = tmp_path / "before.mcap"
-    runner.record(path)
+    runner.ask(commands.Record(path))
     runner.start()
     with (
         contextlib.closing(_Stopped(runner)),
-        runner.watched_by(lambda: seen.append(runner.newest.result)),
+        runner.watch(lambda: seen.append(runner.newest.result)),
     ):
         until = Watch(runner).until
         until(lambda: len(seen) > 60)
         again = prepare(prepared.skin.altered({"inverse": {"alpha": 0.3}}), prepared)
-        runner.adopt(again)
+        runner.ask(commands.Adopt(again))
         until(lambda: runner.prepared is again)
     assert runner.status().recording is None
     with SessionReader(path) as session:

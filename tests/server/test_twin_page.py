@@ -22,8 +22,8 @@ from tomoskin.calibration import (
 from tomoskin.mesh import Hinge
 from tomoskin.pipeline import voltage_covariance
 from tomoskin.run import Runner
-from tomoskin.run.posing import Posed
-from tomoskin.server import TwinDesk
+from tomoskin.run.twin_requests import BendRequest, SetPose
+from tomoskin.server import TwinHandlers
 from tomoskin.source import open_source
 from tomoskin.twin import Bent, Face, TwinSettings, TwinSkin
 
@@ -66,7 +66,7 @@ def site(prepared):
         learnt(prepared), lambda: open_source("twin:preset=ideal,seed=1", prepared.skin)
     )
     runner.start()
-    site = Site(runner, take=lambda hub: hub.take(TwinDesk(hub)))
+    site = Site(runner, take=TwinHandlers)
     yield site
     site.stop()
     runner.stop()
@@ -83,7 +83,7 @@ def test_the_twin_is_bent_by_keys_and_its_bend_is_read_beside_a_touch(opened):
     bend(opened, 39)
     opened.test_id("bend-angle").press("ArrowRight")
     asked = (Bent(Hinge(TRUE, WIDTH)),)
-    Watch(opened.site.runner).until(lambda: opened.site.runner.posed.pose == asked)
+    Watch(opened.site.runner).until(lambda: opened.site.runner.twin.pose.pose == asked)
     opened.until(
         "last.bend?.state === 'bend' && "
         f"Math.abs(window.tomoskin.last.bend.angle - {TRUE}) < {ROUGH}"
@@ -97,7 +97,7 @@ def test_the_twin_is_bent_by_keys_and_its_bend_is_read_beside_a_touch(opened):
     opened.lifted()
     opened.test_id("lay-flat").click()
     opened.until("last.bend?.state === 'idle'")
-    assert opened.site.runner.posed.pose == ()
+    assert opened.site.runner.twin.pose.pose == ()
     assert opened.site.runner.status().bend.state == "idle"
     stretched(opened)
 
@@ -112,11 +112,11 @@ def test_the_state_is_said_on_one_line_that_does_not_move(opened):
     told, runner = opened.test_id("told"), opened.site.runner
     told.filter(has_text="straight").wait_for()
     straight = place(told)
-    runner.bend(Posed((Bent(Hinge(TRUE, WIDTH)),)))
+    runner.ask(SetPose(BendRequest(TRUE, length=WIDTH)))
     told.filter(has_text="bent").wait_for()
     assert place(told) == straight
     assert told.get_attribute("title").startswith("State")
-    runner.bend(Posed())
+    runner.ask(SetPose())
     told.filter(has_text="straight").wait_for()
 
 

@@ -38,7 +38,7 @@ class Watched:
         self.page.on("response", self._response)
 
     def open(self):
-        self.page.goto(self.site.door.address)
+        self.page.goto(self.site.policy.address)
         self.until("last?.referenceReady")
 
     def until(self, condition):

@@ -1,4 +1,4 @@
-"""A stream of the textile disc, moments of it, and a run of an outlet."""
+"""A stream of the textile disc, results and moments of it, and a run of a worker."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ import pytest
 
 from recording.runs import SKIN, TOUCH
 from tomoskin.core import Event, Image
+from tomoskin.pipeline import Result
 from tomoskin.sink import Moment, Stream
 
 ROBOT = Path(__file__).resolve().parents[2] / "docs" / "robot.md"
@@ -37,6 +38,22 @@ def moment_at(host_time, *touches, sequence=0):
     return Moment(sequence, host_time, True, rows + 0.25, rows, touches, image)
 
 
+def result_at(host_time, *touches, sequence=0):
+    """What a pipeline makes of one frame."""
+    moment = moment_at(host_time, *touches, sequence=sequence)
+    return Result(
+        sequence=sequence,
+        host_time=host_time,
+        ready=True,
+        pictured=True,
+        image=moment.image,
+        voltages=moment.voltages,
+        reference=moment.reference,
+        touches=touches,
+        left_out=0,
+    )
+
+
 def free_port():
     with socket.create_server(("127.0.0.1", 0)) as listener:
         return listener.getsockname()[1]
@@ -52,7 +69,7 @@ def stream():
 
 
 class News:
-    """What an outlet says, and a way to wait for something to be true."""
+    """What a worker says, and a way to wait for something to be true."""
 
     def __init__(self):
         self.said = []

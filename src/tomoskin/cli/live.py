@@ -20,7 +20,7 @@ from tomoskin.cli.record import ended_by_signals, recording_to
 if TYPE_CHECKING:
     from tomoskin.pipeline import Prepared
     from tomoskin.run import Runner
-    from tomoskin.server import Door
+    from tomoskin.server import AccessPolicy
 
 
 def live(
@@ -69,16 +69,14 @@ def live(
         from tomoskin.pipeline import colour_limit
         from tomoskin.run import Runner
         from tomoskin.server import (
-            Door,
+            AccessPolicy,
             Hub,
             Server,
-            SettingsDesk,
-            TwinDesk,
             application,
             check_page,
             is_loopback,
             listen,
-            take_flows,
+            serve_requests,
         )
         from tomoskin.source import open_source
 
@@ -92,19 +90,17 @@ def live(
             if not is_loopback(host):
                 _warn(host)
             port = listener.getsockname()[1]
-            door = Door(port, host, **_kept(token_file))
+            policy = AccessPolicy(port, host, **_token(token_file))
             runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
             with recording_to(runner, record):
                 hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
                 hub.opener = partial(open_source, source)
-                hub.take(SettingsDesk(hub))
-                hub.take(TwinDesk(hub))
-                take_flows(hub, source)
-                server = Server.of(application(hub, door))
+                serve_requests(hub, source)
+                server = Server.of(application(hub, policy))
                 with server.stopped_by_signals():
-                    _announce(door, runner, json=json)
+                    _announce(policy, runner, json=json)
                     if open_browser:
-                        webbrowser.open(door.address)
+                        webbrowser.open(policy.address)
                     server.run_on(listener)
         _farewell(runner, json=json)
 
@@ -126,10 +122,10 @@ def _prepared(skin: str | None, source: str, calibration: Path | None) -> Prepar
     return prepared.calibrated(TOUCH.read(calibration))
 
 
-def _kept(token_file: Path | None) -> dict[str, str]:
-    from tomoskin.server import kept_token
+def _token(token_file: Path | None) -> dict[str, str]:
+    from tomoskin.server import load_token
 
-    return {} if token_file is None else {"token": kept_token(token_file)}
+    return {} if token_file is None else {"token": load_token(token_file)}
 
 
 def _warn(host: str) -> None:
@@ -139,11 +135,11 @@ def _warn(host: str) -> None:
     )
 
 
-def _announce(door: Door, runner: Runner, *, json: bool) -> None:
+def _announce(policy: AccessPolicy, runner: Runner, *, json: bool) -> None:
     if json:
-        emit({"type": "listening", "address": door.address, "port": door.port})
+        emit({"type": "listening", "address": policy.address, "port": policy.port})
     else:
-        typer.echo(f"{runner.source} is live at {door.address}")
+        typer.echo(f"{runner.status().source} is live at {policy.address}")
     sys.stdout.flush()
 
 

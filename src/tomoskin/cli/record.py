@@ -52,7 +52,7 @@ def record(
     runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
     with ended_by_signals(), recording_to(runner, file):
         if seconds is None and frames is None and not json:
-            typer.echo(f"{runner.source} is recorded to {file} until Ctrl-C", err=True)
+            typer.echo(f"{runner.status().source} is recorded to {file} until Ctrl-C", err=True)
         _wait(runner, seconds, frames)
         if (problem := _problem(runner)) is not None:
             raise DataError(problem)
@@ -78,8 +78,10 @@ def ended_by_signals() -> Iterator[None]:
 @contextlib.contextmanager
 def recording_to(runner: Runner, file: Path | None) -> Iterator[None]:
     """The runner runs while the block lasts, and records from its first byte to ``file``."""
+    from tomoskin.run import commands
+
     if file is not None:
-        runner.record(file)
+        runner.ask(commands.Record(file))
     try:
         runner.start()
     except BaseException:

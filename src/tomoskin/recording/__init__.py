@@ -23,6 +23,13 @@ from tomoskin.recording.recorder import Recorder
 from tomoskin.recording.repair import Lost, Repaired, repair
 from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.recording.replayed import advance, as_recorded, replayed
+from tomoskin.recording.run_messages import (
+    BoardInfo,
+    RawRead,
+    RunMessage,
+    RunSettings,
+    event_of,
+)
 from tomoskin.recording.session_reader import (
     SessionReader,
     end_time,
@@ -37,14 +44,18 @@ from tomoskin.recording.timeline import Span, Timeline, read_timeline
 __all__ = [
     "Advance",
     "Block",
+    "BoardInfo",
     "Lost",
     "Mark",
     "MarkedFrame",
+    "RawRead",
     "RecordedTouches",
     "Recorder",
     "Repaired",
     "ReplayTransport",
     "Rows",
+    "RunMessage",
+    "RunSettings",
     "SessionInfo",
     "SessionReader",
     "SessionWriter",
@@ -56,6 +67,7 @@ __all__ = [
     "as_recorded",
     "encode_json",
     "end_time",
+    "event_of",
     "grid_message",
     "indexed_frames",
     "log_message",

@@ -1,18 +1,25 @@
-"""Recording beside a running pipeline: what of a run goes into its file, and how often."""
+"""What a run says, written to a session file as it comes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
 
-from tomoskin.core import Event, Frame, Image, PixelMap, Touch
+from tomoskin.core import DataError, Event, Image, PixelMap, Touch
+from tomoskin.pipeline import Result
 from tomoskin.recording.clock import ClockFitter
-from tomoskin.recording.layout import Mark
+from tomoskin.recording.documents import Truth
+from tomoskin.recording.layout import Mark, MarkedFrame
+from tomoskin.recording.run_messages import (
+    BoardInfo,
+    RawRead,
+    RunMessage,
+    RunSettings,
+    event_of,
+)
 from tomoskin.recording.session_writer import SessionWriter
-from tomoskin.recording.write_queue import WriteQueue
-
-MOST_WAITING = 64 << 20
-"""Bytes that may wait for the disk: about a minute of the fastest board."""
 
 IMAGE_PERIOD = 0.2
 """Seconds between two images in the file, by host time."""
@@ -20,109 +27,167 @@ IMAGE_PERIOD = 0.2
 CLOCK_PERIOD = 10.0
 """Seconds between two fits of the device's clock."""
 
+_OBJECT = 256
+"""Bytes that a waiting message is taken for, beside its data."""
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Outcome:
+    """What is kept of a result; None: not worth a message."""
+
+    host_time: float
+    sequence: int
+    touches: tuple[Touch, ...] | None
+    image: Image | None
+    events: tuple[Event, ...]
+    shown: tuple[Touch, ...]
+
 
 class Recorder:
-    """Records to ``session`` from a thread of its own; no call waits for the disk.
+    """Takes the messages of a run into a session file; a consumer of a worker of its own.
 
-    When the disk cannot keep up, messages are left out, counted and reported. When the file cannot
-    be written any further the recording ends, which is reported too; the file stays readable.
+    When the file cannot be written any further the recording ends, which is said; the file stays
+    readable.
 
     Parameters
     ----------
-    session
-        An open session; closed by :meth:`stop`, or when writing fails.
+    path
+        The file.
+    make
+        Opens the session at ``path``; called once, by the worker's thread. DataError when the
+        file cannot be made.
     pixels
         For the images; None where the skin has none (a curved sheet): then there are no images.
     say
-        Called with the kind and text of an event, from either thread.
+        Called with the kind and text of an event.
     """
+
+    kind = "recording"
+    slow, ready = "the disk is too slow, messages are lost", ""
 
     def __init__(
         self,
-        session: SessionWriter,
+        path: Path,
+        make: Callable[[], SessionWriter],
         pixels: PixelMap | None,
         say: Callable[[str, str], None],
-        *,
-        most_waiting: int = MOST_WAITING,
     ) -> None:
-        self.path = session.path
-        self._session, self._pixels = session, pixels
-        self._queue = WriteQueue(session, say, most_waiting)
+        self.path, self.name = path, f"{path}:"
+        self._make, self._pixels, self._say = make, pixels, say
+        self._session: SessionWriter
+        self._made = self._broken = False
         self._last_image = float("-inf")
         self._had_touches = False
         self._clock, self._next_fit = ClockFitter(), float("-inf")
 
-    @property
-    def running(self) -> bool:
-        """Whether what comes is still written."""
-        return self._queue.is_running
+    def admit(self, message: RunMessage) -> RunMessage | _Outcome | None:
+        """What of ``message`` is to be written; by the thread that puts it."""
+        if not isinstance(message, Result):
+            return message
+        touches, image = None, None
+        if message.ready:
+            touches = message.touches if message.touches or self._had_touches else None
+            self._had_touches = bool(message.touches)
+            image = message.image if self._image_is_due(message.host_time) else None
+        events = tuple(map(event_of, message.events))
+        if touches is None and image is None and not events:
+            return None
+        return _Outcome(
+            message.host_time, message.sequence, touches, image, events, message.touches
+        )
 
-    @property
-    def is_complete(self) -> bool:
-        """Whether it was stopped, and not by the disk."""
-        return not self._queue.is_running and not self._queue.has_failed
+    def size(self, item: RunMessage | _Outcome) -> int:
+        """Bytes that it takes while it waits."""
+        match item:
+            case RawRead():
+                return _OBJECT + len(item.data)
+            case MarkedFrame():
+                return _OBJECT + item.frame.samples.nbytes
+            case _Outcome():
+                image = item.image.values.nbytes if item.image is not None else 0
+                return _OBJECT + image + 200 * len(item.shown)
+            case Truth():
+                return _OBJECT + 100 * (len(item.presses) + len(item.bends))
+            case _:
+                return _OBJECT
 
-    @property
-    def left_out(self) -> int:
-        """Messages that were not recorded: the disk was too slow."""
-        return self._queue.left_out
+    def durable(self, item: object) -> bool:
+        """All is written, what came before the file was open too."""
+        del item
+        return True
 
-    def raw(self, host_time: float, data: bytes) -> None:
-        """Bytes as they were read."""
-        self._queue.put(len(data), self._session.raw, host_time, data)
+    def open(self) -> None:
+        """Make the file. Raises DataError."""
+        self._session, self._made = self._make(), True
 
-    def frame(self, frame: Frame, mark: Mark) -> None:
-        """One frame, and what becomes of it; after the raw bytes that it came in."""
-        if not mark & Mark.EARLIER:
-            self._clock.add(frame.ticks, frame.host_time)
-            self._fit_clock(frame.host_time)
-        self._queue.put(frame.samples.nbytes, self._session.frame, frame, mark)
+    def take(self, item: RunMessage | _Outcome) -> None:
+        """Write one message. Raises DataError."""
+        session = self._session
+        match item:
+            case RawRead():
+                session.raw(item.host_time, item.data)
+            case MarkedFrame():
+                self._fit_clock(item)
+                session.frame(item.frame, item.mark)
+            case _Outcome():
+                self._write_outcome(item)
+            case Event(kind="note"):
+                session.note(item.host_time, item.text)
+            case Event():
+                session.event(item)
+            case Truth():
+                session.truth(item.host_time, item.presses, item.bends)
+            case BoardInfo():
+                session.device(item.host_time, item.info)
+            case RunSettings():
+                session.settings(item.host_time, item.values)
 
-    def result(
-        self, host_time: float, sequence: int, image: Image, touches: Sequence[Touch]
-    ) -> None:
-        """What was made of a frame: its touches, and now and then its image."""
-        if touches or self._had_touches:
-            size = 200 * len(touches)
-            self._queue.put(size, self._session.touches, host_time, sequence, touches)
-        self._had_touches = bool(touches)
-        if self._pixels is None or 0 <= host_time - self._last_image < IMAGE_PERIOD:
-            return
-        self._last_image = host_time
-        size = image.values.nbytes
-        self._queue.put(size, self._session.image, host_time, image, self._pixels, touches)
+    def tend(self) -> None:
+        """Write the open chunk, to lose a second at most. Raises DataError."""
+        self._session.settle()
 
-    def event(self, event: Event) -> None:
-        """Something that happened."""
-        self._queue.put(len(event.text), self._session.event, event)
+    def close(self) -> None:
+        """End the file. Raises DataError."""
+        if self._made:
+            self._session.close()
+            if not self._broken:
+                self._say("recorded", f"recorded to {self.path}")
 
-    def note(self, host_time: float, text: str) -> None:
-        """A person's remark."""
-        self._queue.put(len(text), self._session.note, host_time, text)
+    def handle_failure(self, error: Exception) -> None:
+        """The recording ends here; what could be written is in the file."""
+        self._broken = True
+        if not self._made:
+            return  # whoever asked for it is told
+        why = str(error)
+        if not isinstance(error, DataError):
+            _log.exception("the recording thread ended", exc_info=error)
+            why = f"internal error, {type(error).__name__}: {error}"
+        self._say("recording-stopped", f"the recording has ended: {why}")
 
-    def truth(self, host_time: float, presses: Sequence[Any], bends: Sequence[Any] = ()) -> None:
-        """What presses on the twin, and how it is bent, from now on."""
-        size = 100 * (len(presses) + len(bends))
-        self._queue.put(size, self._session.truth, host_time, presses, bends)
+    def _write_outcome(self, item: _Outcome) -> None:
+        session = self._session
+        if item.touches is not None:
+            session.touches(item.host_time, item.sequence, item.touches)
+        if item.image is not None and self._pixels is not None:
+            session.image(item.host_time, item.image, self._pixels, item.shown)
+        for event in item.events:
+            session.event(event)
 
-    def device(self, host_time: float, info: Any) -> None:
-        """What the board is."""
-        self._queue.put(0, self._session.device, host_time, info)
-
-    def settings(self, host_time: float, settings: Mapping[str, Any]) -> None:
-        """How the run is set."""
-        self._queue.put(0, self._session.settings, host_time, settings)
-
-    def wait_until_written(self) -> None:
-        """Return when nothing waits for the disk any more."""
-        self._queue.wait_until_empty()
-
-    def stop(self) -> None:
-        """Write what waits, end the file and return; a second call does nothing."""
-        self._queue.stop()
-
-    def _fit_clock(self, host_time: float) -> None:
+    def _fit_clock(self, item: MarkedFrame) -> None:
         """Now and then a fit of the device's clock."""
-        if host_time >= self._next_fit and (fit := self._clock.fit) is not None:
-            self._queue.put(0, self._session.clock, host_time, fit)
-            self._next_fit = host_time + CLOCK_PERIOD
+        frame = item.frame
+        if item.mark & Mark.EARLIER:
+            return
+        self._clock.add(frame.ticks, frame.host_time)
+        if frame.host_time >= self._next_fit and (fit := self._clock.fit) is not None:
+            self._session.clock(frame.host_time, fit)
+            self._next_fit = frame.host_time + CLOCK_PERIOD
+
+    def _image_is_due(self, host_time: float) -> bool:
+        """Whether a period has gone by, or the time has been set back."""
+        if self._pixels is None or 0 <= host_time - self._last_image < IMAGE_PERIOD:
+            return False
+        self._last_image = host_time
+        return True

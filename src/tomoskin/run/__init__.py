@@ -1,5 +1,6 @@
-"""The running loop: a thread that owns the source, and all who are told what it makes."""
+"""The running loop: a thread that owns the source, commands to it and messages from it."""
 
+from tomoskin.run import commands
 from tomoskin.run.flow import Snapshot
 from tomoskin.run.labelled_frames import (
     SetMade,
@@ -10,34 +11,37 @@ from tomoskin.run.labelled_frames import (
     on_cluster,
     processors,
 )
-from tomoskin.run.posing import posed, way_to_bend
-from tomoskin.run.presses import Harm
+from tomoskin.run.marker import ReplaySource
+from tomoskin.run.posing import SheetPose, sheet_pose, way_to_bend
 from tomoskin.run.runner import Runner
 from tomoskin.run.simulate import Simulated, simulate
 from tomoskin.run.status import Status
-from tomoskin.run.twin_requests import MAX_FORCE, SetPose, SetPresses, SetTwin, TwinRequest
-from tomoskin.run.wishes import Replayed
+from tomoskin.run.twin_control import Harm, TwinControl
+from tomoskin.run.twin_requests import MAX_FORCE, SetPose, SetPresses, SetTwin, StrictRequest
 
 __all__ = [
     "MAX_FORCE",
     "Harm",
-    "Replayed",
+    "ReplaySource",
     "Runner",
     "SetMade",
     "SetPose",
     "SetPresses",
     "SetTwin",
+    "SheetPose",
     "Simulated",
     "Snapshot",
     "Status",
-    "TwinRequest",
+    "StrictRequest",
+    "TwinControl",
     "Workers",
+    "commands",
     "in_processes",
     "in_this_process",
     "make_set",
     "on_cluster",
-    "posed",
     "processors",
+    "sheet_pose",
     "simulate",
     "way_to_bend",
 ]

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
 
-from tomoskin.core import DataError, Event, Frame
+from tomoskin.core import DataError, Event, Frame, ModelError, WireError
 from tomoskin.pipeline import Pipeline, Prepared, Result
-from tomoskin.recording import Mark, advance
-from tomoskin.run.counters import Tally
-from tomoskin.run.latency import Latency
-from tomoskin.run.meter import Meter
-from tomoskin.run.presses import Hands, Pressable
+from tomoskin.recording import BoardInfo, Mark, MarkedFrame, RawRead, Truth, advance
+from tomoskin.run.commands import DirectCommand, Note, ReplayCommand
+from tomoskin.run.counters import Latency, Losses
+from tomoskin.run.marker import Marker, play, replay_status
 from tomoskin.run.publisher import Audience, Publisher
-from tomoskin.run.replay_place import where_is
 from tomoskin.run.status import Status
-from tomoskin.run.wishes import Wishes
+from tomoskin.run.twin_control import Harm, Pressable, TwinControl, described
+from tomoskin.run.twin_requests import SetPose, SetTwin
 from tomoskin.source import Link, ScanSettings, Transport
-from tomoskin.twin import Contact
+from tomoskin.twin import Contact, Faults
+from tomoskin.wire import Info
 
 MOST_AT_ONCE = 16
 """Where more frames than this wait, the oldest are skipped: a late picture helps nobody."""
@@ -48,145 +49,121 @@ class Flow:
         The newest result, or None before the first.
     source
         Source and skin in words, once it has been opened.
-    pressable
-        Whether the source can be pressed, as the twin can.
-    pipeline, wishes, hands, out, latency
-        What makes results, what is wanted of it, who presses the source, who is told, and how
+    board
+        What the board said of itself, once it has.
+    pipeline, marker, twin, out, latency
+        What makes results, what marks frames, what presses the source, where messages go, and how
         long all that takes.
     """
 
     def __init__(self, prepared: Prepared, audience: Audience) -> None:
         self.prepared = prepared
         self.newest: Snapshot | None = None
-        self.source, self.pressable = "", False
-        self.pipeline, self.wishes, self.hands = Pipeline(prepared), Wishes(), Hands()
+        self.source = ""
+        self.board: Info | None = None
+        self.pipeline, self.marker, self.twin = Pipeline(prepared), Marker(), TwinControl()
         self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered)
         self.latency = Latency()
         self._clock = audience.clock
         self._settings = ScanSettings.of(prepared.skin)
-        self._meter = Meter()
-        self._tally, self._earlier, self._skipped = Tally(), Tally(), 0
+        self._losses, self._earlier, self._skipped = Losses(), Losses(), 0
         self._drops, self._polled = 0, 0.0
         self._standstill: str | None = None
         self._ended = False
 
-    def opened(self, transport: Transport) -> None:
+    def begin(self, transport: Transport) -> None:
         """Its source has been opened for the first time; say what it is."""
-        self.wishes.opened(transport)
-        self.pressable = isinstance(transport, Pressable)
+        self.marker.begin(transport)
+        self.twin.attach(transport)
         skin, name = self.prepared.skin.name, transport.name
-        self.source = f"{name} of {skin}" if self.pressable else f"{skin} on {name}"
-        self.out.opened(self.prepared, self.source)
+        self.source = f"{name} of {skin}" if self.twin.pressable else f"{skin} on {name}"
+        self.out.begin(self.prepared, self.source)
 
     def link(self, transport: Transport) -> Link:
-        """The link to its source, which has just been opened, maybe again."""
+        """The protocol session with its source, which has just been opened, maybe again."""
         self._standstill, self._drops = None, 0
-        self.wishes.opened(transport)
-        self.hands.opened(transport)
-        if self.wishes.replay:
-            self.pipeline.number_after(self.wishes.replay.touches_before)
-        clock, tap = self._clock, self.out.tape.read
-        return Link(transport, self.prepared.scan, self._settings, clock=clock, tap=tap)
+        self.marker.begin(transport)
+        self.twin.attach(transport)
+        if self.marker.replay:
+            self.pipeline.number_after(self.marker.replay.touches_before)
+        return Link(
+            transport, self.prepared.scan, self._settings, clock=self._clock, tap=self._put_raw
+        )
 
-    def unlinked(self) -> None:
-        """The link is closed; another may follow."""
-        self._earlier, self._tally = self._earlier + self._tally, Tally()
+    def unlink(self) -> None:
+        """The protocol session is over; another may follow."""
+        self._earlier, self._losses = self._earlier + self._losses, Losses()
 
-    def adopt(self, prepared: Prepared) -> None:
+    def adopt(self, prepared: Prepared) -> Future[None] | None:
         """Go on with other settings; nothing is done where they are of another sheet or scan."""
-        if prepared.skin.body == self.prepared.skin.body:
-            self.out.tape.adopt(prepared)
-            self.prepared = prepared
-            self.pipeline.adopt(prepared)
+        if prepared.skin.body != self.prepared.skin.body:
+            return None
+        ended = self.out.recordings.adopt(prepared)
+        self.prepared = prepared
+        self.pipeline.adopt(prepared)
+        return ended
 
     def press(self, transport: Transport) -> None:
         """Let the source feel what is pressed now."""
-        if isinstance(transport, Pressable) and self.hands.press(transport):
-            self.out.tape.truth(self.hands.truth, self.hands.posed.told)
+        if isinstance(transport, Pressable) and self.twin.press(transport):
+            presses = tuple(map(described, self.twin.truth))
+            self.out.put(Truth(self._clock(), presses, self.twin.pose.truth))
 
-    def take(self, link: Link, found: Sequence[object]) -> None:
+    def do(self, command: DirectCommand) -> None:
+        """Carry out what any thread may do.
+
+        Raises
+        ------
+        WireError
+            For what the source cannot do or does not have.
+        GeometryError
+            For a shape that its sheet cannot take.
+        """
+        match command:
+            case Note():
+                newest = self.newest
+                host_time = newest.result.host_time if newest else self._clock()
+                self.out.put(Event(host_time, "note", command.text))
+            case SetTwin():
+                self._break(command)
+            case SetPose():
+                if not self.twin.bendable:
+                    raise WireError(f"{self.source} cannot be bent from here")
+                self.twin.set_pose(command, self.prepared.skin.surface)
+            case _:
+                self._play(command)
+
+    def take(self, link: Link, items: Sequence[object]) -> None:
         """What one read of the link brought: frames and events."""
         self._polled = self._clock()
-        self.out.tape.linked(link)
-        if link.info is not None and link.info.tick_rate:
-            self.pipeline.tick_rate = link.info.tick_rate
-        frames = [item for item in found if isinstance(item, Frame)]
+        self._note_board(link.info)
+        frames = [item for item in items if isinstance(item, Frame)]
         self._drops = frames[-1].drops if frames else self._drops
-        self._tally = Tally.of(link, self._drops)
-        for event in (item for item in found if isinstance(item, Event)):
-            self.out.event(event)
+        self._losses = Losses.of(link, self._drops)
+        for event in (item for item in items if isinstance(item, Event)):
+            self.out.put(event)
             if event.kind in _STANDSTILL:
                 self._standstill = event.text
-        self._frames(frames)
+        self._take_frames(frames)
         self._end()
-
-    def _end(self) -> None:
-        """A replay has ended when its last frames have been processed, not when they were read."""
-        replay = self.wishes.replay
-        ended = replay is not None and replay.ended
-        if ended != self._ended:
-            self._ended = ended
-            self.out.announce()
-
-    def _frames(self, frames: Sequence[Frame]) -> None:
-        late = len(frames) - MOST_AT_ONCE
-        for number, frame in enumerate(frames):
-            mark = self.wishes.mark(frame, late=number < late)
-            if mark is not None:
-                for before in self.out.tape.again():
-                    advance(self.pipeline, *before)
-                self.out.tape.frame(frame, mark)
-                self._frame(frame, mark)
-
-    def _frame(self, frame: Frame, mark: Mark) -> None:
-        if mark & Mark.SKIPPED:
-            self._skipped += 1
-            return
-        self._standstill = None
-        read, begun = self._read(frame), self._clock()
-        self._meter.arrived(read)
-        self.latency.sampled(frame, self.pipeline.tick_rate)
-        self.latency.took("decode", begun - read)
-        try:
-            result = advance(self.pipeline, frame, mark)
-        except DataError as error:
-            self._skipped += 1
-            self.out.say("refused", f"a frame was left out: {error}")
-            return
-        if result is None:
-            return
-        ready = self._clock()
-        self._meter.took(ready - read)
-        self.latency.took("reconstruct", ready - begun)
-        self.newest = Snapshot(result, self.hands.truth, ready - read, ready)
-        self.out.result(result)
-
-    def _read(self, frame: Frame) -> float:
-        """When its last byte was read, by our clock; the times in a replay are the recording's."""
-        return self._polled if self.wishes.replay else frame.host_time
-
-    def note(self, text: str) -> None:
-        """A person's remark on the picture of this moment; from any thread."""
-        newest = self.newest
-        self.out.note(Event(newest.result.host_time if newest else self._clock(), "note", text))
 
     def status(self, trouble: str | None) -> Status:
         """How it is doing now; ``trouble``: why there is no source, or None."""
-        now, replay = self._clock(), self.wishes.replay
-        p50, p99 = self._meter.latency()
+        now, replay = self._clock(), self.marker.replay
+        p50, p99 = self.latency.age()
         reference = self.pipeline.reference_state
         result = self.newest.result if self.newest else None
-        total = self._earlier + self._tally
+        total = self._earlier + self._losses
         here = replay.now() if replay else now
         return Status(
             source=self.source,
             running=trouble is None and self._standstill is None,
-            paused=self.wishes.held,
-            recording=self.out.tape.path,
+            paused=self.marker.held,
+            recording=self.out.recordings.path,
             sinks=self.out.sink_reports(),
-            replay=where_is(replay, ended=self._ended) if replay else None,
-            frames=self._meter.frames,
-            fps=self._meter.rate(now),
+            replay=replay_status(replay, ended=self._ended) if replay else None,
+            frames=self.latency.frames,
+            fps=self.latency.rate(now),
             dropped=total.dropped + self._skipped + self.pipeline.refused,
             corrupt=total.corrupt,
             gaps=total.gaps,
@@ -201,4 +178,70 @@ class Flow:
             bend=result.bend if result and result.ready else None,
             state=result.state if result and result.ready else None,
             problem=trouble or self._standstill or (result.problem if result else None),
+            board=self.board,
         )
+
+    def _put_raw(self, host_time: float, data: bytes) -> None:
+        self.out.put(RawRead(host_time, data))
+
+    def _note_board(self, info: Info | None) -> None:
+        if info is not self.board:
+            self.board = info
+            if info is not None:
+                self.out.put(BoardInfo(self._clock(), info))
+        if info is not None and info.tick_rate:
+            self.pipeline.tick_rate = info.tick_rate
+
+    def _break(self, command: SetTwin) -> None:
+        if not self.twin.breakable:
+            raise WireError(f"{self.source} cannot be broken from here")
+        try:
+            self.twin.set_harm(Harm(Faults(cut=frozenset(command.cut)), command.noise))
+        except ModelError as error:
+            raise WireError(str(error)) from None
+
+    def _play(self, command: ReplayCommand) -> None:
+        if self.marker.replay is None:
+            raise WireError(f"{self.source} is no replay")
+        play(self.marker.replay, command)
+
+    def _end(self) -> None:
+        """A replay has ended when its last frames have been processed, not when they were read."""
+        replay = self.marker.replay
+        ended = replay is not None and replay.ended
+        if ended != self._ended:
+            self._ended = ended
+            self.out.wake()
+
+    def _take_frames(self, frames: Sequence[Frame]) -> None:
+        late = len(frames) - MOST_AT_ONCE
+        for number, frame in enumerate(frames):
+            mark = self.marker.mark(frame, late=number < late)
+            if mark is not None:
+                for before in self.out.recordings.again():
+                    advance(self.pipeline, *before)
+                self.out.put(MarkedFrame(frame, mark))
+                self._take_frame(frame, mark)
+
+    def _take_frame(self, frame: Frame, mark: Mark) -> None:
+        if mark & Mark.SKIPPED:
+            self._skipped += 1
+            return
+        self._standstill = None
+        # the times in a replay are the recording's
+        read, begun = self._polled if self.marker.replay else frame.host_time, self._clock()
+        self.latency.add_frame(frame, read, self.pipeline.tick_rate)
+        self.latency.add("decode", begun - read)
+        try:
+            result = advance(self.pipeline, frame, mark)
+        except DataError as error:
+            self._skipped += 1
+            self.out.say("refused", f"a frame was left out: {error}")
+            return
+        if result is None:
+            return
+        ready = self._clock()
+        self.latency.add_age(ready - read)
+        self.latency.add("reconstruct", ready - begun)
+        self.newest = Snapshot(result, self.twin.truth, ready - read, ready)
+        self.out.put(result)

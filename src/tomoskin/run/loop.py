@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import logging
+import time
+from concurrent.futures import Future
 
 from threadpoolctl import threadpool_limits
 
-from tomoskin.core import TomoskinError
+from tomoskin.core import SourceError, TomoskinError
 from tomoskin.pipeline import Prepared
+from tomoskin.run import commands
+from tomoskin.run.commands import CommandQueue, Opener
 from tomoskin.run.flow import Flow
 from tomoskin.run.publisher import Audience
-from tomoskin.run.wanted import Opener, Wanted
 from tomoskin.source import Transport
 
 _POLL = 0.05
@@ -21,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 
 class Loop:
-    """Follows one source after the other until nothing more is wanted.
+    """Follows one source after the other until it is stopped, and carries out what is asked.
 
     Attributes
     ----------
@@ -31,14 +34,22 @@ class Loop:
         What opens its source.
     trouble
         Why no frames come, or None.
+    commands
+        What it is asked.
     """
 
-    def __init__(
-        self, prepared: Prepared, opener: Opener, wanted: Wanted, audience: Audience
-    ) -> None:
+    def __init__(self, prepared: Prepared, opener: Opener, audience: Audience) -> None:
         self.flow, self.open = Flow(prepared, audience), opener
         self.trouble: str | None = "not started"
-        self._wanted, self._audience = wanted, audience
+        self.commands = CommandQueue(self._handle)
+        self._audience = audience
+        self._change: tuple[commands.Change, Future[None]] | None = None
+        self._stopping = False
+
+    def stop(self) -> None:
+        """Let :meth:`run` end soon; from any thread."""
+        self._stopping = True
+        self.commands.nudge()
 
     def run(self, transport: Transport | None) -> None:
         """Follow ``transport``, and what comes after it; returns at the end."""
@@ -47,63 +58,100 @@ class Loop:
             with threadpool_limits(1):
                 while transport is not None:
                     self._follow(transport)
-                    transport = self._following()
+                    transport = self._next()
         except Exception as error:
             _log.exception("the live thread ended")
             self.trouble = f"internal error, {type(error).__name__}: {error}; start again"
             self.flow.out.say("internal", self.trouble)
+        finally:
+            self._refuse("it is not running")
+            self.commands.end()
 
     def _follow(self, transport: Transport) -> None:
         """Take frames until the source is lost or to be left."""
         flow, self.trouble = self.flow, _WAITING
         try:
             with flow.link(transport) as link:
-                while not self._wanted.elsewhere:
-                    self._take_over(flow)
+                while not self._is_over():
                     flow.press(transport)
-                    found = link.poll(_POLL)
+                    items = link.poll(_POLL)
                     self.trouble = None if link.running else _WAITING
-                    flow.take(link, found)
+                    flow.take(link, items)
         except TomoskinError as error:
             self.trouble = str(error)
             flow.out.say("source-lost", str(error))
         finally:
-            flow.unlinked()
+            flow.unlink()
 
-    def _take_over(self, flow: Flow) -> None:
-        """Go on with other settings, where some are wanted."""
-        if (settings := self._wanted.next_settings()) is not None:
-            prepared, done = settings
-            flow.adopt(prepared)
-            done.set()
+    def _is_over(self) -> bool:
+        """Carry out what is asked; whether the source of the moment is to be left."""
+        self.commands.carry_out()
+        return self._stopping or self._change is not None
 
-    def _following(self) -> Transport | None:
-        """What is followed next: what was changed to, else the old one anew; None at the end."""
-        delay = _FIRST_DELAY
-        while not self._wanted.stopped:
-            if (transport := self._changed()) is not None:
+    def _next(self) -> Transport | None:
+        """What is followed next: what was changed to, else the old one again; None at the end."""
+        delay, due = _FIRST_DELAY, time.monotonic() + _FIRST_DELAY
+        while not self._stopping:
+            self.commands.carry_out()
+            if (transport := self._change_over()) is not None:
                 return transport
-            if self._wanted.wait(delay):
+            if self.commands.wait(due - time.monotonic()):
                 continue
             try:
                 return self.open()
             except TomoskinError as error:
                 self.trouble = str(error)
                 delay = min(2 * delay, _LONGEST_DELAY)
+                due = time.monotonic() + delay
         return None
 
-    def _changed(self) -> Transport | None:
-        """Change to what is wanted, if anything is; None where it cannot be opened."""
-        change = self._wanted.next_change()
-        if change is None:
+    def _handle(self, command: commands.QueuedCommand) -> Future[None] | None:
+        """Carry out a command; what it returns is done when the command is."""
+        flow = self.flow
+        match command:
+            case commands.TakeReference():
+                flow.marker.take_reference()
+            case commands.SetPause():
+                flow.marker.hold(command.on)
+            case commands.HoldPresses():
+                flow.twin.hold(command.owner, command.presses)
+            case commands.Record():
+                return flow.out.recordings.begin(command.path)
+            case commands.StopRecording():
+                return flow.out.recordings.end()
+            case commands.Adopt():
+                return flow.adopt(command.prepared)
+            case commands.Change():
+                return self._ask_change(command)
+        return None
+
+    def _ask_change(self, change: commands.Change) -> Future[None]:
+        if not self.commands.taken:
+            raise SourceError("it is not running")
+        self._refuse("something else has been chosen meanwhile")
+        future: Future[None] = Future()
+        self._change = change, future
+        return future
+
+    def _refuse(self, why: str) -> None:
+        """The change that waits, if any, is not to be."""
+        change, self._change = self._change, None
+        if change is not None:
+            change[1].set_exception(SourceError(why))
+
+    def _change_over(self) -> Transport | None:
+        """Change to what was asked, if anything was; None where it cannot be opened."""
+        if self._change is None:
             return None
+        (change, future), self._change = self._change, None
+        opener = change.open or self.open
         try:
-            transport = change.open()
+            transport = opener()
         except TomoskinError as error:
-            change.refused(error)
+            future.set_exception(error)
             return None
         self.flow.out.stop()
-        self.flow, self.open = Flow(change.prepared, self._audience), change.open
-        self.flow.opened(transport)
-        change.done.set()
+        self.flow, self.open = Flow(change.prepared, self._audience), opener
+        self.flow.begin(transport)
+        future.set_result(None)
         return transport

@@ -1,9 +1,9 @@
-"""How a page's bends and stretches deform the twin's sheet, and how a recording tells them."""
+"""How a page's bends and stretches deform the twin's sheet, and how a recording describes them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from tomoskin.core import WireError
 from tomoskin.mesh import Arm, Hinge, Plane, Surface
@@ -11,21 +11,13 @@ from tomoskin.run.twin_requests import BendRequest, SetPose
 from tomoskin.twin import Bent, Pose, Stretched
 
 
-@runtime_checkable
-class Bendable(Protocol):
-    """A source whose sheet can be bent and stretched, as the twin's can."""
-
-    def set_pose(self, pose: Pose) -> None:
-        """How it lies from now on."""
-
-
 @dataclass(frozen=True, slots=True)
-class Posed:
-    """A deformed sheet: its ``pose``, what was ``asked``, and the truth for a recording."""
+class SheetPose:
+    """A deformed sheet: its ``pose``, what was ``asked``, and the ``truth`` for a recording."""
 
     pose: Pose = ()
     asked: SetPose = field(default_factory=SetPose)
-    told: tuple[dict[str, Any], ...] = ()
+    truth: tuple[dict[str, Any], ...] = ()
 
 
 def way_to_bend(rest: Surface) -> str | None:
@@ -35,7 +27,7 @@ def way_to_bend(rest: Surface) -> str | None:
     return "joint" if isinstance(rest, Arm) else None
 
 
-def posed(asked: SetPose, rest: Surface) -> Posed:
+def sheet_pose(asked: SetPose, rest: Surface) -> SheetPose:
     """The deformation of a sheet that lies on ``rest``.
 
     Raises
@@ -46,16 +38,16 @@ def posed(asked: SetPose, rest: Surface) -> Posed:
         Where it cannot take that shape.
     """
     pose: Pose = ()
-    told: list[dict[str, Any]] = []
+    truth: list[dict[str, Any]] = []
     if (bend := asked.bend) is not None:
         kind = way_to_bend(rest)
         pose += (Bent(_surface(bend, rest)),)
         axis = bend.axis if kind == "hinge" else 0.0
-        told.append({"kind": kind, "angle": bend.angle, "axis": axis})
+        truth.append({"kind": kind, "angle": bend.angle, "axis": axis})
     if (stretch := asked.stretch) is not None:
         pose += (Stretched(stretch.along, stretch.across, stretch.axis),)
-        told.append({"kind": "stretch", "strain": stretch.along, "axis": stretch.axis})
-    return Posed(pose, asked, tuple(told))
+        truth.append({"kind": "stretch", "strain": stretch.along, "axis": stretch.axis})
+    return SheetPose(pose, asked, tuple(truth))
 
 
 def _surface(bend: BendRequest, rest: Surface) -> Surface:

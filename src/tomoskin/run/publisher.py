@@ -1,58 +1,146 @@
-"""Who is told what a run makes and what happens to it: pages, the recording, the sinks."""
+"""Messages out: everything that a run says goes to every consumer through here."""
 
 from __future__ import annotations
 
 import contextlib
+import logging
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from typing import Any
 
 from tomoskin.core import Event
 from tomoskin.pipeline import Prepared, Result
-from tomoskin.run.events import EventLog, told
-from tomoskin.run.published import moment_of, stream_of
-from tomoskin.run.tape import Tape
-from tomoskin.sink import Outlets, Sink, SinkReport
+from tomoskin.recording import RunMessage
+from tomoskin.run.recordings import Recordings
+from tomoskin.sink import (
+    Capacity,
+    Consumer,
+    Sink,
+    SinkConsumer,
+    SinkReport,
+    Stream,
+    Worker,
+    sink_report,
+    sink_worker,
+    stop_workers,
+)
+
+MOST_WAITING = 256
+"""Results that may wait for a subscriber; the oldest make room."""
+
+_log = logging.getLogger(__name__)
 
 
-class Watchers:
-    """Who is called at each result, from the runner's thread."""
+class EventLog:
+    """Bounded list of events, safe between threads; each has a number that only grows."""
 
-    def __init__(self) -> None:
-        """Nobody yet."""
+    def __init__(self, size: int = 200) -> None:
+        self._events: deque[tuple[int, Event]] = deque(maxlen=size)
+        self._lock = threading.Lock()
+        self._next = 0
+
+    def add(self, event: Event) -> None:
+        """Note one event; the oldest makes room."""
+        with self._lock:
+            self._events.append((self._next, event))
+            self._next += 1
+
+    def since(self, number: int) -> tuple[int, tuple[Event, ...]]:
+        """(number to ask with next time, events from ``number`` on that are still kept)."""
+        with self._lock:
+            return self._next, tuple(e for n, e in self._events if n >= number)
+
+
+class Subscriber(Consumer):
+    """A function that is given each result."""
+
+    kind, slow = "subscriber", "does not keep up, and results are left out"
+
+    def __init__(self, name: str, call: Callable[[Result], None]) -> None:
+        self.name, self._call = name, call
+
+    def admit(self, message: Any) -> Result | None:
+        """Results only."""
+        return message if isinstance(message, Result) else None
+
+    def take(self, item: Result) -> None:
+        """Call the function."""
+        self._call(item)
+
+    def handle_failure(self, error: Exception) -> None:
+        """A fault of our own: it is given no more."""
+        _log.error("%s is given no more results", self.name, exc_info=error)
+
+
+class Audience:
+    """Who listens, whatever skin or source there is.
+
+    Attributes
+    ----------
+    clock
+        Host monotonic seconds.
+    sinks
+        Where results go; each run opens them again.
+    events
+        What happened, for any number of readers at their own pace.
+    """
+
+    def __init__(self, clock: Callable[[], float], sinks: Sequence[Sink] = ()) -> None:
+        self.clock, self.sinks, self.events = clock, sinks, EventLog()
         self._calls: list[Callable[[], None]] = []
+        self._subscribers: list[Worker[Subscriber]] = []
         self._lock = threading.Lock()
 
     @contextlib.contextmanager
-    def with_one(self, announce: Callable[[], None]) -> Iterator[None]:
-        """While the block lasts, ``announce`` is called at each result; after it never again."""
+    def watch(self, call: Callable[[], None]) -> Iterator[None]:
+        """While the block lasts, ``call`` is called at each result; after it never again."""
         with self._lock:
-            self._calls.append(announce)
+            self._calls.append(call)
         try:
             yield
         finally:
             with self._lock:
-                self._calls.remove(announce)
+                self._calls.remove(call)
 
-    def call(self) -> None:
-        """There is a result."""
+    @contextlib.contextmanager
+    def subscribe(self, name: str, call: Callable[[Result], None]) -> Iterator[None]:
+        """While the block lasts, ``call`` is given each result, in a thread of its own."""
+        worker = Worker(Subscriber(name, call), Capacity(MOST_WAITING, "newest", 0.0), self.say)
+        worker.start()
         with self._lock:
-            for announce in self._calls:
-                announce()
+            self._subscribers.append(worker)
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._subscribers.remove(worker)
+            worker.end()
 
+    def say(self, kind: str, text: str) -> None:
+        """Note an event of this moment that concerns no run."""
+        self.events.add(Event(self.clock(), kind, text))
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Audience:
-    """Who listens, whatever skin or source there is; ``clock`` is host monotonic seconds."""
+    def put(self, message: RunMessage) -> None:
+        """Give ``message`` to those who subscribe; keep an event, and wake others at a result."""
+        if isinstance(message, Event):
+            self.events.add(message)
+        with self._lock:
+            subscribers = tuple(self._subscribers)
+        for worker in subscribers:
+            worker.put(message)
+        if isinstance(message, Result):
+            self.wake()
 
-    clock: Callable[[], float]
-    sinks: Sequence[Sink] = ()
-    events: EventLog = field(default_factory=EventLog)
-    watchers: Watchers = field(default_factory=Watchers)
+    def wake(self) -> None:
+        """There is something new to look at."""
+        with self._lock:
+            for call in self._calls:
+                call()
 
 
 class Publisher:
-    """Tells the audience of one skin's run; its recordings are the ``tape``.
+    """Gives what one skin's run says to its recording, its sinks and its audience.
 
     Parameters
     ----------
@@ -66,48 +154,39 @@ class Publisher:
 
     def __init__(self, prepared: Prepared, audience: Audience, numbered: Callable[[], int]) -> None:
         self._audience = audience
-        self._outlets = Outlets(audience.sinks, self.say)
-        self.tape = Tape(prepared, self.say, audience.clock, numbered)
+        self._sinks: tuple[Worker[SinkConsumer], ...] = ()
+        self.recordings = Recordings(prepared, self.say, audience.clock, numbered)
 
-    def opened(self, prepared: Prepared, source: str) -> None:
+    def begin(self, prepared: Prepared, source: str) -> None:
         """A source has been opened, and this is what it is called."""
-        self.tape.opened(source)
-        self._outlets.start(stream_of(prepared, source))
+        self.recordings.name_source(source)
+        stream = Stream.of(prepared, source)
+        self._sinks = tuple(sink_worker(sink, stream, self.say) for sink in self._audience.sinks)
+        for worker in self._sinks:
+            worker.start()
 
-    def stop(self) -> None:
-        """End the recording and the sinks; returns when they are whole."""
-        self.tape.stop()
-        self._outlets.stop()
+    def put(self, message: RunMessage) -> None:
+        """Give ``message`` to every consumer; events from any thread, the rest from one."""
+        self.recordings.put(message)
+        for worker in self._sinks:
+            worker.put(message)
+        self._audience.put(message)
 
     def say(self, kind: str, text: str) -> None:
-        """Publish an event of this moment."""
-        self.event(Event(self._audience.clock(), kind, text))
+        """Publish an event of this moment; from any thread."""
+        self.put(Event(self._audience.clock(), kind, text))
 
-    def event(self, happened: Event) -> None:
-        """Publish an event."""
-        self._audience.events.add(happened)
-        self.tape.event(happened)
-        self._outlets.put(happened)
-
-    def note(self, event: Event) -> None:
-        """Publish a person's remark; from any thread."""
-        self._audience.events.add(event)
-        self.tape.note(event)
-        self._outlets.put(event)
-
-    def result(self, result: Result) -> None:
-        """Publish what was made of a frame, when whoever reads the newest can have it."""
-        self.tape.result(result)
-        for happened in result.events:
-            self.tape.event(told(happened))
-        if self._outlets:
-            self._outlets.put(moment_of(result))
-        self.announce()
-
-    def announce(self) -> None:
+    def wake(self) -> None:
         """Wake those who wait for the status to change."""
-        self._audience.watchers.call()
+        self._audience.wake()
 
     def sink_reports(self) -> tuple[SinkReport, ...]:
         """How each sink is doing."""
-        return self._outlets.reports()
+        return tuple(map(sink_report, self._sinks))
+
+    def stop(self) -> None:
+        """End the recording and the sinks; returns when they are complete."""
+        if (ended := self.recordings.end()) is not None:
+            ended.result()
+        stop_workers(self._sinks)
+        self._sinks = ()

@@ -13,7 +13,7 @@ from tomoskin.core import DataError, Event, Frame
 from tomoskin.pattern import Scan
 from tomoskin.pipeline import REFERENCE_FRAMES
 from tomoskin.recording import Mark, SessionWriter
-from tomoskin.run.presses import described
+from tomoskin.run.twin_control import described
 from tomoskin.skin import Skin
 from tomoskin.source import Configuration, Link, ScanSettings, Transport
 from tomoskin.twin import (

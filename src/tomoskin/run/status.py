@@ -9,9 +9,10 @@ from pathlib import Path
 from tomoskin.calibration import BendReading, ClassReading
 from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline import ReferenceState
-from tomoskin.run.latency import Stage
+from tomoskin.run.counters import Stage
 from tomoskin.signal import ElectrodeHealth
 from tomoskin.sink import SinkReport
+from tomoskin.wire import Info
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +74,8 @@ class Status:
         Which of the states that were learnt it shows; None where none were.
     problem
         What someone should see to, in one sentence, or None.
+    board
+        What the board says that it is, once it has.
     """
 
     source: str
@@ -97,6 +100,7 @@ class Status:
     replay: ReplayStatus | None = None
     bend: BendReading | None = None
     state: ClassReading | None = None
+    board: Info | None = None
 
     @property
     def text(self) -> str:
@@ -111,15 +115,16 @@ class Status:
         drift = self.reference.baseline.drift if self.reference.baseline else 0.0
         return (
             f"{self.source}: {self.fps:.0f} frames/s, {self.dropped} dropped, "
-            f"p99 {1e3 * self.p99:.1f} ms, drift {100 * drift:.1f} %{self._bent}{self._told}"
+            f"p99 {1e3 * self.p99:.1f} ms, drift {100 * drift:.1f} %"
+            f"{self._bend_text}{self._state_text}"
         )
 
     @property
-    def _bent(self) -> str:
+    def _bend_text(self) -> str:
         if self.bend is None:
             return ""
         return f", bend {math.degrees(self.bend.angle):.0f}° ({self.bend.state})"
 
     @property
-    def _told(self) -> str:
+    def _state_text(self) -> str:
         return "" if self.state is None else f", {self.state.text}"

@@ -26,11 +26,11 @@ _Turn = Annotated[float, Meta(ge=-2 * math.pi, le=2 * math.pi)]
 _Corner = Annotated[float, Meta(ge=-1, le=1)]
 
 
-class _Asked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    pass
+class StrictRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a page may send; a field that is not known is an error."""
 
 
-class PressRequest(_Asked, frozen=True):
+class PressRequest(StrictRequest, frozen=True):
     """One press: place m, force N, ``radius`` half of the face's size m, turned by ``angle`` rad.
 
     ``vertices``: corners (x, y) m of a polygon around the probe's middle.
@@ -69,20 +69,20 @@ def _wide(face: Face) -> Face:
     return face
 
 
-class SetPresses(_Asked, frozen=True, tag="presses"):
+class SetPresses(StrictRequest, frozen=True, tag="presses"):
     """All presses that this page holds now."""
 
     presses: Annotated[tuple[PressRequest, ...], Meta(max_length=MAX_PRESSES)]
 
 
-class SetTwin(_Asked, frozen=True, tag="twin"):
+class SetTwin(StrictRequest, frozen=True, tag="twin"):
     """All that is wrong with the twin from now on: electrodes cut, LSB of noise (null: its own)."""
 
     cut: Annotated[tuple[Annotated[int, Meta(ge=0, le=31)], ...], Meta(max_length=32)]
     noise: Annotated[float, Meta(ge=0, le=1000)] | None
 
 
-class BendRequest(_Asked, frozen=True):
+class BendRequest(StrictRequest, frozen=True):
     """By ``angle`` rad from rest, positive where the front becomes convex; for a sheet that lies
     flat, over a strip of ``length`` m along ``axis`` (rad from x), ``offset`` m off the middle."""
 
@@ -92,7 +92,7 @@ class BendRequest(_Asked, frozen=True):
     offset: _Place = 0.0
 
 
-class StretchRequest(_Asked, frozen=True):
+class StretchRequest(StrictRequest, frozen=True):
     """Relative elongations along ``axis`` (rad from x) and across it."""
 
     along: Annotated[float, Meta(ge=-0.5, le=1)]
@@ -100,11 +100,8 @@ class StretchRequest(_Asked, frozen=True):
     axis: _Turn = 0.0
 
 
-class SetPose(_Asked, frozen=True, tag="pose"):
+class SetPose(StrictRequest, frozen=True, tag="pose"):
     """How the twin's sheet is bent and stretched from now on; null: as at rest."""
 
     bend: BendRequest | None = None
     stretch: StretchRequest | None = None
-
-
-TwinRequest = SetPresses | SetTwin | SetPose

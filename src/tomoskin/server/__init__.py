@@ -1,9 +1,9 @@
 """The page's server: what a page may ask, and what it is sent."""
 
-from tomoskin.server.flows import take_flows
+from tomoskin.server.access_policy import AccessPolicy, is_loopback, load_token
+from tomoskin.server.handlers import serve_requests
 from tomoskin.server.hub import Hub
-from tomoskin.server.messages import readings, stages
-from tomoskin.server.security import Door, is_loopback
+from tomoskin.server.page_messages import readings, stages
 from tomoskin.server.server import (
     DEFAULT_PORT,
     STATIC,
@@ -13,25 +13,24 @@ from tomoskin.server.server import (
     check_page,
     listen,
 )
-from tomoskin.server.settings import SettingsDesk
-from tomoskin.server.token import kept_token
-from tomoskin.server.twin import TwinDesk
+from tomoskin.server.settings_handlers import SettingsHandlers
+from tomoskin.server.twin_handlers import TwinHandlers
 
 __all__ = [
     "DEFAULT_PORT",
     "STATIC",
-    "Door",
+    "AccessPolicy",
     "Hub",
     "Server",
     "ServerError",
-    "SettingsDesk",
-    "TwinDesk",
+    "SettingsHandlers",
+    "TwinHandlers",
     "application",
     "check_page",
     "is_loopback",
-    "kept_token",
     "listen",
+    "load_token",
     "readings",
+    "serve_requests",
     "stages",
-    "take_flows",
 ]

@@ -28,7 +28,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,119}")
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FileEntry:
     """A file: name, kind, size in bytes, when it was last written (s since 1970)."""
 
     name: str
@@ -43,22 +43,22 @@ class Folder:
 
     path: Path
 
-    def listed(self) -> list[Found]:
-        """Known files, the newest first, at most :data:`MOST_FILES`."""
-        found = []
+    def list_files(self) -> list[FileEntry]:
+        """Files that are handed out, the newest first, at most :data:`MOST_FILES`."""
+        entries = []
         try:
             for path in self.path.iterdir():
-                if _is_known(path.name) and path.is_file() and not path.is_symlink():
+                if _is_offered(path.name) and path.is_file() and not path.is_symlink():
                     about = path.stat()
                     kind = KINDS[path.suffix]
-                    found.append(Found(path.name, kind, about.st_size, about.st_mtime))
+                    entries.append(FileEntry(path.name, kind, about.st_size, about.st_mtime))
         except OSError as error:
             raise DataError(f"cannot be read: {error.strerror}", where="the folder") from error
-        return sorted(found, key=lambda file: -file.written)[:MOST_FILES]
+        return sorted(entries, key=lambda file: -file.written)[:MOST_FILES]
 
     def existing(self, name: str, *endings: str) -> Path:
         """A file of this folder by its name; DataError where there is none that may be had."""
-        path = self.path / self._checked(name)
+        path = self.path / self._check(name)
         if endings and path.suffix not in endings:
             raise DataError(f"expected a name that ends in {' or '.join(endings)}, got {name}")
         if path.is_symlink() or not path.is_file():
@@ -68,17 +68,17 @@ class Folder:
     def free(self, stem: str, ending: str) -> Path:
         """A name that is not taken: ``stem`` and, where it must be, a number. DataError."""
         for number in count(1):
-            path = self.path / self._checked(f"{stem}{f'-{number}' if number > 1 else ''}{ending}")
+            path = self.path / self._check(f"{stem}{f'-{number}' if number > 1 else ''}{ending}")
             if not path.exists() and not path.is_symlink():
                 return path
         raise AssertionError
 
     @staticmethod
-    def _checked(name: str) -> str:
-        if not _is_known(name):
+    def _check(name: str) -> str:
+        if not _is_offered(name):
             raise DataError("expected the name of a file, without a folder", where=repr(name)[:80])
         return name
 
 
-def _is_known(name: str) -> bool:
+def _is_offered(name: str) -> bool:
     return _NAME.fullmatch(name) is not None and Path(name).suffix in KINDS

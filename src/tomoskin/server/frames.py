@@ -20,6 +20,7 @@ bit 2 some rows are left out of the picture; bit 3 bends of this skin were learn
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -27,6 +28,7 @@ import numpy as np
 from tomoskin.calibration import BendReading
 from tomoskin.core import Touch
 from tomoskin.pipeline import Result
+from tomoskin.run import Runner, Snapshot
 from tomoskin.twin import Contact
 
 READY, NO_PICTURE, ROWS_LEFT_OUT, BEND = 1, 2, 4, 8
@@ -62,6 +64,29 @@ _TOUCH = np.dtype(
 )
 _MOST = 255
 """Labels are bytes: more touches than that are not sent."""
+
+
+class NewestFrame:
+    """The newest result of a runner as a message, made once for all pages."""
+
+    def __init__(self, runner: Runner) -> None:
+        self._runner = runner
+        self._made: tuple[Snapshot, bytes] | None = None
+
+    def __call__(self) -> bytes | None:
+        """The message; None before the first result."""
+        newest = self._runner.newest
+        if newest is None:
+            return None
+        if self._made is None or self._made[0] is not newest:
+            data = encode_result(newest.result, newest.truth, newest.latency)
+            self._made = (newest, data)
+        return self._made[1]
+
+    def note_sent(self, message: bytes) -> None:
+        """Note how long it took until a page's connection had ``message``."""
+        if self._made is not None and self._made[1] is message:
+            self._runner.latency.add("publish", time.monotonic() - self._made[0].ready)
 
 
 def encode_result(result: Result, truth: Sequence[Contact], latency: float) -> bytes:

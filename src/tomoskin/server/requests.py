@@ -1,130 +1,176 @@
-"""What a page may ask for, decoded strictly: unknown fields and impossible numbers are errors."""
+"""What a page may ask for, decoded strictly: unknown fields and impossible numbers are errors.
+
+Requests that are commands to the run stand in ``run/commands.py`` and ``run/twin_requests.py``.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
 
 from tomoskin.core import WireError
-from tomoskin.run import TwinRequest
-from tomoskin.server.flow_requests import FlowRequest
+from tomoskin.run import SetPose, SetPresses, SetTwin, StrictRequest, commands
 
 MAX_REQUEST = 32_768
 """Longest request, bytes: a pattern of some thousand rows, written out."""
 
-MAX_NOTE = 500
-"""Longest note, characters."""
+FileName = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,119}\Z")]
+"""Of a file in the session folder: no folder, nothing hidden; ``server/folder.py`` looks again."""
 
-_Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")]
-"""Of a file: no folder, no ending, nothing hidden."""
+Stem = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")]
+"""Of a file, without its ending: no folder, nothing hidden."""
 
+Format = Literal["touches", "csv", "npz", "mat", "h5", "parquet", "png", "gif"]
 
-class TakeReference(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="reference"):
-    """The next frames become the reference."""
-
+FlowKind = Literal["touch", "wiring"]
 
 Value = str | int | float | list[Any] | None
 """A value as a skin file writes it; null takes the key out."""
 
 
-class SetSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="settings"):
-    """Other values of the skin's keys, by section; the skin's schema says what each may be."""
-
-    changes: dict[str, dict[str, Value]]
+# The run.
 
 
-class UndoSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="undo"):
-    """Take the last change of settings back."""
-
-
-class RedoSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="redo"):
-    """Make it again."""
-
-
-class SaveSkin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="save_skin"):
-    """Write the settings to a skin file of the server's folder."""
-
-    name: _Name
-    replace: bool = False
-
-
-class LoadSkin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="load_skin"):
-    """Take the settings of a skin file of the server's folder, or of a built-in skin."""
-
-    name: _Name
-
-
-class AskPattern(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="pattern"):
-    """The rows of a named pattern on the skin's electrodes, to be edited."""
-
-    name: Annotated[str, Meta(max_length=64)]
-
-
-class SetPause(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="pause"):
-    """Hold the picture, or let it go on."""
-
-    on: bool
-
-
-class SetRecording(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="record"):
+class SetRecording(StrictRequest, frozen=True, tag="record"):
     """Record to a new file in the server's folder, or end the recording."""
 
     on: bool
 
 
-class Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="note"):
-    """A remark on the picture of this moment."""
-
-    text: Annotated[str, Meta(min_length=1, max_length=MAX_NOTE)]
-
-
-class Painted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="painted"):
+class Painted(StrictRequest, frozen=True, tag="painted"):
     """How long the page took of late from a frame's arrival to the end of drawing it, s."""
 
     p50_s: Annotated[float, Meta(ge=0, le=3600)]
     p99_s: Annotated[float, Meta(ge=0, le=3600)]
 
 
-class Seek(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="seek"):
-    """Play the recording from so many seconds after its first frame on."""
-
-    at_s: Annotated[float, Meta(ge=0, le=1e9)]
+# The skin's settings.
 
 
-class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="step"):
-    """Play one read of the recording and stand still."""
+class SetSettings(StrictRequest, frozen=True, tag="settings"):
+    """Other values of the skin's keys, by section; the skin's schema says what each may be."""
+
+    changes: dict[str, dict[str, Value]]
 
 
-class SetSpeed(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="speed"):
-    """Recorded seconds per second; null for as fast as the pictures are made."""
-
-    speed: Annotated[float, Meta(gt=0, le=1000)] | None
+class UndoSettings(StrictRequest, frozen=True, tag="undo"):
+    """Take the last change of settings back."""
 
 
-class SetLoop(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="loop"):
-    """Begin the recording again at its end, or not."""
-
-    on: bool
+class RedoSettings(StrictRequest, frozen=True, tag="redo"):
+    """Make it again."""
 
 
-ReplayRequest = Seek | Step | SetSpeed | SetLoop
-"""What only a replay can do."""
+class SaveSkin(StrictRequest, frozen=True, tag="save_skin"):
+    """Write the settings to a skin file of the server's folder."""
+
+    name: Stem
+    replace: bool = False
+
+
+class LoadSkin(StrictRequest, frozen=True, tag="load_skin"):
+    """Take the settings of a skin file of the server's folder, or of a built-in skin."""
+
+    name: Stem
+
+
+class AskPattern(StrictRequest, frozen=True, tag="pattern"):
+    """The rows of a named pattern on the skin's electrodes, to be edited."""
+
+    name: Annotated[str, Meta(max_length=64)]
+
+
+# Files, sources, and presses where the dot is.
+
+
+class ListFiles(StrictRequest, frozen=True, tag="files"):
+    """What is in the session folder."""
+
+
+class OpenSession(StrictRequest, frozen=True, tag="open"):
+    """Play a session of the folder."""
+
+    name: FileName
+
+
+class GoLive(StrictRequest, frozen=True, tag="live"):
+    """Back from a replay to the source before it."""
+
+
+class ExportSession(StrictRequest, frozen=True, tag="export"):
+    """Convert a session of the folder to another format, into the folder."""
+
+    name: FileName
+    format: Format
+
+
+class ListSources(StrictRequest, frozen=True, tag="sources"):
+    """What can be connected."""
+
+
+class Connect(StrictRequest, frozen=True, tag="connect"):
+    """Connect one of the sources that were listed."""
+
+    source: Annotated[str, Meta(max_length=200)]
+
+
+class BeginFlow(StrictRequest, frozen=True, tag="flow_begin"):
+    """Ask for presses where the dot is: to learn touch, or to find the wiring."""
+
+    kind: FlowKind
+
+
+class UndoPress(StrictRequest, frozen=True, tag="flow_undo"):
+    """Take the last press back."""
+
+
+class EndFlow(StrictRequest, frozen=True, tag="flow_end"):
+    """Leave the flow; what was pressed is forgotten."""
+
+
+class KeepFlow(StrictRequest, frozen=True, tag="flow_keep"):
+    """Write what the presses tell to a file of the folder, and use it from now on."""
+
+    name: Stem
+
+
+class UseCalibration(StrictRequest, frozen=True, tag="calibration"):
+    """Places of touches by a calibration of the folder; null: by the picture again."""
+
+    name: FileName | None
+
+
+RunRequest = (
+    commands.TakeReference
+    | commands.SetPause
+    | SetRecording
+    | commands.Note
+    | Painted
+    | SetPresses
+    | SetTwin
+    | SetPose
+    | commands.ReplayCommand
+)
 
 SettingsRequest = SetSettings | UndoSettings | RedoSettings | SaveSkin | LoadSkin | AskPattern
 
-Request = (
-    TakeReference
-    | SetPause
-    | SetRecording
-    | Note
-    | Painted
-    | TwinRequest
-    | SettingsRequest
-    | ReplayRequest
-    | FlowRequest
+FlowRequest = (
+    ListFiles
+    | OpenSession
+    | GoLive
+    | ExportSession
+    | ListSources
+    | Connect
+    | BeginFlow
+    | UndoPress
+    | EndFlow
+    | KeepFlow
+    | UseCalibration
 )
+
+Request = RunRequest | SettingsRequest | FlowRequest
 
 _DECODER: msgspec.json.Decoder[Request] = msgspec.json.Decoder(Request)
 

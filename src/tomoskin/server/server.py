@@ -1,4 +1,4 @@
-"""The page's server: an application behind its guard, on a socket of its own."""
+"""The page's server: an application behind its access policy, on a socket of its own."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from starlette.websockets import WebSocket
 from websockets.exceptions import InvalidState
 
 from tomoskin.core import DataError, TomoskinError
-from tomoskin.server import messages
-from tomoskin.server.access import Guard
+from tomoskin.server import page_messages
+from tomoskin.server.access import AccessControl
+from tomoskin.server.access_policy import AccessPolicy
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
-from tomoskin.server.page import PATIENCE, Page
-from tomoskin.server.security import Door
+from tomoskin.server.page_connection import PATIENCE, Page
 
 STATIC = Path(__file__).parent / "static"
 """Where the built page lies."""
@@ -80,7 +80,7 @@ def listen(host: str, port: int) -> socket.socket:
     return listener
 
 
-def application(hub: Hub, door: Door, static: Path = STATIC) -> ASGIApp:
+def application(hub: Hub, policy: AccessPolicy, static: Path = STATIC) -> ASGIApp:
     """ASGI application: the built page, ``/ws`` for each open page, ``/status`` for programs,
     ``/files/NAME`` for what is in the session folder."""
     # Whether Python knows the page's typeface depends on its version and on the machine's list.
@@ -93,7 +93,7 @@ def application(hub: Hub, door: Door, static: Path = STATIC) -> ASGIApp:
         return Response(status_code=204)
 
     async def status(_: Request) -> Response:
-        return Response(messages.state(hub.runner.status()), media_type="application/json")
+        return Response(page_messages.state(hub.runner.status()), media_type="application/json")
 
     async def download(request: Request) -> Response:
         name = request.path_params["name"]
@@ -115,7 +115,7 @@ def application(hub: Hub, door: Door, static: Path = STATIC) -> ASGIApp:
         Route("/files/{name}", download),
         Mount("/", StaticFiles(directory=static, html=True)),
     ]
-    return Guard(Starlette(routes=routes, lifespan=lifespan), door)
+    return AccessControl(Starlette(routes=routes, lifespan=lifespan), policy)
 
 
 class Server(uvicorn.Server):

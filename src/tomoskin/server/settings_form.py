@@ -64,10 +64,10 @@ def schema() -> str:
 
 def refusal(error: TomoskinError) -> str:
     """Message that a setting was refused, with its section and key where the error names them."""
-    found = _PLACE.search(error.where)
-    section, key = found.groups() if found else (None, None)
+    place = _PLACE.search(error.where)
+    section, key = place.groups() if place else (None, None)
     advice = f" ({error.hint})" if error.hint else ""
-    text = error.message + advice if found else str(error)
+    text = error.message + advice if place else str(error)
     fields = {"type": "settings_error", "section": section, "key": key, "message": text}
     return msgspec.json.encode(fields).decode()
 

@@ -1,36 +1,56 @@
-"""What a page asks for that takes its time: done in a thread, its refusal told to that page."""
+"""What a page asks for that takes its time: done beside the event loop, its refusal sent back."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
-from typing import Any, TypeVar
-
-import msgspec
+from collections.abc import Callable, Coroutine, Mapping
+from typing import Any, Protocol, TypeVar
 
 from tomoskin.core import TomoskinError
-from tomoskin.server import messages
-from tomoskin.server.hub import Hub, Listener
+from tomoskin.server import page_messages
 
 _T = TypeVar("_T")
 
 
-def run_errand(
-    hub: Hub, page: Listener, work: Callable[[], _T], then: Callable[[_T], None]
-) -> None:
-    """Do ``work`` in a thread and ``then`` in the loop; what it raises goes to ``page``."""
+class Listener(Protocol):
+    """What a handler needs of a page's connection."""
 
-    async def run() -> None:
-        try:
-            found = await asyncio.to_thread(work)
-        except TomoskinError as error:
-            page.post(messages.error(str(error)))
-        else:
-            then(found)
+    def wake(self) -> None:
+        """Say that there is a new frame."""
 
-    hub.keep(run())
+    def post(self, text: str) -> None:
+        """Send ``text`` soon."""
 
 
-def text_of(**fields: Any) -> str:
-    """A message to a page."""
-    return msgspec.json.encode(fields).decode()
+Handler = Callable[[Listener, Any], None]
+"""Does what a page asks; in the event loop, so it returns at once. WireError refuses."""
+
+Handlers = Mapping[type, Handler]
+"""Handlers by the type of the request."""
+
+
+class Tasks:
+    """Work that is under way, kept until it is done: the loop itself would forget it."""
+
+    def __init__(self) -> None:
+        """None is."""
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def keep(self, work: Coroutine[None, None, None]) -> None:
+        """Let ``work`` run until it is done."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def run(self, page: Listener, work: Callable[[], _T], then: Callable[[_T], None]) -> None:
+        """Do ``work`` in a thread and ``then`` in the loop; what it raises goes to ``page``."""
+
+        async def run() -> None:
+            try:
+                outcome = await asyncio.to_thread(work)
+            except TomoskinError as error:
+                page.post(page_messages.error(str(error)))
+            else:
+                then(outcome)
+
+        self.keep(run())

@@ -1,7 +1,25 @@
 """Where results go while they are made: Foxglove, MQTT, LSL, Zenoh, ROS 2, and others by name."""
 
-from tomoskin.sink.outlet import Outlets, SinkReport
+from tomoskin.sink.consumer import SinkConsumer, SinkReport, sink_report, sink_worker
 from tomoskin.sink.registry import make_sink, sink_names
-from tomoskin.sink.sink import Item, Moment, Sink, Stream
+from tomoskin.sink.sink import Item, Moment, Sink, Stream, epoch, raster
+from tomoskin.sink.worker import Capacity, Consumer, Worker, stop_workers
 
-__all__ = ["Item", "Moment", "Outlets", "Sink", "SinkReport", "Stream", "make_sink", "sink_names"]
+__all__ = [
+    "Capacity",
+    "Consumer",
+    "Item",
+    "Moment",
+    "Sink",
+    "SinkConsumer",
+    "SinkReport",
+    "Stream",
+    "Worker",
+    "epoch",
+    "make_sink",
+    "raster",
+    "sink_names",
+    "sink_report",
+    "sink_worker",
+    "stop_workers",
+]

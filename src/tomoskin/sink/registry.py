@@ -27,12 +27,12 @@ def make_sink(spec: str) -> Sink:
         When there is no sink of that name, its argument is none, or its package is missing.
     """
     name, _, argument = spec.partition(":")
-    found = tuple(entry_points(group=GROUP, name=name))
-    if not found:
+    entries = tuple(entry_points(group=GROUP, name=name))
+    if not entries:
         raise SinkError(
-            f'there is no sink "{name}"', hint=f"known are {', '.join(sink_names()) or 'none'}"
+            f'there is no sink "{name}"', hint=f"there are {', '.join(sink_names()) or 'none'}"
         )
-    sink: Sink = found[0].load()(argument)
+    sink: Sink = entries[0].load()(argument)
     return sink
 
 

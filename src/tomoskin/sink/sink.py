@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
-from tomoskin.core import Event, FloatArray, Image, PixelMap, Touch
+from tomoskin.core import Event, FloatArray, GeometryError, Image, PixelMap, Touch
 from tomoskin.pattern import Pattern
+from tomoskin.pipeline import Prepared, Result
+from tomoskin.recording import event_of
 from tomoskin.touch import TouchEvent
+
+_PIXELS = 48
+"""Pixels along the longer side of an image for others: what a glance needs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +37,17 @@ class Stream:
     pattern: Pattern
     pixels: PixelMap | None
     epoch: float
+
+    @classmethod
+    def of(cls, prepared: Prepared, source: str) -> Self:
+        """Of a run that begins now; ``source`` in words."""
+        return cls(
+            skin=prepared.skin.name,
+            source=source,
+            pattern=prepared.pattern,
+            pixels=raster(prepared),
+            epoch=epoch(),
+        )
 
     def log_time(self, host_time: float) -> int:
         """Ns since 1970 of ``host_time``."""
@@ -69,6 +86,21 @@ class Moment:
     happened: tuple[TouchEvent, ...] = ()
     told: tuple[Event, ...] = ()
 
+    @classmethod
+    def of(cls, result: Result, *, with_image: bool) -> Self:
+        """What sinks take of ``result``."""
+        return cls(
+            sequence=result.sequence,
+            host_time=result.host_time,
+            ready=result.ready,
+            voltages=result.voltages,
+            reference=result.reference,
+            touches=result.touches,
+            image=result.image if with_image else None,
+            happened=result.events,
+            told=tuple(map(event_of, result.events)),
+        )
+
 
 Item = Moment | Event
 
@@ -95,8 +127,9 @@ class Sink(Protocol):
 
 @dataclass
 class TouchPace:
-    """A touch that begins or ends is sent at once, what it does meanwhile every ``period`` s.
+    """Which frames' touches are worth sending.
 
+    A touch that begins or ends is sent at once, what it does meanwhile every ``period`` s.
     Frames without touches are sent only after some, once: then the last touch has ended.
     """
 
@@ -113,3 +146,16 @@ class TouchPace:
                 return False
         self._ids, self._last = ids, moment.host_time
         return True
+
+
+def raster(prepared: Prepared) -> PixelMap | None:
+    """Raster for an image that is looked at; None for a curved sheet."""
+    try:
+        return prepared.mesh.pixels(_PIXELS)
+    except GeometryError:
+        return None
+
+
+def epoch() -> float:
+    """What is added to a host time of now to give seconds since 1970."""
+    return time.time() - time.monotonic()

@@ -1,4 +1,4 @@
-"""What a recording begins with, so that a replay of it is as the run was."""
+"""The pre-roll of a recording: what it begins with, so that a replay of it is as the run was."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ _KEPT = 3 * REFERENCE_FRAMES
 """Frames that make a reference, and during which the operator follows its noise."""
 
 _DELAY = 3
-"""A touch is known only when it has stood for so many frames."""
+"""A touch is certain only when it has stood for so many frames."""
 
 Marked = tuple[Frame, Mark]
 
 
-class Beginning:
+class PreRoll:
     """Remembers frames of a run that bring a new pipeline to where the run's is.
 
     Until ``_KEPT`` frames after a reference these are all frames since. Later the pipeline has
@@ -26,9 +26,9 @@ class Beginning:
     """
 
     def __init__(self) -> None:
-        """Nothing has been seen."""
+        """No frame has come."""
         self._since: list[Marked] = []
-        self._whole = True
+        self._complete = True
         self._number = 0
         self._untouched: deque[Frame] = deque(maxlen=_KEPT)
         self._waiting: deque[Frame] = deque()
@@ -39,7 +39,7 @@ class Beginning:
         identity that it has given to a touch."""
         self._newest = None
         if mark & Mark.REFERENCE:
-            self._since, self._whole, self._number = [], True, number
+            self._since, self._complete, self._number = [], True, number
             self._untouched.clear()
             self._waiting.clear()
         if mark & (Mark.HELD | Mark.SKIPPED):
@@ -48,7 +48,7 @@ class Beginning:
         if len(self._since) < _KEPT:
             self._since.append((frame, mark))
         else:
-            self._whole = False
+            self._complete = False
 
     def result(self, result: Result) -> None:
         """What was made of that frame."""
@@ -63,17 +63,17 @@ class Beginning:
         if len(self._waiting) > _DELAY:
             self._untouched.append(self._waiting.popleft())
 
-    def changed(self) -> None:
+    def invalidate(self) -> None:
         """The pipeline is no longer what these frames would make of a new one."""
-        self._whole = False
+        self._complete = False
 
     def begin(self, number: int) -> tuple[tuple[Marked, ...], int, bool]:
         """Frames, the last identity before them, and whether the run must go through them too."""
-        if self._whole:
+        if self._complete:
             return tuple(self._since), self._number, False
         if len(self._untouched) >= REFERENCE_FRAMES:
             marks = [Mark.REFERENCE] + [Mark.NONE] * (len(self._untouched) - 1)
             self._since = list(zip(self._untouched, marks, strict=True))
         self._since = self._since[:_KEPT]
-        self._whole, self._number = True, number
+        self._complete, self._number = True, number
         return tuple(self._since), number, True

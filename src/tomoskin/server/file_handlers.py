@@ -1,20 +1,19 @@
-"""The desk of the session folder: what is in it, a session as replay, exports of it."""
+"""Requests about the session folder: what is in it, a session as replay, exports of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from tomoskin.core import DataError, WireError
 from tomoskin.formats import WRITERS, Export
 from tomoskin.recording import SessionReader
-from tomoskin.server.flow_requests import ExportSession, GoLive, ListFiles, OpenSession
-from tomoskin.server.folder import Folder, Found
-from tomoskin.server.hub import Hub, Listener
-from tomoskin.server.stage import Stage
-from tomoskin.server.task import run_errand, text_of
+from tomoskin.server.folder import FileEntry, Folder
+from tomoskin.server.hub import Hub
+from tomoskin.server.page_messages import text_of
+from tomoskin.server.requests import ExportSession, GoLive, ListFiles, OpenSession
+from tomoskin.server.source_handlers import SourceSwitch
+from tomoskin.server.task import Listener
 
 _EVERY = 0.1
 """Seconds between two images of a picture or film."""
@@ -22,35 +21,29 @@ _EVERY = 0.1
 _SESSION = ".mcap"
 
 
-class FilesDesk:
+class FileHandlers:
     """Answers about files of one folder by their names; one export at a time."""
 
-    def __init__(self, hub: Hub, stage: Stage) -> None:
-        self._hub, self._stage = hub, stage
+    def __init__(self, hub: Hub, switch: SourceSwitch) -> None:
+        self._hub, self._switch = hub, switch
         self._folder = Folder(hub.folder)
         self._exporting: str | None = None
         self._share = 0.0
-
-    @property
-    def handlers(self) -> Mapping[type, Callable[[Listener, Any], None]]:
-        """See :class:`~tomoskin.server.hub.Desk`."""
-        return {
-            ListFiles: lambda page, _: self._list(page),
-            OpenSession: self._open,
-            GoLive: lambda page, _: self._live(page),
-            ExportSession: self._export,
-        }
-
-    def greeting(self) -> Sequence[str]:
-        """Nothing: the folder is read when someone asks."""
-        return ()
+        hub.serve(
+            {
+                ListFiles: lambda page, _: self._list(page),
+                OpenSession: self._open,
+                GoLive: lambda page, _: self._live(page),
+                ExportSession: self._export,
+            }
+        )
 
     def _list(self, page: Listener) -> None:
-        def answer(found: list[Found]) -> None:
+        def answer(files: list[FileEntry]) -> None:
             page.post(
                 text_of(
                     type="files",
-                    files=[asdict(file) for file in found],
+                    files=[asdict(file) for file in files],
                     recording=self._recording(),
                     playing=self._playing(),
                     exporting=self._exporting,
@@ -58,16 +51,16 @@ class FilesDesk:
                 )
             )
 
-        run_errand(self._hub, page, self._folder.listed, answer)
+        self._hub.tasks.run(page, self._folder.list_files, answer)
 
     def _open(self, page: Listener, request: OpenSession) -> None:
         def work() -> None:
-            self._stage.play(self._whole(request.name))
+            self._switch.play(self._complete(request.name))
 
-        run_errand(self._hub, page, work, lambda _: self._hub.show())
+        self._hub.tasks.run(page, work, lambda _: self._hub.show())
 
     def _live(self, page: Listener) -> None:
-        run_errand(self._hub, page, self._stage.back, lambda _: self._hub.show())
+        self._hub.tasks.run(page, self._switch.back, lambda _: self._hub.show())
 
     def _export(self, page: Listener, request: ExportSession) -> None:
         if self._exporting is not None:
@@ -76,7 +69,7 @@ class FilesDesk:
 
         def work() -> Path:
             try:
-                return self._written(self._whole(request.name), request.format)
+                return self._written(self._complete(request.name), request.format)
             finally:
                 self._exporting = None
 
@@ -84,7 +77,7 @@ class FilesDesk:
             self._hub.tell([text_of(type="exported", name=path.name)])
             self._list(page)
 
-        run_errand(self._hub, page, work, done)
+        self._hub.tasks.run(page, work, done)
 
     def _written(self, path: Path, form: str) -> Path:
         ending = ".csv" if form == "touches" else f".{form}"
@@ -98,7 +91,7 @@ class FilesDesk:
     def _advance(self, done: float, total: float) -> None:
         self._share = done / total if total else 0.0
 
-    def _whole(self, name: str) -> Path:
+    def _complete(self, name: str) -> Path:
         if name == self._recording():
             raise DataError("is still being recorded: end the recording first", where=name)
         return self._folder.existing(name, _SESSION)

@@ -1,4 +1,4 @@
-"""What presses at known places tell, press by press: of touch, or of the wiring."""
+"""What presses on the dot tell, press by press: of touch, or of the wiring."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _APART = 0.12
 
 
 @dataclass(frozen=True, eq=False)
-class Lesson:
+class GuidedPress:
     """One press: the place m, and the change (n_meas,) V that it made."""
 
     place: tuple[float, float]
@@ -35,7 +35,7 @@ class Lesson:
 
 
 @dataclass(frozen=True, eq=False)
-class Thought:
+class Estimate:
     """What presses tell so far.
 
     ``text`` in words; ``place`` (2,) m where a further press tells most, None where that is not
@@ -49,63 +49,65 @@ class Thought:
     answer: Locator | WiringAnswer | None = None
 
 
-def touch_thought(prepared: Prepared, lessons: Sequence[Lesson]) -> Thought:
+def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estimate:
     """A locator of the presses, and by how much it misses them. Raises DataError."""
-    if len(lessons) < _FEWEST_TOUCH:
-        left = _FEWEST_TOUCH - len(lessons)
-        return Thought(f"{_counted(left)} to go for a first estimate")
-    dv, xy = _arrays(lessons)
+    if len(presses) < _FEWEST_TOUCH:
+        left = _FEWEST_TOUCH - len(presses)
+        return Estimate(f"{_counted(left)} to go for a first estimate")
+    dv, xy = _arrays(presses)
     locator = Locator.fit(dv, xy, pattern=prepared.pattern, skin=prepared.skin)
     errors = 1e3 * locator.errors
     doubted = sorted({remark.row for remark in locator.remarks})
     text = f"Missed by {np.median(errors):.0f} mm (median; each press left out in turn)"
-    if len(lessons) < _FIRST:
+    if len(presses) < _FIRST:
         text += ": ten presses are a start, fifty are good"
     figures = {
         "errors_mm": errors.tolist(),
         "median_mm": float(np.median(errors)),
         "doubtful": doubted,
     }
-    place = locator.next_place() if len(lessons) >= _FIRST else None
-    return Thought(text, place, True, figures, locator)
+    place = locator.next_place() if len(presses) >= _FIRST else None
+    return Estimate(text, place, True, figures, locator)
 
 
-def wiring_thought(
+def estimate_wiring(
     prepared: Prepared,
-    lessons: Sequence[Lesson],
+    presses: Sequence[GuidedPress],
     untouched: tuple[FloatArray, FloatArray] | None,
-) -> Thought:
+) -> Estimate:
     """The likeliest wiring and how sure that is; ``untouched`` mean and noise V. DataError."""
-    if len(lessons) < _FEWEST_WIRING:
-        left = _FEWEST_WIRING - len(lessons)
-        return Thought(f"{_counted(left)} to go for a first answer")
-    dv, xy = _arrays(lessons)
+    if len(presses) < _FEWEST_WIRING:
+        left = _FEWEST_WIRING - len(presses)
+        return Estimate(f"{_counted(left)} to go for a first answer")
+    dv, xy = _arrays(presses)
     rest, noise = untouched or (None, None)
-    found = solve_wiring(dv, xy, prepared.skin, reference=rest, noise=noise)
+    solution = solve_wiring(dv, xy, prepared.skin, reference=rest, noise=noise)
     ring = ring_of(prepared.skin)
     figures = {
-        "wiring": found.wiring.text(ring),
-        "probability": found.probability,
-        "odds": min(found.odds, 1e9),
-        "runner_up": found.runner_up.text(ring),
-        "polarity_known": found.polarity_known,
-        "doubtful": [row for row, _, _ in found.contradicted],
+        "wiring": solution.wiring.text(ring),
+        "probability": solution.probability,
+        "odds": min(solution.odds, 1e9),
+        "runner_up": solution.runner_up.text(ring),
+        "polarity_known": solution.polarity_known,
+        "doubtful": [row for row, _, _ in solution.contradicted],
     }
-    return Thought(_said(found, figures), found.next_place, found.sure, figures, found)
+    return Estimate(
+        _in_words(solution, figures), solution.next_place, solution.sure, figures, solution
+    )
 
 
-def _said(found: WiringAnswer, figures: dict[str, Any]) -> str:
-    if found.sure:
+def _in_words(solution: WiringAnswer, figures: dict[str, Any]) -> str:
+    if solution.sure:
         return f"Sure: {figures['wiring']}"
-    if found.doubtful:
+    if solution.doubtful:
         return "Too many presses look as if they were elsewhere: was each made on its dot?"
-    if found.unexplained > 1 - found.probability - found.unexplained:
+    if solution.unexplained > 1 - solution.probability - solution.unexplained:
         return "No wiring explains these presses well: press on the dot, and harder"
     return f"Not sure yet: {figures['wiring']}, or {figures['runner_up']}. The dot tells them apart"
 
 
 class Dots:
-    """Where to press next: where a thought says, else where nobody has pressed yet."""
+    """Where to press next: where a estimate says, else where nobody has pressed yet."""
 
     def __init__(self, prepared: Prepared) -> None:
         region = Region.of(prepared.skin)
@@ -113,11 +115,13 @@ class Dots:
         self._places = region.metres(_INSIDE * region.grid)
         self._filled = region.metres(_FILLED * region.grid)
 
-    def next(self, lessons: Sequence[Lesson], thought: Thought | None) -> tuple[float, float]:
+    def next(
+        self, presses: Sequence[GuidedPress], estimate: Estimate | None
+    ) -> tuple[float, float]:
         """(x, y) m of the next dot."""
-        pressed = np.array([lesson.place for lesson in lessons]).reshape(-1, 2)
-        if thought is not None and thought.place is not None:
-            near = np.argmin(np.linalg.norm(self._places - thought.place, axis=1))
+        pressed = np.array([press.place for press in presses]).reshape(-1, 2)
+        if estimate is not None and estimate.place is not None:
+            near = np.argmin(np.linalg.norm(self._places - estimate.place, axis=1))
             place = self._places[near]
             if _gap(pressed, place[None])[0] > _APART * self._unit:
                 return float(place[0]), float(place[1])
@@ -142,9 +146,9 @@ def _gap(pressed: FloatArray, places: FloatArray) -> FloatArray:
     return np.asarray(apart.min(axis=1))
 
 
-def _arrays(lessons: Sequence[Lesson]) -> tuple[FloatArray, FloatArray]:
-    dv = np.array([lesson.dv for lesson in lessons])
-    return dv, np.array([lesson.place for lesson in lessons])
+def _arrays(presses: Sequence[GuidedPress]) -> tuple[FloatArray, FloatArray]:
+    dv = np.array([press.dv for press in presses])
+    return dv, np.array([press.place for press in presses])
 
 
 def _counted(left: int) -> str:

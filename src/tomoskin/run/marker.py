@@ -1,18 +1,21 @@
-"""What is to become of the next frame: as a person wishes, or as it was when it was recorded."""
+"""What becomes of the next frame: as a person wants it, or as it was when it was recorded."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from tomoskin.core import Frame
 from tomoskin.recording import Mark
+from tomoskin.run.commands import ReplayCommand, Seek, SetLoop, SetSpeed
+from tomoskin.run.status import ReplayStatus
 from tomoskin.source import Transport
 
 
 @runtime_checkable
-class Replayed(Protocol):
-    """A source that plays a recording and knows what became of each of its frames."""
+class ReplaySource(Protocol):
+    """A source that plays a recording; its methods may be called from any thread."""
 
     path: Path
     """The recording."""
@@ -55,30 +58,50 @@ class Replayed(Protocol):
         """Stand still, or go on."""
 
 
-class Wishes:
-    """What a person asks of the pipeline between two frames; set from any thread."""
+def play(replay: ReplaySource, command: ReplayCommand) -> None:
+    """Do what is asked; a seek reads the file up to there when it is the first."""
+    if isinstance(command, Seek):
+        replay.seek(replay.start + command.at_s)
+    elif isinstance(command, SetSpeed):
+        replay.speed = math.inf if command.speed is None else command.speed
+    elif isinstance(command, SetLoop):
+        replay.loop = command.on
+    else:
+        replay.step()
+
+
+def replay_status(replay: ReplaySource, *, ended: bool) -> ReplayStatus:
+    """Where a replay is; ``ended``: its last frame has been processed."""
+    speed = None if math.isinf(replay.speed) else replay.speed
+    now, end = replay.now() - replay.start, replay.end - replay.start
+    return ReplayStatus(now, max(now, end), speed, replay.loop, ended)
+
+
+class Marker:
+    """Marks each frame with what becomes of it.
+
+    Attributes
+    ----------
+    replay
+        The recording that is being played, or None.
+    """
 
     def __init__(self) -> None:
-        """No wish but a reference from the first frame on."""
+        """The first frame begins a reference."""
+        self.replay: ReplaySource | None = None
         self._reference = True
         self._held = False
         self._opened = False
-        self._replayed: Replayed | None = None
-
-    @property
-    def replay(self) -> Replayed | None:
-        """The recording that is being played, or None."""
-        return self._replayed
 
     @property
     def held(self) -> bool:
         """Whether the picture is to be held, or the replay stands still."""
-        return self._replayed.paused if self._replayed else self._held
+        return self.replay.paused if self.replay else self._held
 
     def hold(self, on: bool) -> None:
         """Hold the picture, or let it go on; a replay stands still instead."""
-        if self._replayed:
-            self._replayed.pause(on)
+        if self.replay:
+            self.replay.pause(on)
         else:
             self._held = on
 
@@ -86,26 +109,26 @@ class Wishes:
         """The next frame begins a reference."""
         self._reference = True
 
-    def opened(self, transport: Transport) -> None:
-        """A source has been opened; what comes from now on is its."""
+    def begin(self, transport: Transport) -> None:
+        """What comes from now on is of ``transport``, which has just been opened."""
         self._opened = True
-        self._replayed = transport if isinstance(transport, Replayed) else None
+        self.replay = transport if isinstance(transport, ReplaySource) else None
 
     def mark(self, frame: Frame, *, late: bool) -> Mark | None:
         """What becomes of ``frame``; ``late``: newer ones wait already. None: leave it out."""
-        known: Mark | None = Mark.NONE
-        if self._replayed:
-            known = self._replayed.mark(frame.sequence)
+        mark: Mark | None = Mark.NONE
+        if self.replay:
+            mark = self.replay.mark(frame.sequence)
         elif late:
-            known = Mark.SKIPPED
+            mark = Mark.SKIPPED
         elif self._held:
-            known = Mark.HELD
-        if known is None:
+            mark = Mark.HELD
+        if mark is None:
             return None
         if self._opened:
             self._opened = False
-            known |= Mark.OPENED
-        if self._reference and not known & Mark.SKIPPED:
+            mark |= Mark.OPENED
+        if self._reference and not mark & Mark.SKIPPED:
             self._reference = False
-            known |= Mark.REFERENCE
-        return known
+            mark |= Mark.REFERENCE
+        return mark

@@ -9,7 +9,7 @@ from collections import deque
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from tomoskin.core import WireError
-from tomoskin.server import messages
+from tomoskin.server import page_messages
 from tomoskin.server.hub import Hub
 from tomoskin.server.requests import decode_request
 
@@ -48,10 +48,9 @@ class Page:
     async def run(self) -> None:
         """Serve until either side ends it."""
         await self._socket.accept()
-        if self._hub.full:
+        if not self._hub.join(self):
             await self._socket.close(_TRY_AGAIN_LATER, "too many pages are open")
             return
-        self._hub.join(self)
         reason = ""
         tasks = {asyncio.create_task(self._read()), asyncio.create_task(self._write())}
         try:
@@ -76,7 +75,7 @@ class Page:
                 raise WireError("expected text, got a binary message")
             self._hub.obey(self, decode_request(text))
         except WireError as error:
-            self.post(messages.error(str(error)))
+            self.post(page_messages.error(str(error)))
 
     async def _write(self) -> None:
         loop = asyncio.get_running_loop()
@@ -96,7 +95,7 @@ class Page:
         if frame is not None and frame is not self._sent:
             await self._socket.send_bytes(frame)
             self._sent = frame
-            self._hub.sent(frame)
+            self._hub.frame.note_sent(frame)
 
 
 def _reason(done: set[asyncio.Task[None]]) -> str:

@@ -8,6 +8,7 @@ from run.test_replay import Recorded, recorded_touches, touches_of
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.recording import Mark, SessionReader, as_recorded, replayed
+from tomoskin.run import commands
 
 SOON, LATE = (3, 0), (70, 0)
 """Untouched frames before the change and after it."""
@@ -34,11 +35,11 @@ def test_replayed_to_the_bit(prepared, tmp_path, changes, untouched):
     with Recorded(prepared, tmp_path / "whole.mcap") as live:
         live.idle(REFERENCE_FRAMES + before)
         live.touch(0, 6)
-        live.runner.adopt(prepare(prepared.skin.altered(changes), prepared))
+        live.runner.ask(commands.Adopt(prepare(prepared.skin.altered(changes), prepared)))
         live.idle(after)
         live.drift(3)
         live.touch(0, 4)
-        live.runner.record(path)
+        live.runner.ask(commands.Record(path))
         live.touch(0, 6)
         live.idle(8)
         live.touch(1, 8)

@@ -1,17 +1,23 @@
-"""Which source runs, and how a page changes it: a recording, back to live, another board."""
+"""Requests about the source: what can be connected, what the board is, another source."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from tomoskin.core import SourceError
 from tomoskin.pipeline import Prepared
 from tomoskin.recording import ReplayTransport, SessionReader, as_recorded, parse_replay
+from tomoskin.run import commands
 from tomoskin.server.hub import Hub
+from tomoskin.server.page_messages import text_of
+from tomoskin.server.requests import Connect, ListSources
+from tomoskin.server.task import Listener
 from tomoskin.skin import Skin
 from tomoskin.source import Transport, list_ports, open_source
+from tomoskin.wire import SCHEMA
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +34,7 @@ class _Live:
     prepared: Prepared
 
 
-class Stage:
+class SourceSwitch:
     """Changes the runner's source; everything but :attr:`spec` belongs in a thread.
 
     Parameters
@@ -49,11 +55,11 @@ class Stage:
 
     def offers(self) -> list[Offer]:
         """What may be connected: the first source, the twin, the emulator, the ports here."""
-        found = {"twin": "Simulated skin (twin)", "emulator": "Real firmware, simulated board"}
-        found |= {f"serial:{port.device}": str(port) for port in list_ports()}
+        offers = {"twin": "Simulated skin (twin)", "emulator": "Real firmware, simulated board"}
+        offers |= {f"serial:{port.device}": str(port) for port in list_ports()}
         if not self._home.startswith("replay:"):
-            found = {self._home: found.get(self._home, self._home)} | found
-        return [Offer(id, text) for id, text in found.items()]
+            offers = {self._home: offers.get(self._home, self._home)} | offers
+        return [Offer(id, text) for id, text in offers.items()]
 
     def connect(self, spec: str) -> None:
         """Go on with one of :meth:`offers`. Raises SourceError."""
@@ -68,7 +74,7 @@ class Stage:
         with SessionReader(path) as session:
             prepared = as_recorded(session)
         live = self._live or _Live(self.spec, runner.prepared)
-        runner.change(prepared, partial(_replay, path, prepared.skin))
+        runner.ask(commands.Change(prepared, partial(_replay, path, prepared.skin)))
         self._live, self.spec, self._hub.opener = live, f"replay:{path.name}", None
 
     def back(self) -> None:
@@ -80,10 +86,53 @@ class Stage:
         self._go(self._live)
 
     def _go(self, live: _Live) -> None:
-        self._hub.runner.change(live.prepared, partial(open_source, live.spec, live.prepared.skin))
+        opener = partial(open_source, live.spec, live.prepared.skin)
+        self._hub.runner.ask(commands.Change(live.prepared, opener))
         self._live, self.spec = None, live.spec
         self._hub.opener = partial(open_source, live.spec)
 
 
 def _replay(path: Path, skin: Skin) -> Transport:
     return ReplayTransport(SessionReader(path), skin)
+
+
+class SourceHandlers:
+    """Connects the sources of a list, and no others: a page gives no path and no address."""
+
+    def __init__(self, hub: Hub, switch: SourceSwitch) -> None:
+        self._hub, self._switch = hub, switch
+        hub.serve({ListSources: self._list, Connect: self._connect})
+
+    def _list(self, page: Listener, _: ListSources) -> None:
+        def answer(offers: list[Offer]) -> None:
+            page.post(self._message(offers))
+
+        self._hub.tasks.run(page, self._switch.offers, answer)
+
+    def _connect(self, page: Listener, request: Connect) -> None:
+        work = partial(self._switch.connect, request.source)
+        self._hub.tasks.run(page, work, lambda _: self._hub.show())
+
+    def _message(self, offers: list[Offer]) -> str:
+        status = self._hub.runner.status()
+        return text_of(
+            type="sources",
+            sources=[asdict(offer) for offer in offers],
+            current=self._switch.spec,
+            host_protocol=f"{SCHEMA.major}.{SCHEMA.minor}",
+            board=_board(status.board),
+            problem=status.problem,
+        )
+
+
+def _board(info: Any) -> dict[str, Any] | None:
+    if info is None:
+        return None
+    return {
+        "firmware": ".".join(map(str, info.firmware)),
+        "protocol": f"{info.major}.{info.minor}",
+        "channels": info.channels,
+        "adc_bits": info.adc_bits,
+        "current_ma": info.current / 1e3,
+        "unique_id": info.unique_id.hex(),
+    }

@@ -1,21 +1,19 @@
-"""The desk that changes the skin's settings while it runs, takes changes back, saves and loads."""
+"""Requests that change the skin's settings while it runs, take changes back, save and load."""
 
 from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
-
-import msgspec
 
 from tomoskin.core import Output, SkinError, SourceError, TomoskinError, check_outputs, write_text
 from tomoskin.inverse import LightTouch, LinearProblem, Spectrum
 from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned
-from tomoskin.run import Runner
-from tomoskin.server.hub import Hub, Listener
+from tomoskin.run import Runner, commands
+from tomoskin.server.hub import Hub
+from tomoskin.server.page_messages import text_of
 from tomoskin.server.requests import (
     AskPattern,
     LoadSkin,
@@ -25,6 +23,7 @@ from tomoskin.server.requests import (
     UndoSettings,
 )
 from tomoskin.server.settings_form import altered, refusal, schema, table_of
+from tomoskin.server.task import Listener
 from tomoskin.skin import Skin
 
 MOST_KEPT = 100
@@ -99,36 +98,35 @@ class AutomaticAlpha:
         return self._chooser[1](noise).alpha
 
 
-class SettingsDesk:
+class SettingsHandlers:
     """Settings of the runner's skin, the same for all pages; lives in the event loop.
 
     What the picture alone rests on is prepared in a thread and taken over between two frames;
-    for anything else the source is opened anew, as the twin and a board must follow it.
+    for anything else the source is opened again, as the twin and a board must follow it.
     """
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
-        self._wanted: Skin = hub.runner.prepared.skin
+        self._asked: Skin = hub.runner.prepared.skin
         self._history = History()
         self._working = False
         self._took: float | None = None
         self._automatic = AutomaticAlpha()
-
-    @property
-    def handlers(self) -> Mapping[type, Callable[[Listener, Any], None]]:
-        """See :class:`~tomoskin.server.hub.Desk`."""
-        return {
-            SetSettings: self._set,
-            UndoSettings: lambda page, _: self._step(page, self._history.undo),
-            RedoSettings: lambda page, _: self._step(page, self._history.redo),
-            SaveSkin: self._save,
-            LoadSkin: self._load,
-            AskPattern: self._pattern,
-        }
+        hub.serve(
+            {
+                SetSettings: self._set,
+                UndoSettings: lambda page, _: self._step(page, self._history.undo),
+                RedoSettings: lambda page, _: self._step(page, self._history.redo),
+                SaveSkin: self._save,
+                LoadSkin: self._load,
+                AskPattern: self._pattern,
+            },
+            self.greeting,
+        )
 
     def greeting(self) -> Sequence[str]:
         """The schema, and the settings as they are."""
-        return (schema(), self._told())
+        return (schema(), self._message())
 
     def _set(self, page: Listener, request: SetSettings) -> None:
         keys = sorted((s, k) for s, keys in request.changes.items() for k in keys)
@@ -165,7 +163,7 @@ class SettingsDesk:
             page.post(refusal(type(error)(error.message, where=name, hint=error.hint)))
             return
         self._hub.runner.say("saved", f"settings saved as {name}")
-        self._hub.tell([self._told()])
+        self._hub.tell([self._message()])
 
     def _pattern(self, page: Listener, request: AskPattern) -> None:
         try:
@@ -175,7 +173,7 @@ class SettingsDesk:
 
     def _present(self) -> Skin:
         """The settings as they are, or will be when what is being prepared is ready."""
-        return self._wanted if self._working else self._hub.runner.prepared.skin
+        return self._asked if self._working else self._hub.runner.prepared.skin
 
     def _check(self, skin: Skin) -> None:
         """Raise SourceError where the source cannot follow ``skin``."""
@@ -187,16 +185,16 @@ class SettingsDesk:
             raise SourceError("the source cannot be set to another sheet or scan while it runs")
 
     def _go(self, page: Listener, skin: Skin) -> None:
-        self._wanted = skin
+        self._asked = skin
         if not self._working:
             self._working = True
-            self._hub.keep(self._work(page))
-        self._hub.tell([self._told()])
+            self._hub.tasks.keep(self._work(page))
+        self._hub.tell([self._message()])
 
     async def _work(self, page: Listener) -> None:
         """Prepare what is wanted until nothing newer is; what fails is taken back."""
         while True:
-            skin = self._wanted
+            skin = self._asked
             try:
                 scaled = await asyncio.to_thread(self._bring, skin)
                 if scaled is None:
@@ -206,15 +204,15 @@ class SettingsDesk:
                 await asyncio.to_thread(self._automatic.remember, self._hub.runner.prepared)
             except TomoskinError as error:
                 page.post(refusal(error))
-            if self._wanted is skin:
+            if self._asked is skin:
                 break
         self._working = False
-        self._hub.tell([self._told()])
+        self._hub.tell([self._message()])
 
     def _bring(self, skin: Skin) -> tuple[Prepared, float] | None:
         """Prepare ``skin`` and have the runner go on with it; in a thread.
 
-        What it was prepared to and the end of its scale; None where the source was opened anew.
+        What it was prepared to and the end of its scale; None where the source was opened again.
         """
         start, runner, opener = time.monotonic(), self._hub.runner, self._hub.opener
         prepared = prepare(skin, runner.prepared)
@@ -223,32 +221,31 @@ class SettingsDesk:
                 prepared = tuned(prepared, runner.reference)
             scaled = prepared, colour_limit(prepared)
             self._took = time.monotonic() - start
-            runner.adopt(prepared)
+            runner.ask(commands.Adopt(prepared))
             return scaled
         if opener is None:
             raise SourceError("the source cannot be set to another sheet or scan while it runs")
-        runner.change(prepared, partial(opener, skin))
+        runner.ask(commands.Change(prepared, partial(opener, skin)))
         self._took = time.monotonic() - start
         return None
 
-    def _told(self) -> str:
+    def _message(self) -> str:
         """The settings message."""
         skin = self._present()
         files = sorted(path.stem for path in self._hub.folder.glob("*.toml"))
-        fields = {
-            "type": "settings",
-            "document": skin.document,
-            "n_electrodes": skin.n_electrodes,
-            "automatic_alpha": self._automatic.of(self._hub.runner),
-            "alpha": self._hub.runner.status().choice.alpha,
-            "undo": len(self._history.past),
-            "redo": len(self._history.future),
-            "busy": self._working,
-            "took_ms": None if self._took is None else 1e3 * self._took,
-            "files": files[:200],
-            "builtin": Skin.names(),
-        }
-        return msgspec.json.encode(fields).decode()
+        return text_of(
+            type="settings",
+            document=skin.document,
+            n_electrodes=skin.n_electrodes,
+            automatic_alpha=self._automatic.of(self._hub.runner),
+            alpha=self._hub.runner.status().choice.alpha,
+            undo=len(self._history.past),
+            redo=len(self._history.future),
+            busy=self._working,
+            took_ms=None if self._took is None else 1e3 * self._took,
+            files=files[:200],
+            builtin=Skin.names(),
+        )
 
 
 def _save(path: Path, skin: Skin, *, replace: bool) -> None:

@@ -35,7 +35,7 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
     from E1. ``solid``: where the points lie in space, x0, y0, z0, …, of a sheet on a surface.
     """
     skin, mesh, pattern = prepared.skin, prepared.mesh, prepared.pattern
-    return _text(
+    return text_of(
         type="scene",
         skin={"name": skin.name, "description": skin.description, "source": str(skin.source)},
         unit=prepared.operator.unit,
@@ -61,13 +61,13 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
 
 def scale(prepared: Prepared, limit: float) -> str:
     """The end of the colour scale, and its unit, where nothing else of the scene is new."""
-    return _text(type="scale", limit=limit, unit=prepared.operator.unit)
+    return text_of(type="scale", limit=limit, unit=prepared.operator.unit)
 
 
 def state(status: Status) -> str:
     """One look at the runner; numbers that are not known yet are null."""
     reference = status.reference
-    return _text(
+    return text_of(
         type="state",
         running=status.running,
         paused=status.paused,
@@ -76,8 +76,8 @@ def state(status: Status) -> str:
         dropped=status.dropped,
         corrupt=status.corrupt,
         gaps=status.gaps,
-        p50_ms=_known(1e3 * status.p50),
-        p99_ms=_known(1e3 * status.p99),
+        p50_ms=_finite(1e3 * status.p50),
+        p99_ms=_finite(1e3 * status.p99),
         stages=stages(status),
         reference={
             "frames": reference.frames,
@@ -87,7 +87,7 @@ def state(status: Status) -> str:
         },
         baseline=_baseline(reference.baseline),
         sick=[_sick(electrode) for electrode in status.electrodes],
-        noise_v=_known(reference.noise),
+        noise_v=_finite(reference.noise),
         alpha=status.choice.alpha,
         rule=status.choice.rule,
         left_out=status.left_out,
@@ -105,8 +105,8 @@ def stages(status: Status) -> list[dict[str, Any]]:
     return [
         {
             "name": stage.name,
-            "p50_ms": _known(1e3 * stage.p50),
-            "p99_ms": _known(1e3 * stage.p99),
+            "p50_ms": _finite(1e3 * stage.p50),
+            "p99_ms": _finite(1e3 * stage.p99),
         }
         for stage in status.stages
     ]
@@ -122,9 +122,9 @@ def _baseline(now: BaselineState | None) -> dict[str, Any] | None:
     if now is None:
         return None
     return {
-        "drift": _known(now.drift),
+        "drift": _finite(now.drift),
         "held_s": now.held,
-        "noise_v": _known(now.noise),
+        "noise_v": _finite(now.noise),
         "stale": now.stale,
     }
 
@@ -152,28 +152,28 @@ def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
 
 def event(happened: Event) -> str:
     """Something that a person should know."""
-    return _text(type="event", time_s=happened.host_time, kind=happened.kind, text=happened.text)
+    return text_of(type="event", time_s=happened.host_time, kind=happened.kind, text=happened.text)
 
 
-def timeline(found: Timeline) -> str:
+def timeline(line: Timeline) -> str:
     """What happened in the recording that is played; times in s from its first frame."""
-    return _text(
+    return text_of(
         type="timeline",
-        end_s=found.end,
-        notes=[{"time_s": time, "text": event.text} for time, event in found.notes],
+        end_s=line.end,
+        notes=[{"time_s": time, "text": event.text} for time, event in line.notes],
         events=[
-            {"time_s": time, "kind": event.kind, "text": event.text} for time, event in found.events
+            {"time_s": time, "kind": event.kind, "text": event.text} for time, event in line.events
         ],
         touches=[
             {"id": span.id, "kind": span.kind, "begin_s": span.begin, "end_s": span.end}
-            for span in found.touches
+            for span in line.touches
         ],
     )
 
 
 def error(message: str) -> str:
     """Answer to a request that was not understood."""
-    return _text(type="error", message=message)
+    return text_of(type="error", message=message)
 
 
 def _electrodes(prepared: Prepared) -> list[dict[str, Any]]:
@@ -206,7 +206,7 @@ def chain(facets: IntArray) -> list[int]:
     return walk
 
 
-def _known(value: float | None) -> float | None:
+def _finite(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else value
 
 
@@ -215,5 +215,6 @@ def _flat(table: FloatArray | IntArray) -> list[float]:
     return flat
 
 
-def _text(**fields: Any) -> str:
+def text_of(**fields: Any) -> str:
+    """A message to a page."""
     return msgspec.json.encode(fields).decode()

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import ipaddress
+import os
+import re
 import secrets
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from http.cookies import CookieError, SimpleCookie
+from pathlib import Path
 from urllib.parse import parse_qs
+
+from tomoskin.core import DataError
 
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
 """Names under which the server is always reached from this machine."""
 
 _WILDCARDS = frozenset({"", "0.0.0.0", "::"})
 _HTTP_PORT = 80
+_TOKEN = re.compile(r"[A-Za-z0-9_-]{32,128}")
 
 
 @dataclass(frozen=True, slots=True)
-class Door:
+class AccessPolicy:
     """The rules for one server on one port.
 
     Attributes
@@ -45,7 +52,7 @@ class Door:
         """Name of the cookie: cookies ignore ports, so the port is part of the name."""
         return f"tomoskin-{self.port}"
 
-    def knows_host(self, host: str) -> bool:
+    def admits_host(self, host: str) -> bool:
         """Whether a Host header names this server.
 
         A page of another site can point its own name at this machine (DNS rebinding), but not
@@ -58,7 +65,7 @@ class Door:
             return True
         return self.host in _WILDCARDS and _is_address(name)
 
-    def knows_origin(self, origin: str | None, host: str) -> bool:
+    def admits_origin(self, origin: str | None, host: str) -> bool:
         """Whether a request with this Origin header may open a WebSocket on ``host``.
 
         Browsers always send an Origin with a WebSocket; programs that send none still need the
@@ -115,6 +122,26 @@ def is_loopback(host: str) -> bool:
         return False
 
 
+def load_token(path: Path) -> str:
+    """The token in ``path``, made there when the file does not exist.
+
+    Raises
+    ------
+    DataError
+        When the file cannot be read or made, holds no token, or others may read it.
+    """
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except FileExistsError:
+        return _read_token(path)
+    except OSError as error:
+        raise DataError(f"cannot be made: {error.strerror}", where=str(path)) from None
+    with os.fdopen(handle, "w") as file:
+        token = secrets.token_urlsafe(32)
+        file.write(token + "\n")
+    return token
+
+
 def _split(host: str) -> tuple[str, int]:
     """Name and port of a Host header; port −1 where it is none."""
     name, colon, port = host.lower().rpartition(":")
@@ -134,3 +161,22 @@ def _is_address(name: str) -> bool:
     except ValueError:
         return False
     return "%" not in name
+
+
+def _read_token(path: Path) -> str:
+    try:
+        mode = path.stat().st_mode
+        text = path.read_text(encoding="ascii").strip()
+    except (OSError, UnicodeDecodeError):
+        raise DataError("cannot be read", where=str(path)) from None
+    if os.name == "posix" and mode & (stat.S_IRWXG | stat.S_IRWXO):
+        raise DataError(
+            "others may read this file, and with it control the page",
+            where=str(path),
+            hint=f"chmod 600 {path}",
+        )
+    if not _TOKEN.fullmatch(text):
+        raise DataError(
+            "holds no token of this program", where=str(path), hint="name a file that is not there"
+        )
+    return text

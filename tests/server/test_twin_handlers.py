@@ -12,13 +12,12 @@ from server.test_settings import Heard
 from tomoskin.core import GeometryError, WireError
 from tomoskin.mesh import Arm, Cap, Hinge
 from tomoskin.recording import SessionReader
-from tomoskin.run import Runner
-from tomoskin.run.posing import posed as made_posed
-from tomoskin.run.posing import way_to_bend
+from tomoskin.run import Runner, commands
+from tomoskin.run.posing import sheet_pose, way_to_bend
 from tomoskin.run.twin_requests import BendRequest, SetPose, StretchRequest
 from tomoskin.server import Hub
 from tomoskin.server.requests import decode_request
-from tomoskin.server.twin import TwinDesk
+from tomoskin.server.twin_handlers import TwinHandlers
 from tomoskin.source import open_source
 from tomoskin.twin import FACES, Bent, Face, Press, Probe, Square, Stretched
 
@@ -50,10 +49,10 @@ def twin(prepared):
 
     runner = Runner(prepared, opener)
     runner.start()
-    while not runner.breakable:
+    while not runner.twin.breakable:
         pass
     hub = Hub(runner, limit=1.0)
-    hub.take(TwinDesk(hub))
+    TwinHandlers(hub)
     yield hub, transports
     runner.stop()
 
@@ -84,7 +83,7 @@ def test_an_electrode_that_is_not_there(twin):
 def test_a_board_is_not_broken(runner):
     runner.start()
     hub = Hub(runner, limit=1.0)
-    hub.take(TwinDesk(hub))
+    TwinHandlers(hub)
     with pytest.raises(WireError, match="cannot be broken"):
         hub.obey(Heard(), asked(cut=[1]))
 
@@ -155,12 +154,12 @@ def test_the_truth_of_a_recording_knows_bends_and_faces(twin, tmp_path):
     runner, page = hub.runner, Heard()
     until = Watch(runner).until
     until(lambda: runner.newest is not None)
-    runner.record(tmp_path / "bent.mcap")
+    runner.ask(commands.Record(tmp_path / "bent.mcap"))
     posed(hub, page, posing(bend=BEND))
     hub.obey(page, pressing(shape="polygon", vertices=CORNERS, angle=1.0))
     until(lambda: bool(runner.newest.truth))
     assert transport.presses == runner.newest.truth
-    runner.stop_recording()
+    runner.ask(commands.StopRecording())
     with SessionReader(tmp_path / "bent.mcap") as session:
         last = list(session.truth())[-1]
     assert last.bends == ({"kind": "hinge", "angle": 0.8, "axis": 0.5},)
@@ -170,22 +169,22 @@ def test_the_truth_of_a_recording_knows_bends_and_faces(twin, tmp_path):
 
 def test_a_sheet_on_a_limb_bends_at_its_joint():
     surface = Arm(0.03, 0.2, 0.1)
-    made = made_posed(SetPose(BendRequest(0.5), None), surface)
+    made = sheet_pose(SetPose(BendRequest(0.5), None), surface)
     assert made.pose == (Bent(Arm(0.03, 0.7, 0.1)),)
-    assert made.told == ({"kind": "joint", "angle": 0.5, "axis": 0.0},)
+    assert made.truth == ({"kind": "joint", "angle": 0.5, "axis": 0.0},)
     with pytest.raises(GeometryError, match="folds"):
-        made_posed(SetPose(BendRequest(6.0), None), surface)
+        sheet_pose(SetPose(BendRequest(6.0), None), surface)
     cap = Cap(0.2)
     assert way_to_bend(cap) is None
     with pytest.raises(WireError, match="can be stretched"):
-        made_posed(SetPose(BendRequest(0.5), None), cap)
-    assert made_posed(SetPose(None, StretchRequest(0.1)), cap).pose == (Stretched(0.1),)
+        sheet_pose(SetPose(BendRequest(0.5), None), cap)
+    assert sheet_pose(SetPose(None, StretchRequest(0.1)), cap).pose == (Stretched(0.1),)
 
 
 def test_a_board_is_not_bent(runner):
     runner.start()
     hub = Hub(runner, limit=1.0)
-    hub.take(TwinDesk(hub))
+    TwinHandlers(hub)
     with pytest.raises(WireError, match="cannot be bent"):
         hub.obey(Heard(), posing(bend=BEND))
 

@@ -1,4 +1,4 @@
-"""Where the age of a picture comes from: stages, and what pages say of themselves."""
+"""Rate and latency over a bounded window, by stages, and what pages say of themselves."""
 
 import json
 
@@ -8,7 +8,7 @@ import pytest
 from server.serving import Site
 from server.test_server import ask, first, ready
 from tomoskin.core import Frame
-from tomoskin.run.latency import Latency
+from tomoskin.run.counters import Latency
 
 STAGES = ["sample", "decode", "reconstruct", "publish", "paint"]
 
@@ -26,18 +26,47 @@ def test_nothing_is_known_at_first():
 def test_scans_are_timed_by_the_device_where_none_is_lost():
     latency = Latency()
     for number, ticks in [(0, 0), (1, 100), (2, 200), (5, 900), (6, 1010), (0, 20), (1, 110)]:
-        latency.sampled(frame(number, ticks), 1000.0)
+        latency.add_frame(frame(number, ticks), 0.0, 1000.0)
     (sample, *_) = latency.stages()
     assert sample.p50 == pytest.approx(0.1)
     assert 0.1 < sample.p99 <= 0.11
 
 
+def test_before_the_first_frame():
+    latency = Latency()
+    assert np.isnan(latency.age()).all()
+    assert latency.rate(0.0) == 0.0
+
+
+def test_rate_is_of_the_last_second():
+    latency = Latency()
+    for k in range(101):
+        latency.add_frame(frame(k, k), 0.01 * k, 1.0)
+    assert latency.rate(1.0) == pytest.approx(100)
+    assert latency.rate(5.0) == 0.0
+    assert latency.frames == 101
+
+
+def test_latency_forgets_what_is_old():
+    latency = Latency(window=10)
+    for seconds in [9.0] * 50 + [1.0] * 10:
+        latency.add_age(seconds)
+    assert latency.age() == (1.0, 1.0)
+
+
+def test_percentiles():
+    latency = Latency(window=101)
+    for seconds in range(101):
+        latency.add_age(float(seconds))
+    assert latency.age() == (50.0, 99.0)
+
+
 def test_of_several_pages_the_slowest_counts_until_it_goes():
     latency = Latency()
-    latency.painted("a", 0.001, 0.002)
-    latency.painted("b", 0.004, 0.02)
+    latency.set_paint("a", 0.001, 0.002)
+    latency.set_paint("b", 0.004, 0.02)
     assert latency.stages()[-1].p99 == 0.02
-    latency.gone("b")
+    latency.forget("b")
     assert latency.stages()[-1].p99 == 0.002
 
 

@@ -1,0 +1,165 @@
+"""The recordings of one skin's run: the recorder of the moment, and what a new one begins with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from pathlib import Path
+
+from tomoskin.pipeline import REFERENCE_FRAMES, Prepared, Result
+from tomoskin.recording import (
+    BoardInfo,
+    Mark,
+    MarkedFrame,
+    RawRead,
+    Recorder,
+    RunMessage,
+    RunSettings,
+    SessionWriter,
+    Truth,
+)
+from tomoskin.run.pre_roll import Marked, PreRoll
+from tomoskin.sink import Capacity, Worker, epoch, raster
+
+MOST_WAITING = 64 << 20
+"""Bytes that may wait for the disk: about a minute of the fastest board."""
+
+Say = Callable[[str, str], None]
+
+
+class Recordings:
+    """Gives the recorder of the moment what the run says; used by the runner's thread.
+
+    A recording begins with the next bytes from the source, and with a pre-roll: frames that bring
+    a replay to where the run is (:class:`PreRoll`).
+
+    Parameters
+    ----------
+    prepared
+        The skin and its mesh.
+    say
+        Called with the kind and text of what happens to a recording.
+    clock
+        Host monotonic seconds.
+    numbered
+        The last identity that was given to a touch.
+    """
+
+    def __init__(
+        self,
+        prepared: Prepared,
+        say: Say,
+        clock: Callable[[], float],
+        numbered: Callable[[], int],
+    ) -> None:
+        self._prepared, self._say, self._clock = prepared, say, clock
+        self._numbered = numbered
+        self._current: Worker[Recorder] | None = None
+        self._awaiting: Worker[Recorder] | None = None
+        self._pre_roll = PreRoll()
+        self._again: tuple[Marked, ...] = ()
+        self._touches_before = 0
+        self._info: BoardInfo | None = None
+        self._truth = Truth(0.0, ())
+        self._source = ""
+
+    @property
+    def path(self) -> Path | None:
+        """The file that is being written, or None."""
+        worker = self._awaiting or self._current
+        return None if worker is None or worker.ending.done() else worker.consumer.path
+
+    def begin(self, path: Path) -> Future[None]:
+        """Record from the next bytes on, and end what was being recorded.
+
+        Done when the file has been made; DataError where it cannot be.
+        """
+        self.end()
+        worker = self._awaiting = _worker(path, self._prepared, self._clock(), self._say)
+        worker.start()
+        return worker.opening
+
+    def end(self) -> Future[None] | None:
+        """End the recording; done when the file is complete. None where there is none."""
+        self._head()
+        worker = self._current or self._awaiting
+        self._current = self._awaiting = None
+        if worker is None:
+            return None
+        worker.end()
+        return worker.ending
+
+    def adopt(self, prepared: Prepared) -> Future[None] | None:
+        """Other settings from here on; a recording ends, since it holds those of one skin."""
+        ended = self.end()
+        self._prepared = prepared
+        self._pre_roll.invalidate()
+        return ended
+
+    def name_source(self, source: str) -> None:
+        """A source has been opened, and this is what it is called."""
+        self._source = source
+        if self._current:
+            self._current.put(self._settings())
+
+    def put(self, message: RunMessage) -> None:
+        """Have it recorded, and remember what a new recording needs; events from any thread."""
+        match message:
+            case RawRead():
+                self._head()
+            case MarkedFrame():
+                self._pre_roll.frame(message.frame, message.mark, self._numbered())
+            case Result():
+                self._pre_roll.result(message)
+            case BoardInfo():
+                self._info = message
+            case Truth():
+                self._truth = message
+        if (current := self._current) is not None:
+            current.put(message)
+
+    def again(self) -> tuple[Marked, ...]:
+        """Frames that the pipeline is to take again before the next, as a replay will."""
+        frames, self._again = self._again, ()
+        return frames
+
+    def _head(self) -> None:
+        """The recorder whose file has been made gets what a replay begins with."""
+        worker = self._awaiting
+        if worker is None or not worker.opening.done():
+            return
+        self._awaiting = None
+        if worker.opening.exception() is not None:
+            return
+        now = self._clock()
+        frames, self._touches_before, again = self._pre_roll.begin(self._numbered())
+        worker.put(self._settings())
+        worker.put(Truth(now, self._truth.presses, self._truth.bends))
+        for frame, mark in frames:
+            worker.put(MarkedFrame(frame, mark | Mark.EARLIER))
+        if self._info is not None:
+            worker.put(BoardInfo(now, self._info.info))
+        self._again = frames if again else ()
+        self._current = worker
+        self._say("recording", f"recording to {worker.consumer.path}")
+
+    def _settings(self) -> RunSettings:
+        return RunSettings(
+            self._clock(),
+            {
+                "source": self._source,
+                "reference_frames": REFERENCE_FRAMES,
+                "touches_before": self._touches_before,
+            },
+        )
+
+
+def _worker(path: Path, prepared: Prepared, start: float, say: Say) -> Worker[Recorder]:
+    def make() -> SessionWriter:
+        session = SessionWriter(path, prepared.skin, epoch=epoch(), start=start)
+        for calibration in prepared.calibrations.values():
+            session.attach(calibration.kind.attachment, "application/zip", calibration.encode())
+        return session
+
+    recorder = Recorder(path, make, raster(prepared), say)
+    return Worker(recorder, Capacity(MOST_WAITING, "oldest"), say)

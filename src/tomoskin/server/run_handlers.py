@@ -1,0 +1,69 @@
+"""Requests that are commands to the run: presses, pause, reference, notes, recording, replay."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from functools import partial
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+from tomoskin.core import DataError, GeometryError, WireError
+from tomoskin.run import Runner, SetPresses, commands
+from tomoskin.server.requests import Painted, SetRecording
+from tomoskin.server.task import Handlers, Listener, Tasks
+from tomoskin.skin import Skin
+from tomoskin.twin import Contact
+
+_FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"
+
+
+def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
+    """Handlers of a run whose recordings go to ``folder``, under names of their own."""
+
+    def submit(_: Listener, request: commands.Command) -> None:
+        runner.submit(request)
+
+    def press(page: Listener, request: SetPresses) -> None:
+        runner.submit(commands.HoldPresses(page, _on_skin(request, runner.prepared.skin)))
+
+    def paint(page: Listener, request: Painted) -> None:
+        runner.latency.set_paint(page, request.p50_s, request.p99_s)
+
+    def record(_: Listener, request: SetRecording) -> None:
+        tasks.keep(_record(runner, folder, on=request.on))
+
+    def play(page: Listener, request: commands.ReplayCommand) -> None:
+        tasks.run(page, partial(runner.ask, request), lambda _: None)  # a seek may read a file
+
+    return {
+        commands.TakeReference: submit,
+        commands.SetPause: submit,
+        commands.Note: submit,
+        SetPresses: press,
+        Painted: paint,
+        SetRecording: record,
+        **dict.fromkeys(get_args(commands.ReplayCommand), play),
+    }
+
+
+async def _record(runner: Runner, folder: Path, *, on: bool) -> None:
+    begin = commands.Record(folder / time.strftime(_FILE_NAME))
+    try:
+        await asyncio.wrap_future(runner.submit(begin if on else commands.StopRecording()))
+    except DataError as error:
+        runner.say("recording-stopped", f"nothing is recorded: {error}")
+
+
+def _on_skin(request: SetPresses, skin: Skin) -> tuple[Contact, ...]:
+    """A finger that has slid off the sheet presses nothing; WireError for no face at all."""
+    asked = request.presses
+    if not asked:
+        return ()
+    inside = skin.outline.contains(np.array([(p.x, p.y) for p in asked]))
+    try:
+        return tuple(p.contact for p, on in zip(asked, inside, strict=True) if on)
+    except GeometryError as error:
+        raise WireError(str(error)) from None
