@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from report import Report
-from tomoskin.calibration import BENDS, BendExamples, BendModel, JointReference, Observation
+from tomoskin.calibration import BENDS, BendExamples, BendModel, FrameView, JointReference
 from tomoskin.core import FloatArray, Frame, Reading
 from tomoskin.mesh import Cylinder, Hinge
 from tomoskin.pipeline import Pipeline, Result
@@ -168,7 +168,7 @@ class Bench:
         image = self.lab.image
         none = np.zeros((self.lab.prepared.pattern.n_meas, 0))
         return lambda dv, blind: found.push(
-            Observation(0.0, image(dv), None, dv, blind, dv, none, dv, np.zeros(len(dv), bool))
+            FrameView(0.0, image(dv), None, dv, blind, dv, none, dv, np.zeros(len(dv), bool))
         )
 
     def static(self, pose: Pose) -> list[float]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from report import Report
-from tomoskin.calibration import Observation
+from tomoskin.calibration import FrameView
 from tomoskin.core import Frame, Reading
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.finding import Finder, finding
@@ -76,10 +76,10 @@ class Lab:
         samples = self.board.sample(self.table, self.time)
         return self.prepared.readout(Frame(0, 0, self.time, 1, 0, 0, samples)).values
 
-    def view(self, presses: Sequence[Press]) -> Observation:
+    def view(self, presses: Sequence[Press]) -> FrameView:
         """What one frame shows; all voltages in proportion say nothing, as they do live."""
         dv = self.volts(presses) - self.reference.mean
-        return Observation(
+        return FrameView(
             time=0.0,
             image=self.image(dv),
             image_noise=self.floor,
@@ -283,7 +283,7 @@ def _moved(presses: Sequence[Press], by: float) -> tuple[Press, ...]:
 
 
 def _timed(
-    finder: Finder, views: Sequence[Observation]
+    finder: Finder, views: Sequence[FrameView]
 ) -> tuple[list[list[Reading]], Sequence[float]]:
     """Readings, and median and longest processor time, ms."""
     found, taken = [], []

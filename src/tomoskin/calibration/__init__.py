@@ -3,7 +3,7 @@
 from typing import Any
 
 from tomoskin._moved import moved
-from tomoskin.calibration.applied import Applied, Conditions, Observation, TouchFit
+from tomoskin.calibration.applied import Applied, Conditions, FrameView, TouchFit
 from tomoskin.calibration.bending.examples import BendExamples
 from tomoskin.calibration.bending.joint import JointReference
 from tomoskin.calibration.bending.model import BendModel
@@ -42,10 +42,10 @@ __all__ = [
     "Conditions",
     "Examples",
     "FrameClassifier",
+    "FrameView",
     "JointReference",
     "Kind",
     "Locator",
-    "Observation",
     "Presses",
     "Several",
     "TouchFit",

@@ -16,7 +16,7 @@ BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Observation:
+class FrameView:
     """What one frame shows.
 
     Attributes
@@ -55,7 +55,7 @@ class Observation:
         return np.where(self.excluded, np.nan, self.from_rest)
 
 
-Detect = Callable[[Observation, list[Reading]], list[Reading]]
+Detect = Callable[[FrameView, list[Reading]], list[Reading]]
 """Touches fitted to the data of a frame, given those that the skin's own method found."""
 
 
@@ -85,19 +85,17 @@ class Applied:
 
     moved: FloatArray | float = 0.0
 
-    def locate(self, observation: Observation, detections: list[Reading]) -> list[Reading]:
+    def locate(self, view: FrameView, detections: list[Reading]) -> list[Reading]:
         """Detections with better positions."""
-        del observation
+        del view
         return detections
 
-    def read(
-        self, observation: Observation, detections: list[Reading], *, touched: bool
-    ) -> Any | None:
+    def read(self, view: FrameView, detections: list[Reading], *, touched: bool) -> Any | None:
         """What the frame says of the calibration's subject.
 
         ``touched``: whether a touch stands, by one who has tracked the frames before.
         """
-        del observation, detections, touched
+        del view, detections, touched
         return None
 
 

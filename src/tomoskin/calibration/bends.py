@@ -7,7 +7,7 @@ Keys of the .npz: ``kind``, ``version``; ``dv`` (n, n_meas) V, ``angle_rad``, ``
 
 from __future__ import annotations
 
-from tomoskin.calibration.applied import Applied, Conditions, Observation, TouchFit
+from tomoskin.calibration.applied import Applied, Conditions, FrameView, TouchFit
 from tomoskin.calibration.bending.examples import BendExamples
 from tomoskin.calibration.bending.model import BendModel
 from tomoskin.calibration.bending.reader import BendReader, BendReading
@@ -30,14 +30,10 @@ class BendApplied(Applied):
         self._reader = BendReader(model, fit.response, fit.gain)
         self._detect = fit.detect
 
-    def read(
-        self, observation: Observation, detections: list[Reading], *, touched: bool
-    ) -> BendReading:
+    def read(self, view: FrameView, detections: list[Reading], *, touched: bool) -> BendReading:
         """How the sheet is bent in this frame."""
-        touches = self._detect(observation, detections)
-        reading = self._reader.push(
-            observation.change, touches, observation.drift, observation.time, touched=touched
-        )
+        touches = self._detect(view, detections)
+        reading = self._reader.push(view.change, touches, view.drift, view.time, touched=touched)
         self.moved = reading.moved
         return reading
 

@@ -13,7 +13,7 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.calibration.applied import Applied, Conditions, Observation
+from tomoskin.calibration.applied import Applied, Conditions, FrameView
 from tomoskin.calibration.classifier.classifier import Classifier
 from tomoskin.calibration.classifier.examples import Codes, Examples
 from tomoskin.calibration.kind import Calibration, Kind, Progress, located
@@ -97,12 +97,10 @@ class ClassesApplied(Applied):
     def __init__(self, frames: FrameClassifier) -> None:
         self._frames = frames
 
-    def read(
-        self, observation: Observation, detections: list[Reading], *, touched: bool
-    ) -> ClassReading:
+    def read(self, view: FrameView, detections: list[Reading], *, touched: bool) -> ClassReading:
         """The class of this frame."""
         del detections, touched
-        return self._frames(observation.since_reference)
+        return self._frames(view.since_reference)
 
 
 def _pack(frames: FrameClassifier) -> Arrays:

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tomoskin.calibration.applied import Applied, Conditions, Observation, without_information
+from tomoskin.calibration.applied import Applied, Conditions, FrameView, without_information
 from tomoskin.calibration.kind import Calibration, Kind, Progress, located
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
@@ -31,13 +31,13 @@ class LocatedTouch(Applied):
     def __init__(self, locator: Locator) -> None:
         self._locator = locator
 
-    def locate(self, observation: Observation, detections: list[Reading]) -> list[Reading]:
+    def locate(self, view: FrameView, detections: list[Reading]) -> list[Reading]:
         """The strongest detection, at the position that the presses tell."""
         if not detections:
             return []
         # The presses were learnt with all that is in them: nothing is taken out here either.
-        excluded = without_information(observation.nuisance)
-        dv = np.where(excluded, np.nan, observation.change)
+        excluded = without_information(view.nuisance)
+        dv = np.where(excluded, np.nan, view.change)
         if not np.isfinite(dv).any():
             return []
         (position,), (covariance,) = self._locator.predict(dv)

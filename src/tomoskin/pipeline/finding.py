@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tomoskin.calibration import Observation, TouchFit
+from tomoskin.calibration import FrameView, TouchFit
 from tomoskin.core import FloatArray, Reading
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import Reference
@@ -22,7 +22,7 @@ class Finder(Protocol):
         """Go on with another operator or noise."""
         ...
 
-    def push(self, observation: Observation) -> list[Reading]:
+    def push(self, view: FrameView) -> list[Reading]:
         """Readings of a frame, strongest first."""
         ...
 
@@ -38,9 +38,9 @@ class InImage:
         del reference
         self._segmenter = prepared.segmenter
 
-    def push(self, observation: Observation) -> list[Reading]:
+    def push(self, view: FrameView) -> list[Reading]:
         """See :class:`Finder`."""
-        return self._segmenter(observation.image, observation.image_noise)
+        return self._segmenter(view.image, view.image_noise)
 
 
 class InData:
@@ -68,9 +68,9 @@ class InData:
         gain = _gain(self.model, prepared, reference)
         self._spots.renew(_noise(prepared, reference, gain), gain)
 
-    def push(self, observation: Observation) -> list[Reading]:
+    def push(self, view: FrameView) -> list[Reading]:
         """See :class:`Finder`."""
-        return self._spots.push(observation.dv, observation.nuisance)
+        return self._spots.push(view.dv, view.nuisance)
 
 
 def finding(prepared: Prepared, reference: Reference | None, pace: Pace = WHOLE) -> Finder:
@@ -112,7 +112,7 @@ class Fitting:
         if prepared.skin.touch.method == "fit":
             return TouchFit(model.response, gain, lambda _, detections: detections)
         beside = InData(model, prepared, reference)
-        return TouchFit(model.response, gain, lambda observation, _: beside.push(observation))
+        return TouchFit(model.response, gain, lambda view, _: beside.push(view))
 
 
 def _spots(spots: SpotModel, reference: Reference | None) -> SpotModel:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.calibration import Observation
+from tomoskin.calibration import FrameView
 from tomoskin.core import FloatArray, Image, Reading, Touch
 from tomoskin.pattern import Scan
 from tomoskin.pipeline.collecting import Rest
@@ -118,16 +118,16 @@ class Following:
         self._tune()
         conditioned = self._conditioning.condition(measured)
         if conditioned.dv is None:
-            touches = self._track([], measured)
+            touches = self._tracker.update([], measured.time, measured.host_time)
             return self._result(measured, conditioned, self._prepared.no_image, touches, {})
-        observation = self._observe(conditioned, conditioned.dv, measured.time)
-        detections = self._finder.push(observation)
+        view = self._observe(conditioned, conditioned.dv, measured.time)
+        detections = self._finder.push(view)
         for applied in self._applied.values():
-            detections = applied.locate(observation, detections)
-        touches = self._track(detections, measured)
-        readings = self._read(observation, detections, touched=bool(touches))
+            detections = applied.locate(view, detections)
+        touches = self._tracker.update(detections, measured.time, measured.host_time)
+        readings = self._read(view, detections, touched=bool(touches))
         self._learn(measured.time, touched=bool(touches))
-        return self._result(measured, conditioned, observation.image, touches, readings)
+        return self._result(measured, conditioned, view.image, touches, readings)
 
     def first(self, measured: Measured) -> Result:
         """The frame that completed the rest: nothing shows in it."""
@@ -145,9 +145,9 @@ class Following:
             baseline=self._conditioning.state,
         )
 
-    def _observe(self, conditioned: Conditioned, dv: FloatArray, time: float) -> Observation:
+    def _observe(self, conditioned: Conditioned, dv: FloatArray, time: float) -> FrameView:
         image, noise = self._imaging.push(dv, time)
-        return Observation(
+        return FrameView(
             time=time,
             image=image,
             image_noise=noise,
@@ -159,11 +159,9 @@ class Following:
             excluded=conditioned.excluded,
         )
 
-    def _read(
-        self, observation: Observation, detections: list[Reading], *, touched: bool
-    ) -> dict[str, Any]:
+    def _read(self, view: FrameView, detections: list[Reading], *, touched: bool) -> dict[str, Any]:
         readings = {
-            kind: applied.read(observation, detections, touched=touched)
+            kind: applied.read(view, detections, touched=touched)
             for kind, applied in self._applied.items()
         }
         return {kind: reading for kind, reading in readings.items() if reading is not None}
@@ -198,9 +196,6 @@ class Following:
         conditioning = self._conditioning
         interval = np.nan if self.rest is None else self.rest.interval
         return imaging(conditioning.prepared, reference, interval, conditioning.subspace())
-
-    def _track(self, detections: list[Reading], measured: Measured) -> tuple[Touch, ...]:
-        return self._tracker.update(detections, measured.time, measured.host_time)
 
     def _result(
         self,

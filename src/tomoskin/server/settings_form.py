@@ -14,13 +14,13 @@ from tomoskin.pattern import named
 from tomoskin.skin import (
     SECTIONS,
     Choice,
-    Kind,
     Number,
     NumberOrWord,
     OneOrEach,
     Quantity,
     Skin,
     Table,
+    ValueKind,
     Whole,
 )
 
@@ -121,7 +121,7 @@ def _tidy(skin: Skin, name: str, changes: Mapping[str, Any]) -> dict[str, Any]:
     return {**barred, **changes}
 
 
-def _form(kind: Kind[Any]) -> dict[str, Any]:
+def _form(kind: ValueKind[Any]) -> dict[str, Any]:
     match kind:
         case Choice():
             form: dict[str, Any] = {"form": "choice", "words": kind.words}

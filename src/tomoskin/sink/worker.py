@@ -250,7 +250,9 @@ class Worker(Generic[C]):
         while True:
             patience = self._tended + _ROUTINE - time.monotonic()
             with self._news:
-                if patience > 0 and self._news.wait_for(self._has_news, patience):
+                if patience > 0 and self._news.wait_for(
+                    lambda: self._waiting or self._deadline is not None, patience
+                ):
                     late = self._deadline is not None and time.monotonic() > self._deadline
                     if late or not self._waiting:
                         return None
@@ -259,9 +261,6 @@ class Worker(Generic[C]):
                     return item
             self._call(self.consumer.tend)
             self._tended = time.monotonic()
-
-    def _has_news(self) -> bool:
-        return bool(self._waiting) or self._deadline is not None
 
     def _report_gap(self) -> None:
         with self._news:

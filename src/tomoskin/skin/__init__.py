@@ -8,7 +8,6 @@ from tomoskin.skin.build import SECTIONS
 from tomoskin.skin.find import read_text
 from tomoskin.skin.kinds import (
     Choice,
-    Kind,
     Number,
     NumberOrWord,
     OneOrEach,
@@ -17,6 +16,7 @@ from tomoskin.skin.kinds import (
     Row,
     Table,
     Text,
+    ValueKind,
     Whole,
     Words,
     literal,
@@ -32,7 +32,6 @@ __all__ = [
     "Choice",
     "InverseSettings",
     "Key",
-    "Kind",
     "Number",
     "NumberOrWord",
     "OneOrEach",
@@ -47,6 +46,7 @@ __all__ = [
     "Text",
     "TouchSettings",
     "TwinChoice",
+    "ValueKind",
     "Whole",
     "Words",
     "check_names",

@@ -12,7 +12,7 @@ from tomoskin.core import DIMENSIONS, parse_quantity
 T_co = TypeVar("T_co", covariant=True)
 
 
-class Kind(ABC, Generic[T_co]):
+class ValueKind(ABC, Generic[T_co]):
     """One sort of value; ``expected`` is the phrase that errors and the documentation use."""
 
     @property
@@ -33,7 +33,7 @@ class Kind(ABC, Generic[T_co]):
 
 
 @dataclass(frozen=True)
-class Text(Kind[str]):
+class Text(ValueKind[str]):
     """Any text; with ``most``, a short one on one line that is not blank."""
 
     most: int | None = None
@@ -56,7 +56,7 @@ class Text(Kind[str]):
 
 
 @dataclass(frozen=True)
-class Choice(Kind[str]):
+class Choice(ValueKind[str]):
     """One of a few words."""
 
     words: tuple[str, ...]
@@ -72,7 +72,7 @@ class Choice(Kind[str]):
 
 
 @dataclass(frozen=True)
-class Whole(Kind[int]):
+class Whole(ValueKind[int]):
     """A whole number in a range."""
 
     low: int
@@ -91,7 +91,7 @@ class Whole(Kind[int]):
 
 
 @dataclass(frozen=True)
-class Number(Kind[float]):
+class Number(ValueKind[float]):
     """A number without unit in a range."""
 
     low: float
@@ -110,7 +110,7 @@ class Number(Kind[float]):
 
 
 @dataclass(frozen=True)
-class NumberOrWord(Kind[float | str]):
+class NumberOrWord(ValueKind[float | str]):
     """A number in a range, or one of a few words in its place."""
 
     number: Number
@@ -127,7 +127,7 @@ class NumberOrWord(Kind[float | str]):
 
 
 @dataclass(frozen=True)
-class Quantity(Kind[float]):
+class Quantity(ValueKind[float]):
     """A number with a unit; the range is stated in ``unit``, the value comes back in SI."""
 
     dimension: str
@@ -158,10 +158,10 @@ class Quantity(Kind[float]):
 
 
 @dataclass(frozen=True)
-class OneOrEach(Kind[tuple[Any, ...]]):
+class OneOrEach(ValueKind[tuple[Any, ...]]):
     """One value for all electrodes, or a list with one for each; comes back as a tuple."""
 
-    inner: Kind[Any]
+    inner: ValueKind[Any]
 
     @property
     def expected(self) -> str:
@@ -176,10 +176,10 @@ class OneOrEach(Kind[tuple[Any, ...]]):
 
 
 @dataclass(frozen=True)
-class OneOrSpan(Kind[tuple[Any, Any]]):
+class OneOrSpan(ValueKind[tuple[Any, Any]]):
     """One value, or ``[low, high]`` to draw from; comes back as (low, high)."""
 
-    inner: Kind[Any]
+    inner: ValueKind[Any]
 
     @property
     def expected(self) -> str:
@@ -198,7 +198,7 @@ class OneOrSpan(Kind[tuple[Any, Any]]):
 
 
 @dataclass(frozen=True)
-class Words(Kind[tuple[str, ...]]):
+class Words(ValueKind[tuple[str, ...]]):
     """One word out of a few, or a list of different ones; comes back as a tuple."""
 
     words: Choice
@@ -217,10 +217,10 @@ class Words(Kind[tuple[str, ...]]):
 
 
 @dataclass(frozen=True)
-class Row(Kind[tuple[Any, ...]]):
+class Row(ValueKind[tuple[Any, ...]]):
     """A list of fixed length, each entry with a name and a kind; comes back as a tuple."""
 
-    entries: Mapping[str, Kind[Any]]
+    entries: Mapping[str, ValueKind[Any]]
 
     @property
     def noun(self) -> str:
@@ -255,7 +255,7 @@ class Row(Kind[tuple[Any, ...]]):
 
 
 @dataclass(frozen=True)
-class Table(Kind[tuple[tuple[Any, ...], ...]]):
+class Table(ValueKind[tuple[tuple[Any, ...], ...]]):
     """A list of at least so many rows; comes back as a tuple. ``ascending``: by their first entry,
     a time, as a course with straight lines between has them."""
 
@@ -307,7 +307,7 @@ class _EntryError(ValueError):
     """What is wrong with an entry of a list, after its place there."""
 
 
-def _entry(place: str, kind: Kind[Any], value: object) -> Any:
+def _entry(place: str, kind: ValueKind[Any], value: object) -> Any:
     """``value`` as ``kind`` reads it; an error names its ``place`` in a list, or in several."""
     try:
         return kind.read(value)

@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from typing import Any, ClassVar, Self, TypeVar, dataclass_transform
 
 from tomoskin.core import SkinError
-from tomoskin.skin.kinds import Kind, literal, show
+from tomoskin.skin.kinds import ValueKind, literal, show
 
 T = TypeVar("T")
 
@@ -41,7 +41,7 @@ class Key:
         Another key of the section that must stand beside this one.
     """
 
-    kind: Kind[Any]
+    kind: ValueKind[Any]
     meaning: str
     default: str | float | None
     required: bool
@@ -73,7 +73,7 @@ class Key:
 
 
 def key(
-    kind: Kind[T],
+    kind: ValueKind[T],
     meaning: str,
     /,
     *,
