@@ -206,7 +206,11 @@ class Worker(Generic[C]):
         consumer = self.consumer
         try:
             self._call(consumer.open)
-            self._note_open()
+            self._ready = True
+            if not self.opening.done():
+                self.opening.set_result(None)
+            if consumer.ready:
+                self._tell("open", consumer.ready)
             while (item := self._next()) is not None:
                 self._call(consumer.take, item)
                 self.taken += 1
@@ -218,14 +222,6 @@ class Worker(Generic[C]):
                 self._call(consumer.close)
             return pause
         return None
-
-    def _note_open(self) -> None:
-        with self._news:
-            self._ready = True
-        if not self.opening.done():
-            self.opening.set_result(None)
-        if self.consumer.ready:
-            self._tell("open", self.consumer.ready)
 
     def _recover(self, error: Exception) -> float | None:
         """What waits and is of no worth later is left out."""
