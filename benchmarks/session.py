@@ -107,7 +107,7 @@ def recorded(
                 nothing.wait(ahead)
         else:
             while worker.taken < 2 * (start + count):
-                nothing.wait(1e-4)
+                nothing.wait(1e-3)
     used = time.process_time() - processor
     grown = _resident() - memory
     worker.end()

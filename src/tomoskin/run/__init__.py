@@ -12,28 +12,24 @@ from tomoskin.run.labelled_frames import (
     processors,
 )
 from tomoskin.run.marker import ReplaySource
-from tomoskin.run.posing import SheetPose, sheet_pose, way_to_bend
+from tomoskin.run.posing import way_to_bend
 from tomoskin.run.runner import Runner
 from tomoskin.run.simulate import Simulated, simulate
 from tomoskin.run.status import Status
-from tomoskin.run.twin_control import Harm, TwinControl
 from tomoskin.run.twin_requests import MAX_FORCE, SetPose, SetPresses, SetTwin, StrictRequest
 
 __all__ = [
     "MAX_FORCE",
-    "Harm",
     "ReplaySource",
     "Runner",
     "SetMade",
     "SetPose",
     "SetPresses",
     "SetTwin",
-    "SheetPose",
     "Simulated",
     "Snapshot",
     "Status",
     "StrictRequest",
-    "TwinControl",
     "Workers",
     "commands",
     "in_processes",
@@ -41,7 +37,6 @@ __all__ = [
     "make_set",
     "on_cluster",
     "processors",
-    "sheet_pose",
     "simulate",
     "way_to_bend",
 ]

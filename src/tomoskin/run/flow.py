@@ -14,10 +14,10 @@ from tomoskin.run.counters import Latency, Losses
 from tomoskin.run.marker import Marker, play, replay_status
 from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.status import Status
-from tomoskin.run.twin_control import Harm, Pressable, TwinControl, described
+from tomoskin.run.twin_control import Pressable, TwinControl, described
 from tomoskin.run.twin_requests import SetPose, SetTwin
 from tomoskin.source import Link, ScanSettings, Transport
-from tomoskin.twin import Contact, Faults
+from tomoskin.twin import Contact
 from tomoskin.wire import Info
 
 MOST_AT_ONCE = 16
@@ -196,7 +196,7 @@ class Flow:
         if not self.twin.breakable:
             raise WireError(f"{self.source} cannot be broken from here")
         try:
-            self.twin.set_harm(Harm(Faults(cut=frozenset(command.cut)), command.noise))
+            self.twin.set_harm(command)
         except ModelError as error:
             raise WireError(str(error)) from None
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from typing import Any, Protocol, runtime_checkable
 
 from tomoskin.mesh import Surface
 from tomoskin.run.posing import SheetPose, sheet_pose
-from tomoskin.run.twin_requests import SetPose
+from tomoskin.run.twin_requests import SetPose, SetTwin
 from tomoskin.twin import Contact, Faults, Pose, Press
 
 
@@ -39,14 +39,6 @@ class Bendable(Protocol):
         """How it lies from now on."""
 
 
-@dataclass(frozen=True, slots=True)
-class Harm:
-    """What is wrong with a source: ``faults``, and ``noise`` in LSB where that is not its own."""
-
-    faults: Faults = field(default_factory=Faults)
-    noise: float | None = None
-
-
 class TwinControl:
     """Does to the source of the moment what was asked, and to the next one the same.
 
@@ -69,7 +61,7 @@ class TwinControl:
         self.pressable = False
         self.truth: tuple[Contact, ...] = ()
         self.pose = SheetPose()
-        self.harm = Harm()
+        self.harm = SetTwin((), None)
         self._presses: dict[object, tuple[Contact, ...]] = {}
         self._is_due = True
         self._breakable: Breakable | None = None
@@ -95,7 +87,7 @@ class TwinControl:
         """Whether the source has a sheet that can be bent and stretched."""
         return self._bendable is not None
 
-    def set_harm(self, harm: Harm) -> None:
+    def set_harm(self, harm: SetTwin) -> None:
         """Break and mend the source; ModelError for what it does not have."""
         with self._lock:
             self._break(harm)
@@ -126,9 +118,9 @@ class TwinControl:
         self.truth = presses
         return True
 
-    def _break(self, harm: Harm) -> None:
+    def _break(self, harm: SetTwin) -> None:
         if self._breakable is not None:
-            self._breakable.set_faults(harm.faults)
+            self._breakable.set_faults(Faults(cut=frozenset(harm.cut)))
             self._breakable.set_noise(harm.noise)
             self.harm = harm
 

@@ -31,7 +31,7 @@ class TwinHandlers:
         text = text_of(
             type="twin",
             breakable=twin.breakable,
-            cut=sorted(harm.faults.cut),
+            cut=sorted(set(harm.cut)),
             noise=harm.noise,
             bendable=twin.bendable,
             bends=way_to_bend(skin.surface),

@@ -30,7 +30,7 @@ def make_sink(spec: str) -> Sink:
     entries = tuple(entry_points(group=GROUP, name=name))
     if not entries:
         raise SinkError(
-            f'there is no sink "{name}"', hint=f"there are {', '.join(sink_names()) or 'none'}"
+            f'there is no sink "{name}"', hint=f"known are {', '.join(sink_names()) or 'none'}"
         )
     sink: Sink = entries[0].load()(argument)
     return sink

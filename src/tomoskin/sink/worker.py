@@ -120,9 +120,9 @@ class Worker(Generic[C]):
         self.ending: Future[None] = Future()
         self._capacity, self._say = capacity, say
         self._waiting: deque[tuple[int, Any]] = deque()
-        self._size = self._behind = 0
+        self._came = self._went = self._behind = 0  # sizes; each is written by one side
         self._news = threading.Condition()
-        self._ready = False
+        self._ready = self._is_idle = False
         self._asked: float | None = None
         self._tended = time.monotonic()
         self._deadline: float | None = None
@@ -149,7 +149,8 @@ class Worker(Generic[C]):
             first = lost > 0 and self._behind == 0
             self.left_out += lost
             self._behind += lost
-            self._news.notify()
+            if self._is_idle:
+                self._news.notify()
         if first:
             self._tell("behind", self.consumer.slow)
 
@@ -176,14 +177,16 @@ class Worker(Generic[C]):
 
     def _add(self, size: int, item: Any) -> int:
         """Let ``item`` wait; how many messages are left out for it."""
-        if self._capacity.keeps == "oldest" and self._size + size > self._capacity.most:
+        most = self._capacity.most
+        if self._capacity.keeps == "oldest" and self._came - self._went + size > most:
             return 1
+        self._came += size
         self._waiting.append((size, item))
-        self._size += size
         lost = 0
-        while self._size > self._capacity.most:
-            self._size -= self._waiting.popleft()[0]
-            lost += 1
+        while self._came - self._went > most and self._waiting:
+            with contextlib.suppress(IndexError):  # it has been taken at this very moment
+                self._came -= self._waiting.popleft()[0]
+                lost += 1
         return lost
 
     def _run(self) -> None:
@@ -204,7 +207,11 @@ class Worker(Generic[C]):
         consumer = self.consumer
         try:
             self._call(consumer.open)
-            self._note_open()
+            self._ready = True
+            if not self.opening.done():
+                self.opening.set_result(None)
+            if consumer.ready:
+                self._tell("open", consumer.ready)
             while (item := self._next()) is not None:
                 self._call(consumer.take, item)
                 self.taken += 1
@@ -217,21 +224,14 @@ class Worker(Generic[C]):
             return pause
         return None
 
-    def _note_open(self) -> None:
-        with self._news:
-            self._ready = True
-        if not self.opening.done():
-            self.opening.set_result(None)
-        if self.consumer.ready:
-            self._tell("open", self.consumer.ready)
-
     def _recover(self, error: Exception) -> float | None:
         """What waits and is of no worth later is left out."""
         with self._news:
             self._ready = False
             kept = [(size, item) for size, item in self._waiting if self.consumer.durable(item)]
             self.left_out += len(self._waiting) - len(kept)
-            self._waiting, self._size = deque(kept), sum(size for size, _ in kept)
+            self._waiting, self._went = deque(kept), 0
+            self._came = sum(size for size, _ in kept)
         pause = self.consumer.handle_failure(error)
         if pause is None and not self.opening.done():
             self.opening.set_exception(error)
@@ -247,27 +247,35 @@ class Worker(Generic[C]):
 
     def _next(self) -> Any:
         """What is to be taken now; None: no more."""
-        while True:
-            patience = self._tended + _ROUTINE - time.monotonic()
-            with self._news:
-                if patience > 0 and self._news.wait_for(
-                    lambda: self._waiting or self._deadline is not None, patience
-                ):
-                    late = self._deadline is not None and time.monotonic() > self._deadline
-                    if late or not self._waiting:
-                        return None
-                    size, item = self._waiting.popleft()
-                    self._size -= size
-                    return item
-            self._call(self.consumer.tend)
-            self._tended = time.monotonic()
+        while self._deadline is None or time.monotonic() <= self._deadline:
+            if time.monotonic() > self._tended + _ROUTINE:
+                self._call(self.consumer.tend)
+                self._tended = time.monotonic()
+            try:
+                size, item = self._waiting.popleft()  # needs no lock
+            except IndexError:
+                if not self._wait():
+                    return None
+            else:
+                self._went += size
+                return item
+        return None
+
+    def _wait(self) -> bool:
+        """Wait for a message, until the routine is due; False where there will be no more."""
+        patience = self._tended + _ROUTINE - time.monotonic()
+        with self._news:
+            self._is_idle = True
+            self._news.wait_for(lambda: self._waiting or self._deadline is not None, patience)
+            self._is_idle = False
+            return bool(self._waiting) or self._deadline is None
 
     def _report_gap(self) -> None:
+        if not self._behind or self._waiting:
+            return
         with self._news:
-            count = 0 if self._waiting else self._behind
-            self._behind -= count
-        if count:
-            self._tell("gap", f"{count} messages were left out")
+            count, self._behind = self._behind, 0
+        self._tell("gap", f"{count} messages were left out")
 
     def _tell(self, kind: str, text: str) -> None:
         text = f"{self.consumer.name} {text}"
