@@ -24,7 +24,7 @@ GRACE = 2.0
 
 _FIRST_DELAY, _LONGEST_DELAY = 0.5, 10.0
 _LONG = 2.0
-"""Seconds in one call after which a sink is said not to answer."""
+"""Seconds in one call after which a sink is reported not to answer."""
 
 Say = Callable[[str, str], None]
 

@@ -12,7 +12,7 @@ from tomoskin.touch import TouchEvent
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stream:
-    """What will be published, said once.
+    """What will be published: given once, before it begins.
 
     Attributes
     ----------
