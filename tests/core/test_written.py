@@ -182,7 +182,7 @@ def test_a_series_asks_for_its_parts_too(tmp_path: Path) -> None:
 
 OWN_WAYS = {
     "core/written.py": "the way",
-    "recording/message_log.py": "a session is written while it happens, into a file that must be new",
+    "recording/message_log.py": "written while it happens, into a file that must be new",
     "emulator/program.py": "a lock beside what make builds",
     "emulator/memory.py": "in a temporary folder of its own",
 }

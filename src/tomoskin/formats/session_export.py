@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 class Export:
     """A session to be exported.
 
-    ``every`` s between two images; ``advance`` is called with how far it is. Files that are there are
-    written over with ``overwrite`` only.
+    ``every`` s between two images; ``advance`` is called with how far it is. Files that are
+    there are written over with ``overwrite`` only.
     """
 
     session: SessionReader
