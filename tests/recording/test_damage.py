@@ -361,7 +361,7 @@ def start(code, path):
 def test_killed_at_any_moment_all_but_the_last_second_is_there(tmp_path, seed):
     path = tmp_path / "killed.mcap"
     rng = random.Random(seed)
-    wanted = rng.randint(1, 400) * 10
+    wanted = rng.randint(11, 400) * 10  # more than a second
     with start(_WRITE, path) as process:
         for line in process.stdout:
             if int(line) >= wanted:

@@ -17,7 +17,7 @@ _LARGEST = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Display:
-    """Unit, filter and colour scale of a picture.
+    """Unit, filter and colour scale of an image.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Display:
 
 
 def circular_average(mesh: Mesh, radius: float) -> csr_array:
-    """The source's display filter (its section 4.4): mean over a disc, by area.
+    """The thesis's display filter (its section 4.4): mean over a disc, by area.
 
     Returns
     -------

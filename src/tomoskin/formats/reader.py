@@ -1,4 +1,4 @@
-"""Which reader a file needs: told by what is in it, not by its name."""
+"""Which reader a file needs: what is in it decides, not its name."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ FORMATS: tuple[tuple[Detect, Parse], ...] = (
     (pyeit_arrays.detects, pyeit_arrays.parse),
     (serial_log.detects_arrays, serial_log.parse_arrays),
 )
-"""What tells a format by its arrays, and what reads it."""
+"""What recognises a format by its arrays, and what reads it."""
 
 TEXT_FORMATS: tuple[
     tuple[Callable[[list[str]], bool], Callable[[Iterable[str], str], Recording]], ...

@@ -34,9 +34,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Export:
-    """A session to be exported: ``every`` s between two images, ``advance`` told how far it is.
+    """A session to be exported.
 
-    Files that are there are written over with ``overwrite`` only.
+    ``every`` s between two images; ``advance`` is called with how far it is. Files that are
+    there are written over with ``overwrite`` only.
     """
 
     session: SessionReader

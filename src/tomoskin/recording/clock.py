@@ -63,7 +63,7 @@ class _Run:
 
 
 class ClockFitter:
-    """Takes ticks and host times of frames one by one; begins anew when the device does.
+    """Takes ticks and host times of frames one by one; begins again when the device does.
 
     A frame is never early, and late by whatever line, USB and scheduler like: in batches, by
     chance, now and then for long. So the line runs below all frames, as close to them as it can:

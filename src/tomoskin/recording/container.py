@@ -1,7 +1,7 @@
 """An MCAP file in the making: chunks that are each written whole, and an index at the end.
 
-The records are those of the ``mcap`` library. Its Writer is not used: it takes three times as long
-for a message, and what it holds after a failed write cannot be cut back to the last whole record.
+The records are those of the ``mcap`` library. Its Writer is not used: it takes almost three times
+as long for a message, and a file that it could not write on does not end with a whole record.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from mcap.records import Attachment, Footer, Metadata
 from tomoskin.core import MAGIC, DataError
 from tomoskin.recording.mcap_records import (
     LARGEST,
+    LARGEST_SUMMARY,
     PREFIX,
     LoggedMessage,
     Summary,
@@ -155,6 +156,8 @@ class ContainerReader:
         with self._damage_at(start):
             if not len(MAGIC) <= start <= footer.summary_offset_start <= end:
                 raise ValueError("the index is not in the file")
+            if end - start > LARGEST_SUMMARY:
+                raise ValueError(f"an index of {end - start} bytes")
             self.summary = decode_summary(footer, self._read(start, end - start))
 
     def _records(self) -> Iterator[tuple[int, int]]:

@@ -26,7 +26,7 @@ class Mark(IntFlag):
     REFERENCE = 1
     """A new reference begins with this frame."""
     HELD = 2
-    """Left out: the picture was held."""
+    """Left out: the image was held."""
     SKIPPED = 4
     """Left out: too many frames waited."""
     OPENED = 8

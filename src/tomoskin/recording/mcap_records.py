@@ -33,6 +33,9 @@ MESSAGE = struct.Struct("<BQHIQQ")
 LARGEST = 64 << 20
 """A longer record is no record of a session."""
 
+LARGEST_SUMMARY = 1 << 30
+"""A longer index is none: not even a week in the chunks of 0.1 has one."""
+
 _CHUNK_INDEX = struct.Struct("<BQQQQQI")
 _ON_CHANNEL = struct.Struct("<HQ")
 _MESSAGE_OPCODE = int(Opcode.MESSAGE)
@@ -127,13 +130,12 @@ def decode_summary(footer: Footer, data: bytes) -> Summary | None:
 
     Raises ValueError where it does not add up or its CRC differs.
     """
-    if footer.summary_crc not in (0, zlib.crc32(data + encode(footer)[:-_CRC_BYTES])):
+    start = footer.summary_start
+    if footer.summary_crc not in (0, zlib.crc32(encode(footer)[:-_CRC_BYTES], zlib.crc32(data))):
         raise ValueError("the CRC of the index differs")
     groups = {}
-    for group in _decode_all(
-        SummaryOffset, data[footer.summary_offset_start - footer.summary_start :]
-    ):
-        begin = group.group_start - footer.summary_start
+    for group in _decode_all(SummaryOffset, data[footer.summary_offset_start - start :]):
+        begin = group.group_start - start
         groups[group.group_opcode] = data[begin : begin + group.group_length]
     totals = next(_decode_all(Statistics, groups.get(Opcode.STATISTICS, b"")), None)
     attached = _decode_all(AttachmentIndex, groups.get(Opcode.ATTACHMENT_INDEX, b""))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field, replace
@@ -157,19 +157,22 @@ def _copy(found: Iterable[Stretch], container: ContainerWriter, result: Repaired
     """Write the messages of every chunk, and note what is lost; how far it is, byte by byte."""
     after = 0
     for start, stop, record in found:
-        if record is None:
-            result.lost.append(Lost(start, stop, after, None))
-        elif isinstance(record, DataEnd):
-            result.ended = True
-        elif isinstance(record, Chunk):
+        if isinstance(record, Chunk):
             if result.lost and result.lost[-1].before is None:
                 result.lost[-1] = replace(result.lost[-1], before=record.message_start_time)
-            for message in messages_in(record, start):
-                if message.channel in TOPICS:
-                    container.message(message.channel, message.log_time, message.data)
-                    result.messages[TOPICS[message.channel]] += 1
+            _copy_messages(record, container, result)
             result.chunks, after = result.chunks + 1, record.message_end_time
+        elif record is None:
+            result.lost.append(Lost(start, stop, after, None))
+        result.ended |= isinstance(record, DataEnd)
         yield stop
+
+
+def _copy_messages(chunk: Chunk, container: ContainerWriter, result: Repaired) -> None:
+    for message in messages_in(chunk, 0):
+        if message.channel in TOPICS:
+            container.message(message.channel, message.log_time, message.data)
+            result.messages[TOPICS[message.channel]] += 1
 
 
 def _head(file: BinaryIO, place: int, size: int) -> tuple[int, int]:
@@ -189,7 +192,9 @@ def _record(opcode: int, data: bytes) -> Chunk | Attachment | Metadata | DataEnd
         match opcode:
             case Opcode.CHUNK:
                 chunk = decode_chunk(data)
-                return None if chunk.compression else chunk
+                if not chunk.compression:
+                    deque(messages_in(chunk, 0), maxlen=0)  # ValueError where they do not add up
+                    return chunk
             case Opcode.ATTACHMENT:
                 return decode(Attachment, data)
             case Opcode.METADATA:

@@ -84,15 +84,15 @@ class ReplayBoard:
 
 
 def _version(text: Any) -> bytes:
-    """Three numbers of "1.2.3"; zeros where it is not said."""
+    """Three numbers of "1.2.3"; zeros where it says no such."""
     parts = str(text or "").split(".")
-    known = len(parts) == 3 and all(part.isdigit() and int(part) < 256 for part in parts)
-    return bytes(map(int, parts)) if known else bytes(3)
+    is_version = len(parts) == 3 and all(part.isdigit() and int(part) < 256 for part in parts)
+    return bytes(map(int, parts)) if is_version else bytes(3)
 
 
 def _identity(text: Any) -> bytes:
     try:
-        found = bytes.fromhex(str(text or ""))
+        identity = bytes.fromhex(str(text or ""))
     except ValueError:
-        found = b""
-    return found if len(found) == 8 else b"replay\0\0"
+        identity = b""
+    return identity if len(identity) == 8 else b"replay\0\0"

@@ -42,7 +42,7 @@ class SessionReader(AbstractContextManager["SessionReader"]):
     skin
         The skin that it was recorded with.
     epoch
-        What is added to a host time to give seconds since 1970; 0 when it was not said.
+        What is added to a host time to give seconds since 1970; 0 where the file does not say.
     container
         The MCAP file itself.
 

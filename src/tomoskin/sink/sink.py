@@ -18,7 +18,7 @@ _PIXELS = 48
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stream:
-    """What will be published, said once.
+    """What will be published: given once, before it begins.
 
     Attributes
     ----------

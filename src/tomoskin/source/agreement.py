@@ -20,14 +20,14 @@ def check_version(board: Hello | Info, where: str) -> None:
     The message says which side is older.
     """
     theirs, ours = (board.major, board.minor), (SCHEMA.major, SCHEMA.minor)
-    known = {**OLDER, ours: SCHEMA.hash}
-    if known.get(theirs) == board.schema_hash:
+    hashes = {**OLDER, ours: SCHEMA.hash}
+    if hashes.get(theirs) == board.schema_hash:
         return
     spoken = f"expected protocol {ours[0]}.{ours[1]}, the board speaks {theirs[0]}.{theirs[1]}: "
-    if theirs in known:
+    if theirs in hashes:
         raise WireError(
             f"board and host both call a protocol {theirs[0]}.{theirs[1]} but mean different "
-            f"schemas (board {board.schema_hash:08x}, host {known[theirs]:08x})",
+            f"schemas (board {board.schema_hash:08x}, host {hashes[theirs]:08x})",
             where=where,
             hint=f"one is a development build: {_UPDATE_BOARD}",
         )

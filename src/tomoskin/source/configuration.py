@@ -31,7 +31,7 @@ class Configuration:
     """Identity and commands; request ids are filled in when a command is sent.
 
     The identity is a checksum of ``scan`` and ``patterns``, never 0: the same scan has the same
-    identity on every host, and frames of another scan are told apart.
+    identity on every host, and frames of another scan are recognised.
     """
 
     identity: int

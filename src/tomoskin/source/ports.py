@@ -31,7 +31,7 @@ AUTO = "auto"
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """A serial port; ``board`` says what is behind it, empty when that is not known."""
+    """A serial port; ``board`` says what is behind it, empty where nobody knows."""
 
     device: str
     board: str

@@ -32,14 +32,14 @@ class LineQuality:
     """Watches what share of the messages arrives damaged."""
 
     def __init__(self) -> None:
-        """A line of which nothing is known."""
+        """A line that has carried nothing yet."""
         self._messages = self._corrupt = 0
 
     def slower(self, counters: Counters, rate: int) -> int | None:
         """The rate to fall back to from ``rate``, where this one damages too much; else None."""
         corrupt = counters.corrupt - self._corrupt
-        seen = counters.messages - self._messages + corrupt
-        if seen < _WINDOW and corrupt < _DAMAGED:
+        came = counters.messages - self._messages + corrupt
+        if came < _WINDOW and corrupt < _DAMAGED:
             return None
         self.forget(counters)
         if corrupt < _DAMAGED:

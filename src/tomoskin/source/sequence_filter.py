@@ -1,4 +1,4 @@
-"""Only frames of this scan, in order, pass; what is missing or foreign is counted and said."""
+"""Only frames of this scan, in order, pass; what is missing or foreign is counted and reported."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tomoskin.source.configuration import Configuration
 
 _MODULUS = 2**32
 _ANY = -1
-"""Stands for the number of a frame that may be any."""
+"""The expected number of a frame that may have any."""
 
 
 @dataclass(frozen=True, slots=True)

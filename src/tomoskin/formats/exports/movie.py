@@ -82,10 +82,10 @@ def _encoded(command: list[str], first: NDArray[np.uint8], rest: Pictures) -> st
     """Feed a program; why it failed, or ""."""
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         _feed(process, first, rest)
-        _, said = process.communicate()
+        _, errors = process.communicate()
     if not process.returncode:
         return ""
-    text = said.decode(errors="replace").strip().splitlines()
+    text = errors.decode(errors="replace").strip().splitlines()
     return text[-1] if text else f"ffmpeg ended with {process.returncode}"
 
 

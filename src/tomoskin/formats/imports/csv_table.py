@@ -1,7 +1,7 @@
 """The interchange file as text: a header, then one frame a line.
 
 Columns ``v_SOURCE_SINK_PLUS_MINUS`` (V) or ``dv_…``, electrodes from 0; optional ``time_s``, and
-``x_m`` and ``y_m`` for the known place of a single touch. Comma between columns, decimal point.
+``x_m`` and ``y_m`` for the true position of a single touch. Comma between columns, decimal point.
 """
 
 from __future__ import annotations

@@ -94,8 +94,8 @@ def _flat_rows(variables: Mapping[str, Any], source: str) -> tuple[IntArray, Int
     drives = pairs_of(np.atleast_2d(_dense(variables["stim"], source)), "drive", source)
     measure = pairs_of(np.atleast_2d(_dense(variables["meas"], source)), "measurement", source)
     index = _dense(variables["meas_stim"], source).reshape(-1)
-    whole = (index == np.round(index)) & (index >= 1) & (index <= len(drives))
-    if len(index) != len(measure) or not whole.all():
+    is_number = (index == np.round(index)) & (index >= 1) & (index <= len(drives))
+    if len(index) != len(measure) or not is_number.all():
         raise DataError(
             f"expected meas_stim of {len(measure)} drives from 1 to {len(drives)}", where=source
         )

@@ -44,12 +44,12 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     """
     skipped = Skipped()
     blocks = _blocks(lines, skipped)
-    whole = [block for block in blocks if len(block.values) in _SIZES]
-    n_values = len(whole[0].values) if whole else 0
+    complete = [block for block in blocks if len(block.values) in _SIZES]
+    n_values = len(complete[0].values) if complete else 0
     for block in blocks:
         if len(block.values) != n_values or not n_values:
             skipped.add(block.line, "parts of torn frames", 1 + len(block.values))
-    kept = [block for block in whole if len(block.values) == n_values]
+    kept = [block for block in complete if len(block.values) == n_values]
     frames = [block.values for block in kept if not block.is_origin]
     if not frames:
         held = f"{len(blocks[0].values)} in the first" if blocks else "no frame"

@@ -2,7 +2,7 @@
 
 EIDORS' sample recordings in the form ``v`` (n_frames, 256), ``inj`` and ``meas`` (256, 2),
 ``valid`` (256,); optional ``v_ref`` (256,), ``fps`` and ``electrode_xy`` (…, 16, 2). Three
-things differ from file to file and are told from the data themselves:
+things differ from file to file and are recognised from the data themselves:
 
 - layout: a full 16 × 16 scan, or 208 values packed drive by drive from the pair behind the
   driven one on (the remaining 48 are auxiliary). Reciprocity holds in the right one only.
