@@ -10,31 +10,47 @@ from typing import Any
 ROOMS = {
     "live": ("pipeline", "run", "server", "recording", "formats", "calibration"),
     "session": ("recording", "formats", "calibration", "signal", "core"),
-    "touch": ("calibration",),
+    "touch": ("touch", "calibration"),
 }
 """Where the names of a former room are looked for."""
 
 RENAMED = {
-    "Conversation": "ProtocolSession",
-    "FrameGate": "SequenceFilter",
-    "StateClassifier": "Classifier",
-    "StateReading": "ClassReading",
-    "Teller": "FrameClassifier",
-    "read_bends": "BENDS.read",
-    "read_calibration": "TOUCH.read",
-    "read_states": "CLASSES.read",
-    "unpack_bends": "BENDS.decode",
-    "unpack_calibration": "TOUCH.decode",
-    "unpack_states": "CLASSES.decode",
+    "calibration": {
+        "StateClassifier": "Classifier",
+        "StateReading": "ClassReading",
+        "Teller": "FrameClassifier",
+        "read_bends": "BENDS.read",
+        "read_calibration": "TOUCH.read",
+        "read_states": "CLASSES.read",
+        "unpack_bends": "BENDS.decode",
+        "unpack_calibration": "TOUCH.decode",
+        "unpack_states": "CLASSES.decode",
+    },
+    "core": {"Reading": "Detection"},
+    "inverse": {
+        "MOST_LEFT_OUT": "MOST_EXCLUDED",
+        "Pictures": "ImageSeries",
+        "SourceMetrics": "ThesisMetrics",
+        "pictures": "image_series",
+    },
+    "pipeline": {"Result": "FrameResult"},
+    "signal": {"Blind": "NuisanceSubspace", "lost_directions": "nuisance_directions"},
+    "source": {"Conversation": "ProtocolSession", "FrameGate": "SequenceFilter"},
+    "touch": {
+        "NoiseFloor": "ImageNoise",
+        "Promise": "ResolutionBounds",
+        "WHOLE": "EXHAUSTIVE",
+        "promise": "resolution_bounds",
+    },
 }
-"""What a name is called now; after a point, an attribute of it."""
+"""What the names of a room are called now; after a point, an attribute of it."""
 
 
 def moved(room: str, name: str) -> Any:
     """What ``tomoskin.room.name`` is now. Raises AttributeError where there is no such name."""
-    now = RENAMED.get(name, name)
-    first, *rest = now.split(".")
-    for new in ROOMS.get(room, (room,)):
+    for new in ROOMS.get(room, ()) or (room,):
+        now = RENAMED.get(new, {}).get(name, name)
+        first, *rest = now.split(".")
         found = import_module(f"tomoskin.{new}")
         if first in found.__all__:
             old = f"tomoskin.{room}.{name}"

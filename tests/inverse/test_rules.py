@@ -24,8 +24,8 @@ from tomoskin.inverse import (
     choose,
     noise_figure,
 )
+from tomoskin.inverse.choice.alpha_choice import Explanation, Level, crossing
 from tomoskin.inverse.choice.criteria import by_noise_figure, corner, in_the_middle
-from tomoskin.inverse.choice.evidence import Explanation, Level, crossing
 from tomoskin.pattern import Pattern
 
 SIGMA = 1e-5

@@ -1,7 +1,7 @@
 """From a change of voltages to a change of conductivity."""
 
+from tomoskin.inverse.choice.alpha_choice import AlphaChoice, Curve, Evidence
 from tomoskin.inverse.choice.criteria import RULES, choose
-from tomoskin.inverse.choice.evidence import AlphaChoice, Curve, Evidence
 from tomoskin.inverse.choice.light_touch import LightTouch
 from tomoskin.inverse.dispersion import Cole, Regions, cole_of_regions
 from tomoskin.inverse.frequency_difference import (
@@ -10,8 +10,8 @@ from tomoskin.inverse.frequency_difference import (
     weighted_change,
 )
 from tomoskin.inverse.greit.merit import Merit, figures, noise_figure
-from tomoskin.inverse.greit.operator import Greit
 from tomoskin.inverse.greit.targets import Targets, along
+from tomoskin.inverse.greit.trained import Greit
 from tomoskin.inverse.greit.trainer import Desired
 from tomoskin.inverse.iterative.absolute import Absolute, AbsoluteImaging, homogeneous
 from tomoskin.inverse.iterative.field import RandomField

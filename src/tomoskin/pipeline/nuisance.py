@@ -50,7 +50,7 @@ class Drift:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NuisanceSubspace:
+class FrameSubspace:
     """What one frame cannot tell.
 
     Attributes
@@ -82,11 +82,11 @@ class Nuisance:
         self._prepared, self._scale, self._drift = prepared, scale, drift
         self._calibrated = prepared.directions
         self._null_space = _null_space(prepared)
-        self._kept: dict[tuple[int, bytes], NuisanceSubspace] = {}
-        self._newest: tuple[Health | None, int, NuisanceSubspace] | None = None
+        self._kept: dict[tuple[int, bytes], FrameSubspace] = {}
+        self._newest: tuple[Health | None, int, FrameSubspace] | None = None
 
-    def __call__(self, health: Health | None) -> NuisanceSubspace:
-        """NuisanceSubspace of a frame; a monitor gives the same record while all is well."""
+    def __call__(self, health: Health | None) -> FrameSubspace:
+        """FrameSubspace of a frame; a monitor gives the same record while all is well."""
         revision = self._drift.revision
         newest = self._newest
         if newest is not None and newest[0] is health and newest[1] == revision:
@@ -99,11 +99,11 @@ class Nuisance:
         self._newest = health, revision, self._kept[key]
         return self._kept[key]
 
-    def _made(self, health: Health | None) -> NuisanceSubspace:
+    def _made(self, health: Health | None) -> FrameSubspace:
         drift, excluded = self._drift.directions, self._excluded(health)
         parts = [drift[:, 1:] if self._null_space.shape[1] else drift, self._calibrated, excluded]
         blind = self._blind(np.hstack(parts) / self._scale[:, None])
-        return NuisanceSubspace(blind, np.hstack([drift, excluded]))
+        return FrameSubspace(blind, np.hstack([drift, excluded]))
 
     def _excluded(self, health: Health | None) -> FloatArray:
         pattern = self._prepared.pattern

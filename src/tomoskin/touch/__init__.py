@@ -3,7 +3,7 @@
 from typing import Any
 
 from tomoskin._moved import moved
-from tomoskin.touch.design import Demand, Promise, Variant, promise, variants
+from tomoskin.touch.bounds import Demand, Promise, Variant, promise, variants
 from tomoskin.touch.fit.finder import SpotFinder, SpotModel
 from tomoskin.touch.fit.noise import Whitener, measured_covariance
 from tomoskin.touch.fit.pace import LIVE, WHOLE, Pace

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tomoskin.core import DataError, FloatArray, IntArray, ModelError
-from tomoskin.inverse.choice.evidence import (
+from tomoskin.inverse.choice.alpha_choice import (
     AlphaChoice,
     Curve,
     Evidence,

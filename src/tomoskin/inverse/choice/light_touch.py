@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from tomoskin.core import FloatArray
-from tomoskin.inverse.choice.evidence import AlphaChoice, Curve, Evidence
+from tomoskin.inverse.choice.alpha_choice import AlphaChoice, Curve, Evidence
 from tomoskin.inverse.linear.spectrum import Spectrum
 from tomoskin.mesh import Mesh
 

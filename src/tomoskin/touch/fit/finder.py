@@ -19,7 +19,7 @@ from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.pace import WHOLE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Problem, SheetDomain, Weigh
-from tomoskin.touch.fit.residual import ResidualResponse
+from tomoskin.touch.fit.residual_noise import ResidualResponse
 from tomoskin.touch.fit.search import Search, SpotDetections, joined
 from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
 
