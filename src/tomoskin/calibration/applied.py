@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, Image, Reading
-from tomoskin.touch import NoiseFloor, Response
+from tomoskin.core import Detection, FloatArray, Image
+from tomoskin.touch import ImageNoise, Response
 
 BoolArray = NDArray[np.bool_]
 
@@ -41,7 +41,7 @@ class FrameView:
 
     time: float
     image: Image
-    image_noise: NoiseFloor | None
+    image_noise: ImageNoise | None
     dv: FloatArray
     nuisance: FloatArray
     change: FloatArray
@@ -55,7 +55,7 @@ class FrameView:
         return np.where(self.excluded, np.nan, self.from_rest)
 
 
-Detect = Callable[[FrameView, list[Reading]], list[Reading]]
+Detect = Callable[[FrameView, list[Detection]], list[Detection]]
 """Touches fitted to the data of a frame, given those that the skin's own method found."""
 
 
@@ -85,12 +85,12 @@ class Applied:
 
     moved: FloatArray | float = 0.0
 
-    def locate(self, view: FrameView, detections: list[Reading]) -> list[Reading]:
+    def locate(self, view: FrameView, detections: list[Detection]) -> list[Detection]:
         """Detections with better positions."""
         del view
         return detections
 
-    def read(self, view: FrameView, detections: list[Reading], *, touched: bool) -> Any | None:
+    def read(self, view: FrameView, detections: list[Detection], *, touched: bool) -> Any | None:
         """What the frame says of the calibration's subject.
 
         ``touched``: whether a touch stands, by one who has tracked the frames before.

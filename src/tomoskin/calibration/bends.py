@@ -12,7 +12,7 @@ from tomoskin.calibration.bending.examples import BendExamples
 from tomoskin.calibration.bending.model import BendModel
 from tomoskin.calibration.bending.reader import BendReader, BendReading
 from tomoskin.calibration.kind import Calibration, Kind, Progress, located
-from tomoskin.core import Arrays, DataError, FloatArray, IntArray, Reading, real_numbers
+from tomoskin.core import Arrays, DataError, Detection, FloatArray, IntArray, real_numbers
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
 
@@ -30,7 +30,7 @@ class BendApplied(Applied):
         self._reader = BendReader(model, fit.response, fit.gain)
         self._detect = fit.detect
 
-    def read(self, view: FrameView, detections: list[Reading], *, touched: bool) -> BendReading:
+    def read(self, view: FrameView, detections: list[Detection], *, touched: bool) -> BendReading:
         """How the sheet is bent in this frame."""
         touches = self._detect(view, detections)
         reading = self._reader.push(view.change, touches, view.drift, view.time, touched=touched)

@@ -20,9 +20,9 @@ from tomoskin.calibration.kind import Calibration, Kind, Progress, located
 from tomoskin.core import (
     Arrays,
     DataError,
+    Detection,
     FloatArray,
     IntArray,
-    Reading,
     real_numbers,
     whole_number,
 )
@@ -97,7 +97,7 @@ class ClassesApplied(Applied):
     def __init__(self, frames: FrameClassifier) -> None:
         self._frames = frames
 
-    def read(self, view: FrameView, detections: list[Reading], *, touched: bool) -> ClassReading:
+    def read(self, view: FrameView, detections: list[Detection], *, touched: bool) -> ClassReading:
         """The class of this frame."""
         del detections, touched
         return self._frames(view.since_reference)

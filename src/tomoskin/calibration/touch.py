@@ -16,7 +16,7 @@ from tomoskin.calibration.applied import Applied, Conditions, FrameView, without
 from tomoskin.calibration.kind import Calibration, Kind, Progress, located
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
-from tomoskin.core import Arrays, DataError, IntArray, Reading, real_numbers
+from tomoskin.core import Arrays, DataError, Detection, IntArray, real_numbers
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
 from tomoskin.touch import Region
@@ -31,7 +31,7 @@ class LocatedTouch(Applied):
     def __init__(self, locator: Locator) -> None:
         self._locator = locator
 
-    def locate(self, view: FrameView, detections: list[Reading]) -> list[Reading]:
+    def locate(self, view: FrameView, detections: list[Detection]) -> list[Detection]:
         """The strongest detection, at the position that the presses tell."""
         if not detections:
             return []

@@ -69,7 +69,7 @@ def design(
     """
     from tomoskin.formats import write_promise
     from tomoskin.skin import Skin
-    from tomoskin.touch import Demand, promise
+    from tomoskin.touch import Demand, resolution_bounds
 
     counts = _counts(electrodes)
     chosen = Skin.load(skin)
@@ -78,7 +78,7 @@ def design(
     demand = Demand(size, depth, false_alarm, found)
     with Bar("bounding") as bar:
         jobs = 1 + len(counts) * len(patterns.split(","))
-        own = promise(chosen, demand, _PLACES, _part(bar, 0, jobs))
+        own = resolution_bounds(chosen, demand, _PLACES, _part(bar, 0, jobs))
         rows = _compared(chosen, demand, counts, patterns.split(","), bar)
     radius_m = demand.on(chosen.mesh())
     if out is not None:
@@ -127,7 +127,7 @@ def _compared(
 ) -> list[dict[str, Any]]:
     from tomoskin.core import TomoskinError
     from tomoskin.pattern import Scan
-    from tomoskin.touch import promise, variants
+    from tomoskin.touch import resolution_bounds, variants
 
     rows: list[dict[str, Any]] = []
     jobs = 1 + len(counts) * len(patterns)
@@ -137,7 +137,7 @@ def _compared(
             rows.append(row | {"fault": variant.fault})
             continue
         try:
-            bound = promise(variant.skin, demand, _COARSE, _part(bar, number, jobs))
+            bound = resolution_bounds(variant.skin, demand, _COARSE, _part(bar, number, jobs))
         except TomoskinError as error:
             rows.append(row | {"fault": error.message})
             continue

@@ -119,7 +119,7 @@ def _lines(result: Reconstruction, prepared: Prepared) -> Iterator[str]:
         yield ", ".join(f"{name}: {count} frames" for name, count in Counter(names).items())
     for frame, touches in list(zip(result.frames.tolist(), result.touches, strict=True))[:_SHOWN]:
         for t in touches:
-            r = t.reading
+            r = t.detection
             yield (
                 f"frame {frame:>4}  touch {t.id:>3}  x {1e3 * r.x:+7.1f} mm  y {1e3 * r.y:+7.1f} mm"
                 f"  area {1e6 * r.area:7.0f} mm²  peak {r.peak:+.3g} {result.unit}"
@@ -180,7 +180,13 @@ def _document(result: Reconstruction, prepared: Prepared) -> dict[str, Any]:
             if state
         ],
         "touches": [
-            {"frame": f, "id": t.id, "x_m": t.reading.x, "y_m": t.reading.y, "peak": t.reading.peak}
+            {
+                "frame": f,
+                "id": t.id,
+                "x_m": t.detection.x,
+                "y_m": t.detection.y,
+                "peak": t.detection.peak,
+            }
             for f, touches in zip(result.frames.tolist(), result.touches, strict=True)
             for t in touches
         ],

@@ -16,12 +16,12 @@ from tomoskin.pipeline.records import Measured
 from tomoskin.signal import (
     Baseline,
     BaselineState,
-    Blind,
     Health,
     Monitor,
+    NuisanceSubspace,
     Reference,
     difference,
-    lost_directions,
+    nuisance_directions,
 )
 
 MOST_NUISANCE = 0.5
@@ -88,7 +88,7 @@ class Conditioning(Protocol):
         """How the baseline is."""
         ...
 
-    def subspace(self) -> Blind | None:
+    def subspace(self) -> NuisanceSubspace | None:
         """The nuisance subspace of late."""
         ...
 
@@ -175,7 +175,7 @@ class Followed:
         self._given = self._prepared = prepared
         health = self._health
         if health is not None and health.sick:
-            lost = lost_directions(prepared.pattern, health.lost, health.floating)
+            lost = nuisance_directions(prepared.pattern, health.lost, health.floating)
             self._prepared = prepared.blind_to(lost / self._scale[:, None])
         self._nuisance = Nuisance(self._prepared, self._scale, self._drift)
 
@@ -199,7 +199,7 @@ class Followed:
         """See :class:`Conditioning`."""
         return self._baseline.state
 
-    def subspace(self) -> Blind:
+    def subspace(self) -> NuisanceSubspace:
         """See :class:`Conditioning`."""
         return self._nuisance(self._health).blind
 

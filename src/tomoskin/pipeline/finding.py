@@ -8,11 +8,11 @@ from typing import Protocol
 import numpy as np
 
 from tomoskin.calibration import FrameView, TouchFit
-from tomoskin.core import FloatArray, Reading
+from tomoskin.core import Detection, FloatArray
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import Reference
 from tomoskin.source import Configuration, ScanSettings
-from tomoskin.touch import WHOLE, Pace, SpotFinder, SpotModel, measured_covariance
+from tomoskin.touch import EXHAUSTIVE, Pace, SpotFinder, SpotModel, measured_covariance
 
 
 class Finder(Protocol):
@@ -22,7 +22,7 @@ class Finder(Protocol):
         """Go on with another operator or noise."""
         ...
 
-    def push(self, view: FrameView) -> list[Reading]:
+    def push(self, view: FrameView) -> list[Detection]:
         """Readings of a frame, strongest first."""
         ...
 
@@ -38,7 +38,7 @@ class InImage:
         del reference
         self._segmenter = prepared.segmenter
 
-    def push(self, view: FrameView) -> list[Reading]:
+    def push(self, view: FrameView) -> list[Detection]:
         """See :class:`Finder`."""
         return self._segmenter(view.image, view.image_noise)
 
@@ -51,7 +51,7 @@ class InData:
         model: SpotModel,
         prepared: Prepared,
         reference: Reference | None,
-        pace: Pace = WHOLE,
+        pace: Pace = EXHAUSTIVE,
     ) -> None:
         gain = _gain(model, prepared, reference)
         noise = _noise(prepared, reference, gain)
@@ -68,12 +68,12 @@ class InData:
         gain = _gain(self.model, prepared, reference)
         self._spots.renew(_noise(prepared, reference, gain), gain)
 
-    def push(self, view: FrameView) -> list[Reading]:
+    def push(self, view: FrameView) -> list[Detection]:
         """See :class:`Finder`."""
         return self._spots.push(view.dv, view.nuisance)
 
 
-def finding(prepared: Prepared, reference: Reference | None, pace: Pace = WHOLE) -> Finder:
+def finding(prepared: Prepared, reference: Reference | None, pace: Pace = EXHAUSTIVE) -> Finder:
     """What finds the touches: the method that the skin names, unless a calibration locates them.
 
     Fitted touches are those of a sheet that conducts by direction as its reference tells.
@@ -117,7 +117,7 @@ class Fitting:
 
 def _spots(spots: SpotModel, reference: Reference | None) -> SpotModel:
     """On the sheet as its reference tells of it."""
-    return spots if reference is None else spots.as_told(reference.mean)
+    return spots if reference is None else spots.fitted_to(reference.mean)
 
 
 def voltage_covariance(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.calibration import FrameView
-from tomoskin.core import FloatArray, Image, Reading, Touch
+from tomoskin.core import Detection, FloatArray, Image, Touch
 from tomoskin.pattern import Scan
 from tomoskin.pipeline.collecting import Rest
 from tomoskin.pipeline.conditioning import (
@@ -159,7 +159,9 @@ class Following:
             excluded=conditioned.excluded,
         )
 
-    def _read(self, view: FrameView, detections: list[Reading], *, touched: bool) -> dict[str, Any]:
+    def _read(
+        self, view: FrameView, detections: list[Detection], *, touched: bool
+    ) -> dict[str, Any]:
         readings = {
             kind: applied.read(view, detections, touched=touched)
             for kind, applied in self._applied.items()

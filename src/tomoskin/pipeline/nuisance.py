@@ -9,7 +9,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.signal import Baseline, Blind, Health, Reference, lost_directions
+from tomoskin.signal import Baseline, Health, NuisanceSubspace, Reference, nuisance_directions
 
 _KEPT = 8
 """Sets of excluded measurements whose subspace is remembered."""
@@ -61,7 +61,7 @@ class FrameSubspace:
         (n_meas, k) V: directions of drift and of excluded measurements alone.
     """
 
-    blind: Blind
+    blind: NuisanceSubspace
     drift: FloatArray
 
 
@@ -109,11 +109,11 @@ class Nuisance:
         pattern = self._prepared.pattern
         if health is None:
             return np.zeros((pattern.n_meas, 0))
-        return lost_directions(pattern, health.lost, health.floating)
+        return nuisance_directions(pattern, health.lost, health.floating)
 
-    def _blind(self, directions: FloatArray) -> Blind:
+    def _blind(self, directions: FloatArray) -> NuisanceSubspace:
         operator, images = self._prepared.operator, self._null_space
-        blind = Blind.of(directions, operator.precision)
+        blind = NuisanceSubspace.of(directions, operator.precision)
         if not images.shape[1]:
             return blind
         data = (self._prepared.problem.jacobian @ images).real

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray
-from tomoskin.inverse import MOST_LEFT_OUT, Evidence
+from tomoskin.inverse import MOST_EXCLUDED, Evidence
 from tomoskin.pattern import Pattern
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import Consecutive, Recording, Reference, difference, in_phase
@@ -134,7 +134,7 @@ class _Left:
     def of(cls, prepared: Prepared, recording: Recording, dead: IntArray) -> _Left:
         living = np.delete(recording.voltages, dead, axis=1)
         missing = ~np.isfinite(living)
-        most = MOST_LEFT_OUT * recording.voltages.shape[1] - len(dead)
+        most = MOST_EXCLUDED * recording.voltages.shape[1] - len(dead)
         enough = missing.sum(axis=1) <= most
         if not enough.any():
             raise DataError("no frame has finite values in enough rows", where=recording.source)
@@ -277,7 +277,7 @@ def dead_rows(
     rows = np.flatnonzero(np.any(dead, axis=0))
     if len(rows) == pattern.n_meas:
         raise DataError("no frame has finite values", where=source)
-    if len(rows) > MOST_LEFT_OUT * pattern.n_meas:
+    if len(rows) > MOST_EXCLUDED * pattern.n_meas:
         listed = "; ".join(pattern.row_text(row) for row in rows[:_LISTED])
         raise DataError(
             f"{len(rows)} of {pattern.n_meas} rows hold no finite values, too many to leave out: "

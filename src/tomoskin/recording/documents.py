@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from tomoskin.core import Event, Reading, Touch
+from tomoskin.core import Detection, Event, Touch
 
 _NO_CELLS = np.empty(0, dtype=np.int64)
 
@@ -53,7 +53,7 @@ def touches_message(host_time: float, sequence: int, touches: Sequence[Touch]) -
 
 def touch_row(touch: Touch) -> dict[str, Any]:
     """One touch as plain values by name."""
-    r = touch.reading
+    r = touch.detection
     return {
         "id": touch.id, "kind": touch.kind, "since": touch.since,
         "x": r.x, "y": r.y, "sd_x": r.sd_x, "sd_y": r.sd_y, "area": r.area, "peak": r.peak,
@@ -82,7 +82,7 @@ def _touch_of(item: dict[str, Any]) -> Touch:
     sd_x, sd_y = (float("nan") if item[k] is None else item[k] for k in ("sd_x", "sd_y"))
     place = item["x"], item["y"], sd_x, sd_y, item["area"], item["peak"], _NO_CELLS
     cov_xy, close, merged = (item.get(k) for k in ("cov_xy", "close", "merged"))  # format 1.0: none
-    reading = Reading(*place, cov_xy=cov_xy or 0.0, close=bool(close))
+    reading = Detection(*place, cov_xy=cov_xy or 0.0, close=bool(close))
     return Touch(item["id"], item["kind"], item["since"], reading, tuple(merged or ()))
 
 
