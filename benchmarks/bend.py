@@ -13,7 +13,7 @@ import numpy as np
 
 from report import Report
 from tomoskin.calibration import BendExamples, BendModel, JointReference
-from tomoskin.core import FloatArray, Frame, Reading
+from tomoskin.core import Detection, FloatArray, Frame
 from tomoskin.mesh import Cylinder, Hinge
 from tomoskin.pipeline import Pipeline, Result
 from tomoskin.pipeline.finding import View, finding, voltage_covariance
@@ -162,7 +162,7 @@ class Bench:
         self.frame((), pose, REST)
         return Reference.of(self.frames(IDLE, pose))
 
-    def finder(self, reference: Reference) -> Callable[[FloatArray, FloatArray], list[Reading]]:
+    def finder(self, reference: Reference) -> Callable[[FloatArray, FloatArray], list[Detection]]:
         """What finds touches in V less the reference, beside directions that say nothing."""
         found = finding(self.lab.prepared, reference)
         image = self.lab.image
@@ -210,7 +210,7 @@ class Bench:
                 raise AssertionError("every frame is read")
             told = result.bend
             (out.touched if on else out.free).append(told.angle - math.radians(angle))
-            readings = [touch.reading for touch in result.touches]
+            readings = [touch.detection for touch in result.touches]
             if on and steady:
                 out.places.append(missed(readings, press))
                 if len(out.places) % PLAIN == 0:
@@ -254,12 +254,12 @@ class Plain:
     def __init__(self, bench: Bench) -> None:
         self._find = bench.finder(bench.flat)
 
-    def __call__(self, result: Result) -> list[Reading]:
+    def __call__(self, result: Result) -> list[Detection]:
         """Of one frame."""
         return self._find(result.voltages - result.reference, result.reference[:, None])
 
 
-def missed(readings: Sequence[Reading], press: Sequence[Press]) -> float:
+def missed(readings: Sequence[Detection], press: Sequence[Press]) -> float:
     """M from the press to the strongest touch that was found; a radius of the skin where none."""
     if not readings:
         return 0.1

@@ -167,7 +167,7 @@ def _long(skin: Skin, kelvin: float, how: str) -> tuple[object, ...]:
         near = [t for t in result.touches if missed_by([t], place) < 30]
         ghosts += len(result.touches) - len(near)
         if near:
-            peaks.append(near[0].reading.peak)
+            peaks.append(near[0].detection.peak)
             missed.append(missed_by(near, place))
             ids.add(near[0].id)
     after = [bool(r.touches) for r in rig.push(pipeline, round(60 / rig.interval))]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from report import Report
 from tomoskin.core import FloatArray
 from tomoskin.pattern import Pattern
-from tomoskin.signal import Baseline, Blind, Monitor, Reference
+from tomoskin.signal import Baseline, Monitor, NuisanceSubspace, Reference
 
 IDLE = 20
 """First frames of a recording that make its reference."""
@@ -123,8 +123,8 @@ def _drifted(pattern: Pattern, values: FloatArray) -> tuple[object, ...]:
     return len(values), round(float(change), 1), *medians, 1 + modes.shape[1]
 
 
-def _plain(directions: FloatArray, noise: FloatArray) -> Blind:
-    return Blind.of(directions / noise[:, None], np.eye(len(noise)))
+def _plain(directions: FloatArray, noise: FloatArray) -> NuisanceSubspace:
+    return NuisanceSubspace.of(directions / noise[:, None], np.eye(len(noise)))
 
 
 def _rms(values: FloatArray) -> float:

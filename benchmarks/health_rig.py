@@ -59,5 +59,5 @@ def places(random: np.random.Generator, count: int, reach: float) -> FloatArray:
 
 def missed_by(touches: Iterable[Touch], place: FloatArray) -> float:
     """mm from ``place`` to the nearest touch; NaN where there is none."""
-    away = [1e3 * np.hypot(t.reading.x - place[0], t.reading.y - place[1]) for t in touches]
+    away = [1e3 * np.hypot(t.detection.x - place[0], t.detection.y - place[1]) for t in touches]
     return float(min(away, default=np.nan))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Image, Reading, Touch
+from tomoskin.core import Detection, Image, Touch
 from tomoskin.pipeline import Prepared, Result, colour_limit
 from tomoskin.run import Runner, Snapshot
 from tomoskin.server import Door, Hub, Server, SettingsDesk, application, listen
@@ -92,8 +92,8 @@ def _touch(places: np.ndarray, number: int, step: int) -> Touch:
     angle = 2 * np.pi * step / STEPS + 3 * number
     x, y = 0.05 * np.cos(angle), 0.05 * np.sin(angle)
     near = np.flatnonzero(np.hypot(*(places - (x, y)).T) < 0.02)
-    reading = Reading(x, y, 1e-3, 2e-3, 1e-3, -0.1, near, cov_xy=1e-6)
-    return Touch(id=number + 1, since=0.0, reading=reading, kind="decrease")
+    reading = Detection(x, y, 1e-3, 2e-3, 1e-3, -0.1, near, cov_xy=1e-6)
+    return Touch(id=number + 1, since=0.0, detection=reading, kind="decrease")
 
 
 def _no_source() -> Any:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from report import Report
-from tomoskin.core import Frame, Reading
+from tomoskin.core import Detection, Frame
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.finding import Finder, View, finding
 from tomoskin.pipeline.tune import tuned
@@ -137,7 +137,7 @@ class Missed:
     counts: Floats
 
     @classmethod
-    def of(cls, presses: Sequence[Press], readings: Sequence[Sequence[Reading]]) -> Missed:
+    def of(cls, presses: Sequence[Press], readings: Sequence[Sequence[Detection]]) -> Missed:
         errors, distances = [], []
         for press, found in zip(presses, readings, strict=True):
             best = min(found, key=lambda r: np.hypot(r.x - press.x, r.y - press.y), default=None)
@@ -220,7 +220,7 @@ def _numbers() -> Report:
     )
 
 
-def _matched(presses: Sequence[Press], found: Sequence[Reading]) -> tuple[int, int, Floats]:
+def _matched(presses: Sequence[Press], found: Sequence[Detection]) -> tuple[int, int, Floats]:
     """Presses that were found, readings of none, and errors of the former."""
     if not found:
         return 0, 0, np.empty(0)
@@ -271,7 +271,7 @@ def _moved(presses: Sequence[Press], by: float) -> tuple[Press, ...]:
     return tuple(out)
 
 
-def _timed(finder: Finder, views: Sequence[View]) -> tuple[list[list[Reading]], Sequence[float]]:
+def _timed(finder: Finder, views: Sequence[View]) -> tuple[list[list[Detection]], Sequence[float]]:
     """Readings, and median and longest processor time, ms."""
     found, taken = [], []
     for view in views:

@@ -16,7 +16,7 @@ import numpy as np
 from report import Report, progress
 from tomoskin import Locator, Skin
 from tomoskin.calibration import Several
-from tomoskin.core import DataError, Reading
+from tomoskin.core import DataError, Detection
 from tomoskin.pipeline import Pipeline, Prepared, Result, prepare
 from tomoskin.recording import SessionReader
 from tomoskin.run import simulate
@@ -163,7 +163,7 @@ def _judged(frames: list[Frame]) -> tuple[bool, bool, float, float]:
         apart = all(t.said == t.kind for t in touches)
         said += len(touches) == 2 or not apart
         if len(touches) == 2 and apart:
-            away = [[_away(t.reading, p) for p in presses] for t in touches]
+            away = [[_away(t.detection, p) for p in presses] for t in touches]
             swapped = away[0][0] + away[1][1] > away[0][1] + away[1][0]
             owners.append({touches[k].id: k ^ swapped for k in (0, 1)})
     right = bool(owners) and owners[0] == owners[-1] and len(ids) == 2
@@ -325,7 +325,7 @@ def _cost() -> Report:
     for number in range(2000):
         moved = 0.001 * rng.standard_normal((5, 2))
         readings = [
-            Reading(0.03 * k + x, y, 1e-3, 1e-3, 7e-4, -1.0, np.array([k]), snr=50.0)
+            Detection(0.03 * k + x, y, 1e-3, 1e-3, 7e-4, -1.0, np.array([k]), snr=50.0)
             for k, (x, y) in enumerate(moved)
         ]
         start = time.process_time()
@@ -366,7 +366,7 @@ def _changes(path: Path) -> np.ndarray:
         return np.asarray(kept["v_down"].astype(float) - kept["v_up"])
 
 
-def _away(reading: Reading, press: tuple[float, float, float]) -> float:
+def _away(reading: Detection, press: tuple[float, float, float]) -> float:
     return float(np.hypot(reading.x - press[0], reading.y - press[1]))
 
 

@@ -22,7 +22,7 @@ import numpy as np
 import figures
 from imaging import FRAMES, NOSER, Imager, named_metrics
 from lab import Lab, open_lab, report
-from tomoskin.core import FloatArray, Image, Reading
+from tomoskin.core import Detection, FloatArray, Image
 from tomoskin.signal import Reference
 from tomoskin.twin import Circle, Probe
 
@@ -38,7 +38,7 @@ STAGES = {
 }
 """Probes that are on in each stage."""
 
-Shown = tuple[str, Image, list[Reading]]
+Shown = tuple[str, Image, list[Detection]]
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:

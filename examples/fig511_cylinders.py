@@ -24,13 +24,13 @@ import figures
 from fig58_single_press import elongation
 from imaging import NOSER, Imager
 from lab import Lab, open_lab, report
-from tomoskin.core import Image, Reading
+from tomoskin.core import Detection, Image
 from tomoskin.mesh import Hinge
 from tomoskin.twin import Bent, Circle, Pose, Probe
 
 PART, LONGER, ROUND = 0.7, 1.7, 1.5
 PRESS = Probe(Circle(18e-3), 30e-3, 20e-3, 5.0)
-Shown = tuple[str, Image, Reading]
+Shown = tuple[str, Image, Detection]
 
 
 def over(radius: float, degrees: float) -> Pose:
@@ -93,7 +93,7 @@ def check(imager: Imager, shown: Sequence[Shown]) -> dict[str, float]:
     }
 
 
-def axis_of(imager: Imager, region: Reading) -> float:
+def axis_of(imager: Imager, region: Detection) -> float:
     """Degrees between the length of a region and the cylinder's axis, y."""
     place, weight = imager.mesh.centroids[region.cells], imager.mesh.volumes[region.cells]
     offset = place - np.average(place, axis=0, weights=weight)

@@ -25,14 +25,14 @@ import figures
 from imaging import NOSER, Imager
 from lab import Lab, open_lab, report
 from tomoskin.calibration import JointReference
-from tomoskin.core import FloatArray, Image, Reading
+from tomoskin.core import Detection, FloatArray, Image
 from tomoskin.mesh import Cylinder, Hinge, Saddle
 from tomoskin.twin import Bent, Circle, Pose, Probe
 
 RADIUS, FORCE, PART = 18e-3, 5.0, 0.7
 PLACE = (25e-3, 20e-3)
 JOINT, AT, ENCODER = 0.06, 37.0, (0.0, 15.0, 30.0, 45.0)
-Shown = tuple[str, Image, list[Reading]]
+Shown = tuple[str, Image, list[Detection]]
 
 
 def arm(degrees: float) -> Pose:
@@ -101,7 +101,7 @@ def probe() -> Probe:
     return Probe(Circle(RADIUS), *PLACE, FORCE)
 
 
-def checked(name: str, regions: Sequence[Reading]) -> float:
+def checked(name: str, regions: Sequence[Detection]) -> float:
     """By how many mm the one region that there must be misses the probe."""
     assert len(regions) == 1, f"{name}: {len(regions)} regions"
     miss = missed(regions[0])
@@ -125,7 +125,7 @@ def check_joint(moved: Sequence[Shown], alone: Sequence[float]) -> dict[str, flo
     }
 
 
-def missed(region: Reading) -> float:
+def missed(region: Detection) -> float:
     """Mm from the probe."""
     return 1e3 * math.hypot(region.x - PLACE[0], region.y - PLACE[1])
 

@@ -19,7 +19,7 @@ import numpy as np
 import figures
 from imaging import NOSER, Imager, named_metrics
 from lab import Lab, open_lab, report
-from tomoskin.core import Image, Reading
+from tomoskin.core import Detection, Image
 from tomoskin.mesh import Mesh
 from tomoskin.twin import Circle, Probe
 
@@ -57,7 +57,7 @@ def places(lab: Lab) -> list[tuple[float, float]]:
 
 
 def check(
-    name: str, mesh: Mesh, regions: Sequence[Reading], place: tuple[float, float]
+    name: str, mesh: Mesh, regions: Sequence[Detection], place: tuple[float, float]
 ) -> dict[str, float]:
     """Regions found where the probe stood at ``place`` m."""
     assert len(regions) == 1, f"{name}: {len(regions)} regions"
@@ -69,7 +69,7 @@ def check(
     return {f"{name}: miss, mm": 1e3 * miss, f"{name}: length/width": long}
 
 
-def elongation(mesh: Mesh, region: Reading) -> float:
+def elongation(mesh: Mesh, region: Detection) -> float:
     """Length over width of a region: the root of the ratio of its second moments."""
     weight = mesh.volumes[region.cells]
     offset = mesh.centroids[region.cells] - np.average(
@@ -80,7 +80,7 @@ def elongation(mesh: Mesh, region: Reading) -> float:
 
 
 def draw(
-    lab: Lab, mesh: Mesh, shown: Sequence[tuple[str, Image, Reading, tuple[float, float]]]
+    lab: Lab, mesh: Mesh, shown: Sequence[tuple[str, Image, Detection, tuple[float, float]]]
 ) -> None:
     """Maps above, maps with contour and centre below, one colour scale."""
     made, axes = figures.figure(2, len(shown), (7.6, 5.2), sharex=True, sharey=True)

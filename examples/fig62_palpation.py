@@ -23,12 +23,12 @@ import figures
 from bodies import options_of
 from lab import FRAMES as SOURCE_FRAMES
 from lab import Changes, report
-from tomoskin.core import FloatArray, Frame, Reading
+from tomoskin.core import Detection, FloatArray, Frame
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import Matern, OneStep
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Scan
-from tomoskin.signal import Blind, Readout
+from tomoskin.signal import NuisanceSubspace, Readout
 from tomoskin.skin import Skin
 from tomoskin.source import ScanSettings
 from tomoskin.touch import SpotFinder, SpotModel, measured_covariance
@@ -130,7 +130,7 @@ class Palpation:
         """Of pictures."""
         return self.model.mesh
 
-    def __call__(self, stages: Stages) -> list[Reading]:
+    def __call__(self, stages: Stages) -> list[Detection]:
         """Stiff spots, strongest first."""
         finder = SpotFinder(self._spots, self.skin, self.mesh, self._noise(stages))
         return finder.push(*self.change(stages))
@@ -156,7 +156,7 @@ class Palpation:
             weights=noise**-2,
         )
         dv, unseen = self.change(stages)
-        return np.asarray(operator(Blind.of(unseen, operator.precision)(dv)).values)
+        return np.asarray(operator(NuisanceSubspace.of(unseen, operator.precision)(dv)).values)
 
     def _noise(self, stages: Stages) -> FloatArray:
         """(n_meas, n_meas) V² of the difference of two means of frames, and the misfit."""
@@ -173,7 +173,7 @@ class Palpation:
         return np.asarray(means + np.diag((MISFIT * self._state.voltages) ** 2))
 
 
-def errors(found: Sequence[Reading], balls: Sequence[Inclusion]) -> FloatArray:
+def errors(found: Sequence[Detection], balls: Sequence[Inclusion]) -> FloatArray:
     """(n_balls,) m from each ball to the nearest place that was found; inf where none was."""
     return np.array([
         min((np.hypot(one.x - ball.x, one.y - ball.y) for one in found), default=np.inf)
@@ -200,7 +200,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
 
 
 def draw(
-    palpation: Palpation, stages: Stages, found: Sequence[Reading], balls: Sequence[Inclusion]
+    palpation: Palpation, stages: Stages, found: Sequence[Detection], balls: Sequence[Inclusion]
 ) -> Figure:
     """The picture, and the pressure that made it; balls dashed, places found as crosses."""
     made, axes = figures.figure(1, 2, (7.2, 3.3), sharey=True)

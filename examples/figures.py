@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tomoskin.core import AMOUNT, CHANGE, FloatArray, IntArray, Reading
+from tomoskin.core import AMOUNT, CHANGE, Detection, FloatArray, IntArray
 from tomoskin.mesh import Mesh
 
 BLUE, ORANGE, GREEN, PALE = "#0072B2", "#D55E00", "#009E73", "#56B4E9"
@@ -87,7 +87,7 @@ def draw_electrodes(ax: Axes, mesh: Mesh) -> None:
     ax.set_xlabel("x / mm")
 
 
-def mark_region(ax: Axes, mesh: Mesh, reading: Reading, colour: str = "black") -> None:
+def mark_region(ax: Axes, mesh: Mesh, reading: Detection, colour: str = "black") -> None:
     """The contour and the centre of a found region."""
     for first, second in MM * mesh.points[_rim(mesh, reading.cells)]:
         ax.plot(*np.transpose([first, second]), color=colour, linewidth=1.2)

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tomoskin.core import FloatArray, Image, Reading
-from tomoskin.inverse import SourceMetrics
+from tomoskin.core import Detection, FloatArray, Image
+from tomoskin.inverse import ThesisMetrics
 from tomoskin.pipeline import prepare
 from tomoskin.signal import difference
 from tomoskin.skin import Skin
@@ -34,17 +34,17 @@ class Imager:
         kind = self.prepared.operator.difference
         return self.prepared.operator(difference(loaded.mean(axis=0), reference, kind))
 
-    def regions(self, image: Image, part: float) -> list[Reading]:
+    def regions(self, image: Image, part: float) -> list[Detection]:
         """Regions above ``part`` of the extreme, as the source finds them (its figure 4.6)."""
         settings = replace(self.prepared.skin.touch, gamma1=part)
         return Segmenter(self.mesh, settings)(image)
 
-    def metrics(self, image: Image, place: tuple[float, float] | None = None) -> SourceMetrics:
+    def metrics(self, image: Image, place: tuple[float, float] | None = None) -> ThesisMetrics:
         """The source's four metrics (its section 4.4.1), the true place known or not."""
-        return SourceMetrics.of(image, self.mesh, place)
+        return ThesisMetrics.of(image, self.mesh, place)
 
 
-def named_metrics(name: str, metrics: SourceMetrics) -> dict[str, float]:
+def named_metrics(name: str, metrics: ThesisMetrics) -> dict[str, float]:
     """The four metrics as numbers of a report."""
     return {
         f"{name}: maximum, S": metrics.maximum,

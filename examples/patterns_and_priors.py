@@ -22,7 +22,7 @@ import figures
 from imaging import Imager
 from lab import Lab, in_front_of, open_lab, report
 from tomoskin.core import FloatArray
-from tomoskin.inverse import SourceMetrics
+from tomoskin.inverse import ThesisMetrics
 from tomoskin.pattern import match_rows
 from tomoskin.twin import Circle, Probe
 
@@ -40,7 +40,7 @@ COLUMNS = {
     "ERR75 / mm": lambda m: 1e3 * m.error75,
 }
 
-Table = dict[tuple[str, str], list[SourceMetrics]]
+Table = dict[tuple[str, str], list[ThesisMetrics]]
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
@@ -73,7 +73,7 @@ def metrics_of(
     prior: str,
     idle: FloatArray,
     loaded: Mapping[tuple[float, float], FloatArray],
-) -> list[SourceMetrics]:
+) -> list[ThesisMetrics]:
     """One for each place."""
     inverse = {"prior": prior, "difference": "normalised", "alpha": "auto"}
     skin = lab.skin.altered({"drive": {"pattern": pattern}, "inverse": inverse})

@@ -39,6 +39,21 @@ def test_a_name_of_a_former_room_says_where_it_is_now(room: str, name: str, now:
         _ = old.nonsense
 
 
+@pytest.mark.parametrize(
+    ("room", "name", "now"),
+    [
+        ("core", "Reading", "Detection"),
+        ("inverse", "pictures", "image_series"),
+        ("signal", "Blind", "NuisanceSubspace"),
+        ("touch", "promise", "resolution_bounds"),
+    ],
+)
+def test_a_former_name_still_works(room: str, name: str, now: str) -> None:
+    home = import_module(f"tomoskin.{room}")
+    with pytest.warns(DeprecationWarning, match=rf"{room}\.{name} is now tomoskin\.{room}\.{now}"):
+        assert getattr(home, name) is getattr(home, now)
+
+
 def test_the_package_alone_imports_nothing_heavy() -> None:
     code = "import sys, tomoskin; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -171,25 +171,25 @@ def test_rows_that_are_lost_do_not_count_in_the_angle(skin):
 
 
 def test_a_reading_that_is_no_touch_to_who_saw_the_frames_before(skin):
-    from tomoskin.core import Reading
+    from tomoskin.core import Detection
 
     read, _, noise = reader(skin)
     common = skin.response.reference[:, None]
-    left = Reading(x=0.0, y=0.0, sd_x=1e-3, sd_y=1e-3, area=1e-4, peak=-1e-6,
+    left = Detection(x=0.0, y=0.0, sd_x=1e-3, sd_y=1e-3, area=1e-4, peak=-1e-6,
                    cells=np.zeros(1, int))  # fmt: skip
     assert read.push(noise, (left,), common, 0.0).state == "touch"
     assert read.push(noise, (left,), common, 0.1, touched=False).state == "idle"
 
 
 def test_the_angle_is_read_beside_a_touch(skin):
-    from tomoskin.core import Reading
+    from tomoskin.core import Detection
     from tomoskin.touch.fit import depth_of, spots_of
 
     read, shape, noise = reader(skin)
     common = skin.response.reference[:, None]
     spot = spots_of(np.array([[0.03, 0.02]]), 0.015, -0.3)
     touch = skin.response.changes([spot])[0]
-    fitted = Reading(
+    fitted = Detection(
         x=0.031, y=0.0195, sd_x=1e-3, sd_y=1e-3, area=np.pi * 0.0145**2,
         peak=1.25 * np.expm1(float(depth_of(spot)[0])), cells=np.zeros(1, int),
     )  # fmt: skip

@@ -42,7 +42,7 @@ def test_fingers_108_mm_apart_are_two_and_20_mm_apart_are_not(
 ) -> None:
     """The order of the pair's angles is not documented, so only the distance is known."""
     found = several(changes(folder / "round16_twotouch.npz")[[0, 1, 2, 8]])
-    assert [len(readings) for readings in found] == [2, 2, 2, 1]
+    assert [len(detections) for detections in found] == [2, 2, 2, 1]
     for one, other in found[:3]:
         assert 0.09 < np.hypot(one.x - other.x, one.y - other.y) < 0.125
 
@@ -52,8 +52,8 @@ def test_presses_that_add_up_are_found_where_they_were(
 ) -> None:
     dv, xy = presses
     left, right = (np.flatnonzero(s * xy[200:, 0] > 0.04)[:2] + 200 for s in (-1, 1))
-    for a, b, readings in zip(left, right, several(dv[left] + dv[right]), strict=True):
-        one, other = sorted(readings, key=lambda r: r.x)
+    for a, b, detections in zip(left, right, several(dv[left] + dv[right]), strict=True):
+        one, other = sorted(detections, key=lambda r: r.x)
         assert np.hypot(*(xy[a] - (one.x, one.y))) < 0.03
         assert np.hypot(*(xy[b] - (other.x, other.y))) < 0.03
         assert 0.002 < one.sd_x < 0.03
@@ -64,9 +64,9 @@ def test_a_press_is_one_where_the_locator_says(
 ) -> None:
     dv = presses[0][200:220]
     found = several(dv)
-    assert sum(len(readings) == 1 for readings in found) >= 19
+    assert sum(len(detections) == 1 for detections in found) >= 19
     expected = several.locator.predict(dv)[0]
-    alone = [(readings[0], at) for readings, at in zip(found, expected, strict=True)]
+    alone = [(detections[0], at) for detections, at in zip(found, expected, strict=True)]
     assert sum((r.x, r.y) == pytest.approx(tuple(at)) for r, at in alone) >= 19
 
 

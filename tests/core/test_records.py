@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tomoskin.core import Event, Frame, Image, Reading, Touch, Voltages
+from tomoskin.core import Detection, Event, Frame, Image, Touch, Voltages
 
-READING = Reading(0.01, -0.02, np.nan, np.nan, 1e-4, -0.3, np.array([3, 4]))
+READING = Detection(0.01, -0.02, np.nan, np.nan, 1e-4, -0.3, np.array([3, 4]))
 RECORDS = [
     Frame(1, 2, 3.0, 4, 0, 0, np.zeros(3, dtype=np.uint16)),
     Voltages(np.zeros(3), np.zeros(3, dtype=bool), 1, 2, 3.0),

@@ -48,7 +48,7 @@ def test_a_press_is_found_where_it_is(
             touch = _after(runner, came, 15)
         finally:
             runner.stop()
-    reading = touch.reading
+    reading = touch.detection
     assert math.hypot(reading.x - place[0], reading.y - place[1]) < most
 
 

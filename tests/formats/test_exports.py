@@ -86,7 +86,7 @@ def test_hdf5_holds_everything(export, recording, whole):
         assert same(file["drive"][:], PATTERN.drive)
         [touch] = file["touches"][:]
         [expected] = next(iter(session.touches())).touches
-        assert (touch["id"], touch["x"]) == (expected.id, expected.reading.x)
+        assert (touch["id"], touch["x"]) == (expected.id, expected.detection.x)
         assert json.loads(file["truth"][1])["presses"][0]["shape"] == "round"
         assert json.loads(file.attrs["device"])["firmware"] == "1.2.3"
         assert file.attrs["skin"] == SKIN.to_toml()

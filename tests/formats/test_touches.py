@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tomoskin.core import Reading, Touch
+from tomoskin.core import Detection, Touch
 from tomoskin.formats import write_touches
 from tomoskin.mesh import Cylinder, Plane
 from tomoskin.recording import SessionReader, SessionWriter, session_info
 from tomoskin.skin import Skin
 
-READING = Reading(*(0.01, -0.02, 0.001, 0.002, 3e-4, -0.1, np.array([4])), cov_xy=1e-6, close=True)
+READING = Detection(
+    *(0.01, -0.02, 0.001, 0.002, 3e-4, -0.1, np.array([4])), cov_xy=1e-6, close=True
+)
 TOUCHES = (
     Touch(1, "decrease", 0.5, replace(READING, close=False), (1, 3)),
     Touch(2, "decrease", 0.5, READING),
@@ -41,7 +43,10 @@ def test_touches_come_back_as_they_were(session: Path) -> None:
             put.since,
             put.merged,
         )
-        assert (got.reading.cov_xy, got.reading.close) == (put.reading.cov_xy, put.reading.close)
+        assert (got.detection.cov_xy, got.detection.close) == (
+            put.detection.cov_xy,
+            put.detection.close,
+        )
 
 
 def test_a_touch_that_was_only_seen_merged_counts(session: Path) -> None:

@@ -46,9 +46,9 @@ def test_live_touches_are_where_the_skin_is_pressed(fitted):
     for frame in frames(fitted.skin, touched, 5, first=2 * NEEDED):
         result = pipeline.push(frame)
     (touch,) = result.touches
-    assert [touch.reading.x, touch.reading.y] == pytest.approx([0.03, 0.02], abs=0.006)
-    assert 0.0002 < touch.reading.sd_x < 0.006
-    assert touch.reading.snr > 10
+    assert [touch.detection.x, touch.detection.y] == pytest.approx([0.03, 0.02], abs=0.006)
+    assert 0.0002 < touch.detection.sd_x < 0.006
+    assert touch.detection.snr > 10
     assert touch.kind == "decrease"
 
 
@@ -70,7 +70,7 @@ def test_a_recording_gives_the_same_as_live(fitted):
     )
     found = reconstruct(fitted, recording, np.array(idle))
     for (touch,) in found.touches:
-        assert [touch.reading.x, touch.reading.y] == pytest.approx([-0.02, 0.04], abs=0.006)
+        assert [touch.detection.x, touch.detection.y] == pytest.approx([-0.02, 0.04], abs=0.006)
 
 
 def test_noise_that_is_not_known_is_the_read_outs(fitted):

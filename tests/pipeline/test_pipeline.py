@@ -65,10 +65,10 @@ def test_a_touch_is_found_where_it_is_and_keeps_its_identity(push, idle, touched
     settle(push, idle)
     results = [push(touched) for _ in range(10)]
     [touch] = results[-1].touches
-    assert np.hypot(touch.reading.x - 0.03, touch.reading.y - 0.02) < 0.01
+    assert np.hypot(touch.detection.x - 0.03, touch.detection.y - 0.02) < 0.01
     assert touch.kind == "decrease"
-    assert touch.reading.peak < 0
-    assert 0 < touch.reading.sd_x < 0.01
+    assert touch.detection.peak < 0
+    assert 0 < touch.detection.sd_x < 0.01
     assert {t.id for r in results for t in r.touches} == {touch.id}
     released = [push(idle) for _ in range(10)][-1]
     assert released.touches == ()
@@ -118,7 +118,7 @@ def test_rows_at_a_rail_are_left_out_and_said(push, idle, touched, rail):
     change = np.abs(result.image.values - whole.image.values).max()
     assert change < 0.3 * np.abs(whole.image.values).max()
     [touch] = result.touches
-    assert np.hypot(touch.reading.x - 0.03, touch.reading.y - 0.02) < 0.015
+    assert np.hypot(touch.detection.x - 0.03, touch.detection.y - 0.02) < 0.015
     assert push(touched).problem is None
 
 

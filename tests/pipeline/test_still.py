@@ -35,7 +35,7 @@ def test_a_board_without_noise_runs_and_finds_the_touch(kind: dict[str, dict[str
         assert result is not None
         assert result.health is None or not result.health.sick
         assert n >= IDLE or not result.touches
-        found = [np.hypot(t.reading.x - X, t.reading.y - Y) for t in result.touches]
+        found = [np.hypot(t.detection.x - X, t.detection.y - Y) for t in result.touches]
     assert len(found) == 1
     assert found[0] < 0.015
     noise = pipeline.reference_state.noise
@@ -64,7 +64,7 @@ def test_a_recording_without_noise_is_reconstructed(
     found = reconstruct(prepared, recording, recording.voltages[:20])
     assert not any(found.touches[:60])
     assert [len(touches) for touches in found.touches[60:]] == [1] * 4
-    reading = found.touches[-1][0].reading
+    reading = found.touches[-1][0].detection
     assert np.hypot(reading.x - X, reading.y - Y) < 0.015
 
 

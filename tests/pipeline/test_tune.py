@@ -108,7 +108,7 @@ def test_the_pipeline_goes_on_while_its_operator_changes(auto, idle_samples):
     assert all(result.ready and result.pictured for result in results)
     assert pipeline.choice.alpha > 1.6 * auto.choice.alpha
     [touch] = results[-1].touches
-    assert np.hypot(touch.reading.x - 0.03, touch.reading.y - 0.02) < 0.015
+    assert np.hypot(touch.detection.x - 0.03, touch.detection.y - 0.02) < 0.015
     assert len({t.id for result in results for t in result.touches}) == 1
 
 
@@ -119,7 +119,7 @@ def test_the_deviation_of_a_touch_is_that_of_the_operator_in_use(auto, idle_samp
         pipeline.push(next(source))
     touched = frames(auto, samples_of(auto, pressed(auto, 0.03, 0.02)), LOUD)
     found = [pipeline.push(next(touched)).touches for _ in range(60)][20:]
-    readings = [t.reading for touches in found for t in touches]
+    readings = [t.detection for touches in found for t in touches]
     spread = np.std([(r.x, r.y) for r in readings], axis=0)
     told = np.mean([(r.sd_x, r.sd_y) for r in readings], axis=0)
     assert 0.5 < np.hypot(*spread) / np.hypot(*told) < 2.0

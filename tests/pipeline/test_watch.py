@@ -11,7 +11,7 @@ from golden import mismatch
 from run.board import pressed, samples_of
 from tomoskin.core import Frame
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
-from tomoskin.signal import Recording, lost_directions
+from tomoskin.signal import Recording, nuisance_directions
 from tomoskin.skin import Skin
 
 NEEDED = 20
@@ -69,7 +69,7 @@ def without(prepared, samples, *electrodes):
 
 
 def away(touch):
-    return np.hypot(touch.reading.x - PLACE[0], touch.reading.y - PLACE[1])
+    return np.hypot(touch.detection.x - PLACE[0], touch.detection.y - PLACE[1])
 
 
 @pytest.mark.parametrize("cut", [(CUT,), (CUT, 11)])
@@ -157,7 +157,7 @@ def test_off_line_it_is_the_same(sixteen, resting, touched):
 def test_the_prior_knows_which_electrodes_are_gone(sixteen):
     pattern = sixteen.pattern
     floating = np.arange(16) == CUT
-    directions = lost_directions(pattern, (pattern.drive == CUT).any(axis=1), floating)
+    directions = nuisance_directions(pattern, (pattern.drive == CUT).any(axis=1), floating)
     left = sixteen.blind_to(directions)
     beside = np.argmin(
         np.linalg.norm(sixteen.mesh.centroids - sixteen.skin.electrode_centres[CUT], axis=1)

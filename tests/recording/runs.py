@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tomoskin.core import Event, Frame, Image, Reading, Touch
+from tomoskin.core import Detection, Event, Frame, Image, Touch
 from tomoskin.pattern import Scan
 from tomoskin.recording import Mark, SessionWriter
 from tomoskin.skin import Skin
@@ -30,7 +30,9 @@ INFO = Info(
     max_baud=1_000_000,
     unique_id=bytes(range(8)),
 )
-TOUCH = Touch(4, "decrease", 0.25, Reading(0.1, -0.2, 1e-3, float("nan"), 3e-4, -0.5, np.empty(0)))
+TOUCH = Touch(
+    4, "decrease", 0.25, Detection(0.1, -0.2, 1e-3, float("nan"), 3e-4, -0.5, np.empty(0))
+)
 
 
 def frame_of(number, *, rate=100.0, seed=0, n_samples=SCAN.n_samples):

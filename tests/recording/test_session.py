@@ -52,8 +52,8 @@ def test_touches_come_back_to_the_bit(whole):
     [got], names = item.touches, ("x", "y", "sd_x", "area", "peak")
     assert (item.host_time, item.sequence) == (0.2, 20)
     assert (got.id, got.kind, got.since) == (TOUCH.id, TOUCH.kind, TOUCH.since)
-    assert all(getattr(got.reading, n) == getattr(TOUCH.reading, n) for n in names)
-    assert np.isnan(got.reading.sd_y)
+    assert all(getattr(got.detection, n) == getattr(TOUCH.detection, n) for n in names)
+    assert np.isnan(got.detection.sd_y)
 
 
 def test_the_recording_has_the_voltages_of_the_readout_and_labels_from_truth(whole):

@@ -89,7 +89,7 @@ def test_the_moving_ball_is_one_body_on_a_path(tanks: Path) -> None:
 )
 def test_a_target_carried_round_is_seen_to_go_round(tanks: Path, name: str) -> None:
     found = images(tanks / f"{name}.npz", Skin.load("tank-16"), None)
-    places = np.array([(t[0].reading.x, t[0].reading.y) for t in found.touches])
+    places = np.array([(t[0].detection.x, t[0].detection.y) for t in found.touches])
     assert len(places) == 80
     steps = np.diff(np.unwrap(np.arctan2(places[:, 1], places[:, 0])))
     assert abs(steps.sum()) > 2 * np.pi * 0.7
@@ -117,7 +117,7 @@ def test_targets_in_the_deformed_tank(tanks: Path, reference: int, frame: int, s
         electrodes, target = truth["electrode_xy"][frame], truth["target_xy"][frame]
     skin = tank_of(electrodes).altered({"touch": {"sign": sign}})
     found = images(source, skin, reference, slice(frame, frame + 1))
-    first = found.touches[0][0].reading
+    first = found.touches[0][0].detection
     assert np.hypot(first.x - RADIUS * target[0], first.y - RADIUS * target[1]) < NEAR
 
 

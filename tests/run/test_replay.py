@@ -105,7 +105,7 @@ def touches_of(result):
             r.close,
         )
         for t in result.touches
-        for r in [t.reading]
+        for r in [t.detection]
     ]
 
 
@@ -308,7 +308,7 @@ def test_a_recording_begun_later_has_the_reference(prepared, tmp_path):
     positions = {
         n: [(x, y) for _, _, _, _, x, y, *_ in rows] for n, rows in recorded_touches(path).items()
     }
-    got = {r.sequence: [(t.reading.x, t.reading.y) for t in r.touches] for r in results}
+    got = {r.sequence: [(t.detection.x, t.detection.y) for t in r.touches] for r in results}
     assert positions
     assert all(got[n] == rows for n, rows in positions.items())
 

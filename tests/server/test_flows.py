@@ -280,8 +280,8 @@ def test_presses_become_a_calibration(taught, prepared):
     assert gaps[np.triu_indices(10, 1)].min() > 0.01
     (touch,) = last
     x, y = told["presses"][0]
-    assert np.hypot(touch.reading.x - x, touch.reading.y - y) < 0.015
-    assert touch.reading.sd_x > 0.0005
+    assert np.hypot(touch.detection.x - x, touch.detection.y - y) < 0.015
+    assert touch.detection.sd_x > 0.0005
 
 
 def test_a_run_with_a_calibration_replays_to_the_bit(taught):
@@ -295,11 +295,11 @@ def test_a_run_with_a_calibration_replays_to_the_bit(taught):
     assert len(pressed) > 3
     for number in pressed:
         (was,), (now,) = recorded[number], again[number]
-        assert (was.reading.x, was.reading.y, was.reading.sd_x, was.reading.cov_xy) == (
-            now.reading.x,
-            now.reading.y,
-            now.reading.sd_x,
-            now.reading.cov_xy,
+        assert (was.detection.x, was.detection.y, was.detection.sd_x, was.detection.cov_xy) == (
+            now.detection.x,
+            now.detection.y,
+            now.detection.sd_x,
+            now.detection.cov_xy,
         )
 
 
@@ -358,6 +358,6 @@ def test_scrambled_wires_are_found_kept_and_applied(prepared, tmp_path):
         until(lambda: runner.newest and runner.newest.result.ready)
         runner.set_presses(page, (Press(0.03, 0.05, 5.0, 0.015),))
         until(lambda: runner.newest.result.touches)
-        until(lambda: runner.newest.result.touches[0].reading.snr > 8)
-        reading = runner.newest.result.touches[0].reading
+        until(lambda: runner.newest.result.touches[0].detection.snr > 8)
+        reading = runner.newest.result.touches[0].detection
         assert np.hypot(reading.x - 0.03, reading.y - 0.05) < 0.02

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tomoskin.calibration import BendReading
-from tomoskin.core import Image, Reading, Touch
+from tomoskin.core import Detection, Image, Touch
 from tomoskin.pipeline import Result
 from tomoskin.server.frames import encode_result
 from tomoskin.twin import Finger, Press, Probe
@@ -35,7 +35,7 @@ def make(n_cells=5, touches=(), **changes):
 
 
 def touch(number, cells, kind="decrease", sd=0.001):
-    reading = Reading(0.01, -0.02, sd, sd, 2e-4, -0.3, np.array(cells))
+    reading = Detection(0.01, -0.02, sd, sd, 2e-4, -0.3, np.array(cells))
     return Touch(number, kind, 10.0, reading)
 
 
@@ -110,7 +110,7 @@ def test_numbers_that_do_not_fit_are_held_at_their_ends():
 
 def test_a_touch_says_how_many_it_stands_for():
     alone, several = touch(1, [0]), touch(2, [1])
-    several = replace(several, reading=replace(several.reading, close=True))
+    several = replace(several, detection=replace(several.detection, close=True))
     merged = replace(touch(3, [2]), merged=(3, 5, 8))
     data = encode_result(make(5, (alone, several, merged)), [], 0.0)
     at = len(data) - 8 - 3 * 40
@@ -119,7 +119,7 @@ def test_a_touch_says_how_many_it_stands_for():
 
 def test_a_touch_carries_its_whole_covariance():
     first = touch(1, [0])
-    first = replace(first, reading=replace(first.reading, cov_xy=-2e-6))
+    first = replace(first, detection=replace(first.detection, cov_xy=-2e-6))
     found = decode(encode_result(make(touches=(first,)), [], 0.0))
     assert found["touches"][0][-1] == pytest.approx(-2e-6)
 

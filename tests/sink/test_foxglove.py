@@ -86,7 +86,7 @@ def test_what_a_client_sees(served):
         sink.publish(moment_at(1.0, TOUCH, sequence=3))
         found = {topic: content for topic, _, content in (client.message() for _ in "abc")}
     assert found["/touches"]["sequence"] == 3
-    assert found["/touches"]["touches"][0]["x"] == TOUCH.reading.x
+    assert found["/touches"]["touches"][0]["x"] == TOUCH.detection.x
     assert found["/scene"]["entities"][0]["id"] == "touch-4"
     assert found["/image"]["column_count"] == 48
 

@@ -94,7 +94,7 @@ def test_touches_events_and_status(broker, heard, stream):
     topic, text = heard()
     assert topic == "robot/skin/touches"
     told = json.loads(text)
-    assert (told["sequence"], told["touches"][0]["x"]) == (3, TOUCH.reading.x)
+    assert (told["sequence"], told["touches"][0]["x"]) == (3, TOUCH.detection.x)
     assert told["touches"][0]["sd_y"] is None
     begun = TouchEvent("onset", TOUCH, 1.1)
     sink.publish(replace(moment_at(1.1, TOUCH, sequence=4), happened=(begun,)))

@@ -94,14 +94,14 @@ def test_a_touch_is_a_pose_with_covariance(stream):
     cdr = Cdr(encode_cdr(POSE, value))
     assert cdr.header() == (pytest.approx(EPOCH + 0.25), "skin")
     pose = [cdr.take("d") for _ in range(7)]
-    assert pose == [TOUCH.reading.x, TOUCH.reading.y, 0, 0, 0, 0, 1]
+    assert pose == [TOUCH.detection.x, TOUCH.detection.y, 0, 0, 0, 0, 1]
     covariance = np.array([cdr.take("d") for _ in range(36)]).reshape(6, 6)
     assert cdr.ends()
-    assert covariance[0, 0] == TOUCH.reading.sd_x**2
+    assert covariance[0, 0] == TOUCH.detection.sd_x**2
     assert (np.diag(covariance)[1:] == 1e6).all()  # its sd_y is not known
     assert (covariance == np.diag(np.diag(covariance))).all()
-    reading = replace(TOUCH.reading, sd_y=2e-3, cov_xy=5e-7)
-    moment = moment_at(0.25, replace(TOUCH, reading=reading))
+    reading = replace(TOUCH.detection, sd_y=2e-3, cov_xy=5e-7)
+    moment = moment_at(0.25, replace(TOUCH, detection=reading))
     value = messages_of(stream, moment)["tomoskin/touch"]
     assert value["pose"]["covariance"][[1, 6]].tolist() == [5e-7, 5e-7]
 
@@ -209,7 +209,7 @@ def test_a_node_publishes_the_same_messages(rclpy, stream):
     topics = [topic.removeprefix("tomoskin/") for topic, _ in rclpy.published]
     assert topics == ["touch", "touches", "image", "events"]
     pose = rclpy.published[0][1]
-    assert pose.pose.pose.position.x == TOUCH.reading.x
+    assert pose.pose.pose.position.x == TOUCH.detection.x
     assert pose.header.stamp.sec == int(EPOCH)
     assert rclpy.log == ["tomoskin", "destroy", "shutdown"] * 2
     sink.close()

@@ -47,7 +47,7 @@ def test_a_subscriber_gets_ros_messages(peer, heard, stream, domain):
     keys = [str(sample.key_expr) for sample in samples]
     pose = Cdr(samples[0].payload.to_bytes())
     pose.header()
-    assert pose.take("d") == TOUCH.reading.x
+    assert pose.take("d") == TOUCH.detection.x
     if domain is None:
         names = ["touch", "touches", "image", "events"]
         assert keys == [f"tomoskin/{name}" for name in names]

@@ -12,7 +12,7 @@ from tomoskin.forward import ForwardModel
 from tomoskin.pattern import Scan
 from tomoskin.signal import Readout
 from tomoskin.skin import Skin
-from tomoskin.touch import Demand, Promise, promise, variants
+from tomoskin.touch import Demand, ResolutionBounds, resolution_bounds, variants
 from tomoskin.touch.fit import Response, Whitener, detection_bound, row_covariance, spots_of
 
 PLACES = 40
@@ -22,16 +22,16 @@ PRESS = Demand(0.015)
 
 
 @cache
-def of(name: str, demand: Demand = PRESS, oversampling: int = 16) -> Promise:
+def of(name: str, demand: Demand = PRESS, oversampling: int = 16) -> ResolutionBounds:
     skin = Skin.load(name).altered({"readout": {"oversampling": oversampling, "gain": 40}})
-    return promise(skin, demand, PLACES)
+    return resolution_bounds(skin, demand, PLACES)
 
 
 @pytest.mark.parametrize(
     ("name", "least", "most"), [("textile-disc-8", 3.6, 5.6), ("textile-disc-16", 0.6, 3.7)]
 )
 def test_figures_are_those_of_an_independent_model(name: str, least: float, most: float) -> None:
-    """200 mm, 0.1 A, 15 mm, 25 % deep, 16 readings, 0.7 LSB; its profile is another one:
+    """200 mm, 0.1 A, 15 mm, 25 % deep, 16 detections, 0.7 LSB; its profile is another one:
     it bounds the error by up to twice as much."""
     figures = of(name).figures()
     assert 0.4 * least < 1e3 * figures["least_m"] < least
@@ -76,7 +76,9 @@ def test_a_press_so_faint_is_as_far_from_the_noise_as_was_asked() -> None:
 
 def test_progress_is_told() -> None:
     told: list[tuple[float, float]] = []
-    promise(Skin.load("textile-disc-8"), Demand(), PLACES, lambda *part: told.append(part))
+    resolution_bounds(
+        Skin.load("textile-disc-8"), Demand(), PLACES, lambda *part: told.append(part)
+    )
     assert told[0][0] == 0
     assert told[-1][0] == told[-1][1] > 30
 

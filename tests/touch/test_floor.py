@@ -10,12 +10,12 @@ import pytest
 from numpy.random import Generator
 
 from shapes import disc
-from tomoskin.core import DataError, FloatArray, Image, Reading
+from tomoskin.core import DataError, Detection, FloatArray, Image
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import OneStep
 from tomoskin.pattern import Pattern
 from tomoskin.skin import TouchSettings
-from tomoskin.touch import NoiseFloor, Segmenter
+from tomoskin.touch import ImageNoise, Segmenter
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,22 +27,22 @@ class Chain:
     noise: FloatArray
 
     @cached_property
-    def floor(self) -> NoiseFloor:
+    def floor(self) -> ImageNoise:
         return self.floor_of(self.noise)
 
     def segmenter(self, snr: float, sign: str = "decrease") -> Segmenter:
         settings = TouchSettings(0.65, 0.9, 0.005, sign, snr, "centroid", 8)
         return Segmenter(self.operator.model.mesh, settings)
 
-    def begun(self, segmenter: Segmenter, image: Image) -> list[Reading]:
+    def begun(self, segmenter: Segmenter, image: Image) -> list[Detection]:
         """What may begin a touch."""
-        return [reading for reading in segmenter(image, self.floor) if not reading.weak]
+        return [detection for detection in segmenter(image, self.floor) if not detection.weak]
 
     def image(self, dv: FloatArray, rng: Generator) -> Image:
         return self.operator(dv + self.noise * rng.standard_normal(len(self.noise)))
 
-    def floor_of(self, noise: FloatArray) -> NoiseFloor:
-        return NoiseFloor.of(self.operator.matrix * noise, self.operator.model.mesh.identity)
+    def floor_of(self, noise: FloatArray) -> ImageNoise:
+        return ImageNoise.of(self.operator.matrix * noise, self.operator.model.mesh.identity)
 
     def press(self, x: float, y: float, ratio: float) -> FloatArray:
         """Voltages of a press whose image exceeds its noise ``ratio`` times at best."""
@@ -88,10 +88,10 @@ def test_alarms_come_only_where_the_ratio_is_exceeded() -> None:
     found = 0
     for _ in range(300):
         image = chain().image(np.zeros(40), rng)
-        readings = chain().begun(segmenter, image)
-        found += bool(readings)
-        for reading in readings:
-            ratio = -image.values[reading.cells] / chain().floor.sd[reading.cells]
+        detections = chain().begun(segmenter, image)
+        found += bool(detections)
+        for detection in detections:
+            ratio = -image.values[detection.cells] / chain().floor.sd[detection.cells]
             assert ratio.max() >= 2.5
     assert 0 < found < 150
     without_floor = [segmenter(chain().image(np.zeros(40), rng)) for _ in range(100)]
@@ -102,9 +102,9 @@ def test_alarms_come_only_where_the_ratio_is_exceeded() -> None:
 def test_a_press_at_fifteen_times_the_noise_is_found(place: tuple[float, float]) -> None:
     rng, segmenter, n = np.random.default_rng(4), chain().segmenter(snr=5.0), 200
     dv = chain().press(*place, ratio=15.0)
-    readings = [segmenter(chain().image(dv, rng), chain().floor) for _ in range(n)]
-    assert all(readings)
-    gap = [np.hypot(r[0].x - place[0], r[0].y - place[1]) for r in readings]
+    detections = [segmenter(chain().image(dv, rng), chain().floor) for _ in range(n)]
+    assert all(detections)
+    gap = [np.hypot(r[0].x - place[0], r[0].y - place[1]) for r in detections]
     assert np.mean(gap) < 0.01
     assert np.quantile(gap, 0.99) < 0.02
 
@@ -117,9 +117,9 @@ def test_a_press_below_the_ratio_is_no_touch() -> None:
 
 def test_between_release_and_onset_ratio_a_reading_is_weak() -> None:
     image = chain().operator(chain().press(0.0, 0.0, ratio=4.0))
-    (reading,) = chain().segmenter(snr=5.0)(image, chain().floor)
-    assert reading.weak
-    assert reading.snr == pytest.approx(4.0, rel=0.05)
+    (detection,) = chain().segmenter(snr=5.0)(image, chain().floor)
+    assert detection.weak
+    assert detection.snr == pytest.approx(4.0, rel=0.05)
     assert chain().segmenter(snr=7.0)(image, chain().floor) == []
 
 
@@ -133,8 +133,8 @@ def test_a_press_that_another_outshines_is_weak() -> None:
 
 def test_without_a_floor_no_deviation_is_claimed() -> None:
     image = chain().operator(chain().press(0.0, 0.0, ratio=15.0))
-    (reading,) = chain().segmenter(snr=5.0)(image)
-    assert np.isnan([reading.sd_x, reading.sd_y]).all()
+    (detection,) = chain().segmenter(snr=5.0)(image)
+    assert np.isnan([detection.sd_x, detection.sd_y]).all()
 
 
 @pytest.mark.parametrize("sign", ["decrease", "increase", "both"])
@@ -146,9 +146,9 @@ def test_deviation_of_a_centroid_is_what_noise_makes_of_it(
     rng, n = np.random.default_rng(6), 200
     segmenter = fine().segmenter(5.0, sign=sign)
     press = fine().press(*place, ratio) * (-1 if sign == "increase" else 1)
-    readings = [segmenter(fine().image(press, rng), fine().floor)[0] for _ in range(n)]
-    got = np.std([(r.x, r.y) for r in readings], axis=0, ddof=1)
-    reported = np.sqrt(np.mean([(r.sd_x**2, r.sd_y**2) for r in readings], axis=0))
+    detections = [segmenter(fine().image(press, rng), fine().floor)[0] for _ in range(n)]
+    got = np.std([(r.x, r.y) for r in detections], axis=0, ddof=1)
+    reported = np.sqrt(np.mean([(r.sd_x**2, r.sd_y**2) for r in detections], axis=0))
     assert ((reported > 0.65 * got) & (reported < 1.5 * got)).all(), reported / got
 
 
@@ -160,10 +160,10 @@ def test_deviation_of_a_region_that_noise_shifts_is_the_shift(axis: int, sign: f
     offset = mesh.centroids - [0.01, -0.02]
     blob = sign * np.exp(-0.5 * (offset**2).sum(axis=1) / width**2)
     column = (blob * offset[:, axis] / width**2)[:, None]
-    floor = NoiseFloor.of(shift * column, mesh.identity)
-    (reading,) = fine().segmenter(0.0, sign="both")(Image(blob, "S", mesh.identity), floor)
+    floor = ImageNoise.of(shift * column, mesh.identity)
+    (detection,) = fine().segmenter(0.0, sign="both")(Image(blob, "S", mesh.identity), floor)
     expected = np.where(np.arange(2) == axis, shift, 0.0)
-    assert (reading.sd_x, reading.sd_y) == pytest.approx(tuple(expected), abs=0.15 * shift)
+    assert (detection.sd_x, detection.sd_y) == pytest.approx(tuple(expected), abs=0.15 * shift)
 
 
 def test_a_change_of_strength_does_not_move_a_region() -> None:
@@ -171,9 +171,9 @@ def test_a_change_of_strength_does_not_move_a_region() -> None:
     # lopsided, so that edge and inside pull to one side unless the threshold follows the peak
     x, y = (mesh.centroids / 0.03).T
     blob = np.exp(-(x**2) - y**2) * np.exp(0.8 * x)
-    floor = NoiseFloor.of(0.1 * blob[:, None], mesh.identity)
-    (reading,) = fine().segmenter(0.0, sign="both")(Image(blob, "S", mesh.identity), floor)
-    assert np.hypot(reading.sd_x, reading.sd_y) < 3e-4
+    floor = ImageNoise.of(0.1 * blob[:, None], mesh.identity)
+    (detection,) = fine().segmenter(0.0, sign="both")(Image(blob, "S", mesh.identity), floor)
+    assert np.hypot(detection.sd_x, detection.sd_y) < 3e-4
 
 
 def test_deviation_scales_with_the_noise() -> None:
@@ -193,5 +193,5 @@ def test_a_floor_of_another_mesh_with_as_many_cells_is_refused() -> None:
 def test_noise_of_no_channel_is_no_deviation() -> None:
     silent = chain().floor_of(np.zeros(40))
     image = chain().operator(chain().press(0.0, 0.0, ratio=15.0))
-    (reading,) = chain().segmenter(snr=5.0)(image, silent)
-    assert (reading.sd_x, reading.sd_y) == (0.0, 0.0)
+    (detection,) = chain().segmenter(snr=5.0)(image, silent)
+    assert (detection.sd_x, detection.sd_y) == (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""From an image to readings: right place, right sign, thresholds that mean what they say."""
+"""From an image to detections: right place, right sign, thresholds that mean what they say."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from shapes import disc
-from tomoskin.core import DataError, FloatArray, Image, Reading
+from tomoskin.core import DataError, Detection, FloatArray, Image
 from tomoskin.mesh import Mesh
 from tomoskin.skin import TouchSettings
 from tomoskin.touch import Segmenter
@@ -37,7 +37,7 @@ def blob(x: float, y: float, height: float = -1.0, width: float = 0.012) -> Floa
     return np.asarray(height * np.exp(-0.5 * (offset**2).sum(axis=1) / width**2))
 
 
-def segment(values: FloatArray, **changes: object) -> list[Reading]:
+def segment(values: FloatArray, **changes: object) -> list[Detection]:
     image = Image(values, "S", sheet().identity)
     return Segmenter(sheet(), replace(SETTINGS, **changes))(image)  # type: ignore[arg-type]
 
@@ -50,32 +50,32 @@ def test_an_image_of_another_mesh_with_as_many_cells_is_refused() -> None:
 
 @pytest.mark.parametrize("place", [(0.0, 0.0), (0.05, 0.01), (-0.03, -0.06)])
 def test_a_blob_is_found_where_it_is(place: tuple[float, float]) -> None:
-    (reading,) = segment(blob(*place))
+    (detection,) = segment(blob(*place))
     cell = np.sqrt(sheet().volumes.mean())
-    assert np.hypot(reading.x - place[0], reading.y - place[1]) < 0.5 * cell
-    assert reading.peak == blob(*place).min()
-    assert np.isnan(reading.sd_x)
-    assert np.isnan(reading.sd_y)
+    assert np.hypot(detection.x - place[0], detection.y - place[1]) < 0.5 * cell
+    assert detection.peak == blob(*place).min()
+    assert np.isnan(detection.sd_x)
+    assert np.isnan(detection.sd_y)
 
 
 def test_area_is_that_of_the_cells_above_the_threshold() -> None:
     """A Gaussian exceeds a fraction f inside a circle of radius w·√(2 ln 1/f)."""
     image = blob(0.01, 0.02, width=0.02)
-    (reading,) = segment(image, smoothing=0.0, gamma1=0.5, gamma2=1.0)
+    (detection,) = segment(image, smoothing=0.0, gamma1=0.5, gamma2=1.0)
     above = np.flatnonzero(np.abs(image) >= 0.5 * np.abs(image).max())
-    assert sorted(reading.cells) == above.tolist()
-    assert reading.area == pytest.approx(sheet().volumes[above].sum())
-    assert reading.area == pytest.approx(np.pi * 0.02**2 * 2 * np.log(2), rel=0.1)
+    assert sorted(detection.cells) == above.tolist()
+    assert detection.area == pytest.approx(sheet().volumes[above].sum())
+    assert detection.area == pytest.approx(np.pi * 0.02**2 * 2 * np.log(2), rel=0.1)
 
 
 def test_centroid_is_weighted_by_area() -> None:
     """Cells shrink towards the rim; their number must not pull the centroid there."""
     rng = np.random.default_rng(0)
     image = blob(0.0, 0.09, width=0.015) * rng.uniform(0.8, 1.0, len(sheet().cells))
-    (reading,) = segment(image)
-    mass = np.abs(image[reading.cells]) * sheet().volumes[reading.cells]
-    expected = mass @ sheet().centroids[reading.cells] / mass.sum()
-    assert (reading.x, reading.y) == pytest.approx(tuple(expected), abs=1e-15)
+    (detection,) = segment(image)
+    mass = np.abs(image[detection.cells]) * sheet().volumes[detection.cells]
+    expected = mass @ sheet().centroids[detection.cells] / mass.sum()
+    assert (detection.x, detection.y) == pytest.approx(tuple(expected), abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -83,10 +83,10 @@ def test_centroid_is_weighted_by_area() -> None:
 )
 def test_sign(sign: str, kinds: list[float]) -> None:
     image = blob(-0.04, 0.0) + blob(0.04, 0.0, height=0.9)
-    readings = segment(image, sign=sign)
-    assert [r.peak for r in readings] == pytest.approx(kinds, rel=0.05)
-    for reading in readings:
-        assert np.sign(reading.x) == np.sign(reading.peak)
+    detections = segment(image, sign=sign)
+    assert [r.peak for r in detections] == pytest.approx(kinds, rel=0.05)
+    for detection in detections:
+        assert np.sign(detection.x) == np.sign(detection.peak)
 
 
 @pytest.mark.parametrize("sign", ["decrease", "increase"])
@@ -98,8 +98,8 @@ def test_an_image_of_the_other_sign_has_no_touch(sign: str) -> None:
 def test_touching_blobs_of_opposite_sign_stay_apart() -> None:
     offset = sheet().centroids[:, 0]
     image = np.where(np.abs(sheet().centroids).max(axis=1) < 0.03, np.sign(offset), 0.0)
-    readings = segment(image, smoothing=0.0)
-    assert sorted(np.sign(r.peak) for r in readings) == [-1, 1]
+    detections = segment(image, smoothing=0.0)
+    assert sorted(np.sign(r.peak) for r in detections) == [-1, 1]
 
 
 def test_two_blobs_are_two_readings_strongest_first() -> None:
@@ -120,8 +120,8 @@ def test_gamma2_and_smoothing_drop_what_is_narrower_than_the_filter() -> None:
     lone = int(np.argmin(np.linalg.norm(sheet().centroids - [-0.05, 0.0], axis=1)))
     image[lone] = -1.0
     assert len(segment(image, smoothing=0.0)) == 2
-    (reading,) = segment(image, smoothing=0.006)
-    assert reading.x > 0
+    (detection,) = segment(image, smoothing=0.006)
+    assert detection.x > 0
 
 
 def test_the_filter_averages_cells_above_gamma1_only() -> None:
@@ -137,8 +137,8 @@ def test_the_filter_averages_cells_above_gamma1_only() -> None:
     weights = np.where(gap <= 2 * width, np.exp(-0.5 * (gap / width) ** 2), 0.0) * mesh.volumes
     filtered = weights @ masked / weights.sum(axis=1)
     expected = np.flatnonzero(np.abs(filtered) >= 0.9 * limit)
-    readings = segment(image, smoothing=width)
-    assert sorted(np.concatenate([r.cells for r in readings])) == expected.tolist()
+    detections = segment(image, smoothing=width)
+    assert sorted(np.concatenate([r.cells for r in detections])) == expected.tolist()
 
 
 def test_regions_are_the_connected_components() -> None:
@@ -146,29 +146,29 @@ def test_regions_are_the_connected_components() -> None:
     mesh, rng = sheet(), np.random.default_rng(1)
     image = np.where(rng.random(len(mesh.cells)) < 0.5, rng.choice([-1.0, 1.0]), 0.0)
     image *= rng.uniform(0.8, 1.0, len(image))
-    readings = segment(image, smoothing=0.0, gamma1=0.5, gamma2=1.0, max_touches=10_000)
+    detections = segment(image, smoothing=0.0, gamma1=0.5, gamma2=1.0, max_touches=10_000)
     kept = image != 0
     joined = kept[mesh.neighbours].all(axis=1)
     ends = mesh.neighbours[joined].T
     graph = coo_array((np.ones(len(ends[0])), tuple(ends)), shape=(len(image),) * 2)
     _, label = connected_components(graph, directed=False)
     expected = {frozenset(np.flatnonzero(label == k)) for k in np.unique(label[kept])}
-    assert {frozenset(r.cells.tolist()) for r in readings} == expected
+    assert {frozenset(r.cells.tolist()) for r in detections} == expected
 
 
 def test_at_most_so_many_touches_and_the_strongest_stay() -> None:
     places = [(-0.06, 0), (0.06, 0), (0, 0.06), (0, -0.06)]
     heights = [0.85, 1.0, 0.9, 0.95]
     image = sum((blob(*p, height=h) for p, h in zip(places, heights, strict=True)), np.zeros(1))
-    readings = segment(image, max_touches=2)
-    assert [(round(r.x, 2), round(r.y, 2)) for r in readings] == [(0.06, 0.0), (0.0, -0.06)]
+    detections = segment(image, max_touches=2)
+    assert [(round(r.x, 2), round(r.y, 2)) for r in detections] == [(0.06, 0.0), (0.0, -0.06)]
 
 
 def test_scale_does_not_matter() -> None:
     image = blob(0.02, 0.03)
     for scale in (1e-9, 1e9):
-        (reading,) = segment(scale * image)
-        assert (reading.x, reading.y) == pytest.approx(
+        (detection,) = segment(scale * image)
+        assert (detection.x, detection.y) == pytest.approx(
             (segment(image)[0].x, segment(image)[0].y), rel=1e-9
         )
 
@@ -191,6 +191,6 @@ def test_positions_by_extremes_part_what_one_region_joins() -> None:
 def test_a_level_region_still_has_a_position_by_extremes() -> None:
     """A plateau has no cell above all its neighbours."""
     image = np.where(np.abs(sheet().centroids).max(axis=1) < 0.03, -1.0, 0.0)
-    (reading,) = segment(image, smoothing=0.0, position="peak")
-    assert abs(reading.x) < 0.03
-    assert reading.peak == -1.0
+    (detection,) = segment(image, smoothing=0.0, position="peak")
+    assert abs(detection.x) < 0.03
+    assert detection.peak == -1.0

@@ -16,7 +16,7 @@ from tomoskin.calibration.locator.kernel import squared_distances
 from tomoskin.calibration.locator.maps import ResponseMaps
 from tomoskin.calibration.locator.posterior import moments
 from tomoskin.calibration.locator.presses import frames
-from tomoskin.core import FloatArray, IntArray, Reading
+from tomoskin.core import Detection, FloatArray, IntArray
 
 _PLACES = 160
 """Places that a touch is looked for at; what is between them is their mean."""
@@ -97,7 +97,7 @@ class Several:
         single = np.array([new._single(frame).max() for frame in presses])
         return cls(locator, places, changes, new.variance, float(np.quantile(single, 1 - _USUAL)))
 
-    def __call__(self, dv: ArrayLike) -> list[tuple[Reading, ...]]:
+    def __call__(self, dv: ArrayLike) -> list[tuple[Detection, ...]]:
         """Readings of each frame (n, n_meas): two, or one, which may be ``close``.
 
         A frame that one touch explains as well as the presses is not searched for two. Raises
@@ -106,7 +106,7 @@ class Several:
         data = frames(dv, self.locator.presses.dv.shape[1])
         places, covariance = self.locator.predict(data)
         strength = self.locator.strength(data)
-        found: list[tuple[Reading, ...]] = []
+        found: list[tuple[Detection, ...]] = []
         for k, frame in enumerate(self._features(data)):
             alone = _reading(places[k], covariance[k], float(strength[k]))
             if self._single(frame).max() >= self.usual:
@@ -230,9 +230,9 @@ def _spread_out(places: FloatArray, count: int, first: int = 0) -> IntArray:
 
 def _reading(
     place: FloatArray, covariance: FloatArray, strength: float, close: bool = False
-) -> Reading:
+) -> Detection:
     sd = np.sqrt(np.diag(covariance))
-    return Reading(
+    return Detection(
         x=float(place[0]),
         y=float(place[1]),
         sd_x=float(sd[0]),

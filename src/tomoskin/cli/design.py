@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tomoskin.skin import Skin
-    from tomoskin.touch import Demand, Promise
+    from tomoskin.touch import Demand, ResolutionBounds
 
 _ELECTRODES = "8,16,32"
 _PATTERNS = "adjacent,skip:2,opposite"
@@ -60,7 +60,7 @@ def design(
     """
     from tomoskin.core import parse_quantity
     from tomoskin.skin import Skin
-    from tomoskin.touch import Demand, promise
+    from tomoskin.touch import Demand, resolution_bounds
 
     counts = _counts(electrodes)
     chosen = Skin.load(skin)
@@ -72,7 +72,7 @@ def design(
     demand = Demand(size, depth, false_alarm, found)
     with Bar("bounding") as bar:
         jobs = 1 + len(counts) * len(patterns.split(","))
-        own = promise(chosen, demand, _PLACES, _part(bar, 0, jobs))
+        own = resolution_bounds(chosen, demand, _PLACES, _part(bar, 0, jobs))
         rows = _compared(chosen, demand, counts, patterns.split(","), bar)
     radius_m = demand.on(chosen.mesh())
     if out is not None:
@@ -120,7 +120,7 @@ def _compared(
 ) -> list[dict[str, Any]]:
     from tomoskin.core import TomoskinError
     from tomoskin.pattern import Scan
-    from tomoskin.touch import promise, variants
+    from tomoskin.touch import resolution_bounds, variants
 
     rows: list[dict[str, Any]] = []
     jobs = 1 + len(counts) * len(patterns)
@@ -130,7 +130,7 @@ def _compared(
             rows.append(row | {"fault": variant.fault})
             continue
         try:
-            found = promise(variant.skin, demand, _COARSE, _part(bar, number, jobs))
+            found = resolution_bounds(variant.skin, demand, _COARSE, _part(bar, number, jobs))
         except TomoskinError as error:
             rows.append(row | {"fault": error.message})
             continue
@@ -141,7 +141,7 @@ def _compared(
 
 
 def _write(
-    out: Path, skin: Skin, own: Promise, demand: Demand, radius: float, *, overwrite: bool
+    out: Path, skin: Skin, own: ResolutionBounds, demand: Demand, radius: float, *, overwrite: bool
 ) -> None:
     from tomoskin.formats import write_promise
 

@@ -121,7 +121,7 @@ def _report(source: Path, found: Reconstruction, prepared: Prepared, *, json: bo
         typer.echo(", ".join(f"{state}: {count} frames" for state, count in told.items()))
     for frame, touches in list(zip(found.frames.tolist(), found.touches, strict=True))[:_SHOWN]:
         for t in touches:
-            r = t.reading
+            r = t.detection
             typer.echo(
                 f"frame {frame:>4}  touch {t.id:>3}  x {1e3 * r.x:+7.1f} mm  y {1e3 * r.y:+7.1f} mm"
                 f"  area {1e6 * r.area:7.0f} mm²  peak {r.peak:+.3g} {found.unit}"
@@ -188,7 +188,13 @@ def _document(found: Reconstruction, prepared: Prepared) -> dict[str, Any]:
             for f, state in zip(found.frames.tolist(), found.states, strict=False)
         ],
         "touches": [
-            {"frame": f, "id": t.id, "x_m": t.reading.x, "y_m": t.reading.y, "peak": t.reading.peak}
+            {
+                "frame": f,
+                "id": t.id,
+                "x_m": t.detection.x,
+                "y_m": t.detection.y,
+                "peak": t.detection.peak,
+            }
             for f, touches in zip(found.frames.tolist(), found.touches, strict=True)
             for t in touches
         ],

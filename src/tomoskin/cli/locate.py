@@ -88,15 +88,17 @@ def _several(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
     with Bar("locating") as bar:
         for number, frame in enumerate(dv):
             bar(number, len(dv))
-            (readings,) = both(frame)
-            yield tuple(Touch(k, "touch", 0.0, reading) for k, reading in enumerate(readings, 1))
+            (detections,) = both(frame)
+            yield tuple(
+                Touch(k, "touch", 0.0, detection) for k, detection in enumerate(detections, 1)
+            )
 
 
 def _single(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
     import numpy as np
 
     from tomoskin.calibration import Watch
-    from tomoskin.core import Reading, Touch
+    from tomoskin.core import Detection, Touch
 
     locator = known.locator
     watch = Watch(locator)
@@ -108,8 +110,8 @@ def _single(known: Calibration, dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
         for place, sd, peak in zip(places, deviation, strength, strict=True):
             (x, y), (sd_x, sd_y) = place.tolist(), sd.tolist()
             nothing = np.empty(0, dtype=np.int64)
-            reading = Reading(x, y, sd_x, sd_y, area=np.nan, peak=float(peak), cells=nothing)
-            yield (Touch(id=1, kind="touch", since=0.0, reading=reading),)
+            detection = Detection(x, y, sd_x, sd_y, area=np.nan, peak=float(peak), cells=nothing)
+            yield (Touch(id=1, kind="touch", since=0.0, detection=detection),)
     if len(watch.jumped):
         jumped = "; ".join(known.pattern.row_text(row) for row in watch.jumped[:_SHOWN].tolist())
         typer.echo(
@@ -130,11 +132,11 @@ def _report(
                 {
                     "frame": frame,
                     "time_s": float(whole.time[frame]),
-                    "x_m": touch.reading.x,
-                    "y_m": touch.reading.y,
-                    "sd_x_m": touch.reading.sd_x,
-                    "sd_y_m": touch.reading.sd_y,
-                    "strength": touch.reading.peak,
+                    "x_m": touch.detection.x,
+                    "y_m": touch.detection.y,
+                    "sd_x_m": touch.detection.sd_x,
+                    "sd_y_m": touch.detection.sd_y,
+                    "strength": touch.detection.peak,
                     "kind": touch.said,
                 }
                 for frame, touch in rows
@@ -142,7 +144,7 @@ def _report(
         )
         return
     for frame, touch in rows[:_SHOWN]:
-        r = touch.reading
+        r = touch.detection
         close = "" if touch.said == touch.kind else f"  {touch.said}"
         typer.echo(
             f"frame {frame:>4}  x {1e3 * r.x:+7.1f} ± {1e3 * r.sd_x:4.1f} mm  "

@@ -3,6 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from tomoskin._moved import moved
 from tomoskin.core.errors import (
     DataError,
     GeometryError,
@@ -25,13 +26,13 @@ if TYPE_CHECKING:
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
     from tomoskin.core.records import (
         ComplexArray,
+        Detection,
         Event,
         FloatArray,
         Frame,
         Image,
         IntArray,
         PixelMap,
-        Reading,
         Touch,
         Voltages,
     )
@@ -65,6 +66,7 @@ __all__ = [
     "ColourScale",
     "ComplexArray",
     "DataError",
+    "Detection",
     "Event",
     "FloatArray",
     "Frame",
@@ -76,7 +78,6 @@ __all__ = [
     "OutputError",
     "PatternError",
     "PixelMap",
-    "Reading",
     "ScriptError",
     "SinkError",
     "SkinError",
@@ -103,5 +104,5 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     # numpy comes with them; the command line needs errors only until a command runs.
     if name not in __all__:
-        raise AttributeError(f"module 'tomoskin.core' has no attribute {name!r}")
+        return moved("core", name)
     return getattr(import_module(f"tomoskin.core.{_HOME.get(name, 'records')}"), name)

@@ -142,8 +142,8 @@ class Image:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reading:
-    """One region of an image, before it is tracked.
+class Detection:
+    """One candidate for a touch in one frame, before it is tracked.
 
     Attributes
     ----------
@@ -161,7 +161,7 @@ class Reading:
     cov_xy
         Covariance of ``x`` and ``y``, m², beside ``sd_x``² and ``sd_y``².
     snr
-        How many times its noise the reading stands out; NaN where the noise is not known.
+        How many times its noise the detection stands out; NaN where the noise is not known.
     close
         Whether it may be several touches, too close to separate.
     weak
@@ -183,7 +183,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Touch:
-    """A tracked region: a reading with an identity that lasts from onset to release.
+    """A tracked region: a detection with an identity that lasts from onset to release.
 
     Attributes
     ----------
@@ -193,7 +193,7 @@ class Touch:
         "decrease" or "increase", by the sign of its peak.
     since
         Host monotonic seconds of its first frame.
-    reading
+    detection
         The newest.
     merged
         Identities of all the touches that it stands for, its own among them, where several have
@@ -203,15 +203,20 @@ class Touch:
     id: int
     kind: str
     since: float
-    reading: Reading = field(repr=False)
+    detection: Detection = field(repr=False)
     merged: tuple[int, ...] = ()
+
+    @property
+    def reading(self) -> Detection:
+        """The :attr:`detection`, by its name of 0.1."""
+        return self.detection
 
     @property
     def said(self) -> str:
         """Its kind for tables: "merged 1+2" and "too close" say what cannot be told apart."""
         if self.merged:
             return f"merged {'+'.join(map(str, self.merged))}"
-        return "too close" if self.reading.close else self.kind
+        return "too close" if self.detection.close else self.kind
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import numpy as np
 from tomoskin.core import AMOUNT, FloatArray
 from tomoskin.formats.figure import new_figure, save_figure
 from tomoskin.skin import Skin
-from tomoskin.touch import Promise
+from tomoskin.touch import ResolutionBounds
 
 _MM = 1e3
 _LEVELS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
@@ -20,7 +20,7 @@ _TICKS = (*_LEVELS, 0.3, 0.7, 1.5, 3.0, 4.0, 7.0, 15.0, 30.0, 70.0)
 
 
 def write_promise(
-    path: Path, skin: Skin, found: Promise, title: str, *, overwrite: bool = False
+    path: Path, skin: Skin, found: ResolutionBounds, title: str, *, overwrite: bool = False
 ) -> None:
     """Draw both maps side by side, with the electrodes and, within 85 % of the way out, contours.
 
@@ -47,7 +47,7 @@ def write_promise(
     save_figure(path, figure, overwrite=overwrite)
 
 
-def _draw(ax: Any, skin: Skin, found: Promise, values: FloatArray) -> Any:
+def _draw(ax: Any, skin: Skin, found: ResolutionBounds, values: FloatArray) -> Any:
     finite = np.where(np.isfinite(values), values, 1e6)
     low, high = np.percentile(finite[found.inside], (2, 98))
     ends = {"vmin": low / 1.2, "vmax": max(high, 1.5 * low) * 1.2}

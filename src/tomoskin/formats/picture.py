@@ -128,7 +128,7 @@ def _draw(ax: Axes, mesh: Mesh, panel: Panel, limit: float) -> Any:
         x_label, y_label = 1.09 * middle
         ax.text(x_label, y_label, f"E{number}", fontsize=6, color="0.3", ha="center", va="center")
     for touch in panel.touches:
-        place = (_MM * touch.reading.x, _MM * touch.reading.y)
+        place = (_MM * touch.detection.x, _MM * touch.detection.y)
         ax.plot(*place, "+", color="black", markersize=9, markeredgewidth=1.2)
         label = f"{place[0]:.0f}, {place[1]:.0f}"
         ax.annotate(label, place, xytext=(5, 5), textcoords="offset points", fontsize=7)

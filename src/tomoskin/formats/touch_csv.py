@@ -49,7 +49,7 @@ def write_touches(
 
 
 def _row(frame: int, time: float, touch: Touch) -> tuple[object, ...]:
-    r = touch.reading
+    r = touch.detection
     place = (_number(r.x), _number(r.y), _number(r.sd_x), _number(r.sd_y))
     return (frame, f"{time:.6f}", touch.id, *place, _number(r.area), _number(r.peak), touch.said)
 
@@ -57,7 +57,7 @@ def _row(frame: int, time: float, touch: Touch) -> tuple[object, ...]:
 def _in_space(touch: Touch, surface: Surface | None) -> tuple[str, ...]:
     if surface is None:
         return ()
-    place = surface.point([[touch.reading.x, touch.reading.y]])[0]
+    place = surface.point([[touch.detection.x, touch.detection.y]])[0]
     return tuple(map(_number, place.tolist()))
 
 

@@ -1,5 +1,8 @@
 """From a change of voltages to a change of conductivity."""
 
+from typing import Any
+
+from tomoskin._moved import moved
 from tomoskin.inverse.choice.alpha_choice import AlphaChoice, Curve, Evidence
 from tomoskin.inverse.choice.criteria import RULES, choose
 from tomoskin.inverse.choice.light_touch import LightTouch
@@ -18,7 +21,7 @@ from tomoskin.inverse.iterative.field import RandomField
 from tomoskin.inverse.iterative.observation import Observation
 from tomoskin.inverse.iterative.shapes import Segmented, ShapeImaging
 from tomoskin.inverse.iterative.sharp_difference import SharpDifference, SharpImage
-from tomoskin.inverse.linear.images import MOST_LEFT_OUT, Pictures, pictures
+from tomoskin.inverse.linear.images import MOST_EXCLUDED, ImageSeries, image_series
 from tomoskin.inverse.linear.modes import Modes
 from tomoskin.inverse.linear.one_step import OneStep
 from tomoskin.inverse.linear.operator import Operator
@@ -38,10 +41,10 @@ from tomoskin.inverse.resolution import (
     resolved,
     sensitivity,
 )
-from tomoskin.inverse.thesis_metrics import SourceMetrics
+from tomoskin.inverse.thesis_metrics import ThesisMetrics
 
 __all__ = [
-    "MOST_LEFT_OUT",
+    "MOST_EXCLUDED",
     "PRIORS",
     "RULES",
     "Absolute",
@@ -56,6 +59,7 @@ __all__ = [
     "GaussianHighPass",
     "Greit",
     "Identity",
+    "ImageSeries",
     "Laplace",
     "LightTouch",
     "LinearProblem",
@@ -67,7 +71,6 @@ __all__ = [
     "OneStep",
     "Operator",
     "Picard",
-    "Pictures",
     "Prior",
     "RandomField",
     "Regions",
@@ -78,13 +81,13 @@ __all__ = [
     "SharpPrior",
     "Smoothed",
     "Smoother",
-    "SourceMetrics",
     "Sparse",
     "Spectrum",
     "Steady",
     "Structural",
     "Targets",
     "Temporal",
+    "ThesisMetrics",
     "TotalVariation",
     "along",
     "averaging",
@@ -93,11 +96,11 @@ __all__ = [
     "condition_number",
     "figures",
     "homogeneous",
+    "image_series",
     "named_prior",
     "noise_figure",
     "noise_weights",
     "picard",
-    "pictures",
     "point_spread",
     "prior_matrix",
     "resolution_matrix",
@@ -106,3 +109,7 @@ __all__ = [
     "simple_change",
     "weighted_change",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    return moved("inverse", name)

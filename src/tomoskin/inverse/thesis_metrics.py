@@ -12,7 +12,7 @@ from tomoskin.mesh import Mesh
 
 
 @dataclass(frozen=True, slots=True)
-class SourceMetrics:
+class ThesisMetrics:
     """Metrics on the values of the elements, section 4.4.1.
 
     Attributes
@@ -36,7 +36,7 @@ class SourceMetrics:
     error75: float
 
     @classmethod
-    def of(cls, image: Image, mesh: Mesh, truth: ArrayLike | None = None) -> SourceMetrics:
+    def of(cls, image: Image, mesh: Mesh, truth: ArrayLike | None = None) -> ThesisMetrics:
         """Metrics of ``image`` on its ``mesh``; ``truth`` (d,) is the stimulus' centroid, m.
 
         Changes of the sign of the greatest one count; a value at a threshold is over it.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tomoskin.calibration import BendReader, BendReading
-from tomoskin.core import Reading
+from tomoskin.core import Detection
 from tomoskin.pipeline.finding import Finder, InData, View, told_gain
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.watch import Seen, Watch
@@ -23,7 +23,7 @@ class Bends:
         if isinstance(finder, InData):
             spots = finder.model
         else:
-            spots = prepared.spots.as_told(reference.mean)
+            spots = prepared.spots.fitted_to(reference.mean)
         known = prepared.skin.touch.method == "fit"
         self._own = None if known else InData(spots, prepared, reference)
         self._reader = BendReader(prepared.bending, spots.response, told_gain(spots, reference))
@@ -33,7 +33,7 @@ class Bends:
         watch: Watch,
         seen: Seen,
         view: View,
-        found: list[Reading],
+        found: list[Detection],
         time: float,
         *,
         touched: bool,
@@ -44,9 +44,9 @@ class Bends:
             return None
         touches = found if self._own is None else self._own.push(view)
         beside = watch.beside_bends
-        reading = self._reader.push(seen.whole, touches, beside, time, touched=touched)
-        watch.bent(reading.moved)
-        return reading
+        detection = self._reader.push(seen.whole, touches, beside, time, touched=touched)
+        watch.bent(detection.moved)
+        return detection
 
 
 def bends_of(prepared: Prepared, reference: Reference, finder: Finder) -> Bends | None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray
-from tomoskin.inverse import MOST_LEFT_OUT, Evidence
+from tomoskin.inverse import MOST_EXCLUDED, Evidence
 from tomoskin.pattern import Pattern
 from tomoskin.pipeline.dead_rows import dead_rows
 from tomoskin.pipeline.prepare import Prepared
@@ -123,7 +123,7 @@ class _Left:
     def of(cls, prepared: Prepared, recording: Recording, dead: IntArray) -> _Left:
         living = np.delete(recording.voltages, dead, axis=1)
         missing = ~np.isfinite(living)
-        most = MOST_LEFT_OUT * recording.voltages.shape[1] - len(dead)
+        most = MOST_EXCLUDED * recording.voltages.shape[1] - len(dead)
         enough = missing.sum(axis=1) <= most
         if not enough.any():
             raise DataError("no frame has finite values in enough rows", where=recording.source)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, IntArray
-from tomoskin.inverse import MOST_LEFT_OUT
+from tomoskin.inverse import MOST_EXCLUDED
 from tomoskin.pattern import Pattern
 
 _LISTED = 5
@@ -36,7 +36,7 @@ def dead_rows(
     rows = np.flatnonzero(np.any(dead, axis=0))
     if len(rows) == pattern.n_meas:
         raise DataError("no frame has finite values", where=source)
-    if len(rows) > MOST_LEFT_OUT * pattern.n_meas:
+    if len(rows) > MOST_EXCLUDED * pattern.n_meas:
         listed = "; ".join(pattern.row_text(row) for row in rows[:_LISTED])
         raise DataError(
             f"{len(rows)} of {pattern.n_meas} rows hold no finite values, too many to leave out: "

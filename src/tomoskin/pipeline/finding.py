@@ -1,4 +1,4 @@
-"""Image and difference data → readings: regions of the picture, touches fitted to the data, or
+"""Image and difference data → detections: regions of the picture, touches fitted to the data, or
 places that labelled presses tell."""
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.calibration import Locator
-from tomoskin.core import FloatArray, Image, Reading
+from tomoskin.core import Detection, FloatArray, Image
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import Reference
 from tomoskin.source import Configuration, ScanSettings
-from tomoskin.touch import WHOLE, NoiseFloor, Pace, SpotFinder, SpotModel, measured_covariance
+from tomoskin.touch import EXHAUSTIVE, ImageNoise, Pace, SpotFinder, SpotModel, measured_covariance
 
 _ALL = 0.999
 """Part of a row that is taken for all of it."""
@@ -37,7 +37,7 @@ class View:
     """
 
     image: Image
-    floor: NoiseFloor | None
+    floor: ImageNoise | None
     dv: FloatArray
     blind: FloatArray
     whole: FloatArray | None = None
@@ -50,7 +50,7 @@ class Finder(Protocol):
         """Go on with another operator or noise."""
         ...
 
-    def push(self, view: View) -> list[Reading]:
+    def push(self, view: View) -> list[Detection]:
         """Readings of a frame, strongest first."""
         ...
 
@@ -66,7 +66,7 @@ class InImage:
         del reference
         self._segmenter = prepared.segmenter
 
-    def push(self, view: View) -> list[Reading]:
+    def push(self, view: View) -> list[Detection]:
         """See :class:`Finder`."""
         return self._segmenter(view.image, view.floor)
 
@@ -79,7 +79,7 @@ class InData:
         model: SpotModel,
         prepared: Prepared,
         reference: Reference | None,
-        pace: Pace = WHOLE,
+        pace: Pace = EXHAUSTIVE,
     ) -> None:
         gain = _gain(model, prepared, reference)
         noise = _noise(prepared, reference, gain)
@@ -96,7 +96,7 @@ class InData:
         gain = _gain(self.model, prepared, reference)
         self._spots.renew(_noise(prepared, reference, gain), gain)
 
-    def push(self, view: View) -> list[Reading]:
+    def push(self, view: View) -> list[Detection]:
         """See :class:`Finder`."""
         return self._spots.push(view.dv, view.blind)
 
@@ -114,7 +114,7 @@ class ByCalibration:
         self._difference = prepared.operator.difference
         self._mean = prepared.operator.reference if reference is None else reference.mean
 
-    def push(self, view: View) -> list[Reading]:
+    def push(self, view: View) -> list[Detection]:
         """See :class:`Finder`."""
         found = self._image.push(view)
         if not found:
@@ -139,7 +139,7 @@ class ByCalibration:
         ]
 
 
-def finding(prepared: Prepared, reference: Reference | None, pace: Pace = WHOLE) -> Finder:
+def finding(prepared: Prepared, reference: Reference | None, pace: Pace = EXHAUSTIVE) -> Finder:
     """What finds the touches: a calibration, else the method that the skin names.
 
     Fitted touches are those of a sheet that conducts by direction as its reference tells.
@@ -149,7 +149,7 @@ def finding(prepared: Prepared, reference: Reference | None, pace: Pace = WHOLE)
         return ByCalibration(prepared.locator, prepared, reference)
     if prepared.spots is None or prepared.skin.touch.method != "fit":
         return InImage(prepared)
-    spots = prepared.spots if reference is None else prepared.spots.as_told(reference.mean)
+    spots = prepared.spots if reference is None else prepared.spots.fitted_to(reference.mean)
     return InData(spots, prepared, reference, pace)
 
 

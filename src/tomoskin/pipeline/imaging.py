@@ -10,10 +10,10 @@ import numpy as np
 from tomoskin.core import FloatArray, Image
 from tomoskin.inverse import Modes, Temporal
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.signal import Blind, Reference
-from tomoskin.touch import NoiseFloor
+from tomoskin.signal import NuisanceSubspace, Reference
+from tomoskin.touch import ImageNoise
 
-Pictured = tuple[Image, NoiseFloor | None]
+Pictured = tuple[Image, ImageNoise | None]
 """An image, and its noise floor where the noise is known."""
 
 _SETTLED = 3.0
@@ -27,12 +27,12 @@ class Alone:
     """Each image from its own frame."""
 
     def __init__(
-        self, prepared: Prepared, reference: Reference | None, blind: Blind | None = None
+        self, prepared: Prepared, reference: Reference | None, blind: NuisanceSubspace | None = None
     ) -> None:
         self._operator = prepared.operator
         self._floor = None if reference is None else prepared.noise_floor(reference, blind)
 
-    def renew(self, prepared: Prepared, reference: Reference, blind: Blind) -> None:
+    def renew(self, prepared: Prepared, reference: Reference, blind: NuisanceSubspace) -> None:
         """Another operator or noise, or other directions of the data that say nothing."""
         self._operator = prepared.operator
         self._floor = prepared.noise_floor(reference, blind)
@@ -61,17 +61,19 @@ class Filtered:
         modes: Modes,
         reference: Reference | None,
         interval: float,
-        blind: Blind | None = None,
+        blind: NuisanceSubspace | None = None,
     ) -> None:
         self._temporal = Temporal(modes, prepared.skin.inverse.time_constant)
         self._interval = interval
         self._settled = np.inf
         self._noise: FloatArray | None = None
-        self._alone: NoiseFloor | None = None
+        self._alone: ImageNoise | None = None
         if reference is not None:
             self.renew(prepared, reference, blind)
 
-    def renew(self, prepared: Prepared, reference: Reference, blind: Blind | None) -> None:
+    def renew(
+        self, prepared: Prepared, reference: Reference, blind: NuisanceSubspace | None
+    ) -> None:
         """As :meth:`Alone.renew`, but for the operator: the modes stay."""
         if not reference.noise_is_known:
             return
@@ -91,7 +93,7 @@ class Filtered:
             self._settled = time + _SETTLED * self._temporal.time_constant
         return self._temporal.push(dv, time), self._floor(time)
 
-    def _floor(self, time: float) -> NoiseFloor | None:
+    def _floor(self, time: float) -> ImageNoise | None:
         """The filter's own; until that holds, no less than that of a single frame."""
         if self._alone is None or self._steady is None:
             return self._alone
@@ -100,21 +102,24 @@ class Filtered:
         return self._settling
 
     @cached_property
-    def _steady(self) -> NoiseFloor | None:
+    def _steady(self) -> ImageNoise | None:
         if self._noise is None or not self._interval > 0:
             return None
         spread = self._temporal.spread(self._noise, self._interval)
-        return NoiseFloor.of(spread, self._temporal.modes.operator.model.mesh.identity)
+        return ImageNoise.of(spread, self._temporal.modes.operator.model.mesh.identity)
 
     @cached_property
-    def _settling(self) -> NoiseFloor | None:
+    def _settling(self) -> ImageNoise | None:
         if self._alone is None or self._steady is None:
             return self._alone
         return replace(self._alone, sd=np.maximum(self._alone.sd, self._steady.sd))
 
 
 def imaging(
-    prepared: Prepared, reference: Reference | None, interval: float, blind: Blind | None = None
+    prepared: Prepared,
+    reference: Reference | None,
+    interval: float,
+    blind: NuisanceSubspace | None = None,
 ) -> Alone | Filtered:
     """What makes the images of ``prepared``: filtered where its skin has a time constant.
 

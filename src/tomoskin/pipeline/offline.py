@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.calibration import BendReading, StateReading
-from tomoskin.core import DataError, FloatArray, IntArray, Reading, Touch
+from tomoskin.core import DataError, Detection, FloatArray, IntArray, Touch
 from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline.bending import bends_of
 from tomoskin.pipeline.changes import Changes, Idle, changes_of
@@ -112,10 +112,10 @@ def reconstruct(
     for number, now in enumerate(time.tolist()):
         view = stage.push(number, now)
         images.append(view.image)
-        readings = stage.finder.push(view)
-        touches.append(tracker.update(readings, now, now))
+        detections = stage.finder.push(view)
+        touches.append(tracker.update(detections, now, now))
         touched = bool(touches[-1])
-        bends.append(stage.bent(view, readings, now, touched=touched))
+        bends.append(stage.bent(view, detections, now, touched=touched))
         stage.learn(now, touched=touched)
         advance(number + 1, len(time))
     return Reconstruction(
@@ -187,12 +187,12 @@ class _Stage:
         return View(*self._imaging.push(seen.dv, now), seen.dv, blind, seen.whole)
 
     def bent(
-        self, view: View, readings: list[Reading], now: float, *, touched: bool
+        self, view: View, detections: list[Detection], now: float, *, touched: bool
     ) -> BendReading | None:
         """How the sheet was bent in the frame that was pushed last, where that is known."""
         if self._bends is None or self._watch is None or self._seen is None:
             return None
-        return self._bends.push(self._watch, self._seen, view, readings, now, touched=touched)
+        return self._bends.push(self._watch, self._seen, view, detections, now, touched=touched)
 
     def _filled(self, dv: FloatArray, missing: NDArray[np.bool_], now: float) -> View:
         filled = self._prepared.operator.filled(dv, missing)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.calibration import BendReading, StateReading
-from tomoskin.core import FloatArray, Frame, Image, Reading, Touch, Voltages
+from tomoskin.core import Detection, FloatArray, Frame, Image, Touch, Voltages
 from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline.bending import Bends, bends_of
 from tomoskin.pipeline.collector import Collector
@@ -191,11 +191,11 @@ class Pipeline:
             )
         image, floor = self._imaging.push(seen.dv, now)
         view = View(image, floor, seen.dv, seen.blind.directions, seen.whole)
-        readings = self._finder.push(view)
-        touches = self._track(readings, voltages)
+        detections = self._finder.push(view)
+        touches = self._track(detections, voltages)
         touched, bend = bool(touches), None
         if self._bends:
-            bend = self._bends.push(watch, seen, view, readings, now, touched=touched)
+            bend = self._bends.push(watch, seen, view, detections, now, touched=touched)
         if watch.learn(now, touched=touched):
             self._imaging.renew(watch.prepared, watch.baseline.reference, watch.steady())
             self._finder.renew(watch.prepared, watch.baseline.reference)
@@ -218,8 +218,8 @@ class Pipeline:
             return None
         return teller(np.where(lost, np.nan, voltages.values - reference.mean))
 
-    def _track(self, readings: list[Reading], voltages: Voltages) -> tuple[Touch, ...]:
-        return self._tracker.update(readings, self._time(voltages), voltages.host_time)
+    def _track(self, detections: list[Detection], voltages: Voltages) -> tuple[Touch, ...]:
+        return self._tracker.update(detections, self._time(voltages), voltages.host_time)
 
     def _result(
         self,

@@ -29,9 +29,9 @@ from tomoskin.inverse import (
 )
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern, Scan
-from tomoskin.signal import Blind, Readout, Reference, difference_noise
+from tomoskin.signal import NuisanceSubspace, Readout, Reference, difference_noise
 from tomoskin.skin import Skin
-from tomoskin.touch import NoiseFloor, Region, Segmenter, SpotModel
+from tomoskin.touch import ImageNoise, Region, Segmenter, SpotModel
 
 BODY = ("outline", "surface", "electrodes", "material", "drive", "readout", "mesh", "twin")
 """Sections of a skin that sheet, mesh and scan rest on; the others only make pictures of it."""
@@ -179,7 +179,9 @@ class Prepared:
         operator = replace(self.problem, prior=prior).operator(self.choice.alpha)
         return replace(self, operator=operator)
 
-    def noise_floor(self, reference: Reference, blind: Blind | None = None) -> NoiseFloor | None:
+    def noise_floor(
+        self, reference: Reference, blind: NuisanceSubspace | None = None
+    ) -> ImageNoise | None:
         """What the noise of a reference does to the picture; None where it is not known.
 
         ``blind``: what the data do not tell.
@@ -188,7 +190,7 @@ class Prepared:
             return None
         matrix = self.operator.matrix if blind is None else blind.seen_by(self.operator.matrix)
         spread = matrix * self.difference_noise(reference)
-        return NoiseFloor.of(spread, self.mesh.identity)
+        return ImageNoise.of(spread, self.mesh.identity)
 
     def difference_noise(self, reference: Reference) -> FloatArray:
         """(n_meas,) standard deviation of difference data against that reference."""

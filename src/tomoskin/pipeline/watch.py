@@ -12,12 +12,12 @@ from tomoskin.pattern import Scan
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import (
     Baseline,
-    Blind,
     Health,
     Monitor,
+    NuisanceSubspace,
     Reference,
     difference,
-    lost_directions,
+    nuisance_directions,
 )
 
 MOST_BLIND = 0.5
@@ -40,7 +40,7 @@ class Seen:
     count in a sum only; ``whole`` (n_meas,) V, what the frame differs by with all that is in it."""
 
     dv: FloatArray | None
-    blind: Blind
+    blind: NuisanceSubspace
     health: Health
     left_out: int
     whole: FloatArray | None = None
@@ -84,8 +84,8 @@ class Watch:
         self._common = self._gain(reference) if self._projects else np.zeros((len(model), 0))
         self._bends = _of_bends(prepared)
         self._bent = np.zeros(len(model))
-        self._kept: dict[bytes, Blind] = {}
-        self._newest: tuple[Health, Blind] | None = None
+        self._kept: dict[bytes, NuisanceSubspace] = {}
+        self._newest: tuple[Health, NuisanceSubspace] | None = None
         self._learnt = 0
         self._health: Health | None = None
         self._floor_for: tuple[object, float] = (None, np.nan)
@@ -97,7 +97,7 @@ class Watch:
         self._whole = self._prepared = prepared
         self._forget()
         if self._health is not None and self._health.sick:
-            lost = lost_directions(prepared.pattern, self._health.lost, self._health.floating)
+            lost = nuisance_directions(prepared.pattern, self._health.lost, self._health.floating)
             self._prepared = prepared.blind_to(lost / self._scale[:, None])
 
     def renewed(
@@ -182,7 +182,7 @@ class Watch:
             self.take(self._whole)
         return before is not None
 
-    def steady(self) -> Blind:
+    def steady(self) -> NuisanceSubspace:
         """What no frame of late has told."""
         return self._blind(self._health)
 
@@ -201,7 +201,7 @@ class Watch:
         pattern = self._prepared.pattern
         if health is None:
             return np.zeros((pattern.n_meas, 0))
-        return lost_directions(pattern, health.lost, health.floating)
+        return nuisance_directions(pattern, health.lost, health.floating)
 
     def _gain(self, reference: Reference) -> FloatArray:
         """(n_meas, 1): all voltages in proportion, as conductivity does that changes alike."""
@@ -211,7 +211,7 @@ class Watch:
         self._kept.clear()
         self._newest = None
 
-    def _blind(self, health: Health | None) -> Blind:
+    def _blind(self, health: Health | None) -> NuisanceSubspace:
         """What that frame does not tell; a monitor gives the same record while all is well."""
         if self._newest is not None and health is self._newest[0]:
             return self._newest[1]
@@ -224,11 +224,11 @@ class Watch:
             self._newest = health, self._kept[key]
         return self._kept[key]
 
-    def _made(self, health: Health | None) -> Blind:
+    def _made(self, health: Health | None) -> NuisanceSubspace:
         operator, free = self._prepared.operator, self._free()
         common = self._common[:, 1:] if free.shape[1] else self._common
         parts = [common, self._bends, self._lost_directions(health)]
-        blind = Blind.of(np.hstack(parts) / self._scale[:, None], operator.precision)
+        blind = NuisanceSubspace.of(np.hstack(parts) / self._scale[:, None], operator.precision)
         if not free.shape[1]:
             return blind
         seen = (self._prepared.problem.jacobian @ free).real

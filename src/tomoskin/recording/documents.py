@@ -38,7 +38,7 @@ def _number(item: Any) -> Any:
 
 def touch_row(touch: Touch) -> dict[str, Any]:
     """One touch as plain values by name."""
-    r = touch.reading
+    r = touch.detection
     return {
         "id": touch.id, "kind": touch.kind, "since": touch.since,
         "x": r.x, "y": r.y, "sd_x": r.sd_x, "sd_y": r.sd_y, "area": r.area, "peak": r.peak,

@@ -91,9 +91,9 @@ def _size(pixels: PixelMap) -> float:
 
 
 def _entity(touch: Touch, now: dict[str, int]) -> Message:
-    reading = touch.reading
-    width = 2.0 * float(np.sqrt(reading.area / np.pi))
-    pose = _pose(reading.x, reading.y)
+    detection = touch.detection
+    width = 2.0 * float(np.sqrt(detection.area / np.pi))
+    pose = _pose(detection.x, detection.y)
     return {
         "timestamp": now,
         "frame_id": _FRAME,
@@ -101,7 +101,7 @@ def _entity(touch: Touch, now: dict[str, int]) -> Message:
         "lifetime": {"sec": 0, "nsec": 0},
         "frame_locked": True,
         "metadata": [
-            {"key": "kind", "value": touch.kind}, {"key": "peak", "value": f"{reading.peak:.4g}"},
+            {"key": "kind", "value": touch.kind}, {"key": "peak", "value": f"{detection.peak:.4g}"},
         ],
         **{kind: [] for kind in UNUSED},
         "spheres": [

@@ -13,7 +13,7 @@ from typing import Any, Self
 import msgspec
 import numpy as np
 
-from tomoskin.core import DataError, Event, Reading, SkinError, Touch
+from tomoskin.core import DataError, Detection, Event, SkinError, Touch
 from tomoskin.recording import channels
 from tomoskin.recording.container_reader import ContainerReader
 from tomoskin.recording.layout import MarkedFrame, decode_frame, decode_raw
@@ -260,5 +260,5 @@ def _touch(item: dict[str, Any]) -> Touch:
     sd_x, sd_y = (float("nan") if item[k] is None else item[k] for k in ("sd_x", "sd_y"))
     place = item["x"], item["y"], sd_x, sd_y, item["area"], item["peak"], _NO_CELLS
     cov_xy, close, merged = (item.get(k) for k in ("cov_xy", "close", "merged"))  # format 1.0: none
-    reading = Reading(*place, cov_xy=cov_xy or 0.0, close=bool(close))
+    reading = Detection(*place, cov_xy=cov_xy or 0.0, close=bool(close))
     return Touch(item["id"], item["kind"], item["since"], reading, tuple(merged or ()))

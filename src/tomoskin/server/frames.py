@@ -114,16 +114,16 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
         (
             t.id % 2**32,
             t.kind == "increase",
-            min(len(t.merged), _MOST) or t.reading.close,
+            min(len(t.merged), _MOST) or t.detection.close,
             (0, 0),
-            t.reading.x,
-            t.reading.y,
-            t.reading.sd_x,
-            t.reading.sd_y,
-            t.reading.area,
-            t.reading.peak,
+            t.detection.x,
+            t.detection.y,
+            t.detection.sd_x,
+            t.detection.sd_y,
+            t.detection.area,
+            t.detection.peak,
             now - t.since,
-            t.reading.cov_xy,
+            t.detection.cov_xy,
         )
         for t in touches
     ]
@@ -140,5 +140,5 @@ def _bend(bend: BendReading | None) -> bytes:
 def _labels(touches: Sequence[Touch], n_cells: int) -> bytes:
     labels = np.zeros(n_cells + -n_cells % 4, np.uint8)
     for number, touch in enumerate(touches, 1):
-        labels[touch.reading.cells] = number
+        labels[touch.detection.cells] = number
     return labels.tobytes()

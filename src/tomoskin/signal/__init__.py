@@ -1,7 +1,9 @@
 """Counts → voltages → differences: an idle skin's noise and drift, and its electrodes' health."""
 
+from typing import Any
+
+from tomoskin._moved import moved
 from tomoskin.signal.baseline import Baseline, BaselineState
-from tomoskin.signal.blind import Blind
 from tomoskin.signal.difference import (
     DIFFERENCES,
     Consecutive,
@@ -11,9 +13,10 @@ from tomoskin.signal.difference import (
     in_phase,
     undone,
 )
-from tomoskin.signal.health import ElectrodeHealth, Health, Roles, lost_directions
+from tomoskin.signal.health import ElectrodeHealth, Health, Roles, nuisance_directions
 from tomoskin.signal.idle import Idle
 from tomoskin.signal.monitor import Monitor
+from tomoskin.signal.nuisance import NuisanceSubspace
 from tomoskin.signal.readout import FIGURES, BoardFigures, Readout
 from tomoskin.signal.recording import Recording, frame_times
 from tomoskin.signal.reference import Reference
@@ -23,13 +26,13 @@ __all__ = [
     "FIGURES",
     "Baseline",
     "BaselineState",
-    "Blind",
     "BoardFigures",
     "Consecutive",
     "ElectrodeHealth",
     "Health",
     "Idle",
     "Monitor",
+    "NuisanceSubspace",
     "Readout",
     "Recording",
     "Reference",
@@ -39,6 +42,10 @@ __all__ = [
     "difference_noise",
     "frame_times",
     "in_phase",
-    "lost_directions",
+    "nuisance_directions",
     "undone",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    return moved("signal", name)

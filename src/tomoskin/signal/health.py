@@ -50,7 +50,7 @@ class Health:
         (n_meas,) bool: rows of this frame that do not count.
     floating
         (n_electrodes,) bool: electrodes whose readings are any number. Rows that share such a
-        reading still count in their sum: see :func:`tomoskin.signal.lost_directions`.
+        reading still count in their sum: see :func:`tomoskin.signal.nuisance_directions`.
     """
 
     electrodes: tuple[ElectrodeHealth, ...]
@@ -124,7 +124,7 @@ def _share(rows: Mask, bad: Mask) -> FloatArray:
     return np.asarray((rows & bad).sum(axis=1) / np.maximum(count, 1) * (count > 0))
 
 
-def lost_directions(pattern: Pattern, lost: Mask, floating: Mask) -> FloatArray:
+def nuisance_directions(pattern: Pattern, lost: Mask, floating: Mask) -> FloatArray:
     """(n_meas, k) nuisance directions of the data.
 
     A ``lost`` row, (n_meas,) bool, is one. A reading of a ``floating`` electrode,

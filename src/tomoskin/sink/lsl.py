@@ -105,9 +105,9 @@ def _row_labels(pattern: Pattern) -> list[str]:
 
 
 def _touch_row(moment: Moment) -> FloatArray:
-    strongest = sorted(moment.touches, key=lambda t: -abs(t.reading.peak))[:MOST_TOUCHES]
+    strongest = sorted(moment.touches, key=lambda t: -abs(t.detection.peak))[:MOST_TOUCHES]
     row = np.full((MOST_TOUCHES, len(_FIELDS)), np.nan)
     for number, touch in enumerate(strongest):
-        reading = touch.reading
-        row[number] = touch.id, reading.x, reading.y, reading.peak
+        detection = touch.detection
+        row[number] = touch.id, detection.x, detection.y, detection.peak
     return row.ravel()

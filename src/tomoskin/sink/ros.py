@@ -84,13 +84,13 @@ def _header(stamp: int) -> Value:
 
 def _pose(touch: Touch, stamp: int) -> Value:
     """Place in the sheet's plane; what an image does not say has a vast variance."""
-    reading = touch.reading
-    variance = np.array([reading.sd_x**2, reading.sd_y**2, *[_UNKNOWN] * 4])
+    detection = touch.detection
+    variance = np.array([detection.sd_x**2, detection.sd_y**2, *[_UNKNOWN] * 4])
     covariance = np.diag(np.where(np.isfinite(variance), variance, _UNKNOWN))
     if np.isfinite(variance).all():
-        covariance[[0, 1], [1, 0]] = reading.cov_xy
+        covariance[[0, 1], [1, 0]] = detection.cov_xy
     pose = {
-        "position": {"x": reading.x, "y": reading.y, "z": 0.0},
+        "position": {"x": detection.x, "y": detection.y, "z": 0.0},
         "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
     }
     return {"header": _header(stamp), "pose": {"pose": pose, "covariance": covariance.ravel()}}

@@ -3,26 +3,26 @@
 from typing import Any
 
 from tomoskin._moved import moved
-from tomoskin.touch.bounds import Demand, Promise, Variant, promise, variants
+from tomoskin.touch.bounds import Demand, ResolutionBounds, Variant, resolution_bounds, variants
 from tomoskin.touch.fit.finder import SpotFinder, SpotModel
 from tomoskin.touch.fit.noise import Whitener, measured_covariance
-from tomoskin.touch.fit.pace import LIVE, WHOLE, Pace
+from tomoskin.touch.fit.pace import EXHAUSTIVE, LIVE, Pace
 from tomoskin.touch.fit.spot import Response, Spots, spots_of
-from tomoskin.touch.image_noise import NoiseFloor
+from tomoskin.touch.image_noise import ImageNoise
 from tomoskin.touch.region import Region
 from tomoskin.touch.segment import Segmenter
 from tomoskin.touch.tracking.settings import STILL, TrackSettings
 from tomoskin.touch.tracking.tracker import TouchEvent, Tracker
 
 __all__ = [
+    "EXHAUSTIVE",
     "LIVE",
     "STILL",
-    "WHOLE",
     "Demand",
-    "NoiseFloor",
+    "ImageNoise",
     "Pace",
-    "Promise",
     "Region",
+    "ResolutionBounds",
     "Response",
     "Segmenter",
     "SpotFinder",
@@ -34,7 +34,7 @@ __all__ = [
     "Variant",
     "Whitener",
     "measured_covariance",
-    "promise",
+    "resolution_bounds",
     "spots_of",
     "variants",
 ]

@@ -92,7 +92,7 @@ class Demand:
 
 
 @dataclass(frozen=True, eq=False)
-class Promise:
+class ResolutionBounds:
     """The bounds of a skin at the cells of a coarse mesh.
 
     Attributes
@@ -130,9 +130,9 @@ class Promise:
         }
 
 
-def promise(
+def resolution_bounds(
     skin: Skin, demand: Demand, places: int = 500, progress: Advance = lambda _done, _total: None
-) -> Promise:
+) -> ResolutionBounds:
     """Bounds of a press at about so many ``places`` on a skin, from one frame of its read-out.
 
     The noise is that of the converter (:data:`~tomoskin.signal.readout.CONVERSION_NOISE` and
@@ -163,7 +163,9 @@ def promise(
         least.append(least_content(response, faint[some], noise, demand.ratio))
     progress(len(spots), len(spots))
     faintest = -np.expm1(np.maximum(np.concatenate(least) / area, -700.0))
-    return Promise(coarse, np.concatenate(bounds), faintest, _inside(skin, coarse.centroids))
+    return ResolutionBounds(
+        coarse, np.concatenate(bounds), faintest, _inside(skin, coarse.centroids)
+    )
 
 
 def _noise(skin: Skin) -> FloatArray:

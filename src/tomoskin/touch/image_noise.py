@@ -16,7 +16,7 @@ _BAND = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class NoiseFloor:
+class ImageNoise:
     """Measurement noise as it stands in the images of one mesh.
 
     ``spread`` (n_cells, k): spread · spreadᵀ is the image's covariance; ``sd`` (n_cells,) the
@@ -47,7 +47,7 @@ def centroid(mesh: Mesh, cells: IntArray, strength: FloatArray) -> FloatArray:
 
 
 def centroid_sd(
-    mesh: Mesh, cells: IntArray, image: FloatArray, margin: float, floor: NoiseFloor
+    mesh: Mesh, cells: IntArray, image: FloatArray, margin: float, floor: ImageNoise
 ) -> FloatArray:
     """(2,) m, to first order in the noise, for a region above a fraction of the extreme.
 

@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, Image, IntArray, Reading
+from tomoskin.core import DataError, Detection, FloatArray, Image, IntArray
 from tomoskin.mesh import Mesh
 from tomoskin.skin import TouchSettings
 from tomoskin.touch.cells import REACH, Blur, connected, neighbour_table
-from tomoskin.touch.image_noise import NoiseFloor, centroid, centroid_sd
+from tomoskin.touch.image_noise import ImageNoise, centroid, centroid_sd
 from tomoskin.touch.tracking import HELD
 
 
@@ -37,7 +37,7 @@ class Segmenter:
         self._filter = Blur(mesh, settings.smoothing)
         self._neighbours = neighbour_table(mesh)
 
-    def __call__(self, image: Image, floor: NoiseFloor | None = None) -> list[Reading]:
+    def __call__(self, image: Image, floor: ImageNoise | None = None) -> list[Detection]:
         """Regions of ``image``, strongest first.
 
         With a ``floor``, a region counts where the image exceeds ``snr`` times its noise. Down to
@@ -70,15 +70,15 @@ class Segmenter:
             ]
         else:
             detections = [self._centroid(cells, values, floor) for cells in regions]
-        detections.sort(key=lambda reading: -abs(reading.peak))
+        detections.sort(key=lambda detection: -abs(detection.peak))
         detections = detections[: self.settings.max_touches]
         if floor is None or self.settings.position == "peak":
             return detections
         return [*detections, *self._weaker(regions, values, floor)][: self.settings.max_touches]
 
     def _weaker(
-        self, regions: list[IntArray], image: FloatArray, floor: NoiseFloor
-    ) -> list[Reading]:
+        self, regions: list[IntArray], image: FloatArray, floor: ImageNoise
+    ) -> list[Detection]:
         """Maxima of the filtered image outside all regions, down to HELD · Γ1 of the extreme.
 
         A touch that another one outshines is not lost by that: these may carry it on.
@@ -109,14 +109,14 @@ class Segmenter:
                 hint="make the segmenter from the mesh that the image was made on",
             )
 
-    def _centroid(self, cells: IntArray, image: FloatArray, floor: NoiseFloor | None) -> Reading:
+    def _centroid(self, cells: IntArray, image: FloatArray, floor: ImageNoise | None) -> Detection:
         weights, snr = image[cells], _snr(cells, image, floor)
         centre = centroid(self.mesh, cells, np.abs(image))
         sd = np.full(2, np.nan)
         if floor is not None:
             margin = REACH * self.settings.smoothing
             sd = centroid_sd(self.mesh, cells, image, margin, floor)
-        return Reading(
+        return Detection(
             x=float(centre[0]),
             y=float(centre[1]),
             sd_x=float(sd[0]),
@@ -129,9 +129,9 @@ class Segmenter:
         )
 
     def _extremes(
-        self, cells: IntArray, image: FloatArray, filtered: FloatArray, floor: NoiseFloor | None
-    ) -> list[Reading]:
-        """One reading at each cell where the filtered image exceeds all its neighbours'.
+        self, cells: IntArray, image: FloatArray, filtered: FloatArray, floor: ImageNoise | None
+    ) -> list[Detection]:
+        """One detection at each cell where the filtered image exceeds all its neighbours'.
 
         A level region has no such cell; its first highest one counts.
         """
@@ -140,7 +140,7 @@ class Segmenter:
         above[np.argmax(height[cells])] = True
         area, snr = float(self.mesh.volumes[cells].sum()), _snr(cells, image, floor)
         return [
-            Reading(
+            Detection(
                 x=float(self.mesh.centroids[top, 0]),
                 y=float(self.mesh.centroids[top, 1]),
                 sd_x=float("nan"),
@@ -164,14 +164,14 @@ def _of_sign(values: FloatArray, sign: str) -> FloatArray:
 
 
 def _significant(
-    kept: IntArray, strength: FloatArray, floor: NoiseFloor | None, snr: float
+    kept: IntArray, strength: FloatArray, floor: ImageNoise | None, snr: float
 ) -> NDArray[np.bool_]:
     if floor is None:
         return np.ones(len(kept), dtype=bool)
     return np.asarray(strength[kept] >= snr * floor.sd[kept])
 
 
-def _snr(cells: IntArray, image: FloatArray, floor: NoiseFloor | None) -> float:
+def _snr(cells: IntArray, image: FloatArray, floor: ImageNoise | None) -> float:
     """How many times its noise the image of ``cells`` is at most; NaN without a floor."""
     if floor is None:
         return float("nan")

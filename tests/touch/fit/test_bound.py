@@ -29,7 +29,7 @@ ALONG = np.column_stack([np.linspace(0.0, 0.085, 8), np.zeros(8)])
     ("name", "least", "most"), [("textile-disc-8", 3.6, 5.6), ("textile-disc-16", 0.6, 3.7)]
 )
 def test_an_independent_model_has_figures_of_this_size(name: str, least: float, most: float):
-    """Root mean square mm over 85 % of the radius: 0.1 A, 15 mm, 25 % deep, 16 readings, 0.7 LSB.
+    """Root mean square mm over 85 % of the radius: 0.1 A, 15 mm, 25 % deep, 16 detections, 0.7 LSB.
     The other model's profile and noise of the reference are not known: a factor of two."""
     skin = Skin.load(name).altered(
         {"readout": {"oversampling": 16, "gain": 40}, "mesh": {"cells": 1200}}

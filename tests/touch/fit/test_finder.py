@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tomoskin.core import FloatArray, Reading
+from tomoskin.core import Detection, FloatArray
 from tomoskin.forward import ForwardModel
 from tomoskin.skin import Skin
 from tomoskin.touch.fit import SpotFinder, SpotModel, position_bound, spots_of
@@ -47,12 +47,12 @@ def press(x: float, y: float, radius: float = 0.022, depth: float = -0.25) -> Fl
     return spots_of([[x, y]], radius, depth)
 
 
-def place(reading: Reading) -> FloatArray:
-    return np.array([reading.x, reading.y])
+def place(detection: Detection) -> FloatArray:
+    return np.array([detection.x, detection.y])
 
 
-def spread(reading: Reading) -> FloatArray:
-    xx, yy, xy = reading.sd_x**2, reading.sd_y**2, reading.cov_xy
+def spread(detection: Detection) -> FloatArray:
+    xx, yy, xy = detection.sd_x**2, detection.sd_y**2, detection.cov_xy
     return np.array([[xx, xy], [xy, yy]])
 
 
@@ -62,7 +62,7 @@ def test_unbiased_to_the_rim_and_as_good_as_can_be(radius: float) -> None:
     spot, count = press(radius, 0.01), 60
     clean = data(spot)
     found = [finder().push(clean + n, NOTHING)[0] for n in noise(16, count, 1)]
-    errors = np.array([place(reading) - spot[0, :2] for reading in found])
+    errors = np.array([place(detection) - spot[0, :2] for detection in found])
     bound = position_bound(model().response, spot, whitener())[0]
     least = np.sqrt(np.trace(bound))
     assert np.linalg.norm(errors.mean(axis=0)) < 0.45 * least
@@ -77,20 +77,20 @@ def test_ellipses_hold_what_they_say(uneven: float) -> None:
         x, y = random.uniform(-0.06, 0.06, 2)
         spot = press(x, y, random.uniform(0.016, 0.03), random.uniform(-0.4, -0.2))
         off = 1 + uneven * random.standard_normal(len(n))
-        reading = finder().push(off * data(spot) + n, NOTHING)[0]
-        error = place(reading) - [x, y]
-        inside.append(error @ np.linalg.solve(spread(reading), error) < 4.605)
+        detection = finder().push(off * data(spot) + n, NOTHING)[0]
+        error = place(detection) - [x, y]
+        inside.append(error @ np.linalg.solve(spread(detection), error) < 4.605)
     assert 0.8 < np.mean(inside) < 0.99
 
 
 def test_size_and_strength_come_with_the_place() -> None:
-    (reading,) = finder().push(data(press(0.03, 0.04)), NOTHING)
-    assert place(reading) == pytest.approx([0.03, 0.04], abs=1e-4)
-    assert reading.area == pytest.approx(np.pi * 0.022**2, rel=0.05)
-    assert reading.peak == pytest.approx(skin().conductivity * np.expm1(-0.25), rel=0.05)
-    centres = skin().mesh().centroids[reading.cells]
-    assert np.linalg.norm(centres - place(reading), axis=1).max() < 0.0225
-    assert not reading.close
+    (detection,) = finder().push(data(press(0.03, 0.04)), NOTHING)
+    assert place(detection) == pytest.approx([0.03, 0.04], abs=1e-4)
+    assert detection.area == pytest.approx(np.pi * 0.022**2, rel=0.05)
+    assert detection.peak == pytest.approx(skin().conductivity * np.expm1(-0.25), rel=0.05)
+    centres = skin().mesh().centroids[detection.cells]
+    assert np.linalg.norm(centres - place(detection), axis=1).max() < 0.0225
+    assert not detection.close
 
 
 def test_nothing_is_found_in_noise() -> None:
@@ -131,15 +131,15 @@ def test_two_at_one_place_are_one_or_said_to_be_close() -> None:
     spots = np.concatenate([press(0.0, 0.012, 0.012), press(0.0, -0.012, 0.012)])
     for n in noise(16, 4, 8):
         found = finder().push(data(spots) + n, NOTHING)
-        assert len(found) == 1 or all(reading.close for reading in found)
+        assert len(found) == 1 or all(detection.close for detection in found)
         assert np.hypot(found[0].x, found[0].y) < 0.015
 
 
 def test_only_the_sign_that_counts() -> None:
     rise = data(press(0.03, 0.0, depth=0.3))
     assert finder().push(rise, NOTHING) == []
-    (reading,) = finder(sign="both").push(rise, NOTHING)
-    assert reading.peak > 0
+    (detection,) = finder(sign="both").push(rise, NOTHING)
+    assert detection.peak > 0
 
 
 def test_no_more_than_asked_for() -> None:
@@ -168,17 +168,17 @@ def test_rows_that_say_nothing_do_not_count() -> None:
     lost = np.arange(0, 208, 7)
     spoiled = clean.copy()
     spoiled[lost] = 1.0
-    (reading,) = finder().push(spoiled, np.eye(208)[:, lost])
-    assert place(reading) == pytest.approx([0.03, 0.04], abs=2e-4)
+    (detection,) = finder().push(spoiled, np.eye(208)[:, lost])
+    assert place(detection) == pytest.approx([0.03, 0.04], abs=2e-4)
     (whole,) = finder().push(clean, NOTHING)
-    assert reading.sd_x > whole.sd_x
+    assert detection.sd_x > whole.sd_x
 
 
 def test_a_drift_along_a_known_direction_does_not_count() -> None:
     drift = model().response.reference[:, None]
     clean = data(press(0.03, 0.04))
-    (reading,) = finder().push(clean + 0.01 * drift[:, 0], drift)
-    assert place(reading) == pytest.approx([0.03, 0.04], abs=2e-4)
+    (detection,) = finder().push(clean + 0.01 * drift[:, 0], drift)
+    assert place(detection) == pytest.approx([0.03, 0.04], abs=2e-4)
 
 
 def test_a_skin_that_reads_more_is_the_same_skin() -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tomoskin.core import FloatArray, Reading
-from tomoskin.touch import LIVE, WHOLE, Pace, SpotFinder
+from tomoskin.core import Detection, FloatArray
+from tomoskin.touch import EXHAUSTIVE, LIVE, Pace, SpotFinder
 from tomoskin.touch.fit.refine import Fit, Problem
 from touch.fit.scene import covariance, noise
 from touch.fit.test_finder import NOTHING, data, model, place, press, skin, spread
@@ -23,10 +23,10 @@ def finder(pace: Pace = LIVE, scan_time: float = SCAN) -> SpotFinder:
     return SpotFinder(model(), skin(), skin().mesh(), covariance(), scan_time=scan_time, pace=pace)
 
 
-def is_at(reading: Reading, x: float, y: float) -> bool:
+def is_at(detection: Detection, x: float, y: float) -> bool:
     """Within three deviations, which are a few millimetres."""
-    away = place(reading) - [x, y]
-    return bool(away @ np.linalg.solve(spread(reading), away) < 9 and reading.sd_x < 5e-3)
+    away = place(detection) - [x, y]
+    return bool(away @ np.linalg.solve(spread(detection), away) < 9 and detection.sd_x < 5e-3)
 
 
 def moving(begin: FloatArray, end: FloatArray) -> FloatArray:
@@ -40,17 +40,17 @@ def moving(begin: FloatArray, end: FloatArray) -> FloatArray:
 def test_a_press_that_moves_during_a_scan_is_one_touch_in_the_middle_of_its_way() -> None:
     begin, end = (press(x, 0.03, depth=-0.6) for x in (0.015, 0.04))
     smeared = moving(begin, end) + noise(16, 1, 3)[0]
-    (reading,) = finder().push(smeared, NOTHING)
-    assert is_at(reading, 0.0275, 0.03)
-    at_once = finder(WHOLE).push(smeared, NOTHING)
+    (detection,) = finder().push(smeared, NOTHING)
+    assert is_at(detection, 0.0275, 0.03)
+    at_once = finder(EXHAUSTIVE).push(smeared, NOTHING)
     assert len(at_once) > 1 or not is_at(at_once[0], 0.0275, 0.03), "time tells"
 
 
 def test_a_press_that_begins_during_a_scan_is_where_it_is() -> None:
     rising = model().response.times + 0.5
     grown = data(press(-0.03, 0.04)) * rising + noise(16, 1, 4)[0]
-    (reading,) = finder().push(grown, NOTHING)
-    assert is_at(reading, -0.03, 0.04)
+    (detection,) = finder().push(grown, NOTHING)
+    assert is_at(detection, -0.03, 0.04)
 
 
 def test_one_more_touch_a_frame() -> None:
@@ -58,7 +58,7 @@ def test_one_more_touch_a_frame() -> None:
     three = np.concatenate([press(-0.05, 0.0), press(0.05, 0.02), press(0.0, -0.06)])
     counts = [len(ours.push(data(three) + n, NOTHING)) for n in noise(16, 5, 5)]
     assert counts == [1, 2, 3, 3, 3]
-    assert len(finder(WHOLE).push(data(three), NOTHING)) == 3
+    assert len(finder(EXHAUSTIVE).push(data(three), NOTHING)) == 3
 
 
 def test_a_frame_solves_the_sheet_a_bounded_number_of_times(
@@ -81,7 +81,7 @@ def test_a_frame_solves_the_sheet_a_bounded_number_of_times(
     assert 0 < max(solved) <= 2 * (1 + LIVE.warm) + 2 * (1 + LIVE.glance) + LIVE.cold + 1
 
 
-def after_a_slide(pace: Pace) -> tuple[SpotFinder, list[Reading], FloatArray]:
+def after_a_slide(pace: Pace) -> tuple[SpotFinder, list[Detection], FloatArray]:
     """A finder, what it finds of a press that has left a part of itself behind, and that part."""
     ours = finder(pace)
     here = data(STANDING)
@@ -93,9 +93,9 @@ def after_a_slide(pace: Pace) -> tuple[SpotFinder, list[Reading], FloatArray]:
 
 
 def test_what_is_left_behind_is_no_touch_beside_one() -> None:
-    _, (reading,), _ = after_a_slide(LIVE)
-    assert is_at(reading, -0.04, 0.0)
-    _, alone, _ = after_a_slide(WHOLE)
+    _, (detection,), _ = after_a_slide(LIVE)
+    assert is_at(detection, -0.04, 0.0)
+    _, alone, _ = after_a_slide(EXHAUSTIVE)
     assert len(alone) == 2, "frames by themselves show what there is"
 
 
@@ -120,4 +120,4 @@ def test_a_new_press_where_one_was_is_found() -> None:
     ours, _, left = after_a_slide(LIVE)
     frames = [left, left, 0.6 * data(STANDING), 0.6 * data(STANDING)]
     found = [ours.push(dv + n, NOTHING) for dv, n in zip(frames, noise(16, 4, 10), strict=True)]
-    assert [len(readings) for readings in found] == [0, 0, 1, 1]
+    assert [len(detections) for detections in found] == [0, 0, 1, 1]

@@ -7,19 +7,19 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tomoskin.core import Reading
-from touch.tracking.readings import AREA, Run, reading
+from tomoskin.core import Detection
+from touch.tracking.detections import AREA, Run, detection
 
 LIMIT = 0.03
 """Closer than that, two regions are one."""
 
 
-def seen(a: tuple[float, float], b: tuple[float, float]) -> list[Reading]:
+def seen(a: tuple[float, float], b: tuple[float, float]) -> list[Detection]:
     """What a blurred picture shows of two presses."""
     if np.hypot(a[0] - b[0], a[1] - b[1]) > LIMIT:
-        return [reading(*a), reading(*b)]
+        return [detection(*a), detection(*b)]
     middle = 0.5 * (np.array(a) + b)
-    return [reading(*middle, peak=-1.4, area=1.7 * AREA)]
+    return [detection(*middle, peak=-1.4, area=1.7 * AREA)]
 
 
 def slide(run: Run, half: Callable[[float], float], seconds: float, lateral: float = 0.0) -> Run:
@@ -37,7 +37,7 @@ def test_together_and_apart_again_are_the_same_two(rate: float) -> None:
     assert (touch.id, touch.merged, touch.said) == (1, (1, 2), "merged 1+2")
     slide(run, lambda t: 0.01 + 0.03 * min(t, 1), 1.5)
     assert [(t.id, t.merged) for t in run.touches[-1]] == [(1, ()), (2, ())]
-    assert [t.reading.x for t in run.touches[-1]] == pytest.approx([-0.04, 0.04])
+    assert [t.detection.x for t in run.touches[-1]] == pytest.approx([-0.04, 0.04])
     assert run.happened == [
         *(("onset", 1), ("onset", 2), ("merge", 1)),
         *(("split", 1), ("split", 2)),
@@ -53,17 +53,17 @@ def test_a_merge_says_whom() -> None:
 @pytest.mark.parametrize("rate", [10, 40])
 def test_two_that_pass_each_other_swiftly_go_on_where_they_went(rate: float) -> None:
     run = slide(Run(rate), lambda t: 0.08 - 0.1 * t, 1.5, lateral=0.01)
-    assert [(t.id, t.reading.x > 0) for t in run.touches[-1]] == [(1, True), (2, False)]
+    assert [(t.id, t.detection.x > 0) for t in run.touches[-1]] == [(1, True), (2, False)]
 
 
 def test_two_that_meet_and_rest_return_to_their_own_sides() -> None:
     run = slide(Run(), lambda t: 0.04 - 0.06 * min(t, 0.5), 3.0)
     slide(run, lambda t: 0.01 + 0.06 * min(t, 0.5), 1.0)
-    assert [(t.id, round(t.reading.x, 2)) for t in run.touches[-1]] == [(1, -0.04), (2, 0.04)]
+    assert [(t.id, round(t.detection.x, 2)) for t in run.touches[-1]] == [(1, -0.04), (2, 0.04)]
 
 
 def test_a_touch_that_is_lifted_near_another_has_not_merged() -> None:
-    run = Run()([[reading(-0.016), reading(0.016)]] * 10 + [[reading(-0.016)]] * 10)
+    run = Run()([[detection(-0.016), detection(0.016)]] * 10 + [[detection(-0.016)]] * 10)
     assert run.happened == [("onset", 1), ("onset", 2), ("release", 2)]
 
 
@@ -76,21 +76,21 @@ def test_both_end_when_the_merged_one_is_lifted() -> None:
 
 def test_a_press_far_away_is_not_one_that_splits_off() -> None:
     run = slide(Run(), lambda t: 0.04 - 0.03 * min(t, 1), 1.5)
-    run([[*seen((-0.01, 0), (0.01, 0)), reading(0, 0.09)]] * 4)
+    run([[*seen((-0.01, 0), (0.01, 0)), detection(0, 0.09)]] * 4)
     assert [(t.id, t.merged) for t in run.touches[-1]] == [(1, (1, 2)), (3, ())]
 
 
 def test_a_reading_that_may_be_several_is_said_to_be() -> None:
-    run = Run()([[reading(0, close=True)]] * 3)
+    run = Run()([[detection(0, close=True)]] * 3)
     assert run.touches[-1][0].said == "too close"
 
 
 def test_three_become_one_and_three_again() -> None:
-    def three(spread: float) -> list[Reading]:
+    def three(spread: float) -> list[Detection]:
         places = [(spread * np.cos(a), spread * np.sin(a)) for a in (0.5, 2.6, 4.7)]
         if spread > 0.02:
-            return [reading(*place) for place in places]
-        return [reading(0, 0, peak=-1.8, area=2.2 * AREA)]
+            return [detection(*place) for place in places]
+        return [detection(0, 0, peak=-1.8, area=2.2 * AREA)]
 
     spreads = [*np.linspace(0.045, 0.01, 40), *[0.01] * 10, *np.linspace(0.01, 0.045, 40)]
     run = Run()([three(s) for s in spreads])
@@ -98,4 +98,4 @@ def test_three_become_one_and_three_again() -> None:
     assert any(t.merged == (1, 2, 3) for touches in run.touches for t in touches)
     for before, after in zip(first, run.touches[-1], strict=True):
         assert after.id == before.id
-        assert after.reading.x == pytest.approx(before.reading.x)
+        assert after.detection.x == pytest.approx(before.detection.x)

@@ -8,13 +8,13 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 
 from tomoskin.touch import TrackSettings
 from tomoskin.touch.tracking.motion import States, begin, distances, observe, predict, update
-from touch.tracking.readings import reading
+from touch.tracking.detections import detection
 
 SETTINGS = TrackSettings()
 
 
 def state() -> States:
-    place, spread = observe([reading(0.01, -0.02)], SETTINGS)
+    place, spread = observe([detection(0.01, -0.02)], SETTINGS)
     return begin(place[0], spread[0], SETTINGS)
 
 
@@ -51,7 +51,7 @@ def test_two_short_steps_are_one_long_one() -> None:
 
 def test_the_update_is_the_mean_of_two_gaussians() -> None:
     before = predict(state(), 0.1, SETTINGS)
-    places, spreads = observe([reading(0.03, 0.0, sd_x=0.004, cov_xy=2e-6)], SETTINGS)
+    places, spreads = observe([detection(0.03, 0.0, sd_x=0.004, cov_xy=2e-6)], SETTINGS)
     after = update(before, places, spreads)
     prior = before.covariance[0, :2, :2]
     precision = np.linalg.inv(prior) + np.linalg.inv(spreads[0])
@@ -65,7 +65,7 @@ def test_the_update_is_the_mean_of_two_gaussians() -> None:
 
 
 def test_distances_are_mahalanobis() -> None:
-    places, spreads = observe([reading(0.03, 0.01, cov_xy=5e-7), reading(0, 0)], SETTINGS)
+    places, spreads = observe([detection(0.03, 0.01, cov_xy=5e-7), detection(0, 0)], SETTINGS)
     before = state()
     got = distances(before, places, spreads)
     for k in (0, 1):

@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tomoskin.core import Reading
-from touch.tracking.readings import Run, reading
+from tomoskin.core import Detection
+from touch.tracking.detections import Run, detection
 
 LEFT = 0.15
 
 
-def fading(seconds: float, rate: float, top: float = LEFT, x: float = 0.0) -> list[list[Reading]]:
+def fading(seconds: float, rate: float, top: float = LEFT, x: float = 0.0) -> list[list[Detection]]:
     """What is left of a press of size 1: a part fades, a part stays."""
     times = np.arange(0, seconds, 1 / rate)
     return [[sized(top * (0.5 + 0.5 * np.exp(-t)), x)] for t in times]
 
 
-def sized(size: float, x: float = 0.0) -> Reading:
-    """A reading with the noise that a press of size 1 shows 100 times above."""
-    return reading(x, peak=-size, snr=100 * size)
+def sized(size: float, x: float = 0.0) -> Detection:
+    """A detection with the noise that a press of size 1 shows 100 times above."""
+    return detection(x, peak=-size, snr=100 * size)
 
 
 def lifted(rate: float) -> Run:
@@ -39,7 +39,7 @@ def test_a_press_ends_although_something_is_left(rate: float) -> None:
 def test_what_is_left_may_come_and_go() -> None:
     """At the edge of the noise; outshone by another; after a second of nothing."""
     run = lifted(40)(fading(2, 40))
-    run([[reading(0.08)]] * 40)
+    run([[detection(0.08)]] * 40)
     run([[sized(0.08)], []] * 40)
     assert run.happened == [("onset", 1), ("release", 1), ("onset", 2), ("release", 2)]
 
@@ -72,7 +72,7 @@ def test_a_light_press_elsewhere_is_found() -> None:
 
 
 def test_a_change_of_the_other_sign_is_found() -> None:
-    run = lifted(40)([[]] * 10 + [[reading(0, peak=0.15)]] * 20)
+    run = lifted(40)([[]] * 10 + [[detection(0, peak=0.15)]] * 20)
     assert run.happened[-1] == ("onset", 2)
 
 
@@ -106,10 +106,10 @@ def test_a_reset_forgets_what_was_left() -> None:
 def test_what_a_press_leaves_while_it_still_slides_is_no_touch() -> None:
     """As a fit sees it: its depth is anyone's guess, how far it stands out is not."""
     way = np.linspace(0, 0.1, 80)
-    trail = reading(0.0, peak=-0.8, snr=8.0)
+    trail = detection(0.0, peak=-0.8, snr=8.0)
     run = Run(40)([[sized(1, x), trail] if x > 0.04 else [sized(1, x)] for x in way])
     assert run.happened == [("onset", 1)]
-    run([[sized(1, 0.1), reading(0.0, peak=-0.3, snr=40.0)]] * 8)
+    run([[sized(1, 0.1), detection(0.0, peak=-0.3, snr=40.0)]] * 8)
     assert run.happened == [("onset", 1), ("onset", 2)]
 
 

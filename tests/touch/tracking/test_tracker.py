@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tomoskin.core import Reading
+from tomoskin.core import Detection
 from tomoskin.touch import STILL, Tracker, TrackSettings
-from touch.tracking.readings import AREA, Run, reading
+from touch.tracking.detections import AREA, Run, detection
 
 
 @pytest.mark.parametrize(
@@ -18,7 +18,7 @@ from touch.tracking.readings import AREA, Run, reading
 def test_latencies_are_times_and_two_frames_at_least(rate: float, onset: int, release: int) -> None:
     """20 ms and 50 ms, so the number of frames follows the rate."""
     run = Run(rate)
-    run([[reading(0)]] * 60)
+    run([[detection(0)]] * 60)
     assert [len(ids) for ids in run.shown].index(1) == onset - 1
     run([[]] * 60)
     assert [len(ids) for ids in run.shown].index(0) == release - 1
@@ -26,23 +26,23 @@ def test_latencies_are_times_and_two_frames_at_least(rate: float, onset: int, re
 
 
 def test_a_touch_tells_since_when_by_the_host() -> None:
-    run = Run(10)([[]] * 3 + [[reading(0)]] * 3)
+    run = Run(10)([[]] * 3 + [[detection(0)]] * 3)
     assert run.touches[-1][0].since == pytest.approx(100.3)
     assert run.touches[-1][0].kind == "decrease"
     assert run.events[0].host_time == pytest.approx(100.4)
 
 
 def test_frames_that_do_not_follow_each_other_show_what_they_hold() -> None:
-    run = Run(settings=STILL)([[reading(0)], [], [reading(0)]])
+    run = Run(settings=STILL)([[detection(0)], [], [detection(0)]])
     assert run.shown == [[1], [], [2]]
 
 
 def test_a_flicker_never_shows() -> None:
-    assert Run()([[reading(0)], []] * 20).happened == []
+    assert Run()([[detection(0)], []] * 20).happened == []
 
 
 def test_between_onset_and_release_ratio_a_touch_neither_begins_nor_ends() -> None:
-    strong, middle = reading(0, snr=5.1), reading(0, snr=3.5)
+    strong, middle = detection(0, snr=5.1), detection(0, snr=3.5)
     run = Run()([[middle]] * 10)
     assert run.shown[-1] == []
     run([[strong]] * 2 + [[middle]] * 20)
@@ -51,24 +51,24 @@ def test_between_onset_and_release_ratio_a_touch_neither_begins_nor_ends() -> No
 
 
 def test_where_the_noise_is_not_known_every_reading_counts() -> None:
-    unknown = reading(0, snr=np.nan, sd_x=np.nan, sd_y=np.nan)
+    unknown = detection(0, snr=np.nan, sd_x=np.nan, sd_y=np.nan)
     assert Run()([[unknown]] * 2).shown[-1] == [1]
 
 
 def test_what_another_outshines_goes_on_but_does_not_begin() -> None:
-    strong, weak = reading(-0.05), reading(0.05, weak=True)
+    strong, weak = detection(-0.05), detection(0.05, weak=True)
     run = Run()([[strong, weak]] * 5)
     assert run.shown[-1] == [1]
-    run([[strong, reading(0.05)]] * 2 + [[strong, weak]] * 20)
+    run([[strong, detection(0.05)]] * 2 + [[strong, weak]] * 20)
     assert run.shown[-1] == [1, 2]
 
 
 @pytest.mark.parametrize("rate", [10, 40, 1000])
 def test_a_slide_of_a_quarter_of_a_metre_a_second_is_one_touch(rate: float) -> None:
     seconds = np.arange(0, 0.6, 1 / rate)
-    run = Run(rate)([[reading(0)]] * 60 + [[reading(0.25 * s)] for s in seconds])
+    run = Run(rate)([[detection(0)]] * 60 + [[detection(0.25 * s)] for s in seconds])
     assert run.happened == [("onset", 1)]
-    moves = [e.touch.reading.x for e in run.events if e.kind == "move"]
+    moves = [e.touch.detection.x for e in run.events if e.kind == "move"]
     assert moves == sorted(moves)
     assert 5 <= len(moves) <= 50
     assert moves[-1] > 0.11
@@ -77,14 +77,14 @@ def test_a_slide_of_a_quarter_of_a_metre_a_second_is_one_touch(rate: float) -> N
 def test_a_resting_touch_does_not_move() -> None:
     rng = np.random.default_rng(1)
     frames = [
-        [reading(*(0.003 * rng.standard_normal(2)), sd_x=0.003, sd_y=0.003)] for _ in "x" * 99
+        [detection(*(0.003 * rng.standard_normal(2)), sd_x=0.003, sd_y=0.003)] for _ in "x" * 99
     ]
     moves = [e for e in Run()(frames).events if e.kind == "move"]
     assert len(moves) <= 3
 
 
 def test_a_short_gap_does_not_break_identity() -> None:
-    run = Run()([[reading(0)]] * 3 + [[]] * 2 + [[reading(0.004)]])
+    run = Run()([[detection(0)]] * 3 + [[]] * 2 + [[detection(0.004)]])
     assert run.shown[-1] == [1]
 
 
@@ -92,73 +92,73 @@ def test_a_long_pause_does_not_release_by_itself() -> None:
     """As when the picture was held: nothing was missing in between."""
     tracker = Tracker()
     for time in (0.0, 0.025, 0.05, 60.0, 60.025):
-        touches = tracker.update([reading(0)], time, time)
+        touches = tracker.update([detection(0)], time, time)
     assert [touch.id for touch in touches] == [1]
 
 
 def test_a_jump_is_another_touch() -> None:
-    run = Run()([[reading(0)]] * 5 + [[reading(0.06)]] * 10)
+    run = Run()([[detection(0)]] * 5 + [[detection(0.06)]] * 10)
     assert run.happened == [("onset", 1), ("onset", 2), ("release", 1)]
 
 
 def test_a_reading_that_is_surely_elsewhere_is_another_touch() -> None:
-    """40 mm in a millisecond: near for a vague reading, far for a sharp one."""
+    """40 mm in a millisecond: near for a vague detection, far for a sharp one."""
     for sd, same in ((0.001, False), (0.02, True)):
         small = {"sd_x": sd, "sd_y": sd, "area": AREA / 100}
-        run = Run(1000)([[reading(0, **small)]] * 400 + [[reading(0.04, **small)]] * 60)
+        run = Run(1000)([[detection(0, **small)]] * 400 + [[detection(0.04, **small)]] * 60)
         assert (run.shown[-1] == [1]) == same
 
 
 def test_covariance_counts_along_its_axes() -> None:
-    """A reading that is vague along the diagonal may have wandered along it, not across."""
+    """A detection that is vague along the diagonal may have wandered along it, not across."""
     vague = {"sd_x": 0.02, "sd_y": 0.02, "cov_xy": 3.99e-4, "area": AREA / 100}
     for step, same in (((0.03, 0.03), True), ((0.03, -0.03), False)):
-        run = Run(1000)([[reading(0, 0, **vague)]] * 400 + [[reading(*step, **vague)]] * 60)
+        run = Run(1000)([[detection(0, 0, **vague)]] * 400 + [[detection(*step, **vague)]] * 60)
         assert (run.shown[-1] == [1]) == same
 
 
 def test_order_of_readings_does_not_matter() -> None:
-    a, b = reading(-0.05), reading(0.05)
+    a, b = detection(-0.05), detection(0.05)
     run = Run()([[a, b], [b, a], [a, b], [b, a]])
-    assert [(t.id, t.reading.x) for t in run.touches[-1]] == [(1, -0.05), (2, 0.05)]
+    assert [(t.id, t.detection.x) for t in run.touches[-1]] == [(1, -0.05), (2, 0.05)]
 
 
 def test_touches_that_pass_each_other_keep_their_identities() -> None:
     xs = np.linspace(-0.05, 0.05, 60)
-    frames = [[reading(x, 0.004), reading(-x, -0.004)] for x in xs]
+    frames = [[detection(x, 0.004), detection(-x, -0.004)] for x in xs]
     run = Run(40)(frames)
-    assert [(t.id, t.reading.y) for t in run.touches[-1]] == [(1, 0.004), (2, -0.004)]
+    assert [(t.id, t.detection.y) for t in run.touches[-1]] == [(1, 0.004), (2, -0.004)]
 
 
 def test_pairs_have_the_least_sum_not_the_nearest_first() -> None:
-    run = Run(10)([[reading(0.0), reading(0.022)]] * 3 + [[reading(0.015), reading(0.037)]])
-    assert [(t.id, t.reading.x) for t in run.touches[-1]] == [(1, 0.015), (2, 0.037)]
+    run = Run(10)([[detection(0.0), detection(0.022)]] * 3 + [[detection(0.015), detection(0.037)]])
+    assert [(t.id, t.detection.x) for t in run.touches[-1]] == [(1, 0.015), (2, 0.037)]
 
 
 def test_a_touch_does_not_change_its_sign() -> None:
-    run = Run()([[reading(0)]] * 3 + [[reading(0, peak=1)]] * 8)
+    run = Run()([[detection(0)]] * 3 + [[detection(0, peak=1)]] * 8)
     assert run.happened == [("onset", 1), ("onset", 2), ("release", 1)]
     assert run.touches[-1][0].kind == "increase"
 
 
 def test_reset_releases_all_and_counts_on() -> None:
-    run = Run()([[reading(0)]] * 3)
+    run = Run()([[detection(0)]] * 3)
     run.tracker.reset()
     assert run([[]]).shown == [[]]
-    assert run([[reading(0)]] * 3).shown[-1] == [2]
+    assert run([[detection(0)]] * 3).shown[-1] == [2]
     assert run.happened == [("onset", 1), ("release", 1), ("onset", 2)]
 
 
 def test_a_clock_that_begins_again_keeps_the_touches() -> None:
     tracker = Tracker()
     for time, host in ((9.0, 1.0), (9.1, 1.1), (0.0, 1.2), (0.1, 1.3)):
-        touches = tracker.update([reading(0)], time, host)
+        touches = tracker.update([detection(0)], time, host)
     assert [(t.id, t.since) for t in touches] == [(1, 1.0)]
 
 
 def test_a_clock_that_stands_still_is_the_hosts() -> None:
     tracker = Tracker()
-    shown = [len(tracker.update([reading(0)], 0.0, 0.025 * n)) for n in range(3)]
+    shown = [len(tracker.update([detection(0)], 0.0, 0.025 * n)) for n in range(3)]
     assert shown == [0, 1, 1]
 
 
@@ -178,7 +178,7 @@ def test_what_holds_whatever_comes(
     ended: set[int] = set()
     for places in frames:
         before = len(run.events)
-        found: list[Reading] = [reading(*place, close=close) for place in places]
+        found: list[Detection] = [detection(*place, close=close) for place in places]
         (touches,) = run([found]).touches
         for event in run.events[before:]:
             if event.kind == "onset":
@@ -190,16 +190,16 @@ def test_what_holds_whatever_comes(
         told = [number for t in touches for number in (t.merged or (t.id,))]
         assert sorted(told) == sorted(begun - ended), "every touch that goes on is shown once"
         assert [t.id for t in touches] == sorted(t.id for t in touches)
-        assert len({id(t.reading) for t in touches}) == len(touches), "one reading, one touch"
+        assert len({id(t.detection) for t in touches}) == len(touches), "one detection, one touch"
         for touch in touches:
             assert not touch.merged or touch.id == min(touch.merged)
-            assert (touch.kind == "decrease") == (touch.reading.peak < 0)
+            assert (touch.kind == "decrease") == (touch.detection.peak < 0)
 
 
 def test_of_frames_that_do_not_follow_each_other_none_tells_of_another() -> None:
     """A faint target where a strong one was is a target, a weak one beside a new strong one not."""
-    strong, faint = reading(0, peak=-1.0), reading(0, peak=-0.2)
+    strong, faint = detection(0, peak=-1.0), detection(0, peak=-0.2)
     run = Run(settings=STILL)([[strong], [], [faint]])
     assert [len(ids) for ids in run.shown] == [1, 0, 1]
-    run = Run(settings=STILL)([[strong], [reading(0, weak=True), reading(0.05)]])
-    assert [[touch.reading.x for touch in frame] for frame in run.touches] == [[0], [0.05]]
+    run = Run(settings=STILL)([[strong], [detection(0, weak=True), detection(0.05)]])
+    assert [[touch.detection.x for touch in frame] for frame in run.touches] == [[0], [0.05]]

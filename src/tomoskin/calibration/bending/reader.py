@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.calibration.bending.model import BendModel
-from tomoskin.core import FloatArray, Reading
+from tomoskin.core import Detection, FloatArray
 from tomoskin.touch import Response, spots_of
 
 _BENT = 3.0
@@ -66,7 +66,7 @@ class BendReader:
     def push(
         self,
         dv: FloatArray,
-        readings: Sequence[Reading],
+        detections: Sequence[Detection],
         common: FloatArray,
         time: float,
         *,
@@ -74,13 +74,13 @@ class BendReader:
     ) -> BendReading:
         """Read ``dv`` (n_meas,) V less the straight sheet, at ``time`` s.
 
-        ``readings`` are the touches fitted to it; ``common`` (n_meas, k) directions that say
+        ``detections`` are the touches fitted to it; ``common`` (n_meas, k) directions that say
         nothing. Amplitudes are fitted beside what the touches change, their places, sizes,
         strengths and directions free to first order. ``touched`` is False where none of them is a
         touch to one who has seen the frames before.
         """
         model = self._model
-        change, free = self._touches(readings)
+        change, free = self._touches(detections)
         data = model.whiten(dv) - change
         beside = np.hstack([model.whiten(common.T).T, free])
         columns = np.hstack([self._modes, beside / (np.linalg.norm(beside, axis=0) + 1e-300)])
@@ -92,17 +92,17 @@ class BendReader:
         target = self._memory.push(z, time) @ model.weights
         angle, axis = (float(part[0]) for part in model.told(target[None]))
         sd = self._deviation(columns)
-        pressed = bool(readings) and touched
+        pressed = bool(detections) and touched
         state = _state(abs(angle) > _BENT * sd, pressed, bool(strange))
         return BendReading(angle, sd, axis, state, model.directions @ z)
 
-    def _touches(self, readings: Sequence[Reading]) -> tuple[FloatArray, FloatArray]:
+    def _touches(self, detections: Sequence[Detection]) -> tuple[FloatArray, FloatArray]:
         """(r,) what they change, whitened, and (r, c) its derivatives."""
         whiten = self._model.whiten
-        if not readings:
+        if not detections:
             return np.zeros(len(self._modes)), np.zeros((len(self._modes), 0))
         conductivity = float(np.mean(self._response.state.conductivity))
-        spots = np.array([_spot_of(reading, conductivity) for reading in readings])
+        spots = np.array([_spot_of(detection, conductivity) for detection in detections])
         change, slopes, towards = self._response.expanded(spots)
         rows = self._gain * np.column_stack([change, slopes, towards]).T
         seen = whiten(rows)
@@ -117,11 +117,11 @@ class BendReader:
         return float(np.hypot(model.error, np.linalg.norm(slope @ spread)))
 
 
-def _spot_of(reading: Reading, conductivity: float) -> FloatArray:
+def _spot_of(detection: Detection, conductivity: float) -> FloatArray:
     """(4,) parameters of a fitted touch as it was reported."""
-    depth = float(np.log1p(reading.peak / conductivity))
-    place = np.array([[reading.x, reading.y]])
-    return np.asarray(spots_of(place, float(np.sqrt(reading.area / np.pi)), depth)[0])
+    depth = float(np.log1p(detection.peak / conductivity))
+    place = np.array([[detection.x, detection.y]])
+    return np.asarray(spots_of(place, float(np.sqrt(detection.area / np.pi)), depth)[0])
 
 
 def _state(bent: bool, touched: bool, strange: bool) -> str:

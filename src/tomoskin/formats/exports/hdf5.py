@@ -72,7 +72,7 @@ def _touches(session: SessionReader) -> Any:
          r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak)
         for item in session.touches()
         for t in item.touches
-        for r in [t.reading]
+        for r in [t.detection]
     ]  # fmt: skip
     return np.array(table, dtype=_TOUCH)
 

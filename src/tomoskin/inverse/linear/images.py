@@ -12,14 +12,14 @@ from tomoskin.core import DataError, Image, IntArray
 from tomoskin.inverse.linear.operator import Operator
 from tomoskin.pattern import Pattern
 
-MOST_LEFT_OUT = 0.25
+MOST_EXCLUDED = 0.25
 """Above this fraction of excluded measurements a frame gives no image: mostly prior."""
 
 _LISTED = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Pictures:
+class ImageSeries:
     """Images of frames.
 
     Attributes
@@ -67,12 +67,12 @@ class Pictures:
         return "; ".join(parts)
 
 
-def pictures(
+def image_series(
     operator: Operator,
     changes: NDArray[Any],
     pattern: Pattern,
     railed: NDArray[np.bool_] | None = None,
-) -> Pictures:
+) -> ImageSeries:
     """Images of ``changes``, (n_frames, n_meas) difference data in the order of ``pattern``.
 
     A row that is not finite or ``railed``, (n_frames, n_meas) bool, in most frames leaves the
@@ -91,15 +91,15 @@ def pictures(
         excluded |= railed
     dropped = np.flatnonzero(excluded.mean(axis=0) > 0.5)
     excluded[:, dropped] = True
-    frames = np.flatnonzero(excluded.mean(axis=1) <= MOST_LEFT_OUT)
+    frames = np.flatnonzero(excluded.mean(axis=1) <= MOST_EXCLUDED)
     if not len(frames):
         raise DataError(
-            f"no frame has {1 - MOST_LEFT_OUT:.0%} of its rows; most lack "
+            f"no frame has {1 - MOST_EXCLUDED:.0%} of its rows; most lack "
             + "; ".join(pattern.row_text(row) for row in dropped[:_LISTED])
         )
     fewer = operator.without(dropped)
     used = [fewer.check(fewer.filled(changes[f], excluded[f])) for f in frames]
-    return Pictures(
+    return ImageSeries(
         values=np.stack(used) @ fewer.matrix.T,
         frames=frames,
         dropped=dropped,

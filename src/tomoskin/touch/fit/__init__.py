@@ -8,12 +8,12 @@ from tomoskin.touch.fit.bound import (
 )
 from tomoskin.touch.fit.finder import SpotFinder, SpotModel
 from tomoskin.touch.fit.noise import Whitener, measured_covariance, row_covariance
-from tomoskin.touch.fit.pace import LIVE, WHOLE, Pace
+from tomoskin.touch.fit.pace import EXHAUSTIVE, LIVE, Pace
 from tomoskin.touch.fit.spot import Response, Spots, depth_of, spots_of
 
 __all__ = [
+    "EXHAUSTIVE",
     "LIVE",
-    "WHOLE",
     "Pace",
     "Response",
     "SpotFinder",

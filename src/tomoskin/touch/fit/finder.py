@@ -1,4 +1,4 @@
-"""Frames of difference data → readings, each fitted by its parameters."""
+"""Frames of difference data → detections, each fitted by its parameters."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.core import FloatArray, Reading, SkinError
+from tomoskin.core import Detection, FloatArray, SkinError
 from tomoskin.forward import ForwardModel, State
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
 from tomoskin.touch.fit.anisotropy import with_anisotropy
 from tomoskin.touch.fit.candidates import Candidates, Matched
 from tomoskin.touch.fit.noise import Whitener
-from tomoskin.touch.fit.pace import WHOLE, Pace
+from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Problem, SheetDomain, Weigh
 from tomoskin.touch.fit.residual_noise import ResidualResponse
@@ -81,7 +81,7 @@ class SpotModel:
         scale = 1 / np.abs(response.reference) if normalised else np.ones(n_meas)
         return cls(response, prior, SheetDomain(mesh), Candidates.of(response, prior), scale)
 
-    def as_told(self, reference: FloatArray) -> SpotModel:
+    def fitted_to(self, reference: FloatArray) -> SpotModel:
         """The model of a sheet that conducts by direction as its ``reference`` (n_meas,) V tells.
 
         Itself where the reference tells of no direction; see :mod:`tomoskin.touch.fit.anisotropy`.
@@ -102,7 +102,7 @@ class SpotFinder:
     skin
         Whose ``[touch]`` states sign, snr and how many.
     mesh
-        Of the images: readings name its cells.
+        Of the images: detections name its cells.
     noise
         (n_meas, n_meas) covariance of difference data, the reference's own part included.
     gain
@@ -122,7 +122,7 @@ class SpotFinder:
         gain: float = 1.0,
         *,
         scan_time: float = 0.0,
-        pace: Pace = WHOLE,
+        pace: Pace = EXHAUSTIVE,
     ) -> None:
         self._model, self._settings, self._mesh = model, skin.touch, mesh
         self._pace, self._reach, self._unrest = pace, pace.speed * scan_time, 1.0
@@ -139,7 +139,7 @@ class SpotFinder:
         self._whiten = Whitener.of(noise / self._scale[:, None] / self._scale)
         self._matched: OrderedDict[bytes, tuple[Whitener, Matched]] = OrderedDict()
 
-    def push(self, dv: FloatArray, nuisance: FloatArray) -> list[Reading]:
+    def push(self, dv: FloatArray, nuisance: FloatArray) -> list[Detection]:
         """Touches of ``dv`` (n_meas,), strongest first.
 
         ``nuisance`` (n_meas, k) spans the directions along which the data tell nothing of a
@@ -163,9 +163,9 @@ class SpotFinder:
         self._before = found.fit.spots
         if self._fading:
             self._residual = self._residual.after(self._before, self._model.response, self._fading)
-        readings = self._readings(joined(found))
-        readings.sort(key=lambda reading: -abs(reading.peak))
-        return readings
+        detections = self._readings(joined(found))
+        detections.sort(key=lambda detection: -abs(detection.peak))
+        return detections
 
     def _unrest_of(self, spots: FloatArray) -> float:
         """How much of what touches may do they have done since the frame before; 1 where there
@@ -192,17 +192,17 @@ class SpotFinder:
         weigh = Weigh.of(whiten(self._residual.directions.T).T)
         return Whitener(weigh(whiten.matrix)), matched.weighed(weigh)
 
-    def _readings(self, found: SpotDetections) -> list[Reading]:
+    def _readings(self, found: SpotDetections) -> list[Detection]:
         spots = found.fit.spots
         depth = self._unit * np.expm1(depth_of(spots)) if len(spots) else np.zeros(0)
         return [self._reading(spots[k], float(depth[k]), found, k) for k in range(len(spots))]
 
-    def _reading(self, spot: FloatArray, peak: float, found: SpotDetections, k: int) -> Reading:
+    def _reading(self, spot: FloatArray, peak: float, found: SpotDetections, k: int) -> Detection:
         block = found.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
         radius = float(np.exp(spot[LOG_RADIUS]))
         apart = np.linalg.norm(self._mesh.centroids - spot[:2], axis=1)
         cells = np.flatnonzero(apart <= max(radius, apart.min()))
-        return Reading(
+        return Detection(
             x=float(spot[0]),
             y=float(spot[1]),
             sd_x=float(np.sqrt(block[0, 0])),

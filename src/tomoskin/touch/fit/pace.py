@@ -35,7 +35,7 @@ class Pace:
     fading: float
 
 
-WHOLE = Pace(warm=6, glance=15, cold=0, tries=5, restart=True, speed=0.0, fading=0.0)
+EXHAUSTIVE = Pace(warm=6, glance=15, cold=0, tries=5, restart=True, speed=0.0, fading=0.0)
 """Each frame as if it were the only one, of touches that stand still."""
 
 LIVE = Pace(warm=4, glance=1, cold=4, tries=1, restart=False, speed=0.1, fading=4.0)

@@ -41,23 +41,25 @@ def _holds(trace: Trace, lost: Trace) -> bool:
     before = lost.beside.get(trace.number)
     if before is None or trace.sign != lost.sign:
         return False
-    if _between(trace, lost) > _REACH * region_radius(trace.reading):
+    if _between(trace, lost) > _REACH * region_radius(trace.detection):
         return False
-    return trace.reading.close or _change(trace, before, lost) > _CHANGED
+    return trace.detection.close or _change(trace, before, lost) > _CHANGED
 
 
 def _change(trace: Trace, before: Unmerged, lost: Trace) -> float:
     start = before.states.mean[0, :2]
-    way = np.array([lost.reading.x, lost.reading.y]) - start
-    moved = np.array([trace.reading.x, trace.reading.y]) - start
-    was = content(before.reading)
-    grown = content(trace.reading) / was - 1 if was > 0 else 0.0
+    way = np.array([lost.detection.x, lost.detection.y]) - start
+    moved = np.array([trace.detection.x, trace.detection.y]) - start
+    was = content(before.detection)
+    grown = content(trace.detection) / was - 1 if was > 0 else 0.0
     return float(grown + moved @ way / max(float(way @ way), _CLOSE**2))
 
 
 def _between(trace: Trace, lost: Trace) -> float:
-    r, (x, y) = trace.reading, lost.position.tolist()
-    return min(math.hypot(r.x - x, r.y - y), math.hypot(r.x - lost.reading.x, r.y - lost.reading.y))
+    r, (x, y) = trace.detection, lost.position.tolist()
+    return min(
+        math.hypot(r.x - x, r.y - y), math.hypot(r.x - lost.detection.x, r.y - lost.detection.y)
+    )
 
 
 def merge(carrier: Trace, lost: Trace) -> None:
@@ -74,16 +76,16 @@ def origin_of(branch: Trace, traces: Sequence[Trace]) -> Trace | None:
     """The merged touch that a new one has come out of, or None."""
     for trace in traces:
         if trace.others and trace.sign == branch.sign:
-            away = (trace.reading.x - branch.reading.x, trace.reading.y - branch.reading.y)
-            if np.hypot(*away) <= max(_REACH * region_radius(trace.reading), _spread(trace)):
+            away = (trace.detection.x - branch.detection.x, trace.detection.y - branch.detection.y)
+            if np.hypot(*away) <= max(_REACH * region_radius(trace.detection), _spread(trace)):
                 return trace
     return None
 
 
 def _spread(carrier: Trace) -> float:
     """Twice the largest distance between the merged touches when they last were apart."""
-    apart = [member.alone.reading for member in carrier.members if member.alone]
-    positions = np.array([(reading.x, reading.y) for reading in apart])
+    apart = [member.alone.detection for member in carrier.members if member.alone]
+    positions = np.array([(detection.x, detection.y) for detection in apart])
     return 2 * float(np.linalg.norm(positions[:, None] - positions, axis=2).max(initial=0.0))
 
 
@@ -94,7 +96,7 @@ def split(carrier: Trace, branch: Trace, time: float) -> tuple[Trace, Trace]:
     """
     members = [carrier, *carrier.others]
     carrier.others = []
-    seen = np.array([(t.reading.x, t.reading.y) for t in (carrier, branch)])
+    seen = np.array([(t.detection.x, t.detection.y) for t in (carrier, branch)])
     seen -= seen.mean(axis=0)
     cost = min((_costs(expected, seen) for expected in _expected(members, time)), key=_least)
     owners, branches = linear_sum_assignment(cost)

@@ -16,14 +16,14 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from tomoskin.core import FloatArray, Reading
+from tomoskin.core import Detection, FloatArray
 from tomoskin.touch.tracking.settings import TrackSettings
 
 GATE = 16.0
-"""Squared Mahalanobis distance beyond which a reading is of another touch: one in 3,000."""
+"""Squared Mahalanobis distance beyond which a detection is of another touch: one in 3,000."""
 
 _UNKNOWN = 0.004
-"""Deviation of a reading whose noise is unknown, m."""
+"""Deviation of a detection whose noise is unknown, m."""
 
 _BEHIND = 4.0
 """Added to the cost of what is not yet a touch, or was not seen last: one that was comes first."""
@@ -40,23 +40,23 @@ class States:
 
 
 def predict(states: States, seconds: float, settings: TrackSettings) -> States:
-    """States after some seconds without a reading."""
+    """States after some seconds without a detection."""
     if not seconds > 0:
         return states
     step, noise = _step(seconds, settings)
     return States(states.mean @ step.T, step @ states.covariance @ step.T + noise)
 
 
-def begin(reading: FloatArray, spread: FloatArray, settings: TrackSettings) -> States:
-    """State of a touch that is seen for the first time: ``reading`` (2,), ``spread`` (2, 2)."""
+def begin(detection: FloatArray, spread: FloatArray, settings: TrackSettings) -> States:
+    """State of a touch that is seen for the first time: ``detection`` (2,), ``spread`` (2, 2)."""
     covariance = np.zeros((1, 4, 4))
     covariance[0, :2, :2] = spread
     covariance[0, (2, 3), (2, 3)] = settings.speed**2
-    return States(np.concatenate([reading, [0.0, 0.0]])[None], covariance)
+    return States(np.concatenate([detection, [0.0, 0.0]])[None], covariance)
 
 
 def update(states: States, positions: FloatArray, spreads: FloatArray) -> States:
-    """States after one reading each: ``positions`` (n, 2) with covariances (n, 2, 2)."""
+    """States after one detection each: ``positions`` (n, 2) with covariances (n, 2, 2)."""
     cross = states.covariance[:, :, :2]
     gain = cross @ _inverse(cross[:, :2] + spreads)
     away = (positions - states.mean[:, :2])[:, :, None]
@@ -66,7 +66,7 @@ def update(states: States, positions: FloatArray, spreads: FloatArray) -> States
 
 
 def distances(states: States, positions: FloatArray, spreads: FloatArray) -> FloatArray:
-    """(n, m) squared Mahalanobis distances of m readings from n states."""
+    """(n, m) squared Mahalanobis distances of m detections from n states."""
     away = positions - states.mean[:, None, :2]
     both = states.covariance[:, None, :2, :2] + spreads
     xx, xy, yy = both[..., 0, 0], both[..., 0, 1], both[..., 1, 1]
@@ -74,16 +74,18 @@ def distances(states: States, positions: FloatArray, spreads: FloatArray) -> Flo
     return np.asarray((yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
 
 
-def observe(readings: Sequence[Reading], settings: TrackSettings) -> tuple[FloatArray, FloatArray]:
-    """Positions (m, 2) of readings and their covariances (m, 2, 2), wandering included."""
-    positions = np.array([(r.x, r.y) for r in readings]).reshape(-1, 2)
-    spreads = np.array([_spread(r, settings) for r in readings]).reshape(-1, 2, 2)
+def observe(
+    detections: Sequence[Detection], settings: TrackSettings
+) -> tuple[FloatArray, FloatArray]:
+    """Positions (m, 2) of detections and their covariances (m, 2, 2), wandering included."""
+    positions = np.array([(r.x, r.y) for r in detections]).reshape(-1, 2)
+    spreads = np.array([_spread(r, settings) for r in detections]).reshape(-1, 2, 2)
     return positions, spreads
 
 
-def _spread(reading: Reading, settings: TrackSettings) -> tuple[float, float, float, float]:
+def _spread(detection: Detection, settings: TrackSettings) -> tuple[float, float, float, float]:
     more, unknown = settings.wander**2, _UNKNOWN**2
-    xx, yy, xy = reading.sd_x**2, reading.sd_y**2, reading.cov_xy
+    xx, yy, xy = detection.sd_x**2, detection.sd_y**2, detection.cov_xy
     if not (math.isfinite(xx + yy + xy) and xx * yy > xy * xy):
         xx, yy, xy = unknown, unknown, 0.0
     return xx + more, xy, xy, yy + more
@@ -112,32 +114,32 @@ def _step(seconds: float, settings: TrackSettings) -> tuple[FloatArray, FloatArr
     return step, noise
 
 
-def region_radius(reading: Reading) -> float:
-    """Radius of the disc of the reading's area, m; 0 where it has none."""
-    return math.sqrt(reading.area / math.pi) if reading.area > 0 else 0.0
+def region_radius(detection: Detection) -> float:
+    """Radius of the disc of the detection's area, m; 0 where it has none."""
+    return math.sqrt(detection.area / math.pi) if detection.area > 0 else 0.0
 
 
 def assign(
     states: States,
     signs: FloatArray,
     behind: FloatArray,
-    readings: Sequence[Reading],
+    detections: Sequence[Detection],
     seen: tuple[FloatArray, FloatArray],
 ) -> tuple[dict[int, int], FloatArray]:
-    """Pairs {reading: trace} of least cost (Kuhn 1955), and the distances (n, m).
+    """Pairs {detection: trace} of least cost (Kuhn 1955), and the distances (n, m).
 
-    ``signs`` and ``behind`` are (n,), ``seen`` the readings' positions and covariances. A pair
+    ``signs`` and ``behind`` are (n,), ``seen`` the detections' positions and covariances. A pair
     costs its squared Mahalanobis distance, but no more than the gate where the trace is within the
-    reading's region: when two regions become one, its centre jumps. Beyond the gate, and between
+    detection's region: when two regions become one, its centre jumps. Beyond the gate, and between
     signs, there are none.
     """
     positions, spreads = seen
     far = distances(states, positions, spreads)
-    radii = np.array([max(region_radius(r), _LEAST) for r in readings])
+    radii = np.array([max(region_radius(r), _LEAST) for r in detections])
     away = (states.mean[:, None, :2] - positions) / radii[:, None]
     share = away[..., 0] ** 2 + away[..., 1] ** 2
     cost = np.minimum(far, np.where(share < 1, GATE * (0.5 + 0.5 * share), np.inf))
-    cost[signs[:, None] != np.sign([r.peak for r in readings])] = np.inf
+    cost[signs[:, None] != np.sign([r.peak for r in detections])] = np.inf
     allowed = cost <= GATE
     limit = GATE + _BEHIND + 1
     cost = np.where(allowed, cost + _BEHIND * behind[:, None], limit)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tomoskin.core import Reading
+from tomoskin.core import Detection
 from tomoskin.touch.tracking.motion import region_radius
 from tomoskin.touch.tracking.trace import Footprint, Trace, sign_of, size_of
 
@@ -32,7 +32,7 @@ _BESIDE = 1.25
 """A residual lies within this many radii of its region, or of its press's."""
 
 _GONE = 0.5
-"""Seconds without any reading after which there is no residual response: a finder loses what is
+"""Seconds without any detection after which there is no residual response: a finder loses what is
 faint for a few frames."""
 
 _MOST = 64
@@ -54,16 +54,16 @@ class Residual:
     time: float
     unseen: bool = False
 
-    def is_under(self, reading: Reading) -> bool:
-        """Whether the reading lies here, with this sign, and no larger than a residual."""
-        return sign_of(reading) == self.sign and _may_be_residual(
-            reading, Footprint(self.x, self.y, self.press), self.radius
+    def is_under(self, detection: Detection) -> bool:
+        """Whether the detection lies here, with this sign, and no larger than a residual."""
+        return sign_of(detection) == self.sign and _may_be_residual(
+            detection, Footprint(self.x, self.y, self.press), self.radius
         )
 
-    def explains(self, reading: Reading, time: float, least_snr: float) -> bool:
-        """Whether the reading has not grown; follow its level."""
-        size = size_of(reading)
-        noise = size / reading.snr if reading.snr > 0 else 0.0
+    def explains(self, detection: Detection, time: float, least_snr: float) -> bool:
+        """Whether the detection has not grown; follow its level."""
+        size = size_of(detection)
+        noise = size / detection.snr if detection.snr > 0 else 0.0
         if self.unseen:
             self.level, self.unseen = min(self.level, least_snr * noise), False
         grown = size > _GROWTH * self.level + _NOISE * noise
@@ -79,7 +79,7 @@ class ResidualResponses:
     Parameters
     ----------
     least_snr
-        Signal-to-noise ratio below which there is no reading.
+        Signal-to-noise ratio below which there is no detection.
     """
 
     def __init__(self, least_snr: float) -> None:
@@ -93,7 +93,7 @@ class ResidualResponses:
 
     def leave(self, trace: Trace, time: float) -> None:
         """Remember where a touch was that has ended."""
-        radius = region_radius(trace.reading)
+        radius = region_radius(trace.detection)
         for foot in trace.footprints:
             self._residuals.append(
                 Residual(foot.x, foot.y, trace.sign, foot.top, radius, _PART * foot.top, time)
@@ -101,7 +101,7 @@ class ResidualResponses:
         del self._residuals[:-_MOST]
 
     def note(self, time: float, *, quiet: bool) -> None:
-        """Follow whether frames are ``quiet``, without any reading: where they stay so, the
+        """Follow whether frames are ``quiet``, without any detection: where they stay so, the
         residual responses are below the noise."""
         if not quiet:
             self._quiet_since = None
@@ -112,30 +112,30 @@ class ResidualResponses:
             for residual in self._residuals:
                 residual.unseen = True
 
-    def explain(self, reading: Reading, time: float, traces: Iterable[Trace]) -> bool:
-        """Whether the reading is the residual response of an earlier touch.
+    def explain(self, detection: Detection, time: float, traces: Iterable[Trace]) -> bool:
+        """Whether the detection is the residual response of an earlier touch.
 
         Or of one of ``traces``, behind or beside it while it still stands.
         """
-        if any(_is_on_track(reading, trace) for trace in traces):
+        if any(_is_on_track(detection, trace) for trace in traces):
             return True
-        under = [residual for residual in self._residuals if residual.is_under(reading)]
-        answers = [residual.explains(reading, time, self._least_snr) for residual in under]
+        under = [residual for residual in self._residuals if residual.is_under(detection)]
+        answers = [residual.explains(detection, time, self._least_snr) for residual in under]
         return any(answers)  # each of them follows the level
 
 
-def _is_on_track(reading: Reading, trace: Trace) -> bool:
-    if not trace.number or sign_of(reading) != trace.sign:
+def _is_on_track(detection: Detection, trace: Trace) -> bool:
+    if not trace.number or sign_of(detection) != trace.sign:
         return False
-    radius = region_radius(trace.reading)
-    return any(_may_be_residual(reading, foot, radius) for foot in trace.footprints)
+    radius = region_radius(trace.detection)
+    return any(_may_be_residual(detection, foot, radius) for foot in trace.footprints)
 
 
-def _may_be_residual(reading: Reading, foot: Footprint, radius: float) -> bool:
+def _may_be_residual(detection: Detection, foot: Footprint, radius: float) -> bool:
     """Whether it lies where something was, and is no larger than a residual of that."""
-    reach = _BESIDE * max(radius, region_radius(reading))
-    near = (reading.x - foot.x) ** 2 + (reading.y - foot.y) ** 2 <= reach**2
-    return near and size_of(reading) <= _PART * foot.top
+    reach = _BESIDE * max(radius, region_radius(detection))
+    near = (detection.x - foot.x) ** 2 + (detection.y - foot.y) ** 2 <= reach**2
+    return near and size_of(detection) <= _PART * foot.top
 
 
 def is_residual(trace: Trace, time: float, lasting: float) -> bool:
@@ -143,7 +143,7 @@ def is_residual(trace: Trace, time: float, lasting: float) -> bool:
 
     It must have fallen fast and not grown since.
     """
-    size, top = size_of(trace.reading), trace.top
+    size, top = size_of(trace.detection), trace.top
     if size > _PART * top or (trace.low is None and time - trace.strong > _FALL):
         trace.low = None
         return False

@@ -24,7 +24,7 @@ class TrackSettings:
         Standard deviation of a finger's speed along each axis, m/s, and the time after which it
         moves otherwise, s.
     wander
-        What the position of a reading wanders beside its noise, m.
+        What the position of a detection wanders beside its noise, m.
     """
 
     snr: float = 5.0
@@ -36,7 +36,7 @@ class TrackSettings:
 
     @property
     def least_snr(self) -> float:
-        """Below which there is no reading."""
+        """Below which there is no detection."""
         return HELD * self.snr
 
     @property

@@ -1,4 +1,4 @@
-"""One touch in the tracker's memory, from its first reading to its release."""
+"""One touch in the tracker's memory, from its first detection to its release."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from tomoskin.core import FloatArray, Reading, Touch
+from tomoskin.core import Detection, FloatArray, Touch
 from tomoskin.touch.tracking.motion import States, region_radius
 
 _STEP = 0.012
@@ -29,7 +29,7 @@ class Footprint:
 class Unmerged:
     """A touch as it was last seen by itself, and expected in the frame thereafter, device s."""
 
-    reading: Reading
+    detection: Detection
     states: States
     time: float
 
@@ -40,8 +40,8 @@ class Trace:
 
     Attributes
     ----------
-    reading, states
-        Newest reading; position and velocity, one row.
+    detection, states
+        Newest detection; position and velocity, one row.
     since, host_since
         Device and host time of its first frame, s.
     number
@@ -49,12 +49,12 @@ class Trace:
     frames
         Readings so far.
     missing
-        Device time of the first frame without a reading since the last one, or None.
+        Device time of the first frame without a detection since the last one, or None.
     strong, low, least
         Device times at which it was last strong for its position, and since which it has been
         so weak that it may be a residual response, or None; least size of its peak since then.
     footprints, top
-        Where it has been, the newest last; and how large it has been where its reading is now,
+        Where it has been, the newest last; and how large it has been where its detection is now,
         for a press that slid leaves a residual response anywhere along its way.
     alone
         As it was before it merged with others, or None.
@@ -66,7 +66,7 @@ class Trace:
         (2,) m, its position in the last event.
     """
 
-    reading: Reading
+    detection: Detection
     states: States
     since: float
     host_since: float
@@ -97,7 +97,7 @@ class Trace:
     @property
     def sign(self) -> float:
         """Of its peak."""
-        return sign_of(self.reading)
+        return sign_of(self.detection)
 
     @property
     def members(self) -> tuple[Trace, ...]:
@@ -110,25 +110,25 @@ class Trace:
         first = self.members[0]
         merged = tuple(t.number for t in self.members) if self.others else ()
         kind = "decrease" if self.sign < 0 else "increase"
-        return Touch(first.number, kind, first.host_since, self.reading, merged)
+        return Touch(first.number, kind, first.host_since, self.detection, merged)
 
-    def see(self, reading: Reading, time: float) -> None:
-        """Take the reading of this frame."""
-        self.reading = reading
+    def see(self, detection: Detection, time: float) -> None:
+        """Take the detection of this frame."""
+        self.detection = detection
         self.frames += 1
         self.missing = None
         self._step()
-        if size_of(reading) >= _STRONG * self.top:
+        if size_of(detection) >= _STRONG * self.top:
             self.strong = time
 
     def become(self, other: Trace) -> None:
         """Go on from where ``other`` is."""
-        self.reading, self.states, self.strong = other.reading, other.states, other.strong
+        self.detection, self.states, self.strong = other.detection, other.states, other.strong
         self.missing, self.low = other.missing, None
         self._step()
 
     def _step(self) -> None:
-        x, y, size = self.reading.x, self.reading.y, size_of(self.reading)
+        x, y, size = self.detection.x, self.detection.y, size_of(self.detection)
         last = self.footprints[-1] if self.footprints else None
         if last is None or (x - last.x) ** 2 + (y - last.y) ** 2 >= _STEP**2:
             last = Footprint(x, y, size)
@@ -138,22 +138,22 @@ class Trace:
             last.top = size
         self.top = last.top
         if len(self.footprints) > 1:
-            reach = max(region_radius(self.reading), _STEP) ** 2
+            reach = max(region_radius(self.detection), _STEP) ** 2
             near = (f.top for f in self.footprints if (f.x - x) ** 2 + (f.y - y) ** 2 <= reach)
             self.top = max(near, default=last.top)
 
 
-def size_of(reading: Reading) -> float:
+def size_of(detection: Detection) -> float:
     """By how many deviations it stands out, or its peak where the noise is unknown: a fit knows
     the depth of a faint touch badly, but well what it does to the voltages."""
-    return reading.snr if 0 < reading.snr < math.inf else abs(reading.peak)
+    return detection.snr if 0 < detection.snr < math.inf else abs(detection.peak)
 
 
-def content(reading: Reading) -> float:
+def content(detection: Detection) -> float:
     """Size of the peak times the region's area: two regions that become one add them up."""
-    return abs(reading.peak) * reading.area
+    return abs(detection.peak) * detection.area
 
 
-def sign_of(reading: Reading) -> float:
+def sign_of(detection: Detection) -> float:
     """1 or −1."""
-    return -1.0 if reading.peak < 0 else 1.0
+    return -1.0 if detection.peak < 0 else 1.0

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from tomoskin.core import FloatArray, Reading, Touch
+from tomoskin.core import Detection, FloatArray, Touch
 from tomoskin.touch.tracking import motion
 from tomoskin.touch.tracking.merging import carrier_of, merge, origin_of, split
 from tomoskin.touch.tracking.motion import assign
@@ -47,7 +47,7 @@ class TouchEvent:
     @property
     def text(self) -> str:
         """A sentence for people."""
-        r = self.touch.reading
+        r = self.touch.detection
         position = f"{1e3 * r.x:.0f}, {1e3 * r.y:.0f} mm"
         others = [str(number) for number in self.touch.merged if number != self.touch.id]
         return (
@@ -63,7 +63,7 @@ class TouchEvent:
 
 
 class Tracker:
-    """Joins readings to touches; remembers what can come back.
+    """Joins detections to touches; remembers what can come back.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Tracker:
         self._happened: list[TouchEvent] = []
 
     def update(
-        self, readings: Sequence[Reading], time: float, host_time: float
+        self, detections: Sequence[Detection], time: float, host_time: float
     ) -> tuple[Touch, ...]:
         """Touches of this frame, in order of their identity.
 
@@ -95,11 +95,11 @@ class Tracker:
         elapsed = self._elapse(time, host_time)
         self._host = host_time
         if self.settings.still:  # what stood there before says nothing of this frame
-            readings = [reading for reading in readings if not reading.weak]
+            detections = [detection for detection in detections if not detection.weak]
             self._residuals.forget()
-        if readings or self._traces:
-            self._follow(list(readings), elapsed)
-        self._residuals.note(self._now, quiet=not readings)
+        if detections or self._traces:
+            self._follow(list(detections), elapsed)
+        self._residuals.note(self._now, quiet=not detections)
         self.events, self._happened = tuple(self._happened), []
         shown = [trace.touch for trace in self._traces if trace.number]
         return tuple(sorted(shown, key=lambda touch: touch.id))
@@ -125,29 +125,29 @@ class Tracker:
         self._now += elapsed
         return elapsed
 
-    def _follow(self, readings: list[Reading], elapsed: float) -> None:
+    def _follow(self, detections: list[Detection], elapsed: float) -> None:
         traces, settings = self._traces, self.settings
-        seen = motion.observe(readings, settings)
+        seen = motion.observe(detections, settings)
         states = _stacked(traces)
         pairs: dict[int, int] = {}
         if traces:
             states = motion.predict(states, elapsed, settings)
-        if traces and readings:
+        if traces and detections:
             signs = np.array([trace.sign for trace in traces])
             behind = np.array([not t.number or t.missing is not None for t in traces], float)
-            pairs, far = assign(states, signs, behind, readings, seen)
+            pairs, far = assign(states, signs, behind, detections, seen)
             self._note_missing(set(pairs.values()), states)
-            self._see(readings, pairs, seen, states, far)
+            self._see(detections, pairs, seen, states, far)
         else:
             self._note_missing(set(), states)
-        for index, reading in enumerate(readings):
-            if index not in pairs and self._begins(reading):
+        for index, detection in enumerate(detections):
+            if index not in pairs and self._begins(detection):
                 state = motion.begin(seen[0][index], seen[1][index], settings)
-                traces.append(Trace(reading, state, self._now, self._host))
+                traces.append(Trace(detection, state, self._now, self._host))
         self._settle()
 
     def _note_missing(self, paired: set[int], states: motion.States) -> None:
-        """Of those that no reading is of: they are where they are expected."""
+        """Of those that no detection is of: they are where they are expected."""
         if len(paired) == len(self._traces):
             return
         for trace, state in zip(self._traces, _rows(states), strict=True):
@@ -156,13 +156,13 @@ class Tracker:
         going = [trace for trace in lost if trace.missing is None]
         if going:
             reported = [trace for trace in self._traces if trace.number]
-            now = {t.number: Unmerged(t.reading, t.states, self._now) for t in reported}
+            now = {t.number: Unmerged(t.detection, t.states, self._now) for t in reported}
             for trace in going:
                 trace.missing, trace.beside = self._now, now
 
     def _see(
         self,
-        readings: list[Reading],
+        detections: list[Detection],
         pairs: dict[int, int],
         seen: tuple[FloatArray, FloatArray],
         states: motion.States,
@@ -177,15 +177,15 @@ class Tracker:
         jumped = far[own, which] > motion.GATE
         for row, (trace, index, state) in enumerate(zip(own, which, after, strict=True)):
             followed = self._traces[trace]
-            followed.see(readings[index], self._now)
+            followed.see(detections[index], self._now)
             followed.states = state
             if jumped[row]:  # its region has changed: it has not moved
                 followed.states = motion.begin(positions[row], spreads[row], self.settings)
 
-    def _begins(self, reading: Reading) -> bool:
-        if reading.weak or reading.snr < self.settings.snr:
+    def _begins(self, detection: Detection) -> bool:
+        if detection.weak or detection.snr < self.settings.snr:
             return False
-        return not self._residuals.explain(reading, self._now, self._traces)
+        return not self._residuals.explain(detection, self._now, self._traces)
 
     def _settle(self) -> None:
         """Report what has stood long enough, end what has been gone long enough."""
@@ -203,12 +203,12 @@ class Tracker:
 
     def _consider(self, trace: Trace) -> None:
         """Report a newcomer that has stood, forget one that has not."""
-        if trace.missing is not None or trace.reading.snr < self.settings.snr:
+        if trace.missing is not None or trace.detection.snr < self.settings.snr:
             self._traces.remove(trace)
             return
         if not self._lasts(trace.since, self.settings.onset):
             return
-        if self._residuals.explain(trace.reading, self._now, self._traces):
+        if self._residuals.explain(trace.detection, self._now, self._traces):
             self._traces.remove(trace)
             return
         origin = origin_of(trace, self._traces)
@@ -249,13 +249,13 @@ class Tracker:
             self._happened.append(TouchEvent("release", ended, self._host))
 
     def _has_moved(self, trace: Trace) -> bool:
-        r = trace.reading
+        r = trace.detection
         (x, y), sd = trace.reported_at, math.hypot(r.sd_x, r.sd_y)
         far = math.hypot(r.x - x, r.y - y)
         return far > _MOVED and not far < _BY_DEVIATIONS * sd
 
     def _report(self, kind: Happening, trace: Trace) -> None:
-        trace.reported_at = (trace.reading.x, trace.reading.y)
+        trace.reported_at = (trace.detection.x, trace.detection.y)
         self._happened.append(TouchEvent(kind, trace.touch, self._host))
 
 

@@ -9,7 +9,7 @@ from golden import mismatch
 from shapes import disc
 from tomoskin.core import DataError, FloatArray
 from tomoskin.forward import ForwardModel
-from tomoskin.inverse import OneStep, pictures
+from tomoskin.inverse import OneStep, image_series
 from tomoskin.pattern import Pattern
 
 PATTERN = Pattern.adjacent(8)
@@ -22,7 +22,7 @@ def changes() -> FloatArray:
 
 
 def test_whole_frames_are_the_operators_images(changes: FloatArray) -> None:
-    found = pictures(OPERATOR, changes, PATTERN)
+    found = image_series(OPERATOR, changes, PATTERN)
     assert found.report == ""
     for frame in range(10):
         image, expected = found.image(frame), OPERATOR(changes[frame])
@@ -33,7 +33,7 @@ def test_whole_frames_are_the_operators_images(changes: FloatArray) -> None:
 def test_a_dead_channel_leaves_every_frame_and_is_named(changes: FloatArray) -> None:
     changes[:, 17] = np.nan
     changes[:6, 4] = np.inf
-    found = pictures(OPERATOR, changes, PATTERN)
+    found = image_series(OPERATOR, changes, PATTERN)
     assert found.dropped.tolist() == [4, 17]
     assert found.left_out[:, [4, 17]].all()
     assert found.left_out.sum() == 20
@@ -46,7 +46,7 @@ def test_a_dead_channel_leaves_every_frame_and_is_named(changes: FloatArray) -> 
 def test_a_row_that_is_railed_in_one_frame_is_left_out_of_that_one(changes: FloatArray) -> None:
     railed = np.zeros(changes.shape, bool)
     railed[3, [5, 6]] = True
-    found = pictures(OPERATOR, changes, PATTERN, railed)
+    found = image_series(OPERATOR, changes, PATTERN, railed)
     assert found.report == "1 frames lack other rows"
     assert np.array_equal(found.left_out, railed)
     assert mismatch(found.values[3], OPERATOR.without([5, 6])(changes[3]).values) < 1e-10
@@ -56,7 +56,7 @@ def test_a_row_that_is_railed_in_one_frame_is_left_out_of_that_one(changes: Floa
 def test_a_frame_that_lacks_too_much_gives_no_image(changes: FloatArray) -> None:
     changes[2, :11] = np.nan
     changes[4, :10] = np.nan
-    found = pictures(OPERATOR, changes, PATTERN)
+    found = image_series(OPERATOR, changes, PATTERN)
     assert found.frames.tolist() == [0, 1, 3, 4, 5, 6, 7, 8, 9]
     assert found.report == (
         "1 frames lack other rows; 1 frames lack too many rows and give no image"
@@ -67,7 +67,7 @@ def test_a_frame_that_lacks_too_much_gives_no_image(changes: FloatArray) -> None
 def test_no_frame_with_rows_enough(changes: FloatArray) -> None:
     changes[:, :11] = np.nan
     with pytest.raises(DataError, match=r"no frame has 75% of its rows; most lack row 0: source"):
-        pictures(OPERATOR, changes, PATTERN)
+        image_series(OPERATOR, changes, PATTERN)
 
 
 def test_data_of_another_pattern_are_refused_by_identity(changes: FloatArray) -> None:
@@ -82,14 +82,14 @@ def test_data_of_another_pattern_are_refused_by_identity(changes: FloatArray) ->
         with pytest.raises(
             DataError, match=f"of pattern {PATTERN.identity} .* got {other.identity}"
         ):
-            pictures(OPERATOR, changes, other)
-    pictures(OPERATOR, changes, Pattern.from_tables(PATTERN.drive, PATTERN.measure))
+            image_series(OPERATOR, changes, other)
+    image_series(OPERATOR, changes, Pattern.from_tables(PATTERN.drive, PATTERN.measure))
 
 
 @pytest.mark.parametrize("shape", [(40,), (3, 39), (0, 40)])
 def test_changes_of_another_shape(shape: tuple[int, ...]) -> None:
     with pytest.raises(DataError, match=r"expected changes \(n_frames, 40\), got"):
-        pictures(OPERATOR, np.zeros(shape), PATTERN)
+        image_series(OPERATOR, np.zeros(shape), PATTERN)
 
 
 def test_operators_that_differ_in_anything_have_identities_of_their_own() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from tomoskin.core import DataError
 from tomoskin.pattern import Pattern
-from tomoskin.signal import Blind, lost_directions
+from tomoskin.signal import NuisanceSubspace, nuisance_directions
 
 RANDOM = np.random.default_rng(0)
 J = RANDOM.standard_normal((12, 30))
@@ -18,7 +18,7 @@ R = J.T @ P
 
 def test_it_is_the_limit_of_ever_more_noise_along_the_directions():
     directions = RANDOM.standard_normal((12, 3))
-    blind = Blind.of(directions, P)
+    blind = NuisanceSubspace.of(directions, P)
     noisy = J.T @ np.linalg.inv(GRAM + 1e7 * directions @ directions.T)
     np.testing.assert_allclose(blind.seen_by(R), noisy, atol=1e-5)
     dv = RANDOM.standard_normal(12)
@@ -30,7 +30,7 @@ def test_it_is_the_limit_of_ever_more_noise_along_the_directions():
 def test_lost_rows_are_directions_too():
     kept = np.arange(12) > 2
     alone = J[kept].T @ np.linalg.inv(GRAM[np.ix_(kept, kept)])
-    blind = Blind.of(np.eye(12)[:, ~kept], P)
+    blind = NuisanceSubspace.of(np.eye(12)[:, ~kept], P)
     np.testing.assert_allclose(blind.seen_by(R)[:, kept], alone, atol=1e-9)
     assert not np.abs(blind.seen_by(R)[:, ~kept]).max() > 1e-9
 
@@ -45,7 +45,7 @@ def test_a_free_image_is_left_out_whatever_the_data_say():
     rest = inner.T @ precision
     matrix = rest + (free - rest @ seen) @ fitted
     left = precision - precision @ seen @ fitted
-    blind = Blind.of(np.eye(12)[:, :2], left).without_free(seen, free.T @ matrix)
+    blind = NuisanceSubspace.of(np.eye(12)[:, :2], left).without_free(seen, free.T @ matrix)
     dv = RANDOM.standard_normal(12)
     told = matrix @ blind(dv)
     assert np.abs(free.T @ told).max() < 1e-9
@@ -56,20 +56,20 @@ def test_a_free_image_is_left_out_whatever_the_data_say():
 
 def test_directions_that_follow_from_others_count_once():
     one = RANDOM.standard_normal((12, 1))
-    assert Blind.of(np.hstack([one, 2 * one, 0 * one]), P).count == 1
-    assert Blind.of(np.zeros((12, 0)), P).count == 0
+    assert NuisanceSubspace.of(np.hstack([one, 2 * one, 0 * one]), P).count == 1
+    assert NuisanceSubspace.of(np.zeros((12, 0)), P).count == 0
 
 
 def test_nothing_that_is_left_is_refused():
     with pytest.raises(DataError, match="too little is left of 12 rows"):
-        Blind.of(np.eye(12)[:, :2], np.zeros((12, 12)))
+        NuisanceSubspace.of(np.eye(12)[:, :2], np.zeros((12, 12)))
 
 
 def test_a_reading_that_floats_leaves_the_sum_of_its_rows():
     pattern = Pattern.adjacent(8)
     floating = np.arange(8) == 3
     lost = (pattern.drive == 3).any(axis=1)
-    directions = lost_directions(pattern, lost, floating)
+    directions = nuisance_directions(pattern, lost, floating)
     volts = RANDOM.standard_normal((pattern.n_drive, 8))  # potentials, E4's are any number
     again = volts.copy()
     again[:, 3] = 100 * RANDOM.standard_normal(pattern.n_drive)
@@ -78,7 +78,7 @@ def test_a_reading_that_floats_leaves_the_sum_of_its_rows():
     def rows(potential):
         return potential[pattern.drive_index, plus] - potential[pattern.drive_index, minus]
 
-    blind = Blind.of(directions, np.eye(pattern.n_meas))
+    blind = NuisanceSubspace.of(directions, np.eye(pattern.n_meas))
     one, other = (blind(np.where(lost, 0.0, rows(p))) for p in (volts, again))
     np.testing.assert_allclose(one, other, atol=1e-9)
     drive = 6  # far from E4: its two rows there count as one

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from shapes import box, grid
 from tomoskin.core import DataError, FloatArray, Image
-from tomoskin.inverse import SourceMetrics
+from tomoskin.inverse import ThesisMetrics
 from tomoskin.mesh import Mesh
 
 
@@ -41,7 +41,7 @@ def peaked(**values: float) -> FloatArray:
 def test_counted_by_hand() -> None:
     """Five elements over 50 %, two of them over 75 %; one of 40 % and an opposite one are not."""
     values = peaked(c0=4.0, c1=3.0, c2=2.0, c3=2.5, c7=2.9, c8=1.6, c9=-3.9)
-    found = SourceMetrics.of(image(values), SHEET, truth=(1.0, 2.0))
+    found = ThesisMetrics.of(image(values), SHEET, truth=(1.0, 2.0))
     assert found.maximum == 4.0
     assert found.res50 == pytest.approx(1 - np.sqrt(4 / 50))
     assert found.res75 == pytest.approx(1 - np.sqrt(1 / 50))
@@ -51,14 +51,14 @@ def test_counted_by_hand() -> None:
 
 
 def test_a_single_element_is_the_finest_resolution_and_a_sharp_edge() -> None:
-    found = SourceMetrics.of(image(peaked(c11=-0.3)), SHEET, SHEET.centroids[11])
+    found = ThesisMetrics.of(image(peaked(c11=-0.3)), SHEET, SHEET.centroids[11])
     assert (found.maximum, found.res50, found.res75) == (-0.3, 1.0, 1.0)
     assert np.degrees(found.shape_angle) == 90.0
     assert found.error75 == pytest.approx(0.0)
 
 
 def test_everything_at_the_maximum() -> None:
-    found = SourceMetrics.of(image(np.ones(N)), SHEET)
+    found = ThesisMetrics.of(image(np.ones(N)), SHEET)
     assert found.res50 == found.res75 == pytest.approx(1 - np.sqrt((N - 1) / N))
     assert np.degrees(found.shape_angle) == 90.0
     assert np.isnan(found.error75)
@@ -69,7 +69,7 @@ def test_the_centroid_is_that_of_the_area() -> None:
     points = np.array([[0, 0], [4, 0], [1, 3], [4, 4.0]])
     mesh = Mesh(points, np.array([[0, 1, 2], [1, 3, 2]]), (np.array([[0, 1]]),))
     expected = mesh.volumes @ mesh.centroids / mesh.volumes.sum()
-    found = SourceMetrics.of(Image(np.array([1.0, 0.8]), "S", mesh.identity), mesh, expected)
+    found = ThesisMetrics.of(Image(np.array([1.0, 0.8]), "S", mesh.identity), mesh, expected)
     assert found.error75 == pytest.approx(0.0, abs=1e-12)
 
 
@@ -81,8 +81,8 @@ def test_the_centroid_is_that_of_the_area() -> None:
 def test_bounds_and_invariance(seed: int, scale: float, sign: float) -> None:
     """RES75 is never below RES50, β in (0°, 90°]; only maximum and β know the unit."""
     values = np.random.default_rng(seed).standard_normal(N)
-    base = SourceMetrics.of(image(values), SHEET, (0.5, 0.5))
-    found = SourceMetrics.of(image(sign * scale * values), SHEET, (0.5, 0.5))
+    base = ThesisMetrics.of(image(values), SHEET, (0.5, 0.5))
+    found = ThesisMetrics.of(image(sign * scale * values), SHEET, (0.5, 0.5))
     assert 0.0 < found.shape_angle <= np.pi / 2
     assert found.res75 >= found.res50
     assert found.maximum == pytest.approx(sign * scale * base.maximum)
@@ -101,10 +101,10 @@ def test_bounds_and_invariance(seed: int, scale: float, sign: float) -> None:
 )
 def test_refused(values: Any, truth: Any, message: str) -> None:
     with pytest.raises(DataError, match=message):
-        SourceMetrics.of(image(values), SHEET, truth)
+        ThesisMetrics.of(image(values), SHEET, truth)
 
 
 def test_an_image_of_another_mesh_is_refused() -> None:
     line = np.linspace(0, 1, 3)
     with pytest.raises(DataError, match="lives on mesh"):
-        SourceMetrics.of(image(np.ones(N)), box(line, line, line))
+        ThesisMetrics.of(image(np.ones(N)), box(line, line, line))

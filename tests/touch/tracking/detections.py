@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Reading, Touch
+from tomoskin.core import Detection, Touch
 from tomoskin.touch import TouchEvent, Tracker, TrackSettings
 
 AREA = math.pi * 0.015**2
 
 
-def reading(x: float, y: float = 0.0, peak: float = -1.0, **more: Any) -> Reading:
+def detection(x: float, y: float = 0.0, peak: float = -1.0, **more: Any) -> Detection:
     """A region of 15 mm radius, well above its noise."""
     values = {"sd_x": 0.001, "sd_y": 0.001, "area": AREA, "snr": 50.0} | more
-    return Reading(x=x, y=y, peak=peak, cells=np.array([0]), **values)
+    return Detection(x=x, y=y, peak=peak, cells=np.array([0]), **values)
 
 
 @dataclass
@@ -34,12 +34,12 @@ class Run:
         self.tracker = Tracker(self.settings)
         self.frame = 0
 
-    def __call__(self, frames: Iterable[Sequence[Reading]]) -> Run:
+    def __call__(self, frames: Iterable[Sequence[Detection]]) -> Run:
         """Feed frames; ``touches`` are theirs alone."""
         self.touches = []
-        for readings in frames:
+        for detections in frames:
             time = self.frame / self.rate
-            self.touches.append(self.tracker.update(readings, time, 100 + time))
+            self.touches.append(self.tracker.update(detections, time, 100 + time))
             self.events += self.tracker.events
             self.frame += 1
         return self

@@ -15,7 +15,7 @@ _DEPENDENT = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Blind:
+class NuisanceSubspace:
     """Noise of unbounded variance along ``directions`` N, (n_meas, k).
 
     Data of covariance P⁻¹ with that noise have P − PN(NᵀPN)⁻¹NᵀP for their inverse covariance
