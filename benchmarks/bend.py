@@ -15,7 +15,7 @@ from report import Report
 from tomoskin.calibration import BENDS, BendExamples, BendModel, FrameView, JointReference
 from tomoskin.core import Detection, FloatArray, Frame
 from tomoskin.mesh import Cylinder, Hinge
-from tomoskin.pipeline import Pipeline, Result
+from tomoskin.pipeline import FrameResult, Pipeline
 from tomoskin.pipeline.finding import finding, voltage_covariance
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.signal import Reference
@@ -258,7 +258,7 @@ class Plain:
     def __init__(self, bench: Bench) -> None:
         self._find = bench.finder(bench.flat)
 
-    def __call__(self, result: Result) -> list[Detection]:
+    def __call__(self, result: FrameResult) -> list[Detection]:
         """Of one frame."""
         return self._find(result.voltages - result.reference, result.reference[:, None])
 

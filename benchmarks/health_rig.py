@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from tomoskin.core import FloatArray, Frame, Touch
-from tomoskin.pipeline import Pipeline, Result
+from tomoskin.pipeline import FrameResult, Pipeline
 from tomoskin.skin import Skin
 from tomoskin.twin import Faults, Press, TwinSettings, make_electronics
 from twin import table_of
@@ -44,7 +44,7 @@ class Rig:
         count: int,
         presses: Iterable[Press] = (),
         faults: Faults = NONE,
-    ) -> list[Result]:
+    ) -> list[FrameResult]:
         """What a pipeline makes of the next ``count`` frames."""
         found = [pipeline.push(self.frame(presses, faults)) for _ in range(count)]
         return [result for result in found if result is not None]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import Detection, Image, Touch
-from tomoskin.pipeline import Prepared, Result, colour_limit
+from tomoskin.pipeline import FrameResult, Prepared, colour_limit
 from tomoskin.run import Runner, Snapshot
 from tomoskin.server import AccessPolicy, Hub, Server, SettingsHandlers, application, listen
 
@@ -70,10 +70,10 @@ class Stream(Runner):
             time.sleep(max(due - time.monotonic(), 0.0))
 
 
-def _picture(prepared: Prepared, step: int) -> Result:
+def _picture(prepared: Prepared, step: int) -> FrameResult:
     mesh, reference = prepared.mesh, prepared.operator.reference
     noise = np.random.default_rng(step % 16).standard_normal(len(mesh.cells))
-    return Result(
+    return FrameResult(
         sequence=0,
         host_time=0.0,
         ready=True,

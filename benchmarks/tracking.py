@@ -17,7 +17,7 @@ from report import Report, progress
 from tomoskin import Locator, Skin
 from tomoskin.calibration import Several
 from tomoskin.core import DataError, Detection
-from tomoskin.pipeline import Pipeline, Prepared, Result, prepare
+from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
 from tomoskin.recording import SessionReader, tick_rate
 from tomoskin.run import simulate
 from tomoskin.touch import Tracker
@@ -43,7 +43,7 @@ _HEAD = 'format = 1\n[script]\nduration = "{:g} s"\nlead_in = "3 s"\npreset = "t
 class Frame:
     """A result, seconds since time 0 of the script, and what presses then: x, y m and N."""
 
-    result: Result
+    result: FrameResult
     time: float
     presses: tuple[tuple[float, float, float], ...]
 

@@ -18,6 +18,8 @@ import pytest
 from conftest import missing
 from tomoskin import __version__
 
+pytestmark = pytest.mark.slow  # make release looks at the same
+
 ROOT = Path(__file__).resolve().parent.parent
 STATIC = "tomoskin/server/static/"
 MOST_MB = 6.0

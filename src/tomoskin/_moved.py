@@ -33,7 +33,11 @@ RENAMED = {
         "SourceMetrics": "ThesisMetrics",
         "pictures": "image_series",
     },
-    "pipeline": {"Result": "FrameResult"},
+    "pipeline": {
+        "Changes": "RecordedFrames",
+        "Result": "FrameResult",
+        "changes_of": "recorded_frames",
+    },
     "signal": {"Blind": "NuisanceSubspace", "lost_directions": "nuisance_directions"},
     "source": {"Conversation": "ProtocolSession", "FrameGate": "SequenceFilter"},
     "touch": {

@@ -64,6 +64,7 @@ def test_a_session_holds_frames_and_truth_and_is_the_same_again(tomoskin, script
     assert change[pressed].max() > 3 * change[~pressed][:5].max()  # idle frames: the noise of two
 
 
+@pytest.mark.slow
 def test_a_set_is_the_same_whoever_makes_it_and_goes_on(tomoskin, tmp_path):
     n = SHARD_FRAMES + 2
     common = ("simulate", "--presses", n, "--seed", 3, "--json")

@@ -12,7 +12,7 @@ from firmware.boards import PATIENCE
 from tomoskin.core import Touch
 from tomoskin.emulator import Programs
 from tomoskin.emulator.source import open_emulator
-from tomoskin.pipeline import Result, prepare
+from tomoskin.pipeline import FrameResult, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.skin import Skin
 from tomoskin.twin import Press
@@ -52,7 +52,9 @@ def test_a_press_is_found_where_it_is(
     assert math.hypot(reading.x - place[0], reading.y - place[1]) < most
 
 
-def _wait(runner: Runner, came: threading.Event, enough: Callable[[Result], bool]) -> Result:
+def _wait(
+    runner: Runner, came: threading.Event, enough: Callable[[FrameResult], bool]
+) -> FrameResult:
     """The first result that is ``enough``."""
     for _ in range(MOST_FRAMES):
         assert came.wait(PATIENCE), runner.status().problem

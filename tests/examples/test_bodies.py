@@ -13,6 +13,7 @@ from tomoskin.mesh import simplex_measure
 BODIES = ["fig62_palpation", "fig64_face", "soft_volume"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BODIES)
 def test_the_figure_is_made_and_the_numbers_hold(imported, gallery, name, tmp_path):
     module = imported(name)

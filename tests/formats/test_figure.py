@@ -24,7 +24,7 @@ def outside(path: Path) -> float:
     return float(image[~inner].min())
 
 
-@pytest.mark.parametrize("panels", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("panels", [1, 5])
 def test_nothing_touches_the_edge(tmp_path: Path, panels: int) -> None:
     mesh = disc(8, 200)
     sheet = [Panel(f"frame {i}", mesh.centroids[:, 0], ()) for i in range(panels)]

@@ -16,7 +16,7 @@ from run.board import AS_TAKEN, pressed, samples_of
 from run.test_replay import Recorded, recorded_touches, same, touches_of
 from tomoskin.core import FloatArray, Frame
 from tomoskin.inverse import Temporal
-from tomoskin.pipeline import Pipeline, Prepared, Result, prepare
+from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
 from tomoskin.pipeline.following import Following
 from tomoskin.pipeline.imaging import Filtered
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
@@ -67,12 +67,12 @@ def settled(prepared: Prepared, source: Iterator[Callable[..., Frame]]) -> Pipel
     return pipeline
 
 
-def shown(result: Result | None) -> Result:
+def shown(result: FrameResult | None) -> FrameResult:
     assert result is not None
     return result
 
 
-def changes(prepared: Prepared, results: Sequence[Result]) -> FloatArray:
+def changes(prepared: Prepared, results: Sequence[FrameResult]) -> FloatArray:
     kind = prepared.operator.difference
     return np.array([difference(r.voltages, r.reference, kind) for r in results])
 

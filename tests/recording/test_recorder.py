@@ -15,7 +15,7 @@ import pytest
 
 from recording.runs import INFO, SKIN, TOUCH, frame_of, same_frame
 from tomoskin.core import DataError, Event, Image
-from tomoskin.pipeline import Result
+from tomoskin.pipeline import FrameResult
 from tomoskin.recording import (
     BoardInfo,
     Mark,
@@ -121,7 +121,7 @@ def record(worker, count, start=0):
 def result_of(number, image, *touches):
     """A result of the frame ``number``, a hundred a second."""
     none = np.zeros(1)
-    return Result(number, number / 100, True, True, image, none, none, touches, 0)
+    return FrameResult(number, number / 100, True, True, image, none, none, touches, 0)
 
 
 def frames_in(path):

@@ -9,7 +9,7 @@ import pytest
 from run.test_runner import PATIENCE, Watch
 from tomoskin.core import DataError, SourceError, WireError
 from tomoskin.run import SetPose, SetTwin, commands
-from tomoskin.run.commands import CommandQueue
+from tomoskin.run.commands import RunCommands
 
 
 class Taker:
@@ -30,7 +30,7 @@ def taker():
 
 
 def test_while_no_thread_takes_them_who_asks_carries_them_out(taker):
-    queue = CommandQueue(taker)
+    queue = RunCommands(taker)
     assert queue.put("one").done()
     queue.begin()
     later = queue.put("two")
@@ -41,7 +41,7 @@ def test_while_no_thread_takes_them_who_asks_carries_them_out(taker):
 
 
 def test_they_are_carried_out_in_order_by_the_thread_that_takes_them(taker):
-    queue = CommandQueue(taker)
+    queue = RunCommands(taker)
     queue.begin()
     futures = [queue.put(number) for number in range(5)]
     thread = threading.Thread(target=queue.carry_out)
@@ -52,7 +52,7 @@ def test_they_are_carried_out_in_order_by_the_thread_that_takes_them(taker):
 
 
 def test_an_error_is_for_who_asked_and_the_rest_goes_on(taker):
-    queue = CommandQueue(taker)
+    queue = RunCommands(taker)
     queue.begin()
     bad, good = queue.put(DataError("no")), queue.put("yes")
     queue.carry_out()
@@ -62,7 +62,7 @@ def test_an_error_is_for_who_asked_and_the_rest_goes_on(taker):
 
 
 def test_one_that_nobody_waits_for_any_more_is_left_out(taker):
-    queue = CommandQueue(taker)
+    queue = RunCommands(taker)
     queue.begin()
     queue.put("gone").cancel()
     queue.carry_out()

@@ -9,7 +9,7 @@ import pytest
 
 from tomoskin.calibration import BENDS, BendReading
 from tomoskin.core import Detection, Image, Touch
-from tomoskin.pipeline import Result
+from tomoskin.pipeline import FrameResult
 from tomoskin.server.frames import encode_result
 from tomoskin.twin import Finger, Press, Probe
 
@@ -31,7 +31,7 @@ def make(n_cells=5, touches=(), **changes):
         "touches": touches,
         "left_out": 0,
     }
-    return Result(**(fields | changes))
+    return FrameResult(**(fields | changes))
 
 
 def touch(number, cells, kind="decrease", sd=0.001):

@@ -18,7 +18,7 @@ import pytest
 
 from recording.runs import SKIN, TOUCH
 from tomoskin.core import Event, Image
-from tomoskin.pipeline import Result
+from tomoskin.pipeline import FrameResult
 from tomoskin.sink import Moment, Stream
 
 ROBOT = Path(__file__).resolve().parents[2] / "docs" / "robot.md"
@@ -41,7 +41,7 @@ def moment_at(host_time, *touches, sequence=0):
 def result_at(host_time, *touches, sequence=0):
     """What a pipeline makes of one frame."""
     moment = moment_at(host_time, *touches, sequence=sequence)
-    return Result(
+    return FrameResult(
         sequence=sequence,
         host_time=host_time,
         ready=True,

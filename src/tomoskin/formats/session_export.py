@@ -29,7 +29,7 @@ from tomoskin.recording import (
 )
 
 if TYPE_CHECKING:
-    from tomoskin.pipeline import Result
+    from tomoskin.pipeline import FrameResult
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Export:
             title = f"{result.host_time - first:.1f} s"
             yield Panel(title, result.image.values, result.touches)
 
-    def _images(self, prepared: Prepared) -> Iterator[Result]:
+    def _images(self, prepared: Prepared) -> Iterator[FrameResult]:
         """A result every so often; those before the reference stands are left out."""
         total = indexed_frames(self.session)
         due = float("-inf")

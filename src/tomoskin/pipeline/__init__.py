@@ -1,17 +1,21 @@
 """The one frame flow, pure: a reference is collected, then frames are followed to touches."""
 
+from typing import Any
+
+from tomoskin._moved import moved
 from tomoskin.pipeline.finding import voltage_covariance
 from tomoskin.pipeline.offline import Reconstruction, reconstruct
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.pipeline.prepare import Prepared, prepare
 from tomoskin.pipeline.recorded import DOUBTED, Idle, RecordedFrames, recorded_frames
-from tomoskin.pipeline.records import Measured, ReferenceState, Result
+from tomoskin.pipeline.records import FrameResult, Measured, ReferenceState
 from tomoskin.pipeline.scale import colour_limit
 from tomoskin.pipeline.tune import tuned
 
 __all__ = [
     "DOUBTED",
     "REFERENCE_FRAMES",
+    "FrameResult",
     "Idle",
     "Measured",
     "Pipeline",
@@ -19,7 +23,6 @@ __all__ = [
     "Reconstruction",
     "RecordedFrames",
     "ReferenceState",
-    "Result",
     "colour_limit",
     "prepare",
     "reconstruct",
@@ -27,3 +30,7 @@ __all__ = [
     "tuned",
     "voltage_covariance",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    return moved("pipeline", name)

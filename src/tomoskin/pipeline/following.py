@@ -21,7 +21,7 @@ from tomoskin.pipeline.conditioning import (
 from tomoskin.pipeline.finding import Finder, Fitting, finding
 from tomoskin.pipeline.imaging import Filtered, SingleFrame, imaging
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.records import Measured, Result
+from tomoskin.pipeline.records import FrameResult, Measured
 from tomoskin.pipeline.tune import tune
 from tomoskin.signal import Reference
 from tomoskin.touch import WHOLE, Pace, Tracker
@@ -113,7 +113,7 @@ class Following:
         """What is known of the reference and of the electrodes."""
         return self._conditioning
 
-    def push(self, measured: Measured) -> Result:
+    def push(self, measured: Measured) -> FrameResult:
         """Take one frame."""
         self._tune()
         conditioned = self._conditioning.condition(measured)
@@ -129,9 +129,9 @@ class Following:
         self._learn(measured.time, touched=bool(touches))
         return self._result(measured, conditioned, view.image, touches, readings)
 
-    def first(self, measured: Measured) -> Result:
+    def first(self, measured: Measured) -> FrameResult:
         """The frame that completed the rest: nothing shows in it."""
-        return Result(
+        return FrameResult(
             sequence=measured.sequence,
             host_time=measured.host_time,
             ready=True,
@@ -206,8 +206,8 @@ class Following:
         image: Image,
         touches: tuple[Touch, ...],
         readings: dict[str, Any],
-    ) -> Result:
-        return Result(
+    ) -> FrameResult:
+        return FrameResult(
             sequence=measured.sequence,
             host_time=measured.host_time,
             ready=True,

@@ -9,7 +9,7 @@ from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline.collecting import Collecting
 from tomoskin.pipeline.following import Following, Setting
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.records import Measured, ReferenceState, Result
+from tomoskin.pipeline.records import FrameResult, Measured, ReferenceState
 from tomoskin.signal import Reference
 from tomoskin.touch import LIVE, Tracker, TrackSettings
 
@@ -103,7 +103,7 @@ class Pipeline:
     def _prepared(self) -> Prepared:
         return self._state.prepared if isinstance(self._state, Following) else self._given
 
-    def push(self, frame: Frame) -> Result | None:
+    def push(self, frame: Frame) -> FrameResult | None:
         """Take one frame; None while paused, or where the frame is not of this scan."""
         if self.paused:
             return None
@@ -116,14 +116,14 @@ class Pipeline:
             return self._state.push(measured)
         return self._collect(self._state, measured)
 
-    def _collect(self, state: Collecting, measured: Measured) -> Result:
+    def _collect(self, state: Collecting, measured: Measured) -> FrameResult:
         given = self._given
         rest = state.push(measured)
         if rest is not None:
             setting = Setting(LIVE, given.scan)
             self._state = Following.from_rest(given, rest, self._tracker, setting)
             return self._state.first(measured)
-        return Result(
+        return FrameResult(
             sequence=measured.sequence,
             host_time=measured.host_time,
             ready=False,

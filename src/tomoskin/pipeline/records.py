@@ -50,7 +50,7 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Result:
+class FrameResult:
     """One frame from voltages to touches.
 
     Attributes

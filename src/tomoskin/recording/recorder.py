@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tomoskin.core import DataError, Event, Image, PixelMap, Touch
-from tomoskin.pipeline import Result
+from tomoskin.pipeline import FrameResult
 from tomoskin.recording.clock import ClockFitter
 from tomoskin.recording.documents import Truth
 from tomoskin.recording.layout import Mark, MarkedFrame
@@ -84,7 +84,7 @@ class Recorder:
 
     def admit(self, message: RunMessage) -> RunMessage | _Outcome | None:
         """What of ``message`` is to be written; by the thread that puts it."""
-        if not isinstance(message, Result):
+        if not isinstance(message, FrameResult):
             return message
         touches, image = None, None
         if message.ready:

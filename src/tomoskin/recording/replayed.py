@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from tomoskin.calibration import KINDS
 from tomoskin.core import DataError, Frame
-from tomoskin.pipeline import Pipeline, Prepared, Result, prepare
+from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
 from tomoskin.recording.layout import Mark
 from tomoskin.recording.session_reader import SessionReader, tick_rate, touches_before
 
@@ -21,7 +21,7 @@ def as_recorded(session: SessionReader) -> Prepared:
     return prepared
 
 
-def advance(pipeline: Pipeline, frame: Frame, mark: Mark) -> Result | None:
+def advance(pipeline: Pipeline, frame: Frame, mark: Mark) -> FrameResult | None:
     """Give the pipeline one frame as its ``mark`` says; None where there is no picture of it.
 
     Raises
@@ -37,7 +37,7 @@ def advance(pipeline: Pipeline, frame: Frame, mark: Mark) -> Result | None:
     return pipeline.push(frame)
 
 
-def replayed(prepared: Prepared, session: SessionReader) -> Iterator[Result]:
+def replayed(prepared: Prepared, session: SessionReader) -> Iterator[FrameResult]:
     """What the pipeline made of every frame of ``session``, and makes of it again.
 
     ``prepared`` is that of the session's own skin for the same touches, or of another with the

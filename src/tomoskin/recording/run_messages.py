@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tomoskin.core import Event
-from tomoskin.pipeline import Result
+from tomoskin.pipeline import FrameResult
 from tomoskin.recording.documents import Truth
 from tomoskin.recording.layout import MarkedFrame
 from tomoskin.touch import TouchEvent
@@ -38,7 +38,7 @@ class RunSettings:
     values: Mapping[str, Any]
 
 
-RunMessage = RawRead | MarkedFrame | Result | Event | Truth | BoardInfo | RunSettings
+RunMessage = RawRead | MarkedFrame | FrameResult | Event | Truth | BoardInfo | RunSettings
 """All that a run says, in the order of what happens: the bytes of a read, each frame of it with
 what becomes of it, then its result. A person's remark is an event of the kind "note"."""
 

@@ -136,7 +136,7 @@ Handle = Callable[[QueuedCommand], "Future[None] | None"]
 """Carries a command out; what it returns is done when the command is, None: it is done already."""
 
 
-class CommandQueue:
+class RunCommands:
     """Commands put by any thread and taken by one.
 
     While no thread takes them, whoever puts one carries it out.

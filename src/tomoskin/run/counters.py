@@ -34,7 +34,7 @@ Timed = Literal["sample", "decode", "reconstruct", "publish"]
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class StageLatency:
     """How long one stage took of late, s: median and 99th percentile; NaN: not known."""
 
     name: str
@@ -146,10 +146,10 @@ class Latency:
         span = float(np.ptp(recent)) if len(recent) else 0.0
         return (len(recent) - 1) / span if span > 0 else 0.0
 
-    def stages(self) -> tuple[Stage, ...]:
+    def stages(self) -> tuple[StageLatency, ...]:
         """All stages, in the order of the flow; of the pages the one that is slowest."""
         slowest = max(
             self._painted.copy().values(), key=lambda p: p[1], default=(float("nan"),) * 2
         )
-        timed = (Stage(name, *ring.percentiles()) for name, ring in self._rings.items())
-        return *timed, Stage("paint", *slowest)
+        timed = (StageLatency(name, *ring.percentiles()) for name, ring in self._rings.items())
+        return *timed, StageLatency("paint", *slowest)

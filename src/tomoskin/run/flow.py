@@ -7,7 +7,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 
 from tomoskin.core import DataError, Event, Frame, ModelError, WireError
-from tomoskin.pipeline import Pipeline, Prepared, Result
+from tomoskin.pipeline import FrameResult, Pipeline, Prepared
 from tomoskin.recording import BoardInfo, Mark, MarkedFrame, RawRead, Truth, advance
 from tomoskin.run.commands import DirectCommand, Note, ReplayCommand
 from tomoskin.run.counters import Latency, Losses
@@ -32,7 +32,7 @@ class Snapshot:
     """A result, the presses on the twin when it was read, its latency in s, and when it was
     ready, host monotonic s."""
 
-    result: Result
+    result: FrameResult
     truth: tuple[Contact, ...]
     latency: float
     ready: float
@@ -87,7 +87,11 @@ class Flow:
         if self.marker.replay:
             self.pipeline.number_after(self.marker.replay.touches_before)
         return Link(
-            transport, self.prepared.scan, self._settings, clock=self._clock, tap=self._put_raw
+            transport,
+            self.prepared.scan,
+            self._settings,
+            clock=self._clock,
+            tap=lambda host_time, data: self.out.put(RawRead(host_time, data)),
         )
 
     def unlink(self) -> None:
@@ -180,9 +184,6 @@ class Flow:
             problem=trouble or self._standstill or (result.problem if result else None),
             board=self.board,
         )
-
-    def _put_raw(self, host_time: float, data: bytes) -> None:
-        self.out.put(RawRead(host_time, data))
 
     def _note_board(self, info: Info | None) -> None:
         if info is not self.board:

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from tomoskin.core import SourceError, TomoskinError
 from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
-from tomoskin.run.commands import CommandQueue, Opener
+from tomoskin.run.commands import Opener, RunCommands
 from tomoskin.run.flow import Flow
 from tomoskin.run.publisher import Audience
 from tomoskin.source import Transport
@@ -41,7 +41,7 @@ class Loop:
     def __init__(self, prepared: Prepared, opener: Opener, audience: Audience) -> None:
         self.flow, self.open = Flow(prepared, audience), opener
         self.trouble: str | None = "not started"
-        self.commands = CommandQueue(self._handle)
+        self.commands = RunCommands(self._handle)
         self._audience = audience
         self._change: tuple[commands.Change, Future[None]] | None = None
         self._stopping = False

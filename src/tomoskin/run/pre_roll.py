@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from tomoskin.core import Frame
-from tomoskin.pipeline import REFERENCE_FRAMES, Result
+from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult
 from tomoskin.recording import Mark
 
 _KEPT = 3 * REFERENCE_FRAMES
@@ -50,7 +50,7 @@ class PreRoll:
         else:
             self._complete = False
 
-    def result(self, result: Result) -> None:
+    def result(self, result: FrameResult) -> None:
         """What was made of that frame."""
         if self._newest is None or not result.ready or not result.pictured:
             return

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from tomoskin.core import Event
-from tomoskin.pipeline import Prepared, Result
+from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.recording import RunMessage
 from tomoskin.run.recordings import Recordings
 from tomoskin.sink import (
@@ -57,14 +57,14 @@ class Subscriber(Consumer):
 
     kind, slow = "subscriber", "does not keep up, and results are left out"
 
-    def __init__(self, name: str, call: Callable[[Result], None]) -> None:
+    def __init__(self, name: str, call: Callable[[FrameResult], None]) -> None:
         self.name, self._call = name, call
 
-    def admit(self, message: Any) -> Result | None:
+    def admit(self, message: Any) -> FrameResult | None:
         """Results only."""
-        return message if isinstance(message, Result) else None
+        return message if isinstance(message, FrameResult) else None
 
-    def take(self, item: Result) -> None:
+    def take(self, item: FrameResult) -> None:
         """Call the function."""
         self._call(item)
 
@@ -104,7 +104,7 @@ class Audience:
                 self._calls.remove(call)
 
     @contextlib.contextmanager
-    def subscribe(self, name: str, call: Callable[[Result], None]) -> Iterator[None]:
+    def subscribe(self, name: str, call: Callable[[FrameResult], None]) -> Iterator[None]:
         """While the block lasts, ``call`` is given each result, in a thread of its own."""
         worker = Worker(Subscriber(name, call), Capacity(MOST_WAITING, "newest", 0.0), self.say)
         worker.start()
@@ -129,7 +129,7 @@ class Audience:
             subscribers = tuple(self._subscribers)
         for worker in subscribers:
             worker.put(message)
-        if isinstance(message, Result):
+        if isinstance(message, FrameResult):
             self.wake()
 
     def wake(self) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
 
-from tomoskin.pipeline import REFERENCE_FRAMES, Prepared, Result
+from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Prepared
 from tomoskin.recording import (
     BoardInfo,
     Mark,
@@ -109,7 +109,7 @@ class Recordings:
                 self._head()
             case MarkedFrame():
                 self._pre_roll.frame(message.frame, message.mark, self._numbered())
-            case Result():
+            case FrameResult():
                 self._pre_roll.result(message)
             case BoardInfo():
                 self._info = message

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager
 
-from tomoskin.pipeline import Prepared, Result
+from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run.commands import Command, DirectCommand, Opener
 from tomoskin.run.counters import Latency
 from tomoskin.run.flow import Snapshot
@@ -117,7 +117,9 @@ class Runner:
         """
         return self._audience.watch(call)
 
-    def subscribe(self, name: str, call: Callable[[Result], None]) -> AbstractContextManager[None]:
+    def subscribe(
+        self, name: str, call: Callable[[FrameResult], None]
+    ) -> AbstractContextManager[None]:
         """While the block lasts, ``call`` is given each result, from a thread of its own.
 
         When it is slow the oldest results are left out.

@@ -9,7 +9,7 @@ from pathlib import Path
 from tomoskin.calibration import BendReading, ClassReading
 from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline import ReferenceState
-from tomoskin.run.counters import Stage
+from tomoskin.run.counters import StageLatency
 from tomoskin.signal import ElectrodeHealth
 from tomoskin.sink import SinkReport
 from tomoskin.wire import Info
@@ -93,7 +93,7 @@ class Status:
     choice: AlphaChoice
     left_out: int
     problem: str | None
-    stages: tuple[Stage, ...] = ()
+    stages: tuple[StageLatency, ...] = ()
     recording: Path | None = None
     sinks: tuple[SinkReport, ...] = ()
     electrodes: tuple[ElectrodeHealth, ...] = ()

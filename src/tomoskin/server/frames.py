@@ -27,7 +27,7 @@ import numpy as np
 
 from tomoskin.calibration import BendReading
 from tomoskin.core import Touch
-from tomoskin.pipeline import Result
+from tomoskin.pipeline import FrameResult
 from tomoskin.run import Runner, Snapshot
 from tomoskin.twin import Contact
 
@@ -89,7 +89,7 @@ class NewestFrame:
             self._runner.latency.add("publish", time.monotonic() - self._made[0].ready)
 
 
-def encode_result(result: Result, truth: Sequence[Contact], latency: float) -> bytes:
+def encode_result(result: FrameResult, truth: Sequence[Contact], latency: float) -> bytes:
     """Message of one result.
 
     Parameters
@@ -116,7 +116,7 @@ def encode_result(result: Result, truth: Sequence[Contact], latency: float) -> b
     )
 
 
-def _header(result: Result, n_touches: int, n_truth: int, latency: float) -> bytes:
+def _header(result: FrameResult, n_touches: int, n_truth: int, latency: float) -> bytes:
     flags = READY * result.ready | NO_PICTURE * (not result.pictured)
     flags |= ROWS_LEFT_OUT * (result.left_out > 0) | BEND * (result.bend is not None)
     values = (

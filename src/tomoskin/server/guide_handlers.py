@@ -9,7 +9,7 @@ from functools import partial
 
 from tomoskin.calibration import TOUCH
 from tomoskin.core import FloatArray, TomoskinError, WireError
-from tomoskin.pipeline import Result
+from tomoskin.pipeline import FrameResult
 from tomoskin.run import commands
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
@@ -77,7 +77,7 @@ class GuideHandlers:
         self._leave()
         self._tell()
 
-    def _look(self, flow: PressFlow, loop: asyncio.AbstractEventLoop, result: Result) -> None:
+    def _look(self, flow: PressFlow, loop: asyncio.AbstractEventLoop, result: FrameResult) -> None:
         """A frame has come; in a thread of its own."""
         before = flow.taker.phase
         dv = flow.taker.push(result.host_time, result.voltages)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tomoskin.core import Event, TomoskinError
-from tomoskin.pipeline import Result
+from tomoskin.pipeline import FrameResult
 from tomoskin.sink.sink import Item, Moment, Sink, Stream
 from tomoskin.sink.worker import Capacity, Consumer, Say, Worker
 
@@ -58,18 +58,18 @@ class SinkConsumer(Consumer):
         self.name = sink.name
         self.trouble = "connecting"
         self._sink, self._stream, self._say = sink, stream, say
-        self._newest: Result | None = None
+        self._newest: FrameResult | None = None
         self._last_image = float("-inf")
         self._delay = _FIRST_DELAY
 
-    def admit(self, message: Any) -> Result | Event | None:
+    def admit(self, message: Any) -> FrameResult | Event | None:
         """Results and events, and nothing else of a run."""
-        if isinstance(message, Result):
+        if isinstance(message, FrameResult):
             self._newest = message
             return message
         return message if isinstance(message, Event) else None
 
-    def durable(self, item: Result | Event) -> bool:
+    def durable(self, item: FrameResult | Event) -> bool:
         """Events are news however late."""
         return isinstance(item, Event)
 
@@ -78,7 +78,7 @@ class SinkConsumer(Consumer):
         self._sink.open(self._stream)
         self.trouble = ""
 
-    def take(self, item: Result | Event) -> None:
+    def take(self, item: FrameResult | Event) -> None:
         """Send it."""
         self._sink.publish(self._item(item))
         self._delay = _FIRST_DELAY
@@ -99,7 +99,7 @@ class SinkConsumer(Consumer):
         self._delay = min(2 * delay, _LONGEST_DELAY)
         return delay
 
-    def _item(self, item: Result | Event) -> Item:
+    def _item(self, item: FrameResult | Event) -> Item:
         if isinstance(item, Event):
             return item
         due = item is self._newest and not 0 <= item.host_time - self._last_image < IMAGE_PERIOD

@@ -8,7 +8,7 @@ from typing import Protocol, Self
 
 from tomoskin.core import Event, FloatArray, GeometryError, Image, PixelMap, Touch
 from tomoskin.pattern import Pattern
-from tomoskin.pipeline import Prepared, Result
+from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.recording import event_of
 from tomoskin.touch import TouchEvent
 
@@ -87,7 +87,7 @@ class Moment:
     told: tuple[Event, ...] = ()
 
     @classmethod
-    def of(cls, result: Result, *, with_image: bool) -> Self:
+    def of(cls, result: FrameResult, *, with_image: bool) -> Self:
         """What sinks take of ``result``."""
         return cls(
             sequence=result.sequence,
