@@ -56,7 +56,7 @@ docs: dev $(VENV)/.docs  ## the documentation, in build/docs; a warning is an er
 	@$(PY) -m sphinx --quiet --fail-on-warning --keep-going docs build/docs
 
 gallery: native  ## run the examples anew into docs/gallery.md; two minutes
-	@$(PY) scripts/gallery.py
+	@$(PY) docs/make_gallery.py
 
 lint: style types page-check engine-check  ## ruff, mypy, the page's types, and the native engine's where Rust is installed
 

@@ -3,7 +3,7 @@
 The built-in skin ``textile-disc-8``, 200 mm across, as the inverse sees it.
 
 Shown: the triangles, smaller towards the eight electrodes, where the field changes fastest.
-Source saw: 661 triangles and 362 nodes.
+Thesis saw: 661 triangles and 362 nodes.
 Checked: as many of either, within 10 %; no triangle is flatter than a quality of 0.5 (equilateral:
 1); the reference voltages on this mesh differ from those on one with 16 times the triangles by less
 than 1 % of the largest.
@@ -22,7 +22,7 @@ from tomoskin.mesh import Mesh, quality, triangulate
 from tomoskin.skin import Skin
 
 TRIANGLES, NODES = 661, 362
-"""The source's mesh."""
+"""The thesis's mesh."""
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:

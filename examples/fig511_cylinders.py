@@ -1,12 +1,12 @@
 """Figure 5.11: the flat skin's reference, then the skin on cylinders of 40 and 70 mm.
 
 One step with NOSER's prior on normalised differences against the flat skin; threshold 70 %, the
-twin of ``textile-disc-8``. The source calls 40 and 70 mm diameters and radii by turns: radii here.
+twin of ``textile-disc-8``. The thesis calls 40 and 70 mm diameters and radii by turns: radii here.
 Its foam kept the skin from lying close to the smaller cylinder, and strips held its sides: here it
 follows 50° of the 40 mm and 70° of the 70 mm and hangs straight beyond, both angles assumed.
 
 Shown: changes against the flat skin on one scale, and a press on the flat skin beside them.
-Source saw: an elongated region along the cylinder instead of an ellipse; its area and its maximum
+Thesis saw: an elongated region along the cylinder instead of an ellipse; its area and its maximum
 grow with the diameter, the maximum slightly.
 Checked: the largest region lies along the axis, at least 1.7 times as long as wide, that of a press
 at most 1.5; area and maximum grow with the radius. Wrapped by the same 60°, the area grows, but the
@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
 
 
 def check(imager: Imager, shown: Sequence[Shown]) -> dict[str, float]:
-    """What the source saw, and what the model says of its cause."""
+    """What the thesis saw, and what the model says of its cause."""
     long = [elongation(imager.mesh, region) for _, _, region in shown]
     turn = [axis_of(imager, region) for _, _, region in shown[:2]]
     assert min(long[:2]) > LONGER, f"{long[0]:.2f} and {long[1]:.2f} times as long as wide"

@@ -1,13 +1,13 @@
 """Figure 5.12: an 18 mm probe on a 70 mm cylinder, a chair's back, and an arm whose joint moves.
 
-References are taken after the skin is attached, as in the source. The cylinder has a radius of
+References are taken after the skin is attached, as in the thesis. The cylinder has a radius of
 70 mm; the chair's back is a saddle of 400 and 600 mm (assumed); the arm's 30 mm are taken for its
 radius, and its joint bends over 60 mm, 5 N: assumed. One step with NOSER's prior on normalised
 differences, threshold 70 %, the twin of ``textile-disc-8``.
 
 Shown: the same press on three bodies, and on the arm with its joint at 37° by three references; in
 the last the joint hides the press.
-Source saw: the touch found on all of them; moving the joint needs a new reference, by its encoder.
+Thesis saw: the touch found on all of them; moving the joint needs a new reference, by its encoder.
 Checked: one touch within 15 mm of the probe on each body, and on the arm with its joint at 37° by
 the reference interpolated between 0, 15, 30 and 45° of the encoder, no farther off than 1.2 times
 as by a reference taken there, or 3 mm more; against the straight arm's reference the moved joint
@@ -97,7 +97,7 @@ def at_the_joint(lab: Lab, imager: Imager) -> tuple[list[Shown], list[float]]:
 
 
 def probe() -> Probe:
-    """The source's."""
+    """The thesis's."""
     return Probe(Circle(RADIUS), *PLACE, FORCE)
 
 

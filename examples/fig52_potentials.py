@@ -5,7 +5,7 @@ mean of 10 frames with their standard deviation.
 
 Shown: one value for each of the eight drives, in their order; the bars are fifty deviations, since
 one cannot be seen.
-Source saw: the extremes where the driving pair is near; a positive peak beside the ground, the
+Thesis saw: the extremes where the driving pair is near; a positive peak beside the ground, the
 negative one where the electrode itself is the ground (sink).
 Checked: the greatest value stands where the next electrode is the ground; where the electrode
 itself is, the value is negative, and one of the two least (an even sheet reads as much where the

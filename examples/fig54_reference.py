@@ -5,7 +5,7 @@ forty rows, the mean of 10 frames.
 
 Shown: forty rows in eight groups, one for each grounded electrode; gaps are pairs that are not
 read.
-Source saw: a frame whose extremes stand where the driving pair is near.
+Thesis saw: a frame whose extremes stand where the driving pair is near.
 Checked: under each drive the two pairs beside the driving one read most, at least twice as much
 as the pair opposite; exchanging drive and measuring pair changes no value by more than 15 % of
 the largest (reciprocity, Geselowitz 1971; each channel has an amplifier of its own, and a gain that

@@ -4,7 +4,7 @@ The probe's edge is 7.5 mm from the electrode (source: 5 to 10 mm); mean of 10 f
 
 Shown: the change of each row; orange are pairs that contain the electrode behind the probe, grey
 groups are drives through it.
-Source saw: the largest negative changes in the pairs that contain that electrode (where it does not
+Thesis saw: the largest negative changes in the pairs that contain that electrode (where it does not
 drive itself).
 Checked: of the rows that the electrode does not drive, the 6 most negative all contain it; every
 pair that contains it falls, and on average the others do not.

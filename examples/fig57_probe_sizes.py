@@ -3,7 +3,7 @@
 The probes' edges are 7.5 mm from the electrode; mean of 10 frames.
 
 Shown: the change of each row for three probes; grey groups are drives through E4.
-Source saw: the change grows with the size of the probe; it stays largest and negative where E4 is
+Thesis saw: the change grows with the size of the probe; it stays largest and negative where E4 is
 in the measured pair.
 Checked: the root of the summed squares of the change grows from size to size, by more than four
 standard deviations of its noise; for each size the most negative row, of those that E4 does not

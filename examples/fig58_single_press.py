@@ -1,13 +1,13 @@
 """Figure 5.8: maps of an 18 mm probe between E3 and E4, between E7 and E8, and at the centre.
 
 One step with NOSER's prior on normalised differences, threshold 70 %, centre and contour drawn.
-The source names no force: 5 N here. The probe's middle is 62 mm from the centre of the disc.
+The thesis names no force: 5 N here. The probe's middle is 62 mm from the centre of the disc.
 
 Shown: above the pictures, below what exceeds 70 % of the extreme; the probe is dashed, the cross is
 the centre that was found.
-Source saw: each press localised; its shape poorer near the rim.
+Thesis saw: each press localised; its shape poorer near the rim.
 Checked: one region each, its centre within 10 mm of the probe's; near the rim the region is longer
-than wide by at least 1.2 times, at the centre by less. The source's four metrics are reported.
+than wide by at least 1.2 times, at the centre by less. The thesis's four metrics are reported.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """Figure 5.9: circles of 15, 18 and 25 mm radius and a square at the centre, one colour scale.
 
-3 N each; one step with NOSER's prior on normalised differences. As in the source, the circles are
+3 N each; one step with NOSER's prior on normalised differences. As in the thesis, the circles are
 named by their radius and the square by its side.
 
 Shown: four pictures on one scale, with the greatest change in each title; probes are dashed.
-Source saw: the size told by the maximum; round and square not told apart.
+Thesis saw: the size told by the maximum; round and square not told apart.
 Checked: the maximum grows from 15 to 18 to 25 mm, each time by more than 3 standard deviations
 of its noise; the picture of the square has the shape of the circles' (correlation over 0.97, and
-RES50 within the circles' range ± 5 %). The source's four metrics are reported.
+RES50 within the circles' range ± 5 %). The thesis's four metrics are reported.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ Each stage is the mean of 40 frames of 64 readings, since 10 bits are coarse for
 
 Shown: the picture, and the pressure under the plate that made it; balls are dashed, crosses are the
 places that were found.
-Source saw: both balls, at their places; less well with a threshold of 75 %.
+Thesis saw: both balls, at their places; less well with a threshold of 75 %.
 Checked: two are found and no third, each within 8 mm of its place. Their depth is not asked for.
 """
 

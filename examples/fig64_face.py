@@ -11,7 +11,7 @@ With direct current, an electrode that has just driven stays polarised, otherwis
 
 Shown: pictures of the six expressions, with the true movement of each electrode and the one that
 was found.
-Source saw: with direct current, only "A" and the smile are told from the rest.
+Thesis saw: with direct current, only "A" and the smile are told from the rest.
 Checked: with complex data at least 5 of 6 are right in 90 % of the runs, and in more than with
 direct current. Of a picture with movement, the electrode that is said to have moved most is one
 of the three that did, for at least 5 of 6 expressions.

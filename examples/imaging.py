@@ -1,4 +1,4 @@
-"""Pictures of the experiments: one step, regions above a threshold, the source's metrics."""
+"""Pictures of the experiments: one step, regions above a threshold, the thesis's metrics."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from tomoskin.skin import Skin
 from tomoskin.touch import Segmenter
 
 NOSER = {"inverse": {"prior": "noser", "difference": "normalised", "alpha": "auto"}}
-"""The source's inverse: NOSER's prior, one step, normalised differences; alpha by the noise."""
+"""The thesis's inverse: NOSER's prior, one step, normalised differences; alpha by the noise."""
 
 
 FRAMES = 40
-"""Frames of a stage where pictures are compared: four times the source's, for half the noise."""
+"""Frames of a stage where pictures are compared: four times the thesis's, for half the noise."""
 
 
 class Imager:
@@ -35,12 +35,12 @@ class Imager:
         return self.prepared.operator(difference(loaded.mean(axis=0), reference, kind))
 
     def regions(self, image: Image, part: float) -> list[Detection]:
-        """Regions above ``part`` of the extreme, as the source finds them (its figure 4.6)."""
+        """Regions above ``part`` of the extreme, as the thesis finds them (its figure 4.6)."""
         settings = replace(self.prepared.skin.touch, gamma1=part)
         return Segmenter(self.mesh, settings)(image)
 
     def metrics(self, image: Image, place: tuple[float, float] | None = None) -> ThesisMetrics:
-        """The source's four metrics (its section 4.4.1), the true place known or not."""
+        """The thesis's four metrics (its section 4.4.1), the true place known or not."""
         return ThesisMetrics.of(image, self.mesh, place)
 
 

@@ -29,7 +29,7 @@ from tomoskin.source import Link, ScanSettings, Transport, open_source
 from tomoskin.twin import Pose, Probe, TwinSettings, TwinTransport, VirtualClock, make_twin
 
 FRAMES = 10
-"""Frames of a stage, as many as the source averaged."""
+"""Frames of a stage, as many as the thesis averaged."""
 
 REST = 1.0
 """Seconds from a change of the load to the first frame of its stage."""
@@ -39,7 +39,7 @@ Changes = dict[str, dict[str, Any]]
 
 
 def source_drive(n: int, *, driven: bool = False) -> Changes:
-    """The source's adjacent drive: current enters at Ek and leaves at the next, the ground.
+    """The thesis's adjacent drive: current enters at Ek and leaves at the next, the ground.
 
     Neighbouring pairs are read; with ``driven``, those that touch a driven electrode too.
     """

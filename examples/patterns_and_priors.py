@@ -1,11 +1,11 @@
-"""The source's four metrics over drive patterns and priors (its section 4.4.1).
+"""The thesis's four metrics over drive patterns and priors (its section 4.4.1).
 
 An 18 mm probe at 5 N at the centre, half-way out and near the rim. One scan reads the rows of all
 patterns; each pattern then takes its own, so that all see the same presses. One step on normalised
 differences; alpha is chosen for each by the same rule from the noise.
 
 Shown: mean of each metric over the three places; patterns across, priors down.
-Source saw: adjacent driving with a NOSER or Gaussian prior places a press to within centimetres
+Thesis saw: adjacent driving with a NOSER or Gaussian prior places a press to within centimetres
 (chapter 8); no table.
 Checked: for every pattern and prior the mean ERR75 is below 20 mm, and for adjacent driving with
 NOSER below 10 mm; RES75 ≥ RES50 and 0 < shape angle ≤ 90° everywhere.

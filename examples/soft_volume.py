@@ -7,7 +7,7 @@ volume, so the block is deformed as a whole and its electrodes move with the wal
 block untouched, that gives the place of the touch.
 
 Shown: level and upright cuts through each picture; dashed is the truth, the cross what was found.
-Source saw: nothing of the kind; it wishes for soft bodies that sense by themselves (chapter 8).
+Thesis saw: nothing of the kind; it wishes for soft bodies that sense by themselves (chapter 8).
 Checked: the ball within 8 mm in space, the touch within 6 mm on the surface.
 """
 

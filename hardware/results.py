@@ -1,4 +1,4 @@
-"""What the decks say of the source's circuit and of ours, and the file that the twin reads it from.
+"""What the decks say of the thesis's circuit and of ours, and the file that the twin reads it from.
 
 ``python hardware/results.py`` writes the file, ``… --check`` fails when it says something else.
 """

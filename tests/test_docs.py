@@ -115,7 +115,7 @@ def test_the_first_steps_give_a_touch(tmp_path: Path) -> None:
 
 def test_the_gallery_says_what_the_examples_say() -> None:
     checked = subprocess.run(
-        [sys.executable, "scripts/gallery.py", "--check"],
+        [sys.executable, "docs/make_gallery.py", "--check"],
         cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert checked.returncode == 0, f"make gallery:\n{checked.stderr}"

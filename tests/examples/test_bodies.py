@@ -24,7 +24,7 @@ def test_the_figure_is_made_and_the_numbers_hold(imported, gallery, name, tmp_pa
     width, height = struct.unpack(">II", data[16:24])
     assert width > 400
     assert height > 250
-    assert all(part in module.__doc__ for part in ("Shown:", "Source saw:", "Checked:"))
+    assert all(part in module.__doc__ for part in ("Shown:", "Thesis saw:", "Checked:"))
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ def test_the_figure_is_made_and_the_numbers_hold(ran, gallery, name):
     width, height = struct.unpack(">II", data[16:24])
     assert width > 400
     assert height > 250
-    assert all(part in run.module.__doc__ for part in ("Shown:", "Source saw:", "Checked:"))
+    assert all(part in run.module.__doc__ for part in ("Shown:", "Thesis saw:", "Checked:"))
 
 
 @pytest.mark.slow

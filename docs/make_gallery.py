@@ -1,6 +1,6 @@
 """The gallery of the documentation, made by running the examples that have a figure.
 
-``python scripts/gallery.py`` runs them, writes their figures and numbers into
+``python docs/make_gallery.py`` runs them, writes their figures and numbers into
 docs/images/gallery and the page of them, docs/gallery.md; ``… --check`` says what is stale there.
 Below its mark the page holds what stands at the head of each example, its figure and its numbers.
 """
@@ -61,7 +61,7 @@ def page(numbers: Numbers) -> str:
 def _entry(name: str, text: str, numbers: Mapping[str, float]) -> str:
     """One example: what stands at its head, its figure and its numbers."""
     title, _, rest = text.replace("``", "`").partition("\n")
-    body, shown, saw, checked = re.split(r"^(?:Shown|Source saw|Checked): ", rest, flags=re.M)
+    body, shown, saw, checked = re.split(r"^(?:Shown|Thesis saw|Checked): ", rest, flags=re.M)
     rows = [f"| {key} | {value:.3g} |" for key, value in numbers.items()]
     table = "\n".join(["| number | value |", "|---|---:|", *rows])
     heading = title.strip().rstrip(".")
@@ -74,7 +74,7 @@ def _entry(name: str, text: str, numbers: Mapping[str, float]) -> str:
 
 {body.strip()}
 
-**The source saw** {_joined(saw)}
+**The thesis saw** {_joined(saw)}
 
 **Checked:** {_joined(checked)}
 
