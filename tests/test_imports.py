@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tomoskin._moved import RENAMED
+
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = [
     *("core", "mesh", "pattern", "skin", "forward", "inverse", "wire", "source", "signal"),
@@ -175,6 +177,14 @@ def test_rooms_import_only_from_rooms_above() -> None:
 
 def test_no_import_cycle() -> None:
     assert cycle(library()) == []
+
+
+def test_no_module_takes_a_name_that_was_renamed() -> None:
+    """The type checker does not see it: a room's ``__getattr__`` answers for every name."""
+    for module, source in library().items():
+        for found in imports_of(module, {module: source}):
+            room = found.module.removeprefix("tomoskin.")
+            assert found.name not in RENAMED.get(room, {}), f"{module}, line {found.line}"
 
 
 def test_every_module_stands_in_a_room() -> None:

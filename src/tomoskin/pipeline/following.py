@@ -24,7 +24,7 @@ from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.records import FrameResult, Measured
 from tomoskin.pipeline.tune import tune
 from tomoskin.signal import Reference
-from tomoskin.touch import WHOLE, Pace, Tracker
+from tomoskin.touch import EXHAUSTIVE, Pace, Tracker
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,7 @@ class Setting:
     """How frames are followed, whatever the skin: ``pace`` of the fit, and ``scan``, what samples
     are, where frames bring them."""
 
-    pace: Pace = WHOLE
+    pace: Pace = EXHAUSTIVE
     scan: Scan | None = None
 
 
