@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar
 
 
 class Terminal(io.StringIO):
@@ -35,8 +35,8 @@ class AtOnce(Never):
 def clock(monkeypatch: pytest.MonkeyPatch):
     """Set the time that the bar goes by."""
     now = [100.0]
-    monkeypatch.setattr("tomoskin.cli.progress.time.monotonic", lambda: now[0])
-    monkeypatch.setattr("tomoskin.cli.progress.threading.Timer", Never)
+    monkeypatch.setattr("tomoskin.cli.output.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("tomoskin.cli.output.threading.Timer", Never)
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
     return now
@@ -61,7 +61,7 @@ def test_a_terminal_sees_a_bar_after_two_seconds(clock, monkeypatch, seconds, sh
 
 @pytest.mark.usefixtures("clock")
 def test_a_job_that_cannot_say_how_far_it_is_is_seen_to_go_on(monkeypatch):
-    monkeypatch.setattr("tomoskin.cli.progress.threading.Timer", AtOnce)
+    monkeypatch.setattr("tomoskin.cli.output.threading.Timer", AtOnce)
     monkeypatch.setattr("sys.stderr", terminal := Terminal())
     with Bar("preparing"):
         pass

@@ -10,7 +10,7 @@ import pytest
 
 import tomoskin.cli.simulate as tomoskin_simulate
 from doc_tables import examples
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar
 from tomoskin.formats import read_recording
 from tomoskin.recording import SessionReader
 from tomoskin.skin import Skin

@@ -184,7 +184,7 @@ OWN_WAYS = {
     "core/written.py": "the way",
     "recording/message_log.py": "a session, while it happens, into a file that must be new",
     "emulator/program.py": "a lock beside what make builds",
-    "emulator/memory.py": "in a temporary folder of its own",
+    "emulator/process.py": "in a temporary folder of its own",
 }
 OPENERS = {"write_text", "write_bytes", "savefig", "savemat", "ParquetWriter", "mkstemp", "File"}
 

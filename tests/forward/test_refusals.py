@@ -10,7 +10,7 @@ import pytest
 from shapes import disc
 from tomoskin.core import ModelError
 from tomoskin.forward import ForwardModel
-from tomoskin.forward.accuracy import solve_checked
+from tomoskin.forward.solution import solve_checked
 from tomoskin.pattern import Pattern
 
 MESH = disc()

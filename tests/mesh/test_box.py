@@ -13,7 +13,7 @@ from shapes import box as brick_box
 from tomoskin.core import GeometryError
 from tomoskin.forward import ForwardModel
 from tomoskin.mesh import BoxPatch, Mesh, box, simplex_measure
-from tomoskin.mesh.layers import grid_lines
+from tomoskin.mesh.extrude import grid_lines
 from tomoskin.pattern import Pattern
 
 SIZE = (0.3, 0.04, 0.03)

@@ -14,7 +14,7 @@ from scipy.stats import ortho_group, special_ortho_group
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.mesh import simplex_measure
-from tomoskin.mesh.topology import boundary_facets, facets, neighbour_pairs
+from tomoskin.mesh.triangles import boundary_facets, facets, neighbour_pairs
 
 dimensions = st.sampled_from([2, 3])
 seeds = st.integers(0, 10_000)

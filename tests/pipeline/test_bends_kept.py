@@ -26,7 +26,7 @@ from tomoskin.core import Frame
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.recording import Mark, SessionReader, as_recorded, replayed, session_info
-from tomoskin.run.pre_roll import PreRoll
+from tomoskin.run.recordings import PreRoll
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from tomoskin.core import DataError
-from tomoskin.server.access_policy import (
+from tomoskin.server.access import (
     AccessPolicy,
     answer_headers,
     is_loopback,

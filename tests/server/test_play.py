@@ -163,7 +163,7 @@ def test_a_note_is_told_and_recorded_at_the_picture_that_was_shown(prepared, idl
 
 
 def test_a_jump_begins_with_the_frames_of_its_reference(run):
-    from tomoskin.recording.references import References
+    from tomoskin.recording.info import References
 
     found = References(run, {"reference_frames": 2})
     all_frames = frames(run)

@@ -13,7 +13,7 @@ from tomoskin.core import GeometryError, WireError
 from tomoskin.mesh import Arm, Cap, Hinge
 from tomoskin.recording import SessionReader
 from tomoskin.run import Runner, commands
-from tomoskin.run.posing import sheet_pose, way_to_bend
+from tomoskin.run.twin_control import sheet_pose, way_to_bend
 from tomoskin.run.twin_requests import BendRequest, SetPose, StretchRequest
 from tomoskin.server import Hub
 from tomoskin.server.requests import decode_request

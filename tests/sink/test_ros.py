@@ -19,8 +19,7 @@ from recording.runs import TOUCH
 from sink.conftest import EPOCH, EVENT, VALUES, moment_at, touch_of
 from tomoskin.core import Event, SinkError
 from tomoskin.sink import make_sink
-from tomoskin.sink.ros import IMAGE, POSE, TEXT, RosView
-from tomoskin.sink.ros_types import TYPES, encode_cdr, type_hash
+from tomoskin.sink.ros import IMAGE, POSE, TEXT, TYPES, RosView, encode_cdr, type_hash
 
 
 @pytest.mark.parametrize(

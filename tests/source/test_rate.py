@@ -6,7 +6,7 @@ import pytest
 
 from source.boards import HELLO, ManualClock, ScriptedBoard, events, frame_of, frames, linked
 from tomoskin.source import Link
-from tomoskin.source.rate import RATES, LineQuality
+from tomoskin.source.agreement import RATES, LineQuality
 from tomoskin.wire import Counters, SetBaud, encode
 
 

@@ -3,7 +3,6 @@
 from typing import Any
 
 from tomoskin._moved import moved
-from tomoskin.calibration.applied import Applied, Conditions, FrameView, TouchFit
 from tomoskin.calibration.bending.examples import BendExamples
 from tomoskin.calibration.bending.joint import JointReference
 from tomoskin.calibration.bending.model import BendModel
@@ -14,7 +13,7 @@ from tomoskin.calibration.channel_mapping.wiring import Wiring, ring_of
 from tomoskin.calibration.classes import CLASSES, ClassReading, FrameClassifier
 from tomoskin.calibration.classifier.classifier import Answers, Classifier
 from tomoskin.calibration.classifier.examples import Codes, Examples, against_rest
-from tomoskin.calibration.kind import Calibration, Kind
+from tomoskin.calibration.kind import Applied, Calibration, Conditions, FrameView, Kind, TouchFit
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
 from tomoskin.calibration.locator.watch import Watch

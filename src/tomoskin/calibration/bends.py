@@ -7,11 +7,19 @@ Keys of the .npz: ``kind``, ``version``; ``dv`` (n, n_meas) V, ``angle_rad``, ``
 
 from __future__ import annotations
 
-from tomoskin.calibration.applied import Applied, Conditions, FrameView, TouchFit
 from tomoskin.calibration.bending.examples import BendExamples
 from tomoskin.calibration.bending.model import BendModel
 from tomoskin.calibration.bending.reader import BendReader, BendReading
-from tomoskin.calibration.kind import Calibration, Kind, Progress, located
+from tomoskin.calibration.kind import (
+    Applied,
+    Calibration,
+    Conditions,
+    FrameView,
+    Kind,
+    Progress,
+    TouchFit,
+    located,
+)
 from tomoskin.core import Arrays, DataError, Detection, FloatArray, IntArray, real_numbers
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin

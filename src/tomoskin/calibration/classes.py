@@ -13,10 +13,17 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.calibration.applied import Applied, Conditions, FrameView
 from tomoskin.calibration.classifier.classifier import Classifier
 from tomoskin.calibration.classifier.examples import Codes, Examples
-from tomoskin.calibration.kind import Calibration, Kind, Progress, located
+from tomoskin.calibration.kind import (
+    Applied,
+    Calibration,
+    Conditions,
+    FrameView,
+    Kind,
+    Progress,
+    located,
+)
 from tomoskin.core import (
     Arrays,
     DataError,

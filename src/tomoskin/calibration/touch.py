@@ -12,8 +12,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from tomoskin.calibration.applied import Applied, Conditions, FrameView, without_information
-from tomoskin.calibration.kind import Calibration, Kind, Progress, located
+from tomoskin.calibration.kind import (
+    Applied,
+    Calibration,
+    Conditions,
+    FrameView,
+    Kind,
+    Progress,
+    located,
+    without_information,
+)
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
 from tomoskin.core import Arrays, DataError, Detection, IntArray, real_numbers

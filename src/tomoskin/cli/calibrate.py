@@ -14,8 +14,7 @@ from tomoskin.cli.calibrate_states import calibrate_states
 from tomoskin.cli.calibrate_wiring import calibrate_wiring
 from tomoskin.cli.named_files import ForceFlag, Reads
 from tomoskin.cli.options import CalibrationOut, KnownSkinOption, LabelledArgument, ReferenceOption
-from tomoskin.cli.output import JsonFlag, emit
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar, JsonFlag, emit
 from tomoskin.cli.recording import changes, labelled_frames, labels, say_notes
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ import typer
 
 from tomoskin.cli.named_files import ForceFlag, Reads
 from tomoskin.cli.options import CalibrationOut, ReferenceOption
-from tomoskin.cli.output import JsonFlag, emit
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar, JsonFlag, emit
 from tomoskin.cli.recording import idle_frames, say_notes
 from tomoskin.core import DataError
 

@@ -10,8 +10,7 @@ import typer
 from tomoskin.cli.choices import skin_for_file
 from tomoskin.cli.named_files import SKIN, ForceFlag, Writes
 from tomoskin.cli.options import LabelledArgument, ReferenceOption, SkinOption
-from tomoskin.cli.output import JsonFlag, emit
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar, JsonFlag, emit
 from tomoskin.cli.recording import changes, idle_frames, labelled_frames, labels, say_notes
 from tomoskin.core import DataError
 

@@ -10,8 +10,7 @@ import typer
 from tomoskin.cli.choices import quantity
 from tomoskin.cli.named_files import FIGURE, ForceFlag, Writes
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
-from tomoskin.cli.output import JsonFlag, tables, tell
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar, JsonFlag, tables, tell
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:

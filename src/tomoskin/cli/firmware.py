@@ -11,7 +11,7 @@ import typer
 
 from tomoskin.cli.app import group
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar
 
 app = group("firmware")
 

@@ -33,8 +33,7 @@ from tomoskin.cli.options import (
     TimeConstantOption,
     TouchesOut,
 )
-from tomoskin.cli.output import JsonFlag, remark, tell
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.cli.recording import frame_range, idle_frames, say_notes
 from tomoskin.core import DataError
 

@@ -13,8 +13,7 @@ import typer
 from tomoskin.cli.choices import chosen_sinks, skin_for_source, with_bends, with_states
 from tomoskin.cli.named_files import RECORDING, Otherwise, Reads, Writes
 from tomoskin.cli.options import BendOption, SinkOption, SkinOption, SourceOption, StatesOption
-from tomoskin.cli.output import JsonFlag, emit, remark
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.record import ended_by_signals, recording_to
 
 if TYPE_CHECKING:

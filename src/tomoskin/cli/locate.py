@@ -10,8 +10,7 @@ import typer
 
 from tomoskin.cli.named_files import ForceFlag, Reads
 from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption, TouchesOut
-from tomoskin.cli.output import JsonFlag, emit
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar, JsonFlag, emit
 from tomoskin.cli.recording import changes, say_notes
 
 if TYPE_CHECKING:

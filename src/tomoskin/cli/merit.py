@@ -9,8 +9,7 @@ import typer
 
 from tomoskin.cli.named_files import FIGURE, TABLE, ForceFlag, Writes
 from tomoskin.cli.options import SkinArgument
-from tomoskin.cli.output import JsonFlag, tell
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar, JsonFlag, tell
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -14,8 +14,7 @@ import typer
 from tomoskin.cli.choices import chosen_sinks, skin_for_source
 from tomoskin.cli.named_files import RECORDING, Writes
 from tomoskin.cli.options import SinkOption, SkinOption, SourceOption
-from tomoskin.cli.output import JsonFlag, tell
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar, JsonFlag, tell
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:

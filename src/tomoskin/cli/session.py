@@ -11,8 +11,7 @@ import typer
 
 from tomoskin.cli.app import group
 from tomoskin.cli.named_files import RECORDING, TABLE, ForceFlag, Given, Reads, Writes
-from tomoskin.cli.output import JsonFlag, remark, tell
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.cli.recording import say_notes
 
 if TYPE_CHECKING:

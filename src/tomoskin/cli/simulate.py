@@ -10,8 +10,7 @@ import typer
 
 from tomoskin.cli.named_files import RECORDING, ForceFlag, Given, Reads, Writes
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
-from tomoskin.cli.output import JsonFlag, remark, tell
-from tomoskin.cli.progress import Bar
+from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 
 if TYPE_CHECKING:
     from tomoskin.core import Output

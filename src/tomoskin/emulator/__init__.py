@@ -1,10 +1,8 @@
 """The board's real firmware on a simulated processor, before the twin's sheet."""
 
-from tomoskin.emulator.memory import Front, SkinMemory
-from tomoskin.emulator.process import BoardProcess
+from tomoskin.emulator.process import BoardProcess, Front, SkinMemory
 from tomoskin.emulator.program import Programs, build_elf, build_programs
-from tomoskin.emulator.source import emulate_board
-from tomoskin.emulator.transport import EmulatorTransport
+from tomoskin.emulator.transport import EmulatorTransport, emulate_board
 
 __all__ = [
     "BoardProcess",

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.forward import derivatives
-from tomoskin.forward.accuracy import checked_voltages, error_of_drives, solve_checked
 from tomoskin.forward.conductivity import checked_conductivity
 from tomoskin.forward.engine import Compressed, Factor
-from tomoskin.forward.solution import Solution
+from tomoskin.forward.solution import Solution, checked_voltages, error_of_drives, solve_checked
 from tomoskin.forward.system import System
 from tomoskin.forward.update import LocalUpdate
 

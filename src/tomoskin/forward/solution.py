@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,7 +10,118 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.forward.engine import Compressed, Engine, Factor, singular
 from tomoskin.forward.system import System
+
+MOST_RESIDUAL = 1e-6
+"""A relative residual above this means that the matrix was singular to working precision."""
+
+_FLOOR = 1e-12
+"""Voltages that are zero by symmetry are right to this part of √(R_drive · R_measure)."""
+
+
+def solve_checked(
+    engine: Engine, matrix: Compressed, factor: Factor, rhs: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any], float]:
+    """Solution X (n_unknowns, n_rhs), what the residual costs Xᵀ (B − A X), and its largest entry.
+
+    Raises
+    ------
+    ModelError
+        When the residual shows that the matrix is singular to working precision.
+    """
+    solution = factor.solve(rhs)
+    lost, largest = engine.residual(matrix, rhs, solution)
+    if not largest < MOST_RESIDUAL * rhs.real.max():
+        raise singular()
+    return solution, lost, largest
+
+
+def checked_voltages(
+    model: System,
+    grounded: NDArray[Any],
+    lost: NDArray[Any],
+    sharper: Callable[[], NDArray[Any]] | None = None,
+) -> NDArray[Any]:
+    """(…, n_meas) V, of which the residual leaves six digits of the largest of each drive.
+
+    Parameters
+    ----------
+    grounded
+        (…, k, k) Ω transfer resistance against the ground electrode.
+    lost
+        (…, k, k) Ω, fields of 1 A into each electrode times their residuals, Σ over nodes: how
+        far ``grounded`` may be off.
+    sharper
+        A dearer estimate of the voltages' errors (n_meas,) V, asked for where that is too large.
+
+    Raises
+    ------
+    ModelError
+        When more than that is lost.
+    """
+    resistance = padded(grounded)
+    voltages = model.voltages(resistance)
+    order, starts = model.by_drive
+    largest = np.maximum.reduceat(np.abs(voltages[..., order]), starts, axis=-1)
+    least = MOST_RESIDUAL * largest.min(axis=-1)
+    most = 4.0 * model.most_current * np.abs(lost).max(axis=(-2, -1), initial=0.0)
+    if not (most <= least).all():
+        for index in np.argwhere(~(most <= least)):
+            at = tuple(index)
+            _confirm(model, resistance[at], voltages[at], lost[at], sharper)
+    return voltages
+
+
+def _confirm(
+    model: System,
+    resistance: NDArray[Any],
+    voltages: NDArray[Any],
+    lost: NDArray[Any],
+    sharper: Callable[[], NDArray[Any]] | None,
+) -> None:
+    """Refuse voltages (n_meas,) that the residual may have spoilt, one by one."""
+    pattern = model.pattern
+    largest = np.zeros(pattern.n_drive)
+    np.maximum.at(largest, pattern.drive_index, np.abs(voltages))
+    inner = _inner(model, resistance, pattern.drive) * _inner(model, resistance, pattern.measure)
+    floor = _FLOOR * np.abs(model.current[pattern.drive_index]) * np.sqrt(inner)
+    allowed = np.maximum(MOST_RESIDUAL * largest[pattern.drive_index], floor)
+    if (np.abs(model.voltages(padded(lost))) <= allowed).all():
+        return
+    if sharper is None or not (np.abs(sharper()) <= allowed).all():
+        raise singular()
+
+
+def _inner(model: System, resistance: NDArray[Any], pairs: IntArray) -> FloatArray:
+    """(n_pairs,) Ω between the electrodes of each pair, without what the contacts have at least."""
+    (a, b), r = pairs.T, resistance
+    sizes = np.array([size.sum() for size in model.assembly.element.facet_sizes])
+    contact = np.abs(model.contact_impedance) / sizes
+    between = np.abs(r[a, a] - r[a, b] - r[b, a] + r[b, b])
+    return np.asarray(np.maximum(between - contact[a] - contact[b], 0.0))
+
+
+def error_of_drives(model: System, matrix: Any, basis: NDArray[Any]) -> NDArray[Any]:
+    """(n_meas,) V that the residual of each drive's own field may cost.
+
+    Sharper, and dearer, where all fields of the basis share the large potential of a bad ground
+    electrode: that of a drive between others has none of it, and loses no digits to it.
+    """
+    pattern, n_points = model.pattern, model.assembly.n_points
+    fields = np.zeros((len(basis), basis.shape[1] + 1), basis.dtype)
+    fields[:, :-1] = basis
+    error = np.empty(pattern.n_meas, basis.dtype)
+    for drive, (source, sink) in enumerate(pattern.drives):
+        residual = -(matrix @ (fields[:, source] - fields[:, sink]))
+        for electrode, current in ((source, 1.0), (sink, -1.0)):
+            if electrode < basis.shape[1]:
+                residual[n_points + electrode] += current
+        rows = np.flatnonzero(pattern.drive_index == drive)
+        plus, minus = pattern.measure[rows].T
+        error[rows] = (fields[:, plus] - fields[:, minus]).T @ residual * model.current[drive]
+    return error
 
 
 @dataclass(frozen=True, eq=False)

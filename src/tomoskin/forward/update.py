@@ -24,9 +24,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import IntArray, ModelError
-from tomoskin.forward.accuracy import checked_voltages
 from tomoskin.forward.engine import BaseState, Patches, singular
-from tomoskin.forward.solution import Solution, centred
+from tomoskin.forward.solution import Solution, centred, checked_voltages
 from tomoskin.forward.touches import Touch, Touches
 
 Solve = Callable[[NDArray[Any]], NDArray[Any]]

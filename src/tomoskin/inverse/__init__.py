@@ -14,12 +14,10 @@ from tomoskin.inverse.frequency_difference import (
 )
 from tomoskin.inverse.greit.merit import Merit, figures, noise_figure
 from tomoskin.inverse.greit.targets import Targets, along
-from tomoskin.inverse.greit.trained import Greit
-from tomoskin.inverse.greit.trainer import Desired
+from tomoskin.inverse.greit.trainer import Desired, Greit
 from tomoskin.inverse.iterative.absolute import Absolute, AbsoluteImaging, homogeneous
-from tomoskin.inverse.iterative.field import RandomField
 from tomoskin.inverse.iterative.observation import Observation
-from tomoskin.inverse.iterative.shapes import Segmented, ShapeImaging
+from tomoskin.inverse.iterative.shapes import RandomField, Segmented, ShapeImaging
 from tomoskin.inverse.iterative.sharp_difference import SharpDifference, SharpImage
 from tomoskin.inverse.linear.images import MOST_EXCLUDED, ImageSeries, image_series
 from tomoskin.inverse.linear.modes import Modes
@@ -28,8 +26,17 @@ from tomoskin.inverse.linear.operator import Operator
 from tomoskin.inverse.linear.problem import LinearProblem, noise_weights
 from tomoskin.inverse.linear.spectrum import Assembly, Spectrum
 from tomoskin.inverse.linear.temporal import Smoothed, Smoother, Steady, Temporal
-from tomoskin.inverse.priors.named import PRIORS, Identity, Noser, Prior, named_prior, prior_matrix
-from tomoskin.inverse.priors.sharp import SharpPrior, Sparse, TotalVariation
+from tomoskin.inverse.priors.named import (
+    PRIORS,
+    Identity,
+    Noser,
+    Prior,
+    SharpPrior,
+    Sparse,
+    TotalVariation,
+    named_prior,
+    prior_matrix,
+)
 from tomoskin.inverse.priors.smooth import GaussianHighPass, Laplace, Matern, Structural
 from tomoskin.inverse.resolution import (
     Picard,

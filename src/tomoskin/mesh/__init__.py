@@ -1,6 +1,6 @@
 """Outlines, electrodes and the triangles or tetrahedra between them."""
 
-from tomoskin.mesh.arcs import ElectrodeArc, check_arcs
+from tomoskin.mesh.boundary import ElectrodeArc, check_arcs
 from tomoskin.mesh.box import BoxPatch, box
 from tomoskin.mesh.choose import Places
 from tomoskin.mesh.domed import Cap, Saddle
@@ -11,7 +11,7 @@ from tomoskin.mesh.outline import Disc, Ellipse, Outline
 from tomoskin.mesh.patch import FacePatch, Patch, WallPatch, ring
 from tomoskin.mesh.polygon import Polygon, Rectangle
 from tomoskin.mesh.surface import Plane, Surface, laid_on
-from tomoskin.mesh.topology import simplex_measure
+from tomoskin.mesh.triangles import simplex_measure
 from tomoskin.mesh.triangulate import Quality, quality, triangulate
 from tomoskin.mesh.wrapped import Arm, Cylinder, Hinge
 

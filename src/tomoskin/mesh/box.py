@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.mesh.extrude import Body
-from tomoskin.mesh.layers import grid_lines
+from tomoskin.mesh.extrude import Body, grid_lines
 from tomoskin.mesh.mesh import Mesh
 from tomoskin.mesh.outline import check_size
-from tomoskin.mesh.topology import boundary_facets
+from tomoskin.mesh.triangles import boundary_facets
 
 Side = Literal["-x", "+x", "-y", "+y", "-z", "+z"]
 """A side of a box: the end of an axis."""

@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.mesh.topology import facets, paired_facets, simplex_measure
+from tomoskin.mesh.triangles import facets, paired_facets, simplex_measure
 
 _FLAT = 1e-12
 """A cell is degenerate below this fraction of (its longest edge)^dimension."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.mesh.topology import boundary_facets
+from tomoskin.mesh.triangles import boundary_facets
 
 _NUMBERED = re.compile(r"(?:e|el|elec|electrode)[\s_-]*(\d+)", re.IGNORECASE)
 

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from scipy.sparse.linalg import splu
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.mesh.topology import paired_facets
+from tomoskin.mesh.triangles import paired_facets
 
 _ROUNDS = 100
 _SETTLED = 1e-6

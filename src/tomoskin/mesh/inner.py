@@ -13,7 +13,7 @@ from tomoskin.core import FloatArray, IntArray
 from tomoskin.mesh.boundary import Boundary, keeps_clear, rim_distance
 from tomoskin.mesh.polygon import inside
 from tomoskin.mesh.sizing import SizeField
-from tomoskin.mesh.topology import simplex_measure
+from tomoskin.mesh.triangles import simplex_measure
 
 _RIM = 0.6
 """Inner points keep this many wanted edge lengths away from the rim."""

@@ -24,7 +24,7 @@ from tomoskin.mesh.files import (
     renumbered,
 )
 from tomoskin.mesh.pixels import pixel_map, step_for
-from tomoskin.mesh.topology import boundary_facets, neighbour_pairs, owners, simplex_measure
+from tomoskin.mesh.triangles import boundary_facets, neighbour_pairs, owners, simplex_measure
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, GeometryError
-from tomoskin.mesh.arcs import MIN_GAP, ElectrodeArc, check_arcs
+from tomoskin.mesh.boundary import MIN_GAP, ElectrodeArc, check_arcs
 from tomoskin.mesh.outline import Outline
 
 _SAME = 1e-7

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.mesh.arcs import ElectrodeArc, check_arcs
-from tomoskin.mesh.boundary import Boundary, discretise
+from tomoskin.mesh.boundary import Boundary, ElectrodeArc, check_arcs, discretise
 from tomoskin.mesh.inner import inner_points, smoothed, triangles
 from tomoskin.mesh.mesh import Mesh
 from tomoskin.mesh.outline import Outline

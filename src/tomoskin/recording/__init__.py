@@ -9,27 +9,29 @@ from tomoskin.recording.blocks import (
     recording_of,
 )
 from tomoskin.recording.channels import schema_of
-from tomoskin.recording.documents import (
+from tomoskin.recording.foxglove import grid_message, log_message, scene_message
+from tomoskin.recording.info import SessionInfo, session_info
+from tomoskin.recording.layout import (
+    Mark,
+    MarkedFrame,
     RecordedTouches,
     Truth,
     encode_json,
     touch_row,
     touches_message,
 )
-from tomoskin.recording.foxglove import grid_message, log_message, scene_message
-from tomoskin.recording.info import SessionInfo, session_info
-from tomoskin.recording.layout import Mark, MarkedFrame
-from tomoskin.recording.recorder import Recorder
-from tomoskin.recording.repair import Lost, Repaired, repair
-from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
-from tomoskin.recording.replayed import advance, as_recorded, replayed
-from tomoskin.recording.run_messages import (
+from tomoskin.recording.playback import Span, Timeline, read_timeline
+from tomoskin.recording.recorder import (
     BoardInfo,
     RawRead,
+    Recorder,
     RunMessage,
     RunSettings,
     event_of,
 )
+from tomoskin.recording.repair import Lost, Repaired, repair
+from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
+from tomoskin.recording.replayed import advance, as_recorded, replayed
 from tomoskin.recording.session_reader import (
     SessionReader,
     end_time,
@@ -39,7 +41,6 @@ from tomoskin.recording.session_reader import (
     touches_before,
 )
 from tomoskin.recording.session_writer import SessionWriter
-from tomoskin.recording.timeline import Span, Timeline, read_timeline
 
 __all__ = [
     "Advance",

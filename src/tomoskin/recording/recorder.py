@@ -3,23 +3,53 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from tomoskin.core import DataError, Event, Image, PixelMap, Touch
 from tomoskin.pipeline import FrameResult
 from tomoskin.recording.clock import ClockFitter
-from tomoskin.recording.documents import Truth
-from tomoskin.recording.layout import Mark, MarkedFrame
-from tomoskin.recording.run_messages import (
-    BoardInfo,
-    RawRead,
-    RunMessage,
-    RunSettings,
-    event_of,
-)
+from tomoskin.recording.layout import Mark, MarkedFrame, Truth
 from tomoskin.recording.session_writer import SessionWriter
+from tomoskin.touch import TouchEvent
+from tomoskin.wire import Info
+
+
+@dataclass(frozen=True, slots=True)
+class RawRead:
+    """Bytes as one read of the source returned them."""
+
+    host_time: float
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class BoardInfo:
+    """What the board says that it is."""
+
+    host_time: float
+    info: Info
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """How the run is set: plain values by name."""
+
+    host_time: float
+    values: Mapping[str, Any]
+
+
+RunMessage = RawRead | MarkedFrame | FrameResult | Event | Truth | BoardInfo | RunSettings
+"""All that a run says, in the order of what happens: the bytes of a read, each frame of it with
+what becomes of it, then its result. A person's remark is an event of the kind "note"."""
+
+
+def event_of(happened: TouchEvent) -> Event:
+    """What happened to a touch as an event: "touch-onset", "touch-move", "touch-release", …"""
+    return Event(happened.host_time, f"touch-{happened.kind}", happened.text)
+
 
 IMAGE_PERIOD = 0.2
 """Seconds between two images in the file, by host time."""

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 from tomoskin.core import SourceError
 from tomoskin.pattern import Scan
+from tomoskin.recording.info import References
 from tomoskin.recording.layout import Mark, MarkedFrame
 from tomoskin.recording.playback import Item, Playhead
-from tomoskin.recording.references import References
 from tomoskin.recording.replay_board import ReplayBoard
 from tomoskin.recording.session_reader import SessionReader, end_time, touches_before
 from tomoskin.source import Configuration, ScanSettings

@@ -14,14 +14,16 @@ import msgspec
 from tomoskin.core import DataError, Event, SkinError
 from tomoskin.recording import channels
 from tomoskin.recording.container_reader import ContainerReader
-from tomoskin.recording.documents import (
+from tomoskin.recording.layout import (
+    MarkedFrame,
     RecordedTouches,
     Truth,
+    decode_frame,
+    decode_raw,
     event_of,
     touches_of,
     truth_of,
 )
-from tomoskin.recording.layout import MarkedFrame, decode_frame, decode_raw
 from tomoskin.recording.mcap_records import LoggedMessage
 from tomoskin.recording.session_writer import ABOUT, FORMAT, SKIN_FILE
 from tomoskin.skin import Skin

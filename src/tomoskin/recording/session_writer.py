@@ -9,9 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from tomoskin.core import Event, Frame, Image, PixelMap, Touch
 from tomoskin.recording import channels
-from tomoskin.recording.documents import encode_json, plain, touches_message
 from tomoskin.recording.foxglove import grid_message, log_message, scene_message
-from tomoskin.recording.layout import Mark, encode_frame, encode_raw
+from tomoskin.recording.layout import (
+    Mark,
+    encode_frame,
+    encode_json,
+    encode_raw,
+    plain,
+    touches_message,
+)
 from tomoskin.recording.message_log import MessageLog
 
 if TYPE_CHECKING:

@@ -12,10 +12,10 @@ from tomoskin.run.labelled_frames import (
     processors,
 )
 from tomoskin.run.marker import ReplaySource
-from tomoskin.run.posing import way_to_bend
 from tomoskin.run.runner import Runner
 from tomoskin.run.simulate import Simulated, simulate
 from tomoskin.run.status import Status
+from tomoskin.run.twin_control import way_to_bend
 from tomoskin.run.twin_requests import MAX_FORCE, SetPose, SetPresses, SetTwin, StrictRequest
 
 __all__ = [

@@ -1,6 +1,6 @@
 """The page's server: what a page may ask, and what it is sent."""
 
-from tomoskin.server.access_policy import AccessPolicy, is_loopback, load_token
+from tomoskin.server.access import AccessPolicy, is_loopback, load_token
 from tomoskin.server.handlers import serve_requests
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_messages import readings, stages

@@ -1,12 +1,190 @@
-"""The access policy in front of the application: every request passes here first."""
+"""Who may use the server: the policy, and what applies it."""
 
 from __future__ import annotations
+
+import ipaddress
+import os
+import re
+import secrets
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from http.cookies import CookieError, SimpleCookie
+from pathlib import Path
+from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from tomoskin.server.access_policy import AccessPolicy, answer_headers
+from tomoskin.core import DataError
+
+LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
+"""Names under which the server is always reached from this machine."""
+
+_WILDCARDS = frozenset({"", "0.0.0.0", "::"})
+_HTTP_PORT = 80
+_TOKEN = re.compile(r"[A-Za-z0-9_-]{32,128}")
+
+
+@dataclass(frozen=True, slots=True)
+class AccessPolicy:
+    """The rules for one server on one port.
+
+    Attributes
+    ----------
+    port
+        Port that the server listens on.
+    host
+        Name or address that it was bound to.
+    token
+        Secret that the printed address carries; without it there is no entry.
+    """
+
+    port: int
+    host: str = "127.0.0.1"
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(24), repr=False)
+
+    @property
+    def address(self) -> str:
+        """Address for the person at the keyboard, with the token."""
+        name = "127.0.0.1" if self.host in _WILDCARDS else _bracketed(self.host)
+        return f"http://{name}:{self.port}/?token={self.token}"
+
+    @property
+    def cookie(self) -> str:
+        """Name of the cookie: cookies ignore ports, so the port is part of the name."""
+        return f"tomoskin-{self.port}"
+
+    def admits_host(self, host: str) -> bool:
+        """Whether a Host header names this server.
+
+        A page of another site can point its own name at this machine (DNS rebinding), but not
+        an address: so where the server listens on every address, any literal address will do.
+        """
+        name, port = _split(host)
+        if port != self.port:
+            return False
+        if name in LOOPBACK_NAMES or name == _bracketed(self.host).lower():
+            return True
+        return self.host in _WILDCARDS and _is_address(name)
+
+    def admits_origin(self, origin: str | None, host: str) -> bool:
+        """Whether a request with this Origin header may open a WebSocket on ``host``.
+
+        Browsers always send an Origin with a WebSocket; programs that send none still need the
+        token.
+        """
+        return origin is None or origin.lower() == f"http://{host.lower()}"
+
+    def has_token(self, query: str) -> bool:
+        """Whether a query string carries the right token."""
+        given = parse_qs(query).get("token", [])
+        return len(given) == 1 and self._same(given[0])
+
+    def has_cookie(self, header: str) -> bool:
+        """Whether a Cookie header carries the right token."""
+        try:
+            morsel = SimpleCookie(header).get(self.cookie)
+        except CookieError:
+            return False
+        return morsel is not None and self._same(morsel.value)
+
+    def set_cookie(self) -> str:
+        """Set-Cookie header: out of reach of scripts, and never sent from another site."""
+        return f"{self.cookie}={self.token}; Path=/; HttpOnly; SameSite=Strict"
+
+    def _same(self, given: str) -> bool:
+        return secrets.compare_digest(given.encode(), self.token.encode())
+
+
+def answer_headers(host: str) -> Mapping[str, str]:
+    """Headers of every answer: nothing from elsewhere, no inline script, no frame, no leak."""
+    policy = (
+        "default-src 'self'; img-src 'self' data:; "
+        f"connect-src 'self' ws://{host}; "
+        "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+    return {
+        "content-security-policy": policy,
+        "x-content-type-options": "nosniff",
+        "x-frame-options": "DENY",
+        "referrer-policy": "no-referrer",
+        "cross-origin-opener-policy": "same-origin",
+        "cross-origin-resource-policy": "same-origin",
+        "cache-control": "no-store",
+    }
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach a server bound to ``host``."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def load_token(path: Path) -> str:
+    """The token in ``path``, made there when the file does not exist.
+
+    Raises
+    ------
+    DataError
+        When the file cannot be read or made, holds no token, or others may read it.
+    """
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except FileExistsError:
+        return _read_token(path)
+    except OSError as error:
+        raise DataError(f"cannot be made: {error.strerror}", where=str(path)) from None
+    with os.fdopen(handle, "w") as file:
+        token = secrets.token_urlsafe(32)
+        file.write(token + "\n")
+    return token
+
+
+def _split(host: str) -> tuple[str, int]:
+    """Name and port of a Host header; port −1 where it is none."""
+    name, colon, port = host.lower().rpartition(":")
+    if not colon or "]" in port:
+        return host.lower(), _HTTP_PORT
+    digits = port.isascii() and port.isdigit() and len(port) <= 5
+    return name, int(port) if digits else -1
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host and not host.startswith("[") else host
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name.removeprefix("[").removesuffix("]"))
+    except ValueError:
+        return False
+    return "%" not in name
+
+
+def _read_token(path: Path) -> str:
+    try:
+        mode = path.stat().st_mode
+        text = path.read_text(encoding="ascii").strip()
+    except (OSError, UnicodeDecodeError):
+        raise DataError("cannot be read", where=str(path)) from None
+    if os.name == "posix" and mode & (stat.S_IRWXG | stat.S_IRWXO):
+        raise DataError(
+            "others may read this file, and with it control the page",
+            where=str(path),
+            hint=f"chmod 600 {path}",
+        )
+    if not _TOKEN.fullmatch(text):
+        raise DataError(
+            "holds no token of this program", where=str(path), hint="name a file that is not there"
+        )
+    return text
+
 
 _STRANGE_HOST = "This server does not answer under that name.\n"
 _NO_TOKEN = "Open the address that tomoskin printed.\n"

@@ -14,11 +14,11 @@ from tomoskin.server.guided_presses import (
     Dots,
     Estimate,
     GuidedPress,
+    Taker,
     estimate_touch,
     estimate_wiring,
 )
 from tomoskin.server.requests import FlowKind
-from tomoskin.server.taking import Taker
 
 _LEAST = 0.5
 """Noise is never taken for less than this part of what the read-out predicts."""

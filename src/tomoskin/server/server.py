@@ -23,8 +23,7 @@ from websockets.exceptions import InvalidState
 
 from tomoskin.core import DataError, TomoskinError
 from tomoskin.server import page_messages
-from tomoskin.server.access import AccessControl
-from tomoskin.server.access_policy import AccessPolicy
+from tomoskin.server.access import AccessControl, AccessPolicy
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_connection import PATIENCE, Page

@@ -1,7 +1,13 @@
 """Where results go while they are made: Foxglove, MQTT, LSL, Zenoh, ROS 2, and others by name."""
 
-from tomoskin.sink.consumer import SinkConsumer, SinkReport, sink_report, sink_worker
-from tomoskin.sink.registry import make_sink, sink_names
+from tomoskin.sink.consumer import (
+    SinkConsumer,
+    SinkReport,
+    make_sink,
+    sink_names,
+    sink_report,
+    sink_worker,
+)
 from tomoskin.sink.sink import Item, Moment, Sink, Stream, epoch, raster
 from tomoskin.sink.worker import Capacity, Consumer, Worker, stop_workers
 

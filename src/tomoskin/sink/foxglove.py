@@ -14,7 +14,7 @@ from tomoskin.recording import (
     schema_of,
     touches_message,
 )
-from tomoskin.sink.registry import needed, port_of
+from tomoskin.sink.consumer import needed, port_of
 from tomoskin.sink.sink import Item, Moment, Stream, TouchPace
 
 DEFAULT_PORT = 8766

@@ -11,7 +11,7 @@ import numpy as np
 
 from tomoskin.core import Event, FloatArray, SinkError
 from tomoskin.pattern import Pattern
-from tomoskin.sink.registry import needed
+from tomoskin.sink.consumer import needed
 from tomoskin.sink.sink import Item, Moment, Stream, TouchPace
 
 MOST_TOUCHES = 5

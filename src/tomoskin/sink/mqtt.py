@@ -8,7 +8,7 @@ from urllib.parse import SplitResult, unquote, urlsplit
 
 from tomoskin.core import Event, SinkError
 from tomoskin.recording import encode_json, touch_row, touches_message
-from tomoskin.sink.registry import needed
+from tomoskin.sink.consumer import needed
 from tomoskin.sink.sink import Item, Stream, TouchPace
 
 DEFAULT_PORT = 1883

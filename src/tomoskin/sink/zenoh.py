@@ -7,9 +7,8 @@ from collections import Counter
 from typing import Any
 
 from tomoskin.core import SinkError
-from tomoskin.sink.registry import needed
-from tomoskin.sink.ros import TOPICS, RosMessage, RosView
-from tomoskin.sink.ros_types import encode_cdr, type_hash
+from tomoskin.sink.consumer import needed
+from tomoskin.sink.ros import TOPICS, RosMessage, RosView, encode_cdr, type_hash
 from tomoskin.sink.sink import Item, Stream
 
 _WHERE = "sink zenoh"

@@ -3,13 +3,12 @@
 from typing import Any
 
 from tomoskin._moved import moved
+from tomoskin.source.command_queue import FrameCounters, SequenceFilter
 from tomoskin.source.configuration import Configuration
 from tomoskin.source.link import Link
-from tomoskin.source.ports import Port, list_ports
 from tomoskin.source.protocol_session import ProtocolSession, Stage
 from tomoskin.source.registry import GROUP, open_source, read_options, source_names
-from tomoskin.source.sequence_filter import FrameCounters, SequenceFilter
-from tomoskin.source.serial import SerialTransport
+from tomoskin.source.serial import Port, SerialTransport, list_ports
 from tomoskin.source.settings import (
     PRESCALERS,
     ScanSettings,

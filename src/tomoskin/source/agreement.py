@@ -1,14 +1,60 @@
-"""Whether this host and a board can work together, and who is to change if not."""
+"""Whether a board does what it was asked: its scan and its rate."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields
+from typing import Protocol, runtime_checkable
 
 from tomoskin.core import SourceError, WireError
 from tomoskin.pattern import Scan
 from tomoskin.source.settings import ScanSettings
-from tomoskin.wire import OLDER, SCHEMA, Command, HeldPattern, HeldScan, Hello, Info
+from tomoskin.wire import OLDER, SCHEMA, Command, Counters, HeldPattern, HeldScan, Hello, Info
+
+RATES = (1_000_000, 500_000, 250_000)
+"""Rates that the ATmega's clock divides into exactly, fastest first, Bd."""
+
+_WINDOW = 50
+"""Messages that are looked at together."""
+
+_DAMAGED = 5
+"""So many of them damaged, and the line is too fast: by chance in one window of 10⁵ at 1 %."""
+
+
+@runtime_checkable
+class Rated(Protocol):
+    """A transport whose rate can be changed while it is open."""
+
+    @property
+    def rate(self) -> int:
+        """Bd."""
+
+    def use_rate(self, rate: int) -> None:
+        """Send and read at ``rate`` Bd from now on; SourceError when the device has gone away."""
+
+
+class LineQuality:
+    """Watches what share of the messages arrives damaged."""
+
+    def __init__(self) -> None:
+        """A line that has carried nothing yet."""
+        self._messages = self._corrupt = 0
+
+    def slower(self, counters: Counters, rate: int) -> int | None:
+        """The rate to fall back to from ``rate``, where this one damages too much; else None."""
+        corrupt = counters.corrupt - self._corrupt
+        came = counters.messages - self._messages + corrupt
+        if came < _WINDOW and corrupt < _DAMAGED:
+            return None
+        self.forget(counters)
+        if corrupt < _DAMAGED:
+            return None
+        return next((slower for slower in RATES if slower < rate), None)
+
+    def forget(self, counters: Counters) -> None:
+        """Begin a new window."""
+        self._messages, self._corrupt = counters.messages, counters.corrupt
+
 
 _UPDATE_BOARD = "flash the firmware that belongs to this tomoskin"
 _UPDATE_HOST = "update tomoskin on this computer, or flash an older firmware"

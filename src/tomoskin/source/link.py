@@ -9,9 +9,9 @@ from typing import Self
 
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.pattern import Scan
+from tomoskin.source.agreement import LineQuality, Rated
+from tomoskin.source.command_queue import FrameCounters
 from tomoskin.source.protocol_session import ProtocolSession, Stage
-from tomoskin.source.rate import LineQuality, Rated
-from tomoskin.source.sequence_filter import FrameCounters
 from tomoskin.source.settings import ScanSettings, Timing
 from tomoskin.source.transport import Played, Transport
 from tomoskin.wire import Ack, Counters, Decoder, Info

@@ -7,9 +7,8 @@ from enum import Enum, auto
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.pattern import Scan
 from tomoskin.source.agreement import check_board, check_held, check_version
-from tomoskin.source.command_queue import CommandQueue
+from tomoskin.source.command_queue import CommandQueue, SequenceFilter
 from tomoskin.source.configuration import Configuration
-from tomoskin.source.sequence_filter import SequenceFilter
 from tomoskin.source.settings import ScanSettings, Timing
 from tomoskin.wire import (
     SCHEMA,

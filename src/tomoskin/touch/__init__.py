@@ -8,10 +8,9 @@ from tomoskin.touch.fit.finder import SpotFinder, SpotModel
 from tomoskin.touch.fit.noise import Whitener, measured_covariance
 from tomoskin.touch.fit.pace import EXHAUSTIVE, LIVE, Pace
 from tomoskin.touch.fit.spot import Response, Spots, spots_of
-from tomoskin.touch.image_noise import ImageNoise
 from tomoskin.touch.region import Region
-from tomoskin.touch.segment import Segmenter
-from tomoskin.touch.tracking.settings import STILL, TrackSettings
+from tomoskin.touch.segment import ImageNoise, Segmenter
+from tomoskin.touch.tracking.motion import STILL, TrackSettings
 from tomoskin.touch.tracking.tracker import TouchEvent, Tracker
 
 __all__ = [

@@ -10,8 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import t as student
 
 from tomoskin.calibration.classifier.examples import Codes, Examples
-from tomoskin.calibration.classifier.mixture import Mixture, entropy, posterior
-from tomoskin.calibration.classifier.subspace import Subspace, session_mean
+from tomoskin.calibration.classifier.mixture import (
+    Mixture,
+    Subspace,
+    entropy,
+    posterior,
+    session_mean,
+)
 from tomoskin.calibration.locator.presses import frames
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.pattern import Pattern

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from tomoskin.calibration.locator.held_out import FEW, Estimates
+from tomoskin.calibration.locator.posterior import FEW, Estimates
 from tomoskin.calibration.locator.presses import Features, Presses, Strength, frames
 from tomoskin.calibration.locator.rotations import Rotations
 from tomoskin.calibration.locator.stacking import (

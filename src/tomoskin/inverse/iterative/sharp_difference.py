@@ -12,8 +12,8 @@ from tomoskin.forward import ForwardModel
 from tomoskin.inverse.iterative.absolute import STEPS, TOLERANCE, Sharp
 from tomoskin.inverse.iterative.newton import Descent, Goal, Iteration, descend, table
 from tomoskin.inverse.iterative.observation import Observation
+from tomoskin.inverse.priors.named import SharpPrior
 from tomoskin.inverse.priors.penalty import Diagonal
-from tomoskin.inverse.priors.sharp import SharpPrior
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,11 +15,10 @@ from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
 from tomoskin.touch.fit.anisotropy import with_anisotropy
 from tomoskin.touch.fit.candidates import Candidates, Matched
-from tomoskin.touch.fit.noise import Whitener
+from tomoskin.touch.fit.noise import ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Problem, SheetDomain, Weigh
-from tomoskin.touch.fit.residual_noise import ResidualResponse
 from tomoskin.touch.fit.search import Search, SpotDetections, joined
 from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
 

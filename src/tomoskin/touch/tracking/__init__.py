@@ -1,6 +1,6 @@
 """Readings of successive frames → touches that keep their identity, and what happens to them."""
 
-from tomoskin.touch.tracking.settings import HELD, STILL, TrackSettings
+from tomoskin.touch.tracking.motion import HELD, STILL, TrackSettings
 from tomoskin.touch.tracking.tracker import TouchEvent, Tracker
 
 __all__ = ["HELD", "STILL", "TouchEvent", "TrackSettings", "Tracker"]

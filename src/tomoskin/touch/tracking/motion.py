@@ -1,10 +1,4 @@
-"""How a finger moves: an integrated Ornstein–Uhlenbeck process, followed by a Kalman filter.
-
-Its velocity has the standard deviation ``speed`` and is forgotten over the time ``turning``
-(Uhlenbeck & Ornstein 1930; Johnson et al. 2008, Ecology 89, 1208, for tracks), so that it is a
-constant velocity from frame to frame and a bounded walk over a gap, whatever the frame rate.
-Updates are Kalman's (1960); a state is x, y, vx, vy.
-"""
+"""How a touch may move, and the settings of a tracker."""
 
 from __future__ import annotations
 
@@ -17,7 +11,51 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from tomoskin.core import Detection, FloatArray
-from tomoskin.touch.tracking.settings import TrackSettings
+
+HELD = 0.6
+"""Part of the signal-to-noise ratio of an onset above which a touch goes on: between the two it
+neither begins nor ends."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackSettings:
+    """Times are seconds of the device, so that 10 and 1,000 frames/s are treated the same.
+
+    Attributes
+    ----------
+    snr
+        Signal-to-noise ratio at which a touch begins; at :data:`HELD` of it, it ends.
+    onset, release
+        Seconds for which a touch must be seen before it is reported, and missing before it is
+        released; two frames at least, unless they are 0.
+    speed, turning
+        Standard deviation of a finger's speed along each axis, m/s, and the time after which it
+        moves otherwise, s.
+    wander
+        What the position of a detection wanders beside its noise, m.
+    """
+
+    snr: float = 5.0
+    onset: float = 0.02
+    release: float = 0.05
+    speed: float = 0.3
+    turning: float = 0.3
+    wander: float = 0.006
+
+    @property
+    def least_snr(self) -> float:
+        """Below which there is no detection."""
+        return HELD * self.snr
+
+    @property
+    def still(self) -> bool:
+        """Whether a frame tells nothing of the next one."""
+        return self.onset == 0 and self.release == 0
+
+
+STILL = TrackSettings(onset=0.0, release=0.0)
+"""For frames that do not follow each other in time: each shows what it holds."""
+
 
 GATE = 16.0
 """Squared Mahalanobis distance beyond which a detection is of another touch: one in 3,000."""

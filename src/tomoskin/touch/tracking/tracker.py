@@ -12,9 +12,8 @@ import numpy as np
 from tomoskin.core import Detection, FloatArray, Touch
 from tomoskin.touch.tracking import motion
 from tomoskin.touch.tracking.merging import carrier_of, merge, origin_of, split
-from tomoskin.touch.tracking.motion import assign
+from tomoskin.touch.tracking.motion import TrackSettings, assign
 from tomoskin.touch.tracking.residual import ResidualResponses, is_residual
-from tomoskin.touch.tracking.settings import TrackSettings
 from tomoskin.touch.tracking.trace import Trace, Unmerged
 
 Happening = Literal["onset", "move", "release", "merge", "split"]
