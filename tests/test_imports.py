@@ -6,6 +6,7 @@ import ast
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -37,6 +38,7 @@ class Import:
 # What is checked: module name → source text, a package under its own name.
 
 
+@cache
 def library() -> dict[str, str]:
     source = ROOT / "src"
     return {

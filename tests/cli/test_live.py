@@ -54,7 +54,9 @@ def end(process, number):
     return process.returncode, out, errors
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
+)
 def test_it_serves_at_the_printed_address_and_ends_cleanly(start, number):
     process = start("--port", "0", "--source", "twin:fast")
     line = process.stdout.readline()
@@ -72,7 +74,7 @@ def test_it_serves_at_the_printed_address_and_ends_cleanly(start, number):
         assert probe.connect_ex(("127.0.0.1", int(address[2]))) != 0
 
 
-@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("number", ["SIGINT", pytest.param("SIGTERM", marks=pytest.mark.slow)])
 def test_a_signal_before_it_is_ready_is_a_clean_end_too(number):
     code = (
         "import os, signal; from tomoskin import pipeline; from tomoskin.cli import main\n"

@@ -279,6 +279,7 @@ def test_limits_of_the_formula() -> None:
     assert half == pytest.approx([0.2 + 0.1j])  # Debye at its relaxation
 
 
+@pytest.mark.slow
 def test_the_deviations_are_what_noise_makes_of_the_parameters() -> None:
     rng, f = np.random.default_rng(5), np.geomspace(1e3, 1e6, 9)
     clean, sd = cole(f, *BACKGROUND), 1e-3

@@ -36,7 +36,7 @@ def test_names_say_where_results_go_but_no_password(spec, name):
     ("spec", "said"),
     [
         ("", "there is no sink"),
-        ("kafka", "there are foxglove, lsl, mqtt, ros2, zenoh"),
+        ("kafka", "known are foxglove, lsl, mqtt, ros2, zenoh"),
         ("foxglove:port", "expected a port"),
         ("foxglove:70000", "expected a port"),
         ("foxglove:0", "expected a port"),
