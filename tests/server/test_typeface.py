@@ -7,6 +7,7 @@ from itertools import chain
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Error
 
 import tomoskin
 from server.still import PANELS, show, still_site
@@ -17,7 +18,7 @@ pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 
 FAMILY = "Source Sans 3"
 MOST = 60_000
-SAYING = ("core", "live", "skin")
+SAYING = ("core", "pipeline", "run", "server", "skin")
 """Rooms whose words a page shows: of units, of the server, of a skin's settings."""
 WEIGHTS = (400, 500, 600, 700)
 WIDTHS = """weights => weights.map(weight => {
@@ -66,8 +67,17 @@ class Typeset:
         root = self._session.send("DOM.getDocument", {"depth": 0})["root"]["nodeId"]
         asked = {"nodeId": root, "selector": selector}
         nodes = self._session.send("DOM.querySelectorAll", asked)["nodeIds"]
-        drawn = (self._session.send("CSS.getPlatformFontsForNode", {"nodeId": k}) for k in nodes)
-        return [each["fonts"] for each in drawn]
+        drawn = (self._drawn_with(node) for node in nodes)
+        return [fonts for fonts in drawn if fonts is not None]
+
+    def _drawn_with(self, node):
+        """None where the page has taken the element away meanwhile: its numbers go on."""
+        try:
+            return self._session.send("CSS.getPlatformFontsForNode", {"nodeId": node})["fonts"]
+        except Error as error:
+            if "Could not find node" not in error.message:
+                raise
+            return None
 
 
 def ours(fonts):
