@@ -12,7 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from report import Report
-from tomoskin.calibration import BENDS, BendExamples, BendModel, FrameView, JointReference
+from tomoskin.calibration import (
+    BENDS,
+    BendExamples,
+    BendModel,
+    Differences,
+    FrameView,
+    JointReference,
+)
 from tomoskin.core import Detection, FloatArray, Frame
 from tomoskin.mesh import Cylinder, Hinge
 from tomoskin.pipeline import FrameResult, Pipeline
@@ -166,9 +173,10 @@ class Bench:
         """What finds touches in V less the reference, beside directions that say nothing."""
         found = finding(self.lab.prepared, reference)
         image = self.lab.image
-        none = np.zeros((self.lab.prepared.pattern.n_meas, 0))
+        n_meas = self.lab.prepared.pattern.n_meas
+        none, excluded = np.zeros((n_meas, 0)), np.zeros(n_meas, bool)
         return lambda dv, blind: found.push(
-            FrameView(0.0, image(dv), None, dv, blind, dv, none, dv, np.zeros(len(dv), bool))
+            FrameView(0.0, image(dv), None, Differences(dv, blind, dv, none, dv, excluded))
         )
 
     def static(self, pose: Pose) -> list[float]:

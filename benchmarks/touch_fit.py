@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from report import Report
-from tomoskin.calibration import FrameView
+from tomoskin.calibration import Differences, FrameView
 from tomoskin.core import Detection, Frame
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.finding import Finder, finding
@@ -79,10 +79,7 @@ class Lab:
     def view(self, presses: Sequence[Press]) -> FrameView:
         """What one frame shows; all voltages in proportion say nothing, as they do live."""
         dv = self.volts(presses) - self.reference.mean
-        return FrameView(
-            time=0.0,
-            image=self.image(dv),
-            image_noise=self.floor,
+        differences = Differences(
             dv=dv,
             nuisance=self.reference.mean[:, None],
             change=dv,
@@ -90,6 +87,7 @@ class Lab:
             from_rest=dv,
             excluded=np.zeros(len(dv), bool),
         )
+        return FrameView(0.0, self.image(dv), self.floor, differences)
 
     def exact(self, press: Press) -> Floats:
         """(n_meas,) V of the sheet without any noise."""

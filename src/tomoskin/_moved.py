@@ -52,7 +52,7 @@ RENAMED = {
 
 def moved(room: str, name: str) -> Any:
     """What ``tomoskin.room.name`` is now. Raises AttributeError where there is no such name."""
-    for new in ROOMS.get(room, ()) or (room,):
+    for new in ROOMS.get(room, (room,)):
         now = RENAMED.get(new, {}).get(name, name)
         first, *rest = now.split(".")
         found = import_module(f"tomoskin.{new}")

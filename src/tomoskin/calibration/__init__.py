@@ -13,7 +13,15 @@ from tomoskin.calibration.channel_mapping.wiring import Wiring, ring_of
 from tomoskin.calibration.classes import CLASSES, ClassReading, FrameClassifier
 from tomoskin.calibration.classifier.classifier import Answers, Classifier
 from tomoskin.calibration.classifier.examples import Codes, Examples, against_rest
-from tomoskin.calibration.kind import Applied, Calibration, Conditions, FrameView, Kind, TouchFit
+from tomoskin.calibration.kind import (
+    Applied,
+    Calibration,
+    Conditions,
+    Differences,
+    FrameView,
+    Kind,
+    TouchFit,
+)
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
 from tomoskin.calibration.locator.watch import Watch
@@ -39,6 +47,7 @@ __all__ = [
     "Classifier",
     "Codes",
     "Conditions",
+    "Differences",
     "Examples",
     "FrameClassifier",
     "FrameView",

@@ -20,7 +20,7 @@ from tomoskin.calibration.kind import (
     TouchFit,
     located,
 )
-from tomoskin.core import Arrays, DataError, Detection, FloatArray, IntArray, real_numbers
+from tomoskin.core import Arrays, DataError, Detection, real_numbers
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
 
@@ -41,7 +41,8 @@ class BendApplied(Applied):
     def read(self, view: FrameView, detections: list[Detection], *, touched: bool) -> BendReading:
         """How the sheet is bent in this frame."""
         touches = self._detect(view, detections)
-        reading = self._reader.push(view.change, touches, view.drift, view.time, touched=touched)
+        data = view.differences
+        reading = self._reader.push(data.change, touches, data.drift, view.time, touched=touched)
         self.moved = reading.moved
         return reading
 
@@ -74,18 +75,9 @@ def _check(calibration: Calibration[BendModel], skin: Skin) -> None:
         )
 
 
-def _exclude(model: BendModel, measurements: IntArray) -> BendModel:
-    """Raises DataError where its bends do not show in what is left."""
-    return model.without(measurements)
-
-
 def _apply(model: BendModel, conditions: Conditions) -> Applied:
     fit = conditions.touch_fit()
     return Applied() if fit is None else BendApplied(model, fit)
-
-
-def _directions(model: BendModel) -> FloatArray:
-    return model.directions
 
 
 BENDS = Kind(
@@ -99,9 +91,9 @@ BENDS = Kind(
     pack=_pack,
     unpack=_unpack,
     check=_check,
-    exclude=_exclude,
+    exclude=BendModel.without,
     apply=_apply,
-    directions=_directions,
+    directions=lambda model: model.directions,
     fits=True,
 )
 """Bends of the sheet; its model is a :class:`BendModel`."""

@@ -83,7 +83,7 @@ class FrameClassifier:
         """With all measurements."""
         return cls(classifier, np.arange(classifier.examples.dv.shape[1]))
 
-    def without(self, measurements: IntArray) -> Self:
+    def without(self, measurements: IntArray) -> FrameClassifier:
         """For frames that lack ``measurements``."""
         return replace(self, rows=np.delete(self.rows, measurements))
 
@@ -107,7 +107,7 @@ class ClassesApplied(Applied):
     def read(self, view: FrameView, detections: list[Detection], *, touched: bool) -> ClassReading:
         """The class of this frame."""
         del detections, touched
-        return self._frames(view.since_reference)
+        return self._frames(view.differences.since_reference)
 
 
 def _pack(frames: FrameClassifier) -> Arrays:
@@ -149,10 +149,6 @@ def _check(calibration: Calibration[FrameClassifier], skin: Skin) -> None:
     calibration.model.classifier.check(skin.pattern().identity)
 
 
-def _exclude(frames: FrameClassifier, measurements: IntArray) -> FrameClassifier:
-    return frames.without(measurements)
-
-
 def _apply(frames: FrameClassifier, _conditions: Conditions) -> Applied:
     return ClassesApplied(frames)
 
@@ -168,7 +164,7 @@ CLASSES = Kind(
     pack=_pack,
     unpack=_unpack,
     check=_check,
-    exclude=_exclude,
+    exclude=FrameClassifier.without,
     apply=_apply,
 )
 """Classes of frames; its model is a :class:`FrameClassifier`."""

@@ -40,15 +40,11 @@ BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FrameView:
-    """What one frame shows.
+class Differences:
+    """What one frame differs by from the untouched skin.
 
     Attributes
     ----------
-    time
-        Of the frame, s.
-    image, image_noise
-        Its image, and the noise of that where it is known.
     dv
         (n_meas,) difference data without their part in the nuisance subspace.
     nuisance
@@ -63,9 +59,6 @@ class FrameView:
         (n_meas,) bool: measurements that do not count.
     """
 
-    time: float
-    image: Image
-    image_noise: ImageNoise | None
     dv: FloatArray
     nuisance: FloatArray
     change: FloatArray
@@ -77,6 +70,17 @@ class FrameView:
     def since_reference(self) -> FloatArray:
         """(n_meas,) V by which it differs from that reference, NaN where excluded."""
         return np.where(self.excluded, np.nan, self.from_rest)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameView:
+    """What one frame shows: its ``time`` s, its image, the noise of that where it is known, and the
+    differences that it was made of."""
+
+    time: float
+    image: Image
+    image_noise: ImageNoise | None
+    differences: Differences
 
 
 Detect = Callable[[FrameView, list[Detection]], list[Detection]]
@@ -121,16 +125,6 @@ class Applied:
         """
         del view, detections, touched
         return None
-
-
-_ALL = 0.999
-"""Part of a measurement that is taken for all of it."""
-
-
-def without_information(nuisance: FloatArray) -> BoolArray:
-    """(n_meas,) measurements of which the nuisance directions (n_meas, k), orthonormal, leave
-    nothing."""
-    return np.asarray((nuisance**2).sum(axis=1) > _ALL)
 
 
 Progress = Callable[[float, float], None]
@@ -271,13 +265,6 @@ class Calibration(Generic[M]):
         """The same without some measurements; None where it cannot do without."""
         model = self.kind.exclude(self.model, measurements)
         return None if model is None else self.with_model(model)
-
-    @property
-    def directions(self) -> FloatArray:
-        """(n_meas, k) V along which what it reads moves the data."""
-        if self.kind.directions is None:
-            return np.zeros((self.pattern.n_meas, 0))
-        return self.kind.directions(self.model)
 
     def apply(self, conditions: Conditions) -> Applied:
         """What it does with each frame under ``conditions``."""

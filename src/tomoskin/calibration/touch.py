@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.calibration.kind import (
     Applied,
@@ -20,14 +21,16 @@ from tomoskin.calibration.kind import (
     Kind,
     Progress,
     located,
-    without_information,
 )
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
-from tomoskin.core import Arrays, DataError, Detection, IntArray, real_numbers
+from tomoskin.core import Arrays, DataError, Detection, FloatArray, IntArray, real_numbers
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
 from tomoskin.touch import Region
+
+_ALL = 0.999
+"""Part of a measurement that is taken for all of it."""
 
 _SAME_SHAPE = 1e-4
 """Outlines within so many metres of each other are one."""
@@ -44,8 +47,8 @@ class LocatedTouch(Applied):
         if not detections:
             return []
         # The presses were learnt with all that is in them: nothing is taken out here either.
-        excluded = without_information(view.nuisance)
-        dv = np.where(excluded, np.nan, view.change)
+        differences = view.differences
+        dv = np.where(_excluded(differences.nuisance), np.nan, differences.change)
         if not np.isfinite(dv).any():
             return []
         (position,), (covariance,) = self._locator.predict(dv)
@@ -103,6 +106,12 @@ def _exclude(_locator: Locator, _measurements: IntArray) -> None:
 
 def _apply(locator: Locator, _conditions: Conditions) -> Applied:
     return LocatedTouch(locator)
+
+
+def _excluded(nuisance: FloatArray) -> NDArray[np.bool_]:
+    """(n_meas,) measurements of which the nuisance directions (n_meas, k), orthonormal, leave
+    nothing."""
+    return np.asarray((nuisance**2).sum(axis=1) > _ALL)
 
 
 TOUCH = Kind(

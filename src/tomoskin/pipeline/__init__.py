@@ -6,9 +6,9 @@ from tomoskin._moved import moved
 from tomoskin.pipeline.finding import voltage_covariance
 from tomoskin.pipeline.offline import Reconstruction, reconstruct
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
-from tomoskin.pipeline.prepare import Prepared, prepare
+from tomoskin.pipeline.prepare import Prepared, colour_limit, prepare
 from tomoskin.pipeline.recorded import DOUBTED, Idle, RecordedFrames, recorded_frames
-from tomoskin.pipeline.records import FrameResult, Measured, ReferenceState, colour_limit
+from tomoskin.pipeline.records import FrameResult, Measured, ReferenceState
 from tomoskin.pipeline.tune import tuned
 
 __all__ = [

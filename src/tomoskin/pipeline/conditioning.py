@@ -8,6 +8,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from tomoskin.calibration import Differences
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.pattern import Scan
 from tomoskin.pipeline.nuisance import Drift, Nuisance
@@ -37,31 +38,16 @@ class Conditioned:
 
     Attributes
     ----------
-    dv
-        (n_meas,) without their part in the nuisance subspace; None where too little is left.
-    nuisance
-        (n_meas, k) orthonormal directions of that subspace.
+    differences
+        None where too little is left.
     n_excluded
         How many measurements are excluded, or count in a sum only.
-    change
-        (n_meas,) V by which the frame differs from the baseline, with all that is in it.
-    from_rest
-        (n_meas,) V by which it differs from the reference as that was taken.
-    excluded
-        (n_meas,) bool: measurements that do not count.
-    drift
-        (n_meas, k) V: directions of drift and of excluded measurements.
     health
         Of the electrodes; None where there are no voltages to tell it from.
     """
 
-    dv: FloatArray | None
-    nuisance: FloatArray
+    differences: Differences | None
     n_excluded: int
-    change: FloatArray
-    from_rest: FloatArray
-    excluded: NDArray[np.bool_]
-    drift: FloatArray
     health: Health | None = None
 
 
@@ -220,19 +206,18 @@ class Followed:
         n_excluded = int(np.count_nonzero(self._excluded))
         if n_excluded:
             values = np.where(health.lost, mean, values)
-        dv = None
-        if subspace.blind.count <= MOST_NUISANCE * len(values):
-            dv = subspace.blind(difference(values, mean, self._prepared.operator.difference))
-        return Conditioned(
+        if subspace.blind.count > MOST_NUISANCE * len(values):
+            return Conditioned(None, n_excluded, health)
+        dv = subspace.blind(difference(values, mean, self._prepared.operator.difference))
+        differences = Differences(
             dv=dv,
             nuisance=subspace.blind.directions,
-            n_excluded=n_excluded,
             change=values - mean,
+            drift=subspace.drift,
             from_rest=measured.values - baseline.start,
             excluded=health.lost,
-            drift=subspace.drift,
-            health=health,
         )
+        return Conditioned(differences, n_excluded, health)
 
     def learn(self, time: float, moved: FloatArray | float, *, touched: bool) -> bool:
         """See :class:`Conditioning`."""
@@ -286,18 +271,16 @@ class GivenDifferences:
     def condition(self, measured: Measured) -> Conditioned:
         """Of a frame whose values are difference data already."""
         operator, excluded = self.prepared.operator, measured.excluded
-        change = measured.values
-        if operator.difference == "normalised":
-            change = change * np.abs(operator.reference)
-        return Conditioned(
+        change = measured.values * _scale(self.prepared, operator.reference)
+        differences = Differences(
             dv=operator.filled(measured.values, excluded),
             nuisance=np.eye(len(excluded))[:, excluded],
-            n_excluded=int(np.count_nonzero(excluded)),
             change=change,
+            drift=np.zeros((len(excluded), 0)),
             from_rest=change,
             excluded=excluded,
-            drift=np.zeros((len(excluded), 0)),
         )
+        return Conditioned(differences, int(np.count_nonzero(excluded)))
 
     def learn(self, time: float, moved: FloatArray | float, *, touched: bool) -> bool:
         """Nothing can be learnt."""

@@ -70,7 +70,7 @@ class InData:
 
     def push(self, view: FrameView) -> list[Detection]:
         """See :class:`Finder`."""
-        return self._spots.push(view.dv, view.nuisance)
+        return self._spots.push(view.differences.dv, view.differences.nuisance)
 
 
 def finding(prepared: Prepared, reference: Reference | None, pace: Pace = EXHAUSTIVE) -> Finder:

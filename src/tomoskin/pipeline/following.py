@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.calibration import FrameView
-from tomoskin.core import Detection, FloatArray, Image, Touch
+from tomoskin.core import Detection, Image, Touch
 from tomoskin.pattern import Scan
 from tomoskin.pipeline.collecting import Rest
 from tomoskin.pipeline.conditioning import (
@@ -117,46 +117,27 @@ class Following:
         """Take one frame."""
         self._tune()
         conditioned = self._conditioning.condition(measured)
-        if conditioned.dv is None:
+        if conditioned.differences is None:
             touches = self._tracker.update([], measured.time, measured.host_time)
             return self._result(measured, conditioned, self._prepared.no_image, touches, {})
-        view = self._observe(conditioned, conditioned.dv, measured.time)
+        image, noise = self._imaging.push(conditioned.differences.dv, measured.time)
+        view = FrameView(measured.time, image, noise, conditioned.differences)
         detections = self._finder.push(view)
         for applied in self._applied.values():
             detections = applied.locate(view, detections)
         touches = self._tracker.update(detections, measured.time, measured.host_time)
         readings = self._read(view, detections, touched=bool(touches))
         self._learn(measured.time, touched=bool(touches))
-        return self._result(measured, conditioned, view.image, touches, readings)
+        return self._result(measured, conditioned, image, touches, readings)
 
     def first(self, measured: Measured) -> FrameResult:
         """The frame that completed the rest: nothing shows in it."""
-        return FrameResult(
-            sequence=measured.sequence,
-            host_time=measured.host_time,
-            ready=True,
-            pictured=True,
-            image=self._prepared.no_image,
-            voltages=measured.values,
-            reference=self._conditioning.mean,
-            touches=(),
-            left_out=int(np.count_nonzero(measured.excluded)),
-            events=self._tracker.events,
-            baseline=self._conditioning.state,
-        )
-
-    def _observe(self, conditioned: Conditioned, dv: FloatArray, time: float) -> FrameView:
-        image, noise = self._imaging.push(dv, time)
-        return FrameView(
-            time=time,
-            image=image,
-            image_noise=noise,
-            dv=dv,
-            nuisance=conditioned.nuisance,
-            change=conditioned.change,
-            drift=conditioned.drift,
-            from_rest=conditioned.from_rest,
-            excluded=conditioned.excluded,
+        return FrameResult.at_rest(
+            measured,
+            self._prepared.no_image,
+            self._conditioning.mean,
+            self._tracker.events,
+            self._conditioning.state,
         )
 
     def _read(
@@ -171,8 +152,9 @@ class Following:
     def _learn(self, time: float, *, touched: bool) -> None:
         conditioning = self._conditioning
         moved = sum((applied.moved for applied in self._applied.values()), start=0.0)
-        if conditioning.learn(time, moved, touched=touched) and conditioning.reference:
-            prepared, reference = conditioning.prepared, conditioning.reference
+        changed = conditioning.learn(time, moved, touched=touched)
+        if changed and (reference := conditioning.reference) is not None:
+            prepared = conditioning.prepared
             self._imaging.renew(prepared, reference, conditioning.subspace())
             self._finder.renew(prepared, reference)
 
@@ -211,7 +193,7 @@ class Following:
             sequence=measured.sequence,
             host_time=measured.host_time,
             ready=True,
-            pictured=conditioned.dv is not None,
+            pictured=conditioned.differences is not None,
             image=image,
             voltages=measured.values,
             reference=self._conditioning.mean,

@@ -86,7 +86,7 @@ class Nuisance:
         self._newest: tuple[Health | None, int, FrameSubspace] | None = None
 
     def __call__(self, health: Health | None) -> FrameSubspace:
-        """FrameSubspace of a frame; a monitor gives the same record while all is well."""
+        """Of a frame; a monitor gives the same record while all is well."""
         revision = self._drift.revision
         newest = self._newest
         if newest is not None and newest[0] is health and newest[1] == revision:

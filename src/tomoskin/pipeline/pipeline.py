@@ -123,17 +123,8 @@ class Pipeline:
             setting = Setting(LIVE, given.scan)
             self._state = Following.from_rest(given, rest, self._tracker, setting)
             return self._state.first(measured)
-        return FrameResult(
-            sequence=measured.sequence,
-            host_time=measured.host_time,
-            ready=False,
-            pictured=True,
-            image=given.no_image,
-            voltages=measured.values,
-            reference=given.operator.reference,
-            touches=(),
-            left_out=int(np.count_nonzero(measured.excluded)),
-            events=self._tracker.events,
+        return FrameResult.at_rest(
+            measured, given.no_image, given.operator.reference, self._tracker.events
         )
 
 

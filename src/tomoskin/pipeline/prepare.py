@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -28,6 +29,9 @@ from tomoskin.pattern import Pattern, Scan
 from tomoskin.signal import NuisanceSubspace, Readout, Reference, difference_noise
 from tomoskin.skin import Skin
 from tomoskin.touch import ImageNoise, Segmenter, SpotModel
+
+_RADIUS = 0.015
+"""m, of the touch that the scale of colours is made for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +113,8 @@ class Prepared:
     @property
     def directions(self) -> FloatArray:
         """(n_meas, k) V along which what its calibrations read moves the data."""
-        found = [c.directions for c in self.calibrations.values() if c.kind.directions]
-        return np.hstack([np.zeros((self.pattern.n_meas, 0)), *found])
+        own = [c.kind.directions(c.model) for c in self.calibrations.values() if c.kind.directions]
+        return np.hstack([np.zeros((self.pattern.n_meas, 0)), *own])
 
     def without(self, measurements: IntArray) -> Prepared:
         """The skin as if its pattern had never had them; an alpha of "auto" is chosen anew.
@@ -206,6 +210,21 @@ def _problem_after(previous: Prepared, skin: Skin) -> LinearProblem:
     return replace(problem, prior=penalty)
 
 
+def colour_limit(prepared: Prepared) -> float:
+    """End of the symmetric scale, in the image's unit, rounded up to 1, 2 or 5.
+
+    The largest change that the operator shows for a round touch of 15 mm radius in the middle
+    of the sheet that takes away all of its conductivity, by the linear model.
+    """
+    mesh, skin = prepared.mesh, prepared.skin
+    middle = mesh.volumes @ mesh.centroids / mesh.volumes.sum()
+    distance = np.linalg.norm(mesh.centroids - middle, axis=1)
+    touched = distance <= max(_RADIUS, float(distance.min()))
+    change = np.where(touched, -skin.conductivity, 0.0)
+    dv = (prepared.problem.jacobian @ change).real
+    return _rounded(float(np.abs(prepared.operator(dv).values).max()))
+
+
 def _prior(skin: Skin) -> Prior:
     settings = skin.inverse
     return named_prior(
@@ -287,3 +306,10 @@ def _trained(model: ForwardModel, skin: Skin) -> tuple[AlphaChoice, Operator]:
 def _predicted(problem: LinearProblem, readout: Readout) -> FloatArray:
     rows = np.full(len(problem.reference), readout.noise)
     return difference_noise(rows, problem.reference, problem.difference)
+
+
+def _rounded(value: float) -> float:
+    if not value > 0:
+        return 1.0
+    decade = 10.0 ** math.floor(math.log10(value))
+    return next(step * decade for step in (1, 2, 5, 10) if value <= step * decade * (1 + 1e-9))

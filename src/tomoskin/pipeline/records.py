@@ -1,8 +1,7 @@
-"""What goes into the frame flow and comes out of it, and the scale of its images' colours."""
+"""What goes into the frame flow, and what comes out: one frame, all the way to touches."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 
 from tomoskin.calibration import BENDS, CLASSES, BendReading, ClassReading
 from tomoskin.core import FloatArray, Image, Touch, Voltages
-from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import BaselineState, Health
 from tomoskin.touch import TouchEvent
 
@@ -94,6 +92,30 @@ class FrameResult:
     baseline: BaselineState | None = None
     readings: Mapping[str, Any] = field(default_factory=dict)
 
+    @classmethod
+    def at_rest(
+        cls,
+        measured: Measured,
+        image: Image,
+        reference: FloatArray,
+        events: tuple[TouchEvent, ...],
+        baseline: BaselineState | None = None,
+    ) -> Self:
+        """Of a frame that the reference is collected from; ``baseline`` once that stands."""
+        return cls(
+            sequence=measured.sequence,
+            host_time=measured.host_time,
+            ready=baseline is not None,
+            pictured=True,
+            image=image,
+            voltages=measured.values,
+            reference=reference,
+            touches=(),
+            left_out=int(np.count_nonzero(measured.excluded)),
+            events=events,
+            baseline=baseline,
+        )
+
     @property
     def bend(self) -> BendReading | None:
         """How the sheet is bent; None where its bends were not learnt."""
@@ -144,28 +166,3 @@ class ReferenceState:
     def ready(self) -> bool:
         """Whether it stands."""
         return self.since is not None
-
-
-_RADIUS = 0.015
-
-
-def colour_limit(prepared: Prepared) -> float:
-    """End of the symmetric scale, in the image's unit, rounded up to 1, 2 or 5.
-
-    The largest change that the operator shows for a round touch of 15 mm radius in the middle
-    of the sheet that takes away all of its conductivity, by the linear model.
-    """
-    mesh, skin = prepared.mesh, prepared.skin
-    middle = mesh.volumes @ mesh.centroids / mesh.volumes.sum()
-    distance = np.linalg.norm(mesh.centroids - middle, axis=1)
-    touched = distance <= max(_RADIUS, float(distance.min()))
-    change = np.where(touched, -skin.conductivity, 0.0)
-    dv = (prepared.problem.jacobian @ change).real
-    return _rounded(float(np.abs(prepared.operator(dv).values).max()))
-
-
-def _rounded(value: float) -> float:
-    if not value > 0:
-        return 1.0
-    decade = 10.0 ** math.floor(math.log10(value))
-    return next(step * decade for step in (1, 2, 5, 10) if value <= step * decade * (1 + 1e-9))

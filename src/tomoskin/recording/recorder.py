@@ -16,6 +16,17 @@ from tomoskin.recording.session_writer import SessionWriter
 from tomoskin.touch import TouchEvent
 from tomoskin.wire import Info
 
+IMAGE_PERIOD = 0.2
+"""Seconds between two images in the file, by host time."""
+
+CLOCK_PERIOD = 10.0
+"""Seconds between two fits of the device's clock."""
+
+_OBJECT = 256
+"""Bytes that a waiting message is taken for, beside its data."""
+
+_log = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True, slots=True)
 class RawRead:
@@ -49,18 +60,6 @@ what becomes of it, then its result. A person's remark is an event of the kind "
 def event_of(happened: TouchEvent) -> Event:
     """What happened to a touch as an event: "touch-onset", "touch-move", "touch-release", …"""
     return Event(happened.host_time, f"touch-{happened.kind}", happened.text)
-
-
-IMAGE_PERIOD = 0.2
-"""Seconds between two images in the file, by host time."""
-
-CLOCK_PERIOD = 10.0
-"""Seconds between two fits of the device's clock."""
-
-_OBJECT = 256
-"""Bytes that a waiting message is taken for, beside its data."""
-
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
