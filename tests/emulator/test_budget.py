@@ -41,7 +41,7 @@ def test_cycles_to_enclose_a_frame_and_the_stack(
     ):
         frames_of(link, 3)
         before = Watch.read(watch)
-        frames_of(link, 40)
+        frames_of(link, 200)
         after = Watch.read(watch)
     start, _ = symbol(elf, "framing_enclose")
     calls = int(after.spent[start // 2] - before.spent[start // 2]) / 2  # it begins with a push
