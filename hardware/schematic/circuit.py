@@ -11,8 +11,8 @@ from schematic.parts import Part, Pin, R
 RAILS = {"GND", "+12V"}
 """What a gate may be held at: there whenever a current can flow."""
 
-_E24 = (10, 11, 12, 13, 15, 16, 18, 20, 22, 24, 27, 30, 33, 36, 39, 43, 47, 51, 56, 62, 68, 75, 82, 91)
-STOCK = {10 * value for value in _E24} | {round(100 * 10 ** (n / 96)) for n in range(96)}
+_E24 = "10 11 12 13 15 16 18 20 22 24 27 30 33 36 39 43 47 51 56 62 68 75 82 91"
+STOCK = {10 * int(two) for two in _E24.split()} | {round(10 ** (2 + n / 96)) for n in range(96)}
 """Three digits of the values that resistors and capacitors are sold with: E24 and E96."""
 
 Node = tuple[str, str]
@@ -120,6 +120,6 @@ class Circuit:
 
 def _is_stock(value: str) -> bool:
     """Whether ``1.47k`` or ``470p C0G`` is sold."""
-    number = float(value.split()[0].rstrip("pnumkM"))
+    number = float(value.partition(" ")[0].rstrip("pnumkM"))
     digits = number * 10 ** (2 - math.floor(math.log10(number)))
     return any(math.isclose(digits, stock) for stock in STOCK)
