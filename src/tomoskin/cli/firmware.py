@@ -44,12 +44,10 @@ def build(channels: Channels = 8) -> None:
 @app.command()
 def flash(port: Port, channels: Channels = 8) -> None:
     """Write the firmware to an Arduino Mega 2560 with avrdude."""
-    from tomoskin.emulator import firmware_image, write_firmware
+    from tomoskin.emulator import write_firmware
 
-    with Bar("building"):
-        image = firmware_image(channels)
     with Bar("writing"):
-        write_firmware(port, image)
+        write_firmware(port, channels)
     typer.echo(f"{port}: firmware for {channels} channels; next is tomoskin firmware configure")
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Self
 
 from tomoskin.core import SourceError
+from tomoskin.emulator.program import firmware_image
 from tomoskin.source import SerialTransport, Transport
 from tomoskin.wire import Decoder, GetInfo, Info, encode
 
@@ -71,8 +72,10 @@ def check_current(current: float, limit: float, owner: str) -> None:
             )
 
 
-def write_firmware(port: str, image: Path) -> None:
-    """Write an image (.hex) or an ELF to the board at ``port``; SourceError."""
+def write_firmware(port: str, channels: int) -> None:
+    """Write the firmware of a board with ``channels`` to the one at ``port``; SourceError."""
+    _need_avrdude()
+    image = firmware_image(channels)
     _avrdude(port, "-U", f"flash:w:{image}:{'e' if image.suffix == '.elf' else 'i'}")
 
 
@@ -135,12 +138,15 @@ def say_identity(identity: BoardIdentity) -> str:
     return f"{identity.current * 1e3:g} mA, id {name}{number}"
 
 
-def _avrdude(port: str, *words: str) -> None:
-    where = f"avrdude, {port}"
+def _need_avrdude() -> None:
     if shutil.which("avrdude") is None:
-        raise SourceError(
-            "avrdude is missing", where=where, hint="on Debian: apt-get install avrdude"
-        )
+        hint = "on Debian: apt-get install avrdude"
+        raise SourceError("avrdude is missing", where="firmware", hint=hint)
+
+
+def _avrdude(port: str, *words: str) -> None:
+    _need_avrdude()
+    where = f"avrdude, {port}"
     try:
         done = subprocess.run(
             [*_AVRDUDE, port, *words],
