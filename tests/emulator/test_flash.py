@@ -75,7 +75,7 @@ def test_an_eeprom_that_was_not_written_is_noticed(tomoskin):
     ("words", "said"),
     [
         (("--current", "150 mA"), "100 mA, which is what the board's parts"),
-        (("--current", "100 mA", "--skin", "tank-16"), "which is what the skin tank-16"),
+        (("--current", "100 mA", "--skin", "tank-16"), "which is what the skin may"),
         (("--current", "0 A"), "1 µA"),
         (("--current", "12 ohm"), "unit of current"),
         (("--id", "much too long"), "1 to 8 ASCII"),

@@ -72,24 +72,29 @@ def configure(
     ] = None,
 ) -> None:
     """Write a board's current and id into its EEPROM, read them back; without either, say them."""
-    from tomoskin.emulator import check_current, read_identity, say_identity, write_identity
-    from tomoskin.emulator.flash import MOST_CURRENT, REFERENCE
+    from tomoskin.emulator import (
+        check_current,
+        read_identity,
+        say_identity,
+        sense_resistor,
+        write_identity,
+    )
     from tomoskin.skin import Skin
 
     asked = None if current is None else quantity(current, "current", "--current")
-    of_skin = Skin.load(skin).current if skin else MOST_CURRENT
+    of_skin = Skin.load(skin).current if skin else None
     if asked is not None:
-        check_current(asked, of_skin, f"the skin {skin}")
+        check_current(asked, of_skin)
     held = read_identity(port)
     if asked is None and name is None:
         typer.echo(f"{port}: {say_identity(held)}")
         return
     identity = held.change(asked, name)
-    check_current(identity.current, of_skin, f"the skin {skin}")
+    check_current(identity.current, of_skin)
     with Bar("writing"):
         write_identity(port, identity)
     typer.echo(f"{port}: {say_identity(identity)}, read back from the firmware")
-    ohms = f"{REFERENCE / identity.current:.4g} Ω"
+    ohms = f"{sense_resistor(identity.current):.4g} Ω"
     typer.echo(f"the firmware cannot measure it: the sense resistor must be {ohms}")
 
 

@@ -5,6 +5,7 @@ from tomoskin.emulator.flash import (
     check_current,
     read_identity,
     say_identity,
+    sense_resistor,
     write_firmware,
     write_identity,
 )
@@ -26,6 +27,7 @@ __all__ = [
     "firmware_image",
     "read_identity",
     "say_identity",
+    "sense_resistor",
     "write_firmware",
     "write_identity",
 ]

@@ -21,7 +21,7 @@ from tomoskin.wire import Decoder, GetInfo, Info, encode
 MOST_CURRENT = 0.1
 """A, that the parts of the board are made for."""
 
-REFERENCE = 1.225
+_REFERENCE = 1.225
 """V across the board's sense resistor."""
 
 _AVRDUDE = ("avrdude", "-q", "-q", "-p", "atmega2560", "-c", "wiring", "-b", "115200", "-D", "-P")
@@ -59,15 +59,21 @@ class BoardIdentity:
         return _EEPROM.pack(round(self.current * 1e6), self.unique_id)
 
 
-def check_current(current: float, limit: float, owner: str) -> None:
-    """SourceError when ``current`` is none, or above what board and ``owner`` may carry, A."""
-    for most, who in ((MOST_CURRENT, "the board's parts"), (limit, owner)):
+def sense_resistor(current: float) -> float:
+    """Ω that set a board's limiter to ``current`` A."""
+    return _REFERENCE / current
+
+
+def check_current(current: float, of_skin: float | None) -> None:
+    """SourceError when ``current`` is none, or above what board and skin may carry, A."""
+    limits = {"the board's parts": MOST_CURRENT, "the skin": of_skin or MOST_CURRENT}
+    for who, most in limits.items():
         if not 1e-6 <= current <= most:
             raise SourceError(
                 f"expected a current of 1 µA to {most * 1e3:g} mA, which is what {who} may "
                 f"carry, got {current * 1e3:g} mA",
                 where="firmware configure",
-                hint=f"fit a sense resistor of {REFERENCE / most:.4g} Ω or more, then say the "
+                hint=f"fit a sense resistor of {sense_resistor(most):.4g} Ω or more, then say the "
                 "current that it gives",
             )
 
