@@ -9,11 +9,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import msgspec
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from tomoskin.core import Event, Image, PixelMap, Touch
-from tomoskin.recording import touches_message
+from tomoskin.core import Event, FloatArray, Image, PixelMap
+from tomoskin.recording import encode_json
+from tomoskin.sink.naming import UNKNOWN, Naming, SpacePose, event_content, touches_content
 from tomoskin.sink.sink import Item, Moment, Stream, TouchPace
 
 TYPES: dict[str, dict[str, str]] = {
@@ -32,6 +33,18 @@ TYPES: dict[str, dict[str, str]] = {
     },
     "geometry_msgs/msg/PoseWithCovarianceStamped": {
         "header": "std_msgs/msg/Header", "pose": "geometry_msgs/msg/PoseWithCovariance",
+    },
+    "geometry_msgs/msg/Vector3": {"x": "float64", "y": "float64", "z": "float64"},
+    "geometry_msgs/msg/Twist": {
+        "linear": "geometry_msgs/msg/Vector3", "angular": "geometry_msgs/msg/Vector3",
+    },
+    "geometry_msgs/msg/TwistWithCovariance": {
+        "twist": "geometry_msgs/msg/Twist", "covariance": "float64[36]",
+    },
+    "nav_msgs/msg/Odometry": {
+        "header": "std_msgs/msg/Header", "child_frame_id": "string",
+        "pose": "geometry_msgs/msg/PoseWithCovariance",
+        "twist": "geometry_msgs/msg/TwistWithCovariance",
     },
     "sensor_msgs/msg/Image": {
         "header": "std_msgs/msg/Header", "height": "uint32", "width": "uint32",
@@ -132,30 +145,20 @@ def _used_by(kind: str) -> set[str]:
     return direct.union(*(_used_by(name) for name in direct))
 
 
-FRAME = "skin"
-"""Name of the sheet's own frame of coordinates: x right, y up, seen from the front; m."""
-
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+ODOMETRY = "nav_msgs/msg/Odometry"
 IMAGE = "sensor_msgs/msg/Image"
 TEXT = "std_msgs/msg/String"
 
-TOPICS = {
-    "tomoskin/touch": POSE,
-    "tomoskin/touches": TEXT,
-    "tomoskin/image": IMAGE,
-    "tomoskin/events": TEXT,
-}
-"""Type of each topic."""
-
-_UNKNOWN = 1e6
-"""Variance of what is not measured, m² or rad²: what filters take for no knowledge."""
+TOPICS = {"touch": POSE, "track": ODOMETRY, "touches": TEXT, "image": IMAGE, "events": TEXT}
+"""Type of each topic, by its name in the skin's namespace."""
 
 Value = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class RosMessage:
-    """A message for ``topic``, its fields by name, of the time ``stamp`` in ns since 1970."""
+    """A message for ``topic`` (of :data:`TOPICS`), its fields by name; ``stamp`` ns since 1970."""
 
     topic: str
     value: Value
@@ -165,65 +168,76 @@ class RosMessage:
 class RosView:
     """Turns results and events into messages."""
 
-    def __init__(self, stream: Stream) -> None:
-        self._stream = stream
+    def __init__(self, stream: Stream, naming: Naming) -> None:
+        self._stream, self._naming = stream, naming
         self._pace = TouchPace()
 
     def of(self, item: Item) -> Iterator[RosMessage]:
         """Messages of one frame, or of an event."""
         stamp = self._stream.log_time(item.host_time)
         for event in (item,) if isinstance(item, Event) else item.told:
-            content = {"time_s": event.host_time, "kind": event.kind, "text": event.text}
-            yield RosMessage("tomoskin/events", _json(content), stamp)
+            content = event_content(self._stream, self._naming, event)
+            yield RosMessage("events", _json(content), stamp)
         if isinstance(item, Event):
             return
         if self._pace.is_due(item):
-            for touch in item.touches:
-                yield RosMessage("tomoskin/touch", _pose(touch, stamp), stamp)
-            yield RosMessage("tomoskin/touches", _json(_touches(item)), stamp)
+            yield from self._touches(item, stamp)
         if item.image is not None and self._stream.pixels is not None:
-            yield RosMessage(
-                "tomoskin/image", _image(item.image, self._stream.pixels, stamp), stamp
-            )
+            yield RosMessage("image", self._image(item.image, self._stream.pixels, stamp), stamp)
+
+    def _touches(self, moment: Moment, stamp: int) -> Iterator[RosMessage]:
+        """Each touch as a pose and as a track, which has its identity; all of them in words."""
+        header = self._header(stamp)
+        for touch in moment.touches:
+            pose = _pose(SpacePose.of(touch.detection, self._stream.surface))
+            yield RosMessage("touch", {"header": header, "pose": pose}, stamp)
+            child = f"{self._naming.frame_id}/touch_{touch.id}"
+            track = {"header": header, "child_frame_id": child, "pose": pose, "twist": _AT_REST}
+            yield RosMessage("track", track, stamp)
+        content = touches_content(self._stream, self._naming, moment)
+        yield RosMessage("touches", _json(content), stamp)
+
+    def _header(self, stamp: int) -> Value:
+        sec, nanosec = divmod(stamp, 1_000_000_000)
+        return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": self._naming.frame_id}
+
+    def _image(self, image: Image, pixels: PixelMap, stamp: int) -> Value:
+        """Change of conductivity as 32-bit floats, the top row first, NaN outside the sheet."""
+        values = image.on_pixels(pixels).astype("<f4")
+        height, width = values.shape
+        return {
+            "header": self._header(stamp),
+            "height": height,
+            "width": width,
+            "encoding": "32FC1",
+            "is_bigendian": 0,
+            "step": 4 * width,
+            "data": values.tobytes(),
+        }
 
 
-def _touches(moment: Moment) -> dict[str, Any]:
-    return touches_message(moment.host_time, moment.sequence, moment.touches)
+def _json(content: Mapping[str, Any]) -> Value:
+    return {"data": encode_json(content).decode()}
 
 
-def _json(content: Any) -> Value:
-    return {"data": msgspec.json.encode(content).decode()}
-
-
-def _header(stamp: int) -> Value:
-    sec, nanosec = divmod(stamp, 1_000_000_000)
-    return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": FRAME}
-
-
-def _pose(touch: Touch, stamp: int) -> Value:
-    """Place in the sheet's plane; what an image does not say has a vast variance."""
-    detection = touch.detection
-    variance = np.array([detection.sd_x**2, detection.sd_y**2, *[_UNKNOWN] * 4])
-    covariance = np.diag(np.where(np.isfinite(variance), variance, _UNKNOWN))
-    if np.isfinite(variance).all():
-        covariance[[0, 1], [1, 0]] = detection.cov_xy
-    pose = {
-        "position": {"x": detection.x, "y": detection.y, "z": 0.0},
-        "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
-    }
-    return {"header": _header(stamp), "pose": {"pose": pose, "covariance": covariance.ravel()}}
-
-
-def _image(image: Image, pixels: PixelMap, stamp: int) -> Value:
-    """Change of conductivity as 32-bit floats, the top row first, NaN outside the sheet."""
-    values = image.on_pixels(pixels).astype("<f4")
-    height, width = values.shape
+def _pose(pose: SpacePose) -> Value:
+    quaternion = Rotation.from_matrix(pose.axes).as_quat()
     return {
-        "header": _header(stamp),
-        "height": height,
-        "width": width,
-        "encoding": "32FC1",
-        "is_bigendian": 0,
-        "step": 4 * width,
-        "data": values.tobytes(),
+        "pose": {
+            "position": _named("xyz", pose.position),
+            "orientation": _named("xyzw", quaternion),
+        },
+        "covariance": pose.covariance.ravel(),
     }
+
+
+def _named(names: str, values: FloatArray) -> Value:
+    return dict(zip(names, values.tolist(), strict=True))
+
+
+_ZERO = _named("xyz", np.zeros(3))
+_AT_REST = {
+    "twist": {"linear": _ZERO, "angular": _ZERO},
+    "covariance": (UNKNOWN * np.eye(6)).ravel(),
+}
+"""Velocities are not measured."""

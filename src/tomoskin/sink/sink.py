@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, Self
 
 from tomoskin.core import Event, FloatArray, GeometryError, Image, PixelMap, Touch
+from tomoskin.mesh import Plane, Surface
 from tomoskin.pattern import Pattern
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.recording import event_of
@@ -30,6 +31,8 @@ class Stream:
         A raster for images; None where the skin has none (a curved sheet).
     epoch
         What is added to a host time to give seconds since 1970.
+    surface
+        What the sheet lies on.
     """
 
     skin: str
@@ -37,6 +40,7 @@ class Stream:
     pattern: Pattern
     pixels: PixelMap | None
     epoch: float
+    surface: Surface = field(default_factory=Plane)
 
     @classmethod
     def of(cls, prepared: Prepared, source: str) -> Self:
@@ -47,6 +51,7 @@ class Stream:
             pattern=prepared.pattern,
             pixels=raster(prepared),
             epoch=epoch(),
+            surface=prepared.skin.surface,
         )
 
     def log_time(self, host_time: float) -> int:
