@@ -112,8 +112,8 @@ def touch_content(stream: Stream, touch: Touch) -> dict[str, Any]:
 
 
 def origin(stream: Stream, naming: Naming, host_time: float) -> dict[str, Any]:
-    """Whose it is, since when in UTC (s since 1970), and in which coordinates."""
-    utc = round(host_time + stream.epoch, 6)
+    """Whose it is, when in UTC (s since 1970; None in a simulation), in which coordinates."""
+    utc = round(host_time + stream.epoch, 6) if stream.epoch else None
     return {"utc_s": utc, "skin": stream.skin, "frame_id": naming.frame_id}
 
 

@@ -98,6 +98,21 @@ def type_hash(kind: str) -> str:
     return "RIHS01_" + hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
 
+def definition(kind: str) -> list[str]:
+    """The text of a message's definition, then that of each message in it, headed by its name."""
+    inner = (f"MSG: {_short(name)}\n{_fields(name)}" for name in sorted(_used_by(kind)))
+    return [_fields(kind), *inner]
+
+
+def _fields(kind: str) -> str:
+    return "\n".join(f"{_short(text)} {name}" for name, text in TYPES[kind].items())
+
+
+def _short(kind: str) -> str:
+    """As definitions name it: without "msg"."""
+    return kind.replace("/msg/", "/")
+
+
 def _put_message(out: bytearray, kind: str, value: Mapping[str, Any]) -> None:
     for name, text in TYPES[kind].items():
         _put(out, _Field.of(text), value[name])
