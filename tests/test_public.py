@@ -56,6 +56,16 @@ def test_the_package_alone_imports_nothing_heavy() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+def test_no_room_imports_what_only_some_work_needs() -> None:
+    slow = ("scipy.stats", "scipy.signal", "matplotlib", "meshio", "dask")
+    code = (
+        "import sys, tomoskin.formats, tomoskin.server, tomoskin.run; "
+        f"print([m for m in {slow} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
 def test_the_flow_in_a_few_lines() -> None:
     """The example of the design page, end to end."""
     skin = tomoskin.Skin.load("textile-disc-8")

@@ -2,6 +2,7 @@
 
 import errno
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -9,10 +10,11 @@ import pytest
 from run.board import Board
 from tomoskin.core import DataError, SourceError
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
-from tomoskin.recording import session_info
+from tomoskin.recording import RawRead, session_info
 from tomoskin.run import Runner, commands
 from tomoskin.run.flow import MOST_AT_ONCE
 from tomoskin.run.publisher import EventLog
+from tomoskin.run.recordings import Recordings
 from tomoskin.twin import Press
 from tomoskin.wire import Start, Stop
 
@@ -255,3 +257,20 @@ def test_a_recording_can_be_ended_and_another_begun(runner, until, tmp_path):
 def test_a_recording_that_cannot_begin_is_said(runner, tmp_path):
     with pytest.raises(DataError, match="cannot be"):
         runner.ask(commands.Record(tmp_path / "none" / "x.mcap"))
+
+
+def test_a_recording_has_its_path_while_its_first_messages_are_made(prepared, tmp_path):
+    """Another thread may ask for it at any moment, and takes None for the end."""
+    path, paths = tmp_path / "x.mcap", []
+
+    def numbered():
+        paths.append(recordings.path)
+        return 0
+
+    recordings = Recordings(prepared, lambda *_: None, time.monotonic, numbered)
+    recordings.begin(path).result(PATIENCE)
+    recordings.put(RawRead(0.0, b""))
+    recordings.end().result(PATIENCE)
+    assert paths
+    assert set(paths) == {path}
+    assert recordings.path is None

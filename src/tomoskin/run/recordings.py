@@ -200,8 +200,8 @@ class Recordings:
         worker = self._awaiting
         if worker is None or not worker.opening.done():
             return
-        self._awaiting = None
         if worker.opening.exception() is not None:
+            self._awaiting = None
             return
         now = self._clock()
         frames, self._touches_before, again = self._pre_roll.begin(self._numbered())
@@ -212,7 +212,7 @@ class Recordings:
         if self._info is not None:
             worker.put(BoardInfo(now, self._info.info))
         self._again = frames if again else ()
-        self._current = worker
+        self._current, self._awaiting = worker, None  # in this order: `path` is read meanwhile
         self._say("recording", f"recording to {worker.consumer.path}")
 
     def _settings(self) -> RunSettings:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from tomoskin.core import FloatArray, ModelError, TomoskinError
 from tomoskin.forward import ForwardModel
@@ -84,7 +84,7 @@ class Demand:
 
         A matched filter's output is a unit normal number, shifted by that size (Kay 1998, 4.3).
         """
-        return float(norm.isf(self.false_alarm) + norm.ppf(self.found))
+        return float(ndtri(self.found) - ndtri(self.false_alarm))
 
     def on(self, mesh: Mesh) -> float:
         """Radius of the press on a mesh, m."""

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from tomoskin.calibration.classifier.examples import Codes, Examples
 from tomoskin.calibration.classifier.mixture import (
@@ -240,5 +240,5 @@ def _limit(strange: FloatArray) -> float:
     """Strangeness that one known frame in a hundred exceeds, from left-out ones (log-normal)."""
     log = np.log(strange)
     n = len(log)
-    reach = student.ppf(_KNOWN, n - 1) * np.sqrt(1 + 1 / n)
+    reach = stdtrit(n - 1, _KNOWN) * np.sqrt(1 + 1 / n)
     return float(np.exp(log.mean() + reach * log.std(ddof=1)))

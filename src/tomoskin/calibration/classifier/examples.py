@@ -10,7 +10,6 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import lfilter
 
 from tomoskin.calibration.locator.presses import frames
 from tomoskin.core import DataError, FloatArray, IntArray
@@ -220,6 +219,8 @@ def against_rest(pressed: ArrayLike, rest: ArrayLike) -> FloatArray:
 
 
 def _filtered(level: FloatArray, gain: float) -> FloatArray:
+    from scipy.signal import lfilter  # noqa: PLC0415 - slow, and only learning needs it
+
     start = (1 - gain) * level[:1]
     return np.asarray(lfilter([gain], [1, gain - 1], level, axis=0, zi=start)[0])
 

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 from scipy.optimize import minimize, nnls
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from tomoskin.calibration.locator.process import Distances, Process, squared_distances
 from tomoskin.core import FloatArray
@@ -19,7 +19,7 @@ _FREEDOM = 5.0
 """Degrees of freedom of the errors: their tail is heavier than a Gaussian's."""
 
 _HOLDS = 0.9
-NINE_IN_TEN = float(chi2.ppf(_HOLDS, 2))
+NINE_IN_TEN = float(chdtri(2, 1 - _HOLDS))
 """Squared length within which nine in ten of a Gaussian's errors lie."""
 
 _RECENT, _FEWEST = 8, 30
