@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
-
-from mcap.writer import CompressionType, Writer
+from typing import TYPE_CHECKING
 
 from tomoskin import __version__
 from tomoskin.core import written
-from tomoskin.formats import Export
 from tomoskin.pipeline import Prepared
 from tomoskin.recording import SessionReader, as_recorded, indexed_frames, replayed
 from tomoskin.sink.naming import Naming
 from tomoskin.sink.ros import TOPICS, RosMessage, RosView, definition, encode_cdr, type_hash
 from tomoskin.sink.sink import Item, Moment, Stream, raster
+
+if TYPE_CHECKING:
+    from mcap.writer import Writer
+
+    from tomoskin.formats import Export
 
 _BETWEEN = "\n" + 80 * "=" + "\n"
 
@@ -28,6 +31,8 @@ def write_bag(job: Export, path: Path) -> None:
     DataError, OutputError
         When the session cannot be replayed, or the file not be written.
     """
+    from mcap.writer import CompressionType, Writer  # noqa: PLC0415 - no live run needs it
+
     prepared, naming = as_recorded(job.session), Naming()
     view = RosView(_stream(prepared, job.session), naming)
     with written(path, overwrite=job.overwrite) as part, part.open("wb") as file:
