@@ -101,6 +101,13 @@ def test_an_installation_without_sources_flashes_its_image(mega, tomoskin, monke
     assert "holds no firmware" in tomoskin("firmware", "flash", mega.port)[2]
 
 
+def test_a_port_that_is_not_there_is_said_at_once(tomoskin):
+    need(["avrdude", "make", "avr-gcc"], "avrdude gcc-avr avr-libc")
+    for command in ("flash", "configure"):
+        code, _, err = tomoskin("firmware", command, "/dev/nowhere")
+        assert (code, "no such port" in err) == (1, True)
+
+
 def _bytes_of(image):
     """An Intel HEX file of one segment: each byte by its address."""
     found = {}

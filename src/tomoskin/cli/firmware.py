@@ -95,7 +95,7 @@ def configure(
         write_identity(port, identity)
     typer.echo(f"{port}: {say_identity(identity)}, read back from the firmware")
     ohms = f"{sense_resistor(identity.current):.4g} Ω"
-    typer.echo(f"the firmware cannot measure it: the sense resistor must be {ohms}")
+    typer.echo(f"the firmware cannot measure it: the sense resistor must be {ohms} in all")
 
 
 @app.command()

@@ -25,8 +25,9 @@ _REFERENCE = 1.225
 """V across the board's sense resistor."""
 
 _AVRDUDE = ("avrdude", "-q", "-q", "-p", "atmega2560", "-c", "wiring", "-b", "115200", "-D", "-P")
-_LONGEST = 120.0
+_LONGEST = 60.0
 _PATIENCE = 5.0
+_HINT = "is it the board's port, and does nothing else use it?"
 _AGAIN = 0.5
 _EEPROM = struct.Struct("<I8s")
 _NEVER_WRITTEN = b"\xff" * 8
@@ -152,6 +153,7 @@ def _need_avrdude() -> None:
 
 def _avrdude(port: str, *words: str) -> None:
     _need_avrdude()
+    SerialTransport(port).close()  # before one that is absent, avrdude waits for ever
     where = f"avrdude, {port}"
     try:
         done = subprocess.run(
@@ -162,11 +164,11 @@ def _avrdude(port: str, *words: str) -> None:
             timeout=_LONGEST,
         )
     except subprocess.TimeoutExpired:
-        raise SourceError(f"nothing after {_LONGEST:.0f} s", where=where) from None
+        raise SourceError(f"nothing after {_LONGEST:.0f} s", where=where, hint=_HINT) from None
     if done.returncode:
         said = "; ".join(line.strip() for line in done.stderr.splitlines() if line.strip())
         raise SourceError(
             f"could not write: {said or 'it did not say why'}",
             where=where,
-            hint="is it the board's port, and does nothing else use it?",
+            hint=_HINT,
         )
