@@ -21,7 +21,7 @@ from sink.conftest import EPOCH, EVENT, VALUES, moment_at, touch_of
 from tomoskin.core import Event, SinkError
 from tomoskin.mesh import Cylinder
 from tomoskin.sink import make_sink
-from tomoskin.sink.naming import Naming
+from tomoskin.sink.naming import Naming, SpacePose
 from tomoskin.sink.ros import (
     IMAGE,
     ODOMETRY,
@@ -127,6 +127,14 @@ def test_on_a_curved_skin_a_touch_is_where_it_is_in_space(stream):
     (told,) = msgspec.json.decode(value["touches"]["data"])["touches"]
     assert told["position"] == pytest.approx(place.tolist())
     assert told["normal"] == pytest.approx([np.sin(angle), 0, np.cos(angle)])
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 3.1), (0, 3.1, 0), (-3, 0.1, 0), (1, 2, -1)])
+def test_an_orientation_is_that_of_its_axes(turn):
+    wanted = Rotation.from_rotvec(turn)
+    pose = SpacePose((0.0, 0.0, 0.0), tuple(wanted.as_matrix().T.tolist()), np.empty((3, 2)))
+    found = Rotation.from_quat(pose.quaternion())
+    assert (found.inv() * wanted).magnitude() == pytest.approx(0, abs=1e-12)
 
 
 def test_two_skins_do_not_meet(rclpy, stream):

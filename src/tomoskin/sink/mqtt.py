@@ -10,7 +10,14 @@ from urllib.parse import SplitResult, unquote, urlsplit
 from tomoskin.core import Event, SinkError
 from tomoskin.recording import encode_json
 from tomoskin.sink.consumer import needed, options_of
-from tomoskin.sink.naming import Naming, event_content, origin, touch_content, touches_content
+from tomoskin.sink.naming import (
+    Naming,
+    event_content,
+    origin,
+    poses_of,
+    touch_content,
+    touches_content,
+)
 from tomoskin.sink.sink import Item, Stream, TouchPace
 
 DEFAULT_PORT = 1883
@@ -65,11 +72,13 @@ class MqttSink:
                 "time_s": event.host_time,
                 "event": event.kind,
                 **origin(self._stream, self._naming, event.host_time),
-                **touch_content(self._stream, event.touch),
+                **touch_content(event.touch, *poses_of(self._stream, (event.touch,))),
             }
             self._put("touch", encode_json(content))
         if self._pace.is_due(item):
-            self._put("touches", encode_json(touches_content(self._stream, self._naming, item)))
+            poses = poses_of(self._stream, item.touches)
+            content = touches_content(self._stream, self._naming, item, poses)
+            self._put("touches", encode_json(content))
 
     def close(self) -> None:
         """Say that we go, and go."""

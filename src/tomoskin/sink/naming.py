@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -16,6 +17,8 @@ from tomoskin.sink.sink import Moment, Stream
 
 UNKNOWN = 1e6
 """Variance of what is not measured, m² or rad²: what filters take for no knowledge."""
+
+Vector = tuple[float, ...]
 
 _NAMESPACE = re.compile(r"[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)
 _FRAME = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)
@@ -64,39 +67,62 @@ class SpacePose:
     Attributes
     ----------
     position
-        (3,) m, on the surface.
+        m, on the surface.
     axes
-        (3, 3) unit vectors as columns: along the sheet's x, across it, and away from the body.
-    covariance
-        (6, 6) of position and rotation, m² and rad²; along the normal, and of rotations, it is
-        :data:`UNKNOWN`.
+        Unit vectors: along the sheet's x, across it, and away from the body.
+    slope
+        (3, 2): derivative of the position by the sheet's x and y.
     """
 
-    position: FloatArray = field(repr=False)
-    axes: FloatArray = field(repr=False)
-    covariance: FloatArray = field(repr=False)
+    position: Vector
+    axes: tuple[Vector, Vector, Vector]
+    slope: FloatArray = field(repr=False)
 
     @classmethod
     def of(cls, detection: Detection, surface: Surface) -> Self:
-        """Where a detection of the sheet is on its ``surface``."""
+        """Where a detection of the sheet is on its ``surface``; plain numbers, which is faster."""
         uv = [[detection.x, detection.y]]
-        (slope,), (normal,) = surface.jacobian(uv), surface.normal(uv)
-        along = slope[:, 0] / np.linalg.norm(slope[:, 0])
-        covariance = UNKNOWN * np.eye(6)
-        covariance[:3, :3] = slope @ _on_sheet(detection) @ slope.T
-        covariance[:3, :3] += UNKNOWN * np.outer(normal, normal)
-        axes = np.column_stack((along, np.cross(normal, along), normal))
-        return cls(surface.point(uv)[0], axes, covariance)
+        slope = surface.jacobian(uv)[0]
+        along, up = map(_unit, slope.T.tolist())
+        normal = _unit(_cross(along, up))
+        x, y, z = surface.point(uv)[0].tolist()
+        return cls((x, y, z), (along, _cross(normal, along), normal), slope)
+
+    def covariance(self, detection: Detection) -> FloatArray:
+        """(6, 6) of position and rotation, m² and rad².
+
+        Along the normal, and of rotations, it is :data:`UNKNOWN`.
+        """
+        found = UNKNOWN * np.eye(6)
+        normal = np.array(self.axes[2])
+        found[:3, :3] = self.slope @ _on_sheet(detection) @ self.slope.T
+        found[:3, :3] += UNKNOWN * normal[:, None] * normal
+        return found
+
+    def quaternion(self) -> tuple[float, ...]:
+        """X, y, z, w of the rotation to the axes; of 4 q qᵀ the row that is best conditioned."""
+        (xx, yx, zx), (xy, yy, zy), (xz, yz, zz) = self.axes
+        rows = (
+            (1 + xx - yy - zz, xy + yx, xz + zx, zy - yz),
+            (xy + yx, 1 - xx + yy - zz, yz + zy, xz - zx),
+            (xz + zx, yz + zy, 1 - xx - yy + zz, yx - xy),
+            (zy - yz, xz - zx, yx - xy, 1 + xx + yy + zz),
+        )
+        return _unit(max(enumerate(rows), key=lambda item: item[1][item[0]])[1])
 
 
-def touches_content(stream: Stream, naming: Naming, moment: Moment) -> dict[str, Any]:
+def poses_of(stream: Stream, touches: Sequence[Touch]) -> list[SpacePose]:
+    """Where each touch is."""
+    return [SpacePose.of(touch.detection, stream.surface) for touch in touches]
+
+
+def touches_content(
+    stream: Stream, naming: Naming, moment: Moment, poses: Sequence[SpacePose]
+) -> dict[str, Any]:
     """All touches of a frame as plain values, with what makes them understood elsewhere."""
-    return {
-        "host_time": moment.host_time,
-        **origin(stream, naming, moment.host_time),
-        "sequence": moment.sequence,
-        "touches": [touch_content(stream, touch) for touch in moment.touches],
-    }
+    rows = [touch_content(*both) for both in zip(moment.touches, poses, strict=True)]
+    about = {"host_time": moment.host_time, **origin(stream, naming, moment.host_time)}
+    return {**about, "sequence": moment.sequence, "touches": rows}
 
 
 def event_content(stream: Stream, naming: Naming, event: Event) -> dict[str, Any]:
@@ -105,10 +131,9 @@ def event_content(stream: Stream, naming: Naming, event: Event) -> dict[str, Any
     return told | origin(stream, naming, event.host_time)
 
 
-def touch_content(stream: Stream, touch: Touch) -> dict[str, Any]:
+def touch_content(touch: Touch, pose: SpacePose) -> dict[str, Any]:
     """One touch: on the sheet, and in space."""
-    pose = SpacePose.of(touch.detection, stream.surface)
-    return touch_row(touch) | {"position": pose.position, "normal": pose.axes[:, 2]}
+    return touch_row(touch) | {"position": pose.position, "normal": pose.axes[2]}
 
 
 def origin(stream: Stream, naming: Naming, host_time: float) -> dict[str, Any]:
@@ -123,3 +148,12 @@ def _on_sheet(detection: Detection) -> FloatArray:
     if np.isfinite(variance).all():
         return np.diag(variance) + detection.cov_xy * np.eye(2)[::-1]
     return np.diag(np.where(np.isfinite(variance), variance, UNKNOWN))
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _unit(vector: Sequence[float]) -> Vector:
+    length = math.hypot(*vector)
+    return tuple(value / length for value in vector)

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from tomoskin.core import Event, FloatArray, Image, PixelMap
+from tomoskin.core import Detection, Event, Image, PixelMap
 from tomoskin.recording import encode_json
-from tomoskin.sink.naming import UNKNOWN, Naming, SpacePose, event_content, touches_content
+from tomoskin.sink.naming import (
+    UNKNOWN,
+    Naming,
+    SpacePose,
+    event_content,
+    poses_of,
+    touches_content,
+)
 from tomoskin.sink.sink import Item, Moment, Stream, TouchPace
 
 TYPES: dict[str, dict[str, str]] = {
@@ -65,10 +72,11 @@ class _Field:
     kind: str
     length: int | None
 
-    @classmethod
-    def of(cls, text: str) -> _Field:
+    @staticmethod
+    @functools.cache
+    def of(text: str) -> _Field:
         kind, bracket, length = text.rstrip("]").partition("[")
-        return cls(kind, int(length or 0) if bracket else None)
+        return _Field(kind, int(length or 0) if bracket else None)
 
     def description(self) -> dict[str, Any]:
         number = _IDS.get(self.kind, _NESTED)
@@ -203,13 +211,14 @@ class RosView:
     def _touches(self, moment: Moment, stamp: int) -> Iterator[RosMessage]:
         """Each touch as a pose and as a track, which has its identity; all of them in words."""
         header = self._header(stamp)
-        for touch in moment.touches:
-            pose = _pose(SpacePose.of(touch.detection, self._stream.surface))
+        poses = poses_of(self._stream, moment.touches)
+        for touch, place in zip(moment.touches, poses, strict=True):
+            pose = _pose(place, touch.detection)
             yield RosMessage("touch", {"header": header, "pose": pose}, stamp)
             child = f"{self._naming.frame_id}/touch_{touch.id}"
             track = {"header": header, "child_frame_id": child, "pose": pose, "twist": _AT_REST}
             yield RosMessage("track", track, stamp)
-        content = touches_content(self._stream, self._naming, moment)
+        content = touches_content(self._stream, self._naming, moment, poses)
         yield RosMessage("touches", _json(content), stamp)
 
     def _header(self, stamp: int) -> Value:
@@ -235,22 +244,19 @@ def _json(content: Mapping[str, Any]) -> Value:
     return {"data": encode_json(content).decode()}
 
 
-def _pose(pose: SpacePose) -> Value:
-    quaternion = Rotation.from_matrix(pose.axes).as_quat()
-    return {
-        "pose": {
-            "position": _named("xyz", pose.position),
-            "orientation": _named("xyzw", quaternion),
-        },
-        "covariance": pose.covariance.ravel(),
+def _pose(pose: SpacePose, detection: Detection) -> Value:
+    place = {
+        "position": _named("xyz", pose.position),
+        "orientation": _named("xyzw", pose.quaternion()),
     }
+    return {"pose": place, "covariance": pose.covariance(detection).ravel()}
 
 
-def _named(names: str, values: FloatArray) -> Value:
-    return dict(zip(names, values.tolist(), strict=True))
+def _named(names: str, values: Sequence[float]) -> Value:
+    return dict(zip(names, values, strict=True))
 
 
-_ZERO = _named("xyz", np.zeros(3))
+_ZERO = _named("xyz", (0.0, 0.0, 0.0))
 _AT_REST = {
     "twist": {"linear": _ZERO, "angular": _ZERO},
     "covariance": (UNKNOWN * np.eye(6)).ravel(),
