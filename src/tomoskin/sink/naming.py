@@ -125,10 +125,13 @@ def touches_content(
     return {**about, "sequence": moment.sequence, "touches": rows}
 
 
-def event_content(stream: Stream, naming: Naming, event: Event) -> dict[str, Any]:
-    """An event as plain values."""
+def event_content(
+    stream: Stream, naming: Naming, event: Event, *, of_frame: bool = False
+) -> dict[str, Any]:
+    """An event as plain values; of a replay only those of its frames are known in UTC."""
     told = {"time_s": event.host_time, "kind": event.kind, "text": event.text}
-    return told | origin(stream, naming, event.host_time)
+    unknown = {"utc_s": None} if stream.replayed and not of_frame else {}
+    return told | origin(stream, naming, event.host_time) | unknown
 
 
 def touch_content(touch: Touch, pose: SpacePose) -> dict[str, Any]:

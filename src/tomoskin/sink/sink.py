@@ -33,6 +33,8 @@ class Stream:
         What is added to a host time to give seconds since 1970.
     surface
         What the sheet lies on.
+    replayed
+        Whether frames have the times of a recording, and ``epoch`` is theirs.
     """
 
     skin: str
@@ -41,17 +43,19 @@ class Stream:
     pixels: PixelMap | None
     epoch: float
     surface: Surface = field(default_factory=Plane)
+    replayed: bool = False
 
     @classmethod
-    def of(cls, prepared: Prepared, source: str) -> Self:
-        """Of a run that begins now; ``source`` in words."""
+    def of(cls, prepared: Prepared, source: str, recorded: float | None = None) -> Self:
+        """Of a run that begins now; ``source`` in words; ``recorded``: the epoch of a replay."""
         return cls(
             skin=prepared.skin.name,
             source=source,
             pattern=prepared.pattern,
             pixels=raster(prepared),
-            epoch=epoch(),
+            epoch=epoch() if recorded is None else recorded,
             surface=prepared.skin.surface,
+            replayed=recorded is not None,
         )
 
     def log_time(self, host_time: float) -> int:
