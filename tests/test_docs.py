@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tomoskin.cli import main
 from tomoskin.core import Image
 from tomoskin.skin import Skin
 
@@ -89,7 +90,7 @@ def test_the_readme_computes_a_picture() -> None:
     assert isinstance(names["image"], Image)
 
 
-def test_the_first_steps_give_a_touch(tmp_path: Path) -> None:
+def test_the_first_steps_give_a_touch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The script on the page of the first steps: simulated, and the press found in it."""
     page = (DOCS / "start.md").read_text(encoding="utf-8")
     script = re.search(r"^```toml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
@@ -101,12 +102,11 @@ def test_the_first_steps_give_a_touch(tmp_path: Path) -> None:
         if line.startswith(("tomoskin simulate", "tomoskin session", "tomoskin image"))
     ]
     assert [step[0] for step in steps] == ["simulate", "session", "image"]
+    monkeypatch.chdir(tmp_path)
     for step in steps:
-        done = subprocess.run(
-            [sys.executable, "-c", "from tomoskin.cli import main; main()", *step],
-            cwd=tmp_path, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
+        with pytest.raises(SystemExit) as end:
+            main(step)
+        assert not end.value.code
     rows = (tmp_path / "touches.csv").read_text().splitlines()[1:]
     places = [tuple(map(float, row.split(",")[3:5])) for row in rows]
     assert len(places) > 10

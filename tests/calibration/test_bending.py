@@ -54,7 +54,7 @@ def test_angle_and_axis_of_a_bend_along_any_axis():
     features = [
         Memory(model.n_modes, model.size, remembers=model.remembers).push(row, 0.0) for row in z
     ]
-    told, turned = model.told(np.array(features) @ model.weights)
+    told, turned = model.predict(np.array(features) @ model.weights)
     assert np.degrees(told) == pytest.approx(np.degrees(angle), abs=2.0)
     assert np.degrees(turned) == pytest.approx(np.degrees(axis), abs=2.0)
 

@@ -71,7 +71,7 @@ def test_which_way_round_the_electrodes_go_is_found() -> None:
     turns = Rotations.of(PATTERN)
     for way, angle in ((1, turns.angle), (-1, turns.reversed().angle)):
         dv, xy = alike(12, 0, way)
-        np.testing.assert_array_equal(ChannelMaps.of(xy / RADIUS, dv, turns).turns.angle, angle)
+        np.testing.assert_array_equal(ChannelMaps.of(xy / RADIUS, dv, turns).rotations.angle, angle)
 
 
 def test_rows_that_are_not_alike_all_round_lose_little() -> None:

@@ -53,6 +53,7 @@ def document(output: tuple[int, str, str]) -> Any:
     return json.loads(text)
 
 
+@pytest.mark.slow
 def test_with_a_recording_every_rule_chooses(
     tomoskin: Command, recording: Path, tmp_path: Path
 ) -> None:

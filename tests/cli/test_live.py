@@ -58,7 +58,7 @@ def end(process, number):
     "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
 )
 def test_it_serves_at_the_printed_address_and_ends_cleanly(start, number):
-    process = start("--port", "0", "--source", "twin:fast")
+    process = start("--port", "0")
     line = process.stdout.readline()
     address = re.fullmatch(
         r"twin of textile-disc-8 is live at (http://127\.0\.0\.1:(\d+)/)(\?token=\S+)\n", line
@@ -85,16 +85,6 @@ def test_a_signal_before_it_is_ready_is_a_clean_end_too(number):
     assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
 
 
-def test_json(start):
-    process = start("--port", "0", "--source", "twin:fast", "--json")
-    started = json.loads(process.stdout.readline())
-    code, out, errors = end(process, signal.SIGTERM)
-    assert (code, errors) == (0, "")
-    assert started["type"] == "listening"
-    assert str(started["port"]) in started["address"]
-    assert json.loads(out)["type"] == "stopped"
-
-
 def test_a_port_in_use_is_one_sentence(refused):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
@@ -104,14 +94,6 @@ def test_a_port_in_use_is_one_sentence(refused):
         f"tomoskin: port {port}: the port is in use, perhaps by another tomoskin "
         "(choose another with --port, or any free one with --port 0)\n"
     )
-
-
-def test_other_hosts_are_warned_about(start):
-    process = start("--port", "0", "--host", "0.0.0.0", "--source", "twin:fast")
-    process.stdout.readline()
-    code, _, errors = end(process, signal.SIGTERM)
-    assert code == 0
-    assert "warning: --host 0.0.0.0" in errors
 
 
 @pytest.mark.parametrize(
@@ -141,13 +123,22 @@ def test_wrong_usage(refused, arguments):
 
 
 def test_it_records_from_the_first_byte_to_the_end(start, tmp_path):
+    """In JSON, and for any host, of which it warns."""
     path = tmp_path / "run.mcap"
-    process = start("--port", "0", "--source", "twin:fast", "--record", str(path), "--json")
-    assert json.loads(process.stdout.readline())["type"] == "listening"
+    process = start(
+        *("--port", "0", "--host", "0.0.0.0", "--source", "twin:fast"),
+        *("--record", str(path), "--json"),
+    )
+    started = json.loads(process.stdout.readline())
+    assert started["type"] == "listening"
+    assert str(started["port"]) in started["address"]
     while session_info(path).frames < 30:
         threading.Event().wait(0.05)
-    code, _, errors = end(process, signal.SIGTERM)
-    assert (code, errors) == (0, "")
+    code, out, errors = end(process, signal.SIGTERM)
+    assert code == 0
+    assert json.loads(out)["type"] == "stopped"
+    (warning,) = errors.splitlines()
+    assert "warning: --host 0.0.0.0" in warning
     found = session_info(path)
     assert not found.torn
     assert found.frames >= 30

@@ -93,6 +93,8 @@ NEW_ONLY = {
 
 BOTH = [pytest.param(case, id=" ".join(name)) for name, case in (CASES | NEW_ONLY).items()]
 FORCED = [pytest.param(case, id=" ".join(name)) for name, case in CASES.items()]
+LONG = {"skin alpha out", "design out"}
+"""Work of many seconds before they write."""
 
 
 def force(case: Case) -> tuple[str, ...]:
@@ -235,7 +237,13 @@ def test_a_failure_leaves_the_old_file(
     assert sorted(tmp_path.iterdir()) == [tmp_path / "broken", mine]
 
 
-@pytest.mark.parametrize("case", FORCED)
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(*case.values, id=case.id, marks=[pytest.mark.slow] * (case.id in LONG))
+        for case in FORCED
+    ],
+)
 def test_with_force_a_file_is_written_over(
     tomoskin: Run,
     tmp_path: Path,

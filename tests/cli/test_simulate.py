@@ -143,6 +143,7 @@ def test_a_skin_whose_board_does_not_settle(tomoskin, script, tmp_path, how):
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_a_cluster_that_is_not_there(tomoskin, tmp_path):
     drawn = ("simulate", "--presses", 3, "--out", tmp_path / "set")
     code, _, error = tomoskin(*drawn, "--cluster", "nonsense://")

@@ -25,7 +25,17 @@ MEASURED = [
 ]
 
 
-@pytest.mark.parametrize("name", [*MEASURED, "fig31_mesh"])
+LONG = {"fig59_four_probes", "patterns_and_priors"}
+"""What they measure, others measure more quickly."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name in LONG))
+        for name in [*MEASURED, "fig31_mesh"]
+    ],
+)
 def test_the_figure_is_made_and_the_numbers_hold(ran, gallery, name):
     run = ran(name)
     assert run.found.keys() == gallery[name].keys()

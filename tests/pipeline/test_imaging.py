@@ -148,7 +148,7 @@ def test_alpha_that_follows_the_noise_takes_the_filter_with_it() -> None:
 def test_the_floor_is_the_noise_of_the_filtered_images() -> None:
     source = frames(seed=4)
     pipeline = settled(filtered(), source)
-    results = [shown(pipeline.push(make(False))) for make in islice(source, 3000)]
+    results = [shown(pipeline.push(make(False))) for make in islice(source, 1500)]
     images = np.array([r.image.values for r in results])[200:]
     following = pipeline._state
     assert isinstance(following, Following)

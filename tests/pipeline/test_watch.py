@@ -98,7 +98,7 @@ def test_when_too_many_electrodes_are_gone_it_says_so(feed, sixteen, touched):
 
 def test_a_change_of_all_voltages_alike_is_no_touch(feed, sixteen, resting):
     warmer = samples_of(sixteen, np.full(len(sixteen.mesh.cells), 0.97 * sixteen.skin.conductivity))
-    plain = Feed(prepare(sixteen.skin.altered({"signal": {"common_modes": "kept"}})))
+    plain = Feed(prepare(sixteen.skin.altered({"signal": {"common_modes": "kept"}}), sixteen))
     plain(resting, NEEDED + 5)
     shown = [np.abs(f(warmer).image.values).max() for f in (feed, plain)]
     assert shown[0] < 0.5 * shown[1]
@@ -107,7 +107,7 @@ def test_a_change_of_all_voltages_alike_is_no_touch(feed, sixteen, resting):
 
 def test_a_prior_that_leaves_the_constant_free_makes_none_of_the_gain(sixteen, resting, touched):
     """Laplace's constant is what all voltages in proportion tell, which is taken out."""
-    laplace = Feed(prepare(sixteen.skin.altered({"inverse": {"prior": "laplace"}})))
+    laplace = Feed(prepare(sixteen.skin.altered({"inverse": {"prior": "laplace"}}), sixteen))
     laplace(resting, NEEDED + 5)
     result = laplace(touched, 6)
     values = np.abs(result.image.values)

@@ -18,13 +18,10 @@ SOON, LATE = (3, 0), (70, 0)
     ("changes", "untouched"),
     [
         ({"inverse": {"alpha": 0.3}}, SOON),
-        ({"inverse": {"alpha": 0.3}}, (3, 15)),
         ({"inverse": {"alpha": 0.3}}, (10, 40)),
         ({"inverse": {"alpha": 0.3}}, LATE),
-        ({"inverse": {"alpha": "auto", "prior": "gaussian"}}, SOON),
         ({"inverse": {"alpha": "auto"}, "touch": {"gamma1": 0.7}}, (70, 30)),
         ({"inverse": {"time_constant": "50 ms"}}, LATE),
-        ({"touch": {"snr": 8.0}}, LATE),
         ({"touch": {"method": "fit"}}, LATE),
     ],
 )

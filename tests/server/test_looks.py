@@ -17,7 +17,6 @@ pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 SIZES = {
     (1280, 720): False,
     (1440, 900): False,
-    (1024, 768): False,
     (820, 1180): True,
     (390, 844): True,
 }

@@ -41,13 +41,13 @@ _USUAL = 0.99
 class TouchHypotheses:
     """Log-likelihoods of a frame: one touch, two close together, two apart; and the latter two.
 
-    ``places`` (2, 2) and ``spread`` (2, 2, 2) are m and m²; ``gains`` (2,).
+    ``positions`` (2, 2) and ``spread`` (2, 2, 2) are m and m²; ``gains`` (2,).
     """
 
     one: float
     close: float
     apart: float
-    places: FloatArray
+    positions: FloatArray
     spread: FloatArray
     gains: FloatArray
 
@@ -71,7 +71,7 @@ class Several:
     ----------
     locator
         What single presses have taught.
-    places, changes
+    positions, changes
         (g, 2) in the locator's unit; (g, k) dv there over the features' scale.
     variance
         (k,) of whitened features about the maps, mean over the places.
@@ -80,7 +80,7 @@ class Several:
     """
 
     locator: Locator
-    places: FloatArray
+    positions: FloatArray
     changes: FloatArray
     variance: FloatArray
     usual: float
@@ -89,12 +89,14 @@ class Several:
     def of(cls, locator: Locator) -> Self:
         """Read the maps of ``locator``."""
         maps, grid = _maps(locator), locator.estimates.grid
-        places = grid[_spread_out(grid, _PLACES)]
-        changes, variance = np.sinh(maps.features_at(places)), maps.at(places)[1]
-        new = cls(locator, places, changes, variance.mean(axis=0), -np.inf)
+        positions = grid[_spread_out(grid, _PLACES)]
+        changes, variance = np.sinh(maps.features_at(positions)), maps.at(positions)[1]
+        new = cls(locator, positions, changes, variance.mean(axis=0), -np.inf)
         presses = new._features(locator.presses.dv)
         single = np.array([new._single(frame).max() for frame in presses])
-        return cls(locator, places, changes, new.variance, float(np.quantile(single, 1 - _USUAL)))
+        return cls(
+            locator, positions, changes, new.variance, float(np.quantile(single, 1 - _USUAL))
+        )
 
     def __call__(self, dv: ArrayLike) -> list[tuple[Detection, ...]]:
         """Readings of each frame (n, n_meas): two, or one, which may be ``close``.
@@ -103,22 +105,24 @@ class Several:
         DataError as :meth:`Locator.predict` does.
         """
         data = frames(dv, self.locator.presses.dv.shape[1])
-        places, covariance = self.locator.predict(data)
+        positions, covariance = self.locator.predict(data)
         strength = self.locator.strength(data)
-        found: list[tuple[Detection, ...]] = []
+        detections: list[tuple[Detection, ...]] = []
         for k, frame in enumerate(self._features(data)):
-            alone = _reading(places[k], covariance[k], float(strength[k]))
+            alone = _reading(positions[k], covariance[k], float(strength[k]))
             if self._single(frame).max() >= self.usual:
-                found.append((alone,))
+                detections.append((alone,))
                 continue
             evidence = self.evidence(frame)
             if evidence.says == "two":
-                pair = zip(evidence.places, evidence.spread, evidence.gains, strict=True)
-                found.append(tuple(_reading(at, cov, float(gain)) for at, cov, gain in pair))
+                pair = zip(evidence.positions, evidence.spread, evidence.gains, strict=True)
+                detections.append(tuple(_reading(at, cov, float(gain)) for at, cov, gain in pair))
             else:
                 close = evidence.says == "close"
-                found.append((_reading(places[k], covariance[k], float(strength[k]), close),))
-        return found
+                detections.append(
+                    (_reading(positions[k], covariance[k], float(strength[k]), close),)
+                )
+        return detections
 
     def evidence(self, frame: FloatArray) -> TouchHypotheses:
         """What the features (k,) of one frame say."""
@@ -139,7 +143,7 @@ class Several:
             one=float(single.max()),
             close=close[0],
             apart=apart[0],
-            places=self.locator.region.metres(np.stack([mean for mean, _ in pair])),
+            positions=self.locator.region.metres(np.stack([mean for mean, _ in pair])),
             spread=self.locator.region.unit**2 * np.stack([cov for _, cov in pair]),
             gains=_GAINS[np.array(apart[1:]) % len(_GAINS)],
         )
@@ -183,33 +187,33 @@ class Several:
         """The likeliest touch, then others spread over the skin."""
         by_place = single.reshape(-1, len(_GAINS))
         first = int(by_place.max(axis=1).argmax())
-        for place in _spread_out(self.places, _SEEDS, first):
+        for place in _spread_out(self.positions, _SEEDS, first):
             yield int(place) * len(_GAINS) + int(by_place[place].argmax())
 
     def _best(self, given: FloatArray, fixed: int) -> dict[bool, tuple[float, int]]:
         """Best partner of the touch ``fixed``, close to it and apart from it."""
         apart = self._is_apart[fixed // len(_GAINS)]
-        found = {}
+        best = {}
         for kind in (False, True):
             rows = np.flatnonzero(np.repeat(apart == kind, len(_GAINS)))
             if len(rows):
                 top = int(rows[given[rows].argmax()])
-                found[kind] = (float(given[top]), top)
-        return found
+                best[kind] = (float(given[top]), top)
+        return best
 
     @cached_property
     def _is_apart(self) -> NDArray[np.bool_]:
         limit = _CLOSE * _maps(self.locator).basis.likeness.length
-        return squared_distances(self.places, self.places) > limit**2
+        return squared_distances(self.positions, self.positions) > limit**2
 
     def _about(self, frame: FloatArray, fixed: int, near: int) -> tuple[FloatArray, FloatArray]:
         """Mean (2,) and covariance (2, 2) of a touch about ``near``, the other one given."""
         given = self._log_likelihood(frame, fixed)
         limit = _maps(self.locator).basis.likeness.length
-        centre = self.places[near // len(_GAINS)]
-        around = squared_distances(self.places, centre[None])[:, 0] <= limit**2
+        centre = self.positions[near // len(_GAINS)]
+        around = squared_distances(self.positions, centre[None])[:, 0] <= limit**2
         weight = np.exp(given - given.max()).reshape(-1, len(_GAINS)).sum(axis=1) * around
-        mean, covariance = moments((weight / weight.sum())[None], self.places)
+        mean, covariance = moments((weight / weight.sum())[None], self.positions)
         return mean[0], covariance[0] + np.eye(2) * np.pi / (12 * _PLACES)
 
 
@@ -217,13 +221,13 @@ def _maps(locator: Locator) -> ResponseMaps:
     return locator.estimates.likelihood.maps
 
 
-def _spread_out(places: FloatArray, count: int, first: int = 0) -> IntArray:
+def _spread_out(positions: FloatArray, count: int, first: int = 0) -> IntArray:
     """Indices of ``count`` places, each the farthest from those before (Gonzalez 1985)."""
     chosen = [first]
-    nearest = squared_distances(places, places[[first]])[:, 0]
-    while len(chosen) < min(count, len(places)):
+    nearest = squared_distances(positions, positions[[first]])[:, 0]
+    while len(chosen) < min(count, len(positions)):
         chosen.append(int(nearest.argmax()))
-        nearest = np.minimum(nearest, squared_distances(places, places[[chosen[-1]]])[:, 0])
+        nearest = np.minimum(nearest, squared_distances(positions, positions[[chosen[-1]]])[:, 0])
     return np.array(chosen)
 
 

@@ -23,13 +23,13 @@ def choose_engine() -> Engine:
     ModelError
         When the variable names no engine, or the native one, and that does not work.
     """
-    wanted = os.environ.get(VARIABLE, "")
-    if wanted not in ("", "scipy", "native"):
-        raise ModelError(f"expected {VARIABLE} to be scipy or native, got {wanted!r}")
-    if wanted == "scipy":
+    choice = os.environ.get(VARIABLE, "")
+    if choice not in ("", "scipy", "native"):
+        raise ModelError(f"expected {VARIABLE} to be scipy or native, got {choice!r}")
+    if choice == "scipy":
         return Scipy(f"{VARIABLE} asks for it")
     engine = _native()
-    if wanted == "native" and not isinstance(engine, Native):
+    if choice == "native" and not isinstance(engine, Native):
         raise ModelError(
             f"{VARIABLE} asks for the native engine, but {engine.reason}",
             hint="install tomoskin-core (pip install ./core-native), or unset the variable",

@@ -46,10 +46,10 @@ class Native:
         self, matrix: Compressed, rhs: NDArray[Any], solution: NDArray[Any]
     ) -> tuple[NDArray[Any], float]:
         """See :class:`Engine`."""
-        found: tuple[NDArray[Any], float] = self.core.residual(
+        residual: tuple[NDArray[Any], float] = self.core.residual(
             matrix.indptr, matrix.indices, matrix.values, rhs, solution
         )
-        return found
+        return residual
 
     def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
         """See :class:`Engine`."""

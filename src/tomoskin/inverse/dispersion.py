@@ -223,7 +223,7 @@ class Cole:
         """
         f, gamma = _checked(frequency, admittivity)
         weight = _weight(sd, gamma)
-        best = min(_fits(f, gamma, weight), key=lambda found: float(found.cost))
+        best = min(_fits(f, gamma, weight), key=lambda fit: float(fit.cost))
         free = 2 * len(f) - 4
         scale = 1.0 if sd is not None else 2.0 * float(best.cost) / free
         sigma0, sigma1, tau = (float(value) for value in np.exp(best.x[:3]))

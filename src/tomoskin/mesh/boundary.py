@@ -201,8 +201,8 @@ def _graded(
     steps = np.diff(s) * (density[1:] + density[:-1]) / 2
     count = np.concatenate([[0.0], np.cumsum(steps)])
     parts = max(least, round(float(count[-1])))
-    wanted = np.arange(parts) * (count[-1] / parts)
-    return np.asarray(start + np.interp(wanted, count, s))
+    target = np.arange(parts) * (count[-1] / parts)
+    return np.asarray(start + np.interp(target, count, s))
 
 
 def _split_encroached(

@@ -67,7 +67,7 @@ def _numbered(groups: Mapping[str, IntArray]) -> list[str]:
     found = {name: m for name in groups if (m := _NUMBERED.fullmatch(name.strip()))}
     if not found:
         raise GeometryError(
-            f"no group is named as an electrode (E1, E2, …); {_known(groups)}",
+            f"no group is named as an electrode (E1, E2, …); {_listing(groups)}",
             hint="say which facets are electrodes: electrodes=…",
         )
     return sorted(found, key=lambda name: int(found[name][1]))
@@ -76,11 +76,11 @@ def _numbered(groups: Mapping[str, IntArray]) -> list[str]:
 def _named(groups: Mapping[str, IntArray], names: Sequence[str]) -> list[IntArray]:
     for name in names:
         if name not in groups:
-            raise GeometryError(f'no group of facets is named "{name}"; {_known(groups)}')
+            raise GeometryError(f'no group of facets is named "{name}"; {_listing(groups)}')
     return [groups[name] for name in names]
 
 
-def _known(groups: Mapping[str, IntArray]) -> str:
+def _listing(groups: Mapping[str, IntArray]) -> str:
     return f"groups: {', '.join(groups)}" if groups else "the file has no groups of facets"
 
 

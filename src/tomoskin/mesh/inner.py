@@ -76,8 +76,8 @@ def _hexagonal(rim: Boundary, field: SizeField, random: np.random.Generator) -> 
         spacing, angle = spacing / math.sqrt(3), angle + math.pi / 6
         xy = origin + steps @ _basis(spacing, angle)
         candidates = _clear_of_rim(xy[new], rim, field)
-        wanted = (spacing / field(candidates)) ** 2  # of this level's density
-        kept = random.uniform(size=len(candidates)) < (3 * wanted - 1) / 2
+        target = (spacing / field(candidates)) ** 2  # of this level's density
+        kept = random.uniform(size=len(candidates)) < (3 * target - 1) / 2
         chosen.append(candidates[kept])
         if spacing <= field.sizes.min():
             break

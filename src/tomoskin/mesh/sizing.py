@@ -40,8 +40,8 @@ class SizeField:
         k = min(8, len(self.sizes))
         gap, index = self._tree.query(xy, k=k, distance_upper_bound=reach)
         padded = np.append(self.sizes, np.inf)  # the tree says n for "no neighbour"
-        found = (padded[index] + self.growth * gap).reshape(len(xy), k).min(axis=1)
-        return np.asarray(np.minimum(found, self.coarse))
+        size = (padded[index] + self.growth * gap).reshape(len(xy), k).min(axis=1)
+        return np.asarray(np.minimum(size, self.coarse))
 
     @cached_property
     def _tree(self) -> cKDTree:

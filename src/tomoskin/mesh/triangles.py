@@ -39,10 +39,10 @@ def facets(cells: IntArray) -> tuple[IntArray, IntArray]:
     return facet, np.tile(np.arange(len(cells)), k)
 
 
-def owners(cells: IntArray, wanted: IntArray) -> IntArray:
-    """(n,) a cell that each facet of ``wanted`` (n, k − 1) belongs to, by its corners."""
+def owners(cells: IntArray, chosen: IntArray) -> IntArray:
+    """(n,) a cell that each facet of ``chosen`` (n, k − 1) belongs to, by its corners."""
     facet, owner = facets(cells)
-    both = np.concatenate([facet, np.sort(wanted, axis=1)])
+    both = np.concatenate([facet, np.sort(chosen, axis=1)])
     number = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
     of = np.empty(number.max() + 1, dtype=np.int64)
     of[number[: len(facet)]] = owner

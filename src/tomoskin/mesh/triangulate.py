@@ -63,9 +63,9 @@ def triangulate(
     corners = np.unique(breaks)
     fewest = math.inf
     for growth in GROWTHS:
-        wanted = float(cells)
+        target = float(cells)
         for _ in range(_RETRIES):
-            plan = _sized(outline, arcs, corners, wanted, growth=growth, seed=seed)
+            plan = _sized(outline, arcs, corners, target, growth=growth, seed=seed)
             inner = smoothed(plan.rim, plan.inner, plan.field)
             table = triangles(plan.rim, inner)
             if abs(len(table) / cells - 1) <= TOLERANCE:
@@ -74,7 +74,7 @@ def triangulate(
             fewest = min(fewest, len(table))
             if plan.miss > TOLERANCE:
                 break  # the wanted number is out of reach: let cells grow faster
-            wanted *= cells / len(table)
+            target *= cells / len(table)
     raise GeometryError(
         f"{cells} cells cannot resolve this outline and its electrodes",
         hint=f"ask for {1.5 * max(fewest, cells):.0f} cells or more",
@@ -130,8 +130,8 @@ def _facets(rim: Boundary, n_electrodes: int) -> tuple[IntArray, ...]:
     result = []
     for number in range(n_electrodes):
         own = np.flatnonzero(rim.owner == number)
-        jump = np.flatnonzero(np.diff(own) > 1)  # where the arc runs through the first node
-        result.append(edges[np.roll(own, -1 - jump[0]) if len(jump) else own])
+        gap = np.flatnonzero(np.diff(own) > 1)  # where the arc runs through the first node
+        result.append(edges[np.roll(own, -1 - gap[0]) if len(gap) else own])
     return tuple(result)
 
 

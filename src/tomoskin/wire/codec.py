@@ -110,10 +110,10 @@ def encode_payload(message: Message) -> bytes:
 
 def _pack_tail(layout: Layout, items: Any) -> bytes:
     if layout.tail_record is None:
-        samples, wanted = np.asarray(items), np.dtype(_DTYPES[layout.spec.fields[-1].item])
-        if samples.dtype != wanted or samples.ndim != 1:
+        samples, expected = np.asarray(items), np.dtype(_DTYPES[layout.spec.fields[-1].item])
+        if samples.dtype != expected or samples.ndim != 1:
             raise WireError(
-                f"expected samples (n,) of {wanted}, got {samples.shape} of {samples.dtype}",
+                f"expected samples (n,) of {expected}, got {samples.shape} of {samples.dtype}",
                 where=layout.spec.name,
             )
         return samples.tobytes()

@@ -22,10 +22,10 @@ def pack(samples: NDArray[np.uint16]) -> NDArray[np.uint8]:
 
 def unpack(packed: NDArray[np.uint8]) -> NDArray[np.uint16]:
     """(n,) samples; :func:`packed_size_fits` of the length."""
-    whole = len(packed) // (_GROUP + 1)
-    groups = packed[: whole * (_GROUP + 1)].reshape(whole, _GROUP + 1)
+    n_groups = len(packed) // (_GROUP + 1)
+    groups = packed[: n_groups * (_GROUP + 1)].reshape(n_groups, _GROUP + 1)
     samples = _join(groups[:, :_GROUP], groups[:, _GROUP:]).ravel()
-    rest = packed[whole * (_GROUP + 1) :]
+    rest = packed[n_groups * (_GROUP + 1) :]
     return np.append(samples, _join(rest[:-1], rest[-1:])) if len(rest) else samples
 
 

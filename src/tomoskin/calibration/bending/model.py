@@ -141,9 +141,9 @@ class BendModel:
             When the bends do not show above the noise.
         """
         whiten = Whitener.of(covariance)
-        seen = whiten(examples.dv)
-        _, singular, rows = np.linalg.svd(seen, full_matrices=False)
-        edge = np.sqrt(seen.shape[1]) + np.sqrt(len(seen))
+        whitened = whiten(examples.dv)
+        _, singular, rows = np.linalg.svd(whitened, full_matrices=False)
+        edge = np.sqrt(whitened.shape[1]) + np.sqrt(len(whitened))
         count = min(int(np.count_nonzero(singular > _ABOVE * edge)), _MOST)
         if count == 0:
             raise DataError(
@@ -151,12 +151,12 @@ class BendModel:
                 hint="bend it farther, or check that the frames are those of the angles",
             )
         directions = np.linalg.pinv(whiten.matrix) @ rows[:count].T
-        z = seen @ rows[:count].T
+        z = whitened @ rows[:count].T
         size = float(np.linalg.norm(z, axis=1).max())
         plays, weights, errors = min(
             ((plays, *_regressed(_features(z, examples, size, plays), examples))
              for plays in (None, Memory.plays_after(z, size))),
-            key=lambda found: np.mean(found[2] ** 2) * (_WORTH if found[0] is None else 1.0),
+            key=lambda fit: np.mean(fit[2] ** 2) * (_WORTH if fit[0] is None else 1.0),
         )  # fmt: skip
         return cls(examples, covariance, directions, weights, plays, errors, size)
 
@@ -193,10 +193,10 @@ class BendModel:
         """Rad, root mean square by which left-out angles are missed."""
         return float(np.sqrt(np.mean(self._angles(self.examples.targets - self.errors) ** 2)))
 
-    def _angles(self, told: FloatArray) -> FloatArray:
-        return np.asarray(self.told(told)[0] - self.examples.angle)
+    def _angles(self, targets: FloatArray) -> FloatArray:
+        return np.asarray(self.predict(targets)[0] - self.examples.angle)
 
-    def told(self, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def predict(self, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(n,) angle and axis, rad, of ``targets`` (n, t)."""
         if targets.shape[1] == 1:
             axes = self.examples.axes
@@ -219,14 +219,14 @@ def _regressed(features: FloatArray, examples: BendExamples) -> tuple[FloatArray
     targets, scale = examples.targets, np.abs(features).max(axis=0) + 1e-12
     x = features / scale
     fold = np.arange(len(x)) * _FOLDS // len(x)
-    found = []
+    candidates = []
     for ridge in _RIDGES:
         errors = np.zeros_like(targets)
         for k in range(_FOLDS):
             out = fold == k
             errors[out] = targets[out] - x[out] @ _ridge(x[~out], targets[~out], ridge)
-        found.append((float(np.mean(errors**2)), ridge, errors))
-    _, ridge, errors = min(found, key=lambda one: one[0])
+        candidates.append((float(np.mean(errors**2)), ridge, errors))
+    _, ridge, errors = min(candidates, key=lambda one: one[0])
     return _ridge(x, targets, ridge) / scale[:, None], errors
 
 

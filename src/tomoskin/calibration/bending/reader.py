@@ -84,13 +84,13 @@ class BendReader:
         data = model.whiten(dv) - change
         beside = np.hstack([model.whiten(common.T).T, free])
         columns = np.hstack([self._modes, beside / (np.linalg.norm(beside, axis=0) + 1e-300)])
-        found, _, rank, _ = np.linalg.lstsq(columns, data, rcond=1e-9)
-        z = found[: model.n_modes]
-        left = data - columns @ found
+        fitted, _, rank, _ = np.linalg.lstsq(columns, data, rcond=1e-9)
+        z = fitted[: model.n_modes]
+        left = data - columns @ fitted
         explained = np.linalg.norm(model.whiten(dv)) * _ROUGH
         strange = left @ left > (_LIKE**2) * max(len(data) - rank, 1) + explained**2
         target = self._memory.push(z, time) @ model.weights
-        angle, axis = (float(part[0]) for part in model.told(target[None]))
+        angle, axis = (float(part[0]) for part in model.predict(target[None]))
         sd = self._deviation(columns)
         pressed = bool(detections) and touched
         state = _state(abs(angle) > _BENT * sd, pressed, bool(strange))
@@ -105,8 +105,8 @@ class BendReader:
         spots = np.array([_spot_of(detection, conductivity) for detection in detections])
         change, slopes, towards = self._response.expanded(spots)
         rows = self._gain * np.column_stack([change, slopes, towards]).T
-        seen = whiten(rows)
-        return seen[0], seen[1:].T
+        whitened = whiten(rows)
+        return whitened[0], whitened[1:].T
 
     def _deviation(self, columns: FloatArray) -> float:
         """Rad: what the examples are missed by, and what the noise and the touches leave open."""

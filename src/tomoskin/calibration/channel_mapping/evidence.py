@@ -28,18 +28,19 @@ _BLOCK = 64
 
 @dataclass(frozen=True, eq=False)
 class IndentationResponses:
-    """What presses at some places do to the transfer resistances of a skin.
+    """What presses at some positions do to the transfer resistances of a skin.
 
-    ``places`` (p, 2) m; ``changes`` (size, p, n, n) Ω of a press of each size; ``rest`` (n, n) Ω.
+    ``positions`` (p, 2) m; ``changes`` (size, p, n, n) Ω of a press of each size; ``rest`` (n, n)
+    Ω.
     """
 
     model: ForwardModel
-    places: FloatArray
+    positions: FloatArray
     changes: FloatArray
     rest: FloatArray
 
     @classmethod
-    def of(cls, skin: Skin, places: FloatArray) -> Self:
+    def of(cls, skin: Skin, positions: FloatArray) -> Self:
         """By the exact local update, for presses that lower the conductivity."""
         mesh = skin.mesh()
         model = ForwardModel(
@@ -50,20 +51,20 @@ class IndentationResponses:
         shapes = Spots(mesh)
         sizes = []
         for radius in _RADII:
-            spots = spots_of(places, radius * extent, np.log1p(-_DEPTH))
+            spots = spots_of(positions, radius * extent, np.log1p(-_DEPTH))
             touches = []
             for spot in spots:
                 cells, change = shapes.change(spot[None])
                 touches.append((cells, skin.conductivity * np.exp(change)))
             changed = state.local.transfer_resistances_of(touches)
             sizes.append(changed - state.transfer_resistance)
-        return cls(model, places, np.stack(sizes), np.asarray(state.transfer_resistance))
+        return cls(model, positions, np.stack(sizes), np.asarray(state.transfer_resistance))
 
     def rows(self, wirings: Sequence[Wiring], resistance: FloatArray) -> FloatArray:
         """(h, …, n_meas) V of resistances (…, n, n) Ω as each wiring reads them, sign apart."""
         order = np.array([w.places for w in wirings])
-        seen = [resistance[..., p[:, None], p] for p in order]
-        return np.asarray(self.model.voltages(np.stack(seen)))
+        response = [resistance[..., p[:, None], p] for p in order]
+        return np.asarray(self.model.voltages(np.stack(response)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,11 +108,13 @@ class MappingLikelihood:
         return np.concatenate(parts)
 
     def _presses(self, wirings: Sequence[Wiring]) -> FloatArray:
-        told = self.sheet.rows(wirings, self.sheet.changes)
-        found = agreement(self.dv, told, self.noise)
+        predicted = self.sheet.rows(wirings, self.sheet.changes)
+        correlation = agreement(self.dv, predicted, self.noise)
         way = np.array([-1.0 if w.reversed else 1.0 for w in wirings])
-        signed = found[:, None] * np.array(self.signs)[:, None, None] * way[:, None, None, None]
-        loud = likelihood(loudness(self.dv, told, self.noise), self.worth)
+        signed = (
+            correlation[:, None] * np.array(self.signs)[:, None, None] * way[:, None, None, None]
+        )
+        loud = likelihood(loudness(self.dv, predicted, self.noise), self.worth)
         return np.asarray(likelihood(signed, self.worth) + loud[:, None])
 
     def at_rest(self, wirings: Sequence[Wiring]) -> FloatArray:
@@ -120,8 +123,8 @@ class MappingLikelihood:
             return np.zeros(len(wirings))
         noise = np.full(len(self.reference), _QUIET * np.median(np.abs(self.reference)))
         predicted = self.sheet.rows(wirings, self.sheet.rest)
-        found = agreement(self.reference, predicted, noise)
-        return likelihood(found * [-1.0 if w.reversed else 1.0 for w in wirings], self.worth)
+        correlation = agreement(self.reference, predicted, noise)
+        return likelihood(correlation * [-1.0 if w.reversed else 1.0 for w in wirings], self.worth)
 
     def __call__(self, wirings: Sequence[Wiring]) -> FloatArray:
         """(h,) log-likelihood of all; the unknown size and sign are averaged over."""
@@ -133,11 +136,13 @@ class MappingLikelihood:
 
 def agreement(measured: FloatArray, predicted: FloatArray, noise: FloatArray) -> FloatArray:
     """(…,) cosine between measured (…, n_meas) and predicted changes of unknown strength."""
-    known = np.isfinite(measured)
-    seen = np.where(known, measured, 0.0) / noise
-    told = np.where(known, predicted, 0.0) / noise
-    size = np.linalg.norm(seen, axis=-1) / np.maximum(np.linalg.norm(told, axis=-1), 1e-300)
-    a, b = _rooted(seen), _rooted(told * size[..., None])
+    finite = np.isfinite(measured)
+    response = np.where(finite, measured, 0.0) / noise
+    predicted = np.where(finite, predicted, 0.0) / noise
+    size = np.linalg.norm(response, axis=-1) / np.maximum(
+        np.linalg.norm(predicted, axis=-1), 1e-300
+    )
+    a, b = _rooted(response), _rooted(predicted * size[..., None])
     product = (a * b).sum(axis=-1)
     lengths = np.linalg.norm(a, axis=-1) * np.linalg.norm(b, axis=-1)
     return np.asarray(product / np.maximum(lengths, 1e-300))
@@ -149,9 +154,9 @@ def loudness(measured: FloatArray, predicted: FloatArray, noise: FloatArray) -> 
     Measured (p, n_meas), predicted (…, p, n_meas). Each row is divided by its mean over the
     presses, so that neither gains nor uneven sheets matter; 0 for a single press.
     """
-    known = np.isfinite(measured)
-    a = _loud(np.where(known, measured, 0.0) / noise)
-    b = _loud(np.where(known, predicted, 0.0) / noise)
+    finite = np.isfinite(measured)
+    a = _loud(np.where(finite, measured, 0.0) / noise)
+    b = _loud(np.where(finite, predicted, 0.0) / noise)
     product, lengths = (a * b).sum(axis=-1), np.linalg.norm(a, axis=-1) * np.linalg.norm(b, axis=-1)
     return np.asarray(product / np.maximum(lengths, 1e-9 * a.shape[-1]))
 

@@ -140,15 +140,15 @@ def solve_wiring(
     sheet = IndentationResponses.of(skin, np.vstack([presses.xy, grid]))
     progress(1, 3)
     n = len(presses)
-    here = replace(sheet, places=presses.xy, changes=sheet.changes[:, :n])
-    there = replace(sheet, places=grid, changes=sheet.changes[:, n:])
+    here = replace(sheet, positions=presses.xy, changes=sheet.changes[:, :n])
+    there = replace(sheet, positions=grid, changes=sheet.changes[:, n:])
     sign = {"decrease": (1.0,), "increase": (-1.0,)}.get(skin.touch.sign, (1.0, -1.0))
-    known = quiet_noise(presses.dv) if noise is None else noise
-    evidence = MappingLikelihood(here, presses.dv, known, reference, sign, _WORTH)
-    told = len(sign) == 1 or reference is not None
-    found = _searched(evidence, ring_of(skin), told)
+    sd = quiet_noise(presses.dv) if noise is None else noise
+    evidence = MappingLikelihood(here, presses.dv, sd, reference, sign, _WORTH)
+    signed = len(sign) == 1 or reference is not None
+    scores = _searched(evidence, ring_of(skin), signed)
     progress(2, 3)
-    answer = _weighed(found, there, known, told, n)
+    answer = _weighed(scores, there, sd, signed, n)
     contradicted = _contradicted(evidence, there, answer.wiring)
     progress(3, 3)
     return replace(answer, contradicted=contradicted)
@@ -164,40 +164,40 @@ def _checked(presses: Presses, skin: Skin) -> Presses:
 
 
 def _searched(
-    evidence: MappingLikelihood, ring: tuple[int, ...], told: bool
+    evidence: MappingLikelihood, ring: tuple[int, ...], signed: bool
 ) -> dict[Wiring, float]:
     """Log-probability of the wirings that were looked at, prior included, not normalised."""
-    polarities = (False, True) if told else (False,)
+    polarities = (False, True) if signed else (False,)
     frontier = [replace(w, reversed=r) for w in turns(ring) for r in polarities]
-    found: dict[Wiring, float] = {}
+    searched: dict[Wiring, float] = {}
     each = np.log((1 - _SWAPPED) / len(frontier))
     pairs = len(ring) * (len(ring) - 1) / 2
     for _ in range(1 + _MOST_SWAPS):
-        fresh = [w for w in dict.fromkeys(frontier) if w not in found]
+        fresh = [w for w in dict.fromkeys(frontier) if w not in searched]
         scores = (each + evidence(fresh)).tolist() if fresh else []
-        found.update(zip(fresh, scores, strict=True))
-        best = sorted(fresh, key=lambda w: -found[w])[: max(int(_TRIED / pairs), 6)]
+        searched.update(zip(fresh, scores, strict=True))
+        best = sorted(fresh, key=lambda w: -searched[w])[: max(int(_TRIED / pairs), 6)]
         frontier = list(chain.from_iterable(swaps(w) for w in best))
         each += np.log(_SWAPPED / pairs)
-    return found
+    return searched
 
 
 def _weighed(
-    found: dict[Wiring, float],
+    scores: dict[Wiring, float],
     there: IndentationResponses,
     noise: FloatArray,
-    told: bool,
+    signed: bool,
     presses: int,
 ) -> WiringAnswer:
     """The likeliest, with those that no press at all could tell from it."""
-    ranked = sorted(found, key=lambda w: -found[w])
-    weights = np.exp(np.array([found[w] for w in ranked]) - found[ranked[0]])
-    nothing = np.exp(np.log(_NOTHING) - found[ranked[0]])
+    ranked = sorted(scores, key=lambda w: -scores[w])
+    weights = np.exp(np.array([scores[w] for w in ranked]) - scores[ranked[0]])
+    nothing = np.exp(np.log(_NOTHING) - scores[ranked[0]])
     total = weights.sum() + nothing
     best, mine = ranked[0], float(weights[0])
     answers = there.rows([best], there.changes[0])[0]
     faint = 0.02 * float(np.median(np.abs(answers))) * noise / np.median(noise)
-    second, place, odds = ranked[1], there.places[0], float("inf")
+    second, place, odds = ranked[1], there.positions[0], float("inf")
     for wiring, weight in zip(ranked[1:], weights[1:].tolist(), strict=True):
         others = there.rows([wiring], there.changes[0])[0]
         same = agreement(answers, others, faint)
@@ -206,17 +206,17 @@ def _weighed(
             mine += weight
             continue
         second, odds = wiring, mine / max(weight, 1e-300)
-        place = there.places[int(np.argmin(same))]
+        place = there.positions[int(np.argmin(same))]
         break
     unexplained, sure = float(nothing / total), float(mine / total)
-    return WiringAnswer(presses, best, sure, second, odds, unexplained, told, place, ())
+    return WiringAnswer(presses, best, sure, second, odds, unexplained, signed, place, ())
 
 
 def _contradicted(
     evidence: MappingLikelihood, there: IndentationResponses, wiring: Wiring
 ) -> tuple[tuple[int, float, float], ...]:
     """Presses that fit far better at another place than at their label."""
-    extent = float(np.ptp(there.places, axis=0).max())
+    extent = float(np.ptp(there.positions, axis=0).max())
     labelled = evidence.sheet.rows([wiring], evidence.sheet.changes)[0]
     elsewhere = there.rows([wiring], there.changes)[0]
     fits = np.array(evidence.signs)[:, None] * (-1.0 if wiring.reversed else 1.0)
@@ -226,7 +226,7 @@ def _contradicted(
         other = (fits[..., None] * agreement(dv, elsewhere, evidence.noise)).max(axis=(0, 1))
         best = int(np.argmax(other))
         gain = likelihood(other[best], evidence.worth) - likelihood(mine, evidence.worth)
-        gap = np.linalg.norm(there.places[best] - evidence.sheet.places[row])
+        gap = np.linalg.norm(there.positions[best] - evidence.sheet.positions[row])
         if gain > _ELSEWHERE and gap > _FAR * extent:
-            remarks.append((row, *there.places[best].tolist()))
+            remarks.append((row, *there.positions[best].tolist()))
     return tuple(remarks)

@@ -112,7 +112,7 @@ class Classifier:
     def learn(cls, examples: Examples, identities: tuple[str, str] = ("", "")) -> Self:
         """Learn from checked examples; ``identities`` of pattern and skin."""
         taught = examples.taught().checked()
-        told, strange = _left_out(taught)
+        distances, strange = _left_out(taught)
         truth = examples.codes.numbers(taught.flags[taught.newest])
         subspace = Subspace.of(examples)
         made = cls(
@@ -120,9 +120,9 @@ class Classifier:
             *identities,
             subspace,
             _mixture(subspace, taught, examples),
-            sharpness=_sharpness(told, truth),
+            sharpness=_sharpness(distances, truth),
             limit=_limit(strange),
-            right=float(np.mean(told.argmin(axis=1) == truth)),
+            right=float(np.mean(distances.argmin(axis=1) == truth)),
         )
         return made if examples.labelled[examples.newest].all() else made._settled(strange)
 
@@ -130,9 +130,9 @@ class Classifier:
         """Fitted to the newest session, not all of whose frames have a label."""
         newest = self.examples.part(self.examples.newest)
         x = self.subspace.whitened(newest.dv) @ self.subspace.axes
-        known = self.examples.codes.numbers(newest.flags)
+        numbers = self.examples.codes.numbers(newest.flags)
         start = self.mixture.moved_to(x) if len(x) >= _ENOUGH else self.mixture
-        mixture = start.adapted(x, known)
+        mixture = start.adapted(x, numbers)
         strange = _compared(self.subspace, mixture, newest.dv)[1]
         limit = self.limit * max(float(np.median(strange) / np.median(usual)), 1.0)
         return replace(self, mixture=mixture, limit=limit)
@@ -188,15 +188,15 @@ class Classifier:
                 )
 
 
-def _mixture(subspace: Subspace, taught: Examples, whole: Examples) -> Mixture:
+def _mixture(subspace: Subspace, taught: Examples, complete: Examples) -> Mixture:
     """Learnt from labelled frames, each session about the mean of the whole of it."""
     x = np.empty((len(taught), subspace.axes.shape[1]))
     for number in np.unique(taught.session):
-        middle = session_mean(whole.dv[whole.session == number])
+        middle = session_mean(complete.dv[complete.session == number])
         chosen = taught.session == number
         x[chosen] = subspace.whitened(taught.dv[chosen], middle) @ subspace.axes
     group = np.unique(taught.session, return_inverse=True)[1].reshape(-1)
-    return Mixture.of(whole.codes.table, x, taught.flags, group)
+    return Mixture.of(complete.codes.table, x, taught.flags, group)
 
 
 def _compared(
@@ -217,7 +217,7 @@ def _compared(
 def _left_out(taught: Examples) -> tuple[FloatArray, FloatArray]:
     """Distances and strangeness of the newest session's frames, learnt from the others."""
     asked = taught.part(taught.newest)
-    told = np.zeros((len(asked), len(taught.codes.table)))
+    distances = np.zeros((len(asked), len(taught.codes.table)))
     strange = np.zeros(len(asked))
     fold = np.full(len(taught), -1)
     fold[taught.newest] = np.arange(len(asked)) % _FOLDS
@@ -225,14 +225,14 @@ def _left_out(taught: Examples) -> tuple[FloatArray, FloatArray]:
         kept, out = taught.part(fold != number), fold[taught.newest] == number
         subspace = Subspace.of(kept)
         mixture = _mixture(subspace, kept, kept)
-        told[out], strange[out] = _compared(subspace, mixture, asked.dv[out])
-    return told, strange
+        distances[out], strange[out] = _compared(subspace, mixture, asked.dv[out])
+    return distances, strange
 
 
-def _sharpness(told: FloatArray, truth: IntArray) -> float:
+def _sharpness(distances: FloatArray, truth: IntArray) -> float:
     """Temperature of the probabilities at which left-out labels are likeliest (Guo et al. 2017)."""
     rows = np.arange(len(truth))
-    likely = [np.log(posterior(told, s)[rows, truth] + 1e-12).mean() for s in _SHARPNESS]
+    likely = [np.log(posterior(distances, s)[rows, truth] + 1e-12).mean() for s in _SHARPNESS]
     return float(_SHARPNESS[int(np.argmax(likely))])
 
 

@@ -81,8 +81,8 @@ class Codes:
 
     def numbers(self, flags: FloatArray) -> IntArray:
         """(n,) row of ``table`` for each of (n, f) flags, −1 where they are NaN."""
-        found = (self.table == flags[:, None, :]).all(axis=2)
-        return np.where(found.any(axis=1), found.argmax(axis=1), -1)
+        match = (self.table == flags[:, None, :]).all(axis=2)
+        return np.where(match.any(axis=1), match.argmax(axis=1), -1)
 
     def text(self, number: int) -> str:
         """A combination in words: names joined by +, "none" where no flag is set."""
@@ -149,8 +149,8 @@ class Examples:
         The few labels of a session that is fitted without most of them count in that fit.
         """
         partly = np.unique(self.session[~self.labelled])
-        whole = self.labelled & ~np.isin(self.session, partly)
-        return self.part(whole if whole.any() else self.labelled)
+        complete = self.labelled & ~np.isin(self.session, partly)
+        return self.part(complete if complete.any() else self.labelled)
 
     def and_then(self, other: Examples) -> Self:
         """These, then the ``other`` ones as a session of their own.
@@ -174,9 +174,9 @@ class Examples:
 
     def checked(self) -> Self:
         """These, or DataError that names the state that has too few labelled frames."""
-        known = self.flags[self.labelled]
-        counts = np.stack([known.sum(axis=0), (1 - known).sum(axis=0)])
-        if not len(known):
+        flags = self.flags[self.labelled]
+        counts = np.stack([flags.sum(axis=0), (1 - flags).sum(axis=0)])
+        if not len(flags):
             raise DataError("expected labelled frames, got none", hint="ten of each are a start")
         if counts.min() < _FEWEST:
             which, flag = np.unravel_index(np.argmin(counts), counts.shape)

@@ -46,11 +46,11 @@ class Subspace:
             data = examples.dv[examples.session == number]
             middles.append(session_mean(data))
             parts.append(_filled((data - middles[-1]) / scale))
-        whole = np.vstack(parts)
-        d = int(np.clip(len(whole) // _FRAMES_EACH, 2, min(_MOST, *whole.shape)))
-        axes = _largest(whole, d)
-        beside = (whole**2).sum() - ((whole @ axes) ** 2).sum()
-        free = max(len(whole) * (whole.shape[1] - d), 1)
+        stacked = np.vstack(parts)
+        d = int(np.clip(len(stacked) // _FRAMES_EACH, 2, min(_MOST, *stacked.shape)))
+        axes = _largest(stacked, d)
+        beside = (stacked**2).sum() - ((stacked @ axes) ** 2).sum()
+        free = max(len(stacked) * (stacked.shape[1] - d), 1)
         return cls(middles[-1], scale, axes, max(float(beside / free), 1e-12))
 
     def whitened(self, dv: FloatArray, middle: FloatArray | None = None) -> FloatArray:
@@ -72,8 +72,8 @@ def _noise(examples: Examples) -> FloatArray:
             continue
         data = _filled(part.dv - session_mean(part.dv))
         design = part.flags - part.flags.mean(axis=0)
-        told = design @ np.linalg.lstsq(design, data, rcond=None)[0]
-        total += ((data - told) ** 2).sum(axis=0)
+        fitted = design @ np.linalg.lstsq(design, data, rcond=None)[0]
+        total += ((data - fitted) ** 2).sum(axis=0)
         count += max(len(part) - np.linalg.matrix_rank(design) - 1, 1)
     deviation = np.sqrt(total / max(count, 1))
     alive = deviation[deviation > 0]
@@ -84,8 +84,8 @@ def _noise(examples: Examples) -> FloatArray:
 
 def session_mean(data: FloatArray) -> FloatArray:
     """(n_meas,) mean over the frames that have a value, 0 where none has."""
-    known = np.isfinite(data)
-    return np.asarray(np.where(known, data, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
+    finite = np.isfinite(data)
+    return np.asarray(np.where(finite, data, 0.0).sum(axis=0) / np.maximum(finite.sum(axis=0), 1))
 
 
 def _filled(data: FloatArray) -> FloatArray:
@@ -155,15 +155,15 @@ class Mixture:
         first = x.mean(axis=0) - self.table.mean(axis=0) @ effect
         return type(self)(self.table, np.vstack([first, effect]), self.covariance)
 
-    def adapted(self, x: FloatArray, known: IntArray) -> Self:
+    def adapted(self, x: FloatArray, numbers: IntArray) -> Self:
         """Fitted to frames x (n, d), with this mixture as the prior.
 
-        ``known`` (n,) is the combination of a frame, −1 where it is not known.
+        ``numbers`` (n,) is the combination of a frame, −1 where it is not known.
         """
         mixture, before = self, np.zeros((len(x), len(self.table)))
         for _ in range(_ROUNDS):
             weights = posterior(mixture.distances(x))
-            weights[known >= 0] = np.eye(len(self.table))[known[known >= 0]]
+            weights[numbers >= 0] = np.eye(len(self.table))[numbers[numbers >= 0]]
             mixture = self._renewed(x, weights)
             if np.abs(weights - before).max() < _SETTLED:
                 break

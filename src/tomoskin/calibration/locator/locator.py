@@ -140,30 +140,32 @@ class Locator:
         cls,
         presses: Presses,
         region: Region,
-        known: tuple[Pattern | None, str],
+        origin: tuple[Pattern | None, str],
         progress: Advance,
         like: Locator | None = None,
     ) -> Self:
-        places = region.scaled(presses.xy)
+        positions = region.scaled(presses.xy)
         features = like.features if like else Features.of(presses.dv)
         data = features(presses.dv)
         progress(0, _STEPS)
         maps = like.estimates.likelihood.maps if like else None
-        turns = Rotations.of(known[0]) if known[0] else Rotations.none(presses.dv.shape[1])
+        rotations = Rotations.of(origin[0]) if origin[0] else Rotations.none(presses.dv.shape[1])
         grid = region.lattice(_COARSE) if len(presses) < FEW else region.grid
-        estimates = Estimates.of(data, places, grid, turns.of_rows(features.rows), maps)
+        estimates = Estimates.of(data, positions, grid, rotations.of_rows(features.rows), maps)
         progress(1, _STEPS)
-        stacking = Stacking.of(data, estimates.left_out, places, like.stacking if like else None)
+        stacking = Stacking.of(data, estimates.left_out, positions, like.stacking if like else None)
         progress(2, _STEPS)
-        disagreement = disagreement_of(stacking.left_out_told, stacking.left_out)
+        disagreement = disagreement_of(stacking.left_out_by_expert, stacking.left_out)
         calibrated = CalibratedCovariance.of(
-            stacking.left_out - places, estimates.left_out_spread, disagreement
+            stacking.left_out - positions, estimates.left_out_spread, disagreement
         )
         covariance = calibrated(estimates.left_out_spread, disagreement)
-        held = float(np.mean(squared_lengths(stacking.left_out - places, covariance) < NINE_IN_TEN))
+        held = float(
+            np.mean(squared_lengths(stacking.left_out - positions, covariance) < NINE_IN_TEN)
+        )
         remarks = (
-            *twins(data, places, region.unit),
-            *outliers(stacking.left_out, places, covariance, region.unit),
+            *twins(data, positions, region.unit),
+            *outliers(stacking.left_out, positions, covariance, region.unit),
         )
         progress(3, _STEPS)
         power = Strength.of(presses, stacking.left_out)
@@ -172,7 +174,7 @@ class Locator:
         return cls(
             presses,
             region,
-            *known,
+            *origin,
             features,
             estimates,
             stacking,
@@ -191,9 +193,9 @@ class Locator:
         """
         data = self.features(frames(dv, self.presses.dv.shape[1]))
         guess, spread = self.estimates(data)
-        told = self.stacking.told(data, guess)
-        answer = self.stacking.combined(told)
-        covariance = self.calibrated(spread, disagreement_of(told, answer))
+        by_expert = self.stacking.by_expert(data, guess)
+        answer = self.stacking.combined(by_expert)
+        covariance = self.calibrated(spread, disagreement_of(by_expert, answer))
         return self.region.metres(answer), self.region.unit**2 * covariance
 
     def strength(self, dv: ArrayLike) -> FloatArray:

@@ -75,10 +75,10 @@ class Coregion:
             last = evidence
             ratio = data.weights[:, None] * gain
             part = ratio / (1 + ratio)
-            seen, left = part * rows, rows - part * rows
+            inside, left = part * rows, rows - part * rows
             weighed = part / data.weights[:, None]
             back = noise @ q
-            signal = _back(back, (seen / data.weights[:, None]).T @ seen, weighed.sum(axis=0))
+            signal = _back(back, (inside / data.weights[:, None]).T @ inside, weighed.sum(axis=0))
             noise = _back(back, left.T @ left, part.sum(axis=0)) + data.rest
             signal, noise = _shrunk(signal, m), _shrunk(noise, data.n)
             noise[np.diag_indices(k)] += _FLOOR * np.diag(noise).mean()
@@ -126,23 +126,23 @@ class ResponseMaps:
     def of(
         cls,
         likeness: Likeness,
-        places: FloatArray,
+        positions: FloatArray,
         features: FloatArray,
         coregion: Coregion | None = None,
     ) -> Self:
-        """Maps for ``features`` (n, k) of presses at ``places`` (n, 2).
+        """Maps for ``features`` (n, k) of presses at ``positions`` (n, 2).
 
         How the rows answer together is learnt, unless ``coregion`` knows it.
         """
         mean = features.mean(axis=0)
         centred = features - mean
-        basis = Basis.of(likeness, places)
-        values = basis(places)
+        basis = Basis.of(likeness, positions)
+        values = basis(positions)
         weights, axes = np.linalg.eigh(values.T @ values)
         keep = weights > _ROUNDING * weights[-1]
         weights, axes = weights[keep], axes[:, keep]
         rows = (axes / np.sqrt(weights)).T @ (values.T @ centred)
-        n_rest = len(places) - len(weights)
+        n_rest = len(positions) - len(weights)
         rest = centred.T @ centred - rows.T @ rows if n_rest else np.zeros(2 * (len(mean),))
         data = Projected(weights, rows, rest, n_rest)
         return cls(mean, basis, data, axes, coregion or Coregion.of(data))
@@ -156,17 +156,17 @@ class ResponseMaps:
         """(n, k) coordinates in which the noise is independent with variance 1."""
         return np.asarray((features - self.mean) @ self.coregion.whiten)
 
-    def at(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance, both (n, k), of the whitened features of a press at ``places``."""
-        at = self.basis(places) @ self.axes
+    def at(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mean and variance, both (n, k), of the whitened features of a press at ``positions``."""
+        at = self.basis(positions) @ self.axes
         mean_of, variance_of = self._solved
         gain = self.coregion.gain
         left = self.basis.likeness.variance * gain - (at**2) @ variance_of
         return at @ mean_of, 1.0 + np.maximum(left, 0.0)
 
-    def features_at(self, places: FloatArray) -> FloatArray:
-        """(n, k) features that are expected of presses at ``places`` (n, 2)."""
-        return np.asarray(self.at(places)[0] @ self._unwhiten + self.mean)
+    def features_at(self, positions: FloatArray) -> FloatArray:
+        """(n, k) features that are expected of presses at ``positions`` (n, 2)."""
+        return np.asarray(self.at(positions)[0] @ self._unwhiten + self.mean)
 
     @cached_property
     def _unwhiten(self) -> FloatArray:
@@ -176,6 +176,6 @@ class ResponseMaps:
     def _solved(self) -> tuple[FloatArray, FloatArray]:
         """What takes a basis function to the mean, and its square to the known variance."""
         weights, gain = self.data.weights[:, None], self.coregion.gain
-        known = gain / (1 + weights * gain)
+        posterior = gain / (1 + weights * gain)
         rows = self.data.rows @ self.coregion.whiten
-        return np.sqrt(weights) * known * rows, weights * gain * known
+        return np.sqrt(weights) * posterior * rows, weights * gain * posterior

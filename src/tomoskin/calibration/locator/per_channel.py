@@ -35,30 +35,34 @@ class ChannelMaps:
     ``groups`` are the rows of each group, whose maps are ``orbits``.
     """
 
-    turns: Rotations
+    rotations: Rotations
     groups: tuple[IntArray, ...]
     orbits: tuple[OrbitMaps, ...]
 
     @classmethod
-    def of(cls, places: FloatArray, features: FloatArray, turns: Rotations) -> Self:
-        """Maps for ``features`` (n, k) of presses at ``places`` (n, 2).
+    def of(cls, positions: FloatArray, features: FloatArray, rotations: Rotations) -> Self:
+        """Maps for ``features`` (n, k) of presses at ``positions`` (n, 2).
 
         Of each group of rows the length scale and the share, and the way round of all, are those
         of the largest marginal likelihood.
         """
-        ways = (turns, turns.reversed()) if turns.any else (turns,)
+        ways = (rotations, rotations.reversed()) if rotations.any else (rotations,)
         angles = np.concatenate([way.angle for way in ways])
-        modes = [LikenessModes.of(Likeness(length), places, angles) for length in LENGTHS]
+        modes = [LikenessModes.of(Likeness(length), positions, angles) for length in LENGTHS]
         return max((cls._of(modes, features, way) for way in ways), key=lambda m: m.evidence)
 
     @classmethod
-    def _of(cls, modes: Sequence[LikenessModes], features: FloatArray, turns: Rotations) -> Self:
-        groups = tuple(np.flatnonzero(turns.orbit == orbit) for orbit in np.unique(turns.orbit))
-        shares = _SHARES if turns.any else (0.0,)
+    def _of(
+        cls, modes: Sequence[LikenessModes], features: FloatArray, rotations: Rotations
+    ) -> Self:
+        groups = tuple(
+            np.flatnonzero(rotations.orbit == orbit) for orbit in np.unique(rotations.orbit)
+        )
+        shares = _SHARES if rotations.any else (0.0,)
         orbits = (
             max(
                 (
-                    OrbitMaps.of(m, m.alone(features[:, rows]), turns.angle[rows], share)
+                    OrbitMaps.of(m, m.alone(features[:, rows]), rotations.angle[rows], share)
                     for m in modes
                     for share in shares
                 ),
@@ -66,12 +70,12 @@ class ChannelMaps:
             )
             for rows in groups
         )
-        return cls(turns, groups, tuple(orbits))
+        return cls(rotations, groups, tuple(orbits))
 
-    def again(self, places: FloatArray, features: FloatArray) -> Self:
+    def again(self, positions: FloatArray, features: FloatArray) -> Self:
         """Maps of other presses with the same settings."""
-        angle, lengths = self.turns.angle, {maps.modes.likeness for maps in self.orbits}
-        modes = {likeness: LikenessModes.of(likeness, places, angle) for likeness in lengths}
+        angle, lengths = self.rotations.angle, {maps.modes.likeness for maps in self.orbits}
+        modes = {likeness: LikenessModes.of(likeness, positions, angle) for likeness in lengths}
         orbits = []
         for rows, maps in zip(self.groups, self.orbits, strict=True):
             theirs = modes[maps.modes.likeness]
@@ -84,19 +88,19 @@ class ChannelMaps:
         """Log marginal likelihood, up to a constant of the features."""
         return sum(maps.evidence for maps in self.orbits)
 
-    def at(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance, both (g, k), of the features of a press at ``places`` (g, 2)."""
-        mean, variance = np.empty((2, len(places), len(self.turns.angle)))
+    def at(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mean and variance, both (g, k), of the features of a press at ``positions`` (g, 2)."""
+        mean, variance = np.empty((2, len(positions), len(self.rotations.angle)))
         modes = {maps.modes.likeness: maps.modes for maps in self.orbits}
-        seen = {likeness: m.at(places) for likeness, m in modes.items()}
+        values = {likeness: m.at(positions) for likeness, m in modes.items()}
         for rows, maps in zip(self.groups, self.orbits, strict=True):
-            mean[:, rows], variance[:, rows] = maps.at(*seen[maps.modes.likeness])
+            mean[:, rows], variance[:, rows] = maps.at(*values[maps.modes.likeness])
         return mean, variance
 
 
 @dataclass(frozen=True, eq=False)
 class ChannelLikelihood:
-    """The maps read at the places of a grid: a Student density for each row, so that a row that
+    """The maps read at the positions of a grid: a Student density for each row, so that a row that
     is told wrong costs little.
 
     ``mean``, ``steep`` (k, g): the answer, and one over its deviation; ``volume`` (g,).

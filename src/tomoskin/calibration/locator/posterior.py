@@ -24,7 +24,7 @@ _LEAST = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class GridLikelihood:
-    """Maps read at the places of a grid, ready for frames.
+    """Maps read at the positions of a grid, ready for frames.
 
     A feature vector of k values has a Student density of k degrees of freedom about each place's
     answer: the covariances were learnt from few presses, and a frame far from every map must
@@ -38,9 +38,9 @@ class GridLikelihood:
     volume: FloatArray
 
     @classmethod
-    def of(cls, maps: ResponseMaps, places: FloatArray) -> Self:
-        """For the grid ``places`` (g, 2)."""
-        mean, variance = maps.at(places)
+    def of(cls, maps: ResponseMaps, positions: FloatArray) -> Self:
+        """For the grid ``positions`` (g, 2)."""
+        mean, variance = maps.at(positions)
         answer = mean / variance
         offset = (mean * answer).sum(axis=1)
         volume = np.log(variance).sum(axis=1)
@@ -57,7 +57,7 @@ class GridLikelihood:
 
 
 def pooled(log_likelihoods: Sequence[FloatArray], powers: FloatArray) -> FloatArray:
-    """(n, g) probabilities of the grid's places: the product of powers of each likelihood.
+    """(n, g) probabilities of the grid's positions: the product of powers of each likelihood.
 
     A logarithmic opinion pool (Genest & Zidek 1986); a single one is tempered by its power.
     """
@@ -104,7 +104,7 @@ _NEAR = 0.5
 """Mean squared step, in parts of that between any two presses, below which they are in an order."""
 
 Likelihood = Callable[[FloatArray], FloatArray]
-"""Features (n, k) → log-likelihood (n, g) of the grid's places."""
+"""Features (n, k) → log-likelihood (n, g) of the grid's positions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,36 +128,36 @@ class Estimates:
     def of(
         cls,
         features: FloatArray,
-        places: FloatArray,
+        positions: FloatArray,
         grid: FloatArray,
-        turns: Rotations,
+        rotations: Rotations,
         like: ResponseMaps | None = None,
     ) -> Self:
         """Learn the maps; length scales by evidence, powers by left-out presses.
 
         Maps that are ``like`` others have their length scale and coregionalisation.
         """
-        known = like.coregion if like else None
+        coregion = like.coregion if like else None
         lengths = [like.basis.likeness] if like else map(Likeness, LENGTHS)
         maps = max(
-            (ResponseMaps.of(x, places, features, known) for x in lengths),
+            (ResponseMaps.of(x, positions, features, coregion) for x in lengths),
             key=lambda m: m.evidence,
         )
         together = maps.basis.likeness
 
         def joint(some: FloatArray, theirs: FloatArray) -> GridLikelihood:
-            return GridLikelihood.of(ResponseMaps.of(together, some, theirs, known), grid)
+            return GridLikelihood.of(ResponseMaps.of(together, some, theirs, coregion), grid)
 
-        parts = [_left_out(joint, places, features)]
+        parts = [_left_out(joint, positions, features)]
         alone = None
-        if len(places) < FEW:
-            alone = found = ChannelMaps.of(places, features, turns)
+        if len(positions) < FEW:
+            alone = channels = ChannelMaps.of(positions, features, rotations)
 
             def single(some: FloatArray, theirs: FloatArray) -> ChannelLikelihood:
-                return ChannelLikelihood.of(found.again(some, theirs), grid)
+                return ChannelLikelihood.of(channels.again(some, theirs), grid)
 
-            parts.append(_left_out(single, places, features))
-        powers = powers_of(parts, grid, places)
+            parts.append(_left_out(single, positions, features))
+        powers = powers_of(parts, grid, positions)
         left_out = moments(pooled(parts, powers), grid)
         per_channel = ChannelLikelihood.of(alone, grid) if alone and powers[1] else None
         return cls(grid, GridLikelihood.of(maps, grid), per_channel, powers, *left_out)
@@ -180,24 +180,26 @@ class Estimates:
 
 
 def _left_out(
-    learn: Callable[[FloatArray, FloatArray], Likelihood], places: FloatArray, features: FloatArray
+    learn: Callable[[FloatArray, FloatArray], Likelihood],
+    positions: FloatArray,
+    features: FloatArray,
 ) -> FloatArray:
     """(n, g) log-likelihood of each press, from what was learnt without its fold.
 
     Folds are stretches of time, so that they are as strange to each other as presses to come; but
     where presses follow each other over the skin, a stretch of time is a part of the skin.
     """
-    n = len(places)
+    n = len(positions)
     folds = min(_FOLDS[n >= _SCARCE], n)
     order = np.arange(n)
-    fold = order * folds // n if _in_any_order(places) else order % folds
+    fold = order * folds // n if _in_any_order(positions) else order % folds
     parts = [fold == k for k in range(folds)]
-    found = [learn(places[~out], features[~out])(features[out]) for out in parts]
+    values = [learn(positions[~out], features[~out])(features[out]) for out in parts]
     order = np.argsort(np.concatenate([np.flatnonzero(out) for out in parts]))
-    return np.asarray(np.concatenate(found)[order])
+    return np.asarray(np.concatenate(values)[order])
 
 
-def _in_any_order(places: FloatArray) -> bool:
+def _in_any_order(positions: FloatArray) -> bool:
     """Whether presses that follow each other are about as far apart as any two."""
-    step = float((np.diff(places, axis=0) ** 2).sum(axis=1).mean())
-    return step > _NEAR * 2 * float(places.var(axis=0).sum())
+    step = float((np.diff(positions, axis=0) ** 2).sum(axis=1).mean())
+    return step > _NEAR * 2 * float(positions.var(axis=0).sum())

@@ -168,11 +168,11 @@ class Features:
 
     def _fill(self, values: FloatArray, hole: NDArray[np.bool_]) -> None:
         """Put the conditional mean of a Gaussian, given the other values, into the holes."""
-        known = ~hole
+        finite = ~hole
         gain = cho_solve(
-            cho_factor(self.covariance[np.ix_(known, known)]), values[known] - self.mean[known]
+            cho_factor(self.covariance[np.ix_(finite, finite)]), values[finite] - self.mean[finite]
         )
-        values[hole] = self.mean[hole] + self.covariance[np.ix_(hole, known)] @ gain
+        values[hole] = self.mean[hole] + self.covariance[np.ix_(hole, finite)] @ gain
 
 
 def _scales(sizes: FloatArray) -> FloatArray:
@@ -184,10 +184,10 @@ def _scales(sizes: FloatArray) -> FloatArray:
 
 def _changing(dv: FloatArray) -> NDArray[np.bool_]:
     finite = np.isfinite(dv)
-    seen = finite.mean(axis=0) > 1 - _MOST_MISSING
+    present = finite.mean(axis=0) > 1 - _MOST_MISSING
     high = np.where(finite, dv, -np.inf).max(axis=0)
     low = np.where(finite, dv, np.inf).min(axis=0)
-    return np.asarray(seen & (high > low))
+    return np.asarray(present & (high > low))
 
 
 _NEAR = 0.3
@@ -200,37 +200,37 @@ _LEAST = 1e-12
 class Strength:
     """A local power law: log strength = a + b (log size − log usual size at the place).
 
-    ``places`` (n, 2); ``sizes`` (n,) log root mean square of each press; ``labels`` (n,) log
+    ``positions`` (n, 2); ``sizes`` (n,) log root mean square of each press; ``labels`` (n,) log
     strength, or None; ``exponent`` b.
     """
 
-    places: FloatArray
+    positions: FloatArray
     sizes: FloatArray
     labels: FloatArray | None
     exponent: float
 
     @classmethod
-    def of(cls, presses: Presses, places: FloatArray) -> Self:
-        """Learn from presses whose left-out places are ``places`` (n, 2), in radii."""
+    def of(cls, presses: Presses, positions: FloatArray) -> Self:
+        """Learn from presses whose left-out places are ``positions`` (n, 2), in radii."""
         sizes = _size(presses.dv)
         if presses.strength is None:
-            return cls(places, sizes, None, 1.0)
+            return cls(positions, sizes, None, 1.0)
         labels = np.log(np.maximum(presses.strength, _LEAST))
-        plain = cls(places, sizes, labels, 0.0)
-        x = sizes - plain.usual(places, sizes)
-        y = labels - plain.usual(places, labels)
+        plain = cls(positions, sizes, labels, 0.0)
+        x = sizes - plain.usual(positions, sizes)
+        y = labels - plain.usual(positions, labels)
         exponent = float(x @ y) / max(float(x @ x), _LEAST)
-        return cls(places, sizes, labels, exponent)
+        return cls(positions, sizes, labels, exponent)
 
-    def __call__(self, dv: FloatArray, places: FloatArray) -> FloatArray:
-        """(n,) strengths of frames ``dv`` (n, n_meas) whose touch is at ``places`` (n, 2)."""
-        beyond = self.exponent * (_size(dv) - self.usual(places, self.sizes))
-        middle = 0.0 if self.labels is None else self.usual(places, self.labels)
+    def __call__(self, dv: FloatArray, positions: FloatArray) -> FloatArray:
+        """(n,) strengths of frames ``dv`` (n, n_meas) whose touch is at ``positions`` (n, 2)."""
+        beyond = self.exponent * (_size(dv) - self.usual(positions, self.sizes))
+        middle = 0.0 if self.labels is None else self.usual(positions, self.labels)
         return np.asarray(np.exp(middle + beyond))
 
-    def usual(self, places: FloatArray, values: FloatArray) -> FloatArray:
-        """(m,) mean of the presses' ``values`` (n,) about ``places`` (m, 2)."""
-        near = np.exp(-0.5 * squared_distances(places, self.places) / _NEAR**2) + _LEAST
+    def usual(self, positions: FloatArray, values: FloatArray) -> FloatArray:
+        """(m,) mean of the presses' ``values`` (n,) about ``positions`` (m, 2)."""
+        near = np.exp(-0.5 * squared_distances(positions, self.positions) / _NEAR**2) + _LEAST
         return np.asarray(near @ values / near.sum(axis=1))
 
 

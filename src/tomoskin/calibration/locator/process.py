@@ -64,29 +64,29 @@ class Basis:
     root: FloatArray
 
     @classmethod
-    def of(cls, likeness: Likeness, places: FloatArray) -> Self:
-        """Basis for responses at ``places`` (n, 2)."""
-        centres = places[_pivots(likeness, places)]
+    def of(cls, likeness: Likeness, positions: FloatArray) -> Self:
+        """Basis for responses at ``positions`` (n, 2)."""
+        centres = positions[_pivots(likeness, positions)]
         values, vectors = eigh(likeness(centres, centres))
         keep = values > _ROUNDING * values[-1]
         return cls(likeness, centres, vectors[:, keep] / np.sqrt(values[keep]))
 
-    def __call__(self, places: FloatArray) -> FloatArray:
-        """(n, m) values of the functions at ``places`` (n, 2)."""
-        return np.asarray(self.likeness(places, self.centres) @ self.root)
+    def __call__(self, positions: FloatArray) -> FloatArray:
+        """(n, m) values of the functions at ``positions`` (n, 2)."""
+        return np.asarray(self.likeness(positions, self.centres) @ self.root)
 
 
-def _pivots(likeness: Likeness, places: FloatArray) -> list[int]:
+def _pivots(likeness: Likeness, positions: FloatArray) -> list[int]:
     """Rows whose likeness to all others explains the rest."""
-    left = np.full(len(places), likeness.variance)
-    factor = np.zeros((len(places), min(_MOST, len(places))))
+    left = np.full(len(positions), likeness.variance)
+    factor = np.zeros((len(positions), min(_MOST, len(positions))))
     chosen: list[int] = []
     while len(chosen) < factor.shape[1]:
         pivot = int(left.argmax())
         if left[pivot] < _TOLERANCE * likeness.variance:
             break
         k = len(chosen)
-        column = likeness(places, places[pivot : pivot + 1])[:, 0]
+        column = likeness(positions, positions[pivot : pivot + 1])[:, 0]
         column -= factor[:, :k] @ factor[pivot, :k]
         factor[:, k] = column / np.sqrt(left[pivot])
         left = np.maximum(left - factor[:, k] ** 2, 0.0)
@@ -129,10 +129,10 @@ class Process:
         n = len(targets)
         chosen = np.unique(np.linspace(0, n - 1, min(n, _LEARNT_ON)).astype(int))
         few = {name: square[np.ix_(chosen, chosen)] for name, square in squares.items()}
-        return cls.known(tuple(terms), _learn(tuple(terms), few, targets[chosen]), squares, targets)
+        return cls.given(tuple(terms), _learn(tuple(terms), few, targets[chosen]), squares, targets)
 
     @classmethod
-    def known(
+    def given(
         cls,
         terms: tuple[tuple[str, ...], ...],
         logs: FloatArray,
@@ -187,10 +187,10 @@ def _learn(terms: Sequence[tuple[str, ...]], squares: Distances, targets: FloatA
         return value + 0.5 * float(away @ away), slope + away / prior[:, 1]
 
     bounds = [(m - 4 * s, m + 4 * s) for m, s in prior]
-    found = minimize(
+    optimum = minimize(
         cost, prior[:, 0], jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _STEPS}
     )
-    return np.asarray(found.x)
+    return np.asarray(optimum.x)
 
 
 def _cost(

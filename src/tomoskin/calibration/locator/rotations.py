@@ -60,10 +60,10 @@ class Rotations:
         return bool(self.angle.any())
 
 
-def turned(places: FloatArray, angle: float) -> FloatArray:
-    """``places`` (n, 2) as a row that is turned by ``angle`` sees them: turned back."""
+def turned(positions: FloatArray, angle: float) -> FloatArray:
+    """``positions`` (n, 2) as a row that is turned by ``angle`` sees them: turned back."""
     c, s = np.cos(angle), np.sin(angle)
-    return np.asarray(places @ np.array([[c, -s], [s, c]]))
+    return np.asarray(positions @ np.array([[c, -s], [s, c]]))
 
 
 _RATIOS = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
@@ -86,27 +86,27 @@ class PerChannelFeatures:
 
 @dataclass(frozen=True, eq=False)
 class LikenessModes:
-    """Presses at ``places`` (n, 2) in the ``axes`` (n, n) of their likeness, of ``weights`` (n,).
+    """Presses at ``positions`` (n, 2) in the ``axes`` (n, n) of their likeness.
 
-    ``common`` holds what a row and its turned copies share: functions of the turned place, whose
-    values at the presses are ``seen`` for each angle.
+    ``weights`` (n,) are those of the axes. ``common`` holds what a row and its turned copies share:
+    functions of the turned position, whose values at the presses are ``values`` for each angle.
     """
 
     likeness: Likeness
-    places: FloatArray
+    positions: FloatArray
     weights: FloatArray
     axes: FloatArray
     common: Basis
-    seen: dict[float, FloatArray]
+    values: dict[float, FloatArray]
 
     @classmethod
-    def of(cls, likeness: Likeness, places: FloatArray, angles: FloatArray) -> Self:
+    def of(cls, likeness: Likeness, positions: FloatArray, angles: FloatArray) -> Self:
         """For rows that are turned by one of ``angles``."""
-        weights, axes = np.linalg.eigh(likeness(places, places))
-        copies = {angle: turned(places, angle) for angle in np.unique(angles).tolist()}
+        weights, axes = np.linalg.eigh(likeness(positions, positions))
+        copies = {angle: turned(positions, angle) for angle in np.unique(angles).tolist()}
         common = Basis.of(likeness, np.concatenate([*copies.values()]))
-        seen = {angle: axes.T @ common(copy) for angle, copy in copies.items()}
-        return cls(likeness, places, np.maximum(weights, 0.0), axes, common, seen)
+        values = {angle: axes.T @ common(copy) for angle, copy in copies.items()}
+        return cls(likeness, positions, np.maximum(weights, 0.0), axes, common, values)
 
     def alone(self, features: FloatArray) -> PerChannelFeatures:
         """What each row of ``features`` (n, k) tells by itself (Rasmussen & Williams 2006, 5.8)."""
@@ -118,10 +118,10 @@ class LikenessModes:
         best = log.argmax(axis=0)
         return PerChannelFeatures(mean, rows, size[best, np.arange(len(mean))], _RATIOS[best])
 
-    def at(self, places: FloatArray) -> tuple[FloatArray, dict[float, FloatArray]]:
+    def at(self, positions: FloatArray) -> tuple[FloatArray, dict[float, FloatArray]]:
         """(g, n) of the likeness and, for each angle, (g, m) of what is common."""
-        near = self.likeness(places, self.places) @ self.axes
-        return near, {angle: self.common(turned(places, angle)) for angle in self.seen}
+        near = self.likeness(positions, self.positions) @ self.axes
+        return near, {angle: self.common(turned(positions, angle)) for angle in self.values}
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,15 +154,15 @@ class OrbitMaps:
         rows = alone.rows / np.sqrt(alone.size)
         spread = (1 - share) * modes.weights[:, None] + alone.noise
         functions = len(modes.common.root.T) if share else 0
-        seen = np.stack([modes.seen[angle][:, :functions] for angle in angles.tolist()])
-        weighed = (seen / np.sqrt(spread.T)[:, :, None]).reshape(spread.size, functions)
-        whole = np.eye(functions) / (share or 1.0) + weighed.T @ weighed
-        root = np.linalg.inv(np.linalg.cholesky(whole))
-        known = root @ (weighed.T @ (rows / np.sqrt(spread)).T.ravel())
-        pull = root.T @ known
-        left = (rows - (seen @ pull).T) / spread
+        values = np.stack([modes.values[angle][:, :functions] for angle in angles.tolist()])
+        weighed = (values / np.sqrt(spread.T)[:, :, None]).reshape(spread.size, functions)
+        precision = np.eye(functions) / (share or 1.0) + weighed.T @ weighed
+        root = np.linalg.inv(np.linalg.cholesky(precision))
+        weighted = root @ (weighed.T @ (rows / np.sqrt(spread)).T.ravel())
+        pull = root.T @ weighted
+        left = (rows - (values @ pull).T) / spread
         evidence = (
-            0.5 * float(known @ known)
+            0.5 * float(weighted @ weighted)
             + float(np.log(np.diag(root)).sum())
             - 0.5 * functions * float(np.log(share or 1.0))
             - 0.5 * float((rows**2 / spread + np.log(spread) + np.log(alone.size)).sum())
@@ -179,8 +179,8 @@ class OrbitMaps:
         variance = own * self.modes.likeness.variance + self.noise
         variance = variance - own**2 * near**2 @ (1 / self.spread)
         for row, angle in enumerate(self.angles.tolist() if self.share else ()):
-            there, seen = common[angle], self.modes.seen[angle]
+            there, values = common[angle], self.modes.values[angle]
             mean[:, row] += there @ self.pull
-            blind = there - own * near @ (seen / self.spread[:, row, None])
-            variance[:, row] += ((blind @ self.root.T) ** 2).sum(axis=1)
+            rest = there - own * near @ (values / self.spread[:, row, None])
+            variance[:, row] += ((rest @ self.root.T) ** 2).sum(axis=1)
         return self.mean + np.sqrt(self.size) * mean, self.size * np.maximum(variance, _FLOOR)

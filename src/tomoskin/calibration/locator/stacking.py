@@ -59,12 +59,12 @@ class CalibratedCovariance:
             return float((np.log(np.linalg.det(cov)) + heavy).sum()) + 0.05 * float(logs @ logs)
 
         start = np.array([-1.0, -1.0, np.log(0.3 * size)])
-        found = np.exp(minimize(cost, start, method="Nelder-Mead", options={"maxiter": 150}).x)
-        far = squared_lengths(errors, cls(*found)(posterior, disagreement))
+        optimum = np.exp(minimize(cost, start, method="Nelder-Mead", options={"maxiter": 150}).x)
+        far = squared_lengths(errors, cls(*optimum)(posterior, disagreement))
         last = far[-max(len(far) // _RECENT, _FEWEST) :]
         factor = max(_high(far), _high(last) / _CHANCE) / NINE_IN_TEN
         spent = (len(errors) + _SPENT) / max(len(errors) - _SPENT, 1)
-        return cls(*(float(x) for x in factor * spent * found))
+        return cls(*(float(x) for x in factor * spent * optimum))
 
     def __call__(self, posterior: FloatArray, disagreement: FloatArray) -> FloatArray:
         """(n, 2, 2) covariance."""
@@ -72,10 +72,10 @@ class CalibratedCovariance:
         return np.asarray(self.posterior * posterior + self.disagreement * disagreement + common)
 
 
-def disagreement_of(told: FloatArray, answer: FloatArray) -> FloatArray:
+def disagreement_of(by_expert: FloatArray, answer: FloatArray) -> FloatArray:
     """(n, 2, 2) scatter of what the experts say, (experts, n, 2), about the answer (n, 2)."""
-    away = told - answer
-    return np.asarray(np.einsum("eni,enj->nij", away, away) / len(told))
+    away = by_expert - answer
+    return np.asarray(np.einsum("eni,enj->nij", away, away) / len(by_expert))
 
 
 def _high(far: FloatArray) -> float:
@@ -132,7 +132,7 @@ class Expert:
         if like is None:
             process = Process.of(terms, squares, targets)
         else:
-            process = Process.known(terms, like.process.logs, squares, targets)
+            process = Process.given(terms, like.process.logs, squares, targets)
         return cls(process, estimate is not None, centre, scale)
 
     def left_out(self, estimate: FloatArray) -> FloatArray:
@@ -161,7 +161,7 @@ class Stacking:
     unit: float
     experts: tuple[Expert, ...]
     weights: FloatArray
-    left_out_told: FloatArray
+    left_out_by_expert: FloatArray
 
     @classmethod
     def of(
@@ -181,22 +181,22 @@ class Stacking:
             "features": between / unit,
             "estimate": squared_distances(estimates, estimates) / _NEAR**2,
         }
-        known = like.experts if like else (None, None, None)
+        given = like.experts if like else (None, None, None)
         experts = (
-            Expert.of(_PLAIN, squares, xy, None, known[0]),
-            Expert.of(_BOTH, squares, xy, None, known[1]),
-            Expert.of(_BOTH, squares, xy, estimates, known[2]),
+            Expert.of(_PLAIN, squares, xy, None, given[0]),
+            Expert.of(_BOTH, squares, xy, None, given[1]),
+            Expert.of(_BOTH, squares, xy, estimates, given[2]),
         )
-        told = np.stack([estimates, *(e.left_out(estimates) for e in experts)])
-        weights = _weights(told, xy)
-        return cls(features, estimates, unit, experts, weights, told)
+        by_expert = np.stack([estimates, *(e.left_out(estimates) for e in experts)])
+        weights = _weights(by_expert, xy)
+        return cls(features, estimates, unit, experts, weights, by_expert)
 
     @property
     def left_out(self) -> FloatArray:
         """(n, 2) what each press would be told without itself."""
-        return self.combined(self.left_out_told)
+        return self.combined(self.left_out_by_expert)
 
-    def told(self, features: FloatArray, estimates: FloatArray) -> FloatArray:
+    def by_expert(self, features: FloatArray, estimates: FloatArray) -> FloatArray:
         """(experts, m, 2) what each says of frames, the maps first."""
         squares = {
             "features": squared_distances(features, self.features) / self.unit,
@@ -204,9 +204,9 @@ class Stacking:
         }
         return np.stack([estimates, *(expert(squares, estimates) for expert in self.experts)])
 
-    def combined(self, told: FloatArray) -> FloatArray:
+    def combined(self, by_expert: FloatArray) -> FloatArray:
         """(m, 2) places from what each says, (experts, m, 2)."""
-        return np.asarray(np.tensordot(self.weights, told, 1))
+        return np.asarray(np.tensordot(self.weights, by_expert, 1))
 
 
 def _usual(between: FloatArray) -> float:
@@ -214,12 +214,12 @@ def _usual(between: FloatArray) -> float:
     return float(np.median(between[between > 0])) if (between > 0).any() else 1.0
 
 
-def _weights(told: FloatArray, xy: FloatArray) -> FloatArray:
+def _weights(by_expert: FloatArray, xy: FloatArray) -> FloatArray:
     """Parts that add up to one, of least squared error; far-off presses weigh less (Huber)."""
-    errors = np.linalg.norm(told - xy, axis=2).min(axis=0)
+    errors = np.linalg.norm(by_expert - xy, axis=2).min(axis=0)
     weigh = np.sqrt(1 / np.maximum(errors, np.median(errors) + 1e-9))[:, None]
-    columns = (told * weigh).reshape(len(told), -1).T
-    design = np.vstack([columns, np.full((1, len(told)), _TOGETHER)])
+    columns = (by_expert * weigh).reshape(len(by_expert), -1).T
+    design = np.vstack([columns, np.full((1, len(by_expert)), _TOGETHER)])
     weights, _ = nnls(design, np.append((xy * weigh).ravel(), _TOGETHER))
     learnt = len(xy) / (len(xy) + _WORTH)
     return np.asarray(learnt * weights / weights.sum() + (1 - learnt) * _BEFORE)
@@ -242,26 +242,26 @@ class Remark:
     reason: str
 
 
-def twins(features: FloatArray, places: FloatArray, unit: float) -> list[Remark]:
+def twins(features: FloatArray, positions: FloatArray, unit: float) -> list[Remark]:
     """Presses with the same data as an earlier one, at another place."""
     between = squared_distances(features, features)
     usual = float(np.median(between)) or 1.0
-    apart = squared_distances(places, places)
+    apart = squared_distances(positions, positions)
     pairs = np.argwhere(np.triu((between < _SAME * usual) & (apart > _APART**2), 1))
-    seen: dict[int, Remark] = {}
+    remarks: dict[int, Remark] = {}
     for first, second in pairs.tolist():
         far = 1e3 * unit * float(np.sqrt(apart[first, second]))
-        seen.setdefault(
+        remarks.setdefault(
             second, Remark(second, f"has the same data as press {first}, {far:.0f} mm away")
         )
-    return list(seen.values())
+    return list(remarks.values())
 
 
 def outliers(
-    told: FloatArray, places: FloatArray, covariance: FloatArray, unit: float
+    estimates: FloatArray, positions: FloatArray, covariance: FloatArray, unit: float
 ) -> list[Remark]:
-    """Presses that lie far from where the others say they are: ``told`` (n, 2) left out."""
-    error = told - places
+    """Presses that lie far from where the others say they are: ``estimates`` (n, 2) left out."""
+    error = estimates - positions
     length = np.linalg.norm(error, axis=1)
     rows = np.flatnonzero((squared_lengths(error, covariance) > _UNLIKELY) & (length > _FAR))
     return [

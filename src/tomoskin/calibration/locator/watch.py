@@ -39,8 +39,8 @@ class Watch:
 
     def __init__(self, locator: Locator) -> None:
         self._locator = locator
-        told = locator.stacking.left_out
-        off = np.abs(self._surprise(locator.presses.dv, told))
+        estimates = locator.stacking.left_out
+        off = np.abs(self._surprise(locator.presses.dv, estimates))
         self._usual = np.median(off, axis=0) + np.finfo(float).tiny
         self._limit = np.maximum(_OFF, _GUARD * _worst(self._clipped(off)))
         usual = [np.ones(off.shape[1])] * _PRESSES
@@ -59,8 +59,8 @@ class Watch:
         Raises DataError as :meth:`Locator.predict` does.
         """
         answers = [self._next(frame) for frame in frames(dv, self._locator.presses.dv.shape[1])]
-        places, covariances = zip(*answers, strict=True)
-        return np.concatenate(places), np.concatenate(covariances)
+        positions, covariances = zip(*answers, strict=True)
+        return np.concatenate(positions), np.concatenate(covariances)
 
     def _next(self, frame: FloatArray) -> tuple[FloatArray, FloatArray]:
         answer = self._locator.predict(self._kept(frame))
@@ -84,10 +84,10 @@ class Watch:
         used = np.isfinite(kept[self._locator.features.rows])
         return kept if used.any() else frame
 
-    def _surprise(self, dv: FloatArray, places: FloatArray) -> FloatArray:
-        """(n, k) features less what the maps say of presses at ``places`` (n, 2)."""
+    def _surprise(self, dv: FloatArray, positions: FloatArray) -> FloatArray:
+        """(n, k) features less what the maps say of presses at ``positions`` (n, 2)."""
         maps = self._locator.estimates.likelihood.maps
-        return self._locator.features(dv) - maps.features_at(places)
+        return self._locator.features(dv) - maps.features_at(positions)
 
     def _clipped(self, off: FloatArray) -> FloatArray:
         return np.minimum(off / self._usual, _FARTHEST)

@@ -165,10 +165,10 @@ def least(spectrum: Spectrum, quantity: Quantity, why: Explanation) -> AlphaChoi
     values = np.array([quantity(float(a)) for a in alphas])
     at = int(values.argmin())
     low, high = np.log(alphas[[max(at - 1, 0), min(at + 1, len(alphas) - 1)]])
-    found = minimize_scalar(lambda t: quantity(float(np.exp(t))), bounds=(low, high))
+    minimum = minimize_scalar(lambda t: quantity(float(np.exp(t))), bounds=(low, high))
     end = ", at the end of the range" if at in (0, len(alphas) - 1) else ""
     curve = Curve(alphas, values, "alpha", why.quantity, at)
-    return AlphaChoice(float(np.exp(found.x)), why.rule, why.reason + end, curve)
+    return AlphaChoice(float(np.exp(minimum.x)), why.rule, why.reason + end, curve)
 
 
 def crossing(spectrum: Spectrum, quantity: Quantity, level: Level, why: Explanation) -> AlphaChoice:

@@ -59,9 +59,9 @@ class LightTouch:
         mesh, alphas = spectrum.problem.model.mesh, spectrum.alphas[::_STRIDE]
         touches = _touches(mesh) * (DEPTH * np.abs(spectrum.problem.conductivity[:, None]))
         size = mesh.volumes @ touches**2
-        seen = spectrum.analysis @ (spectrum.problem.jacobian @ touches)
+        response = spectrum.analysis @ (spectrum.problem.jacobian @ touches)
         projected = spectrum.modes.conj().T @ (mesh.volumes[:, None] * touches)
-        blur = np.array([np.mean(_blur(spectrum, a, seen, projected) / size) for a in alphas])
+        blur = np.array([np.mean(_blur(spectrum, a, response, projected) / size) for a in alphas])
         return cls(spectrum, alphas, 1.0 + blur, float(1.0 / np.mean(1.0 / size)))
 
     def __call__(self, noise: FloatArray) -> AlphaChoice:
@@ -99,10 +99,10 @@ def _touches(mesh: Mesh) -> FloatArray:
 
 
 def _blur(
-    spectrum: Spectrum, alpha: float, seen: NDArray[Any], projected: NDArray[Any]
+    spectrum: Spectrum, alpha: float, response: NDArray[Any], projected: NDArray[Any]
 ) -> FloatArray:
     """(k,) ∫x̂² − 2∫x̂x of each touch."""
-    image = spectrum.gains(alpha)[:, None] * seen
+    image = spectrum.gains(alpha)[:, None] * response
     square = np.einsum("mt,mt->t", image.conj(), spectrum.overlap @ image)
     return np.asarray(np.real(square - 2.0 * np.einsum("mt,mt->t", projected.conj(), image)))
 

@@ -175,8 +175,8 @@ class Trainer:
 
         def excess(decade: float) -> float:
             matrix, _ = self.matrix(10.0**decade)
-            found = noise_figure(matrix, self.mesh.volumes, self.middle, self.noise)
-            return float(np.log(found / figure))
+            reached = noise_figure(matrix, self.mesh.volumes, self.middle, self.noise)
+            return float(np.log(reached / figure))
 
         low, high = (excess(decade) for decade in _WEIGHTS)
         if low * high > 0:

@@ -159,11 +159,11 @@ class AbsoluteImaging:
         DataError
             When the observation is not one of this pattern.
         """
-        seen = observation.whitened(self.model.pattern.n_meas)
+        data = observation.whitened(self.model.pattern.n_meas)
         image = Cells(len(self.model.mesh.cells))
-        unknowns, begin = medium(self.model, seen, image, self.contacts, background)
+        unknowns, begin = medium(self.model, data, image, self.contacts, background)
         descent = descend(
-            Goal(unknowns, self._cost(unknowns), seen.target),
+            Goal(unknowns, self._cost(unknowns), data.target),
             begin,
             most=self.steps,
             tolerance=self.tolerance,
@@ -236,13 +236,13 @@ def homogeneous(
 
 
 def _uniform(
-    model: ForwardModel, seen: Whitened, contacts: Contacts, background: float | None
+    model: ForwardModel, data: Whitened, contacts: Contacts, background: float | None
 ) -> Absolute:
     if background is None:
-        background = _of_right_size(model, seen.target, seen.rows)
-    unknowns = Unknowns(model, _Nothing(len(model.mesh.cells)), background, contacts, seen.rows)
+        background = _of_right_size(model, data.target, data.rows)
+    unknowns = Unknowns(model, _Nothing(len(model.mesh.cells)), background, contacts, data.rows)
     descent = descend(
-        Goal(unknowns, Quadratic(others(unknowns.n_contacts)), seen.target),
+        Goal(unknowns, Quadratic(others(unknowns.n_contacts)), data.target),
         Descent.begin(unknowns.size),
         most=STEPS,
         tolerance=TOLERANCE,
@@ -253,7 +253,7 @@ def _uniform(
 
 def medium(
     model: ForwardModel,
-    seen: Whitened,
+    data: Whitened,
     image: ImageMap,
     contacts: Contacts,
     background: float | None,
@@ -263,10 +263,10 @@ def medium(
     With a ``background``, on that and with the model's contacts.
     """
     if background is not None:
-        unknowns = Unknowns(model, image, background, contacts, seen.rows)
+        unknowns = Unknowns(model, image, background, contacts, data.rows)
         return unknowns, Descent.begin(unknowns.size)
-    uniform = _uniform(model, seen, contacts, None)
-    unknowns = Unknowns(model, image, uniform.background, contacts, seen.rows)
+    uniform = _uniform(model, data, contacts, None)
+    unknowns = Unknowns(model, image, uniform.background, contacts, data.rows)
     x = np.zeros(unknowns.size)
     if contacts != "fixed":
         ratio = uniform.contact_impedance / model.contact_impedance

@@ -188,10 +188,10 @@ def minimiser(
     if not free.shape[1]:
         dual = cho_solve(factor, rhs, check_finite=False)
         return spread @ dual, jacobian.T @ dual
-    seen = jacobian @ free
-    half = cho_solve(factor, seen, check_finite=False)
-    part = np.linalg.lstsq(seen.T @ half, half.T @ rhs, rcond=None)[0]
-    dual = cho_solve(factor, rhs - seen @ part, check_finite=False)
+    response = jacobian @ free
+    half = cho_solve(factor, response, check_finite=False)
+    part = np.linalg.lstsq(response.T @ half, half.T @ rhs, rcond=None)[0]
+    dual = cho_solve(factor, rhs - response @ part, check_finite=False)
     return spread @ dual + free @ part, jacobian.T @ dual
 
 

@@ -258,14 +258,14 @@ class ShapeImaging:
         one that explains most is the beginning. Raises DataError when the observation is not one
         of this pattern.
         """
-        seen = observation.whitened(self.model.pattern.n_meas)
+        data = observation.whitened(self.model.pattern.n_meas)
         phases = [Phases(self.field, softness, self.most) for softness in self.softness]
-        unknowns, descent = medium(self.model, seen, phases[0], self.contacts, background)
+        unknowns, descent = medium(self.model, data, phases[0], self.contacts, background)
         rest = others(unknowns.n_contacts, self.drift)
         cost = Quadratic(Joint(Diagonal(np.ones(self.field.size)), 1.0, rest))
         for phase in phases:
             unknowns = replace(unknowns, image=phase)
-            goal = Goal(unknowns, cost, seen.target)
+            goal = Goal(unknowns, cost, data.target)
             descent = descend(goal, descent, most=1, tolerance=0.0)
         point = unknowns.at(descent.unknowns)
         return Segmented(Absolute.of(point, descent), self.field, point.latent)

@@ -80,12 +80,12 @@ class SharpDifference:
 
     def __call__(self, observation: Observation) -> SharpImage:
         """Image of difference data. Raises DataError when they are not of this pattern."""
-        seen = observation.whitened(self.model.pattern.n_meas)
-        forward = _Linear(seen.rows @ self.jacobian)
+        data = observation.whitened(self.model.pattern.n_meas)
+        forward = _Linear(data.rows @ self.jacobian)
         mesh = self.model.mesh
         cost = Sharp(self.prior, mesh, self.alpha**2, Diagonal(np.empty(0)))
         descent = descend(
-            Goal(forward, cost, seen.target),
+            Goal(forward, cost, data.target),
             Descent.begin(len(mesh.cells)),
             most=self.steps,
             tolerance=self.tolerance,
@@ -101,11 +101,11 @@ class _Linear:
 
     jacobian: FloatArray
 
-    def at(self, unknowns: FloatArray) -> _Seen:
-        return _Seen(self.jacobian @ unknowns, self.jacobian)
+    def at(self, unknowns: FloatArray) -> _Prediction:
+        return _Prediction(self.jacobian @ unknowns, self.jacobian)
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
+class _Prediction:
     predicted: FloatArray
     jacobian: FloatArray

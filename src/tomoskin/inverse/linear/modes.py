@@ -61,10 +61,10 @@ class Modes:
         root = np.sqrt(problem.weights)
         if operator.matrix.shape != problem.jacobian.shape[::-1]:
             raise _foreign()
-        seen = root[:, None] * (problem.jacobian @ operator.matrix) / root
-        if np.abs(seen - seen.conj().T).max() > _SKEW * np.abs(seen).max():
+        resolution = root[:, None] * (problem.jacobian @ operator.matrix) / root
+        if np.abs(resolution - resolution.conj().T).max() > _SKEW * np.abs(resolution).max():
             raise _foreign()
-        trust, basis = np.linalg.eigh((seen + seen.conj().T) / 2.0)
+        trust, basis = np.linalg.eigh((resolution + resolution.conj().T) / 2.0)
         analysis = (root[:, None] * basis).conj().T
         return cls._without_nothing(operator, analysis, (operator.matrix / root) @ basis, trust)
 

@@ -172,9 +172,9 @@ class LinearProblem:
             matrix += (spread - matrix @ system) @ precision  # refined once
         free = self.prior.free
         if free.shape[1]:
-            seen = self.jacobian @ free
-            precision, fitted = _fitted(precision, seen)
-            matrix += (free - matrix @ seen) @ fitted
+            response = self.jacobian @ free
+            precision, fitted = _fitted(precision, response)
+            matrix += (free - matrix @ response) @ fitted
         return Operator(
             self.model,
             matrix,
@@ -184,10 +184,10 @@ class LinearProblem:
         )
 
 
-def _fitted(precision: NDArray[Any], seen: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+def _fitted(precision: NDArray[Any], response: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
     """K⁻¹ less the part of the free images, and C (k, n_meas); ``seen`` is B."""
-    half = precision @ seen
-    fitted = _inverse(seen.conj().T @ half) @ half.conj().T
+    half = precision @ response
+    fitted = _inverse(response.conj().T @ half) @ half.conj().T
     return precision - half @ fitted, fitted
 
 

@@ -69,15 +69,15 @@ class Spectrum:
         if not k:
             values, u = _eigen(system)
             return cls(problem, values, u.conj().T * root, (spread * root) @ u)
-        seen, rest, upper = _seen(root[:, None] * problem.jacobian, free)
+        basis, rest, upper = _free_part(root[:, None] * problem.jacobian, free)
         values, inner = _eigen(rest.conj().T @ system @ rest)
         u = rest @ inner
-        fitted = solve_triangular(upper, seen.conj().T @ system @ u)
+        fitted = solve_triangular(upper, basis.conj().T @ system @ u)
         cheap = solve_triangular(upper, np.eye(k))
         return cls(
             problem,
             np.concatenate([np.full(k, np.inf), values]),
-            np.hstack([seen, u]).conj().T * root,
+            np.hstack([basis, u]).conj().T * root,
             np.hstack([free @ cheap, (spread * root) @ u - free @ fitted]),
         )
 
@@ -111,7 +111,7 @@ class Spectrum:
 
     def filters(self, alpha: float) -> FloatArray:
         """(n_meas,) filter factors λ/(λ + α²): the part of each coefficient that is believed."""
-        return 1.0 - _remainder(self, alpha)
+        return 1.0 - _complement(self, alpha)
 
     def freedom(self, alpha: float) -> float:
         """Effective degrees of freedom: the sum of the filter factors."""
@@ -127,7 +127,7 @@ class Spectrum:
 
     def residual(self, alpha: float, dv: NDArray[Any]) -> FloatArray:
         """(…,) ‖dv − Jx‖_W of the images x of data (…, n_meas)."""
-        unexplained = _remainder(self, alpha) * self.coefficients(dv)
+        unexplained = _complement(self, alpha) * self.coefficients(dv)
         return np.asarray(np.linalg.norm(unexplained, axis=-1))
 
     def seminorm(self, alpha: float, dv: NDArray[Any]) -> FloatArray:
@@ -163,7 +163,7 @@ class Spectrum:
         return np.asarray((self.modes.conj().T * volumes) @ self.modes)
 
 
-def _remainder(spectrum: Spectrum, alpha: float) -> FloatArray:
+def _complement(spectrum: Spectrum, alpha: float) -> FloatArray:
     """1 − filter factor, without loss of digits."""
     return np.where(np.isfinite(spectrum.values), alpha**2 * spectrum.gains(alpha), 0.0)
 
@@ -188,7 +188,7 @@ def _eigen(system: NDArray[Any]) -> tuple[FloatArray, NDArray[Any]]:
     return np.maximum(values[::-1], 0.0), vectors[:, ::-1]
 
 
-def _seen(
+def _free_part(
     jacobian: NDArray[Any], free: FloatArray
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """What the data see of the free images N: JN = QR, with the rest of the data's space."""

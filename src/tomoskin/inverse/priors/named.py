@@ -56,9 +56,9 @@ class TotalVariation:
 
     def touching(self, mesh: Mesh, image: FloatArray) -> Penalty:
         """Weighted graph Laplacian."""
-        jump = self._jumps(mesh, image)
+        step = self._jumps(mesh, image)
         return sparse_penalty(
-            graph_laplacian(mesh, _edges(mesh) / np.sqrt(jump**2 + self._beta**2))
+            graph_laplacian(mesh, _edges(mesh) / np.sqrt(step**2 + self._beta**2))
         )
 
     def energy(self, mesh: Mesh, image: FloatArray) -> float:

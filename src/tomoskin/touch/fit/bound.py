@@ -15,8 +15,8 @@ def fisher_information(response: Response, spots: FloatArray, noise: Whitener) -
     For Gaussian noise it is JᵀC⁻¹J (Kay 1993, eq. 3.31 without its second term), in the order of
     the columns: 1/m² for x and y, 1 for the logarithm of the radius, 1/m⁴ for the content.
     """
-    found = [noise(jacobian.T) for _, jacobian in response.each(spots)]
-    jacobians = np.stack(found)
+    whitened = [noise(jacobian.T) for _, jacobian in response.each(spots)]
+    jacobians = np.stack(whitened)
     return np.asarray(jacobians @ jacobians.swapaxes(1, 2))
 
 

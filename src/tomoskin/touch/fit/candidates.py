@@ -47,10 +47,10 @@ class Candidates:
         spots = np.concatenate(
             [spots_of(positions, size * prior.radius, -_FAINT) for size in _SIZES]
         )
-        found = response.changes([spot[None] for spot in spots])
+        changes = response.changes([spot[None] for spot in spots])
         content = spots[:, CONTENT].copy()
         spots[:, CONTENT] = 1.0
-        return cls(spots, found / content[:, None])
+        return cls(spots, changes / content[:, None])
 
     def matched(self, whiten: Whitener) -> Matched:
         """The same for one noise."""

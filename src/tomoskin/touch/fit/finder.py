@@ -157,12 +157,12 @@ class SpotFinder:
             data=whiten(dv / self._scale),
         )
         search = Search(problem, matched, self._settings.snr, self._most, self._pace, quiet)
-        found = search(self._before)
-        self._unrest = self._unrest_of(found.fit.spots)
-        self._before = found.fit.spots
+        detected = search(self._before)
+        self._unrest = self._unrest_of(detected.fit.spots)
+        self._before = detected.fit.spots
         if self._fading:
             self._residual = self._residual.after(self._before, self._model.response, self._fading)
-        detections = self._readings(joined(found))
+        detections = self._detections(joined(detected))
         detections.sort(key=lambda detection: -abs(detection.peak))
         return detections
 
@@ -191,13 +191,15 @@ class SpotFinder:
         weigh = Weigh.of(whiten(self._residual.directions.T).T)
         return Whitener(weigh(whiten.matrix)), matched.weighed(weigh)
 
-    def _readings(self, found: SpotDetections) -> list[Detection]:
-        spots = found.fit.spots
+    def _detections(self, detected: SpotDetections) -> list[Detection]:
+        spots = detected.fit.spots
         depth = self._unit * np.expm1(depth_of(spots)) if len(spots) else np.zeros(0)
-        return [self._reading(spots[k], float(depth[k]), found, k) for k in range(len(spots))]
+        return [self._detection(spots[k], float(depth[k]), detected, k) for k in range(len(spots))]
 
-    def _reading(self, spot: FloatArray, peak: float, found: SpotDetections, k: int) -> Detection:
-        block = found.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
+    def _detection(
+        self, spot: FloatArray, peak: float, detected: SpotDetections, k: int
+    ) -> Detection:
+        block = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
         radius = float(np.exp(spot[LOG_RADIUS]))
         apart = np.linalg.norm(self._mesh.centroids - spot[:2], axis=1)
         cells = np.flatnonzero(apart <= max(radius, apart.min()))
@@ -210,8 +212,8 @@ class SpotFinder:
             peak=peak,
             cells=cells,
             cov_xy=float(block[0, 1]),
-            snr=float(found.ratio[k]),
-            close=bool(found.close[k]),
+            snr=float(detected.ratio[k]),
+            close=bool(detected.close[k]),
         )
 
 

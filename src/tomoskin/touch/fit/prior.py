@@ -55,10 +55,10 @@ class SpotPrior:
 
     def away(self, spots: FloatArray) -> FloatArray:
         """(k, 4) deviations of spots (k, 4) from the prior's middle; positions have none."""
-        found = np.zeros_like(spots)
-        found[:, LOG_RADIUS] = (spots[:, LOG_RADIUS] - math.log(self.radius)) / self.spread
-        found[:, CONTENT] = spots[:, CONTENT] / self.content
-        return found
+        deviations = np.zeros_like(spots)
+        deviations[:, LOG_RADIUS] = (spots[:, LOG_RADIUS] - math.log(self.radius)) / self.spread
+        deviations[:, CONTENT] = spots[:, CONTENT] / self.content
+        return deviations
 
     @property
     def weights(self) -> FloatArray:

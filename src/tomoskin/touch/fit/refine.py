@@ -60,7 +60,7 @@ class Fit:
     ----------
     spots
         (k, 4), see :mod:`tomoskin.touch.fit.spot`.
-    seen
+    predicted
         (r,) what the spots do to the whitened data.
     residual
         (r,) whitened data less that, weighed for unknown directions.
@@ -77,7 +77,7 @@ class Fit:
     """
 
     spots: FloatArray
-    seen: FloatArray
+    predicted: FloatArray
     residual: FloatArray
     jacobian: FloatArray
     weigh: Weigh
@@ -143,12 +143,12 @@ class Problem:
         """The frame with these spots, as they are."""
         change, jacobian, directed = self.response.expanded(spots)
         unknown = np.hstack([_DIRECTED * directed, self._within_scan(spots, jacobian)])
-        seen, weigh = self.whiten(change), Weigh.of(self.whiten(unknown.T).T)
-        residual, slope = weigh(self.data - seen), weigh(self.whiten(jacobian.T).T)
+        predicted, weigh = self.whiten(change), Weigh.of(self.whiten(unknown.T).T)
+        residual, slope = weigh(self.data - predicted), weigh(self.whiten(jacobian.T).T)
         away, weights = self.prior.away(spots), np.tile(self.prior.weights, len(spots))
         normal = slope.T @ slope + np.diag(weights**2)
         cost = (residual @ residual + float((away**2).sum())) / 2
-        return Fit(spots, seen, residual, slope, weigh, normal, float(cost))
+        return Fit(spots, predicted, residual, slope, weigh, normal, float(cost))
 
     def _within_scan(self, spots: FloatArray, jacobian: FloatArray) -> FloatArray:
         """(n_meas, 3k) V: what it does that touches move along x and y, and grow, while the rows
@@ -203,7 +203,7 @@ class SheetDomain:
 
     def held(self, spots: FloatArray) -> FloatArray:
         """``spots`` (k, 4) on the sheet."""
-        apart, cell = (np.atleast_1d(found) for found in self._tree.query(spots[:, :2]))
+        apart, cell = (np.atleast_1d(nearest) for nearest in self._tree.query(spots[:, :2]))
         off = np.asarray(apart > self._margin[cell])
         if not off.any():
             return spots

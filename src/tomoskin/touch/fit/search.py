@@ -23,7 +23,7 @@ _DOUBTFUL = 0.8
 _MISSHAPEN = 0.02
 """A wrong profile leaves up to this part of what a touch changes: no evidence of another one."""
 
-_SHAPE_DOUBT = 0.5
+_SHAPE_SD = 0.5
 """How far a true profile is from ours, of the way to a bell: a standard deviation."""
 
 _UNEVEN = 0.08
@@ -140,24 +140,24 @@ class Search:
 
     def _threshold(self, fit: Fit, part: float) -> float:
         """What a wrong profile may leave adds to the noise."""
-        misshapen = _MISSHAPEN * float(np.linalg.norm(fit.seen))
+        misshapen = _MISSHAPEN * float(np.linalg.norm(fit.predicted))
         return part * self.least * float(np.hypot(1.0, misshapen / self.least))
 
     def _standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
         return self.matched.ratios(fit.residual, fit.jacobian, self.problem.sign)
 
     def _best(self, starts: list[FloatArray]) -> Fit:
-        seen = (self.problem.refined(start, self.pace.glance) for start in starts)
-        best = min(seen, key=lambda fit: fit.cost)
+        fits = (self.problem.refined(start, self.pace.glance) for start in starts)
+        best = min(fits, key=lambda fit: fit.cost)
         return best if best.settled else self.problem.settled(best, self.pace.cold)
 
     def _ratios(self, fit: Fit) -> FloatArray:
         """(k,) size of what each spot changes that the others could not take up."""
         k = len(fit.spots)
         if k == 1:
-            return np.array([np.linalg.norm(fit.seen)])
+            return np.array([np.linalg.norm(fit.predicted)])
         others = [np.delete(fit.spots, number, axis=0) for number in range(k)]
-        alone = fit.seen - self.problem.whiten(self.problem.response.changes(others))
+        alone = fit.predicted - self.problem.whiten(self.problem.response.changes(others))
         for number in range(k):
             slope = np.delete(fit.jacobian, np.s_[4 * number : 4 * number + 4], axis=1)
             basis, _ = np.linalg.qr(slope)
@@ -212,8 +212,8 @@ def _covariance(problem: Problem, fit: Fit) -> FloatArray:
     """
     scatter = max(1.0, fit.misfit / fit.degrees)
     other = problem.whiten(problem.response.changes([fit.spots], bell)[0])
-    wrong = fit.weigh(other - fit.seen)
-    moved = _SHAPE_DOUBT * (fit.covariance @ (fit.jacobian.T @ wrong))
+    wrong = fit.weigh(other - fit.predicted)
+    moved = _SHAPE_SD * (fit.covariance @ (fit.jacobian.T @ wrong))
     return np.asarray(scatter * fit.covariance + np.outer(moved, moved) + _uneven(problem, fit))
 
 
@@ -231,23 +231,23 @@ def _uneven(problem: Problem, fit: Fit) -> FloatArray:
     return np.asarray(max(beyond, _UNEVEN**2) * (moved @ moved.T))
 
 
-def joined(found: SpotDetections) -> SpotDetections:
+def joined(detected: SpotDetections) -> SpotDetections:
     """The same with each two touches as one whose positions are not distinct (2 deviations)."""
-    spots, k = found.fit.spots, len(found.fit.spots)
+    spots, k = detected.fit.spots, len(detected.fit.spots)
     for i in range(k):
         for j in range(i + 1, k):
             away = spots[i, :2] - spots[j, :2]
             pick = [4 * i, 4 * i + 1, 4 * j, 4 * j + 1]
-            block = found.covariance[np.ix_(pick, pick)]
+            block = detected.covariance[np.ix_(pick, pick)]
             turn = np.concatenate([away, -away])
             if (away @ away) ** 2 < 4 * (turn @ block @ turn):
-                return joined(_merged(found, i, j))
-    return found
+                return joined(_merged(detected, i, j))
+    return detected
 
 
-def _merged(found: SpotDetections, i: int, j: int) -> SpotDetections:
+def _merged(detected: SpotDetections, i: int, j: int) -> SpotDetections:
     """Touches i and j as one, at the middle of their contents."""
-    fit, keep = found.fit, np.delete(np.arange(len(found.fit.spots)), j)
+    fit, keep = detected.fit, np.delete(np.arange(len(detected.fit.spots)), j)
     share = np.abs(fit.spots[[i, j], CONTENT])
     share = share / share.sum()
     one = fit.spots[i].copy()
@@ -260,9 +260,9 @@ def _merged(found: SpotDetections, i: int, j: int) -> SpotDetections:
     for column, part in ((i, share[0]), (j, share[1])):
         mix[4 * i : 4 * i + 2, 4 * column : 4 * column + 2] = part * np.eye(2)
     rows = (4 * keep[:, None] + np.arange(N_PARAMETERS)).ravel()
-    covariance = (mix @ found.covariance @ mix.T)[np.ix_(rows, rows)]
-    ratio = found.ratio.copy()
-    ratio[i] = np.hypot(*found.ratio[[i, j]])
-    close = found.close.copy()
+    covariance = (mix @ detected.covariance @ mix.T)[np.ix_(rows, rows)]
+    ratio = detected.ratio.copy()
+    ratio[i] = np.hypot(*detected.ratio[[i, j]])
+    close = detected.close.copy()
     close[i] = True
     return SpotDetections(replace(fit, spots=spots[keep]), ratio[keep], covariance, close[keep])

@@ -76,18 +76,20 @@ def bell(square: FloatArray) -> FloatArray:
 
 
 def spots_of(
-    places: FloatArray, radius: FloatArray | float, depth: FloatArray | float
+    positions: FloatArray, radius: FloatArray | float, depth: FloatArray | float
 ) -> FloatArray:
-    """(n, 4) spots at ``places`` (n, 2) m, of radius m; ``depth`` is log(σ/σ₀) at the centre.
+    """(n, 4) spots at ``positions`` (n, 2) m, of radius m; ``depth`` is log(σ/σ₀) at the centre.
 
     A press makes the sheet conduct less: its depth is negative.
     """
-    places = np.asarray(places, dtype=np.float64)
-    radius = np.broadcast_to(np.asarray(radius, dtype=np.float64), places.shape[:1])
-    if places.ndim != 2 or places.shape[1] != 2 or not (radius > 0).all():
-        raise ModelError(f"expected places (n, 2) and radii above 0, got {places.shape}, {radius}")
+    positions = np.asarray(positions, dtype=np.float64)
+    radius = np.broadcast_to(np.asarray(radius, dtype=np.float64), positions.shape[:1])
+    if positions.ndim != 2 or positions.shape[1] != 2 or not (radius > 0).all():
+        raise ModelError(
+            f"expected positions (n, 2) and radii above 0, got {positions.shape}, {radius}"
+        )
     content = FILLING * radius**2 * depth
-    return np.column_stack([places, np.log(radius), content])
+    return np.column_stack([positions, np.log(radius), content])
 
 
 def depth_of(spots: FloatArray) -> FloatArray:
@@ -237,9 +239,9 @@ class Response:
         for part in parts:
             change[part.cells] += part.height
         pressed = self.state.model.at(self.state.conductivity * np.exp(change))
-        found = np.array([_answers(pressed, part) for part in parts])
-        slopes = found[:, :N_PARAMETERS].reshape(-1, found.shape[2]).T
-        return pressed.voltages - self.reference, slopes, found[:, N_PARAMETERS].T
+        answers = np.array([_answers(pressed, part) for part in parts])
+        slopes = answers[:, :N_PARAMETERS].reshape(-1, answers.shape[2]).T
+        return pressed.voltages - self.reference, slopes, answers[:, N_PARAMETERS].T
 
     def _solved(self, cells: IntArray, sigma: FloatArray) -> State:
         conductivity = self.state.conductivity.copy()
