@@ -99,7 +99,7 @@ lock: dev  ## pin the newest packages, with hashes, in requirements/*.txt
 	@for out in $(LOCKS); do $(MAKE) --no-print-directory lock-$$out || exit 1; done
 
 clean:  ## remove everything that make made
-	rm -rf $(VENV) build dist src/tomoskin/server/static web/node_modules
+	rm -rf $(VENV) build dist src/tomoskin/server/static src/tomoskin/emulator/images web/node_modules
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 # Set-up. A stamp's time says when its step was last done.

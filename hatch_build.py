@@ -1,4 +1,4 @@
-"""The build hook: a wheel, an editable install and an sdist each hold the built page."""
+"""The build hook: each install holds the built page, wheel and sdist the built firmware too."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "scripts"))
+import images
 import page as page_build
 
 
@@ -22,11 +23,17 @@ class PageHook(BuildHookInterface[Any]):
         return [page_build.NODE_REQUIREMENT]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
-        """Build the page, or end the build with one sentence that says why not."""
+        """Build the page, or end the build with one sentence that says why not; the firmware."""
         try:
             page_build.build(self._page)
         except page_build.PageError as error:
             sys.exit(f"tomoskin: {error}")
+        if version == "editable":  # of a checkout, which builds what it flashes
+            return
+        try:
+            images.build(Path(self.root))
+        except images.ImageError as error:
+            self.app.display_warning(f"tomoskin: no firmware in this build: {error}")
 
     @property
     def _page(self) -> page_build.Page:

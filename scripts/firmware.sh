@@ -4,7 +4,7 @@ set -eu
 . "$(dirname "$0")/apt.sh"
 
 ready() {
-    for program in cc c++ avr-gcc avr-size simavr gcovr cppcheck; do
+    for program in cc c++ avr-gcc avr-size avrdude simavr gcovr cppcheck; do
         command -v $program >/dev/null || return 1
     done
     found=""
@@ -25,5 +25,5 @@ more() {
 }
 
 provide "compilers, emulator and test tools for the firmware" "its tests cannot run" \
-    make gcc g++ libc6-dev gcc-avr avr-libc simavr libsimavr-dev libelf-dev libgtest-dev gcovr \
+    make gcc g++ libc6-dev gcc-avr avr-libc avrdude simavr libsimavr-dev libelf-dev libgtest-dev gcovr \
     cppcheck clang

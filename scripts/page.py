@@ -69,7 +69,7 @@ class Page:
 
     def digest(self) -> str:
         """Return a hash of the sources' names and contents; times do not survive a clone."""
-        return _digest(self.root, self._sources())
+        return digest_of(self.root, self._sources())
 
     def _sources(self) -> Iterator[Path]:
         for folder, names, files in os.walk(self.web):
@@ -119,7 +119,7 @@ def install(page: Page, node: Node) -> None:
     locked = [page.web / "package.json", page.web / "package-lock.json"]
     if not locked[1].is_file():
         raise PageError(f"the page's lock file is missing: {locked[1]}")
-    wanted = f"{platform.system()} {platform.machine()} {_digest(page.web, locked)}"
+    wanted = f"{platform.system()} {platform.machine()} {digest_of(page.web, locked)}"
     stamp = page.web / "node_modules" / ".tomoskin"
     if _text(stamp) == wanted:
         return
@@ -213,7 +213,8 @@ def _failure(what: str, output: str) -> str:
     return f"npm {what} failed{':' if tail else ''}\n{tail}".strip()
 
 
-def _digest(root: Path, files: Sequence[Path] | Iterator[Path]) -> str:
+def digest_of(root: Path, files: Sequence[Path] | Iterator[Path]) -> str:
+    """Return a hash of the files' names below `root` and their contents."""
     total = hashlib.sha256()
     for file in files:
         content = hashlib.sha256(file.read_bytes()).hexdigest()

@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import urllib.request
+import zipfile
 from collections.abc import Iterator, Sequence
 from importlib.metadata import Distribution, distribution
 from pathlib import Path
@@ -43,6 +44,13 @@ def pure(folder: Path) -> tuple[Path, Path]:
     run(sys.executable, *PIP, "wheel", *offline, "-w", str(folder), str(sdist), cwd=folder)
     (wheel,) = folder.glob("tomoskin-*.whl")
     return sdist, wheel
+
+
+def firmware_in(wheel: Path) -> str:
+    """A line that says which boards' firmware a wheel holds."""
+    with zipfile.ZipFile(wheel) as archive:
+        found = [Path(name).name for name in archive.namelist() if name.endswith(".hex")]
+    return f"firmware inside: {', '.join(found) or 'NONE, for want of avr-gcc'}"
 
 
 def fast(folder: Path) -> Path:
@@ -139,6 +147,7 @@ def main() -> int:
             print(f"ok  tomoskin {' '.join(words)}")
         empty.serves()
         print("ok  tomoskin live")
+    print(firmware_in(files[1]))
     for file in files:
         size, digest = file.stat().st_size, hashlib.sha256(file.read_bytes()).hexdigest()
         print(f"{file.relative_to(ROOT)}  {size / 1e6:.2f} MB  sha256 {digest}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -22,6 +23,7 @@ pytestmark = pytest.mark.slow  # make release looks at the same
 
 ROOT = Path(__file__).resolve().parent.parent
 STATIC = "tomoskin/server/static/"
+IMAGES = "tomoskin/emulator/images/"
 MOST_MB = 6.0
 
 
@@ -66,6 +68,17 @@ def test_the_built_page_is_in_both(wheel: list[str], sdist: list[str]) -> None:
     assert {f"src/{name}" for name in page} <= set(sdist)
 
 
+def test_the_firmware_of_both_boards_is_in_both(wheel: list[str], sdist: list[str], built) -> None:
+    if shutil.which("avr-gcc") is None:
+        missing("the firmware in a wheel: no avr-gcc (Debian: apt-get install gcc-avr avr-libc)")
+    images = {f"{IMAGES}tomoskin-{channels}.hex" for channels in (8, 16)}
+    assert images <= set(wheel)
+    assert {f"src/{name}" for name in images} <= set(sdist)
+    with zipfile.ZipFile(built[1]) as archive:
+        for name in images:
+            assert archive.read(name).splitlines()[-1] == b":00000001FF"  # it is whole
+
+
 def test_every_file_of_the_library_is_in_it(wheel: list[str]) -> None:
     source = ROOT / "src"
     suffixes = {".py", ".toml", ".typed"}
@@ -88,7 +101,8 @@ def test_the_sdist_holds_the_sources_and_no_recordings(sdist: list[str], built) 
     wanted |= {"hatch_build.py", "firmware/Makefile", "core-native/Cargo.toml"}
     assert wanted - set(sdist) == set()
     assert [n for n in sdist if re.search(r"(^|/)(shared|node_modules|target|\.venv)/", n)] == []
-    assert [name for name in sdist if name.endswith((".mcap", ".npz", ".hex", ".so"))] == []
+    binaries = {name for name in sdist if name.endswith((".mcap", ".npz", ".elf", ".so"))}
+    assert binaries == {"tests/recording/of_0_1.mcap"}  # that old files are still read
     assert max(file.stat().st_size for file in built) < 1e6 * MOST_MB
 
 

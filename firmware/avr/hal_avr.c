@@ -20,7 +20,7 @@
 #define BY_64(timer) (_BV(CS##timer##1) | _BV(CS##timer##0)) /* 4 us */
 #define RECEIVE_SIZE 128u
 
-/* Set by `tomoskin firmware flash`; an EEPROM that was never written reads 0xFF. */
+/* Set by `tomoskin firmware configure`; an EEPROM that was never written reads 0xFF. */
 struct identity {
     uint32_t current; /* uA */
     uint8_t unique_id[8];

@@ -1,6 +1,6 @@
-/* tomoskin-emulator [-s SKIN_MEMORY] [-c MICROAMPERES] [-l LINK] [-w WATCH] [-f] [-r] [-d] ELF:
+/* tomoskin-emulator [-s SKIN_MEMORY] [-e EEPROM] [-l LINK] [-w WATCH] [-f] [-r] [-d] ELF:
    the firmware on a simulated ATmega2560. Its switches and converter inputs are as in avr/pins.h;
-   what they must never do is said on stderr. -f: while it scans, as fast as it goes and not in real
+   what they must never do is said on stderr. -e: a file that its EEPROM begins with. -f: while it scans, as fast as it goes and not in real
    time. -r: opening the port resets the board, and for a second its bootloader swallows what is
    said to it. -d: end when stdin does. */
 #include "skin.h"
@@ -237,12 +237,15 @@ static void open_line(const char *link_path) {
     (void)fflush(stdout);
 }
 
-static void set_identity(uint32_t current) {
-    uint8_t identity[12] = {0, 0, 0, 0, 'e', 'm', 'u', 'l', 'a', 't', 'e', 'd'};
-    for (int byte = 0; byte < 4; byte++) {
-        identity[byte] = (uint8_t)(current >> 8 * byte);
+static void fill_eeprom(const char *path) {
+    uint8_t bytes[4096];
+    FILE *file = fopen(path, "rb");
+    size_t size = file != NULL ? fread(bytes, 1, sizeof bytes, file) : 0;
+    if (size == 0) {
+        give_up("the EEPROM's file cannot be read");
     }
-    avr_eeprom_desc_t eeprom = {.ee = identity, .offset = 0, .size = sizeof identity};
+    (void)fclose(file);
+    avr_eeprom_desc_t eeprom = {.ee = bytes, .offset = 0, .size = (uint32_t)size};
     (void)avr_ioctl(avr, AVR_IOCTL_EEPROM_SET, &eeprom);
 }
 
@@ -347,13 +350,13 @@ static void run(void) {
 
 int main(int count, char **arguments) {
     const char *link = NULL;
-    uint32_t current = 100000;
+    const char *eeprom = NULL;
     skin = skin_star();
-    for (int option; (option = getopt(count, arguments, "s:c:l:w:frd")) != -1;) {
+    for (int option; (option = getopt(count, arguments, "s:e:l:w:frd")) != -1;) {
         if (option == 's') {
             skin = skin_open(optarg);
-        } else if (option == 'c') {
-            current = (uint32_t)strtoul(optarg, NULL, 10);
+        } else if (option == 'e') {
+            eeprom = optarg;
         } else if (option == 'l') {
             link = optarg;
         } else if (option == 'w') {
@@ -372,7 +375,9 @@ int main(int count, char **arguments) {
         give_up("expected one ELF");
     }
     build_board(arguments[optind]);
-    set_identity(current);
+    if (eeprom != NULL) {
+        fill_eeprom(eeprom);
+    }
     open_line(link);
     avr_cycle_count_t next = 0;
     for (;;) {

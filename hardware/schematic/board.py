@@ -61,10 +61,11 @@ def connector(c: Circuit, table: pins.Pins, channels: int) -> None:
 
 
 def current_source(c: Circuit) -> None:
-    """1.225 V below the rail across 12.25 ohm: 100 mA into BUS, whatever its load."""
+    """1.225 V below the rail across 12.4 || 1020 ohm: 100 mA into BUS, whatever its load."""
     c.add(p.REFERENCE_1V2, "+12V REF")
     c.add(p.R, "REF GND", "10k")
-    c.add(p.PRECISE, "+12V SENSE", "12.25")
+    c.add(p.PRECISE, "+12V SENSE", "12.4")
+    c.add(p.R, "+12V SENSE", "1.02k")
     c.add(p.OPA, "DRIVE GND REF BACK +12V")
     c.add(p.R, "SENSE BACK", "1k")
     c.add(p.C, "DRIVE BACK", "470p C0G")

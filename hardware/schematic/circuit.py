@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 
@@ -9,6 +10,10 @@ from schematic.parts import Part, Pin, R
 
 RAILS = {"GND", "+12V"}
 """What a gate may be held at: there whenever a current can flow."""
+
+_E24 = "10 11 12 13 15 16 18 20 22 24 27 30 33 36 39 43 47 51 56 62 68 75 82 91"
+STOCK = {10 * int(two) for two in _E24.split()} | {round(10 ** (2 + n / 96)) for n in range(96)}
+"""Three digits of the values that resistors and capacitors are sold with: E24 and E96."""
 
 Node = tuple[str, str]
 """Reference and pin's name."""
@@ -52,9 +57,14 @@ class Circuit:
         """What a rule check finds.
 
         A net with one pin; two outputs on one net; an input that nothing drives; a supply pin off
-        every supply; a transistor's gate that no resistor holds at a rail when nothing drives it.
+        every supply; a transistor's gate that no resistor holds at a rail when nothing drives it; a
+        resistor or capacitor of a value that nobody sells.
         """
-        found = []
+        found = [
+            f"{reference}: {placed.value} is no stock value (E24, E96)"
+            for reference, placed in self.placed.items()
+            if placed.part.letter in "RC" and not _is_stock(placed.value)
+        ]
         for net, nodes in self.nets().items():
             kinds = [self.placed[reference].part.pins[pin] for reference, pin in nodes]
             drives = kinds.count(Pin.OUTPUT) + kinds.count(Pin.POWER_OUT)
@@ -106,3 +116,10 @@ class Circuit:
             lines.append(",".join([*map(str, row), " ".join(references)]))
         total = sum(placed.part.euros for placed in self.placed.values())
         return "\n".join([*lines, f"total,,,{len(self.placed)},,{total:.0f},"]) + "\n"
+
+
+def _is_stock(value: str) -> bool:
+    """Whether ``1.47k`` or ``470p C0G`` is sold."""
+    number = float(value.partition(" ")[0].rstrip("pnumkM"))
+    digits = number * 10 ** (2 - math.floor(math.log10(number)))
+    return any(math.isclose(digits, stock) for stock in STOCK)

@@ -185,6 +185,7 @@ OWN_WAYS = {
     "recording/message_log.py": "a session, while it happens, into a file that must be new",
     "emulator/program.py": "a lock beside what make builds",
     "emulator/process.py": "in a temporary folder of its own",
+    "emulator/flash.py": "in a temporary folder of its own",
 }
 OPENERS = {"write_text", "write_bytes", "savefig", "savemat", "ParquetWriter", "mkstemp", "File"}
 

@@ -137,7 +137,7 @@ def test_a_board_for_another_host(programs: Programs, monkeypatch: pytest.Monkey
 def test_the_command_line_builds_and_says_what_is_missing(
     programs: Programs, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    said = CliRunner().invoke(app, ["firmware", "build"])
+    said = CliRunner().invoke(app, ["firmware", "build", "--channels", "16"])
     assert said.exit_code == 0
     assert Path(said.output.strip()) == programs.elf
     monkeypatch.setattr("shutil.which", lambda _: None)

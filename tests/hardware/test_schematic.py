@@ -25,12 +25,14 @@ def test_the_rule_check_finds_what_is_wrong():
     supplies(circuit)
     circuit.add(parts.NFET, "FLOATS GND FLOATS")  # a gate that nothing holds
     circuit.add(parts.FOLLOWER, "2V5 GND FLOATS NOWHERE +3V")  # a second output, no supply
+    odd = circuit.add(parts.PRECISE, "2V5 GND", "12.25")
     said = "\n".join(circuit.problems())
     for problem in (
         "2V5: two outputs",
         "FLOATS: a gate that no resistor holds",
         "NOWHERE: only",
         "+3V: supplied by nothing",
+        f"{odd}: 12.25 is no stock value",
     ):
         assert problem in said
 

@@ -52,8 +52,17 @@ def test_a_value_is_the_same_in_both(block, element, nets):
     assert on_board(*nets).split()[0] == in_deck(block, element)
 
 
-def test_what_sets_current_and_gain():
-    assert 1.225 / float(on_board("+12V", "SENSE")) == pytest.approx(results.AMPERES)
+def test_what_sets_the_current():
+    pair = [p.value for p in BOARD.placed.values() if set(p.nets.values()) == {"+12V", "SENSE"}]
+    of_deck = [float(in_deck("CURRENT_mended", name)[1:].split("/")[0]) for name in ("R1", "R4")]
+    ohms = [float(value.rstrip("k")) * (1e3 if "k" in value else 1) for value in pair]
+    assert ohms == pytest.approx([value / results.AMPERES for value in of_deck])
+    amperes = sum(1.225 / value for value in ohms)
+    assert amperes == pytest.approx(results.AMPERES, rel=2e-4)
+    assert amperes < results.AMPERES  # what the skin may carry
+
+
+def test_what_sets_the_gain():
     ohms = float(on_board("RA_3", "RB_3").rstrip("k")) * 1e3
     assert 1 + 50e3 / ohms == pytest.approx(results.GAIN, rel=0.002)
     assert on_board("BUS", "DUMP") == "22"

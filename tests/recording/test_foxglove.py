@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 
 import pytest
 from foxglove import messages as sdk
 
 from recording.runs import SKIN, TOUCH
 from tomoskin.core import Event, Image
+from tomoskin.mesh import Cylinder
 from tomoskin.recording import encode_json, grid_message, log_message, scene_message, schema_of
 
 OURS = {"host_time", "unit"}
@@ -100,6 +102,14 @@ def test_schemas_name_the_fields_of_the_messages(image, scene, topic):
     content = {"/scene": scene, "/image": image, "/events": log_message(Event(0, "a", "b"), 0)}
     schema = json.loads(schema_of(topic).data)
     assert names(content[topic]) == names_of_schema(schema)
+
+
+def test_on_a_curved_skin_a_touch_is_in_space():
+    (entity,) = scene_message((TOUCH,), 0, Cylinder(0.05))["entities"]
+    for part in (entity["spheres"][0], entity["texts"][0]):
+        x, y, z = part["pose"]["position"].values()
+        assert math.hypot(x, z + 0.05) == pytest.approx(0.05)
+        assert (y, z < -0.01) == (pytest.approx(TOUCH.detection.y), True)
 
 
 def names(content):

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import threading
+from contextlib import closing
+from pathlib import Path
 
 import pytest
 
 from run.test_runner import PATIENCE, Watch
 from server.serving import Site
 from tomoskin.core import Event, SinkError
+from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
+from tomoskin.recording.replay import open_replay
 from tomoskin.run import Runner
 from tomoskin.sink import Moment
+from tomoskin.sink.naming import Naming, event_content
+from tomoskin.skin import Skin
 
 FRAMES = 3 * REFERENCE_FRAMES
 
@@ -103,3 +109,18 @@ def test_how_they_are_is_said(runner, sinks, gate):
     assert [sink["name"] for sink in told["sinks"]] == list(sinks)
     assert told["sinks"][1]["text"].startswith("is away")
     gate.set()
+
+
+def test_a_replay_is_published_with_the_times_of_its_day():
+    old = Path(__file__).parents[1] / "recording" / "of_0_1.mcap"
+    skin, sink = Skin.load("textile-disc-8"), Sink("good")
+    with closing(open_replay(f"{old}@max", skin)) as replay:
+        runner = Runner(prepare(skin), lambda: replay, sinks=(sink,))
+        runner.start()
+        Watch(runner).until(lambda: sink.streams)
+        runner.stop()
+    (stream,) = sink.streams
+    assert (stream.epoch, stream.replayed) == (1e9, True)
+    event = Event(0.5, "connected", "board 01")
+    assert event_content(stream, Naming(), event, of_frame=True)["utc_s"] == 1e9 + 0.5
+    assert event_content(stream, Naming(), event)["utc_s"] is None  # it is of today

@@ -22,10 +22,12 @@ def test_the_installed_sinks():
         ("foxglove:0.0.0.0:9000", "foxglove at ws://0.0.0.0:9000"),
         ("mqtt://broker", "mqtt://broker:1883/tomoskin"),
         ("mqtt://me:secret@broker:99/robot/skin", "mqtt://broker:99/robot/skin"),
+        ("mqtt://broker/robot/skin?frame=left_forearm", "mqtt://broker:1883/robot/skin"),
         ("lsl", "lsl tomoskin"),
         ("lsl:left-hand", "lsl left-hand"),
         ("zenoh", "zenoh peers"),
         ("zenoh:tcp/10.0.0.1:7447,domain=3", "zenoh tcp/10.0.0.1:7447"),
+        ("zenoh:namespace=left_arm", "zenoh peers"),
     ],
 )
 def test_names_say_where_results_go_but_no_password(spec, name):
@@ -50,6 +52,10 @@ def test_names_say_where_results_go_but_no_password(spec, name):
         ("zenoh:domain=x", "expected an endpoint"),
         ("zenoh:tcp/a:1,tcp/b:2", "expected an endpoint"),
         ('zenoh:tcp/"', "expected an endpoint"),
+        ("zenoh:namespace=left arm", "expected a namespace"),
+        ("zenoh:space=x", "expected domain=…, namespace=…, frame=…"),
+        ("mqtt://host/a?qos=1", "expected frame=…"),
+        ("mqtt://host/a?frame=left arm", "expected a frame"),
     ],
 )
 def test_what_cannot_be_meant(spec, said):
@@ -58,9 +64,10 @@ def test_what_cannot_be_meant(spec, said):
 
 
 def test_a_password_is_never_said():
-    with pytest.raises(SinkError) as raised:
-        make_sink("mqtt://me:secret@host/a#b")
-    assert "secret" not in str(raised.value)
+    for spec in ("mqtt://me:secret@host/a#b", "mqtt://me:12?secret@host/a"):
+        with pytest.raises(SinkError) as raised:
+            make_sink(spec)
+        assert "secret" not in str(raised.value)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from paho.mqtt import client as paho
 
 from conftest import missing
 from recording.runs import TOUCH
-from sink.conftest import EVENT, PATIENCE, free_port, moment_at, touch_of
+from sink.conftest import EPOCH, EVENT, PATIENCE, free_port, moment_at, touch_of
 from tomoskin.core import SinkError
 from tomoskin.sink import make_sink
 from tomoskin.sink.mqtt import PERIOD
@@ -96,17 +96,21 @@ def test_touches_events_and_status(broker, heard, stream):
     told = json.loads(text)
     assert (told["sequence"], told["touches"][0]["x"]) == (3, TOUCH.detection.x)
     assert told["touches"][0]["sd_y"] is None
+    assert told["touches"][0]["position"] == [TOUCH.detection.x, TOUCH.detection.y, 0.0]
+    assert (told["skin"], told["frame_id"]) == (stream.skin, "robot/skin/skin")
+    assert told["utc_s"] == EPOCH + told["host_time"]
     begun = TouchEvent("onset", TOUCH, 1.1)
     sink.publish(replace(moment_at(1.1, TOUCH, sequence=4), happened=(begun,)))
     topic, text = heard()
     assert topic == "robot/skin/touch"
     told = json.loads(text)
     assert (told["event"], told["id"], told["time_s"]) == ("onset", TOUCH.id, 1.1)
+    assert (told["utc_s"], told["normal"]) == (EPOCH + 1.1, [0, 0, 1])
     assert heard()[0] == "robot/skin/touches"
     sink.publish(EVENT)
-    assert heard() == (
-        "robot/skin/events", '{"time_s":0.5,"kind":"connected","text":"board 01"}',
-    )  # fmt: skip
+    topic, text = heard()
+    assert topic == "robot/skin/events"
+    assert text.startswith('{"time_s":0.5,"kind":"connected","text":"board 01","utc_s":')
     sink.close()
     assert heard() == ("robot/skin/status", "offline")
 

@@ -14,12 +14,25 @@ from types import ModuleType, SimpleNamespace
 import msgspec
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from recording.runs import TOUCH
 from sink.conftest import EPOCH, EVENT, VALUES, moment_at, touch_of
 from tomoskin.core import Event, SinkError
+from tomoskin.mesh import Cylinder
 from tomoskin.sink import make_sink
-from tomoskin.sink.ros import IMAGE, POSE, TEXT, TYPES, RosView, encode_cdr, type_hash
+from tomoskin.sink.naming import Naming, SpacePose
+from tomoskin.sink.ros import (
+    IMAGE,
+    ODOMETRY,
+    POSE,
+    TEXT,
+    TOPICS,
+    TYPES,
+    RosView,
+    encode_cdr,
+    type_hash,
+)
 
 
 @pytest.mark.parametrize(
@@ -28,31 +41,10 @@ from tomoskin.sink.ros import IMAGE, POSE, TEXT, TYPES, RosView, encode_cdr, typ
         (TEXT, "df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"),
         (IMAGE, "d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47"),
         # has the covariance that our pose has
-        (
-            "nav_msgs/msg/Odometry",
-            "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0",
-        ),
+        (ODOMETRY, "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"),
     ],
 )
-def test_hashes_are_those_of_ros_2(kind, digest, monkeypatch):
-    vector = {"x": "float64", "y": "float64", "z": "float64"}
-    twist = {"linear": "geometry_msgs/msg/Vector3", "angular": "geometry_msgs/msg/Vector3"}
-    more = {
-        "geometry_msgs/msg/Vector3": vector,
-        "geometry_msgs/msg/Twist": twist,
-        "geometry_msgs/msg/TwistWithCovariance": {
-            "twist": "geometry_msgs/msg/Twist",
-            "covariance": "float64[36]",
-        },
-        "nav_msgs/msg/Odometry": {
-            "header": "std_msgs/msg/Header",
-            "child_frame_id": "string",
-            "pose": "geometry_msgs/msg/PoseWithCovariance",
-            "twist": "geometry_msgs/msg/TwistWithCovariance",
-        },
-    }
-    for name, fields in more.items():
-        monkeypatch.setitem(TYPES, name, fields)
+def test_hashes_are_those_of_ros_2(kind, digest):
     assert type_hash(kind) == f"RIHS01_{digest}"
 
 
@@ -85,11 +77,11 @@ class Cdr:
 
 
 def messages_of(stream, item):
-    return {message.topic: message.value for message in RosView(stream).of(item)}
+    return {message.topic: message.value for message in RosView(stream, Naming()).of(item)}
 
 
 def test_a_touch_is_a_pose_with_covariance(stream):
-    value = messages_of(stream, moment_at(0.25, TOUCH))["tomoskin/touch"]
+    value = messages_of(stream, moment_at(0.25, TOUCH))["touch"]
     cdr = Cdr(encode_cdr(POSE, value))
     assert cdr.header() == (pytest.approx(EPOCH + 0.25), "skin")
     pose = [cdr.take("d") for _ in range(7)]
@@ -101,12 +93,65 @@ def test_a_touch_is_a_pose_with_covariance(stream):
     assert (covariance == np.diag(np.diag(covariance))).all()
     reading = replace(TOUCH.detection, sd_y=2e-3, cov_xy=5e-7)
     moment = moment_at(0.25, replace(TOUCH, detection=reading))
-    value = messages_of(stream, moment)["tomoskin/touch"]
+    value = messages_of(stream, moment)["touch"]
     assert value["pose"]["covariance"][[1, 6]].tolist() == [5e-7, 5e-7]
 
 
+def test_a_track_says_whose_pose_it_is(stream):
+    view = RosView(stream, Naming("left_arm"))
+    tracks = [m for m in view.of(moment_at(0.25, TOUCH, touch_of(5))) if m.topic == "track"]
+    for message, number in zip(tracks, (4, 5), strict=True):
+        cdr = Cdr(encode_cdr(ODOMETRY, message.value))
+        assert cdr.header() == (pytest.approx(EPOCH + 0.25), "left_arm/skin")
+        assert cdr.text() == f"left_arm/skin/touch_{number}"
+        assert [cdr.take("d") for _ in range(3)] == [TOUCH.detection.x, TOUCH.detection.y, 0]
+        rest = [cdr.take("d") for _ in range(4 + 36 + 6 + 36)]
+        assert rest[4 + 36 :][:7] == [0] * 6 + [1e6]  # velocities are not known
+        assert cdr.ends()
+
+
+def test_on_a_curved_skin_a_touch_is_where_it_is_in_space(stream):
+    radius, angle = 0.05, 0.6
+    detection = replace(TOUCH.detection, x=radius * angle, y=0.02, sd_x=1e-3, sd_y=2e-3)
+    touch = replace(TOUCH, detection=detection)
+    curved = replace(stream, surface=Cylinder(radius), pixels=None)
+    value = messages_of(curved, moment_at(0.25, touch))
+    pose = value["touch"]["pose"]
+    place = np.array([*pose["pose"]["position"].values()])
+    x, height = radius * np.sin(angle), radius * (np.cos(angle) - 1)
+    assert place == pytest.approx([x, 0.02, height])
+    turn = Rotation.from_quat([*pose["pose"]["orientation"].values()])
+    assert turn.as_rotvec() == pytest.approx([0, angle, 0])  # about the cylinder's axis
+    local = turn.as_matrix().T @ pose["covariance"].reshape(6, 6)[:3, :3] @ turn.as_matrix()
+    assert np.diag(local) == pytest.approx([1e-6, 4e-6, 1e6], rel=1e-3)
+    (told,) = msgspec.json.decode(value["touches"]["data"])["touches"]
+    assert told["position"] == pytest.approx(place.tolist())
+    assert told["normal"] == pytest.approx([np.sin(angle), 0, np.cos(angle)])
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 3.1), (0, 3.1, 0), (-3, 0.1, 0), (1, 2, -1)])
+def test_an_orientation_is_that_of_its_axes(turn):
+    wanted = Rotation.from_rotvec(turn)
+    pose = SpacePose((0.0, 0.0, 0.0), tuple(wanted.as_matrix().T.tolist()), np.empty((3, 2)))
+    found = Rotation.from_quat(pose.quaternion())
+    assert (found.inv() * wanted).magnitude() == pytest.approx(0, abs=1e-12)
+
+
+def test_two_skins_do_not_meet(rclpy, stream):
+    sinks = [make_sink("ros2"), make_sink("ros2:namespace=left_arm,frame=left_forearm")]
+    for sink in sinks:
+        sink.open(stream)
+        sink.publish(moment_at(0.25, TOUCH))
+        sink.close()
+    headed = [(topic, msg) for topic, msg in rclpy.published if "touches" not in topic]
+    frames = {topic: msg.header.frame_id for topic, msg in headed}
+    assert frames["/tomoskin/track"] == "skin"
+    assert frames["/left_arm/track"] == "left_forearm"
+    assert {topic.rpartition("/")[2] for topic in frames} == TOPICS.keys() - {"touches", "events"}
+
+
 def test_an_image_is_of_floats_with_the_top_row_first(stream):
-    cdr = Cdr(encode_cdr(IMAGE, messages_of(stream, moment_at(0.0))["tomoskin/image"]))
+    cdr = Cdr(encode_cdr(IMAGE, messages_of(stream, moment_at(0.0))["image"]))
     cdr.header()
     height, width = cdr.take("I"), cdr.take("I")
     assert (cdr.text(), cdr.take("B"), cdr.take("I")) == ("32FC1", 0, 4 * width)
@@ -117,19 +162,20 @@ def test_an_image_is_of_floats_with_the_top_row_first(stream):
 
 
 def test_texts_are_json(stream):
-    view = RosView(stream)
+    view = RosView(stream, Naming())
     touched = {m.topic: m.value for m in view.of(moment_at(0.0, TOUCH, touch_of(5), sequence=7))}
-    told = msgspec.json.decode(touched["tomoskin/touches"]["data"])
+    told = msgspec.json.decode(touched["touches"]["data"])
     assert (told["sequence"], [t["id"] for t in told["touches"]]) == (7, [4, 5])
     after = [m.topic for m in view.of(moment_at(0.1))]
-    assert after == ["tomoskin/touches", "tomoskin/image"]
-    assert [m.topic for m in view.of(moment_at(0.2))] == ["tomoskin/image"]
+    assert after == ["touches", "image"]
+    assert [m.topic for m in view.of(moment_at(0.2))] == ["image"]
     ended = replace(moment_at(0.3), told=(Event(0.3, "touch-release", "touch 4 ends"),))
-    assert [m.topic for m in view.of(ended)] == ["tomoskin/events", "tomoskin/image"]
+    assert [m.topic for m in view.of(ended)] == ["events", "image"]
     (event,) = view.of(EVENT)
     cdr = Cdr(encode_cdr(TEXT, event.value))
     assert msgspec.json.decode(cdr.text()) == {
         "time_s": 0.5, "kind": "connected", "text": "board 01",
+        "utc_s": EPOCH + 0.5, "skin": stream.skin, "frame_id": "skin",
     }  # fmt: skip
 
 
@@ -163,21 +209,23 @@ class Rclpy(ModuleType):
         assert signal_handler_options is None  # of a context of one's own: none
         context.ok = True
 
-    def create_node(self, node_name, *, context=None):
+    def create_node(self, node_name, *, context=None, namespace=None):
         assert context.ok
+        assert namespace.startswith("/")
         self.log.append(node_name)
+
+        def create_publisher(msg_type, topic, qos_profile):
+            assert qos_profile > 0
+
+            def publish(msg):
+                assert isinstance(msg, msg_type)
+                self.published.append((f"{namespace}/{topic}", msg))
+
+            return SimpleNamespace(publish=publish)
+
         return SimpleNamespace(
-            create_publisher=self.create_publisher, destroy_node=lambda: self.log.append("destroy")
+            create_publisher=create_publisher, destroy_node=lambda: self.log.append("destroy")
         )
-
-    def create_publisher(self, msg_type, topic, qos_profile):
-        assert qos_profile > 0
-
-        def publish(msg):
-            assert isinstance(msg, msg_type)
-            self.published.append((topic, msg))
-
-        return SimpleNamespace(publish=publish)
 
     def shutdown(self, *, context=None):
         self.log.append("shutdown")
@@ -188,7 +236,7 @@ class Rclpy(ModuleType):
 def rclpy(monkeypatch):
     fake = Rclpy()
     monkeypatch.setitem(sys.modules, "rclpy", fake)
-    for kind in (POSE, IMAGE, TEXT):
+    for kind in (POSE, ODOMETRY, IMAGE, TEXT):
         package, _, name = kind.rpartition("/")
         module = ModuleType(package.replace("/", "."))
         setattr(module, name, message_class(kind))
@@ -205,8 +253,8 @@ def test_a_node_publishes_the_same_messages(rclpy, stream):
         sink.publish(moment_at(0.25, TOUCH))
         sink.publish(EVENT)
         sink.close()
-    topics = [topic.removeprefix("tomoskin/") for topic, _ in rclpy.published]
-    assert topics == ["touch", "touches", "image", "events"]
+    topics = [topic.removeprefix("/tomoskin/") for topic, _ in rclpy.published]
+    assert topics == ["touch", "track", "touches", "image", "events"]
     pose = rclpy.published[0][1]
     assert pose.pose.pose.position.x == TOUCH.detection.x
     assert pose.header.stamp.sec == int(EPOCH)
@@ -218,5 +266,6 @@ def test_without_ros_2_it_says_what_to_do(monkeypatch):
     monkeypatch.setitem(sys.modules, "rclpy", None)
     with pytest.raises(SinkError, match=r"rclpy.*setup\.bash.*--sink zenoh"):
         make_sink("ros2")
-    with pytest.raises(SinkError, match="no argument"):
-        make_sink("ros2:node")
+    for wrong in ("node", "namespace=left arm", "namespace=/arm", "frame=", "name=x"):
+        with pytest.raises(SinkError, match="expected"):
+            make_sink(f"ros2:{wrong}")

@@ -38,22 +38,23 @@ def heard(peer):
 
 @pytest.mark.parametrize("domain", [None, 7])
 def test_a_subscriber_gets_ros_messages(peer, heard, stream, domain):
-    sink = make_sink(f"zenoh:{peer[0]}" + ("" if domain is None else f",domain={domain}"))
+    options = "" if domain is None else f",domain={domain},namespace=left/tomoskin"
+    sink = make_sink(f"zenoh:{peer[0]}{options}")
     sink.open(stream)
     sink.publish(moment_at(0.25, TOUCH))
     sink.publish(EVENT)
-    samples = [heard() for _ in range(4)]
+    samples = [heard() for _ in range(5)]
     sink.close()
     keys = [str(sample.key_expr) for sample in samples]
     pose = Cdr(samples[0].payload.to_bytes())
     pose.header()
     assert pose.take("d") == TOUCH.detection.x
     if domain is None:
-        names = ["touch", "touches", "image", "events"]
+        names = ["touch", "track", "touches", "image", "events"]
         assert keys == [f"tomoskin/{name}" for name in names]
         return
-    assert keys[3] == (
-        "7/tomoskin/events/std_msgs::msg::dds_::String_/"
+    assert keys[4] == (
+        "7/left/tomoskin/events/std_msgs::msg::dds_::String_/"
         "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
     )
     layout = tuple[str, ext.Int64, str, ext.Int64, str, list[ext.UInt8]]

@@ -41,6 +41,7 @@ EXPORTS = {
     ".png": "a sheet of maps",
     ".gif": "a film",
     ".mp4": "a film",
+    ".mcap": "a bag of ROS 2",
 }
 """What each ending gives; more is in docs/session-file.md."""
 
@@ -112,7 +113,7 @@ def export(
     out: Annotated[
         Path,
         typer.Argument(
-            metavar="OUT", help="X.csv, .parquet, .h5, .npz, .mat, .vtu, .png, .gif or .mp4."
+            metavar="OUT", help="X.csv, .parquet, .h5, .npz, .mat, .vtu, .png, .gif, .mp4, .mcap."
         ),
         Writes(EXPORTS, _exported),
     ],
@@ -129,8 +130,9 @@ def export(
     """Convert a session: voltages, or the images that they give again."""
     from tomoskin.formats import WRITERS, Export
     from tomoskin.recording import SessionReader
+    from tomoskin.sink import write_bag
 
-    write = WRITERS[out.suffix.lower()]
+    write = (WRITERS | {".mcap": write_bag})[out.suffix.lower()]
     with SessionReader(file) as session, Bar(f"writing {out}") as bar:
         job = Export(session, every, bar, overwrite=force)
         write(job, out)

@@ -10,6 +10,7 @@ from dataclasses import astuple, dataclass
 from pathlib import Path
 
 from tomoskin.core import FloatArray, SourceError
+from tomoskin.emulator.flash import BoardIdentity
 from tomoskin.emulator.program import Programs
 
 MOST_ELECTRODES = 32
@@ -82,10 +83,12 @@ class BoardProcess:
 
         ``options``: further ones of the emulator, see ``firmware/emulator/emulator.c``.
         """
+        eeprom = memory.with_name("eeprom")
+        eeprom.write_bytes(BoardIdentity(current, b"emulated").pack())
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
         self._process = subprocess.Popen(
             [
-                *(programs.emulator, "-d", "-s", memory, "-c", str(round(current * 1e6))),
+                *(programs.emulator, "-d", "-s", memory, "-e", eeprom),
                 *options,
                 programs.elf,
             ],

@@ -1,4 +1,4 @@
-"""The firmware's ELF and the emulator that runs it, built from the repository's ``firmware``."""
+"""The firmware and the emulator that runs it: built from ``firmware``, or as the wheel holds it."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from tomoskin.core import SourceError
 
 FOLDER = Path(__file__).resolve().parents[3] / "firmware"
 """Where the sources are, in a checkout."""
+
+IMAGES = Path(__file__).parent / "images"
+"""Where a wheel has the firmware, built: ``tomoskin-8.hex`` for a board with 8 channels."""
 
 _BUILD = FOLDER.parent / "build" / "firmware"
 _PACKAGES = "make gcc gcc-avr avr-libc libsimavr-dev libelf-dev"
@@ -34,6 +37,24 @@ def build_elf(channels: int = 16) -> Path:
     """The firmware of a board with ``channels``, built if it is not up to date; SourceError."""
     _make("avr", f"CHANNELS={channels}")
     return _BUILD / f"tomoskin-{channels}.elf"
+
+
+def firmware_image(channels: int) -> Path:
+    """What is written to a board: built from the sources in a checkout, else the wheel's image.
+
+    Raises
+    ------
+    SourceError
+        When it cannot be built, or the wheel was made where it could not be.
+    """
+    if FOLDER.is_dir():
+        return build_elf(channels)
+    image = IMAGES / f"tomoskin-{channels}.hex"
+    if not image.is_file():
+        raise SourceError(
+            "this installation holds no firmware", where="firmware", hint="use a git checkout"
+        )
+    return image
 
 
 def build_programs() -> Programs:
@@ -61,7 +82,9 @@ def build_alone() -> Iterator[None]:
 def _make(*arguments: str) -> None:
     if not FOLDER.is_dir():
         raise SourceError(
-            "the firmware's sources are not here", where="firmware", hint="use a git checkout"
+            "the firmware's sources are not here",
+            where="firmware",
+            hint="use a git checkout; tomoskin firmware flash needs none",
         )
     absent = [tool for tool in _NEEDED if shutil.which(tool) is None]
     if absent:

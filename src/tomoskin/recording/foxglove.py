@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import CHANGE, Event, Image, PixelMap, Touch
+from tomoskin.mesh import Plane, Surface
 from tomoskin.recording.channels import UNUSED
 
 _INFO, _WARNING = 2, 3
@@ -25,6 +26,7 @@ _QUIET = frozenset(
 
 _FLOAT32 = 7
 _FRAME = "skin"
+_FLAT = Plane()
 _TEXT_HEIGHT = 8e-3
 _TEXT_COLOUR = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
 _UPRIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
@@ -75,12 +77,12 @@ def grid_message(image: Image, pixels: PixelMap, host_time: float, log_time: int
     }
 
 
-def scene_message(touches: Sequence[Touch], log_time: int) -> Message:
-    """A ``foxglove.SceneUpdate`` that shows these touches and no others."""
+def scene_message(touches: Sequence[Touch], log_time: int, surface: Surface = _FLAT) -> Message:
+    """A ``foxglove.SceneUpdate`` that shows these touches on ``surface``, and no others."""
     now = _timestamp(log_time)
     return {
         "deletions": [{"timestamp": now, "type": 1, "id": ""}],
-        "entities": [_entity(touch, now) for touch in touches],
+        "entities": [_entity(touch, surface, now) for touch in touches],
     }
 
 
@@ -90,10 +92,10 @@ def _size(pixels: PixelMap) -> float:
     return 1e-3 if several is None else abs(float(several[1] - several[0]))
 
 
-def _entity(touch: Touch, now: dict[str, int]) -> Message:
+def _entity(touch: Touch, surface: Surface, now: dict[str, int]) -> Message:
     detection = touch.detection
     width = 2.0 * float(np.sqrt(detection.area / np.pi))
-    pose = _pose(detection.x, detection.y)
+    pose = _pose(*surface.point([[detection.x, detection.y]])[0].tolist())
     return {
         "timestamp": now,
         "frame_id": _FRAME,
@@ -115,8 +117,8 @@ def _entity(touch: Touch, now: dict[str, int]) -> Message:
     }  # fmt: skip
 
 
-def _pose(x: float, y: float) -> Message:
-    return {"position": {"x": x, "y": y, "z": 0.0}, "orientation": _UPRIGHT}
+def _pose(x: float, y: float, z: float = 0.0) -> Message:
+    return {"position": {"x": x, "y": y, "z": z}, "orientation": _UPRIGHT}
 
 
 def _timestamp(log_time: int) -> dict[str, int]:

@@ -74,7 +74,7 @@ class ReplayTransport:
     ) -> None:
         self.path, self.name = session.path, f"replay:{session.path.name}"
         self.speed, self.loop, self.paused = speed, loop, False
-        self.touches_before = touches_before(session)
+        self.touches_before, self.epoch = touches_before(session), session.epoch
         self._session, self._clock = session, clock or WallClock()
         self._condition = threading.Condition()
         self._board = ReplayBoard(skin, session.device())

@@ -77,7 +77,8 @@ class Flow:
         self.twin.attach(transport)
         skin, name = self.prepared.skin.name, transport.name
         self.source = f"{name} of {skin}" if self.twin.pressable else f"{skin} on {name}"
-        self.out.begin(self.prepared, self.source)
+        replay = self.marker.replay
+        self.out.begin(self.prepared, self.source, replay.epoch if replay else None)
 
     def link(self, transport: Transport) -> Link:
         """The protocol session with its source, which has just been opened, maybe again."""

@@ -29,6 +29,9 @@ class ReplaySource(Protocol):
     speed: float
     """Recorded seconds per second; inf for as fast as it is read."""
 
+    epoch: float
+    """What is added to its host times to give seconds since 1970."""
+
     touches_before: int
     """The last identity that a touch had before it begins."""
 

@@ -157,10 +157,10 @@ class Publisher:
         self._sinks: tuple[Worker[SinkConsumer], ...] = ()
         self.recordings = Recordings(prepared, self.say, audience.clock, numbered)
 
-    def begin(self, prepared: Prepared, source: str) -> None:
-        """A source has been opened, and this is what it is called."""
+    def begin(self, prepared: Prepared, source: str, recorded: float | None = None) -> None:
+        """A source has been opened, and this is what it is called; a replay's epoch."""
         self.recordings.name_source(source)
-        stream = Stream.of(prepared, source)
+        stream = Stream.of(prepared, source, recorded)
         self._sinks = tuple(sink_worker(sink, stream, self.say) for sink in self._audience.sinks)
         for worker in self._sinks:
             worker.start()

@@ -1,5 +1,6 @@
 """Where results go while they are made: Foxglove, MQTT, LSL, Zenoh, ROS 2, and others by name."""
 
+from tomoskin.sink.bag import write_bag
 from tomoskin.sink.consumer import (
     SinkConsumer,
     SinkReport,
@@ -28,4 +29,5 @@ __all__ = [
     "sink_report",
     "sink_worker",
     "stop_workers",
+    "write_bag",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import logging
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from typing import Any
@@ -64,6 +65,18 @@ def port_of(text: str, where: str) -> int:
     if text.isascii() and text.isdigit() and 0 < int(text) < 65536:
         return int(text)
     raise SinkError(f'expected a port from 1 to 65535, got "{text}"', where=where)
+
+
+def options_of(words: Iterable[str], known: tuple[str, ...], where: str) -> dict[str, str]:
+    """``a=1`` and ``b=2`` by name; SinkError for what is not known."""
+    options = {}
+    for word in words:
+        key, _, value = word.partition("=")
+        if key not in known or not value:
+            form = ", ".join(f"{name}=…" for name in known)
+            raise SinkError(f'expected {form}, got "{word}"', where=where)
+        options[key] = value
+    return options
 
 
 MOST_WAITING = 256

@@ -68,7 +68,7 @@ class FoxgloveSink:
         pixels = self._stream.pixels
         if item.image is None:
             return
-        self._send("/scene", scene_message(item.touches, now), now)
+        self._send("/scene", scene_message(item.touches, now, self._stream.surface), now)
         if pixels is not None and self._channels["/image"].has_sinks():
             self._send("/image", grid_message(item.image, pixels, item.host_time, now), now)
 

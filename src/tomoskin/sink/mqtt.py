@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from typing import Any
 from urllib.parse import SplitResult, unquote, urlsplit
 
 from tomoskin.core import Event, SinkError
-from tomoskin.recording import encode_json, touch_row, touches_message
-from tomoskin.sink.consumer import needed
+from tomoskin.recording import encode_json
+from tomoskin.sink.consumer import needed, options_of
+from tomoskin.sink.naming import (
+    Naming,
+    event_content,
+    origin,
+    poses_of,
+    touch_content,
+    touches_content,
+)
 from tomoskin.sink.sink import Item, Stream, TouchPace
 
 DEFAULT_PORT = 1883
@@ -27,8 +36,8 @@ class MqttSink:
     by the broker, which turns it to offline by itself when we vanish.
     """
 
-    def __init__(self, url: SplitResult, port: int) -> None:
-        self.topic = url.path.strip("/") or "tomoskin"
+    def __init__(self, url: SplitResult, port: int, naming: Naming) -> None:
+        self.topic, self._naming = naming.namespace, naming
         self.name = f"mqtt://{url.hostname}:{port}/{self.topic}"
         self._url, self._port = url, port
         self._paho = needed("paho.mqtt.client", "mqtt")
@@ -36,7 +45,7 @@ class MqttSink:
 
     def open(self, stream: Stream) -> None:
         """Connect; SinkError when the broker does not let us in."""
-        del stream
+        self._stream = stream
         paho = self._paho
         client = paho.Client(paho.CallbackAPIVersion.VERSION2, reconnect_on_failure=False)
         self._client = client
@@ -56,14 +65,19 @@ class MqttSink:
     def publish(self, item: Item) -> None:
         """Send what is worth a message."""
         if isinstance(item, Event):
-            content = {"time_s": item.host_time, "kind": item.kind, "text": item.text}
-            self._put("events", encode_json(content))
+            self._put("events", encode_json(event_content(self._stream, self._naming, item)))
             return
         for event in item.happened:
-            content = {"time_s": event.host_time, "event": event.kind} | touch_row(event.touch)
+            content = {
+                "time_s": event.host_time,
+                "event": event.kind,
+                **origin(self._stream, self._naming, event.host_time),
+                **touch_content(event.touch, *poses_of(self._stream, (event.touch,))),
+            }
             self._put("touch", encode_json(content))
         if self._pace.is_due(item):
-            content = touches_message(item.host_time, item.sequence, item.touches)
+            poses = poses_of(self._stream, item.touches)
+            content = touches_content(self._stream, self._naming, item, poses)
             self._put("touches", encode_json(content))
 
     def close(self) -> None:
@@ -104,17 +118,20 @@ class _Answer:
 
 
 def open_mqtt(argument: str) -> MqttSink:
-    """``mqtt://[USER:PASSWORD@]HOST[:1883][/TOPIC]``."""
+    """``mqtt://[USER:PASSWORD@]HOST[:1883][/TOPIC][?frame=NAME]``."""
     where = "sink mqtt"
     try:
         url = urlsplit(f"mqtt:{argument}")
         port = url.port or DEFAULT_PORT
     except ValueError as error:
         raise SinkError(str(error), where=where) from None
-    if not url.hostname or "?" in argument or "#" in argument or "+" in url.path:
+    if not url.hostname or "#" in argument or "+" in url.path or "@" in url.query:
         raise SinkError(
             f'expected mqtt://HOST:PORT/TOPIC, got "mqtt:{argument.rpartition("@")[2]}"',
             where=where,
             hint="for example mqtt://127.0.0.1:1883/robot/skin",
         )
-    return MqttSink(url, port)
+    options = options_of(filter(None, url.query.split("&")), ("frame",), where)
+    naming = Naming.of(options, where)
+    topic = url.path.strip("/") or naming.namespace  # MQTT's may be called anything
+    return MqttSink(url, port, replace(naming, namespace=topic))

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import msgspec
 import numpy as np
 
-from tomoskin.core import Event, Image, PixelMap, Touch
-from tomoskin.recording import touches_message
+from tomoskin.core import Detection, Event, Image, PixelMap
+from tomoskin.recording import encode_json
+from tomoskin.sink.naming import (
+    UNKNOWN,
+    Naming,
+    SpacePose,
+    event_content,
+    poses_of,
+    touches_content,
+)
 from tomoskin.sink.sink import Item, Moment, Stream, TouchPace
 
 TYPES: dict[str, dict[str, str]] = {
@@ -32,6 +40,18 @@ TYPES: dict[str, dict[str, str]] = {
     },
     "geometry_msgs/msg/PoseWithCovarianceStamped": {
         "header": "std_msgs/msg/Header", "pose": "geometry_msgs/msg/PoseWithCovariance",
+    },
+    "geometry_msgs/msg/Vector3": {"x": "float64", "y": "float64", "z": "float64"},
+    "geometry_msgs/msg/Twist": {
+        "linear": "geometry_msgs/msg/Vector3", "angular": "geometry_msgs/msg/Vector3",
+    },
+    "geometry_msgs/msg/TwistWithCovariance": {
+        "twist": "geometry_msgs/msg/Twist", "covariance": "float64[36]",
+    },
+    "nav_msgs/msg/Odometry": {
+        "header": "std_msgs/msg/Header", "child_frame_id": "string",
+        "pose": "geometry_msgs/msg/PoseWithCovariance",
+        "twist": "geometry_msgs/msg/TwistWithCovariance",
     },
     "sensor_msgs/msg/Image": {
         "header": "std_msgs/msg/Header", "height": "uint32", "width": "uint32",
@@ -52,10 +72,11 @@ class _Field:
     kind: str
     length: int | None
 
-    @classmethod
-    def of(cls, text: str) -> _Field:
+    @staticmethod
+    @functools.cache
+    def of(text: str) -> _Field:
         kind, bracket, length = text.rstrip("]").partition("[")
-        return cls(kind, int(length or 0) if bracket else None)
+        return _Field(kind, int(length or 0) if bracket else None)
 
     def description(self) -> dict[str, Any]:
         number = _IDS.get(self.kind, _NESTED)
@@ -83,6 +104,21 @@ def type_hash(kind: str) -> str:
         "referenced_type_descriptions": [_described(name) for name in sorted(_used_by(kind))],
     }
     return "RIHS01_" + hashlib.sha256(json.dumps(content).encode()).hexdigest()
+
+
+def definition(kind: str) -> list[str]:
+    """The text of a message's definition, then that of each message in it, headed by its name."""
+    inner = (f"MSG: {_short(name)}\n{_fields(name)}" for name in sorted(_used_by(kind)))
+    return [_fields(kind), *inner]
+
+
+def _fields(kind: str) -> str:
+    return "\n".join(f"{_short(text)} {name}" for name, text in TYPES[kind].items())
+
+
+def _short(kind: str) -> str:
+    """As definitions name it: without "msg"."""
+    return kind.replace("/msg/", "/")
 
 
 def _put_message(out: bytearray, kind: str, value: Mapping[str, Any]) -> None:
@@ -132,30 +168,20 @@ def _used_by(kind: str) -> set[str]:
     return direct.union(*(_used_by(name) for name in direct))
 
 
-FRAME = "skin"
-"""Name of the sheet's own frame of coordinates: x right, y up, seen from the front; m."""
-
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+ODOMETRY = "nav_msgs/msg/Odometry"
 IMAGE = "sensor_msgs/msg/Image"
 TEXT = "std_msgs/msg/String"
 
-TOPICS = {
-    "tomoskin/touch": POSE,
-    "tomoskin/touches": TEXT,
-    "tomoskin/image": IMAGE,
-    "tomoskin/events": TEXT,
-}
-"""Type of each topic."""
-
-_UNKNOWN = 1e6
-"""Variance of what is not measured, m² or rad²: what filters take for no knowledge."""
+TOPICS = {"touch": POSE, "track": ODOMETRY, "touches": TEXT, "image": IMAGE, "events": TEXT}
+"""Type of each topic, by its name in the skin's namespace."""
 
 Value = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class RosMessage:
-    """A message for ``topic``, its fields by name, of the time ``stamp`` in ns since 1970."""
+    """A message for ``topic`` (of :data:`TOPICS`), its fields by name; ``stamp`` ns since 1970."""
 
     topic: str
     value: Value
@@ -165,65 +191,75 @@ class RosMessage:
 class RosView:
     """Turns results and events into messages."""
 
-    def __init__(self, stream: Stream) -> None:
-        self._stream = stream
+    def __init__(self, stream: Stream, naming: Naming) -> None:
+        self._stream, self._naming = stream, naming
         self._pace = TouchPace()
 
     def of(self, item: Item) -> Iterator[RosMessage]:
         """Messages of one frame, or of an event."""
         stamp = self._stream.log_time(item.host_time)
+        of_frame = not isinstance(item, Event)
         for event in (item,) if isinstance(item, Event) else item.told:
-            content = {"time_s": event.host_time, "kind": event.kind, "text": event.text}
-            yield RosMessage("tomoskin/events", _json(content), stamp)
+            content = event_content(self._stream, self._naming, event, of_frame=of_frame)
+            yield RosMessage("events", _json(content), stamp)
         if isinstance(item, Event):
             return
         if self._pace.is_due(item):
-            for touch in item.touches:
-                yield RosMessage("tomoskin/touch", _pose(touch, stamp), stamp)
-            yield RosMessage("tomoskin/touches", _json(_touches(item)), stamp)
+            yield from self._touches(item, stamp)
         if item.image is not None and self._stream.pixels is not None:
-            yield RosMessage(
-                "tomoskin/image", _image(item.image, self._stream.pixels, stamp), stamp
-            )
+            yield RosMessage("image", self._image(item.image, self._stream.pixels, stamp), stamp)
+
+    def _touches(self, moment: Moment, stamp: int) -> Iterator[RosMessage]:
+        """Each touch as a pose and as a track, which has its identity; all of them in words."""
+        header = self._header(stamp)
+        poses = poses_of(self._stream, moment.touches)
+        for touch, place in zip(moment.touches, poses, strict=True):
+            pose = _pose(place, touch.detection)
+            yield RosMessage("touch", {"header": header, "pose": pose}, stamp)
+            child = f"{self._naming.frame_id}/touch_{touch.id}"
+            track = {"header": header, "child_frame_id": child, "pose": pose, "twist": _AT_REST}
+            yield RosMessage("track", track, stamp)
+        content = touches_content(self._stream, self._naming, moment, poses)
+        yield RosMessage("touches", _json(content), stamp)
+
+    def _header(self, stamp: int) -> Value:
+        sec, nanosec = divmod(stamp, 1_000_000_000)
+        return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": self._naming.frame_id}
+
+    def _image(self, image: Image, pixels: PixelMap, stamp: int) -> Value:
+        """Change of conductivity as 32-bit floats, the top row first, NaN outside the sheet."""
+        values = image.on_pixels(pixels).astype("<f4")
+        height, width = values.shape
+        return {
+            "header": self._header(stamp),
+            "height": height,
+            "width": width,
+            "encoding": "32FC1",
+            "is_bigendian": 0,
+            "step": 4 * width,
+            "data": values.tobytes(),
+        }
 
 
-def _touches(moment: Moment) -> dict[str, Any]:
-    return touches_message(moment.host_time, moment.sequence, moment.touches)
+def _json(content: Mapping[str, Any]) -> Value:
+    return {"data": encode_json(content).decode()}
 
 
-def _json(content: Any) -> Value:
-    return {"data": msgspec.json.encode(content).decode()}
-
-
-def _header(stamp: int) -> Value:
-    sec, nanosec = divmod(stamp, 1_000_000_000)
-    return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": FRAME}
-
-
-def _pose(touch: Touch, stamp: int) -> Value:
-    """Place in the sheet's plane; what an image does not say has a vast variance."""
-    detection = touch.detection
-    variance = np.array([detection.sd_x**2, detection.sd_y**2, *[_UNKNOWN] * 4])
-    covariance = np.diag(np.where(np.isfinite(variance), variance, _UNKNOWN))
-    if np.isfinite(variance).all():
-        covariance[[0, 1], [1, 0]] = detection.cov_xy
-    pose = {
-        "position": {"x": detection.x, "y": detection.y, "z": 0.0},
-        "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+def _pose(pose: SpacePose, detection: Detection) -> Value:
+    place = {
+        "position": _named("xyz", pose.position),
+        "orientation": _named("xyzw", pose.quaternion()),
     }
-    return {"header": _header(stamp), "pose": {"pose": pose, "covariance": covariance.ravel()}}
+    return {"pose": place, "covariance": pose.covariance(detection).ravel()}
 
 
-def _image(image: Image, pixels: PixelMap, stamp: int) -> Value:
-    """Change of conductivity as 32-bit floats, the top row first, NaN outside the sheet."""
-    values = image.on_pixels(pixels).astype("<f4")
-    height, width = values.shape
-    return {
-        "header": _header(stamp),
-        "height": height,
-        "width": width,
-        "encoding": "32FC1",
-        "is_bigendian": 0,
-        "step": 4 * width,
-        "data": values.tobytes(),
-    }
+def _named(names: str, values: Sequence[float]) -> Value:
+    return dict(zip(names, values, strict=True))
+
+
+_ZERO = _named("xyz", (0.0, 0.0, 0.0))
+_AT_REST = {
+    "twist": {"linear": _ZERO, "angular": _ZERO},
+    "covariance": (UNKNOWN * np.eye(6)).ravel(),
+}
+"""Velocities are not measured."""

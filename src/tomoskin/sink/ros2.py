@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from tomoskin.core import SinkError
+from tomoskin.sink.consumer import options_of
+from tomoskin.sink.naming import Naming
 from tomoskin.sink.ros import TOPICS, RosView
 from tomoskin.sink.sink import Item, Stream
 
@@ -19,9 +21,9 @@ Value = Mapping[str, Any]
 class Ros2Sink:
     """Publishes by ``rclpy``, which comes with a ROS 2 installation and not from the registry."""
 
-    name = "ros2"
-
-    def __init__(self) -> None:
+    def __init__(self, naming: Naming) -> None:
+        self.name = f"ros2 /{naming.namespace}"
+        self._naming = naming
         try:
             self._rclpy: Any = importlib.import_module("rclpy")
         except ImportError as error:
@@ -38,8 +40,10 @@ class Ros2Sink:
         """Start a node in a context of its own, which takes no signals."""
         self._context = self._rclpy.Context()
         self._rclpy.init(args=[], context=self._context)
-        self._node = self._rclpy.create_node("tomoskin", context=self._context)
-        self._view = RosView(stream)
+        self._node = self._rclpy.create_node(
+            "tomoskin", context=self._context, namespace=f"/{self._naming.namespace}"
+        )
+        self._view = RosView(stream, self._naming)
         self._publishers = {
             topic: self._node.create_publisher(kind, topic, _DEPTH)
             for topic, kind in self._kinds.items()
@@ -62,10 +66,10 @@ class Ros2Sink:
 
 
 def open_ros2(argument: str) -> Ros2Sink:
-    """``ros2``; SinkError for any argument, or without rclpy."""
-    if argument:
-        raise SinkError(f'takes no argument, got "{argument}"', where="sink ros2")
-    return Ros2Sink()
+    """``ros2``, ``ros2:namespace=NAME,frame=NAME``; SinkError for others, or without rclpy."""
+    where = "sink ros2"
+    words = filter(None, argument.split(","))
+    return Ros2Sink(Naming.of(options_of(words, ("namespace", "frame"), where), where))
 
 
 def _message_class(kind: str) -> Any:

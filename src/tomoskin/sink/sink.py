@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, Self
 
 from tomoskin.core import Event, FloatArray, GeometryError, Image, PixelMap, Touch
+from tomoskin.mesh import Plane, Surface
 from tomoskin.pattern import Pattern
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.recording import event_of
@@ -30,6 +31,10 @@ class Stream:
         A raster for images; None where the skin has none (a curved sheet).
     epoch
         What is added to a host time to give seconds since 1970.
+    surface
+        What the sheet lies on.
+    replayed
+        Whether frames have the times of a recording, and ``epoch`` is theirs.
     """
 
     skin: str
@@ -37,16 +42,20 @@ class Stream:
     pattern: Pattern
     pixels: PixelMap | None
     epoch: float
+    surface: Surface = field(default_factory=Plane)
+    replayed: bool = False
 
     @classmethod
-    def of(cls, prepared: Prepared, source: str) -> Self:
-        """Of a run that begins now; ``source`` in words."""
+    def of(cls, prepared: Prepared, source: str, recorded: float | None = None) -> Self:
+        """Of a run that begins now; ``source`` in words; ``recorded``: the epoch of a replay."""
         return cls(
             skin=prepared.skin.name,
             source=source,
             pattern=prepared.pattern,
             pixels=raster(prepared),
-            epoch=epoch(),
+            epoch=epoch() if recorded is None else recorded,
+            surface=prepared.skin.surface,
+            replayed=recorded is not None,
         )
 
     def log_time(self, host_time: float) -> int:

@@ -7,7 +7,8 @@ from collections import Counter
 from typing import Any
 
 from tomoskin.core import SinkError
-from tomoskin.sink.consumer import needed
+from tomoskin.sink.consumer import needed, options_of
+from tomoskin.sink.naming import Naming
 from tomoskin.sink.ros import TOPICS, RosMessage, RosView, encode_cdr, type_hash
 from tomoskin.sink.sink import Item, Stream
 
@@ -27,14 +28,16 @@ class ZenohSink:
     domain
         ROS domain: keys and attachments are then those of ``rmw_zenoh``; None for plain keys,
         as subscribers of Zenoh and ``zenoh-bridge-ros2dds`` have them.
+    naming
+        Of topics and frame.
     """
 
-    def __init__(self, endpoint: str, domain: int | None) -> None:
+    def __init__(self, endpoint: str, domain: int | None, naming: Naming) -> None:
         self.name = f"zenoh {endpoint or 'peers'}"
-        self._endpoint, self._domain = endpoint, domain
+        self._endpoint, self._domain, self._naming = endpoint, domain, naming
         self._zenoh = needed("zenoh", "zenoh")
         self._ext = needed("zenoh.ext", "zenoh")
-        self._keys = {topic: _key(topic, domain) for topic in TOPICS}
+        self._keys = {topic: _key(naming, topic, domain) for topic in TOPICS}
         self._identity = list(os.urandom(16))
         self._session: Any = None
 
@@ -52,7 +55,7 @@ class ZenohSink:
         except self._zenoh.ZError as error:
             reason = str(error).partition(" at /")[0]  # where in its own sources
             raise SinkError(f"cannot be joined: {reason}", where=self.name) from error
-        self._view = RosView(stream)
+        self._view = RosView(stream, self._naming)
         self._sent: Counter[str] = Counter()
 
     def publish(self, item: Item) -> None:
@@ -82,28 +85,28 @@ class ZenohSink:
 
 
 def open_zenoh(argument: str) -> ZenohSink:
-    """``zenoh``, ``zenoh:tcp/HOST:7447``, and for ``rmw_zenoh`` ``domain=N`` after a comma."""
-    parts = [part for part in argument.split(",") if part]
-    domain, endpoint = None, ""
-    for part in parts:
-        key, equals, value = part.partition("=")
-        if equals and key == "domain" and value.isascii() and value.isdigit():
-            domain = int(value)
-        elif not equals and "/" in part and '"' not in part and not endpoint:
-            endpoint = part
-        else:
-            raise SinkError(
-                f'expected an endpoint, then perhaps domain=N, got "{part}"',
-                where=_WHERE,
-                hint="for example zenoh:tcp/192.168.1.5:7447,domain=0",
-            )
-    return ZenohSink(endpoint, domain)
+    """``zenoh:ENDPOINT,domain=N,namespace=NAME,frame=NAME``; each may be left out."""
+    words = [word for word in argument.split(",") if word]
+    endpoints = [word for word in words if "=" not in word]
+    named = [word for word in words if "=" in word]
+    options = options_of(named, ("domain", "namespace", "frame"), _WHERE)
+    domain = options.get("domain", "0")
+    bad = [word for word in endpoints if "/" not in word or '"' in word] + endpoints[1:]
+    if bad or not (domain.isascii() and domain.isdigit()):
+        raise SinkError(
+            f'expected an endpoint, then perhaps domain=N, got "{[*bad, domain][0]}"',
+            where=_WHERE,
+            hint="for example zenoh:tcp/192.168.1.5:7447,domain=0,namespace=left_arm",
+        )
+    number = int(domain) if "domain" in options else None
+    return ZenohSink("".join(endpoints), number, Naming.of(options, _WHERE))
 
 
-def _key(topic: str, domain: int | None) -> str:
+def _key(naming: Naming, topic: str, domain: int | None) -> str:
     """As the bridge has it, or as ``rmw_zenoh`` does: domain, topic, type and its hash."""
+    full = f"{naming.namespace}/{topic}"
     if domain is None:
-        return topic
+        return full
     kind = TOPICS[topic]
     package, _, name = kind.rpartition("/")
-    return f"{domain}/{topic}/{package.replace('/', '::')}::dds_::{name}_/{type_hash(kind)}"
+    return f"{domain}/{full}/{package.replace('/', '::')}::dds_::{name}_/{type_hash(kind)}"
