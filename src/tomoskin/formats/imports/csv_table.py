@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import csv
 import re
+from array import array
 from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from tomoskin.core import DataError, IntArray
+from tomoskin.core import DataError, IntArray, check_fits, most_bytes
 from tomoskin.signal import Recording, frame_times
 
 _COLUMN = re.compile(r"(dv|v)_(\d+)_(\d+)_(\d+)_(\d+)")
@@ -53,7 +54,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     kinds = {match[1] for match in matches if match}
     if len(kinds) != 1:
         raise DataError("expected columns of v or of dv, not both", where=f"{source}, line 1")
-    table = np.array(list(_values(rows, header, source))).reshape(-1, len(header))
+    table = np.asarray(_values(rows, header, source)).reshape(-1, len(header))
     used = [number for number, match in enumerate(matches) if match]
     electrodes = np.array([[int(part) for part in m.groups()[1:]] for m in matches if m])
     by_name = {name: table[:, number] for number, name in enumerate(header)}
@@ -85,7 +86,9 @@ def _check_separator(header: list[str], source: str) -> None:
         )
 
 
-def _values(rows: Iterator[list[str]], header: list[str], source: str) -> Iterator[list[float]]:
+def _values(rows: Iterator[list[str]], header: list[str], source: str) -> array[float]:
+    """The numbers of all lines, one after another."""
+    values, most = array("d"), most_bytes()
     for number, row in enumerate(rows, start=2):
         if not row:
             continue
@@ -95,10 +98,11 @@ def _values(rows: Iterator[list[str]], header: list[str], source: str) -> Iterat
                 where=f"{source}, line {number}",
                 hint="a decimal comma makes two fields of one",
             )
-        yield [
-            _number(text, name, f"{source}, line {number}")
-            for text, name in zip(row, header, strict=True)
-        ]
+        where = f"{source}, line {number}"
+        values.extend(_number(text, name, where) for text, name in zip(row, header, strict=True))
+        if values.itemsize * len(values) > most:
+            check_fits(values.itemsize * len(values), source)
+    return values
 
 
 def _number(text: str, name: str, where: str) -> float:
