@@ -127,7 +127,7 @@ def export(
     force: ForceFlag = False,
 ) -> None:
     """Convert a session: voltages, or the images that they give again."""
-    from tomoskin.formats import WRITERS, Export
+    from tomoskin.formats import WRITERS, Export, omitted
     from tomoskin.recording import SessionReader
 
     write = WRITERS[out.suffix.lower()]
@@ -138,10 +138,12 @@ def export(
             job.touches(touches)
         if session.torn:
             remark(f"{file}: {session.torn}")
+        without = ", ".join(omitted(session, out.suffix.lower()))
     series = out.with_suffix(".pvd")  # names the files of a series
     for path in dict.fromkeys((out, series, touches)):
         if path is not None and path.is_file():
-            typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
+            but = f", without {without}" if without and path == out else ""
+            typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB{but}")
 
 
 @app.command("import")

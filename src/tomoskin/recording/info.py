@@ -74,7 +74,9 @@ class References:
             self._searched = item.frame.host_time
 
 
-_OWN = frozenset({SKIN_FILE, OLD_INDEX_FILE})
+OWN_FILES = frozenset({SKIN_FILE, OLD_INDEX_FILE})
+"""What a session attaches of itself."""
+
 _OFTEN = 1000
 _MODULUS = 2**32
 
@@ -202,5 +204,5 @@ def session_info(path: Path, advance: Advance = no_report) -> SessionInfo:
             device=session.device(),
             clock=clock.fit,
             messages=messages,
-            attached=tuple(name for name in session.attachments() if name not in _OWN),
+            attached=tuple(name for name in session.attachments() if name not in OWN_FILES),
         )

@@ -58,6 +58,10 @@ class Recording:
                 where=self.source,
             )
         n_frames, n_rows = self.voltages.shape
+        if not 1 <= self.idle <= n_frames:
+            raise DataError(
+                f"expected idle from 1 to {n_frames}, got {self.idle}", where=self.source
+            )
         _check(self.drive.shape, (n_rows, 2), "drive", self.source)
         _check(self.measure.shape, (n_rows, 2), "measure", self.source)
         _check(self.time.shape, (n_frames,), "time_s", self.source)

@@ -1,7 +1,8 @@
 """The interchange file as text: a header, then one frame a line.
 
-Columns ``v_SOURCE_SINK_PLUS_MINUS`` (V) or ``dv_…``, electrodes from 0; optional ``time_s``, and
-``x_m`` and ``y_m`` for the true position of a single touch. Comma between columns, decimal point.
+Columns ``v_SOURCE_SINK_PLUS_MINUS`` (V) or ``dv_…``, electrodes from 0; optional ``time_s``,
+``idle`` (1 in the first frames, of the untouched skin, then 0), and ``x_m`` and ``y_m`` for the
+true position of a single touch. Comma between columns, decimal point.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from tomoskin.core import DataError, IntArray, check_fits, most_bytes
+from tomoskin.core import DataError, FloatArray, IntArray, check_fits, most_bytes
 from tomoskin.signal import Recording, frame_times
 
 _COLUMN = re.compile(r"(dv|v)_(\d+)_(\d+)_(\d+)_(\d+)")
-_KNOWN = ("time_s", "x_m", "y_m")
+_KNOWN = ("time_s", "idle", "x_m", "y_m")
 _BESIDE = ("frame", "sequence", "ticks", "mark")
 """Columns that an export has beside them; not needed here."""
 
@@ -47,7 +48,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     ]
     if unknown or len(set(header)) != len(header):
         raise DataError(
-            f"expected columns v_SOURCE_SINK_PLUS_MINUS, time_s, x_m, y_m, each once, got "
+            f"expected columns v_SOURCE_SINK_PLUS_MINUS, {', '.join(_KNOWN)}, each once, got "
             f'"{(unknown or header)[0]}"',
             where=f"{source}, line 1",
         )
@@ -68,6 +69,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
         labels=np.column_stack([by_name["x_m"], by_name["y_m"]]) if has_place else None,
         is_change=kinds == {"dv"},
         source=source,
+        idle=_idle(by_name["idle"], source) if "idle" in by_name else 1,
     )
 
 
@@ -75,6 +77,14 @@ def column_names(drive: IntArray, measure: IntArray, kind: str = "v") -> list[st
     """Names of the columns of a table of rows."""
     tables = np.hstack([drive, measure]).tolist()
     return ["_".join([kind, *map(str, row)]) for row in tables]
+
+
+def _idle(marks: FloatArray, source: str) -> int:
+    """Number of idle frames: at the beginning."""
+    idle = int(np.count_nonzero(marks == 1))
+    if not ((marks[:idle] == 1).all() and (marks[idle:] == 0).all()):
+        raise DataError("expected idle 1 in the first frames, then 0", where=source)
+    return max(1, idle)
 
 
 def _check_separator(header: list[str], source: str) -> None:
