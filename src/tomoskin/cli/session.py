@@ -12,7 +12,7 @@ import typer
 from tomoskin.cli.app import group
 from tomoskin.cli.named_files import RECORDING, TABLE, ForceFlag, Given, Reads, Writes
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.cli.recording import say_notes
+from tomoskin.cli.recording import say_notes, span_lines
 
 if TYPE_CHECKING:
     from tomoskin.core import Output
@@ -179,8 +179,10 @@ def _lines(info: SessionInfo) -> list[tuple[str, str]]:
                    f"{1e3 * info.longest_pause:.0f} ms"),
         ("missing", f"{info.lost} frames in {info.gaps} gaps, {info.dropped} dropped by the "
                     f"board, {info.skipped} skipped, {info.held} held"),
-        ("touches", str(info.touches)),
+        *_touches(info),
     ]  # fmt: skip
+    if info.presses:
+        lines.append(("presses", f"{info.presses} on the twin"))
     if info.attached:
         lines.append(("files inside", ", ".join(info.attached)))
     if info.device:
@@ -197,6 +199,12 @@ def _lines(info: SessionInfo) -> list[tuple[str, str]]:
         counted = ", ".join(f"{kind} {count}" for kind, count in sorted(info.events.items()))
         lines.append(("events", counted))
     return lines
+
+
+def _touches(info: SessionInfo) -> list[tuple[str, str]]:
+    if not (info.touches or info.messages["/image"]):
+        return [("touches", "none recorded: tomoskin image looks for them")]
+    return [("touches", str(info.touches)), *(("", line) for line in span_lines(info.spans))]
 
 
 def _drift(part: float) -> str:

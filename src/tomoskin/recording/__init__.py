@@ -21,7 +21,7 @@ from tomoskin.recording.layout import (
     touch_row,
     touches_message,
 )
-from tomoskin.recording.playback import Span, Timeline, read_timeline
+from tomoskin.recording.playback import Timeline, read_timeline
 from tomoskin.recording.recorder import (
     BoardInfo,
     RawRead,
@@ -63,7 +63,6 @@ __all__ = [
     "SessionInfo",
     "SessionReader",
     "SessionWriter",
-    "Span",
     "Timeline",
     "Truth",
     "advance",

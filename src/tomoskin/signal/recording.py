@@ -78,7 +78,13 @@ class Recording:
         """Frames ``start`` to ``stop`` − 1."""
         chosen = slice(start, stop)
         labels = None if self.labels is None else self.labels[chosen]
-        return replace(self, voltages=self.voltages[chosen], time=self.time[chosen], labels=labels)
+        return replace(
+            self,
+            voltages=self.voltages[chosen],
+            time=self.time[chosen],
+            labels=labels,
+            idle=max(1, min(self.idle, stop) - start),
+        )
 
     def in_order_of(self, pattern: Pattern) -> Recording:
         """Return the recording with exactly the pattern's rows, in its order and signs.
