@@ -373,6 +373,13 @@ def test_a_decimal_comma_is_refused_with_its_line(tmp_path):
         read_recording(table)
 
 
+def test_a_return_inside_a_line_of_a_table_is_refused(tmp_path):
+    table = tmp_path / "x.csv"
+    table.write_bytes(b"time_s,v_1_0_2_3\n0,1.5\n1,1\r.5\n")
+    with pytest.raises(DataError, match=r"x\.csv, line 3: is no table"):
+        read_recording(table)
+
+
 def eit_kit_text(beginning, frame):
     return beginning + "\r\n" + "".join(f"{value:.4f}\r\n" for value in frame)
 

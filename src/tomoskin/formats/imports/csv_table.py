@@ -37,7 +37,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
         When a column is not known, or a line has another number of fields or one that is no
         number; the message names line and column.
     """
-    rows = csv.reader(iter(lines))
+    rows = _rows(lines, source)
     header = [name.strip() for name in next(rows)]
     _check_separator(header, source)
     matches = [_COLUMN.fullmatch(name) for name in header]
@@ -94,6 +94,15 @@ def _check_separator(header: list[str], source: str) -> None:
             where=f"{source}, line 1",
             hint="export it for English: 1.5, not 1,5",
         )
+
+
+def _rows(lines: Iterable[str], source: str) -> Iterator[list[str]]:
+    """Fields of each line."""
+    rows = csv.reader(lines)
+    try:
+        yield from rows
+    except csv.Error as error:
+        raise DataError(f"is no table: {error}", where=f"{source}, line {rows.line_num}") from error
 
 
 def _values(rows: Iterator[list[str]], header: list[str], source: str) -> array[float]:

@@ -146,4 +146,4 @@ def _dense(value: Any, where: str) -> NDArray[Any]:
     array = np.asarray(sparse.toarray() if issparse(value) else value)
     if array.dtype.kind not in "biufc":
         raise DataError(f"expected numbers, got {array.dtype}", where=where)
-    return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64)
+    return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64, copy=False)
