@@ -164,7 +164,7 @@ def test_the_terminal_says_each_touch_once(save, image, frames) -> None:
     assert code == 0
     assert "8 frames, 1 touch\n" in out
     assert "3.00 to   5.00 s" in line
-    x, y = (float(re.search(rf" {axis} +([-+0-9.]+) mm", line)[1]) for axis in "xy")
+    x, y = map(float, re.findall(r" [xy] +([-+0-9.]+) mm", line))
     assert np.hypot(*np.subtract((1e-3 * x, 1e-3 * y), PLACE)) < 0.012
 
 
