@@ -87,9 +87,18 @@ def decode_raw(data: bytes | memoryview, where: str) -> tuple[float, bytes]:
     return host_time, bytes(data[_RAW.size :])
 
 
+class _Timed(msgspec.Struct):
+    host_time: float = math.nan
+
+
 def host_time_of(data: bytes) -> float:
-    """Host time, s, of a message of ``/raw`` or ``/frames``; NaN where it is too short."""
-    return float(_HOST_TIME.unpack_from(data)[0]) if len(data) >= _HOST_TIME.size else math.nan
+    """Host time, s, of a message of any channel; NaN where it does not say."""
+    if data.startswith(_CDR):
+        return float(_HOST_TIME.unpack_from(data)[0]) if len(data) >= _HOST_TIME.size else math.nan
+    try:
+        return msgspec.json.decode(data, type=_Timed).host_time
+    except (msgspec.DecodeError, UnicodeDecodeError):
+        return math.nan
 
 
 def _wrong(what: str, data: bytes | memoryview, where: str) -> DataError:

@@ -17,7 +17,7 @@ from mcap.records import Attachment, Chunk, DataEnd, McapRecord, Metadata
 
 from tomoskin.core import MAGIC, DataError, Output, SkinError, check_outputs, written
 from tomoskin.recording.blocks import Advance, no_report
-from tomoskin.recording.channels import CHANNELS, FRAMES, RAW, SCHEMAS, TOPICS
+from tomoskin.recording.channels import CHANNELS, SCHEMAS, TOPICS
 from tomoskin.recording.container import ContainerWriter
 from tomoskin.recording.layout import host_time_of
 from tomoskin.recording.mcap_records import LARGEST, PREFIX, decode, decode_chunk, messages_in
@@ -180,8 +180,7 @@ def _earliest_epoch(chunk: Chunk) -> float:
 
     Frames from before the recording are logged when it begins, later than they were.
     """
-    timed = (m for m in messages_in(chunk, 0) if m.channel in (RAW, FRAMES))
-    ages = ((m.log_time, host_time_of(m.data)) for m in timed)
+    ages = ((m.log_time, host_time_of(m.data)) for m in messages_in(chunk, 0))
     differences = ((log - round(1e9 * host)) / 1e9 for log, host in ages if math.isfinite(host))
     return min(differences, default=math.inf)
 
