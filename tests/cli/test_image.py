@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -155,12 +156,25 @@ def test_per_cent_and_averaged_for_the_eye_alone(save, image, tmp_path) -> None:
     assert image(save(), "--out", tmp_path / "shown.png", *options)[0] == 0
 
 
+def test_the_terminal_says_each_touch_once(save, image, frames) -> None:
+    """With its beginning, its end and its place, whatever stands before and after it."""
+    thrice = np.vstack([frames[:3], *(3 * [frames[3:]]), frames[:2]])
+    code, out, _ = image(save(voltages=thrice), "--reference", "first:3")
+    (line,) = (line for line in out.splitlines() if line.startswith("touch"))
+    assert code == 0
+    assert "8 frames, 1 touch\n" in out
+    assert "3.00 to   5.00 s" in line
+    x, y = map(float, re.findall(r" [xy] +([-+0-9.]+) mm", line))
+    assert np.hypot(*np.subtract((1e-3 * x, 1e-3 * y), PLACE)) < 0.012
+
+
 def test_json_says_the_same(save, image) -> None:
     code, out, _ = image(save(), "--json")
     found = json.loads(out)
     assert code == 0
     assert found["frames"] == 4
     assert [t["frame"] for t in found["touches"]][-1] == 3
+    assert {t["id"] for t in found["touches"]} == {span["id"] for span in found["spans"]}
     assert found["agreement"] > 0.99
 
 

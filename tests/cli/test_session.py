@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
+from recording.runs import write_all, write_frames
 from tomoskin.formats import read_recording
 from tomoskin.recording import SessionReader
 
@@ -42,6 +44,16 @@ def test_info(tomoskin, recorded):
     assert found["lost"] == found["gaps"] == 0
     assert found["torn"] == ""
     assert found["events"]["connected"] == 1
+    assert "none recorded" not in out
+
+
+def test_info_counts_touches_as_image_does(tomoskin, tmp_path):
+    """Each once, and says where none recorded."""
+    _, out, _ = tomoskin("session", "info", write_all(tmp_path / "all.mcap"))
+    assert re.search(r"touches +1\n +touch   4    0.20 to   0.20 s  x  \+100.0 mm", out)
+    assert re.search(r"presses +1 on the twin", out)
+    _, out, _ = tomoskin("session", "info", write_frames(tmp_path / "few.mcap", 3))
+    assert "none recorded: tomoskin image looks for them" in out
 
 
 def test_repair_mends_a_cut_file_and_leaves_it_alone(tomoskin, recorded, tmp_path):

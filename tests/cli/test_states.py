@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -48,7 +49,7 @@ def test_ranges_of_frames_teach_states(tomoskin: Run, tmp_path: Path) -> None:
     asked = write(tmp_path / "asked.npz", np.vstack([frames(kind, 1), strange]))
     code, out, err = tomoskin("states", asked, "--calibration", c, "--out", table, "--ask", 2)
     assert (code, err) == (0, "")
-    assert "frame    0  idle  " in out
+    assert re.search(r"frames    0 to +\d+  idle  \d+ % or more\nframes +\d+ to +\d+  ", out)
     assert "labels tell most at frames" in out
     with table.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))

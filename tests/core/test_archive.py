@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tracemalloc
 import zipfile
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import tomoskin.core.archive
+import tomoskin.core.memory
 from tomoskin.core import DataError
 from tomoskin.core.archive import load_arrays
 from tomoskin.formats import read_recording
@@ -39,7 +40,7 @@ def header(text: str) -> bytes:
 def refused(path: Path, content: bytes) -> str:
     path.write_bytes(content)
     with pytest.raises(DataError) as caught:
-        load_arrays(path)
+        dict(load_arrays(path))
     assert caught.value.where == str(path)
     return str(caught.value)
 
@@ -95,7 +96,7 @@ def test_any_damage_is_a_data_error_or_leaves_the_arrays_alone(
     path = folder / "damaged.npz"
     path.write_bytes(content)
     try:
-        arrays = load_arrays(path)
+        arrays = dict(load_arrays(path))
     except DataError:
         return
     for key in arrays.keys() & ARRAYS.keys():
@@ -152,9 +153,23 @@ def test_a_compression_of_the_future(tmp_path: Path) -> None:
 
 
 def test_a_bomb_is_refused_unopened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tomoskin.core.archive, "MAX_BYTES", 900)
-    message = refused(tmp_path / "x.npz", whole())
-    assert "unpacks to 0.0 GiB, more than 0" in message
+    monkeypatch.setattr(tomoskin.core.memory, "machine_memory", lambda: 3600)
+    message = refused(tmp_path / "x.npz", whole())  # 80 numbers, and 80 that are bytes in the file
+    assert "takes 0.0 GiB, more than a quarter of this machine's 0.0 GiB" in message
+    monkeypatch.setattr(tomoskin.core.memory, "machine_memory", lambda: 5120)
+    assert load_arrays(tmp_path / "x.npz")["drive"].shape == (40, 2)
+
+
+def test_what_is_not_asked_for_is_not_unpacked(tmp_path: Path) -> None:
+    path = tmp_path / "x.npz"
+    np.savez_compressed(path, names=np.arange(3), zeros=np.zeros(1 << 21))
+    tracemalloc.start()
+    try:
+        assert set(load_arrays(path)) == {"names", "zeros"}
+        assert load_arrays(path)["names"].tolist() == [0, 1, 2]
+        assert tracemalloc.get_traced_memory()[1] < 2 << 20
+    finally:
+        tracemalloc.stop()
 
 
 def test_members_that_are_no_arrays_are_no_recording(tmp_path: Path) -> None:

@@ -24,7 +24,9 @@ PATTERN = SKIN.pattern()
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    return write_all(tmp_path_factory.mktemp("whole") / "whole.mcap")
+    """A session with something in every channel, and a reference of five frames."""
+    path = tmp_path_factory.mktemp("whole") / "whole.mcap"
+    return write_all(path, reference=(0, 5))
 
 
 @pytest.fixture(scope="module")
@@ -49,20 +51,43 @@ def same(a, b):
     return np.array_equal(a, b, equal_nan=True)
 
 
-def test_csv_is_read_again(export, recording):
-    got = read_recording(export("x.csv"))
-    assert same(got.voltages, recording.voltages)
-    np.testing.assert_allclose(got.time, recording.time, atol=1e-5)
-    assert same(got.drive, PATTERN.drive)
-    assert same(got.measure, PATTERN.measure)
+@pytest.mark.parametrize("name", ["x.csv", "x.npz", "x.mat"])
+def test_it_is_read_again_as_the_session_is(export, recording, name):
+    """With all that an image rests on: so it gives the same touches, at the same times."""
+    got = read_recording(export(name))
+    for array in ("voltages", "drive", "measure", "time", "labels"):
+        assert same(getattr(got, array), getattr(recording, array)), array
+    assert (got.idle, got.reference) == (recording.idle, None)
+    assert recording.idle == 5
+
+
+def test_what_a_table_cannot_hold_is_said(tomoskin, whole, tmp_path):
+    for ending, said in ((".csv", True), (".npz", True), (".mat", True), (".h5", False)):
+        _, out, _ = tomoskin("session", "export", whole, tmp_path / f"x{ending}")
+        without = "without the skin (--skin textile-disc-8), the touches (--touches X.csv), events"
+        assert (without in out) == said, ending
+        assert ("calibration.json" in out) == said, ending
+
+
+@pytest.mark.parametrize(
+    ("column", "said"), [("0,1", "idle 1 in the first frames"), ("1,nan", "idle 1 in the first")]
+)
+def test_idle_frames_that_are_not_the_first_are_refused(tmp_path, column, said):
+    path = tmp_path / "x.csv"
+    lines = [f"{idle},0.1" for idle in column.split(",")]
+    path.write_text("\n".join(["idle,v_1_0_2_3", *lines]))
+    with pytest.raises(DataError, match=said):
+        read_recording(path)
 
 
 def test_parquet(export, recording):
     table = pq.read_table(export("x.parquet"))
-    assert table.column_names == ["frame", "time_s", "sequence", "ticks", "mark", "voltages"]
+    beside = ["frame", "time_s", "sequence", "ticks", "mark", "idle", "x_m", "y_m"]
+    assert table.column_names == [*beside, "voltages"]
     values = table["voltages"].combine_chunks().flatten().to_numpy(zero_copy_only=False)
     assert same(values.reshape(-1, PATTERN.n_meas), recording.voltages)
-    assert table["time_s"].to_pylist() == [frame_of(n).host_time for n in range(30)]
+    assert table["time_s"].to_pylist() == recording.time.tolist()
+    assert table["idle"].to_pylist() == 5 * [1] + 25 * [0]
     assert table["ticks"].to_pylist() == [frame_of(n).ticks for n in range(30)]
     assert json.loads(table.schema.metadata[b"drive"]) == PATTERN.drive.tolist()
     assert json.loads(table.schema.metadata[b"measure"]) == PATTERN.measure.tolist()
@@ -87,20 +112,14 @@ def test_hdf5_holds_everything(export, recording, whole):
         [touch] = file["touches"][:]
         [expected] = next(iter(session.touches())).touches
         assert (touch["id"], touch["x"]) == (expected.id, expected.detection.x)
+        assert (touch["frame"], touch["time"]) == (20, recording.time[20])
         assert json.loads(file["truth"][1])["presses"][0]["shape"] == "round"
         assert json.loads(file.attrs["device"])["firmware"] == "1.2.3"
         assert file.attrs["skin"] == SKIN.to_toml()
 
 
-def test_npz_is_read_again(export, recording):
-    got = read_recording(export("x.npz"))
-    assert same(got.voltages, recording.voltages)
-    assert same(got.labels, recording.labels)
-
-
 def test_matlab_has_eidors_structures(export, recording):
-    path = export("x.mat")
-    variables = loadmat(path)
+    variables = loadmat(export("x.mat"))
     assert variables["stimulation"].shape == (1, PATTERN.n_drive)
     first = variables["stimulation"][0, 0]  # a structure array, not cells
     assert first["stimulation"].item() == "Amp"
@@ -113,11 +132,6 @@ def test_matlab_has_eidors_structures(export, recording):
     assert np.array_equal(measured.argmax(axis=1), PATTERN.measure[:5, 0])
     assert np.array_equal(measured.argmin(axis=1), PATTERN.measure[:5, 1])
     assert same(variables["vi"], recording.voltages.T)
-    again = read_recording(path)
-    assert same(again.voltages, recording.voltages)
-    assert same(again.drive, PATTERN.drive)
-    assert same(again.measure, PATTERN.measure)
-    assert same(again.time, recording.time)
 
 
 def test_a_series_of_meshes(export):
@@ -125,7 +139,7 @@ def test_a_series_of_meshes(export):
     listed = Xml.parse(path.with_suffix(".pvd")).getroot().findall(".//DataSet")
     times = [float(item.get("timestep")) for item in listed]
     files = [path.with_name(item.get("file")) for item in listed]
-    assert len(files) == 2
+    assert len(files) == 3
     assert times == sorted(times)
     for file in files:
         piece = Xml.parse(file).getroot().find(".//Piece")

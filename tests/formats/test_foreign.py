@@ -119,12 +119,23 @@ def test_a_damaged_matlab_file_is_refused(tmp_path):
             read_recording(path)
 
 
-def test_a_matlab_bomb_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("tomoskin.formats.imports.matlab.MAX_BYTES", 1 << 20)
+@pytest.mark.parametrize("kind", [float, np.uint8])
+def test_a_matlab_bomb_is_refused(tmp_path, monkeypatch, kind):
+    """By what its numbers become in memory: MATLAB keeps small ones as bytes."""
+    monkeypatch.setattr("tomoskin.core.memory.machine_memory", lambda: 31_000_000)
     path = tmp_path / "bomb.mat"
-    savemat(path, {"vi": np.zeros((1000, 1000))}, do_compression=True)
+    savemat(path, {"vi": np.zeros((1000, 1000), kind)}, do_compression=True)
     assert path.stat().st_size < 50_000
-    with pytest.raises(DataError, match="unpacks to more"):
+    with pytest.raises(DataError, match=r"more than a quarter of this machine's .* of memory"):
+        read_recording(path)
+
+
+def test_a_table_that_outgrows_memory_is_refused(tmp_path, monkeypatch):
+    """Eight bytes of memory for each two of text."""
+    monkeypatch.setattr("tomoskin.core.memory.machine_memory", lambda: 200_000)
+    path = tmp_path / "zeros.csv"
+    path.write_text("v_1_0_2_3,v_1_0_3_4\n" + 5000 * "0,0\n")
+    with pytest.raises(DataError, match="more than a quarter of this machine's"):
         read_recording(path)
 
 
@@ -359,6 +370,13 @@ def test_a_decimal_comma_is_refused_with_its_line(tmp_path):
         read_recording(table)
     table.write_text("time_s,v_1_0_2_3\n0,5,1,5\n")
     with pytest.raises(DataError, match=r"line 2: expected 2 fields, got 4.*decimal comma"):
+        read_recording(table)
+
+
+def test_a_return_inside_a_line_of_a_table_is_refused(tmp_path):
+    table = tmp_path / "x.csv"
+    table.write_bytes(b"time_s,v_1_0_2_3\n0,1.5\n1,1\r.5\n")
+    with pytest.raises(DataError, match=r"x\.csv, line 3: is no table"):
         read_recording(table)
 
 

@@ -63,10 +63,11 @@ def put(session, frame, mark=Mark.NONE):
     session.frame(frame, mark)
 
 
-def write_all(path):
-    """A session with something in every channel."""
+def write_all(path, *, reference=(5, 1)):
+    """A session with something in every channel; frame and length of its ``reference``."""
+    begins, frames = reference
     with SessionWriter(path, SKIN, epoch=1e9) as session:
-        session.settings(0.0, {"source": "twin"})
+        session.settings(0.0, {"source": "twin", "reference_frames": frames})
         session.device(0.0, INFO)
         session.truth(0.0, ())
         session.event(Event(0.0, "connected", "board 01"))
@@ -74,8 +75,8 @@ def write_all(path):
             if number == 10:
                 session.truth(frame_of(9).host_time + 1e-6, (PRESS,))
                 session.note(0.1, "pressed")
-            put(session, frame_of(number), Mark.REFERENCE if number == 5 else Mark.NONE)
-        session.touches(0.2, 20, (TOUCH,))
+            put(session, frame_of(number), Mark.REFERENCE if number == begins else Mark.NONE)
+        session.touches(frame_of(20).host_time, 20, (TOUCH,))
         mesh = SKIN.mesh()
         values = np.linspace(-1, 1, len(mesh.cells))
         session.image(0.2, Image(values, "S", mesh.identity), mesh.pixels(48), (TOUCH,))

@@ -12,6 +12,8 @@ import tracemalloc
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
@@ -51,24 +53,27 @@ def assert_true(found):
     assert all(same_frame(frame, frame_of(frame.sequence, rate=RATE)) for frame in found)
 
 
+def chunks(data):
+    """(start, end, frames) of each chunk's record."""
+    for start in record_starts(data):
+        opcode, length = PREFIX.unpack_from(data, start)
+        stop = start + PREFIX.size + length
+        if opcode == Opcode.CHUNK:
+            place, count = start + PREFIX.size + 28 + 4 + 8, 0  # times, size, CRC and two lengths
+            while place < stop:
+                kind, size = PREFIX.unpack_from(data, place)
+                place += PREFIX.size
+                count += kind == Opcode.MESSAGE and struct.unpack_from("<H", data, place)[0] == 2
+                place += size
+            yield start, stop, count
+        if opcode == Opcode.DATA_END:
+            return
+
+
 def chunk_ends(data):
     """(end of each chunk's record, frames up to there)."""
-    ends, place, count = [], len(MAGIC), 0
-    while place < len(data):
-        opcode, length = PREFIX.unpack_from(data, place)
-        place += PREFIX.size + length
-        if opcode == Opcode.CHUNK:
-            body = data[place - length : place]
-            inner = 28 + 4 + 8  # times, size, CRC, compression and length of the records
-            while inner < length:
-                kind, size = PREFIX.unpack_from(body, inner)
-                inner += PREFIX.size
-                count += kind == Opcode.MESSAGE and struct.unpack_from("<H", body, inner)[0] == 2
-                inner += size
-            ends.append((place, count))
-        if opcode == Opcode.DATA_END:
-            break
-    return ends
+    count = 0
+    return [(stop, count := count + frames) for _, stop, frames in chunks(data)]
 
 
 def record_starts(data):
@@ -236,13 +241,81 @@ def test_repair_of_a_file_without_its_end_keeps_everything_else(tmp_path):
 
 
 def test_repair_takes_a_skin_where_the_files_own_is_lost(small, tmp_path):
-    data = small.read_bytes().replace(b"skin.toml", b"skin.tolm", 1)
+    nameless = small.read_bytes().replace(b"skin.toml", b"skin.tolm", 1)
     path = tmp_path / "skinless.mcap"
-    path.write_bytes(data)
+    path.write_bytes(nameless)
+    repair(path, tmp_path / "built-in.mcap")  # its strings name a skin that comes with us
+    assert len(frames_in(tmp_path / "built-in.mcap")[0]) == 60
+    path.write_bytes(nameless.replace(b"textile-disc-8", b"textile-disc-9", 1))
     with pytest.raises(DataError, match=r"skin is lost.*--skin"):
         repair(path, tmp_path / "a.mcap")
     repair(path, tmp_path / "b.mcap", skin=SKIN)
     assert len(frames_in(tmp_path / "b.mcap")[0]) == 60
+
+
+MUTATIONS = st.lists(
+    st.tuples(
+        st.integers(0, 400) | st.integers(0, 20_000),
+        st.integers(0, 30),
+        st.binary(max_size=30) | st.integers(0, 2**32 - 1).map(lambda n: n.to_bytes(4, "little")),
+    ),
+    min_size=1,
+    max_size=3,
+)
+"""Where, how many bytes are taken out, and what is put there."""
+
+
+@settings(max_examples=50)
+@given(MUTATIONS)
+def test_what_is_repaired_opens_and_holds_every_whole_frame(small, mutations):
+    data, mended = small.read_bytes(), small.with_name("mended.mcap")
+    damaged = bytearray(data)
+    for place, length, put in mutations:
+        damaged[place : place + length] = put
+    path = small.with_name("mutated.mcap")
+    path.write_bytes(damaged)
+    mended.unlink(missing_ok=True)
+    refusal = ""
+    try:
+        result = repair(path, mended)
+    except DataError as error:
+        refusal = error.message
+    if not mended.exists():
+        assert "nothing" in refusal  # is saved
+        return
+    found, error = frames_in(mended)
+    assert error is None
+    whole = sum(count for start, stop, count in chunks(data) if data[start:stop] in damaged)
+    assert len(found) >= whole
+    assert len(found) == 60 or result.lost or not result.ended
+    with SessionReader(mended) as session:
+        assert session.epoch == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_length_that_is_wrong_swallows_nothing(small, tmp_path):
+    """Of a record that is not needed: what follows it is."""
+    data = bytearray(small.read_bytes())
+    (_, end, _), *_ = chunks(bytes(data))
+    assert data[end] == Opcode.MESSAGE_INDEX
+    data[end + 2] ^= 0x10  # 4 KiB more
+    path, mended = tmp_path / "damaged.mcap", tmp_path / "mended.mcap"
+    path.write_bytes(data)
+    assert repair(path, mended).lost
+    assert len(frames_in(mended)[0]) == 60
+
+
+@pytest.mark.parametrize("written", [b"1000000009.0", b"1000000000.x"])
+@pytest.mark.parametrize("frames", [True, False])
+def test_the_clock_is_found_again_by_the_messages(tmp_path, written, frames):
+    path, mended = tmp_path / "all.mcap", tmp_path / "mended.mcap"
+    data = write_all(path).read_bytes()
+    if not frames:  # the first chunk alone: how the run was set
+        (_, stop, _), *_ = chunks(data)
+        data = data[:stop]
+    path.write_bytes(data.replace(b"1000000000.0", written, 1))
+    repair(path, mended)
+    with SessionReader(mended) as session:
+        assert session.epoch == pytest.approx(1e9, abs=1e-6)
 
 
 def test_repair_of_nothing_leaves_nothing(tmp_path):

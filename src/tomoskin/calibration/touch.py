@@ -73,9 +73,8 @@ def _pack(locator: Locator) -> Arrays:
         "pattern": np.array(locator.pattern_id),
         "skin": np.array(locator.skin_id),
     }
-    if locator.presses.strength is not None:
-        arrays["strength"] = locator.presses.strength
-    return arrays
+    strength = locator.presses.strength
+    return arrays if strength is None else {**arrays, "strength": strength}
 
 
 def _unpack(arrays: Arrays, pattern: Pattern, where: str, progress: Progress) -> Locator:

@@ -147,6 +147,11 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         _fail(str(error), code=2)
     except TomoskinError as error:
         _fail(str(error))
+    except MemoryError as error:
+        _fail(
+            f"this machine has too little memory for that{error and f': {error}'} "
+            "(take a part of the recording, or a larger machine)"
+        )
     except Exception as error:
         _fail(
             f"internal error, {type(error).__name__}: {error} "

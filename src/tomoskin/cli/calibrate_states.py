@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -15,9 +15,8 @@ from tomoskin.cli.recording import changes, say_notes
 from tomoskin.core import DataError, FloatArray
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from tomoskin.calibration import Calibration, Codes, Examples, FrameClassifier
+    from tomoskin.core import Arrays
     from tomoskin.pattern import Pattern
     from tomoskin.skin import Skin
 
@@ -52,7 +51,7 @@ def marked(path: Path, dv: FloatArray, given: list[str], codes: Codes | None) ->
     return Examples.of(codes, dv, np.full((len(dv), len(codes.names)), np.nan))
 
 
-def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+def _arrays(path: Path) -> Arrays:
     from tomoskin.core import load_arrays
     from tomoskin.formats import is_session
 

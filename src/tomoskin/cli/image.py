@@ -34,7 +34,7 @@ from tomoskin.cli.options import (
     TouchesOut,
 )
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.cli.recording import frame_range, idle_frames, say_notes
+from tomoskin.cli.recording import frame_range, idle_frames, say_notes, span_lines
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
@@ -43,10 +43,8 @@ if TYPE_CHECKING:
     from tomoskin.formats import Display
     from tomoskin.pattern import Pattern
     from tomoskin.pipeline import Prepared, Reconstruction
+    from tomoskin.touch import Span
 
-
-_SHOWN = 20
-"""Frames whose touches are said."""
 
 _MOST_FIELDS = 200
 """Frames of a .vtu file."""
@@ -82,32 +80,37 @@ def image(
     """Write the images of a recording and the touches in them, or say what they are."""
     from tomoskin.formats import read_recording, write_touches
     from tomoskin.pipeline import prepare, reconstruct
+    from tomoskin.touch import touch_spans
 
     own = skin_for_file(skin, recording)
     chosen, rule = with_alpha(own, alpha)
     chosen = with_time_constant(chosen, time_constant)
     display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
+    whole = read_recording(recording)  # what cannot be read is said before the work
     with Bar("preparing"):
         prepared = with_states(with_bends(prepare(chosen), bend), states, own)
-    recorded = read_recording(recording).in_order_of(prepared.pattern)
+    recorded = whole.in_order_of(prepared.pattern)
     say_notes(recorded)
     idle = idle_frames(recorded, reference, prepared.pattern)
     start, stop = frame_range(recorded, frames)
     with Bar("reconstructing") as bar:
         result = reconstruct(prepared, recorded.part(start, stop), idle, rule=rule, advance=bar)
     result = result.numbered_from(start)
+    times = recorded.time[result.frames].tolist()
     if touches is not None:
-        rows = zip(result.frames.tolist(), result.touches, strict=True)
-        timed = ((frame, float(recorded.time[frame]), some) for frame, some in rows)
-        write_touches(touches, timed, prepared.skin.surface, overwrite=force)
+        rows = zip(result.frames.tolist(), times, result.touches, strict=True)
+        write_touches(touches, rows, prepared.skin.surface, overwrite=force)
     if out is not None:
         WRITERS[out.suffix.lower()](out, prepared, result, display, overwrite=force)
     _warn(recording, result, prepared.pattern)
-    tell(_document(result, prepared), _lines(result, prepared), json=json)
+    since = (time - float(recorded.time[0]) for time in times)
+    spans = touch_spans(zip(since, result.touches, strict=True))
+    tell(_document(result, spans, prepared), _lines(result, spans, prepared), json=json)
 
 
-def _lines(result: Reconstruction, prepared: Prepared) -> Iterator[str]:
-    yield f"{len(result.frames)} frames, {sum(map(len, result.touches))} touches"
+def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) -> Iterator[str]:
+    number = "1 touch" if len(spans) == 1 else f"{len(spans)} touches"
+    yield f"{len(result.frames)} frames, {number}"
     yield alpha_line(result.choice)
     if prepared.modes is not None:
         seconds = prepared.skin.inverse.time_constant
@@ -116,15 +119,9 @@ def _lines(result: Reconstruction, prepared: Prepared) -> Iterator[str]:
     states = [("unknown" if state.unknown else state.name) for state in result.states if state]
     for names in filter(None, (bends, states)):
         yield ", ".join(f"{name}: {count} frames" for name, count in Counter(names).items())
-    for frame, touches in list(zip(result.frames.tolist(), result.touches, strict=True))[:_SHOWN]:
-        for t in touches:
-            r = t.detection
-            yield (
-                f"frame {frame:>4}  touch {t.id:>3}  x {1e3 * r.x:+7.1f} mm  y {1e3 * r.y:+7.1f} mm"
-                f"  area {1e6 * r.area:7.0f} mm²  peak {r.peak:+.3g} {result.unit}"
-            )
-    if len(result.frames) > _SHOWN:
-        yield f"… and {len(result.frames) - _SHOWN} frames more: --touches writes them all"
+    yield from span_lines(spans, result.unit)
+    if spans:
+        yield "times are from the first frame on; --touches X.csv writes each frame of each touch"
 
 
 def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
@@ -156,7 +153,9 @@ def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
         )
 
 
-def _document(result: Reconstruction, prepared: Prepared) -> dict[str, Any]:
+def _document(
+    result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared
+) -> dict[str, Any]:
     missing = zip(result.frames.tolist(), result.rows_missing.tolist(), strict=True)
     return {
         "frames": len(result.frames),
@@ -177,6 +176,18 @@ def _document(result: Reconstruction, prepared: Prepared) -> dict[str, Any]:
             {"frame": f, **asdict(state)}
             for f, state in zip(result.frames.tolist(), result.states, strict=False)
             if state
+        ],
+        "spans": [
+            {
+                "id": span.id,
+                "kind": span.kind,
+                "begin_s": span.begin,
+                "end_s": span.end,
+                "x_m": span.x,
+                "y_m": span.y,
+                "peak": span.peak,
+            }
+            for span in spans
         ],
         "touches": [
             {

@@ -11,12 +11,18 @@ from tomoskin.cli.output import remark
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from numpy.typing import NDArray
 
     from tomoskin.core import FloatArray, IntArray
     from tomoskin.pattern import Pattern
     from tomoskin.pipeline import Idle
     from tomoskin.signal import Recording
+    from tomoskin.touch import Span
+
+_SHOWN = 20
+"""Touches that are listed."""
 
 
 def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Idle:
@@ -53,6 +59,16 @@ def say_notes(recording: Recording) -> None:
     """What of the file was left out, on stderr."""
     for note in recording.notes:
         remark(f"{recording.source}: {note}")
+
+
+def span_lines(spans: Sequence[Span], unit: str = "") -> Iterator[str]:
+    """Each touch in a line: when, where and how strong; the first of them."""
+    for span in spans[:_SHOWN]:
+        when = f"{span.begin:6.2f} to {span.end:6.2f} s"
+        where = f"x {1e3 * span.x:+7.1f} mm  y {1e3 * span.y:+7.1f} mm"
+        yield f"touch {span.id:>3}  {when}  {where}  strength {span.peak:+.3g} {unit}".rstrip()
+    if len(spans) > _SHOWN:
+        yield f"… and {len(spans) - _SHOWN} touches more"
 
 
 def _frames_of(recording: Recording, kind: str, number: int) -> NDArray[Any]:

@@ -12,7 +12,7 @@ import typer
 from tomoskin.cli.app import group
 from tomoskin.cli.named_files import RECORDING, TABLE, ForceFlag, Given, Reads, Writes
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.cli.recording import say_notes
+from tomoskin.cli.recording import say_notes, span_lines
 
 if TYPE_CHECKING:
     from tomoskin.core import Output
@@ -128,7 +128,7 @@ def export(
     force: ForceFlag = False,
 ) -> None:
     """Convert a session: voltages, or the images that they give again."""
-    from tomoskin.formats import WRITERS, Export
+    from tomoskin.formats import WRITERS, Export, omitted
     from tomoskin.recording import SessionReader
     from tomoskin.sink import write_bag
 
@@ -140,10 +140,12 @@ def export(
             job.touches(touches)
         if session.torn:
             remark(f"{file}: {session.torn}")
+        without = ", ".join(omitted(session, out.suffix.lower()))
     series = out.with_suffix(".pvd")  # names the files of a series
     for path in dict.fromkeys((out, series, touches)):
         if path is not None and path.is_file():
-            typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
+            but = f", without {without}" if without and path == out else ""
+            typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB{but}")
 
 
 @app.command("import")
@@ -179,8 +181,10 @@ def _lines(info: SessionInfo) -> list[tuple[str, str]]:
                    f"{1e3 * info.longest_pause:.0f} ms"),
         ("missing", f"{info.lost} frames in {info.gaps} gaps, {info.dropped} dropped by the "
                     f"board, {info.skipped} skipped, {info.held} held"),
-        ("touches", str(info.touches)),
+        *_touches(info),
     ]  # fmt: skip
+    if info.presses:
+        lines.append(("presses", f"{info.presses} on the twin"))
     if info.attached:
         lines.append(("files inside", ", ".join(info.attached)))
     if info.device:
@@ -197,6 +201,12 @@ def _lines(info: SessionInfo) -> list[tuple[str, str]]:
         counted = ", ".join(f"{kind} {count}" for kind, count in sorted(info.events.items()))
         lines.append(("events", counted))
     return lines
+
+
+def _touches(info: SessionInfo) -> list[tuple[str, str]]:
+    if not (info.touches or info.messages["/image"]):
+        return [("touches", "none recorded: tomoskin image looks for them")]
+    return [("touches", str(info.touches)), *(("", line) for line in span_lines(info.spans))]
 
 
 def _drift(part: float) -> str:

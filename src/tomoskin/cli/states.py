@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from tomoskin.signal import Recording
 
 _SHOWN = 20
+"""Changes of state that are said."""
 
 
 def states(
@@ -97,12 +99,15 @@ def _write(
 
 
 def _say(answers: Answers, asked: list[int]) -> None:
-    rows = list(zip(answers.label, answers.probability, answers.rejected, strict=True))
-    for frame, (label, sure, unknown) in enumerate(rows[:_SHOWN]):
-        told = f"unknown (nearest: {label})" if unknown else f"{label}  {100 * sure:.0f} %"
-        typer.echo(f"frame {frame:>4}  {told}")
-    if len(rows) > _SHOWN:
-        typer.echo(f"… and {len(rows) - _SHOWN} frames more: --out writes them all")
+    rows = list(zip(answers.label, answers.rejected.tolist(), answers.probability, strict=True))
+    runs = [list(run) for _, run in groupby(enumerate(rows), key=lambda item: item[1][:2])]
+    for run in runs[:_SHOWN]:
+        (first, (label, rejected, _)), (last, _) = run[0], run[-1]
+        sure = min(probability for _, (_, _, probability) in run)
+        told = f"unknown (nearest: {label})" if rejected else f"{label}  {100 * sure:.0f} % or more"
+        typer.echo(f"frames {first:>4} to {last:>4}  {told}")
+    if len(runs) > _SHOWN:
+        typer.echo(f"… and {len(rows) - runs[_SHOWN][0][0]} frames more: --out writes them all")
     typer.echo(f"{int(answers.rejected.sum())} of {len(rows)} frames are of no known state")
     if asked:
         typer.echo(f"labels tell most at frames {', '.join(map(str, asked))}")

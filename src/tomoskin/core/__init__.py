@@ -24,6 +24,7 @@ from tomoskin.core.written import write_text, written
 if TYPE_CHECKING:
     from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
+    from tomoskin.core.memory import check_fits, machine_memory, most_bytes
     from tomoskin.core.records import (
         ComplexArray,
         Detection,
@@ -44,8 +45,11 @@ _HOME = {
     "CHANGE": "colours",
     "CHANGE_ON_DARK": "colours",
     "ColourScale": "colours",
+    "check_fits": "memory",
     "electrode_table": "typed_arrays",
     "load_arrays": "archive",
+    "machine_memory": "memory",
+    "most_bytes": "memory",
     "numbers": "typed_arrays",
     "pack_arrays": "archive",
     "real_numbers": "typed_arrays",
@@ -86,9 +90,12 @@ __all__ = [
     "Touch",
     "Voltages",
     "WireError",
+    "check_fits",
     "check_outputs",
     "electrode_table",
     "load_arrays",
+    "machine_memory",
+    "most_bytes",
     "numbers",
     "pack_arrays",
     "parse_quantity",

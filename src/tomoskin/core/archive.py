@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+import math
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core.errors import DataError
+from tomoskin.core.memory import check_fits
 from tomoskin.core.written import written
-
-MAX_BYTES = 4 << 30
-"""An archive that unpacks to more than this is refused."""
 
 _UNREADABLE = (
     ValueError,
@@ -31,23 +31,81 @@ _UNREADABLE = (
 )
 """What numpy and zipfile raise for an array that is torn, foreign or hostile."""
 
-Arrays = dict[str, NDArray[Any]]
+_IN_MEMORY = dict.fromkeys("biuf", 8) | {"c": 16}
+"""Bytes that a number of each kind becomes, however small it is in the file."""
+
+Arrays = Mapping[str, NDArray[Any]]
+"""Arrays by their name."""
 
 
-def load_arrays(path: Path) -> Arrays:
-    """All arrays of a .npz file; never unpickles. Raises as :func:`unpack_arrays` does."""
-    return _arrays(path, str(path))
+class Archive(Arrays):
+    """The arrays of a .npz file, each read when it is asked for; never unpickles.
 
-
-def unpack_arrays(data: bytes, where: str) -> Arrays:
-    """All arrays of the bytes of a .npz file; never unpickles.
+    Parameters
+    ----------
+    file
+        Its path or its bytes.
+    where
+        What it is called in messages.
 
     Raises
     ------
     DataError
-        When the file is missing, no archive, torn, too large when unpacked, or holds objects.
+        When the file is missing, no archive, or would be too large in memory; when an array that
+        is asked for is torn or holds objects.
     """
-    return _arrays(io.BytesIO(data), where)
+
+    def __init__(self, file: Path | bytes, where: str) -> None:
+        self._file, self._where = file, where
+        with self._opened() as archive:
+            self._names = {name.removesuffix(".npy"): name for name in archive.namelist()}
+            check_fits(sum(_size(archive, name) for name in self._names.values()), where)
+
+    def __getitem__(self, key: str) -> NDArray[Any]:
+        """Read one array."""
+        name = self._names[key]
+        with self._opened() as archive, archive.open(name) as member:
+            if not name.endswith(".npy"):
+                return np.asarray(member.read())
+            array: NDArray[Any] = np.lib.format.read_array(member, allow_pickle=False)
+            return array
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the arrays."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._names)
+
+    @contextmanager
+    def _opened(self) -> Iterator[zipfile.ZipFile]:
+        """The archive; whatever it does not say as it should is a DataError."""
+        where = self._where
+        file = io.BytesIO(self._file) if isinstance(self._file, bytes) else self._file
+        try:
+            with zipfile.ZipFile(file) as archive:
+                yield archive
+        except FileNotFoundError as error:
+            raise DataError("there is no such file", where=where) from error
+        except OSError as error:
+            raise DataError(f"cannot be read: {error.strerror or error}", where=where) from error
+        except (zipfile.BadZipFile, EOFError, zipfile.LargeZipFile) as error:
+            raise DataError(
+                f"is not a whole .npz archive: {error}", where=where, hint="copy it again"
+            ) from error
+        except _UNREADABLE as error:
+            raise DataError(f"holds an array that cannot be read: {error}", where=where) from error
+
+
+def load_arrays(path: Path) -> Arrays:
+    """The arrays of a .npz file; raises as :class:`Archive` does."""
+    return Archive(path, str(path))
+
+
+def unpack_arrays(data: bytes, where: str) -> Arrays:
+    """The arrays of the bytes of a .npz file; raises as :class:`Archive` does."""
+    return Archive(data, where)
 
 
 def pack_arrays(arrays: Arrays) -> bytes:
@@ -57,37 +115,25 @@ def pack_arrays(arrays: Arrays) -> bytes:
     return file.getvalue()
 
 
-def _arrays(file: Path | io.BytesIO, where: str) -> Arrays:
-    try:
-        _check_size(file, where)
-        if isinstance(file, io.BytesIO):
-            file.seek(0)
-        with np.load(file, allow_pickle=False) as archive:
-            return {key: np.asarray(archive[key]) for key in archive.files}
-    except FileNotFoundError as error:
-        raise DataError("there is no such file", where=where) from error
-    except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", where=where) from error
-    except (zipfile.BadZipFile, EOFError, zipfile.LargeZipFile) as error:
-        raise DataError(
-            f"is not a whole .npz archive: {error}", where=where, hint="copy it again"
-        ) from error
-    except _UNREADABLE as error:
-        raise DataError(f"holds an array that cannot be read: {error}", where=where) from error
-
-
-def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], *, overwrite: bool = False) -> None:
+def save_arrays(path: Path, arrays: Arrays, *, overwrite: bool = False) -> None:
     """Write a .npz file, the same bytes each time; raises as :func:`written` does."""
     with written(path, overwrite=overwrite) as part, part.open("wb") as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
-def _check_size(file: Path | io.BytesIO, where: str) -> None:
-    with zipfile.ZipFile(file) as archive:
-        size = sum(member.file_size for member in archive.infolist())
-    if size > MAX_BYTES:
-        raise DataError(
-            f"unpacks to {size / 2**30:.1f} GiB, more than {MAX_BYTES / 2**30:.0f}",
-            where=where,
-            hint="split it",
-        )
+def _size(archive: zipfile.ZipFile, name: str) -> int:
+    """Bytes of a member in memory, by what it says of itself; ValueError where it holds less."""
+    held = archive.getinfo(name).file_size
+    if not name.endswith(".npy"):
+        return held
+    with archive.open(name) as member:
+        first = np.lib.format.read_magic(member) == (1, 0)
+        read = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
+        shape, _, dtype = read(member)
+        begun = member.tell()
+    count = math.prod(shape)
+    if dtype.hasobject:
+        return held
+    if count < 0 or count * dtype.itemsize > held - begun:
+        raise ValueError(f"{name} claims the shape {shape}, and holds {held} bytes")
+    return int(count * max(dtype.itemsize, _IN_MEMORY.get(dtype.kind, 0)))

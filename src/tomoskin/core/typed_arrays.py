@@ -19,7 +19,7 @@ def numbers(arrays: Arrays, key: str, source: str) -> NDArray[Any]:
     array = arrays[key]
     if array.dtype.kind not in "biufc":
         raise DataError(f"expected numbers in {key}, got {array.dtype}", where=source)
-    return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64)
+    return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64, copy=False)
 
 
 def real_numbers(arrays: Arrays, key: str, source: str) -> FloatArray:

@@ -12,7 +12,7 @@ from tomoskin.formats.labelled_set import is_done, join_shards, shard_path, writ
 from tomoskin.formats.merit_picture import write_merit, write_merit_table
 from tomoskin.formats.picture import MOST_PANELS, Panel, plot, rendered, write_picture
 from tomoskin.formats.reader import is_session, read_recording
-from tomoskin.formats.session_export import WRITERS, Export
+from tomoskin.formats.session_export import WRITERS, Export, omitted
 from tomoskin.formats.touch_csv import write_touches
 from tomoskin.formats.vtu import series_files, write_series, write_vtu
 
@@ -27,6 +27,7 @@ __all__ = [
     "is_done",
     "is_session",
     "join_shards",
+    "omitted",
     "plot",
     "read_recording",
     "rendered",

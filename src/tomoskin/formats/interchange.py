@@ -2,7 +2,7 @@
 
 Keys: ``voltages`` (n_frames, n_meas) V, or ``dv``; ``drive`` (n_meas, 2) source, sink;
 ``measure`` (n_meas, 2) plus, minus; optional ``time_s`` (n_frames,), ``reference`` (n_meas,),
-``xy_m`` (n_frames, 2).
+``xy_m`` (n_frames, 2), ``idle`` frames at the beginning that show the untouched skin.
 """
 
 from __future__ import annotations
@@ -13,7 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import Arrays, DataError, electrode_table, numbers, real_numbers, save_arrays
+from tomoskin.core import (
+    Arrays,
+    DataError,
+    electrode_table,
+    numbers,
+    real_numbers,
+    save_arrays,
+    whole_number,
+)
 from tomoskin.signal import Recording, frame_times
 
 REQUIRED = frozenset({"drive", "measure"})
@@ -46,6 +54,7 @@ def parse(arrays: Arrays, source: str) -> Recording:
         labels=real_numbers(arrays, "xy_m", source) if "xy_m" in arrays else None,
         is_change=key == "dv",
         source=source,
+        idle=whole_number(arrays, "idle", source) if "idle" in arrays else 1,
     )
 
 
@@ -56,6 +65,7 @@ def write_interchange(path: Path, recording: Recording, *, overwrite: bool = Fal
         "drive": recording.drive,
         "measure": recording.measure,
         "time_s": recording.time,
+        "idle": np.array(recording.idle),
     }
     if recording.reference is not None:
         arrays["reference"] = recording.reference

@@ -20,13 +20,17 @@ from tomoskin.formats.touch_csv import write_touches
 from tomoskin.formats.vtu import write_series
 from tomoskin.pipeline import Prepared, colour_limit
 from tomoskin.recording import (
+    OWN_FILES,
     Advance,
     SessionReader,
     as_recorded,
     indexed_frames,
+    message_counts,
     recording_of,
     replayed,
+    scanned_touches,
 )
+from tomoskin.skin import Skin
 
 if TYPE_CHECKING:
     from tomoskin.pipeline import FrameResult
@@ -95,8 +99,7 @@ class Export:
 
     def touches(self, path: Path) -> None:
         """Write a table of the recorded touches."""
-        found = self.session.touches()
-        rows = ((t.sequence, t.host_time, t.touches) for t in found)
+        rows = scanned_touches(self.session)
         write_touches(path, rows, self.session.skin.surface, overwrite=self.overwrite)
 
     def _panels(self, prepared: Prepared) -> Iterator[Panel]:
@@ -137,3 +140,20 @@ WRITERS: dict[str, Callable[[Export, Path], None]] = {
     ".mp4": Export.film,
 }
 """What writes a file, by the ending of its name."""
+
+_TABLES = (".csv", ".parquet", ".npz", ".mat")
+"""Files of voltages."""
+
+_BESIDE = {"/touches": "the touches (--touches X.csv)", "/events": "events", "/notes": "notes"}
+"""What only a session or a .h5 holds, by the topic of its messages."""
+
+
+def omitted(session: SessionReader, ending: str) -> tuple[str, ...]:
+    """What of ``session`` a file of that ``ending`` does not hold, in words."""
+    if ending not in _TABLES:
+        return ()
+    name = session.skin.name
+    skin = f"the skin (--skin {name if name in Skin.names() else 'names its file'})"
+    counts = message_counts(session)
+    beside = [words for topic, words in _BESIDE.items() if counts[topic]]
+    return skin, *beside, *(name for name in session.attachments() if name not in OWN_FILES)

@@ -21,12 +21,15 @@ IN_SPACE = ("space_x_m", "space_y_m", "space_z_m")
 
 def write_touches(
     path: Path,
-    frames: Iterable[tuple[int, float, tuple[Touch, ...]]],
+    frames: Iterable[tuple[int | None, float, tuple[Touch, ...]]],
     surface: Surface | None = None,
     *,
     overwrite: bool = False,
 ) -> int:
     """Write touches of (frame, time, touches); return the number of rows.
+
+    A frame is its index in the recording, from 0, and empty where that does not hold it; its time
+    is the recording's own.
 
     A standard deviation that is not known is an empty field; the kind is :attr:`Touch.said`. On
     a ``surface`` that is not flat each row ends with the touch's place on it.
@@ -48,10 +51,11 @@ def write_touches(
     return count
 
 
-def _row(frame: int, time: float, touch: Touch) -> tuple[object, ...]:
+def _row(frame: int | None, time: float, touch: Touch) -> tuple[object, ...]:
     r = touch.detection
     place = (_number(r.x), _number(r.y), _number(r.sd_x), _number(r.sd_y))
-    return (frame, f"{time:.6f}", touch.id, *place, _number(r.area), _number(r.peak), touch.said)
+    number = "" if frame is None else frame
+    return (number, f"{time:.6f}", touch.id, *place, _number(r.area), _number(r.peak), touch.said)
 
 
 def _in_space(touch: Touch, surface: Surface | None) -> tuple[str, ...]:

@@ -27,7 +27,9 @@ class RowMatch:
     unused: IntArray
 
     def apply(self, values: FloatArray) -> FloatArray:
-        """(…, n_foreign) → (…, n_meas) in the pattern's order and sign."""
+        """(…, n_foreign) → (…, n_meas) in the pattern's order and sign; itself where it is so."""
+        if np.array_equal(self.rows, np.arange(values.shape[-1])) and (self.signs == 1.0).all():
+            return values
         return np.asarray(values[..., self.rows] * self.signs)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.calibration import BENDS, CLASSES, BendReading, ClassReading
-from tomoskin.core import DataError, FloatArray, IntArray, Touch
+from tomoskin.core import DataError, FloatArray, IntArray, Touch, check_fits
 from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline.collecting import Rest
 from tomoskin.pipeline.following import Following, Setting
@@ -113,26 +113,35 @@ def reconstruct(
     if prepared.modes is not None:
         _check_times(time, idle, recording.source)
     following = _following(prepared, recorded, time)
-    results = []
+    images = _room(len(time), len(prepared.mesh.cells), recording.source)
+    touches, readings = [], []
     for number, now in enumerate(time.tolist()):
         values, missing = recorded.values[number], recorded.missing[number]
-        results.append(following.push(Measured(values, missing, now, now, number)))
+        result = following.push(Measured(values, missing, now, now, number))
+        images[number] = result.image.values
+        touches.append(result.touches)
+        readings.append(result.readings)
         advance(number + 1, len(time))
     return Reconstruction(
         frames=recorded.frames,
         rows_missing=recorded.missing.sum(axis=1),
         left_out=recorded.left_out,
-        images=np.stack([result.image.values for result in results]),
+        images=images,
         unit=prepared.operator.unit,
-        touches=tuple(result.touches for result in results),
+        touches=tuple(touches),
         agreement=recorded.agreement,
         choice=prepared.choice,
         rows_left_out=recorded.rows_left_out,
         readings={
-            kind: tuple(result.readings.get(kind) for result in results)
-            for kind in prepared.calibrations
+            kind: tuple(reading.get(kind) for reading in readings) for kind in prepared.calibrations
         },
     )
+
+
+def _room(n_frames: int, n_cells: int, source: str) -> FloatArray:
+    """(n_frames, n_cells) for images; DataError where they are too many for memory."""
+    check_fits(8 * n_frames * n_cells, f"{source}, images of {n_frames} frames")
+    return np.empty((n_frames, n_cells))
 
 
 def _tuned(recorded: RecordedFrames, rule: str | None) -> Prepared:

@@ -132,14 +132,16 @@ class _Left:
 
     @classmethod
     def of(cls, prepared: Prepared, recording: Recording, dead: IntArray) -> _Left:
-        living = np.delete(recording.voltages, dead, axis=1)
+        living = np.delete(recording.voltages, dead, axis=1) if len(dead) else recording.voltages
         missing = ~np.isfinite(living)
         most = MOST_EXCLUDED * recording.voltages.shape[1] - len(dead)
         enough = missing.sum(axis=1) <= most
         if not enough.any():
             raise DataError("no frame has finite values in enough rows", where=recording.source)
         frames, left_out = np.flatnonzero(enough), np.flatnonzero(~enough)
-        return cls(prepared, recording, dead, frames, left_out, living[enough], missing[enough])
+        if len(left_out):
+            living, missing = living[enough], missing[enough]
+        return cls(prepared, recording, dead, frames, left_out, living, missing)
 
     def frames_of(
         self,

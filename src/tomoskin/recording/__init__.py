@@ -5,12 +5,13 @@ from tomoskin.recording.blocks import (
     Block,
     Rows,
     all_blocks,
+    press_positions,
     read_session,
     recording_of,
 )
 from tomoskin.recording.channels import schema_of
 from tomoskin.recording.foxglove import grid_message, log_message, scene_message
-from tomoskin.recording.info import SessionInfo, session_info
+from tomoskin.recording.info import OWN_FILES, SessionInfo, session_info
 from tomoskin.recording.layout import (
     Mark,
     MarkedFrame,
@@ -20,7 +21,7 @@ from tomoskin.recording.layout import (
     touch_row,
     touches_message,
 )
-from tomoskin.recording.playback import Span, Timeline, read_timeline
+from tomoskin.recording.playback import Timeline, read_timeline
 from tomoskin.recording.recorder import (
     BoardInfo,
     RawRead,
@@ -32,6 +33,7 @@ from tomoskin.recording.recorder import (
 from tomoskin.recording.repair import Lost, Repaired, repair
 from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.recording.replayed import advance, as_recorded, replayed
+from tomoskin.recording.scanned import idle_count, scanned_touches
 from tomoskin.recording.session_reader import (
     SessionReader,
     end_time,
@@ -43,6 +45,7 @@ from tomoskin.recording.session_reader import (
 from tomoskin.recording.session_writer import SessionWriter
 
 __all__ = [
+    "OWN_FILES",
     "Advance",
     "Block",
     "BoardInfo",
@@ -60,7 +63,6 @@ __all__ = [
     "SessionInfo",
     "SessionReader",
     "SessionWriter",
-    "Span",
     "Timeline",
     "Truth",
     "advance",
@@ -70,16 +72,19 @@ __all__ = [
     "end_time",
     "event_of",
     "grid_message",
+    "idle_count",
     "indexed_frames",
     "log_message",
     "message_counts",
     "open_replay",
     "parse_replay",
+    "press_positions",
     "read_session",
     "read_timeline",
     "recording_of",
     "repair",
     "replayed",
+    "scanned_touches",
     "scene_message",
     "schema_of",
     "session_info",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.pattern import Pattern, Scan
-from tomoskin.recording.layout import Mark, MarkedFrame
-from tomoskin.recording.session_reader import SessionReader, indexed_frames, tick_rate
+from tomoskin.recording.scanned import ScannedFrame, idle_count, scanned_frames
+from tomoskin.recording.session_reader import SessionReader, indexed_frames
 from tomoskin.signal import Readout, Recording
 
 Advance = Callable[[float, float], None]
@@ -31,13 +32,15 @@ MOST_FRAMES = 2048
 class Block:
     """Successive frames, one row each.
 
-    ``number`` (n,) from the first in the file; ``time`` (n,) host monotonic s; ``sequence``,
-    ``ticks``, ``mark`` (n,); ``samples`` (n, n_samples) counts; ``voltages`` (n, n_meas) V, NaN
-    where a sample stood at a rail.
+    ``number`` (n,) from the first in the file; ``time`` (n,) s when they were scanned and
+    ``host_time`` (n,) when they were read, host monotonic; ``sequence``, ``ticks``, ``mark``
+    (n,); ``samples`` (n, n_samples) counts; ``voltages`` (n, n_meas) V, NaN where a sample stood
+    at a rail.
     """
 
     number: IntArray
     time: FloatArray
+    host_time: FloatArray
     sequence: IntArray
     ticks: NDArray[np.uint64]
     mark: IntArray
@@ -108,79 +111,27 @@ def recording_of(session: SessionReader) -> Recording:
     """
     rows = Rows.of(session)
     blocks = list(all_blocks(session, rows))
-    read = np.concatenate([block.time for block in blocks])
-    ticks = np.concatenate([block.ticks for block in blocks])
+    positions = press_positions(session)
+    n_frames = sum(len(block.number) for block in blocks)
     return Recording(
         voltages=np.concatenate([block.voltages for block in blocks]),
         drive=rows.pattern.drive,
         measure=rows.pattern.measure,
-        time=_scan_times(read, ticks, tick_rate(session)),
+        time=np.concatenate([block.time for block in blocks]),
         reference=None,
-        labels=_labels(session, read),
+        labels=None if positions is None else np.concatenate(list(map(positions, blocks))),
         is_change=False,
         source=str(session.path),
         notes=(f"the file {session.torn}",) if session.torn else (),
-        idle=_idle(session, blocks[0].mark),
+        idle=min(idle_count(session, rows.readout.scan), n_frames),
     )
 
 
-def _blocks(session: SessionReader, rows: Rows) -> Iterator[Block]:
-    n_samples = rows.readout.scan.n_samples
-    waiting: list[tuple[int, MarkedFrame]] = []
-    for number, item in enumerate(_counted_frames(session)):
-        if len(item.frame.samples) == n_samples:
-            waiting.append((number, item))
-        if len(waiting) == MOST_FRAMES:
-            yield _block(waiting, rows)
-            waiting = []
-    if waiting:
-        yield _block(waiting, rows)
+def press_positions(session: SessionReader) -> Callable[[Block], FloatArray] | None:
+    """Gives (n, 2) m, where exactly one press was on the twin in each frame of a block, else NaN.
 
-
-def _counted_frames(session: SessionReader) -> Iterator[MarkedFrame]:
-    """All frames; DataError at the end when some that were written are missing."""
-    count, expected = 0, indexed_frames(session)
-    for count, item in enumerate(session.frames(), start=1):  # noqa: B007
-        yield item
-    if session.container.summary and count != expected:
-        raise DataError(
-            f"is damaged: {expected} frames were written, {count} are there",
-            where=str(session.path),
-        )
-
-
-def _block(items: list[tuple[int, MarkedFrame]], rows: Rows) -> Block:
-    frames = [item.frame for _, item in items]
-    samples = np.stack([frame.samples for frame in frames])
-    return Block(
-        number=np.array([number for number, _ in items]),
-        time=np.array([frame.host_time for frame in frames]),
-        sequence=np.array([frame.sequence for frame in frames]),
-        ticks=np.array([frame.ticks for frame in frames], dtype=np.uint64),
-        mark=np.array([int(item.mark) for _, item in items]),
-        samples=samples,
-        voltages=rows.voltages(samples),
-    )
-
-
-def _scan_times(read: FloatArray, ticks: NDArray[np.uint64], rate: float) -> FloatArray:
-    """When each frame was scanned, s: frames of one read have one host time, but not one tick.
-
-    Where the device's clock does not go on throughout, when they were read.
+    None where the file holds no truth.
     """
-    if not (ticks[1:] > ticks[:-1]).all():
-        return read
-    return np.asarray(read[0] + (ticks - ticks[0]) / rate)
-
-
-def _idle(session: SessionReader, marks: IntArray) -> int:
-    """Frames of the first reference, where the recording begins with it."""
-    needed = session.settings().get("reference_frames", 1)
-    begins = bool(marks[0] & Mark.REFERENCE) and isinstance(needed, int)
-    return max(1, min(needed, len(marks))) if begins else 1
-
-
-def _labels(session: SessionReader, time: FloatArray) -> FloatArray | None:
     truth = list(session.truth())
     if not truth:
         return None
@@ -190,4 +141,25 @@ def _labels(session: SessionReader, time: FloatArray) -> FloatArray | None:
             [press] = item.presses
             positions[number] = float(press["x"]), float(press["y"])
     changes = np.array([item.host_time for item in truth])
-    return positions[np.searchsorted(changes, time, side="right")]
+    return lambda block: positions[np.searchsorted(changes, block.host_time, side="right")]
+
+
+def _blocks(session: SessionReader, rows: Rows) -> Iterator[Block]:
+    frames = scanned_frames(session, rows.readout.scan)
+    while some := list(islice(frames, MOST_FRAMES)):
+        yield _block(some, rows)
+
+
+def _block(items: list[ScannedFrame], rows: Rows) -> Block:
+    frames = [item.frame for _, _, item in items]
+    samples = np.stack([frame.samples for frame in frames])
+    return Block(
+        number=np.array([number for number, _, _ in items]),
+        time=np.array([time for _, time, _ in items]),
+        host_time=np.array([frame.host_time for frame in frames]),
+        sequence=np.array([frame.sequence for frame in frames]),
+        ticks=np.array([frame.ticks for frame in frames], dtype=np.uint64),
+        mark=np.array([int(item.mark) for _, _, item in items]),
+        samples=samples,
+        voltages=rows.voltages(samples),
+    )

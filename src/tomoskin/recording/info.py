@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from tomoskin.recording.clock import ClockFit, ClockFitter
 from tomoskin.recording.layout import Mark, MarkedFrame
 from tomoskin.recording.session_reader import SessionReader, indexed_frames, message_counts
 from tomoskin.recording.session_writer import OLD_INDEX_FILE, SKIN_FILE
+from tomoskin.touch import Span, touch_spans
 
 _USUAL = 20
 """Frames that make a reference, where the session does not say."""
@@ -74,7 +76,9 @@ class References:
             self._searched = item.frame.host_time
 
 
-_OWN = frozenset({SKIN_FILE, OLD_INDEX_FILE})
+OWN_FILES = frozenset({SKIN_FILE, OLD_INDEX_FILE})
+"""What a session attaches of itself."""
+
 _OFTEN = 1000
 _MODULUS = 2**32
 
@@ -85,7 +89,8 @@ class SessionInfo:
 
     ``frames`` and those of them that were ``held`` or ``skipped``; ``lost`` frames missing in the
     sequence, in ``gaps`` places; ``dropped`` by the device itself; ``rate`` frames/s, NaN below
-    two; ``longest_pause`` s between two frames; ``touches`` number of different ones;
+    two; ``longest_pause`` s between two frames; ``touches`` number of those that were recorded,
+    and ``spans`` these, in s from the first frame; ``presses`` on the twin, each once;
     ``attached`` names of the files inside beside the skin, as calibrations that were on; ``torn``
     what is missing at the end, or "".
     """
@@ -115,6 +120,7 @@ class SessionInfo:
     clock: ClockFit | None
     messages: dict[str, int]
     attached: tuple[str, ...] = ()
+    spans: tuple[Span, ...] = ()
 
 
 @dataclass
@@ -157,6 +163,11 @@ class _Frames:
         return (self.count - 1) / span if span > 0 else float("nan")
 
 
+def _begun(counts: Sequence[int]) -> int:
+    """How many began, of those that there are at one time after the other."""
+    return sum(max(0, now - before) for before, now in pairwise([0, *counts]))
+
+
 def session_info(path: Path, advance: Advance = no_report) -> SessionInfo:
     """Read a whole session and say what is in it.
 
@@ -174,8 +185,8 @@ def session_info(path: Path, advance: Advance = no_report) -> SessionInfo:
             clock.add(item.frame.ticks, item.frame.host_time)
             if number % _OFTEN == 0:
                 advance(number, max(total, number + 1))
-        every = (touch for item in session.touches() for touch in item.touches)
-        touches = {number for touch in every for number in (touch.id, *touch.merged)}
+        touched = ((item.host_time - frames.first, item.touches) for item in session.touches())
+        spans = touch_spans(touched)
         messages = message_counts(session)
         return SessionInfo(
             path=str(path),
@@ -195,12 +206,13 @@ def session_info(path: Path, advance: Advance = no_report) -> SessionInfo:
             lost=frames.lost,
             gaps=frames.gaps,
             dropped=frames.dropped,
-            touches=len(touches),
-            presses=sum(1 for item in session.truth() if item.presses),
+            touches=len(spans),
+            presses=_begun([len(item.presses) for item in session.truth()]),
             events=dict(Counter(event.kind for event in session.events())),
             notes=sum(1 for _ in session.notes()),
             device=session.device(),
             clock=clock.fit,
             messages=messages,
-            attached=tuple(name for name in session.attachments() if name not in _OWN),
+            spans=spans,
+            attached=tuple(name for name in session.attachments() if name not in OWN_FILES),
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from tomoskin.core import DataError, Detection, Event, Frame, Touch
 _CDR = b"\x00\x01\x00\x00"
 _FRAME = struct.Struct("<4sdQIHHBBxxI")
 _RAW = struct.Struct("<4sdI")
+_HOST_TIME = struct.Struct("<4xd")
 
 
 class Mark(IntFlag):
@@ -83,6 +85,20 @@ def decode_raw(data: bytes | memoryview, where: str) -> tuple[float, bytes]:
     if cdr != _CDR or len(data) != _RAW.size + n:
         raise _wrong("raw bytes", data, where)
     return host_time, bytes(data[_RAW.size :])
+
+
+class _Timed(msgspec.Struct):
+    host_time: float = math.nan
+
+
+def host_time_of(data: bytes) -> float:
+    """Host time, s, of a message of any channel; NaN where it does not say."""
+    if data.startswith(_CDR):
+        return float(_HOST_TIME.unpack_from(data)[0]) if len(data) >= _HOST_TIME.size else math.nan
+    try:
+        return msgspec.json.decode(data, type=_Timed).host_time
+    except (msgspec.DecodeError, UnicodeDecodeError):
+        return math.nan
 
 
 def _wrong(what: str, data: bytes | memoryview, where: str) -> DataError:

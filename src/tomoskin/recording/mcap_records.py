@@ -181,6 +181,6 @@ def _read(kind: type[Record], data: bytes) -> Record:
     reader: Any = kind
     try:
         record: Record = reader.read(ReadDataStream(io.BytesIO(data[PREFIX.size :])))
-    except (McapError, struct.error) as error:
+    except (McapError, struct.error, OverflowError) as error:
         raise ValueError(f"the {kind.__name__} is cut") from error
     return record

@@ -10,20 +10,11 @@ from pathlib import Path
 from tomoskin.core import Event, Frame
 from tomoskin.recording.layout import Mark, MarkedFrame
 from tomoskin.recording.session_reader import SessionReader, end_time
+from tomoskin.touch import Span, touch_spans
 from tomoskin.wire import SCHEMA, Deframer, decode_payload, encode
 
 MOST_SPANS = 2000
 """Touches on it; later ones are left out."""
-
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """A touch from its first frame to its last, s."""
-
-    id: int
-    kind: str
-    begin: float
-    end: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,27 +42,11 @@ def read_timeline(path: Path) -> Timeline:
         def timed(events: Iterator[Event]) -> tuple[tuple[float, Event], ...]:
             return tuple((event.host_time - start, event) for event in events)
 
-        spans = tuple(_spans(session, start))
+        touched = ((item.host_time - start, item.touches) for item in session.touches())
+        spans = touch_spans(touched)[:MOST_SPANS]
         last = end_time(session)
         end = max((span.end for span in spans), default=0.0) if last is None else last - start
         return Timeline(end, timed(session.notes()), timed(session.events()), spans)
-
-
-def _spans(session: SessionReader, start: float) -> Iterator[Span]:
-    """Touches with the same number at different times are different touches: one run each."""
-    open_ones: dict[int, Span] = {}
-    done: list[Span] = []
-    for item in session.touches():
-        now = item.host_time - start
-        present = {touch.id: touch for touch in item.touches}
-        done += [open_ones.pop(gone) for gone in open_ones.keys() - present.keys()]
-        for number, touch in present.items():
-            begun = open_ones[number].begin if number in open_ones else now
-            open_ones[number] = Span(number, touch.kind, begun, now)
-        if len(done) >= MOST_SPANS:
-            break
-    done += open_ones.values()
-    return iter(sorted(done, key=lambda span: (span.begin, span.id)))
 
 
 RawBytes = tuple[float, bytes]

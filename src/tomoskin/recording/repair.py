@@ -2,34 +2,42 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter, deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
+from mcap import records
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Chunk, DataEnd, Metadata
+from mcap.records import Attachment, Chunk, DataEnd, McapRecord, Metadata
 
 from tomoskin.core import MAGIC, DataError, Output, SkinError, check_outputs, written
 from tomoskin.recording.blocks import Advance, no_report
 from tomoskin.recording.channels import CHANNELS, SCHEMAS, TOPICS
 from tomoskin.recording.container import ContainerWriter
+from tomoskin.recording.layout import host_time_of
 from tomoskin.recording.mcap_records import LARGEST, PREFIX, decode, decode_chunk, messages_in
 from tomoskin.recording.message_log import LIBRARY, errors_of
-from tomoskin.recording.session_writer import ABOUT, FORMAT, OLD_INDEX_FILE, SKIN_FILE
+from tomoskin.recording.session_reader import epoch_of
+from tomoskin.recording.session_writer import ABOUT, OLD_INDEX_FILE, SKIN_FILE, about_session
 from tomoskin.skin import Skin
 
 _WINDOW = 1 << 20
 _BEGINNING = re.compile(rb"(?=[\x06\x09\x0c].{3}\x00{5})", re.DOTALL)
 """Kind and length of a chunk, attachment or named strings of up to 16 MiB."""
 
-_OPCODES = frozenset(Opcode)
+_KINDS: dict[int, type[McapRecord]] = {
+    Opcode[name]: getattr(records, "".join(map(str.title, name.split("_"))))
+    for name in Opcode.__members__
+}
+"""What a record of each kind is decoded as."""
 
-_DATA = (Opcode.CHUNK, Opcode.ATTACHMENT)
-"""Records that are lost where they are not whole; others are made again."""
+_SAME_EPOCH = 1e-6
+"""So many s may lie between an epoch as it is written and as the log times of messages tell it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +70,7 @@ class Stretch(NamedTuple):
 
     start: int
     stop: int
-    record: Chunk | Attachment | Metadata | DataEnd | None
+    record: McapRecord | None
 
 
 def repair(
@@ -104,53 +112,85 @@ def repair(
 
 
 def stretches(file: BinaryIO, size: int) -> Iterator[Stretch]:
-    """The chunks, attachments, named strings and the DATA END of a file, and what is lost between.
+    """The records of a file up to its DATA END, and what is lost between.
 
-    It goes record by record, and where one is damaged on to the next whole one.
+    It goes record by record, and where one is damaged on to the next whole one of data. That may
+    begin before the damage: a length that is wrong, of a record without a CRC, swallows nothing.
     """
-    place = len(MAGIC) if _read(file, 0, len(MAGIC)) == MAGIC else 0
+    place = sure = len(MAGIC) if _read(file, 0, len(MAGIC)) == MAGIC else 0
     while place < size:
         opcode, stop = _head(file, place, size)
         record = _record(opcode, _read(file, place, stop - place))
-        lost = record is None and (stop == place or opcode in _DATA)
-        if lost:
-            stop = _next_record(file, place + 1, size)
-        if lost or record is not None:
+        if record is None:
+            stop = _next_record(file, sure, place, size)
+            yield Stretch(place if stop > place else sure, stop, None)
+        else:
             yield Stretch(place, stop, record)
         if isinstance(record, DataEnd):
             return
+        if isinstance(record, Chunk | Attachment):
+            sure = stop
         place = stop
 
 
 def _front(
     found: Iterable[Stretch], skin: Skin | None, where: str
 ) -> tuple[dict[str, str], list[Attachment]]:
-    """The named strings and the attachments, wherever they are in the file."""
-    about = {"format": str(FORMAT), "epoch_s": "0.0"}
+    """The named strings and the attachments, wherever they are in the file.
+
+    The strings have no CRC: they are made again of the skin, and of the clock as messages tell it.
+    """
+    about: dict[str, str] = {}
     attachments: dict[str, Attachment] = {}
-    is_session = False
+    is_session, epoch = False, math.inf
     for _, _, record in found:
         is_session |= isinstance(record, Chunk | Attachment | Metadata)
         if isinstance(record, Attachment) and record.name != OLD_INDEX_FILE:
             attachments[record.name] = record
         elif isinstance(record, Metadata) and record.name == ABOUT:
             about = record.metadata
+        elif isinstance(record, Chunk):
+            epoch = min(epoch, _earliest_epoch(record))
     if not is_session:
         raise DataError("holds no part of a session: nothing can be recovered", where=where)
-    if skin is None:
-        skin = _skin_of(attachments.get(SKIN_FILE), where)
+    skin = skin or _skin_of(attachments.get(SKIN_FILE), about, where)
     data = skin.to_toml().encode()
     attachments[SKIN_FILE] = Attachment(0, 0, SKIN_FILE, "application/toml", data)
-    return about, list(attachments.values())
+    return about_session(skin, _epoch(about, epoch)), list(attachments.values())
 
 
-def _skin_of(attachment: Attachment | None, where: str) -> Skin:
+def _skin_of(attachment: Attachment | None, about: Mapping[str, str], where: str) -> Skin:
+    """The skin in the file, or the built-in one that its strings name."""
     if attachment is not None:
         try:
             return Skin.from_toml(attachment.data.decode(), source=f"{where}, {SKIN_FILE}")
         except (SkinError, UnicodeDecodeError):
             pass  # the same as no skin
-    raise DataError("its skin is lost", where=where, hint="name the skin: --skin")
+    if (name := about.get("skin", "")) in Skin.names():
+        skin = Skin.load(name)
+        if skin.identity == about.get("skin_identity"):
+            return skin
+    raise DataError(
+        "its skin is lost, so nothing is saved", where=where, hint="name the skin: --skin"
+    )
+
+
+def _earliest_epoch(chunk: Chunk) -> float:
+    """Log time less host time, s, where it is least; infinite where no message tells.
+
+    Frames from before the recording are logged when it begins, later than they were.
+    """
+    ages = ((m.log_time, host_time_of(m.data)) for m in messages_in(chunk, 0))
+    differences = ((log - round(1e9 * host)) / 1e9 for log, host in ages if math.isfinite(host))
+    return min(differences, default=math.inf)
+
+
+def _epoch(about: Mapping[str, str], told: float) -> float:
+    """The epoch as it is written, unless what the messages have ``told`` differs."""
+    own = epoch_of(about)
+    if own is not None and (math.isinf(told) or abs(own - told) < _SAME_EPOCH):
+        return own
+    return 0.0 if math.isinf(told) else told
 
 
 def _copy(found: Iterable[Stretch], container: ContainerWriter, result: Repaired) -> Iterator[int]:
@@ -182,38 +222,30 @@ def _head(file: BinaryIO, place: int, size: int) -> tuple[int, int]:
         return 0, place
     opcode, length = PREFIX.unpack(head)
     stop = place + PREFIX.size + int(length)
-    fits = opcode in _OPCODES and length <= LARGEST and stop <= size
+    fits = opcode in _KINDS and length <= LARGEST and stop <= size
     return opcode, stop if fits else place
 
 
-def _record(opcode: int, data: bytes) -> Chunk | Attachment | Metadata | DataEnd | None:
-    """What ``data`` is, when it is whole and of a kind that is kept."""
+def _record(opcode: int, data: bytes) -> McapRecord | None:
+    """What ``data`` is, when it is whole."""
     try:
-        match opcode:
-            case Opcode.CHUNK:
-                chunk = decode_chunk(data)
-                if not chunk.compression:
-                    deque(messages_in(chunk, 0), maxlen=0)  # ValueError where they do not add up
-                    return chunk
-            case Opcode.ATTACHMENT:
-                return decode(Attachment, data)
-            case Opcode.METADATA:
-                return decode(Metadata, data)
-            case Opcode.DATA_END:
-                return decode(DataEnd, data)
+        if opcode == Opcode.CHUNK:
+            chunk = decode_chunk(data)
+            deque(messages_in(chunk, 0), maxlen=0)  # ValueError where they do not add up
+            return None if chunk.compression else chunk
+        return decode(_KINDS[opcode], data) if data else None
     except ValueError:
-        pass
-    return None
+        return None
 
 
-def _next_record(file: BinaryIO, place: int, size: int) -> int:
-    """Where the next whole record of data begins, or the end of the file."""
+def _next_record(file: BinaryIO, place: int, beyond: int, size: int) -> int:
+    """Where from ``place`` on a whole record of data begins that ends ``beyond`` it, or the end."""
     while place < size:
         window = _read(file, place, _WINDOW + PREFIX.size)
         for match in _BEGINNING.finditer(window):
             start = place + match.start()
             opcode, stop = _head(file, start, size)
-            if _record(opcode, _read(file, start, stop - start)) is not None:
+            if stop > beyond and _record(opcode, _read(file, start, stop - start)) is not None:
                 return start
         place += _WINDOW
     return size

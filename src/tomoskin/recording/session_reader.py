@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ import msgspec
 
 from tomoskin.core import DataError, Event, SkinError
 from tomoskin.recording import channels
-from tomoskin.recording.container_reader import ContainerReader
+from tomoskin.recording.container_reader import MEND, ContainerReader
 from tomoskin.recording.layout import (
     MarkedFrame,
     RecordedTouches,
@@ -171,10 +171,19 @@ def _epoch(container: ContainerReader) -> float:
             where=container.where,
             hint="it was written by another version of tomoskin",
         )
+    epoch = epoch_of(about)
+    if epoch is None:
+        raise DataError("does not say when its clock began", where=container.where, hint=MEND)
+    return epoch
+
+
+def epoch_of(about: Mapping[str, str]) -> float | None:
+    """What is added to a host time to give seconds since 1970, where a session says it."""
     try:
-        return float(about["epoch_s"])
-    except (KeyError, ValueError) as error:
-        raise DataError("does not say when its clock began", where=container.where) from error
+        epoch = float(about["epoch_s"])
+    except (KeyError, ValueError):
+        return None
+    return epoch if math.isfinite(epoch) else None
 
 
 def _skin(container: ContainerReader) -> Skin:

@@ -37,6 +37,17 @@ OLD_INDEX_FILE = "tomoskin.seek"
 """Name of an attachment in files of 0.1: offsets in the file, which a copy must not keep."""
 
 
+def about_session(skin: Skin, epoch: float) -> dict[str, str]:
+    """What a session of ``skin`` says of itself; ``epoch`` + host time = seconds since 1970."""
+    return {
+        "format": str(FORMAT),
+        "epoch_s": repr(float(epoch)),
+        "skin": skin.name,
+        "skin_identity": skin.identity,
+        "electrodes": str(skin.n_electrodes),
+    }
+
+
 class SessionWriter(MessageLog):
     """Writes one session file; a context manager.
 
@@ -63,14 +74,7 @@ class SessionWriter(MessageLog):
     """
 
     def __init__(self, path: Path, skin: Skin, *, epoch: float = 0.0, start: float = 0.0) -> None:
-        about = {
-            "format": str(FORMAT),
-            "epoch_s": repr(float(epoch)),
-            "skin": skin.name,
-            "skin_identity": skin.identity,
-            "electrodes": str(skin.n_electrodes),
-        }
-        super().__init__(path, ABOUT, about, epoch=epoch, start=start)
+        super().__init__(path, ABOUT, about_session(skin, epoch), epoch=epoch, start=start)
         self._start = start
         self.attach(SKIN_FILE, "application/toml", skin.to_toml().encode())
 

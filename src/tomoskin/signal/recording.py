@@ -58,6 +58,10 @@ class Recording:
                 where=self.source,
             )
         n_frames, n_rows = self.voltages.shape
+        if not 1 <= self.idle <= n_frames:
+            raise DataError(
+                f"expected idle from 1 to {n_frames}, got {self.idle}", where=self.source
+            )
         _check(self.drive.shape, (n_rows, 2), "drive", self.source)
         _check(self.measure.shape, (n_rows, 2), "measure", self.source)
         _check(self.time.shape, (n_frames,), "time_s", self.source)
@@ -74,7 +78,13 @@ class Recording:
         """Frames ``start`` to ``stop`` − 1."""
         chosen = slice(start, stop)
         labels = None if self.labels is None else self.labels[chosen]
-        return replace(self, voltages=self.voltages[chosen], time=self.time[chosen], labels=labels)
+        return replace(
+            self,
+            voltages=self.voltages[chosen],
+            time=self.time[chosen],
+            labels=labels,
+            idle=max(1, min(self.idle, stop) - start),
+        )
 
     def in_order_of(self, pattern: Pattern) -> Recording:
         """Return the recording with exactly the pattern's rows, in its order and signs.

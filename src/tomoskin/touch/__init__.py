@@ -10,6 +10,7 @@ from tomoskin.touch.fit.pace import EXHAUSTIVE, LIVE, Pace
 from tomoskin.touch.fit.spot import Response, Spots, spots_of
 from tomoskin.touch.region import Region
 from tomoskin.touch.segment import ImageNoise, Segmenter
+from tomoskin.touch.spans import Span, touch_spans
 from tomoskin.touch.tracking.motion import STILL, TrackSettings
 from tomoskin.touch.tracking.tracker import TouchEvent, Tracker
 
@@ -24,6 +25,7 @@ __all__ = [
     "ResolutionBounds",
     "Response",
     "Segmenter",
+    "Span",
     "SpotFinder",
     "SpotModel",
     "Spots",
@@ -35,6 +37,7 @@ __all__ = [
     "measured_covariance",
     "resolution_bounds",
     "spots_of",
+    "touch_spans",
     "variants",
 ]
 

@@ -9,11 +9,18 @@ import msgspec
 import numpy as np
 
 from tomoskin.core import DataError, written
-from tomoskin.recording import Advance, Block, Rows, SessionReader, all_blocks
+from tomoskin.recording import (
+    Advance,
+    Block,
+    Rows,
+    SessionReader,
+    all_blocks,
+    scanned_touches,
+)
 
-_FRAMES = ("number", "time", "sequence", "ticks", "mark", "samples", "voltages")
+_FRAMES = ("number", "time", "host_time", "sequence", "ticks", "mark", "samples", "voltages")
 _TOUCH = np.dtype(
-    [("time", "f8"), ("sequence", "i8"), ("id", "i8"), ("kind", "S32"), ("since", "f8")]
+    [("frame", "i8"), ("time", "f8"), ("id", "i8"), ("kind", "S32"), ("since", "f8")]
     + [(name, "f8") for name in ("x", "y", "sd_x", "sd_y", "area", "peak")]
 )
 
@@ -67,11 +74,12 @@ def _append(group: Any, block: Block) -> None:
 
 
 def _touches(session: SessionReader) -> Any:
+    """By frame, as in every table; -1 where a touch's frame is not in the file."""
     table = [
-        (item.host_time, item.sequence, t.id, t.said.encode(), t.since,
+        (-1 if frame is None else frame, time, t.id, t.said.encode(), t.since,
          r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak)
-        for item in session.touches()
-        for t in item.touches
+        for frame, time, touches in scanned_touches(session)
+        for t in touches
         for r in [t.detection]
     ]  # fmt: skip
     return np.array(table, dtype=_TOUCH)

@@ -19,11 +19,12 @@ _STIMULATION = [("stimulation", "O"), ("stim_pattern", "O"), ("meas_pattern", "O
 def write_matlab(
     path: Path, recording: Recording, current: float, n_electrodes: int, *, overwrite: bool = False
 ) -> None:
-    """Write ``stimulation`` (structure array), ``vi`` (n_meas, n_frames) V and ``time_s``.
+    """Write ``stimulation`` (structure array), ``vi`` (n_meas, n_frames) V, ``time_s``, ``idle``.
 
     Each stimulation has ``stimulation`` "Amp", ``stim_pattern`` (n_electrodes, 1) A and
     ``meas_pattern`` (n, n_electrodes), as EIDORS' models do; rows are in EIDORS' order, drive by
-    drive. ``vh`` is there when the recording has a reference, ``xy_m`` when it has labels.
+    drive. The first ``idle`` frames show the untouched skin. ``vh`` is there when the recording
+    has a reference, ``xy_m`` when it has labels.
 
     Raises
     ------
@@ -48,6 +49,7 @@ def write_matlab(
         "stimulation": stimulation,
         "vi": values,
         "time_s": recording.time[:, None],
+        "idle": recording.idle,
     }
     if recording.reference is not None:
         variables["vh"] = recording.reference[order][:, None]

@@ -4,14 +4,41 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import DataError, written
 from tomoskin.formats.imports.csv_table import column_names
-from tomoskin.recording import Advance, Block, Rows, SessionReader, all_blocks
+from tomoskin.recording import (
+    Advance,
+    Block,
+    Rows,
+    SessionReader,
+    all_blocks,
+    idle_count,
+    press_positions,
+)
 
-_BESIDE = ("frame", "time_s", "sequence", "ticks", "mark")
+Column = NDArray[Any]
+
+
+class _Beside:
+    """Columns beside the voltages; ``x_m`` and ``y_m`` where the file holds truth."""
+
+    def __init__(self, session: SessionReader, rows: Rows) -> None:
+        self._idle = idle_count(session, rows.readout.scan)
+        self._positions = press_positions(session)
+        place = ("x_m", "y_m") if self._positions else ()
+        self.names = ("frame", "time_s", "sequence", "ticks", "mark", "idle", *place)
+
+    def __call__(self, block: Block) -> tuple[Column, ...]:
+        """Of one block, in the order of the names."""
+        place = self._positions(block).T if self._positions else ()
+        idle = (block.number < self._idle).astype(np.int64)
+        return block.number, block.time, block.sequence, block.ticks, block.mark, idle, *place
 
 
 def write_csv(
@@ -25,21 +52,22 @@ def write_csv(
         When the session is damaged, and as :func:`written` does.
     """
     rows = Rows.of(session)
-    names = column_names(rows.pattern.drive, rows.pattern.measure)
+    names, beside = column_names(rows.pattern.drive, rows.pattern.measure), _Beside(session, rows)
     with (
         written(path, overwrite=overwrite) as part,
         part.open("w", encoding="utf-8", newline="") as file,
     ):
-        file.write(",".join([*_BESIDE, *names]) + "\n")
+        file.write(",".join([*beside.names, *names]) + "\n")
         for block in all_blocks(session, rows, advance):
-            for number in range(len(block.number)):
-                file.write(_line(block, number))
+            columns = [column.tolist() for column in beside(block)]
+            for *first, voltages in zip(*columns, block.voltages.tolist(), strict=True):
+                file.write(",".join(map(_text, [*first, *voltages])) + "\n")
 
 
 def write_parquet(
     path: Path, session: SessionReader, advance: Advance, *, overwrite: bool = False
 ) -> None:
-    """One row a frame: frame, time_s, sequence, ticks, mark, and ``voltages`` as a list of floats.
+    """One row a frame: the columns beside, and ``voltages`` as a list of floats.
 
     The tables ``drive`` and ``measure`` are JSON in the schema's metadata, with the skin.
 
@@ -57,8 +85,9 @@ def write_parquet(
         ) from error
     rows = Rows.of(session)
     n = rows.pattern.n_meas
-    kinds = (pa.int64(), pa.float64(), pa.int64(), pa.uint64(), pa.int64())
-    fields = [pa.field(name, kind) for name, kind in zip(_BESIDE, kinds, strict=True)]
+    beside = _Beside(session, rows)
+    kinds = {"time_s": pa.float64(), "ticks": pa.uint64(), "x_m": pa.float64(), "y_m": pa.float64()}
+    fields = [pa.field(name, kinds.get(name, pa.int64())) for name in beside.names]
     fields.append(pa.field("voltages", pa.list_(pa.float64(), n)))
     schema = pa.schema(fields, metadata=_about(session, rows))
     with (
@@ -67,18 +96,12 @@ def write_parquet(
     ):
         for block in all_blocks(session, rows, advance):
             values = pa.FixedSizeListArray.from_arrays(pa.array(block.voltages.reshape(-1)), n)
-            columns = [block.number, block.time, block.sequence, block.ticks, block.mark]
-            arrays = [pa.array(column) for column in columns]
+            arrays = [pa.array(column) for column in beside(block)]
             file.write_batch(pa.record_batch([*arrays, values], schema=schema))
 
 
-def _line(block: Block, number: int) -> str:
-    beside = (
-        f"{block.number[number]},{float(block.time[number])!r},{block.sequence[number]},"
-        f"{block.ticks[number]},{block.mark[number]},"
-    )
-    values = ("" if math.isnan(value) else repr(value) for value in block.voltages[number].tolist())
-    return beside + ",".join(values) + "\n"
+def _text(value: float) -> str:
+    return "" if math.isnan(value) else repr(value)
 
 
 def _about(session: SessionReader, rows: Rows) -> dict[str, str]:

@@ -1,22 +1,24 @@
 """The interchange file as text: a header, then one frame a line.
 
-Columns ``v_SOURCE_SINK_PLUS_MINUS`` (V) or ``dv_…``, electrodes from 0; optional ``time_s``, and
-``x_m`` and ``y_m`` for the true position of a single touch. Comma between columns, decimal point.
+Columns ``v_SOURCE_SINK_PLUS_MINUS`` (V) or ``dv_…``, electrodes from 0; optional ``time_s``,
+``idle`` (1 in the first frames, of the untouched skin, then 0), and ``x_m`` and ``y_m`` for the
+true position of a single touch. Comma between columns, decimal point.
 """
 
 from __future__ import annotations
 
 import csv
 import re
+from array import array
 from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from tomoskin.core import DataError, IntArray
+from tomoskin.core import DataError, FloatArray, IntArray, check_fits, most_bytes
 from tomoskin.signal import Recording, frame_times
 
 _COLUMN = re.compile(r"(dv|v)_(\d+)_(\d+)_(\d+)_(\d+)")
-_KNOWN = ("time_s", "x_m", "y_m")
+_KNOWN = ("time_s", "idle", "x_m", "y_m")
 _BESIDE = ("frame", "sequence", "ticks", "mark")
 """Columns that an export has beside them; not needed here."""
 
@@ -35,7 +37,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
         When a column is not known, or a line has another number of fields or one that is no
         number; the message names line and column.
     """
-    rows = csv.reader(iter(lines))
+    rows = _rows(lines, source)
     header = [name.strip() for name in next(rows)]
     _check_separator(header, source)
     matches = [_COLUMN.fullmatch(name) for name in header]
@@ -46,14 +48,14 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     ]
     if unknown or len(set(header)) != len(header):
         raise DataError(
-            f"expected columns v_SOURCE_SINK_PLUS_MINUS, time_s, x_m, y_m, each once, got "
+            f"expected columns v_SOURCE_SINK_PLUS_MINUS, {', '.join(_KNOWN)}, each once, got "
             f'"{(unknown or header)[0]}"',
             where=f"{source}, line 1",
         )
     kinds = {match[1] for match in matches if match}
     if len(kinds) != 1:
         raise DataError("expected columns of v or of dv, not both", where=f"{source}, line 1")
-    table = np.array(list(_values(rows, header, source))).reshape(-1, len(header))
+    table = np.asarray(_values(rows, header, source)).reshape(-1, len(header))
     used = [number for number, match in enumerate(matches) if match]
     electrodes = np.array([[int(part) for part in m.groups()[1:]] for m in matches if m])
     by_name = {name: table[:, number] for number, name in enumerate(header)}
@@ -67,6 +69,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
         labels=np.column_stack([by_name["x_m"], by_name["y_m"]]) if has_place else None,
         is_change=kinds == {"dv"},
         source=source,
+        idle=_idle(by_name["idle"], source) if "idle" in by_name else 1,
     )
 
 
@@ -74,6 +77,14 @@ def column_names(drive: IntArray, measure: IntArray, kind: str = "v") -> list[st
     """Names of the columns of a table of rows."""
     tables = np.hstack([drive, measure]).tolist()
     return ["_".join([kind, *map(str, row)]) for row in tables]
+
+
+def _idle(marks: FloatArray, source: str) -> int:
+    """Number of idle frames: at the beginning."""
+    idle = int(np.count_nonzero(marks == 1))
+    if not ((marks[:idle] == 1).all() and (marks[idle:] == 0).all()):
+        raise DataError("expected idle 1 in the first frames, then 0", where=source)
+    return max(1, idle)
 
 
 def _check_separator(header: list[str], source: str) -> None:
@@ -85,7 +96,18 @@ def _check_separator(header: list[str], source: str) -> None:
         )
 
 
-def _values(rows: Iterator[list[str]], header: list[str], source: str) -> Iterator[list[float]]:
+def _rows(lines: Iterable[str], source: str) -> Iterator[list[str]]:
+    """Fields of each line."""
+    rows = csv.reader(lines)
+    try:
+        yield from rows
+    except csv.Error as error:
+        raise DataError(f"is no table: {error}", where=f"{source}, line {rows.line_num}") from error
+
+
+def _values(rows: Iterator[list[str]], header: list[str], source: str) -> array[float]:
+    """The numbers of all lines, one after another."""
+    values, most = array("d"), most_bytes()
     for number, row in enumerate(rows, start=2):
         if not row:
             continue
@@ -95,10 +117,11 @@ def _values(rows: Iterator[list[str]], header: list[str], source: str) -> Iterat
                 where=f"{source}, line {number}",
                 hint="a decimal comma makes two fields of one",
             )
-        yield [
-            _number(text, name, f"{source}, line {number}")
-            for text, name in zip(row, header, strict=True)
-        ]
+        where = f"{source}, line {number}"
+        values.extend(_number(text, name, where) for text, name in zip(row, header, strict=True))
+        if values.itemsize * len(values) > most:
+            check_fits(values.itemsize * len(values), source)
+    return values
 
 
 def _number(text: str, name: str, where: str) -> float:

@@ -10,14 +10,16 @@ their numbers: EIDORS' own circles begin at the top and count clockwise, as buil
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import issparse
 
-from tomoskin.core import DataError, IntArray
+from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.formats.imports.tables import pairs_of, voltages_of
 from tomoskin.signal import Recording, frame_times
 
@@ -55,13 +57,18 @@ def parse(variables: Mapping[str, Any], source: str) -> Recording:
             where=source,
         )
     reference = _found(variables, _REFERENCE, select, len(drive), source)
-    return voltages_of(
+    recording = voltages_of(
         source,
         voltages,
         (drive, measure),
         time=_times(variables, len(voltages)),
         reference=None if reference is None else reference[0],
     )
+    labels = _numbers(variables, "xy_m", (len(voltages), 2))
+    idle = _numbers(variables, "idle", ())
+    count = 1.0 if idle is None else float(idle)
+    is_count = count in range(1, len(voltages) + 1)
+    return replace(recording, labels=labels, idle=int(count) if is_count else 1)
 
 
 def _stimulation(variables: Any) -> list[Mapping[str, Any]] | None:
@@ -121,11 +128,17 @@ def _found(
     return None
 
 
-def _times(variables: Mapping[str, Any], n: int) -> NDArray[np.float64]:
-    time = variables.get("time_s")
-    if isinstance(time, np.ndarray) and time.size == n and time.dtype.kind in "iuf":
-        return time.reshape(-1).astype(np.float64)
-    return frame_times(n)
+def _times(variables: Mapping[str, Any], n: int) -> FloatArray:
+    time = _numbers(variables, "time_s", (n,))
+    return frame_times(n) if time is None else time
+
+
+def _numbers(variables: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> FloatArray | None:
+    """What our own export has beside; None where it is something else."""
+    found = np.asarray(variables.get(name))
+    if found.size != math.prod(shape) or found.dtype.kind not in "iuf":
+        return None
+    return found.reshape(shape).astype(np.float64)
 
 
 def _dense(value: Any, where: str) -> NDArray[Any]:
@@ -133,4 +146,4 @@ def _dense(value: Any, where: str) -> NDArray[Any]:
     array = np.asarray(sparse.toarray() if issparse(value) else value)
     if array.dtype.kind not in "biufc":
         raise DataError(f"expected numbers, got {array.dtype}", where=where)
-    return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64)
+    return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64, copy=False)

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from pathlib import Path
 from typing import Any
 
-from scipy.io import loadmat
+from scipy.io import loadmat, whosmat
 
-from tomoskin.core import DataError
-
-MAX_BYTES = 2 << 30
-"""A file that unpacks to more than this is refused."""
+from tomoskin.core import DataError, check_fits
 
 _HEAD = 128
 _COMPRESSED = 15
 _BLOCK = 1 << 20
+_NUMBER = 8
+_HOLDERS = ("struct", "cell", "object", "opaque", "function", "sparse")
+"""What holds variables of its own: it is measured by what it unpacks to."""
 
 
 def is_matlab(beginning: bytes) -> bool:
@@ -30,7 +31,7 @@ def load_matlab(path: Path) -> dict[str, Any]:
     Raises
     ------
     DataError
-        When the file is of v7.3, damaged, or would unpack to more than ``MAX_BYTES``.
+        When the file is of v7.3, damaged, or would be too large in memory.
     """
     where = str(path)
     try:
@@ -51,7 +52,12 @@ def load_matlab(path: Path) -> dict[str, Any]:
 
 
 def _check_size(path: Path) -> None:
-    """Unpack every compressed variable a block at a time, keeping none of it."""
+    """Unpack every compressed variable a block at a time, keeping none of it.
+
+    What a number takes in memory is more than in the file, where small ones stand as bytes.
+    """
+    shapes = [shape for _, shape, kind in whosmat(path) if kind not in _HOLDERS]
+    check_fits(sum(_NUMBER * math.prod(shape) for shape in shapes), str(path))
     total = 0
     with path.open("rb") as file:
         file.seek(_HEAD - 2)
@@ -63,20 +69,13 @@ def _check_size(path: Path) -> None:
                 file.seek(size, 1)
             else:
                 total = _unpacked(file.read(size), total, str(path))
-            _check_total(total, str(path))
+            check_fits(total, str(path))
 
 
 def _unpacked(data: bytes, total: int, where: str) -> int:
     unpack = zlib.decompressobj()
     while data:
         total += len(unpack.decompress(data, _BLOCK))
-        _check_total(total, where)
+        check_fits(total, where)
         data = unpack.unconsumed_tail
     return total
-
-
-def _check_total(total: int, where: str) -> None:
-    if total > MAX_BYTES:
-        raise DataError(
-            f"unpacks to more than {MAX_BYTES / 2**30:.0f} GiB", where=where, hint="split it"
-        )

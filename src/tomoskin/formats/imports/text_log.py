@@ -6,12 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tomoskin.core import DataError
+from tomoskin.core import DataError, check_fits
 
 LONGEST_LINE = 1 << 16
 """Bytes of a line; what follows is a line of its own."""
-
-MOST_BYTES = 1 << 30
 
 _LISTED = 8
 
@@ -45,11 +43,10 @@ def text_lines(path: Path) -> Iterator[str]:
     Raises
     ------
     DataError
-        When the file cannot be read or is larger than ``MOST_BYTES``.
+        When the file cannot be read or is too large for memory.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise DataError("is too large for a text log (over 1 GiB)", where=str(path))
+        check_fits(path.stat().st_size, str(path))
         with path.open("rb") as file:
             while line := file.readline(LONGEST_LINE):
                 yield _text(line)

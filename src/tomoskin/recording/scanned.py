@@ -1,0 +1,70 @@
+"""What ``frame`` and ``time_s`` are in every table: frames of a session, numbered and timed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from tomoskin.core import DataError, Frame, Touch
+from tomoskin.pattern import Scan
+from tomoskin.recording.layout import Mark, MarkedFrame
+from tomoskin.recording.session_reader import SessionReader, indexed_frames, tick_rate
+
+
+class ScannedFrame(NamedTuple):
+    """A frame of the skin's scan: its ``number`` from 0, and the ``time`` it was scanned at, s."""
+
+    number: int
+    time: float
+    item: MarkedFrame
+
+
+def scanned_frames(session: SessionReader, scan: Scan) -> Iterator[ScannedFrame]:
+    """Frames of ``scan``; those of another are left out.
+
+    Raises
+    ------
+    DataError
+        At the end, when some that were written are missing.
+    """
+    rate, number, read, before = tick_rate(session), 0, 0, None
+    first: Frame | None = None
+    for read, item in enumerate(session.frames(), start=1):  # noqa: B007
+        frame = item.frame
+        if len(frame.samples) != scan.n_samples:
+            continue
+        if first is None or (before is not None and frame.ticks <= before):
+            first = frame  # the device's clock begins again
+        before = frame.ticks
+        # frames of one read have one host time, but not one tick
+        yield ScannedFrame(number, first.host_time + (frame.ticks - first.ticks) / rate, item)
+        number += 1
+    if session.container.summary and read != (expected := indexed_frames(session)):
+        raise DataError(
+            f"is damaged: {expected} frames were written, {read} are there",
+            where=str(session.path),
+        )
+
+
+def scanned_touches(
+    session: SessionReader,
+) -> Iterator[tuple[int | None, float, tuple[Touch, ...]]]:
+    """(frame, time, touches) of the recorded touches; None and host time without their frame."""
+    wanted = {(item.host_time, item.sequence) for item in session.touches()}
+    found: dict[tuple[float, int], tuple[int, float]] = {}
+    scan = Scan.of(session.skin.pattern())
+    for number, time, item in scanned_frames(session, scan) if wanted else ():
+        key = item.frame.host_time, item.frame.sequence
+        if key in wanted:
+            found.setdefault(key, (number, time))
+    for touched in session.touches():
+        key = touched.host_time, touched.sequence
+        yield *found.get(key, (None, touched.host_time)), touched.touches
+
+
+def idle_count(session: SessionReader, scan: Scan) -> int:
+    """Frames of the first reference where the recording begins with it; 1 where it does not."""
+    first = next(scanned_frames(session, scan), None)
+    needed = session.settings().get("reference_frames", 1)
+    begins = first is not None and first.item.mark & Mark.REFERENCE and isinstance(needed, int)
+    return max(1, needed) if begins else 1
