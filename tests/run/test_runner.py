@@ -8,11 +8,13 @@ import pytest
 
 from run.board import Board
 from tomoskin.core import DataError, SourceError
+from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.recording import session_info
 from tomoskin.run import Runner, commands
 from tomoskin.run.flow import MOST_AT_ONCE
 from tomoskin.run.publisher import EventLog
+from tomoskin.skin import Skin
 from tomoskin.twin import Press
 from tomoskin.wire import Start, Stop
 
@@ -255,3 +257,15 @@ def test_a_recording_can_be_ended_and_another_begun(runner, until, tmp_path):
 def test_a_recording_that_cannot_begin_is_said(runner, tmp_path):
     with pytest.raises(DataError, match="cannot be"):
         runner.ask(commands.Record(tmp_path / "none" / "x.mcap"))
+
+
+def test_a_skin_that_saturates_is_said_before_its_electrodes_are_blamed(board):
+    skin = Skin.load("textile-disc-8").altered(
+        {"mesh": {"cells": 150}, "material": {"sheet_resistance": "800 ohm/sq"}}
+    )
+    runner = Runner(prepare(skin), lambda: board)
+    runner.start()
+    Watch(runner).until(lambda: runner.newest)
+    assert " mA with a gain of 0.7" in runner.status().problem
+    runner.stop()
+    assert "saturated" in [event.kind for event in runner.events.since(0)[1]]

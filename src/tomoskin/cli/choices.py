@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import typer
 
 from tomoskin.cli.options import DEFAULT_SKIN
+from tomoskin.cli.output import remark
 
 if TYPE_CHECKING:
     from tomoskin.formats import Display
     from tomoskin.inverse import AlphaChoice
     from tomoskin.pipeline import Prepared
+    from tomoskin.signal import Headroom
     from tomoskin.sink import Sink
     from tomoskin.skin import Skin
 
@@ -45,6 +47,12 @@ def skin_for_file(skin: str | None, path: Path) -> Skin:
         with SessionReader(path) as session:
             return session.skin
     return Skin.load(DEFAULT_SKIN if skin is None else skin)
+
+
+def say_headroom(headroom: Headroom) -> None:
+    """Say on stderr what is beyond the board, where something is."""
+    if headroom.problem is not None:
+        remark(headroom.problem)
 
 
 def with_alpha(skin: Skin, given: str | None) -> tuple[Skin, str | None]:

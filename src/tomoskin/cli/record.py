@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.choices import chosen_sinks, skin_for_source
+from tomoskin.cli.choices import chosen_sinks, say_headroom, skin_for_source
 from tomoskin.cli.named_files import RECORDING, Writes
 from tomoskin.cli.options import SinkOption, SkinOption, SourceOption
 from tomoskin.cli.output import Bar, JsonFlag, tell
@@ -48,6 +48,7 @@ def record(
     chosen = skin_for_source(skin, source)
     with Bar("preparing"):
         prepared = prepare(chosen)
+    say_headroom(prepared.headroom)
     runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
     with ended_by_signals(), recording_to(runner, file):
         if seconds is None and frames is None and not json:

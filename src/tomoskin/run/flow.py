@@ -69,6 +69,7 @@ class Flow:
         self._losses, self._earlier, self._skipped = Losses(), Losses(), 0
         self._drops, self._polled = 0, 0.0
         self._standstill: str | None = None
+        self._saturated: str | None = None
         self._ended = False
 
     def begin(self, transport: Transport) -> None:
@@ -78,6 +79,9 @@ class Flow:
         skin, name = self.prepared.skin.name, transport.name
         self.source = f"{name} of {skin}" if self.twin.pressable else f"{skin} on {name}"
         self.out.begin(self.prepared, self.source)
+        self._saturated = self.prepared.headroom.problem
+        if self._saturated is not None:
+            self.out.say("saturated", self._saturated)
 
     def link(self, transport: Transport) -> Link:
         """The protocol session with its source, which has just been opened, maybe again."""
@@ -181,7 +185,7 @@ class Flow:
             electrodes=result.health.sick if result and result.health else (),
             bend=result.bend if result and result.ready else None,
             state=result.state if result and result.ready else None,
-            problem=trouble or self._standstill or (result.problem if result else None),
+            problem=trouble or self._standstill or self._saturated or (result and result.problem),
             board=self.board,
         )
 
