@@ -60,11 +60,17 @@ _PICKLE = b"\x80"
 def read_recording(path: Path) -> Recording:
     """Recording in ``path``: a session, an interchange file or a format that can be imported.
 
+    Absurd values are excluded; its notes name them.
+
     Raises
     ------
     DataError
         When the file cannot be read or is of no known kind; the message lists its keys.
     """
+    return _read(path).plausible()
+
+
+def _read(path: Path) -> Recording:
     head = _beginning(path)
     if head.startswith(MAGIC):
         return read_session(path)

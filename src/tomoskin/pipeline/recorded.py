@@ -100,7 +100,7 @@ def recorded_frames(prepared: Prepared, recording: Recording, idle: Idle) -> Rec
         When the rows are not in the pattern's order, the reference does not look like this
         skin, or too few frames or rows are left.
     """
-    pattern = prepared.pattern
+    pattern, recording = prepared.pattern, recording.plausible()
     prepared.operator.accept(
         Pattern.from_tables(recording.drive, recording.measure, pattern.n_electrodes)
     )

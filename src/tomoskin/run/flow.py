@@ -185,7 +185,10 @@ class Flow:
             electrodes=result.health.sick if result and result.health else (),
             bend=result.bend if result and result.ready else None,
             state=result.state if result and result.ready else None,
-            problem=trouble or self._standstill or self._saturated or (result and result.problem),
+            problem=trouble
+            or self._standstill
+            or self._saturated
+            or (result.problem if result else None),
             board=self.board,
         )
 
