@@ -203,6 +203,15 @@ def test_a_frame_without_some_rows_is_imaged_without_them_and_named(
     }
 
 
+def test_how_well_the_reference_agrees_is_said(save, image, frames) -> None:
+    code, out, _ = image(save(voltages=6 * frames))
+    assert code == 0
+    assert "agrees with the skin's model by 1.000 (1 = proportional), at 6 times its size" in out
+    document = json.loads(image(save(), "--json")[1])
+    assert document["agreement"] == pytest.approx(1.0, abs=1e-3)
+    assert document["size"] == pytest.approx(1.0, abs=0.02)
+
+
 def test_absurd_values_are_excluded_and_named(save, image, frames, tmp_path) -> None:
     """Without a warning of numpy, which the tests take for an error."""
     whole, table = tmp_path / "whole.csv", tmp_path / "touches.csv"

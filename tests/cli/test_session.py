@@ -8,6 +8,7 @@ import pytest
 
 from tomoskin.formats import read_recording
 from tomoskin.recording import SessionReader
+from tomoskin.skin import Skin
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +69,28 @@ def test_a_session_is_imaged_with_its_own_skin(tomoskin, tmp_path):
     code, out, _ = tomoskin("image", path, "--frames", "0:2", "--json")
     assert code == 0
     assert json.loads(out)["frames"] == 2
+
+
+def test_a_session_imaged_with_another_skin_is_said(tomoskin, recorded, tmp_path):
+    """The pattern of all discs is the same: only the size, and the file itself, tell."""
+    other = Skin.load("textile-disc-8").altered(
+        {
+            "skin": {"name": "other"},
+            "outline": {"diameter": "300 mm"},
+            "material": {"sheet_resistance": "8 ohm/sq"},
+            "electrodes": {"contact_impedance": "2 mohm*m"},
+        }
+    )
+    file = tmp_path / "other.toml"
+    file.write_text(other.to_toml())
+    code, out, errors = tomoskin("image", recorded, "--frames", "0:2", "--skin", file)
+    assert code == 0
+    assert "model by 1.000" in out
+    assert "was recorded on textile-disc-8; other has another outline, electrodes, mat" in errors
+    assert "times its size: check the skin, its current and its sheet resistance" in errors
+    code, out, errors = tomoskin("image", recorded, "--frames", "0:2", "--skin", "textile-disc-8")
+    assert (code, errors) == (0, "")
+    assert "model by 1.000" in out
 
 
 def test_a_replay_is_recorded_with_the_skin_in_the_file(tomoskin, recorded, tmp_path):

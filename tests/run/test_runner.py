@@ -4,6 +4,7 @@ import errno
 import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from run.board import Board
@@ -257,6 +258,21 @@ def test_a_recording_can_be_ended_and_another_begun(runner, until, tmp_path):
 def test_a_recording_that_cannot_begin_is_said(runner, tmp_path):
     with pytest.raises(DataError, match="cannot be"):
         runner.ask(commands.Record(tmp_path / "none" / "x.mcap"))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda idle: idle // 8, "check the skin, its current and its sheet resistance"),
+        (lambda idle: np.roll(idle, len(idle) // 2 + 3), "check the skin and the electrodes'"),
+    ],
+)
+def test_a_reference_that_is_not_the_skins_is_said(prepared, idle, change, words):
+    runner = Runner(prepared, Board(free=change(idle)).open)
+    runner.start()
+    Watch(runner).until(lambda: runner.newest and runner.newest.result.ready)
+    assert words in runner.status().problem
+    runner.stop()
 
 
 def test_a_skin_that_saturates_is_said_before_its_electrodes_are_blamed(board):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
@@ -108,6 +109,8 @@ def image(
 
 def _lines(result: Reconstruction, prepared: Prepared) -> Iterator[str]:
     yield f"{len(result.frames)} frames, {sum(map(len, result.touches))} touches"
+    if math.isfinite(result.agreement):
+        yield result.model_agreement.text
     yield alpha_line(result.choice)
     if prepared.modes is not None:
         seconds = prepared.skin.inverse.time_constant
@@ -129,7 +132,7 @@ def _lines(result: Reconstruction, prepared: Prepared) -> Iterator[str]:
 
 def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
     """Say on stderr what was left out, and what looks wrong."""
-    from tomoskin.pipeline import DOUBTED
+    from tomoskin.formats import is_session
 
     if len(result.rows_left_out):
         rows = result.rows_left_out.tolist()
@@ -149,11 +152,8 @@ def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
             f"{source}: {len(result.left_out)} frames hold too many values that are not "
             f"finite and were left out: {_listed(result.left_out.tolist())}"
         )
-    if result.agreement < DOUBTED:
-        remark(
-            f"{source}: the reference agrees with this skin's model by only "
-            f"{result.agreement:.2f} (1 = proportional): check --skin and the electrodes' order"
-        )
+    if (doubt := result.model_agreement.doubt(volts=is_session(source))) is not None:
+        remark(f"{source}: {doubt}")
 
 
 def _document(result: Reconstruction, prepared: Prepared) -> dict[str, Any]:
@@ -164,6 +164,7 @@ def _document(result: Reconstruction, prepared: Prepared) -> dict[str, Any]:
         "left_out": result.left_out.tolist(),
         "rows_left_out": result.rows_left_out.tolist(),
         "agreement": result.agreement,
+        "size": result.model_agreement.size,
         "unit": result.unit,
         "alpha": result.choice.alpha,
         "rule": result.choice.rule,

@@ -14,7 +14,7 @@ import typer
 from tomoskin.cli.choices import chosen_sinks, say_headroom, skin_for_source
 from tomoskin.cli.named_files import RECORDING, Writes
 from tomoskin.cli.options import SinkOption, SkinOption, SourceOption
-from tomoskin.cli.output import Bar, JsonFlag, tell
+from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
@@ -56,6 +56,8 @@ def record(
         _wait(runner, seconds, frames)
         if (problem := _problem(runner)) is not None:
             raise DataError(problem)
+        if (doubt := runner.status().problem) is not None:
+            remark(doubt)
     status = runner.status()
     size = file.stat().st_size
     document = {"file": str(file), "bytes": size, "frames": status.frames, "lost": status.gaps,

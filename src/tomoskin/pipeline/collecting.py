@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
+from tomoskin.pipeline.model_agreement import NO_AGREEMENT, ModelAgreement
 from tomoskin.pipeline.records import Measured
 from tomoskin.signal import Reference
 
@@ -30,12 +31,15 @@ class Rest:
         Between its frames, s; NaN where there was a single one.
     host_time
         Of the last of them, s.
+    agreement
+        Of the reference with the model.
     """
 
     reference: Reference
     without_reference: NDArray[np.bool_]
     interval: float
     host_time: float = 0.0
+    agreement: ModelAgreement = NO_AGREEMENT
 
 
 class Collecting:
@@ -83,4 +87,5 @@ class Collecting:
         values[:, excluded] = self._model[excluded]
         reference = Reference.of(values, self._least)
         interval = float(np.median(np.diff(self._times))) if self.needed > 1 else np.nan
-        return Rest(reference, excluded, interval, measured.host_time)
+        agreement = ModelAgreement.of(reference.mean[~excluded], self._model[~excluded])
+        return Rest(reference, excluded, interval, measured.host_time, agreement)

@@ -7,7 +7,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 
 from tomoskin.core import DataError, Event, Frame, ModelError, WireError
-from tomoskin.pipeline import FrameResult, Pipeline, Prepared
+from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
 from tomoskin.recording import BoardInfo, Mark, MarkedFrame, RawRead, Truth, advance
 from tomoskin.run.commands import DirectCommand, Note, ReplayCommand
 from tomoskin.run.counters import Latency, Losses
@@ -188,9 +188,16 @@ class Flow:
             problem=trouble
             or self._standstill
             or self._saturated
-            or (result.problem if result else None),
+            or (result.problem if result else None)
+            or self._doubt(reference),
             board=self.board,
         )
+
+    def _doubt(self, reference: ReferenceState) -> str | None:
+        """Whether the reference is this skin's, where positions rest on its model."""
+        if any(c.kind.locates for c in self.prepared.calibrations.values()):
+            return None
+        return reference.agreement.doubt(volts=True)
 
     def _note_board(self, info: Info | None) -> None:
         if info is not self.board:

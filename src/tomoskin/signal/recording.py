@@ -93,7 +93,7 @@ class Recording:
         """The recording without absurd values: NaN stands for them, and notes name them."""
         most = self._most()
         limits = {"voltages": most, "reference": most, "time": _MOST_TIME}
-        changes: dict[str, NDArray[Any]] = {}
+        changes: dict[str, Any] = {}
         notes = []
         for key, limit in limits.items():
             values = getattr(self, key)
@@ -146,7 +146,7 @@ class Recording:
 
 def _beyond(values: NDArray[Any], most: float) -> NDArray[np.bool_]:
     """Infinite values are excluded as what is not finite."""
-    return np.isfinite(values) & (np.abs(values) > most)
+    return np.asarray(np.isfinite(values) & (np.abs(values) > most))
 
 
 def _absurd(key: str, absurd: NDArray[np.bool_], most: float) -> str:
