@@ -52,6 +52,9 @@ def test_repair_mends_a_cut_file_and_leaves_it_alone(tomoskin, recorded, tmp_pat
     code, _, errors = tomoskin("session", "info", cut)
     assert code == 0
     assert "was not ended" in errors
+    code, _, errors = tomoskin("image", cut, "--frames", "0:2")
+    assert code == 0
+    assert "tomoskin session repair ends it" in errors
     code, out, _ = tomoskin("session", "repair", cut)
     assert code == 0
     assert "recovered" in out
@@ -115,6 +118,32 @@ def test_an_existing_file_is_refused(tomoskin, recorded):
     code, _, errors = tomoskin("record", recorded, "--source", "twin:fast", "--frames", "1")
     assert code == 2
     assert "exists already" in errors
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("image",),
+        ("session", "info"),
+        ("session", "repair"),
+        ("skin", "check"),
+        ("locate", "presses.npz", "--calibration"),
+    ],
+)
+def test_an_empty_file_is_called_so(tomoskin, tmp_path, command):
+    path = tmp_path / "x.mcap"
+    path.touch()
+    code, _, errors = tomoskin(*command, path)
+    assert code == 1
+    assert errors == f"tomoskin: {path}: is empty, a file without content\n"
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "nan"])
+def test_no_time_is_no_recording(tomoskin, tmp_path, seconds):
+    code, _, errors = tomoskin("record", tmp_path / "x.mcap", "--seconds", seconds)
+    assert code == 2
+    assert "expected more than 0 s" in errors
+    assert not (tmp_path / "x.mcap").exists()
 
 
 @pytest.mark.parametrize("command", ["info", "repair"])

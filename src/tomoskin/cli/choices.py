@@ -145,5 +145,5 @@ def with_states(prepared: Prepared, path: Path | None, skin: Skin) -> Prepared:
     if path is None:
         return prepared
     calibration = CLASSES.read(path)
-    calibration.model.classifier.check(skin_id=skin.identity)
+    calibration.check_skin(skin)
     return prepared.calibrated(calibration)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import signal
 import threading
 from collections.abc import Iterator
@@ -33,7 +34,7 @@ def record(
     source: SourceOption = "twin",
     seconds: Annotated[
         float | None,
-        typer.Option(min=0.0, help="How long; else until Ctrl-C or a replay's end."),
+        typer.Option(help="How long; else until Ctrl-C or a replay's end."),
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="How many frames.")] = None,
     sink: SinkOption = None,
@@ -45,6 +46,8 @@ def record(
     from tomoskin.source import open_source
 
     sinks = chosen_sinks(sink)
+    if seconds is not None and not 0 < seconds < math.inf:
+        raise typer.BadParameter(f"expected more than 0 s, got {seconds:g}", param_hint="--seconds")
     chosen = skin_for_source(skin, source)
     with Bar("preparing"):
         prepared = prepare(chosen)
@@ -59,6 +62,8 @@ def record(
         if (doubt := runner.status().problem) is not None:
             remark(doubt)
     status = runner.status()
+    if not status.frames:
+        raise DataError("no frame came until the end: none is in it", where=str(file))
     size = file.stat().st_size
     document = {"file": str(file), "bytes": size, "frames": status.frames, "lost": status.gaps,
                 "dropped": status.dropped, "corrupt": status.corrupt}  # fmt: skip

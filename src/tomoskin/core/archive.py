@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core.errors import DataError
+from tomoskin.core.errors import EMPTY, DataError
 from tomoskin.core.written import written
 
 MAX_BYTES = 4 << 30
@@ -83,6 +83,8 @@ def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], *, overwrite: bo
 
 
 def _check_size(file: Path | io.BytesIO, where: str) -> None:
+    if isinstance(file, Path) and not file.stat().st_size:
+        raise DataError(EMPTY, where=where)
     with zipfile.ZipFile(file) as archive:
         size = sum(member.file_size for member in archive.infolist())
     if size > MAX_BYTES:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import MAGIC, Arrays, DataError, load_arrays
+from tomoskin.core import EMPTY, MAGIC, Arrays, DataError, load_arrays
 from tomoskin.formats import interchange
 from tomoskin.formats.imports import (
     csv_table,
@@ -135,7 +135,9 @@ def _from_text(head: bytes, path: Path) -> Recording:
 def _beginning(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
-            return file.read(_HEAD)
+            if head := file.read(_HEAD):
+                return head
+        raise DataError(EMPTY, where=str(path))
     except FileNotFoundError as error:
         raise DataError("there is no such file", where=str(path)) from error
     except OSError as error:
