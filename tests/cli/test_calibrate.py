@@ -89,6 +89,7 @@ def test_for_programs(tomoskin, tmp_path, presses, touched):
     assert found["presses"] == 40
     assert found["remarks"][0]["frame"] == 7
     assert found["mean_mm"] >= found["median_mm"] > 0
+    assert not found["is_guess"]
     assert 0.8 <= found["held_by_90_percent_ellipses"] <= 1
     code, out, _ = tomoskin("locate", touched[0], "--calibration", calibration, "--json")
     assert code == 0
@@ -103,6 +104,23 @@ def test_frames_without_a_label_are_not_learnt_from(tomoskin, tmp_path):
     code, out, _ = tomoskin("calibrate", "touch", path, "--out", tmp_path / "c.npz")
     assert code == 0
     assert out.startswith("20 presses")
+
+
+@pytest.mark.parametrize("n", [10, 30])
+def test_presses_that_do_not_show_in_the_data_are_said(tomoskin, tmp_path, n):
+    random = np.random.default_rng(n)
+    path = tmp_path / "noise.npz"
+    np.savez(
+        path,
+        dv=random.normal(size=(n, PATTERN.n_meas)),
+        xy_m=random.uniform(-0.07, 0.07, (n, 2)),
+        drive=PATTERN.drive,
+        measure=PATTERN.measure,
+    )
+    code, out, err = tomoskin("calibrate", "touch", path, "--out", tmp_path / "c.npz", "--json")
+    assert code == 0
+    assert "the frames hardly tell where they were pressed" in err
+    assert json.loads(out)["is_guess"]
 
 
 def test_presses_are_added_to_an_older_calibration(tomoskin, tmp_path, presses):
@@ -120,7 +138,7 @@ def test_presses_are_added_to_an_older_calibration(tomoskin, tmp_path, presses):
         *("--skin", "textile-square-16"),
     )
     assert code == 1
-    assert "the calibration is of skin" in err
+    assert 'is of another skin: learnt on "textile-disc-8", asked for on "textile-' in err
 
 
 def test_a_calibration_of_another_skin_is_refused(tomoskin, tmp_path, presses, touched):
@@ -130,7 +148,7 @@ def test_a_calibration_of_another_skin_is_refused(tomoskin, tmp_path, presses, t
         "locate", touched[0], "--calibration", calibration, "--skin", "textile-disc-16"
     )
     assert code == 1
-    assert "the calibration is of skin" in err
+    assert 'is of another skin: learnt on "textile-disc-8", asked for on "textile-' in err
     more = tmp_path / "sixteen.npz"
     wide = Pattern.adjacent(16)
     np.savez(more, dv=np.ones((3, wide.n_meas)), drive=wide.drive, measure=wide.measure)

@@ -217,6 +217,42 @@ def test_a_frame_without_some_rows_is_imaged_without_them_and_named(
     }
 
 
+def test_how_well_the_reference_agrees_is_said(save, image, frames) -> None:
+    code, out, _ = image(save(voltages=6 * frames))
+    assert code == 0
+    assert "agrees with the skin's model by 1.000 (1 = proportional), at 6 times its size" in out
+    document = json.loads(image(save(), "--json")[1])
+    assert document["agreement"] == pytest.approx(1.0, abs=1e-3)
+    assert document["size"] == pytest.approx(1.0, abs=0.02)
+
+
+def test_absurd_values_are_excluded_and_named(save, image, frames, tmp_path) -> None:
+    """Without a warning of numpy, which the tests take for an error."""
+    whole, table = tmp_path / "whole.csv", tmp_path / "touches.csv"
+    image(save(), "--reference", "first:3", "--touches", whole)
+    broken = np.vstack([frames, frames[3], frames[3]])
+    broken[4], broken[5, 7] = 1e300, -100.0
+    time = [0.0, 0.1, 0.2, 1e300, 0.4, 0.5]
+    path = save(voltages=broken, time_s=time)
+    code, _, err = image(path, "--reference", "first:3", "--touches", table)
+    assert code == 0
+    assert "41 absurd values of voltages (frames 4, 5), beyond 88, were excluded" in err
+    assert "1 absurd values of time (frames 3), beyond 1e+18, were excluded" in err
+    found = places(table)
+    assert {3, 5} <= found.keys()
+    assert 4 not in found
+    assert found[3] == places(whole)[3]
+    assert math.dist(found[5], found[3]) < 0.005
+
+
+def test_absurd_differences_are_excluded(save, image, frames) -> None:
+    broken = frames - frames[:3].mean(axis=0)
+    broken[1, 3] = 1e300
+    code, _, err = image(save(voltages=None, dv=broken))
+    assert code == 0
+    assert "1 absurd values of voltages (frames 1), beyond 1e+12" in err
+
+
 def test_a_frame_without_a_quarter_of_its_rows_is_left_out_and_named(
     save, image, tmp_path, frames
 ) -> None:

@@ -10,6 +10,7 @@ import pytest
 from recording.runs import write_all, write_frames
 from tomoskin.formats import read_recording
 from tomoskin.recording import SessionReader
+from tomoskin.skin import Skin
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +64,9 @@ def test_repair_mends_a_cut_file_and_leaves_it_alone(tomoskin, recorded, tmp_pat
     code, _, errors = tomoskin("session", "info", cut)
     assert code == 0
     assert "was not ended" in errors
+    code, _, errors = tomoskin("image", cut, "--frames", "0:2")
+    assert code == 0
+    assert "tomoskin session repair ends it" in errors
     code, out, _ = tomoskin("session", "repair", cut)
     assert code == 0
     assert "recovered" in out
@@ -80,6 +84,28 @@ def test_a_session_is_imaged_with_its_own_skin(tomoskin, tmp_path):
     code, out, _ = tomoskin("image", path, "--frames", "0:2", "--json")
     assert code == 0
     assert json.loads(out)["frames"] == 2
+
+
+def test_a_session_imaged_with_another_skin_is_said(tomoskin, recorded, tmp_path):
+    """The pattern of all discs is the same: only the size, and the file itself, tell."""
+    other = Skin.load("textile-disc-8").altered(
+        {
+            "skin": {"name": "other"},
+            "outline": {"diameter": "300 mm"},
+            "material": {"sheet_resistance": "8 ohm/sq"},
+            "electrodes": {"contact_impedance": "2 mohm*m"},
+        }
+    )
+    file = tmp_path / "other.toml"
+    file.write_text(other.to_toml())
+    code, out, errors = tomoskin("image", recorded, "--frames", "0:2", "--skin", file)
+    assert code == 0
+    assert "model by 1.000" in out
+    assert "was recorded on textile-disc-8; other has another outline, electrodes, mat" in errors
+    assert "times its size: check the skin, its current and its sheet resistance" in errors
+    code, out, errors = tomoskin("image", recorded, "--frames", "0:2", "--skin", "textile-disc-8")
+    assert (code, errors) == (0, "")
+    assert "model by 1.000" in out
 
 
 def test_a_replay_is_recorded_with_the_skin_in_the_file(tomoskin, recorded, tmp_path):
@@ -104,6 +130,32 @@ def test_an_existing_file_is_refused(tomoskin, recorded):
     code, _, errors = tomoskin("record", recorded, "--source", "twin:fast", "--frames", "1")
     assert code == 2
     assert "exists already" in errors
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("image",),
+        ("session", "info"),
+        ("session", "repair"),
+        ("skin", "check"),
+        ("locate", "presses.npz", "--calibration"),
+    ],
+)
+def test_an_empty_file_is_called_so(tomoskin, tmp_path, command):
+    path = tmp_path / "x.mcap"
+    path.touch()
+    code, _, errors = tomoskin(*command, path)
+    assert code == 1
+    assert errors == f"tomoskin: {path}: is empty, a file without content\n"
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "nan"])
+def test_no_time_is_no_recording(tomoskin, tmp_path, seconds):
+    code, _, errors = tomoskin("record", tmp_path / "x.mcap", "--seconds", seconds)
+    assert code == 2
+    assert "expected more than 0 s" in errors
+    assert not (tmp_path / "x.mcap").exists()
 
 
 @pytest.mark.parametrize("command", ["info", "repair"])

@@ -53,3 +53,16 @@ def test_a_wrong_file_is_one_sentence(tomoskin, tmp_path):
 def test_usage(tomoskin):
     assert tomoskin("skin", "paint")[0] == 2
     assert tomoskin("skin", "check")[0] == 2
+
+
+def test_a_skin_that_saturates_its_board_is_no_good_skin(tomoskin, tmp_path):
+    file = tmp_path / "saturated.toml"
+    skin = Skin.load("textile-disc-8").altered({"material": {"sheet_resistance": "800 ohm/sq"}})
+    file.write_text(skin.to_toml())
+    code, out, errors = tomoskin("skin", "check", str(file))
+    assert (code, out) == (1, "")
+    for part in ("saturated.toml", "supply: 10.8 V", "a current of 0.12 mA fits", "gain"):
+        assert part in errors
+    code, out, errors = tomoskin("design", "--skin", str(file), "--electrodes", "")
+    assert (code, out) == (1, "")
+    assert "a current of 0.11 mA fits" in errors

@@ -109,7 +109,7 @@ def test_another_skin_or_another_file_is_refused(
     assert tomoskin("states", flagged, "--calibration", c, *skin)[0] == 0
     code, _, err = tomoskin("states", flagged, "--calibration", c, "--skin", "textile-disc-16")
     assert code == 1
-    assert "the calibration is of skin" in err
+    assert 'learnt on "textile-disc-8", asked for on "textile-disc-16"' in err
     code, _, err = tomoskin("states", flagged, "--calibration", flagged)
     assert code == 1
     assert "not a calibration of states" in err

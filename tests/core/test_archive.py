@@ -65,9 +65,7 @@ def test_a_folder(tmp_path: Path) -> None:
         read_recording(tmp_path)
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"\0", b"frame,v0,v1\n1,2,3\n", b"PK\x03\x04", b"\x93NUMPY"]
-)
+@pytest.mark.parametrize("content", [b"\0", b"frame,v0,v1\n1,2,3\n", b"PK\x03\x04", b"\x93NUMPY"])
 def test_no_archive(tmp_path: Path, content: bytes) -> None:
     assert "is not a whole .npz archive" in refused(tmp_path / "x.npz", content)
 

@@ -61,6 +61,13 @@ def test_wrong_unit_is_named_with_those_that_would_do(text: str, dimension: str,
         parse_quantity(text, dimension)
 
 
+def test_a_decimal_comma_gets_a_hint() -> None:
+    with pytest.raises(ValueError, match=r'got "200,5 mm"; with a decimal point: "200.5 mm"'):
+        parse_quantity("200,5 mm", "length")
+    with pytest.raises(ValueError, match=r'got "1,200,5 mm"$'):
+        parse_quantity("1,200,5 mm", "length")
+
+
 @pytest.mark.parametrize("text", ["1e999 m", "-1e400 mm"])
 def test_too_large_to_be_meant(text: str) -> None:
     with pytest.raises(ValueError, match="expected a finite number"):

@@ -144,6 +144,24 @@ def test_a_row_at_a_rail_in_the_reference_stays_out(push, idle, touched):
     assert np.isfinite(result.reference).all()
 
 
+@pytest.mark.parametrize("rail", [0, 65535])
+def test_a_frame_of_nothing_but_rails_does_not_spoil_the_reference(push, idle, touched, rail):
+    push(np.full_like(idle, rail))
+    settle(push, idle)
+    for _ in range(3):
+        result = push(touched)
+        assert result.left_out == 0
+    assert result.touches
+
+
+def test_a_reference_of_nothing_but_rails_is_said(push, idle, touched):
+    settle(push, np.zeros_like(idle))
+    for _ in range(30):  # until alpha has been tuned
+        result = push(touched)
+    assert not result.pictured
+    assert "too little is left" in result.problem
+
+
 def test_memory_does_not_grow(push, idle, touched):
     settle(push, idle)
     for _ in range(20):

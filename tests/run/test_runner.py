@@ -5,16 +5,19 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from run.board import Board
 from tomoskin.core import DataError, SourceError
+from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.recording import RawRead, session_info
 from tomoskin.run import Runner, commands
 from tomoskin.run.flow import MOST_AT_ONCE
 from tomoskin.run.publisher import EventLog
 from tomoskin.run.recordings import Recordings
+from tomoskin.skin import Skin
 from tomoskin.twin import Press
 from tomoskin.wire import Start, Stop
 
@@ -274,3 +277,30 @@ def test_a_recording_has_its_path_while_its_first_messages_are_made(prepared, tm
     assert paths
     assert set(paths) == {path}
     assert recordings.path is None
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda idle: idle // 8, "check the skin, its current and its sheet resistance"),
+        (lambda idle: np.roll(idle, len(idle) // 2 + 3), "check the skin and the electrodes'"),
+    ],
+)
+def test_a_reference_that_is_not_the_skins_is_said(prepared, idle, change, words):
+    runner = Runner(prepared, Board(free=change(idle)).open)
+    runner.start()
+    Watch(runner).until(lambda: runner.newest and runner.newest.result.ready)
+    assert words in runner.status().problem
+    runner.stop()
+
+
+def test_a_skin_that_saturates_is_said_before_its_electrodes_are_blamed(board):
+    skin = Skin.load("textile-disc-8").altered(
+        {"mesh": {"cells": 150}, "material": {"sheet_resistance": "800 ohm/sq"}}
+    )
+    runner = Runner(prepare(skin), lambda: board)
+    runner.start()
+    Watch(runner).until(lambda: runner.newest)
+    assert " mA with a gain of 0.7" in runner.status().problem
+    runner.stop()
+    assert "saturated" in [event.kind for event in runner.events.since(0)[1]]

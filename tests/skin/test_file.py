@@ -318,7 +318,7 @@ def test_files_that_are_no_skin_files(tmp_path: Path) -> None:
         tmp_path: "folder",
         binary: "not a text file",
         large: "too large",
-        empty: "is missing",
+        empty: "is empty",
         tmp_path / "none.toml": "no such file",
         Path("/dev/null"): "device",
     }

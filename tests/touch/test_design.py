@@ -126,3 +126,23 @@ def test_variants_are_on_the_same_sheet() -> None:
 def test_what_cannot_be_meant_is_refused(given: dict[str, float], words: str) -> None:
     with pytest.raises(ModelError, match=words):
         Demand(**given)
+
+
+def test_what_saturates_tells_nothing() -> None:
+    """The same bound as of the pattern without those measurements."""
+    skin = Skin.load("textile-disc-8").altered({"readout": {"gain": 53}})
+    found = resolution_bounds(skin, PRESS, 8)
+    excluded = found.headroom.saturated
+    assert 0 < np.count_nonzero(excluded) < len(excluded) - 4
+    pattern = skin.pattern()
+    kept = {
+        "drive": {
+            "drive": pattern.drive[~excluded].tolist(),
+            "measure": pattern.measure[~excluded].tolist(),
+            "pattern": None,
+        }
+    }
+    less = resolution_bounds(skin.altered(kept), PRESS, 8)
+    np.testing.assert_allclose(found.rms, less.rms, rtol=1e-6)
+    with pytest.raises(ModelError, match="a current of"):
+        resolution_bounds(skin.altered({"readout": {"gain": 400}}), PRESS, 8)

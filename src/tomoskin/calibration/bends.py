@@ -69,10 +69,7 @@ def _unpack(arrays: Arrays, pattern: Pattern, where: str, _progress: Progress) -
 
 def _check(calibration: Calibration[BendModel], skin: Skin) -> None:
     if skin.pattern().identity != calibration.pattern.identity:
-        raise DataError(
-            f'the calibration of bends is of another scan, that of "{calibration.skin_name}"',
-            hint="learn the bends of this one: tomoskin calibrate bend",
-        )
+        raise calibration.mismatch("scan", skin)
 
 
 def _apply(model: BendModel, conditions: Conditions) -> Applied:
@@ -93,6 +90,7 @@ BENDS = Kind(
     check=_check,
     exclude=BendModel.without,
     apply=_apply,
+    skin_id=lambda _model: "",
     directions=lambda model: model.directions,
     fits=True,
 )

@@ -146,7 +146,8 @@ def _examples(arrays: Arrays, where: str) -> Examples:
 
 def _check(calibration: Calibration[FrameClassifier], skin: Skin) -> None:
     """The skin may have any settings of its images."""
-    calibration.model.classifier.check(skin.pattern().identity)
+    if skin.pattern().identity != calibration.pattern.identity:
+        raise calibration.mismatch("scan", skin)
 
 
 def _apply(frames: FrameClassifier, _conditions: Conditions) -> Applied:
@@ -166,5 +167,6 @@ CLASSES = Kind(
     check=_check,
     exclude=FrameClassifier.without,
     apply=_apply,
+    skin_id=lambda frames: frames.classifier.skin_id,
 )
 """Classes of frames; its model is a :class:`FrameClassifier`."""

@@ -168,6 +168,8 @@ class Kind(Generic[M]):
         Model without some measurements; None where it cannot do without.
     apply
         Model and conditions → what it does with each frame.
+    skin_id
+        Model → identity of the skin that it was learnt on; "" where none is known.
     directions
         Model → (n_meas, k) V along which what it reads moves the data: images do without them.
         None where it reads nothing of that sort.
@@ -189,6 +191,7 @@ class Kind(Generic[M]):
     check: Callable[[Calibration[M], Skin], None]
     exclude: Callable[[M, IntArray], M | None]
     apply: Callable[[M, Conditions], Applied]
+    skin_id: Callable[[M], str]
     directions: Callable[[M], FloatArray] | None = None
     locates: bool = False
     fits: bool = False
@@ -256,6 +259,22 @@ class Calibration(Generic[M]):
     def check(self, skin: Skin) -> None:
         """Raise DataError where it cannot serve ``skin``."""
         self.kind.check(self, skin)
+
+    def check_skin(self, skin: Skin) -> None:
+        """Raise DataError where it was learnt on another skin, or on other settings of it."""
+        learnt_on = self.kind.skin_id(self.model)
+        if learnt_on and learnt_on != skin.identity:
+            raise self.mismatch("skin", skin)
+
+    def mismatch(self, what: str, skin: Skin) -> DataError:
+        """That it was learnt on another ``what`` than that of ``skin``, by their names."""
+        mine = f'"{self.skin_name}"' if self.skin_name else "a skin that it does not name"
+        other = f'"{skin.name}"' + (", set otherwise" if skin.name == self.skin_name else "")
+        return DataError(
+            f"the calibration of {self.kind.subject} is of another {what}: "
+            f"learnt on {mine}, asked for on {other}",
+            hint=f"calibrate this one: tomoskin calibrate {self.kind.command}",
+        )
 
     def with_model(self, model: M) -> Self:
         """The same with another model."""

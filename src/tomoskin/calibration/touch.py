@@ -92,11 +92,12 @@ def _unpack(arrays: Arrays, pattern: Pattern, where: str, progress: Progress) ->
 def _check(calibration: Calibration[Locator], skin: Skin) -> None:
     """It rests on measurements and positions alone: other settings of the image do not matter."""
     locator = calibration.model
-    locator.check(skin.pattern())
+    if skin.pattern().identity != calibration.pattern.identity:
+        raise calibration.mismatch("scan", skin)
     outline, known = Region.of(skin).outline, locator.region.outline
     same = outline.shape == known.shape and np.allclose(outline, known, atol=_SAME_SHAPE)
     if locator.skin_id and not same:
-        raise DataError("the calibration is of a sheet of another shape")
+        raise calibration.mismatch("shape of the sheet", skin)
 
 
 def _exclude(_locator: Locator, _measurements: IntArray) -> None:
@@ -126,6 +127,7 @@ TOUCH = Kind(
     check=_check,
     exclude=_exclude,
     apply=_apply,
+    skin_id=lambda locator: locator.skin_id,
     locates=True,
 )
 """Touch positions from labelled presses; its model is a :class:`Locator`."""

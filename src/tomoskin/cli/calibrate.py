@@ -14,7 +14,7 @@ from tomoskin.cli.calibrate_states import calibrate_states
 from tomoskin.cli.calibrate_wiring import calibrate_wiring
 from tomoskin.cli.named_files import ForceFlag, Reads
 from tomoskin.cli.options import CalibrationOut, KnownSkinOption, LabelledArgument, ReferenceOption
-from tomoskin.cli.output import Bar, JsonFlag, emit
+from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.recording import changes, labelled_frames, labels, say_notes
 
 if TYPE_CHECKING:
@@ -68,6 +68,12 @@ def touch(
     calibration = learn(dv[frames], xy[frames])
     calibration.write(out, overwrite=force)
     found = _findings(calibration, frames.tolist())
+    if found["is_guess"]:
+        remark(
+            f"{recording}: the frames hardly tell where they were pressed: presses left out are "
+            f"missed by {found['mean_mm']:.0f} mm, and by {found['guessed_mm']:.0f} mm if the "
+            "answer is always their middle; look at --reference and the labels, or press harder"
+        )
     if json:
         emit(found)
     else:
@@ -93,7 +99,7 @@ def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern
 
     old = TOUCH.read(path)
     if (skin := known_skin(name, recording)) is not None:
-        old.model.check(skin=skin)
+        old.check_skin(skin)
 
     def learn(dv: FloatArray, xy: FloatArray) -> Calibration[Locator]:
         with Bar("learning") as bar:
@@ -123,6 +129,8 @@ def _findings(calibration: Calibration[Locator], frames: list[int]) -> dict[str,
         "mean_mm": float(errors.mean()),
         "median_mm": float(np.median(errors)),
         "p95_mm": float(np.percentile(errors, 95)),
+        "guessed_mm": 1e3 * locator.guessed,
+        "is_guess": locator.is_guess,
         "held_by_90_percent_ellipses": locator.held,
         "drift": locator.drift,
         "next_press_mm": [x, y],
@@ -139,10 +147,10 @@ def _say(found: dict[str, Any]) -> None:
         f"{found['mean_mm']:.1f} mm (median {found['median_mm']:.1f}, 95 % {found['p95_mm']:.1f}), "
         f"and their 90 % ellipses hold {100 * found['held_by_90_percent_ellipses']:.0f} %"
     )
-    for remark in found["remarks"][:_SHOWN]:
-        frame = remark["frame"]
+    for doubtful in found["remarks"][:_SHOWN]:
+        frame = doubtful["frame"]
         who = "an older press" if frame is None else f"frame {frame:>4}"
-        typer.echo(f"{who}  doubtful: {remark['reason']}")
+        typer.echo(f"{who}  doubtful: {doubtful['reason']}")
     if len(found["remarks"]) > _SHOWN:
         typer.echo(f"… and {len(found['remarks']) - _SHOWN} more: --json lists them all")
     if found["drift"] > _DRIFTED:

@@ -148,7 +148,8 @@ def _what_of(
 
     skin = known_skin(name, path)
     if old is not None:
-        old.model.classifier.check(skin_id=skin.identity if skin else "")
+        if skin is not None:
+            old.check_skin(skin)
         return skin, old.pattern
     return skin, skin.pattern() if skin else None
 

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import typer
 
 from tomoskin.cli.options import DEFAULT_SKIN
+from tomoskin.cli.output import remark
 
 if TYPE_CHECKING:
     from tomoskin.formats import Display
     from tomoskin.inverse import AlphaChoice
     from tomoskin.pipeline import Prepared
+    from tomoskin.signal import Headroom
     from tomoskin.sink import Sink
     from tomoskin.skin import Skin
 
@@ -23,8 +25,8 @@ def skin_for_source(skin: str | None, source: str) -> Skin:
     from tomoskin.skin import Skin
 
     name, _, argument = source.partition(":")
-    if skin is None and name == "replay":
-        return skin_for_file(None, parse_replay(argument)[0])
+    if name == "replay":
+        return skin_for_file(skin, parse_replay(argument)[0])
     return Skin.load(DEFAULT_SKIN if skin is None else skin)
 
 
@@ -41,10 +43,26 @@ def skin_for_file(skin: str | None, path: Path) -> Skin:
     from tomoskin.recording import SessionReader
     from tomoskin.skin import Skin
 
-    if skin is None and is_session(path):
-        with SessionReader(path) as session:
-            return session.skin
-    return Skin.load(DEFAULT_SKIN if skin is None else skin)
+    chosen = None if skin is None else Skin.load(skin)
+    if not is_session(path):
+        return chosen or Skin.load(DEFAULT_SKIN)
+    with SessionReader(path) as session:
+        own = session.skin
+    if chosen is not None and (others := _sheet_differences(own, chosen)):
+        remark(f"{path} was recorded on {own.name}; {chosen.name} has another {', '.join(others)}")
+    return chosen or own
+
+
+def _sheet_differences(one: Skin, other: Skin) -> list[str]:
+    """Sections in which the sheets, and the currents through them, differ."""
+    sections = ("outline", "surface", "electrodes", "material", "drive")
+    return [name for name in sections if one.document[name] != other.document[name]]
+
+
+def say_headroom(headroom: Headroom) -> None:
+    """Say on stderr what is beyond the board, where something is."""
+    if headroom.problem is not None:
+        remark(headroom.problem)
 
 
 def with_alpha(skin: Skin, given: str | None) -> tuple[Skin, str | None]:
@@ -127,5 +145,5 @@ def with_states(prepared: Prepared, path: Path | None, skin: Skin) -> Prepared:
     if path is None:
         return prepared
     calibration = CLASSES.read(path)
-    calibration.model.classifier.check(skin_id=skin.identity)
+    calibration.check_skin(skin)
     return prepared.calibrated(calibration)

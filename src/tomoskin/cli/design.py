@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.choices import quantity
+from tomoskin.cli.choices import quantity, say_headroom
 from tomoskin.cli.named_files import FIGURE, ForceFlag, Writes
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
 from tomoskin.cli.output import Bar, JsonFlag, tables, tell
@@ -86,6 +86,7 @@ def design(
             f"{100 * depth:.0f} %; noticed: {100 * found:g} % found, {false_alarm:g} false alarms"
         )
         write_promise(out, chosen, own, title, overwrite=force)
+    say_headroom(own.headroom)
     document = {
         "skin": chosen.name,
         "press": {"radius_m": radius_m, "depth": depth},
@@ -131,7 +132,7 @@ def _compared(
     rows: list[dict[str, Any]] = []
     jobs = 1 + len(counts) * len(patterns)
     for number, variant in enumerate(variants(skin, counts, patterns), start=1):
-        row = {"electrodes": variant.electrodes, "pattern": variant.pattern}
+        row: dict[str, Any] = {"electrodes": variant.electrodes, "pattern": variant.pattern}
         if variant.skin is None:
             rows.append(row | {"fault": variant.fault})
             continue
@@ -142,7 +143,10 @@ def _compared(
             continue
         pattern = variant.skin.pattern()
         samples = Scan.of(pattern).n_samples
-        rows.append(row | {"rows": pattern.n_meas, "samples": samples} | bound.figures())
+        row |= {"rows": pattern.n_meas, "samples": samples} | bound.figures()
+        if (problem := bound.headroom.problem) is not None:
+            row["saturated"] = problem
+        rows.append(row)
     return rows
 
 
@@ -174,5 +178,5 @@ def _lines(document: dict[str, Any]) -> Iterator[str | Table]:
     if shown:
         yield from tables("the same sheet otherwise", _HEADINGS, shown)
     for row in document["compared"]:
-        if "fault" in row:
-            yield f"{row['electrodes']} electrodes, {row['pattern']}: {row['fault']}"
+        if (words := row.get("fault") or row.get("saturated")) is not None:
+            yield f"{row['electrodes']} electrodes, {row['pattern']}: {words}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
@@ -111,6 +112,8 @@ def image(
 def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) -> Iterator[str]:
     number = "1 touch" if len(spans) == 1 else f"{len(spans)} touches"
     yield f"{len(result.frames)} frames, {number}"
+    if math.isfinite(result.agreement):
+        yield result.model_agreement.text
     yield alpha_line(result.choice)
     if prepared.modes is not None:
         seconds = prepared.skin.inverse.time_constant
@@ -126,7 +129,7 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
 
 def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
     """Say on stderr what was left out, and what looks wrong."""
-    from tomoskin.pipeline import DOUBTED
+    from tomoskin.formats import is_session
 
     if len(result.rows_left_out):
         rows = result.rows_left_out.tolist()
@@ -146,11 +149,8 @@ def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
             f"{source}: {len(result.left_out)} frames hold too many values that are not "
             f"finite and were left out: {_listed(result.left_out.tolist())}"
         )
-    if result.agreement < DOUBTED:
-        remark(
-            f"{source}: the reference agrees with this skin's model by only "
-            f"{result.agreement:.2f} (1 = proportional): check --skin and the electrodes' order"
-        )
+    if (doubt := result.model_agreement.doubt(volts=is_session(source))) is not None:
+        remark(f"{source}: {doubt}")
 
 
 def _document(
@@ -163,6 +163,7 @@ def _document(
         "left_out": result.left_out.tolist(),
         "rows_left_out": result.rows_left_out.tolist(),
         "agreement": result.agreement,
+        "size": result.model_agreement.size,
         "unit": result.unit,
         "alpha": result.choice.alpha,
         "rule": result.choice.rule,

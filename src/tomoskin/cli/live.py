@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.choices import chosen_sinks, skin_for_source, with_bends, with_states
+from tomoskin.cli.choices import (
+    chosen_sinks,
+    say_headroom,
+    skin_for_source,
+    with_bends,
+    with_states,
+)
 from tomoskin.cli.named_files import RECORDING, Otherwise, Reads, Writes
 from tomoskin.cli.options import BendOption, SinkOption, SkinOption, SourceOption, StatesOption
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
@@ -84,6 +90,7 @@ def live(
         with Bar("preparing"):
             prepared = with_bends(_prepared(skin, source, calibration), bend)
             prepared = with_states(prepared, states, prepared.skin)
+        say_headroom(prepared.headroom)
         chosen = prepared.skin
         with listen(host, port) as listener:
             if not is_loopback(host):

@@ -68,7 +68,7 @@ def _check_skin(known: Calibration[Locator], name: str | None, path: Path) -> No
     from tomoskin.cli.choices import known_skin
 
     if (skin := known_skin(name, path)) is not None:
-        known.model.check(skin=skin)
+        known.check_skin(skin)
 
 
 def _several(known: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch, ...]]:

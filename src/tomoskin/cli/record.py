@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import signal
 import threading
 from collections.abc import Iterator
@@ -11,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tomoskin.cli.choices import chosen_sinks, skin_for_source
+from tomoskin.cli.choices import chosen_sinks, say_headroom, skin_for_source
 from tomoskin.cli.named_files import RECORDING, Writes
 from tomoskin.cli.options import SinkOption, SkinOption, SourceOption
-from tomoskin.cli.output import Bar, JsonFlag, tell
+from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def record(
     source: SourceOption = "twin",
     seconds: Annotated[
         float | None,
-        typer.Option(min=0.0, help="How long; else until Ctrl-C or a replay's end."),
+        typer.Option(help="How long; else until Ctrl-C or a replay's end."),
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="How many frames.")] = None,
     sink: SinkOption = None,
@@ -45,9 +46,12 @@ def record(
     from tomoskin.source import open_source
 
     sinks = chosen_sinks(sink)
+    if seconds is not None and not 0 < seconds < math.inf:
+        raise typer.BadParameter(f"expected more than 0 s, got {seconds:g}", param_hint="--seconds")
     chosen = skin_for_source(skin, source)
     with Bar("preparing"):
         prepared = prepare(chosen)
+    say_headroom(prepared.headroom)
     runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
     with ended_by_signals(), recording_to(runner, file):
         if seconds is None and frames is None and not json:
@@ -55,7 +59,11 @@ def record(
         _wait(runner, seconds, frames)
         if (problem := _problem(runner)) is not None:
             raise DataError(problem)
+        if (doubt := runner.status().problem) is not None:
+            remark(doubt)
     status = runner.status()
+    if not status.frames:
+        raise DataError("no frame came until the end: none is in it", where=str(file))
     size = file.stat().st_size
     document = {"file": str(file), "bytes": size, "frames": status.frames, "lost": status.gaps,
                 "dropped": status.dropped, "corrupt": status.corrupt}  # fmt: skip

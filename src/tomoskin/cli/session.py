@@ -77,7 +77,7 @@ def info(file: _File, json: JsonFlag = False) -> None:
         info = session_info(file, bar)
     tell(asdict(info), (f"{name:<12} {text}" for name, text in _lines(info)), json=json)
     if info.torn and not json:
-        remark(f"{file}: {info.torn} (tomoskin session repair ends it)")
+        remark(f"{file}: {info.torn}")
 
 
 @app.command()

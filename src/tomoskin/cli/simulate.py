@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tomoskin.cli.choices import say_headroom
 from tomoskin.cli.named_files import RECORDING, ForceFlag, Given, Reads, Writes
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
@@ -65,9 +66,11 @@ def simulate(
     json: JsonFlag = False,
 ) -> None:
     """Check which of the two is asked for, and do it."""
+    from tomoskin.signal import Headroom
     from tomoskin.skin import Skin
 
     chosen = Skin.load(skin)
+    say_headroom(Headroom.of_skin(chosen))
     if presses is not None:
         workers = _workers(processes, cluster)
         plan = _plan(chosen, script, seed or 0, presses)

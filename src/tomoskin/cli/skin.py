@@ -45,12 +45,17 @@ def show(name: SkinArgument, json: JsonFlag = False) -> None:
 
 @app.command()
 def check(file: SkinArgument, json: JsonFlag = False) -> None:
-    """Check a skin file, and mesh it."""
+    """Check a skin file, mesh it, and compare the voltages that it expects with the board's."""
+    from tomoskin.core import SkinError
     from tomoskin.mesh import quality
+    from tomoskin.signal import Headroom
     from tomoskin.skin import Skin
 
     skin = Skin.load(file)
     mesh = quality(skin.mesh())
+    headroom = Headroom.of_skin(skin)
+    if headroom.problem is not None:
+        raise SkinError(headroom.problem, where=skin.source)
     figures = {
         "n_cells": mesh.n_cells,
         "n_points": mesh.n_points,
@@ -61,7 +66,8 @@ def check(file: SkinArgument, json: JsonFlag = False) -> None:
         f"{skin.name}: ok; {skin.n_electrodes} electrodes, {skin.pattern().n_meas} measurements, "
         f"{mesh.n_cells} triangles of quality {mesh.minimum:.2f} (least), {mesh.mean:.2f} (mean)"
     )
-    tell(_summary(skin) | {"ok": True, "mesh": figures}, [line], json=json)
+    document = {"ok": True, "mesh": figures, "headroom": headroom.figures()}
+    tell(_summary(skin) | document, [line, f"expected: {headroom.text}"], json=json)
 
 
 @app.command()

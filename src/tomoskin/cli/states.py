@@ -51,7 +51,7 @@ def states(
     whole = read_recording(recording)
     say_notes(whole)
     if (chosen := known_skin(skin, recording)) is not None:
-        classifier.check(skin_id=chosen.identity)
+        known.check_skin(chosen)
     whole = whole.in_order_of(known.pattern)
     dv = changes(whole, reference, known.pattern)
     with Bar("telling states"):

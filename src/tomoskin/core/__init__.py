@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from tomoskin._moved import moved
 from tomoskin.core.errors import (
+    EMPTY,
     DataError,
     GeometryError,
     ModelError,
@@ -64,6 +65,7 @@ __all__ = [
     "CHANGE",
     "CHANGE_ON_DARK",
     "DIMENSIONS",
+    "EMPTY",
     "MAGIC",
     "RECORDING",
     "Arrays",

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core.errors import DataError
+from tomoskin.core.errors import EMPTY, DataError
 from tomoskin.core.memory import check_fits
 from tomoskin.core.written import written
 
@@ -91,6 +91,8 @@ class Archive(Arrays):
         except OSError as error:
             raise DataError(f"cannot be read: {error.strerror or error}", where=where) from error
         except (zipfile.BadZipFile, EOFError, zipfile.LargeZipFile) as error:
+            if not (len(file.getbuffer()) if isinstance(file, io.BytesIO) else file.stat().st_size):
+                raise DataError(EMPTY, where=where) from error
             raise DataError(
                 f"is not a whole .npz archive: {error}", where=where, hint="copy it again"
             ) from error

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+EMPTY = "is empty, a file without content"
+"""What is wrong with such a file, whatever it should hold."""
+
 
 class TomoskinError(Exception):
     """Base of every error that tomoskin raises on purpose.

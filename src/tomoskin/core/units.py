@@ -28,6 +28,7 @@ DIMENSIONS: dict[str, dict[str, float]] = {
 """For each dimension the accepted unit symbols and their size in SI."""
 
 _QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*$")
+_COMMA = re.compile(r"(?<=\d),(?=\d)")
 
 
 def parse_quantity(text: str, dimension: str) -> float:
@@ -43,7 +44,12 @@ def parse_quantity(text: str, dimension: str) -> float:
     choices = ", ".join(u or "no unit" for u in units)
     found = _QUANTITY.match(text)
     if not found:
-        raise ValueError(f'expected a number with a unit of {dimension} ({choices}), got "{text}"')
+        hint = ""
+        if _COMMA.search(text) and _QUANTITY.match(pointed := _COMMA.sub(".", text)):
+            hint = f'; with a decimal point: "{pointed.strip()}"'
+        raise ValueError(
+            f'expected a number with a unit of {dimension} ({choices}), got "{text}"{hint}'
+        )
     number, unit = found.groups()
     unit = unit.replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
     if unit not in units:

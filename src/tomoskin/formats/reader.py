@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import MAGIC, Arrays, DataError, load_arrays
+from tomoskin.core import EMPTY, MAGIC, Arrays, DataError, load_arrays
 from tomoskin.formats import interchange
 from tomoskin.formats.imports import (
     csv_table,
@@ -60,11 +60,17 @@ _PICKLE = b"\x80"
 def read_recording(path: Path) -> Recording:
     """Recording in ``path``: a session, an interchange file or a format that can be imported.
 
+    Absurd values are excluded; its notes name them.
+
     Raises
     ------
     DataError
         When the file cannot be read or is of no known kind; the message lists its keys.
     """
+    return _read(path).plausible()
+
+
+def _read(path: Path) -> Recording:
     head = _beginning(path)
     if head.startswith(MAGIC):
         return read_session(path)
@@ -129,7 +135,9 @@ def _from_text(head: bytes, path: Path) -> Recording:
 def _beginning(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
-            return file.read(_HEAD)
+            if head := file.read(_HEAD):
+                return head
+        raise DataError(EMPTY, where=str(path))
     except FileNotFoundError as error:
         raise DataError("there is no such file", where=str(path)) from error
     except OSError as error:

@@ -4,10 +4,11 @@ from typing import Any
 
 from tomoskin._moved import moved
 from tomoskin.pipeline.finding import voltage_covariance
+from tomoskin.pipeline.model_agreement import DOUBTED, ModelAgreement
 from tomoskin.pipeline.offline import Reconstruction, reconstruct
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.pipeline.prepare import Prepared, colour_limit, prepare
-from tomoskin.pipeline.recorded import DOUBTED, Idle, RecordedFrames, recorded_frames
+from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
 from tomoskin.pipeline.records import FrameResult, Measured, ReferenceState
 from tomoskin.pipeline.tune import tuned
 
@@ -17,6 +18,7 @@ __all__ = [
     "FrameResult",
     "Idle",
     "Measured",
+    "ModelAgreement",
     "Pipeline",
     "Prepared",
     "Reconstruction",

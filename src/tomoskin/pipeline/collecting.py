@@ -8,8 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
+from tomoskin.pipeline.model_agreement import NO_AGREEMENT, ModelAgreement
 from tomoskin.pipeline.records import Measured
 from tomoskin.signal import Reference
+
+_MOST_EXCLUDED, _MOST_LOST = 0.5, 0.25
+"""A frame is lost of which more than the first part is excluded, and the others make a reference if
+no more than the second part of them is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,12 +31,15 @@ class Rest:
         Between its frames, s; NaN where there was a single one.
     host_time
         Of the last of them, s.
+    agreement
+        Of the reference with the model.
     """
 
     reference: Reference
     without_reference: NDArray[np.bool_]
     interval: float
     host_time: float = 0.0
+    agreement: ModelAgreement = NO_AGREEMENT
 
 
 class Collecting:
@@ -39,7 +47,7 @@ class Collecting:
 
     A measurement that was excluded in any of them, or that read exactly zero in all, has no
     reference: it takes the model's value, so that nothing downstream meets a NaN or divides by
-    zero.
+    zero. A few frames of which most is excluded do not count at all.
 
     Parameters
     ----------
@@ -56,7 +64,7 @@ class Collecting:
         self._values = np.empty((needed, len(model)))
         self._times = np.empty(needed)
         self._model, self._least = model, least
-        self._excluded: NDArray[np.bool_] = np.zeros(len(model), dtype=bool)
+        self._excluded = np.zeros(self._values.shape, dtype=bool)
         self.taken = 0
 
     @property
@@ -68,12 +76,16 @@ class Collecting:
         """Take one frame; the untouched skin once there are enough."""
         self._values[self.taken] = np.where(measured.excluded, self._model, measured.values)
         self._times[self.taken] = measured.time
-        self._excluded |= measured.excluded
+        self._excluded[self.taken] = measured.excluded
         self.taken += 1
         if self.taken < self.needed:
             return None
-        excluded = self._excluded | ~self._values.any(axis=0)
-        self._values[:, excluded] = self._model[excluded]
-        reference = Reference.of(self._values, self._least)
+        lost = self._excluded.mean(axis=1) > _MOST_EXCLUDED
+        counts = ~lost if lost.mean() <= _MOST_LOST else np.ones_like(lost)
+        values = self._values[counts]
+        excluded = self._excluded[counts].any(axis=0) | ~values.any(axis=0)
+        values[:, excluded] = self._model[excluded]
+        reference = Reference.of(values, self._least)
         interval = float(np.median(np.diff(self._times))) if self.needed > 1 else np.nan
-        return Rest(reference, excluded, interval, measured.host_time)
+        agreement = ModelAgreement.of(reference.mean[~excluded], self._model[~excluded])
+        return Rest(reference, excluded, interval, measured.host_time, agreement)

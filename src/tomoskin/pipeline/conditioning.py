@@ -162,7 +162,8 @@ class Followed:
         health = self._health
         if health is not None and health.sick:
             lost = nuisance_directions(prepared.pattern, health.lost, health.floating)
-            self._prepared = prepared.blind_to(lost / self._scale[:, None])
+            if lost.shape[1] <= MOST_NUISANCE * len(lost):  # else no image is made
+                self._prepared = prepared.blind_to(lost / self._scale[:, None])
         self._nuisance = Nuisance(self._prepared, self._scale, self._drift)
 
     @property

@@ -13,6 +13,7 @@ from tomoskin.core import DataError, FloatArray, IntArray, Touch, check_fits
 from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline.collecting import Rest
 from tomoskin.pipeline.following import Following, Setting
+from tomoskin.pipeline.model_agreement import ModelAgreement
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
 from tomoskin.pipeline.records import Measured
@@ -38,8 +39,8 @@ class Reconstruction:
         (n, n_cells) change of conductivity, in ``unit``.
     touches
         One tuple a frame.
-    agreement
-        Cosine between the reference and the model's voltages, NaN where there is no reference.
+    model_agreement
+        Of the reference with the model's voltages.
     choice
         The alpha of the images, and what chose it.
     rows_left_out
@@ -55,10 +56,15 @@ class Reconstruction:
     images: FloatArray
     unit: str
     touches: tuple[tuple[Touch, ...], ...]
-    agreement: float
+    model_agreement: ModelAgreement
     choice: AlphaChoice
     rows_left_out: IntArray
     readings: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
+
+    @property
+    def agreement(self) -> float:
+        """Cosine between the reference and the model's voltages, NaN where there is none."""
+        return self.model_agreement.cosine
 
     @property
     def bends(self) -> tuple[BendReading | None, ...]:
@@ -129,7 +135,7 @@ def reconstruct(
         images=images,
         unit=prepared.operator.unit,
         touches=tuple(touches),
-        agreement=recorded.agreement,
+        model_agreement=recorded.agreement,
         choice=prepared.choice,
         rows_left_out=recorded.rows_left_out,
         readings={

@@ -83,7 +83,9 @@ class Pipeline:
         assert state.rest is not None, "a pipeline follows from its rest on"
         noise = float(np.sqrt(np.mean(state.rest.reference.noise**2)))
         baseline = state.conditioning.state
-        return ReferenceState(needed, needed, state.rest.host_time, noise, baseline)
+        return ReferenceState(
+            needed, needed, state.rest.host_time, noise, baseline, state.rest.agreement
+        )
 
     @property
     def numbered(self) -> int:

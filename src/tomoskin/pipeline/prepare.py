@@ -26,7 +26,7 @@ from tomoskin.inverse import (
 )
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern, Scan
-from tomoskin.signal import NuisanceSubspace, Readout, Reference, difference_noise
+from tomoskin.signal import Headroom, NuisanceSubspace, Readout, Reference, difference_noise
 from tomoskin.skin import Skin
 from tomoskin.touch import ImageNoise, Segmenter, SpotModel
 
@@ -109,6 +109,11 @@ class Prepared:
     def no_image(self) -> Image:
         """The image of no change."""
         return self.operator(np.zeros(self.pattern.n_meas))
+
+    @cached_property
+    def headroom(self) -> Headroom:
+        """What the untouched skin asks of the board, and what that gives."""
+        return Headroom.of(self.skin, self.model.at(self.skin.conductivity))
 
     @property
     def directions(self) -> FloatArray:

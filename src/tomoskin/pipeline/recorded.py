@@ -11,13 +11,9 @@ from numpy.typing import NDArray
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.inverse import MOST_EXCLUDED, Evidence
 from tomoskin.pattern import Pattern
+from tomoskin.pipeline.model_agreement import NO_AGREEMENT, REFUSED, ModelAgreement
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import Consecutive, Recording, Reference, difference, in_phase
-
-REFUSED = 0.3
-DOUBTED = 0.8
-"""Agreement of a recording's reference with the model's voltages (cosine, 1 = proportional):
-below the first the recording is refused as another skin's, below the second it is doubted."""
 
 _LISTED = 5
 """Measurements that a message names."""
@@ -57,7 +53,7 @@ class RecordedFrames:
     reference
         Mean and noise of the idle frames; None where there are none.
     agreement
-        Cosine between the reference and the model's voltages, NaN where there is no reference.
+        Of the reference with the model's voltages.
     """
 
     prepared: Prepared
@@ -68,7 +64,7 @@ class RecordedFrames:
     missing: NDArray[np.bool_]
     positions: FloatArray | None
     reference: Reference | None
-    agreement: float
+    agreement: ModelAgreement
 
     @property
     def differences(self) -> FloatArray:
@@ -100,7 +96,7 @@ def recorded_frames(prepared: Prepared, recording: Recording, idle: Idle) -> Rec
         When the rows are not in the pattern's order, the reference does not look like this
         skin, or too few frames or rows are left.
     """
-    pattern = prepared.pattern
+    pattern, recording = prepared.pattern, recording.plausible()
     prepared.operator.accept(
         Pattern.from_tables(recording.drive, recording.measure, pattern.n_electrodes)
     )
@@ -148,7 +144,7 @@ class _Left:
         missing: NDArray[np.bool_],
         values: FloatArray,
         reference: Reference | None = None,
-        agreement: float = np.nan,
+        agreement: ModelAgreement = NO_AGREEMENT,
     ) -> RecordedFrames:
         """These values of the last of the frames."""
         frames, labels = self.frames[len(self.frames) - len(values) :], self.recording.labels
@@ -188,7 +184,7 @@ def _rounding(prepared: Prepared, quiet: FloatArray) -> FloatArray:
     return np.where(still, scale * prepared.readout.rounding, 0.0)
 
 
-def _in_volts(left: _Left, quiet: NDArray[Any]) -> tuple[FloatArray, FloatArray, float]:
+def _in_volts(left: _Left, quiet: NDArray[Any]) -> tuple[FloatArray, FloatArray, ModelAgreement]:
     """Values and idle frames as a real model has them, and how well they agree with it."""
     operator, source = left.prepared.operator, left.recording.source
     model, mean = operator.reference, quiet.mean(axis=0)
@@ -196,7 +192,7 @@ def _in_volts(left: _Left, quiet: NDArray[Any]) -> tuple[FloatArray, FloatArray,
     quiet, _ = in_phase(quiet, mean, model)
     agreement = _agreement(quiet.mean(axis=0), model, source)
     if operator.difference == "plain":
-        _check_scale(quiet.mean(axis=0), model, source)
+        _check_scale(agreement.size, source)
     return values, quiet, agreement
 
 
@@ -227,9 +223,9 @@ def _given(left: _Left, recording: Recording, dead: IntArray) -> FloatArray:
     return difference(dv + reference, reference, operator.difference)
 
 
-def _agreement(reference: FloatArray, model: FloatArray, source: str) -> float:
-    length = float(np.linalg.norm(reference) * np.linalg.norm(model))
-    cosine = float(reference @ model) / length if length else 0.0
+def _agreement(reference: FloatArray, model: FloatArray, source: str) -> ModelAgreement:
+    agreement = ModelAgreement.of(reference, model)
+    cosine = agreement.cosine
     if cosine <= -REFUSED:
         raise DataError(
             f"the voltages are those of this skin with the sign reversed (agreement {cosine:.2f})",
@@ -243,11 +239,10 @@ def _agreement(reference: FloatArray, model: FloatArray, source: str) -> float:
             where=source,
             hint="check --skin, the order of the electrodes and --reference",
         )
-    return cosine
+    return agreement
 
 
-def _check_scale(reference: FloatArray, model: FloatArray, source: str) -> None:
-    scale = float(np.linalg.norm(reference) / np.linalg.norm(model))
+def _check_scale(scale: float, source: str) -> None:
     if not 1 / _MOST_SCALE < scale < _MOST_SCALE:
         raise DataError(
             f"its voltages are {scale:.3g} times those of the skin's model",

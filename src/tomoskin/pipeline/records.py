@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tomoskin.calibration import BENDS, CLASSES, BendReading, ClassReading
 from tomoskin.core import FloatArray, Image, Touch, Voltages
+from tomoskin.pipeline.model_agreement import NO_AGREEMENT, ModelAgreement
 from tomoskin.signal import BaselineState, Health
 from tomoskin.touch import TouchEvent
 
@@ -154,13 +155,14 @@ class FrameResult:
 @dataclass(frozen=True, slots=True)
 class ReferenceState:
     """How far the reference is: frames taken of those needed, when it was done, its noise in V,
-    and what has become of it since."""
+    what has become of it since, and how well it agrees with the model."""
 
     frames: int
     needed: int
     since: float | None = None
     noise: float | None = None
     baseline: BaselineState | None = None
+    agreement: ModelAgreement = NO_AGREEMENT
 
     @property
     def ready(self) -> bool:

@@ -12,7 +12,7 @@ from typing import BinaryIO
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Footer, Metadata
 
-from tomoskin.core import MAGIC, DataError
+from tomoskin.core import EMPTY, MAGIC, DataError
 from tomoskin.recording.mcap_records import (
     LARGEST,
     LARGEST_SUMMARY,
@@ -28,6 +28,8 @@ from tomoskin.recording.mcap_records import (
 
 MEND = "tomoskin session repair recovers what is whole"
 """What to do about a damaged file."""
+
+_END = "tomoskin session repair ends it"
 
 _FOOTER_BYTES = len(encode(Footer(0, 0, 0)))
 
@@ -137,6 +139,8 @@ class ContainerReader:
 
     def _open(self) -> None:
         """Read the summary, where the file has its end."""
+        if not self.size:
+            raise DataError(EMPTY, where=self.where)
         if self._read(0, len(MAGIC)) != MAGIC:
             raise DataError(
                 "is not an MCAP file",
@@ -148,7 +152,8 @@ class ContainerReader:
         try:
             footer = decode(Footer, tail.removesuffix(MAGIC))
         except ValueError:
-            self.torn = "was not ended: the program or the computer stopped while it was written"
+            stop = "the program or the computer stopped while it was written"
+            self.torn = f"was not ended: {stop} ({_END})"
             return
         self._end, start = end, footer.summary_start
         if not start:
@@ -177,7 +182,8 @@ class ContainerReader:
         if place < self._end < self.size:
             raise self._damage(place, "a record is cut")
         if place < self._end:
-            self.torn = f"was not ended: a record is cut at byte {place} of {self.size}"
+            cut = f"a record is cut at byte {place} of {self.size}"
+            self.torn = f"was not ended: {cut} ({_END})"
 
     def _record(self, offset: int) -> bytes:
         """A whole record; ValueError where it would go beyond the end."""

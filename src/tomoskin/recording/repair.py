@@ -15,7 +15,7 @@ from mcap import records
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Chunk, DataEnd, McapRecord, Metadata
 
-from tomoskin.core import MAGIC, DataError, Output, SkinError, check_outputs, written
+from tomoskin.core import EMPTY, MAGIC, DataError, Output, SkinError, check_outputs, written
 from tomoskin.recording.blocks import Advance, no_report
 from tomoskin.recording.channels import CHANNELS, SCHEMAS, TOPICS
 from tomoskin.recording.container import ContainerWriter
@@ -96,7 +96,8 @@ def repair(
         raise DataError("there is no such file", where=str(source))
     result = Repaired(target)
     with errors_of(source), source.open("rb") as file:
-        size = file.seek(0, 2)
+        if not (size := file.seek(0, 2)):
+            raise DataError(EMPTY, where=str(source))
         about, attachments = _front(stretches(file, size), skin, str(source))
         with written(target) as part:
             output = part.open("wb", buffering=0)

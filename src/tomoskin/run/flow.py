@@ -7,7 +7,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 
 from tomoskin.core import DataError, Event, Frame, ModelError, WireError
-from tomoskin.pipeline import FrameResult, Pipeline, Prepared
+from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
 from tomoskin.recording import BoardInfo, Mark, MarkedFrame, RawRead, Truth, advance
 from tomoskin.run.commands import DirectCommand, Note, ReplayCommand
 from tomoskin.run.counters import Latency, Losses
@@ -69,6 +69,7 @@ class Flow:
         self._losses, self._earlier, self._skipped = Losses(), Losses(), 0
         self._drops, self._polled = 0, 0.0
         self._standstill: str | None = None
+        self._saturated: str | None = None
         self._ended = False
 
     def begin(self, transport: Transport) -> None:
@@ -79,6 +80,9 @@ class Flow:
         self.source = f"{name} of {skin}" if self.twin.pressable else f"{skin} on {name}"
         replay = self.marker.replay
         self.out.begin(self.prepared, self.source, replay.epoch if replay else None)
+        self._saturated = self.prepared.headroom.problem
+        if self._saturated is not None:
+            self.out.say("saturated", self._saturated)
 
     def link(self, transport: Transport) -> Link:
         """The protocol session with its source, which has just been opened, maybe again."""
@@ -182,9 +186,19 @@ class Flow:
             electrodes=result.health.sick if result and result.health else (),
             bend=result.bend if result and result.ready else None,
             state=result.state if result and result.ready else None,
-            problem=trouble or self._standstill or (result.problem if result else None),
+            problem=trouble
+            or self._standstill
+            or self._saturated
+            or (result.problem if result else None)
+            or self._doubt(reference),
             board=self.board,
         )
+
+    def _doubt(self, reference: ReferenceState) -> str | None:
+        """Whether the reference is this skin's, where positions rest on its model."""
+        if any(c.kind.locates for c in self.prepared.calibrations.values()):
+            return None
+        return reference.agreement.doubt(volts=True)
 
     def _note_board(self, info: Info | None) -> None:
         if info is not self.board:

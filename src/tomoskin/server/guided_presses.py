@@ -167,7 +167,9 @@ def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estima
     errors = 1e3 * locator.errors
     doubted = sorted({remark.row for remark in locator.remarks})
     text = f"Missed by {np.median(errors):.0f} mm (median; each press left out in turn)"
-    if len(presses) < _FIRST:
+    if locator.is_guess:
+        text += "; the middle of all presses is as good an answer: press harder"
+    elif len(presses) < _FIRST:
         text += ": ten presses are a start, fifty are good"
     figures = {
         "errors_mm": errors.tolist(),

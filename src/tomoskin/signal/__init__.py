@@ -13,6 +13,7 @@ from tomoskin.signal.difference import (
     in_phase,
     undone,
 )
+from tomoskin.signal.headroom import Headroom
 from tomoskin.signal.health import ElectrodeHealth, Health, Roles, nuisance_directions
 from tomoskin.signal.idle import Idle
 from tomoskin.signal.monitor import Monitor
@@ -29,6 +30,7 @@ __all__ = [
     "BoardFigures",
     "Consecutive",
     "ElectrodeHealth",
+    "Headroom",
     "Health",
     "Idle",
     "Monitor",

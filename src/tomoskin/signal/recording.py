@@ -11,6 +11,19 @@ from numpy.typing import NDArray
 from tomoskin.core import DataError, FloatArray, IntArray, PatternError
 from tomoskin.pattern import Pattern, match_rows
 
+_MOST = 1e12
+"""No instrument has a unit in which a voltage is a larger number."""
+
+_MOST_OF_MEDIAN = 1e4
+"""Voltages beyond so many times the largest of the median frame are absurd: 3 in real recordings,
+and an input at its rail is some hundred. Differences have no such scale, as idle ones are zero."""
+
+_MOST_TIME = 1e18
+"""s; what counts nanoseconds since 1970 as seconds is below."""
+
+_LISTED = 5
+"""Frames that a note names."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -86,6 +99,29 @@ class Recording:
             idle=max(1, min(self.idle, stop) - start),
         )
 
+    def plausible(self) -> Recording:
+        """The recording without absurd values: NaN stands for them, and notes name them."""
+        most = self._most()
+        limits = {"voltages": most, "reference": most, "time": _MOST_TIME}
+        changes: dict[str, Any] = {}
+        notes = []
+        for key, limit in limits.items():
+            values = getattr(self, key)
+            if values is None or not (absurd := _beyond(values, limit)).any():
+                continue
+            changes[key] = np.where(absurd, np.nan, values)
+            notes.append(_absurd(key, absurd, limit))
+        return replace(self, **changes, notes=(*self.notes, *notes)) if changes else self
+
+    def _most(self) -> float:
+        """The largest number that can be a voltage of this recording."""
+        size = np.abs(self.voltages)
+        tops = np.where(size <= _MOST, size, 0.0).max(axis=1)
+        if self.is_change or not tops.any():
+            return _MOST
+        median = float(np.quantile(tops[tops > 0], 0.5, method="lower"))
+        return min(_MOST, _MOST_OF_MEDIAN * median)
+
     def in_order_of(self, pattern: Pattern) -> Recording:
         """Return the recording with exactly the pattern's rows, in its order and signs.
 
@@ -116,6 +152,21 @@ class Recording:
             measure=pattern.measure,
             reference=None if self.reference is None else match.apply(self.reference),
         )
+
+
+def _beyond(values: NDArray[Any], most: float) -> NDArray[np.bool_]:
+    """Infinite values are excluded as what is not finite."""
+    return np.asarray(np.isfinite(values) & (np.abs(values) > most))
+
+
+def _absurd(key: str, absurd: NDArray[np.bool_], most: float) -> str:
+    count = np.count_nonzero(absurd)
+    where = ""
+    if key != "reference":
+        frames = np.flatnonzero(absurd.reshape(len(absurd), -1).any(axis=1)).tolist()
+        listed = ", ".join(map(str, frames[:_LISTED]))
+        where = f" (frames {listed}{', …' if len(frames) > _LISTED else ''})"
+    return f"{count} absurd values of {key}{where}, beyond {most:.2g}, were excluded"
 
 
 def _check(got: tuple[int, ...], expected: tuple[int, ...], key: str, source: str) -> None:

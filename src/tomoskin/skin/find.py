@@ -7,7 +7,7 @@ from importlib.resources import files
 from os import PathLike, fspath
 from pathlib import Path
 
-from tomoskin.core import SkinError
+from tomoskin.core import EMPTY, SkinError
 
 BUILT_IN = "built-in"
 """Source of the skins that come with tomoskin."""
@@ -60,7 +60,9 @@ def read_text(path: Path, what: str, most: int = 10_000_000) -> str:
             raise SkinError(f"is a folder or device, not {what}", where=where)
         if path.stat().st_size > most:
             raise SkinError(f"is too large for {what} (over {most / 1e6:g} MB)", where=where)
-        return path.read_bytes().decode("utf-8-sig")
+        if not (text := path.read_bytes().decode("utf-8-sig")).strip():
+            raise SkinError(EMPTY, where=where)
+        return text
     except UnicodeDecodeError as error:
         raise SkinError(
             f"is not a text file (byte {error.start} is not UTF-8)", where=where

@@ -4,6 +4,7 @@ is for. Reading, errors, writing, the page's form and the documentation all foll
 from __future__ import annotations
 
 import inspect
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
@@ -157,6 +158,9 @@ class Section:
         )
 
 
+_COMMA = re.compile(r"=\s*[-+]?\d+,\d+\s*$", re.MULTILINE)
+
+
 def toml_tables(text: str, source: str, version: int) -> dict[str, Any]:
     """Tables of a TOML file whose first key is ``format = version``, as written.
 
@@ -165,7 +169,8 @@ def toml_tables(text: str, source: str, version: int) -> dict[str, Any]:
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also numbers or nesting beyond all bounds
-        raise SkinError(f"is not valid TOML: {error}", where=source) from None
+        hint = "numbers have decimal points" if _COMMA.search(text) else ""
+        raise SkinError(f"is not valid TOML: {error}", where=source, hint=hint) from None
     where = f"{source}: format"
     if "format" not in tables:
         raise SkinError("is missing", where=where, hint=f"begin the file with format = {version}")

@@ -14,7 +14,7 @@ from tomoskin.core import FloatArray, ModelError, TomoskinError
 from tomoskin.forward import ForwardModel
 from tomoskin.mesh import Mesh, triangulate
 from tomoskin.pattern import Scan
-from tomoskin.signal import Readout
+from tomoskin.signal import Headroom, Readout
 from tomoskin.skin import Skin
 from tomoskin.touch.fit import (
     Response,
@@ -24,7 +24,7 @@ from tomoskin.touch.fit import (
     row_covariance,
     spots_of,
 )
-from tomoskin.touch.fit.spot import CONTENT
+from tomoskin.touch.fit.spot import CONTENT, N_PARAMETERS
 from tomoskin.touch.region import Region
 
 Advance = Callable[[float, float], None]
@@ -106,12 +106,15 @@ class ResolutionBounds:
         hole would not be noticed.
     inside
         (n_cells,) whether a cell counts for the figures.
+    headroom
+        What the skin asks of the board; what saturates does not count.
     """
 
     mesh: Mesh
     bound: FloatArray
     faintest: FloatArray
     inside: FloatArray
+    headroom: Headroom
 
     @cached_property
     def rms(self) -> FloatArray:
@@ -137,18 +140,20 @@ def resolution_bounds(
 
     The noise is that of the converter (:data:`~tomoskin.signal.readout.CONVERSION_NOISE` and
     rounding, summed readings), shared by the rows that share a sample, and that of a reference
-    of 20 frames.
+    of 20 frames. Measurements that saturate (:class:`~tomoskin.signal.Headroom`) tell nothing.
 
     Raises
     ------
     TomoskinError
-        When the skin cannot be meshed or modelled, or the demand cannot be meant.
+        When the skin cannot be meshed or modelled, too many of its measurements saturate, or the
+        demand cannot be meant.
     """
     coarse = triangulate(skin.outline, skin.arcs[:1], places)
     fine = skin.altered({"mesh": {"cells": _CELLS}}).mesh()
     model = ForwardModel(fine, skin.pattern(), skin.contact_impedance, skin.current)
-    response = Response(model.at(skin.conductivity))
-    noise = Whitener.of(_noise(skin))
+    state = model.at(skin.conductivity)
+    headroom = Headroom.of(skin, state)
+    response, noise = Response(state), _noise(skin, headroom)
     radius = demand.on(fine)
     spots = spots_of(coarse.centroids, radius, -1.0)
     area = math.pi * radius**2
@@ -164,14 +169,19 @@ def resolution_bounds(
     progress(len(spots), len(spots))
     faintest = -np.expm1(np.maximum(np.concatenate(least) / area, -700.0))
     return ResolutionBounds(
-        coarse, np.concatenate(bounds), faintest, _inside(skin, coarse.centroids)
+        coarse, np.concatenate(bounds), faintest, _inside(skin, coarse.centroids), headroom
     )
 
 
-def _noise(skin: Skin) -> FloatArray:
+def _noise(skin: Skin, headroom: Headroom) -> Whitener:
+    """Raises ModelError where too little is left of what the model expects."""
+    excluded = headroom.saturated
+    if np.count_nonzero(~excluded) < N_PARAMETERS and (problem := headroom.problem):
+        raise ModelError(problem)
     scan = Scan.of(skin.pattern())
     sample = Readout.of(scan, skin.readout).noise / math.sqrt(2)
-    return row_covariance(scan, sample) * (1 + 1 / REFERENCE_FRAMES)
+    noise = Whitener.of(row_covariance(scan, sample) * (1 + 1 / REFERENCE_FRAMES))
+    return noise.without(np.eye(len(excluded))[:, excluded])
 
 
 def _inside(skin: Skin, positions: FloatArray) -> FloatArray:

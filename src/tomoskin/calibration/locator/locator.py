@@ -42,6 +42,10 @@ _GROWN = 1.25
 _CHANGED = 2.5
 """How many times as far as usual new presses are missed on a skin that has changed (medians)."""
 
+_GUESS, _GUESS_OF_FEW = 0.75, 2.5
+"""Part of a guess's error above which nothing was learnt; less by the second over the number of
+presses. Noise gives 0.5 to 0.85 with 8 presses, 0.8 to 0.92 with 10, 0.93 to 0.99 from 20 on."""
+
 
 def _silent(_done: float, _total: float) -> None:
     pass
@@ -244,6 +248,19 @@ class Locator:
             self.region.unit
             * np.linalg.norm(self.stacking.left_out - self.region.scaled(self.presses.xy), axis=1)
         )
+
+    @property
+    def guessed(self) -> float:
+        """Mean m by which presses are missed when the middle of the others is the answer."""
+        xy = self.presses.xy
+        away = np.linalg.norm(xy - xy.mean(axis=0), axis=1)
+        return float(away.mean() * len(xy) / max(len(xy) - 1, 1))
+
+    @property
+    def is_guess(self) -> bool:
+        """Whether :attr:`errors` are about as large as :attr:`guessed`: noise gives such ones."""
+        limit = _GUESS - _GUESS_OF_FEW / len(self.presses)
+        return bool(self.errors.mean() > limit * self.guessed)
 
     @property
     def drift(self) -> float:
