@@ -91,6 +91,7 @@ class Page:
     async def _send(self) -> None:
         while self._outbox:
             await self._socket.send_text(self._outbox.popleft())
+            await asyncio.sleep(0)  # that the page is gone is said in the loop's next turn
         frame = self._hub.frame()
         if frame is not None and frame is not self._sent:
             await self._socket.send_bytes(frame)
