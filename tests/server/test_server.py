@@ -1,6 +1,5 @@
 """The server as a page, a slow page, several pages and an attacker meet it."""
 
-import asyncio
 import gc
 import json
 import mimetypes
@@ -12,7 +11,6 @@ import warnings
 from contextlib import ExitStack, contextmanager
 
 import pytest
-from starlette.websockets import WebSocket, WebSocketState
 from websockets.exceptions import ConnectionClosed, InvalidState, InvalidStatus
 
 from run.board import Board, pressed, samples_of
@@ -387,35 +385,6 @@ def test_a_page_that_does_not_read_leaves_no_connection_behind(runner, static, m
             warnings.simplefilter("always")
             gc.collect()
     assert [str(one.message) for one in said] == []
-
-
-def test_a_page_that_vanishes_is_written_to_no_more(runner):
-    """Its connection says so in the loop's next turn; asyncio warns of every later write."""
-    hub, written, gone = Hub(runner, limit=1.0), [], asyncio.Event()
-    for number in range(20):
-        runner.say("test", f"event {number}")
-
-    async def receive():
-        await gone.wait()
-        return {"type": "websocket.disconnect"}
-
-    async def send(message):
-        if gone.is_set():
-            raise OSError("gone")
-        written.append(message["type"])
-        if written[0] == "websocket.send":
-            asyncio.get_running_loop().call_soon(gone.set)
-
-    async def serve():
-        async with hub.running():
-            await asyncio.sleep(0)
-            page = WebSocket({"type": "websocket"}, receive, send)
-            page.client_state = page.application_state = WebSocketState.CONNECTED
-            page.accept = lambda: asyncio.sleep(0)
-            await asyncio.wait_for(page_connection.Page(page, hub).run(), PATIENCE)
-
-    asyncio.run(serve())
-    assert written == ["websocket.send"]
 
 
 def test_stopping_with_a_page_open_is_quick(runner, static):

@@ -24,6 +24,7 @@ from tomoskin.core.written import write_text, written
 if TYPE_CHECKING:
     from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
+    from tomoskin.core.json_bytes import encode_json
     from tomoskin.core.records import (
         ComplexArray,
         Detection,
@@ -45,6 +46,7 @@ _HOME = {
     "CHANGE_ON_DARK": "colours",
     "ColourScale": "colours",
     "electrode_table": "typed_arrays",
+    "encode_json": "json_bytes",
     "load_arrays": "archive",
     "numbers": "typed_arrays",
     "pack_arrays": "archive",
@@ -88,6 +90,7 @@ __all__ = [
     "WireError",
     "check_outputs",
     "electrode_table",
+    "encode_json",
     "load_arrays",
     "numbers",
     "pack_arrays",

@@ -12,6 +12,7 @@ from tomoskin.core import Output, SkinError, SourceError, TomoskinError, check_o
 from tomoskin.inverse import LightTouch, LinearProblem, Spectrum
 from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned
 from tomoskin.run import Runner, commands
+from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_messages import text_of
 from tomoskin.server.requests import (
@@ -232,7 +233,6 @@ class SettingsHandlers:
     def _message(self) -> str:
         """The settings message."""
         skin = self._present()
-        files = sorted(path.stem for path in self._hub.folder.glob("*.toml"))
         return text_of(
             type="settings",
             document=skin.document,
@@ -243,7 +243,7 @@ class SettingsHandlers:
             redo=len(self._history.future),
             busy=self._working,
             took_ms=None if self._took is None else 1e3 * self._took,
-            files=files[:200],
+            files=Folder(self._hub.folder).skins(),
             builtin=Skin.names(),
         )
 

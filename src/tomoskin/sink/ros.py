@@ -9,10 +9,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import msgspec
 import numpy as np
 
-from tomoskin.core import Event, Image, PixelMap, Touch
+from tomoskin.core import Event, Image, PixelMap, Touch, encode_json
 from tomoskin.recording import touches_message
 from tomoskin.sink.sink import Item, Moment, Stream, TouchPace
 
@@ -192,7 +191,7 @@ def _touches(moment: Moment) -> dict[str, Any]:
 
 
 def _json(content: Any) -> Value:
-    return {"data": msgspec.json.encode(content).decode()}
+    return {"data": encode_json(content).decode()}
 
 
 def _header(stamp: int) -> Value:
