@@ -135,6 +135,28 @@ def test_presses_of_all_owners_reach_the_source(runner, board, until):
     until(lambda: board.presses == () and runner.newest.truth == ())
 
 
+def test_a_press_that_cannot_be_solved_is_refused_and_the_source_goes_on(runner, board, until):
+    good, bad = Press(0, 0, 1, 0.01), Press(0.01, 0, 2, 0.01)
+    take = board.set_presses
+
+    def solve(presses):
+        if bad in presses:
+            raise ZeroDivisionError("float division by zero")
+        take(presses)
+
+    board.set_presses = solve
+    runner.start()
+    for _ in range(3):
+        runner.ask(commands.HoldPresses("a", (bad, good)))
+    until(lambda: runner.newest and runner.newest.truth == (good,) == board.presses)
+    _, happened = runner.events.since(0)
+    refused = [event.text for event in happened if event.kind == "press-refused"]
+    assert refused == ["a press is left out: ZeroDivisionError: float division by zero"]
+    assert not [event for event in happened if event.kind == "source-lost"]
+    runner.ask(commands.HoldPresses("a", ()))
+    until(lambda: board.presses == ())
+
+
 def test_losses_are_counted(prepared, idle):
     board = Board()
     runner = Runner(prepared, lambda: board)

@@ -66,6 +66,7 @@ class TwinSkin:
         self._pose: Pose = ()
         self._loaded: tuple[object, ...] = (self._presses, self._pose)
         self._stood: tuple[object, ...] = self._loaded
+        self._dented: tuple[tuple[Contact, ...], Load] = (self._presses, self._nothing)
         self._posed: tuple[Pose, FloatArray] = (self._pose, self._nothing.strain)
         self._state = MaterialState.fresh(self.material, n)
         self._conductivity: FloatArray | None = None
@@ -109,11 +110,18 @@ class TwinSkin:
         """What the cells feel under the present presses, in the present pose."""
         presses, pose = self._presses, self._pose
         if not _same((presses, pose), self._loaded):
-            dented = indent(probes_of(presses), self.contact, self._points, self._blur)
+            dented = self._dent(presses)
             given = dented.depth + depth_of(pose, self._points)
             self._load = Load(strain=dented.strain + self._strain(pose), depth=given)
             self._loaded = (presses, pose)
         return self._load
+
+    def _dent(self, presses: tuple[Contact, ...]) -> Load:
+        """What the ``presses`` alone do."""
+        if presses is not self._dented[0]:
+            dented = indent(probes_of(presses), self.contact, self._points, self._blur)
+            self._dented = presses, dented
+        return self._dented[1]
 
     def _strain(self, pose: Pose) -> FloatArray:
         """(n_cells, 3) of the pose alone."""
@@ -122,16 +130,19 @@ class TwinSkin:
         return self._posed[1]
 
     def set_presses(self, presses: tuple[Contact, ...]) -> None:
-        """Replace all presses at once, from any thread.
+        """Replace all presses at once, from any thread; they are solved here.
 
         Raises
         ------
         GeometryError
-            When the centre of one is off the skin; then nothing is changed.
+            When the centre of one is off the skin, or its face cannot press; then nothing is
+            changed.
         """
         check_on_skin(presses, self._outline)
         if presses != self._presses:
-            self._presses = tuple(presses)
+            taken = tuple(presses)
+            self._dent(taken)
+            self._presses = taken
 
     def set_pose(self, pose: Pose) -> None:
         """Bend and stretch the sheet, from any thread; ``()`` lets it lie as at rest.
