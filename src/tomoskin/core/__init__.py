@@ -18,6 +18,7 @@ from tomoskin.core.errors import (
     WireError,
 )
 from tomoskin.core.outputs import MAGIC, RECORDING, Output, check_outputs
+from tomoskin.core.stages import reach, watch_stages
 from tomoskin.core.units import DIMENSIONS, parse_quantity
 from tomoskin.core.written import write_text, written
 
@@ -95,9 +96,11 @@ __all__ = [
     "numbers",
     "pack_arrays",
     "parse_quantity",
+    "reach",
     "real_numbers",
     "save_arrays",
     "unpack_arrays",
+    "watch_stages",
     "whole_number",
     "write_text",
     "written",

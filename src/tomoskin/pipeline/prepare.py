@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.calibration import Calibration, Kind
-from tomoskin.core import FloatArray, Image, IntArray, ModelError
+from tomoskin.core import FloatArray, Image, IntArray, ModelError, reach
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import (
     AlphaChoice,
@@ -181,12 +181,15 @@ def prepare(skin: Skin, previous: Prepared | None = None) -> Prepared:
     ------
     TomoskinError
         When the skin cannot be meshed, modelled or inverted; the message says which.
+
+    Its stages are told to :func:`~tomoskin.core.watch_stages`.
     """
     if previous is not None and previous.skin.body == skin.body:
         return _prepared(skin, _problem_after(previous, skin), previous)
-    model = ForwardModel(
-        skin.mesh(), skin.pattern(), skin.contact_impedance, skin.polarity * skin.current
-    )
+    reach("mesh")
+    mesh = skin.mesh()
+    reach("model")
+    model = ForwardModel(mesh, skin.pattern(), skin.contact_impedance, skin.polarity * skin.current)
     return _prepared(skin, _problem(model, skin))
 
 
@@ -240,12 +243,14 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
     scan = Scan.of(model.pattern)
     readout = Readout.of(scan, skin.readout)
     same = previous is not None and previous.problem is problem
+    reach("image")
     light_touch, choice, operator = _chosen(
         problem, skin, readout, previous.light_touch if previous and same else None
     )
     segmenter = previous.segmenter if previous and previous.skin.touch == skin.touch else None
     calibrations = previous.calibrations if previous else {}
     spots = None
+    reach("touches")
     if _fits(skin, calibrations):
         kept = previous.spots if previous and _same_difference(previous.skin, skin) else None
         spots = kept or SpotModel.of(skin, model)

@@ -7,6 +7,8 @@ import { say, send } from "../state";
 import { Field, nameOf } from "./Field";
 import {
   discard,
+  doing,
+  progress,
   redo,
   refused,
   schema,
@@ -133,9 +135,12 @@ function View() {
           Redo
         </button>
         <span class="took" data-testid="took" role="status">
-          {now.busy ? "preparing…" : took}
+          {now.busy ? (progress.value ? doing(progress.value) : "preparing") : took}
         </span>
       </div>
+      {now.busy && progress.value?.stage && (
+        <progress value={progress.value.done} max={progress.value.stages} aria-label="Change of settings" />
+      )}
       {refused.value && refused.value.section === null && (
         <p class="wrong" role="alert">
           {refused.value.message}
