@@ -13,6 +13,7 @@ from tomoskin.recording import session_info
 from tomoskin.run import Runner, commands
 from tomoskin.run.flow import MOST_AT_ONCE
 from tomoskin.run.publisher import EventLog
+from tomoskin.source import Timing
 from tomoskin.twin import Press
 from tomoskin.wire import Start, Stop
 
@@ -155,6 +156,38 @@ def test_a_press_that_cannot_be_solved_is_refused_and_the_source_goes_on(runner,
     assert not [event for event in happened if event.kind == "source-lost"]
     runner.ask(commands.HoldPresses("a", ()))
     until(lambda: board.presses == ())
+
+
+class Silent(Board):
+    """A port behind which nobody speaks, that knows why."""
+
+    def __init__(self):
+        super().__init__()
+        self._out.clear()
+        self.diagnosed = threading.Semaphore(0)
+
+    def _answer(self, _command):
+        return b""
+
+    def diagnose(self, heard):
+        assert heard == b""
+        self.diagnosed.release()
+        return SourceError("likely the wrong port", where="port", hint="try another")
+
+
+def test_why_no_board_answers_is_said_once_and_stands_until_one_does(prepared, monkeypatch):
+    monkeypatch.setattr("tomoskin.source.link.Timing", lambda: Timing(0.01, 0.01, 1, goodbye=0.01))
+    board = Silent()
+    runner = Runner(prepared, lambda: board)
+    runner.start()
+    for _ in range(3):
+        assert board.diagnosed.acquire(timeout=PATIENCE)
+    status = runner.status()
+    _, happened = runner.events.since(0)
+    runner.stop()
+    assert not status.running
+    assert status.problem == "port: likely the wrong port (try another)"
+    assert [event.kind for event in happened] == ["no-answer"]
 
 
 def test_losses_are_counted(prepared, idle):

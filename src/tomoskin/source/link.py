@@ -13,8 +13,11 @@ from tomoskin.source.agreement import LineQuality, Rated
 from tomoskin.source.command_queue import FrameCounters
 from tomoskin.source.protocol_session import ProtocolSession, Stage
 from tomoskin.source.settings import ScanSettings, Timing
-from tomoskin.source.transport import Played, Transport
+from tomoskin.source.transport import Diagnosable, Played, Transport
 from tomoskin.wire import Ack, Counters, Decoder, Info
+
+_HEARD = 256
+"""So many of the first bytes tell what speaks where no board does."""
 
 
 class Link:
@@ -22,6 +25,11 @@ class Link:
 
     Everything happens in :meth:`poll`; leaving the ``with`` block, or :meth:`close`, stops the
     board.
+
+    Attributes
+    ----------
+    diagnosis
+        Why no board answers, once it should have; None where it does, or nobody can tell.
     """
 
     def __init__(
@@ -49,6 +57,8 @@ class Link:
         self._first_rate = transport.rate if isinstance(transport, Rated) else 0
         self._session = ProtocolSession(scan, settings, self._timing, self._clock(), transport.name)
         self._closed = False
+        self._heard = b""
+        self.diagnosis: SourceError | None = None
 
     @property
     def running(self) -> bool:
@@ -86,7 +96,11 @@ class Link:
             The device speaks another protocol.
         """
         now = self._clock()
-        found = self._session.tick(now)
+        try:
+            found = self._session.tick(now)
+        except SourceError as error:
+            raise self.diagnosis or error from None
+        self._diagnose()
         self._flush()
         patience = min(timeout, self._session.deadline() - now)
         found += self._listen(max(patience, 0.0))
@@ -129,6 +143,8 @@ class Link:
         now = self._clock()
         if data and self._tap:
             self._tap(now, data)
+        if not self.counters.messages:
+            self._heard = (self._heard + data)[:_HEARD]
         if data and self._played and self._played.after_seek():
             self._decoder.forget()
             self._session.frames.expect_any()
@@ -138,6 +154,17 @@ class Link:
         found += self._follow_rate(now)
         self._flush()
         return found
+
+    def _diagnose(self) -> None:
+        """Once nobody has spoken for too long: find the likeliest cause."""
+        if self.counters.messages:
+            self.diagnosis = None
+        elif (
+            self.diagnosis is None
+            and self._session.stage is Stage.SETTING_UP
+            and isinstance(self.transport, Diagnosable)
+        ):
+            self.diagnosis = self.transport.diagnose(self._heard)
 
     def _follow_rate(self, now: float) -> list[Event]:
         """Follow the board to another rate; fall back to a slower one on a bad line."""
