@@ -138,9 +138,6 @@ function View() {
           {now.busy ? (progress.value ? doing(progress.value) : "preparing") : took}
         </span>
       </div>
-      {now.busy && progress.value?.stage && (
-        <progress value={progress.value.done} max={progress.value.stages} aria-label="Change of settings" />
-      )}
       {refused.value && refused.value.section === null && (
         <p class="wrong" role="alert">
           {refused.value.message}
