@@ -131,13 +131,16 @@ class Prepared:
         """The skin whose prior knows that data along ``directions`` (n_meas, k) say nothing.
 
         A prior that weighs by sensitivity then holds changes beside a lost electrode for as
-        likely as elsewhere. Trained operators, and those with a filter over frames, stay.
+        likely as elsewhere. Trained operators, and those with a filter over frames, stay, and so
+        does any where nothing else is left.
         """
         if self.skin.inverse.method != "one-step" or self.modes is not None:
             return self
         basis = np.linalg.qr(directions)[0]
         jacobian = self.problem.jacobian
         left = jacobian - basis @ (basis.T @ jacobian)
+        if not left.any(axis=0).all():  # nothing is left to weigh by
+            return self
         prior = _prior(self.skin).penalty(self.mesh, left)
         operator = replace(self.problem, prior=prior).operator(self.choice.alpha)
         return replace(self, operator=operator)
