@@ -131,7 +131,7 @@ class SettingsHandlers:
         self._asked: Skin = hub.runner.prepared.skin
         self._history = History()
         self._working = False
-        self._stage: int | None = None
+        self._stage: str | None = None
         self._took: float | None = None
         self._automatic = AutomaticAlpha()
         hub.serve(
@@ -148,7 +148,7 @@ class SettingsHandlers:
 
     def greeting(self) -> Sequence[str]:
         """The schema, the settings as they are, and how far a change is."""
-        return (schema(), self._message(), self._progress())
+        return (schema(), self._message(), _progress(self._stage))
 
     def _set(self, page: Listener, request: SetSettings) -> None:
         keys = sorted((s, k) for s, keys in request.changes.items() for k in keys)
@@ -248,18 +248,10 @@ class SettingsHandlers:
             if skin is not self._asked:
                 raise _SupersededError
             if stage:
-                loop.call_soon_threadsafe(self._tell_stage, stage)
+                self._stage = stage
+                loop.call_soon_threadsafe(self._hub.tell, [_progress(stage)])
 
         return watch
-
-    def _tell_stage(self, stage: str) -> None:
-        self._stage = STAGES.index(stage)
-        self._hub.tell([self._progress()])
-
-    def _progress(self) -> str:
-        """The progress message."""
-        stage = None if self._stage is None else STAGES[self._stage]
-        return text_of(type="progress", stage=stage, done=self._stage or 0, stages=len(STAGES))
 
     def _bring(self, skin: Skin) -> tuple[Prepared, float] | None:
         """Prepare ``skin`` and have the runner go on with it; in a thread.
@@ -298,6 +290,12 @@ class SettingsHandlers:
             files=Folder(self._hub.folder).skins(),
             builtin=Skin.names(),
         )
+
+
+def _progress(stage: str | None) -> str:
+    """The progress message; None: nothing is being changed."""
+    done = 0 if stage is None else STAGES.index(stage)
+    return text_of(type="progress", stage=stage, done=done, stages=len(STAGES))
 
 
 def _change(runner: Runner, prepared: Prepared, open_source: commands.Opener) -> None:

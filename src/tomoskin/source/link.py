@@ -100,7 +100,10 @@ class Link:
             found = self._session.tick(now)
         except SourceError as error:
             raise self.diagnosis or error from None
-        self._diagnose()
+        if self.counters.messages:
+            self.diagnosis = None
+        elif self.diagnosis is None and self._session.stage is Stage.SETTING_UP:
+            self.diagnosis = _diagnosis(self.transport, self._heard)
         self._flush()
         patience = min(timeout, self._session.deadline() - now)
         found += self._listen(max(patience, 0.0))
@@ -155,17 +158,6 @@ class Link:
         self._flush()
         return found
 
-    def _diagnose(self) -> None:
-        """Once nobody has spoken for too long: find the likeliest cause."""
-        if self.counters.messages:
-            self.diagnosis = None
-        elif (
-            self.diagnosis is None
-            and self._session.stage is Stage.SETTING_UP
-            and isinstance(self.transport, Diagnosable)
-        ):
-            self.diagnosis = self.transport.diagnose(self._heard)
-
     def _follow_rate(self, now: float) -> list[Event]:
         """Follow the board to another rate; fall back to a slower one on a bad line."""
         transport = self.transport
@@ -195,3 +187,8 @@ class Link:
         data = self._session.commands.take()
         if data:
             self.transport.write(data)
+
+
+def _diagnosis(transport: Transport, heard: bytes) -> SourceError | None:
+    """The likeliest cause of nobody's having spoken, where the transport can tell."""
+    return transport.diagnose(heard) if isinstance(transport, Diagnosable) else None

@@ -49,11 +49,12 @@ class TwinSkin:
         ``rest`` is what the sheet lies on at rest, and the mesh too.
         """
         self.model = model
-        self.contact, self.material, self.bend = settings.contact, settings.material, settings.bend
+        self.material, self.bend = settings.material, settings.bend
         self.rest = rest or Plane()
         self._outline = outline
         self._points = model.mesh.centroids
         self._blur = math.sqrt(float(model.mesh.volumes.mean())) / math.sqrt(12)
+        self._ground = settings.contact, self._points, self._blur
         spread, self._random = (
             np.random.default_rng(part) for part in np.random.SeedSequence(settings.seed).spawn(2)
         )
@@ -110,18 +111,13 @@ class TwinSkin:
         """What the cells feel under the present presses, in the present pose."""
         presses, pose = self._presses, self._pose
         if not _same((presses, pose), self._loaded):
-            dented = self._dent(presses)
+            if presses is not self._dented[0]:
+                self._dented = presses, indent(probes_of(presses), *self._ground)
+            dented = self._dented[1]
             given = dented.depth + depth_of(pose, self._points)
             self._load = Load(strain=dented.strain + self._strain(pose), depth=given)
             self._loaded = (presses, pose)
         return self._load
-
-    def _dent(self, presses: tuple[Contact, ...]) -> Load:
-        """What the ``presses`` alone do."""
-        if presses is not self._dented[0]:
-            dented = indent(probes_of(presses), self.contact, self._points, self._blur)
-            self._dented = presses, dented
-        return self._dented[1]
 
     def _strain(self, pose: Pose) -> FloatArray:
         """(n_cells, 3) of the pose alone."""
@@ -141,7 +137,7 @@ class TwinSkin:
         check_on_skin(presses, self._outline)
         if presses != self._presses:
             taken = tuple(presses)
-            self._dent(taken)
+            self._dented = taken, indent(probes_of(taken), *self._ground)
             self._presses = taken
 
     def set_pose(self, pose: Pose) -> None:
