@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
+import shutil
+import sys
 
 import pytest
 
@@ -209,3 +212,20 @@ def test_what_is_written_is_said(tomoskin, recorded, tmp_path):
     assert (code, "session import" in err) == (1, True)
     code, _, err = tomoskin("session", "export", recorded, tmp_path / "none" / "x.csv")
     assert (code, "make the folder first" in err) == (2, True)
+
+
+def test_a_file_whose_name_is_no_text_is_told(recorded, tmp_path, monkeypatch):
+    from tomoskin.cli import main
+
+    path = tmp_path / "run\udcff.mcap"
+    try:
+        shutil.copy(recorded, path)
+    except OSError as error:
+        pytest.skip(f"names are text here: {error}")
+    written = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written, "utf-8", errors="strict"))
+    with pytest.raises(SystemExit) as end:
+        main(["session", "info", str(path)])
+    sys.stdout.flush()
+    assert not end.value.code
+    assert b"run\\udcff.mcap" in written.getvalue()

@@ -164,3 +164,8 @@ def test_the_prior_knows_which_electrodes_are_gone(sixteen):
     )
     penalty = [p.operator.matrix[beside] for p in (sixteen, left)]
     assert np.linalg.norm(penalty[1]) > np.linalg.norm(penalty[0])
+
+
+def test_the_prior_stays_where_nothing_is_left(sixteen):
+    everything = np.eye(sixteen.pattern.n_meas)
+    assert sixteen.blind_to(everything) is sixteen

@@ -14,7 +14,7 @@ from tomoskin.core import DataError, Frame, SourceError
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.recording import Mark, SessionReader, advance, replayed
-from tomoskin.recording.replay import ReplayTransport, open_replay
+from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.run import Runner, commands
 from tomoskin.run.flow import MOST_AT_ONCE
 from tomoskin.skin import Skin
@@ -410,9 +410,20 @@ def test_another_skin_is_refused(run):
         open_replay(str(run), Skin.load("textile-disc-16"))
 
 
-@pytest.mark.parametrize("speed", ["@0", "@-1", "@fast", "@nan", "@1,twice", "@"])
+@pytest.mark.parametrize(
+    ("rest", "speed", "loop"),
+    [("", 1, False), (",loop", 1, True), ("@2", 2, False), ("@2,loop", 2, True)],
+)
+@pytest.mark.parametrize("name", ["run.mcap", "a@2,loop.mcap", "a,b@lab.mcap"])
+def test_what_stands_behind_a_file(tmp_path, name, rest, speed, loop):
+    file = tmp_path / name
+    file.touch()
+    assert parse_replay(f"{file}{rest}") == (file, speed, loop)
+
+
+@pytest.mark.parametrize("speed", ["@0", "@-1", "@fast", "@nan", "@1,twice", "@", ",twice"])
 def test_an_impossible_speed_is_refused(run, prepared, speed):
-    with pytest.raises((SourceError, DataError), match=r"expected a speed|no such file"):
+    with pytest.raises((SourceError, DataError), match=r"expected perhaps @SPEED|no such file"):
         open_replay(f"{run}{speed}", prepared.skin)
 
 

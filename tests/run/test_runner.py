@@ -18,6 +18,7 @@ from tomoskin.run.flow import MOST_AT_ONCE
 from tomoskin.run.publisher import EventLog
 from tomoskin.run.recordings import Recordings
 from tomoskin.skin import Skin
+from tomoskin.source import Timing
 from tomoskin.twin import Press
 from tomoskin.wire import Start, Stop
 
@@ -138,6 +139,60 @@ def test_presses_of_all_owners_reach_the_source(runner, board, until):
     until(lambda: board.presses == (two,))
     runner.ask(commands.HoldPresses("b", ()))
     until(lambda: board.presses == () and runner.newest.truth == ())
+
+
+def test_a_press_that_cannot_be_solved_is_refused_and_the_source_goes_on(runner, board, until):
+    good, bad = Press(0, 0, 1, 0.01), Press(0.01, 0, 2, 0.01)
+    take = board.set_presses
+
+    def solve(presses):
+        if bad in presses:
+            raise ZeroDivisionError("float division by zero")
+        take(presses)
+
+    board.set_presses = solve
+    runner.start()
+    for _ in range(3):
+        runner.ask(commands.HoldPresses("a", (bad, good)))
+    until(lambda: runner.newest and runner.newest.truth == (good,) == board.presses)
+    _, happened = runner.events.since(0)
+    refused = [event.text for event in happened if event.kind == "press-refused"]
+    assert refused == ["a press is left out: ZeroDivisionError: float division by zero"]
+    assert not [event for event in happened if event.kind == "source-lost"]
+    runner.ask(commands.HoldPresses("a", ()))
+    until(lambda: board.presses == ())
+
+
+class Silent(Board):
+    """A port behind which nobody speaks, that knows why."""
+
+    def __init__(self):
+        super().__init__()
+        self._out.clear()
+        self.diagnosed = threading.Semaphore(0)
+
+    def _answer(self, _command):
+        return b""
+
+    def diagnose(self, heard):
+        assert heard == b""
+        self.diagnosed.release()
+        return SourceError("likely the wrong port", where="port", hint="try another")
+
+
+def test_why_no_board_answers_is_said_once_and_stands_until_one_does(prepared, monkeypatch):
+    monkeypatch.setattr("tomoskin.source.link.Timing", lambda: Timing(0.01, 0.01, 1, goodbye=0.01))
+    board = Silent()
+    runner = Runner(prepared, lambda: board)
+    runner.start()
+    for _ in range(3):
+        assert board.diagnosed.acquire(timeout=PATIENCE)
+    status = runner.status()
+    _, happened = runner.events.since(0)
+    runner.stop()
+    assert not status.running
+    assert status.problem == "port: likely the wrong port (try another)"
+    assert [event.kind for event in happened] == ["no-answer"]
 
 
 def test_losses_are_counted(prepared, idle):

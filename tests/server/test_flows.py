@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -85,13 +87,26 @@ def test_links_and_folders_are_no_files(tmp_path):
     (inside / "run.mcap").write_bytes(b"run")
     (inside / "notes.txt").write_bytes(b"not listed")
     folder = Folder(inside)
-    assert [file.name for file in folder.list_files()] == ["run.mcap"]
+    assert [file.name for file in folder.list_files().files] == ["run.mcap"]
     for name in ("link.npz", "folder.npz", "none.npz"):
         with pytest.raises(DataError, match="no such file"):
             folder.existing(name)
     with pytest.raises(DataError, match=r"ends in \.npz"):
         folder.existing("run.mcap", ".npz")
     assert folder.existing("run.mcap").read_bytes() == b"run"
+
+
+def test_names_that_no_page_may_ask_for_are_counted(tmp_path):
+    names = (b"run.mcap", b"skin.toml", b"two words.toml", b"a.b.toml", b"\xff.txt")
+    try:
+        for name in (*names, b"sk\xffn.toml", b"r\xff.mcap"):
+            Path(os.fsdecode(os.fsencode(tmp_path) + b"/" + name)).touch()
+    except OSError as error:
+        pytest.skip(f"names are text here: {error}")
+    found = Folder(tmp_path).list_files()
+    assert {file.name for file in found.files} == {"run.mcap", "skin.toml", "a.b.toml"}
+    assert found.others == 3
+    assert Folder(tmp_path).skins() == ["skin"]
 
 
 def test_a_name_that_is_taken_gets_a_number(tmp_path):

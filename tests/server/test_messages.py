@@ -133,6 +133,13 @@ def test_the_line_of_state_says_the_problem_first():
     assert "paused" in make_status(paused=True).text
 
 
+def test_whatever_a_file_is_called_the_state_is_told():
+    status = make_status(source="skin on replay:\udcff.mcap", recording=Path("r\udcff.mcap"))
+    told = json.loads(page_messages.state(status))
+    assert told["recording"] == "r?.mcap"
+    assert told["text"].startswith("skin on replay:?.mcap")
+
+
 def test_event_and_error():
     event = json.loads(page_messages.event(Event(1.5, "lost", "2 frames lost")))
     assert event == {"type": "event", "time_s": 1.5, "kind": "lost", "text": "2 frames lost"}

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from run.board import Board
-from run.test_runner import Watch
-from tomoskin.core import PatternError
+from run.test_runner import PATIENCE, Watch
+from tomoskin.core import PatternError, reach
 from tomoskin.core.outputs import MAGIC
 from tomoskin.pattern import named
 from tomoskin.pipeline import colour_limit, prepare
@@ -20,6 +20,7 @@ from tomoskin.run import Runner, commands
 from tomoskin.server import Hub, SettingsHandlers
 from tomoskin.server.requests import decode_request
 from tomoskin.server.settings_form import table_of
+from tomoskin.server.settings_handlers import STAGES
 
 CHANGES = {
     "alpha": {"inverse": {"alpha": 0.05}},
@@ -55,6 +56,19 @@ class Heard:
 
     def last(self, kind):
         return next((m for m in reversed(self.told) if m["type"] == kind), None)
+
+
+class Unpressable:
+    """A board as on a cable."""
+
+    def __init__(self, board):
+        self.name = "board on a cable"
+        self.read, self.write, self.close = board.read, board.write, board.close
+        self._board = board
+
+    @property
+    def closed(self):
+        return self._board.closed
 
 
 class Office:
@@ -142,18 +156,85 @@ def test_a_setting_that_cannot_be_is_refused_in_words(office, changes, section, 
     assert office.runner.prepared is before
 
 
-def test_another_sheet_opens_the_source_anew(office, idle):
-    opened = []
+def test_another_sheet_opens_a_simulated_source_anew_while_the_old_one_goes_on(office, board, idle):
+    opened, closed = [], []
 
     def opener(skin):
         opened.append(skin)
+        closed.append(board.closed)
         return Board(free=idle)
 
     office.hub.opener = opener
     office.ask(settings(material={"sheet_resistance": "2 ohm/sq"}))
     assert opened == [office.runner.prepared.skin]
+    assert closed == [False]
+    assert board.closed
+    told = [m for m in office.page.told if m["type"] == "progress" and m["stage"]]
+    assert list(dict.fromkeys(m["stage"] for m in told)) == list(STAGES)
+    assert [m["done"] for m in told] == sorted(m["done"] for m in told)
     assert office.runner.prepared.skin.conductivity == pytest.approx(0.5)
     assert office.page.last("scene") is not None
+
+
+def test_a_port_is_let_go_before_it_is_opened_again(prepared, idle, tmp_path):
+    boards, closed = [], []
+
+    def opener(_skin):
+        closed.extend(board.closed for board in boards)
+        boards.append(Unpressable(Board(free=idle)))
+        return boards[-1]
+
+    runner = Runner(prepared, lambda: opener(prepared.skin))
+    runner.start()
+    Watch(runner).until(lambda: runner.newest and runner.newest.result.ready)
+    office = Office(runner, tmp_path)
+    office.hub.opener = opener
+    office.ask(settings(material={"sheet_resistance": "2 ohm/sq"}))
+    runner.stop()
+    assert closed == [True]
+
+
+def test_a_newer_change_ends_an_older_one(office, monkeypatch):
+    begun, ended = [], []
+
+    def prepare_endlessly(skin, previous):
+        if skin.inverse.alpha != 0.5:
+            return prepare(skin, previous)
+        begun.append(skin)
+        try:
+            while True:
+                reach()
+        finally:
+            ended.append(skin)
+
+    async def ask():
+        async with office.hub.running():
+            office.hub.join(office.page)
+            for alpha in (0.5, 0.3):
+                change = settings(inverse={"alpha": alpha})
+                office.hub.obey(office.page, decode_request(msgspec.json.encode(change)))
+                while not begun:
+                    await asyncio.sleep(0)
+            while office.page.last("settings")["busy"]:
+                await asyncio.sleep(0)
+
+    monkeypatch.setattr("tomoskin.server.settings_handlers.prepare", prepare_endlessly)
+    asyncio.run(asyncio.wait_for(ask(), PATIENCE))
+    assert len(begun) == len(ended) == 1
+    adopted(office, alpha=0.3)
+    assert office.page.last("settings_error") is None
+
+
+def test_what_nobody_expected_is_refused_and_the_next_change_is_made(office, monkeypatch):
+    def fail(_skin, _previous):
+        raise ZeroDivisionError("by zero")
+
+    with monkeypatch.context() as broken:
+        broken.setattr("tomoskin.server.settings_handlers.prepare", fail)
+        office.ask(settings(inverse={"alpha": 0.2}))
+    assert "ZeroDivisionError: by zero" in office.page.last("settings_error")["message"]
+    office.ask(settings(inverse={"alpha": 0.3}))
+    adopted(office, alpha=0.3)
 
 
 def test_saved_and_loaded(office, tmp_path):

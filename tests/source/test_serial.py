@@ -5,14 +5,16 @@ import os
 import select
 import threading
 import time
+from itertools import count
 
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from source.boards import BOARD, SCAN, SETTINGS, Counting, frames, poll_until
 from tomoskin.core import SourceError
-from tomoskin.source import Link
+from tomoskin.source import Link, Timing
 from tomoskin.source import serial as port
+from tomoskin.source.silence import SIGN_ON
 from tomoskin.twin import TwinDevice
 
 pytest.importorskip("pty")
@@ -86,6 +88,54 @@ def test_unplugged_while_scanning(bench):
     with pytest.raises(SourceError, match="gone away"):
         poll_until(link, lambda _: False)
     link.close()
+
+
+class Stranger:
+    """What is behind a pseudo-terminal that no board is behind: answers once what it is asked."""
+
+    def __init__(self, answers):
+        import tty
+
+        self._master, slave = os.openpty()
+        tty.setraw(slave)
+        self.path = os.ttyname(slave)
+        self._slave, self._answers = slave, answers
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self):
+        asked = b""
+        while SIGN_ON not in asked:
+            asked += os.read(self._master, 4096)
+        os.write(self._master, self._answers)
+
+    def say(self, words):
+        os.write(self._master, words)
+
+    def close(self):
+        os.write(self._slave, SIGN_ON)  # lets the thread end where nobody has asked
+        self._thread.join()
+        os.close(self._master)
+        os.close(self._slave)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [(b"", "in its bootloader"), (b"hello from a sketch\r\n", "something else speaks there")],
+)
+def test_where_no_board_answers_the_likeliest_cause_is_found_and_raised(words, says):
+    stranger = Stranger(bytes.fromhex("1b01000b0e010008") + b"AVRISP_2")
+    timing = Timing(hello=0.1, answer=0.02, tries=2, goodbye=0.0)
+    passing = count(0.0, 0.01)  # the time between two looks at the clock, whatever the load
+    transport = port.SerialTransport(stranger.path)
+    link = Link(transport, SCAN, SETTINGS, timing=timing, clock=lambda: next(passing))
+    stranger.say(words)
+    with pytest.raises(SourceError, match=says) as raised:
+        poll_until(link, lambda _: False)
+    assert link.diagnosis is raised.value
+    assert link.transport.rate == port.BAUD
+    link.close()
+    stranger.close()
 
 
 def test_reading_and_writing_after_close(bench):

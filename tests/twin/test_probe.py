@@ -6,7 +6,7 @@ import pytest
 
 from tomoskin.core import GeometryError, ModelError
 from tomoskin.mesh import Disc
-from tomoskin.twin import Circle, Face, Finger, Press, Probe, Square
+from tomoskin.twin import FACES, Circle, Face, Finger, Press, Probe, Square
 from tomoskin.twin.probe import check_on_skin
 
 
@@ -15,8 +15,8 @@ from tomoskin.twin.probe import check_on_skin
     [
         ((math.nan, 0, 1, 0.01), GeometryError, "finite place"),
         ((0, math.inf, 1, 0.01), GeometryError, "finite place"),
-        ((0, 0, 1, 0.0), GeometryError, "radius above 0"),
-        ((0, 0, 1, math.nan), GeometryError, "radius above 0"),
+        ((0, 0, 1, 0.0), GeometryError, "expected radius of 1 µm or more"),
+        ((0, 0, 1, math.nan), GeometryError, "expected radius of 1 µm or more"),
         ((0, 0, -0.1, 0.01), ModelError, "push, not pull"),
         ((0, 0, math.nan, 0.01), ModelError, "force of 0 N or more"),
     ],
@@ -43,10 +43,11 @@ def test_a_press_is_a_flat_round_probe():
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: Circle(0.0), "radius above 0"),
-        (lambda: Circle(0.01, -1.0), "crown above 0"),
-        (lambda: Square(math.nan), "side above 0"),
-        (lambda: Finger(across=math.inf), "across above 0"),
+        (lambda: Circle(0.0), "expected radius of 1 µm or more"),
+        (lambda: Circle(0.01, -1.0), "expected crown of 1 µm or more"),
+        (lambda: Square(math.nan), "expected side of 1 µm or more"),
+        (lambda: Finger(across=math.inf), "expected across of 1 µm or more"),
+        (lambda: FACES["finger"](1e-300), "expected length of 1 µm or more"),
         (lambda: Face(((0, 0), (0.01, 0.01), (0.01, 0), (0, 0.01))), "cross"),
         (lambda: Face(((0, 0), (0.01, 0.0))), "at least 3"),
         (lambda: Face(((0, 0), (0.01, 0.0), (0.02, 0.0))), "area|touch|cross|side"),

@@ -13,6 +13,7 @@ from tomoskin.twin import (
     PRESETS,
     Circle,
     ElectronicsSettings,
+    Face,
     Faults,
     Finger,
     Press,
@@ -97,7 +98,11 @@ def test_a_refused_press_changes_nothing(sheet):
     sheet.set_presses(good)
     with pytest.raises(GeometryError, match="off the skin"):
         sheet.set_presses((Press(1, 0, 1, 0.01),))
+    speck = Face(((0.01, 0.01), (0.0101, 0.01), (0.01, 0.0101)))  # between two nodes of its grid
+    with pytest.raises(GeometryError, match="covers no node"):
+        sheet.set_presses((*good, Probe(speck, 0, 0.03, 1.0)))
     assert sheet.presses == good
+    sheet.resistance()
 
 
 def test_potentials_are_those_of_the_analytic_disc(skin):

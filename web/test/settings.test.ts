@@ -2,7 +2,7 @@ import { describe, expect, it, vi } from "vitest";
 
 vi.stubGlobal("window", { location: { href: "http://127.0.0.1/" }, setTimeout, clearTimeout });
 
-const { stands, typed } = await import("../src/settings/model");
+const { doing, stands, typed } = await import("../src/settings/model");
 
 describe("what a person types", () => {
   it("gets the unit that was there, else the schema's", () => {
@@ -25,4 +25,9 @@ it("a key stands only beside the choice that it goes with", () => {
   const count = { when: null, unless: "positions" } as never;
   expect(stands(count, { positions: null })).toBe(true);
   expect(stands(count, { positions: [[0, 1]] })).toBe(false);
+});
+
+it("a change says what it is doing, and how far it is", () => {
+  expect(doing({ type: "progress", stage: "image", done: 2, stages: 5 })).toBe("preparing images, 3 of 5");
+  expect(doing({ type: "progress", stage: null, done: 0, stages: 5 })).toBe("preparing");
 });

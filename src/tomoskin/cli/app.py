@@ -8,6 +8,7 @@ by :func:`group`) that imports heavy rooms inside, and its sentence in the list 
 from __future__ import annotations
 
 import inspect
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -141,6 +142,7 @@ def _options(
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run a command and exit: 0 done, 1 failed, 2 wrong usage."""
+    _write_any_name()
     try:
         app(args=None if arguments is None else list(arguments), prog_name="tomoskin")
     except OutputError as error:
@@ -158,6 +160,12 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             f"(set {DEBUG}=1 to see where, and please report it)"
         )
     sys.exit(0)
+
+
+def _write_any_name() -> None:
+    """Let stdout take names of files that are no text, as stderr does."""
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def _fail(message: str, code: int = 1) -> NoReturn:

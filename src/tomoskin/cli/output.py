@@ -91,9 +91,9 @@ JsonFlag = Annotated[bool, typer.Option("--json", help="Machine-readable output.
 
 def emit(document: Any) -> None:
     """Write ``document`` as one line of JSON on stdout, at once."""
-    import msgspec
+    from tomoskin.core import encode_json
 
-    typer.echo(msgspec.json.encode(document).decode())
+    typer.echo(encode_json(document).decode())
 
 
 def tell(document: Any, lines: Iterable[str | Table], *, json: bool) -> None:

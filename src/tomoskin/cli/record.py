@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from tomoskin.run import Runner, Status
 
 _OFTEN = 0.1
+_TROUBLES = frozenset({"no-answer", "source-lost", "silent", "fault", "internal"})
+"""Events after which no frames come."""
 
 
 def record(
@@ -97,9 +99,33 @@ def recording_to(runner: Runner, file: Path | None) -> Iterator[None]:
             file.unlink(missing_ok=True)
         raise
     try:
-        yield
+        with _troubles_told(runner):
+            yield
     finally:
         runner.stop()
+
+
+@contextlib.contextmanager
+def _troubles_told(runner: Runner) -> Iterator[None]:
+    """While the block lasts, say on stderr why no frames come, and when they come again."""
+    ended = threading.Event()
+
+    def tell() -> None:
+        number, troubled = 0, False
+        while not ended.wait(_OFTEN):
+            number, happened = runner.events.since(number)
+            for event in happened:
+                if event.kind in _TROUBLES or (troubled and event.kind == "connected"):
+                    remark(event.text)
+                    troubled = event.kind in _TROUBLES
+
+    thread = threading.Thread(target=tell, name="troubles", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 def _wait(runner: Runner, seconds: float | None, frames: int | None) -> None:

@@ -19,12 +19,14 @@ from tomoskin.core.errors import (
     WireError,
 )
 from tomoskin.core.outputs import MAGIC, RECORDING, Output, check_outputs
+from tomoskin.core.stages import reach, watch_stages
 from tomoskin.core.units import DIMENSIONS, parse_quantity
 from tomoskin.core.written import write_text, written
 
 if TYPE_CHECKING:
     from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
+    from tomoskin.core.json_bytes import encode_json
     from tomoskin.core.memory import check_fits, machine_memory, most_bytes
     from tomoskin.core.records import (
         ComplexArray,
@@ -48,6 +50,7 @@ _HOME = {
     "ColourScale": "colours",
     "check_fits": "memory",
     "electrode_table": "typed_arrays",
+    "encode_json": "json_bytes",
     "load_arrays": "archive",
     "machine_memory": "memory",
     "most_bytes": "memory",
@@ -95,15 +98,18 @@ __all__ = [
     "check_fits",
     "check_outputs",
     "electrode_table",
+    "encode_json",
     "load_arrays",
     "machine_memory",
     "most_bytes",
     "numbers",
     "pack_arrays",
     "parse_quantity",
+    "reach",
     "real_numbers",
     "save_arrays",
     "unpack_arrays",
+    "watch_stages",
     "whole_number",
     "write_text",
     "written",

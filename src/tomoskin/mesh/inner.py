@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.spatial import Delaunay, cKDTree
 
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray, IntArray, reach
 from tomoskin.mesh.boundary import Boundary, keeps_clear, rim_distance
 from tomoskin.mesh.polygon import inside
 from tomoskin.mesh.sizing import SizeField
@@ -126,6 +126,7 @@ def smoothed(rim: Boundary, inner: FloatArray, field: SizeField) -> FloatArray:
     schemes based on optimal Delaunay triangulations", CMAME 200 (2011) 967-984.
     """
     for number in range(ROUNDS):
+        reach()
         cells = triangles(rim, inner)
         if number in MENDS:
             inner = _mended(rim, inner, cells, field)

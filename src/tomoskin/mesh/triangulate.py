@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tomoskin.core import FloatArray, GeometryError, IntArray
+from tomoskin.core import FloatArray, GeometryError, IntArray, reach
 from tomoskin.mesh.boundary import Boundary, ElectrodeArc, check_arcs, discretise
 from tomoskin.mesh.inner import inner_points, smoothed, triangles
 from tomoskin.mesh.mesh import Mesh
@@ -109,6 +109,7 @@ def _sized(
     plans: list[_Plan] = []
     last = math.inf
     for turn in range(_SEARCH):
+        reach()
         rim = discretise(outline, arcs, corners, coarse, growth)
         field = SizeField(coarse, rim.midpoints, np.minimum(rim.lengths, coarse), growth)
         inner = inner_points(rim, field, np.random.default_rng(seed))

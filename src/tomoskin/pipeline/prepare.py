@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.calibration import Calibration, Kind
-from tomoskin.core import FloatArray, Image, IntArray, ModelError
+from tomoskin.core import FloatArray, Image, IntArray, ModelError, reach
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import (
     AlphaChoice,
@@ -136,13 +136,16 @@ class Prepared:
         """The skin whose prior knows that data along ``directions`` (n_meas, k) say nothing.
 
         A prior that weighs by sensitivity then holds changes beside a lost electrode for as
-        likely as elsewhere. Trained operators, and those with a filter over frames, stay.
+        likely as elsewhere. Trained operators, and those with a filter over frames, stay, and so
+        does any where nothing else is left.
         """
         if self.skin.inverse.method != "one-step" or self.modes is not None:
             return self
         basis = np.linalg.qr(directions)[0]
         jacobian = self.problem.jacobian
         left = jacobian - basis @ (basis.T @ jacobian)
+        if not left.any(axis=0).all():  # nothing is left to weigh by
+            return self
         prior = _prior(self.skin).penalty(self.mesh, left)
         operator = replace(self.problem, prior=prior).operator(self.choice.alpha)
         return replace(self, operator=operator)
@@ -186,12 +189,15 @@ def prepare(skin: Skin, previous: Prepared | None = None) -> Prepared:
     ------
     TomoskinError
         When the skin cannot be meshed, modelled or inverted; the message says which.
+
+    Its stages are told to :func:`~tomoskin.core.watch_stages`.
     """
     if previous is not None and previous.skin.body == skin.body:
         return _prepared(skin, _problem_after(previous, skin), previous)
-    model = ForwardModel(
-        skin.mesh(), skin.pattern(), skin.contact_impedance, skin.polarity * skin.current
-    )
+    reach("mesh")
+    mesh = skin.mesh()
+    reach("model")
+    model = ForwardModel(mesh, skin.pattern(), skin.contact_impedance, skin.polarity * skin.current)
     return _prepared(skin, _problem(model, skin))
 
 
@@ -245,12 +251,14 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
     scan = Scan.of(model.pattern)
     readout = Readout.of(scan, skin.readout)
     same = previous is not None and previous.problem is problem
+    reach("image")
     light_touch, choice, operator = _chosen(
         problem, skin, readout, previous.light_touch if previous and same else None
     )
     segmenter = previous.segmenter if previous and previous.skin.touch == skin.touch else None
     calibrations = previous.calibrations if previous else {}
     spots = None
+    reach("touches")
     if _fits(skin, calibrations):
         kept = previous.spots if previous and _same_difference(previous.skin, skin) else None
         spots = kept or SpotModel.of(skin, model)

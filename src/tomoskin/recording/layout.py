@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from tomoskin import core
 from tomoskin.core import DataError, Detection, Event, Frame, Touch
 
 _CDR = b"\x00\x01\x00\x00"
@@ -128,7 +129,7 @@ class RecordedTouches:
 
 def encode_json(content: Mapping[str, Any]) -> bytes:
     """JSON whose numbers come back to the bit; what is not finite becomes null."""
-    return msgspec.json.encode(content, enc_hook=_number)
+    return core.encode_json(content, _number)
 
 
 def plain(item: Any) -> dict[str, Any]:

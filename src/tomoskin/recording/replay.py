@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -193,7 +194,7 @@ class ReplayTransport:
 
 
 def open_replay(argument: str, skin: Skin) -> ReplayTransport:
-    """``replay:FILE``, ``replay:FILE@2`` (speed), ``replay:FILE@max``, ``replay:FILE@1,loop``.
+    """``replay:FILE``, ``replay:FILE@2`` (speed), ``replay:FILE@max``, each perhaps with ``,loop``.
 
     Raises
     ------
@@ -211,22 +212,29 @@ def open_replay(argument: str, skin: Skin) -> ReplayTransport:
         raise
 
 
+_SPEED, _OPTION = r"@(?P<speed>[^@,/\\]*)", r",(?P<option>[^@,/\\]*)"
+_TAILS = ("", _OPTION, _SPEED, _SPEED + _OPTION)
+"""What may stand behind the file of a replay."""
+
+
 def parse_replay(argument: str) -> tuple[Path, float, bool]:
     """File, speed and whether to begin again, of what stands behind ``replay:``."""
-    path, at, rest = argument.rpartition("@")
-    if not at or Path(argument).exists():
-        path, rest = argument, "1"
-    if not path:
+    found = [m for tail in _TAILS if (m := re.fullmatch(f"(.+?){tail}", argument, re.DOTALL))]
+    if not found:
         raise SourceError("expected a session file, such as replay:run.mcap", where="replay")
-    text, *options = rest.split(",")
+    # what is called so is meant, whatever is in its name
+    match = next((m for m in found if Path(m[1]).exists()), found[-1])
+    path, words = match[1], match.groupdict()
+    text, option = words.get("speed", "1"), words.get("option", "loop")
     speed = math.inf if text == "max" else _number(text)
-    if not speed > 0 or options not in ([], ["loop"]):
+    if not speed > 0 or option != "loop":
         raise SourceError(
-            f'expected a speed above 0 or max, then perhaps ,loop, got "@{rest}"',
+            "expected perhaps @SPEED, above 0 or max, then perhaps ,loop; "
+            f'got "{argument.removeprefix(path)}"',
             where=f"replay:{path}",
-            hint="for example replay:run.mcap@2 or replay:run.mcap@1,loop",
+            hint="for example replay:run.mcap,loop or replay:run.mcap@2,loop",
         )
-    return Path(path), speed, bool(options)
+    return Path(path), speed, "option" in words
 
 
 def _number(text: str) -> float:

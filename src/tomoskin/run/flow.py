@@ -114,9 +114,13 @@ class Flow:
 
     def press(self, transport: Transport) -> None:
         """Let the source feel what is pressed now."""
+        before = self.twin.refusals
         if isinstance(transport, Pressable) and self.twin.press(transport):
             presses = tuple(map(described, self.twin.truth))
             self.out.put(Truth(self._clock(), presses, self.twin.pose.truth))
+            for why in dict.fromkeys(self.twin.refusals):
+                if why not in before:
+                    self.out.say("press-refused", f"a press is left out: {why}")
 
     def do(self, command: DirectCommand) -> None:
         """Carry out what any thread may do.

@@ -53,6 +53,7 @@ class Loop:
 
     def run(self, transport: Transport | None) -> None:
         """Follow ``transport``, and what comes after it; returns at the end."""
+        self.trouble = _WAITING
         try:
             # a frame's products are small: more threads would only wait for each other
             with threadpool_limits(1):
@@ -69,19 +70,27 @@ class Loop:
 
     def _follow(self, transport: Transport) -> None:
         """Take frames until the source is lost or to be left."""
-        flow, self.trouble = self.flow, _WAITING
+        flow = self.flow
         try:
             with flow.link(transport) as link:
                 while not self._is_over():
                     flow.press(transport)
                     items = link.poll(_POLL)
-                    self.trouble = None if link.running else _WAITING
+                    if link.running:
+                        self.trouble = None
+                    elif link.diagnosis is not None:
+                        self._report("no-answer", str(link.diagnosis))
                     flow.take(link, items)
         except TomoskinError as error:
-            self.trouble = str(error)
-            flow.out.say("source-lost", str(error))
+            self._report("source-lost", str(error))
         finally:
             flow.unlink()
+
+    def _report(self, kind: str, trouble: str) -> None:
+        """Say why no frames come, unless that is known already."""
+        if trouble != self.trouble:
+            self.trouble = trouble
+            self.flow.out.say(kind, trouble)
 
     def _is_over(self) -> bool:
         """Carry out what is asked; whether the source of the moment is to be left."""
@@ -153,5 +162,6 @@ class Loop:
         self.flow.out.stop()
         self.flow, self.open = Flow(change.prepared, self._audience), opener
         self.flow.begin(transport)
+        self.trouble = _WAITING
         future.set_result(None)
         return transport

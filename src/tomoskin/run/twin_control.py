@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
-from tomoskin.core import WireError
+from tomoskin.core import TomoskinError, WireError
 from tomoskin.mesh import Arm, Hinge, Plane, Surface
 from tomoskin.run.twin_requests import BendRequest, SetPose, SetTwin
 from tomoskin.twin import Bent, Contact, Faults, Pose, Press, Stretched
@@ -100,6 +101,8 @@ class TwinControl:
         Whether the source can be pressed.
     truth
         The presses that the source feels.
+    refusals
+        Why it does not feel the others.
     pose
         How its sheet is bent and stretched.
     harm
@@ -110,6 +113,7 @@ class TwinControl:
         """Nothing is done, and there is no source."""
         self.pressable = False
         self.truth: tuple[Contact, ...] = ()
+        self.refusals: tuple[str, ...] = ()
         self.pose = SheetPose()
         self.harm = SetTwin((), None)
         self._presses: dict[object, tuple[Contact, ...]] = {}
@@ -163,9 +167,8 @@ class TwinControl:
         if not self._is_due:
             return False
         self._is_due = False
-        presses = tuple(press for held in self._presses.values() for press in held)
-        source.set_presses(presses)
-        self.truth = presses
+        asked = tuple(press for held in self._presses.values() for press in held)
+        self.truth, self.refusals = _felt(source, asked)
         return True
 
     def _break(self, harm: SetTwin) -> None:
@@ -179,6 +182,26 @@ class TwinControl:
             self._bendable.set_pose(pose.pose)
             self.pose = pose
         self._is_due = True
+
+
+def _felt(
+    source: Pressable, presses: tuple[Contact, ...]
+) -> tuple[tuple[Contact, ...], tuple[str, ...]]:
+    """Those of ``presses`` that ``source`` takes, and why it does not take the others."""
+    with contextlib.suppress(Exception):  # which of them it was is found below
+        source.set_presses(presses)
+        return presses, ()
+    felt: tuple[Contact, ...] = ()
+    refusals = []
+    for press in presses:
+        try:
+            source.set_presses((*felt, press))
+            felt = (*felt, press)
+        except Exception as error:  # whatever it is, the source goes on
+            known = isinstance(error, TomoskinError)
+            refusals.append(str(error) if known else f"{type(error).__name__}: {error}")
+    source.set_presses(felt)
+    return felt, tuple(refusals)
 
 
 def described(contact: Contact) -> dict[str, Any]:

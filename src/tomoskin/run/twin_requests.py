@@ -39,7 +39,7 @@ class PressRequest(StrictRequest, frozen=True):
     x: _Place
     y: _Place
     force: Annotated[float, Meta(ge=0, le=MAX_FORCE)]
-    radius: Annotated[float, Meta(gt=0, le=1)]
+    radius: Annotated[float, Meta(ge=1e-4, le=1)]
     shape: Literal["circle", "square", "finger", "polygon"] = "circle"
     angle: _Turn = 0.0
     vertices: Annotated[tuple[tuple[_Corner, _Corner], ...], Meta(max_length=24)] | None = None

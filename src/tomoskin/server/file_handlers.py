@@ -8,7 +8,7 @@ from pathlib import Path
 from tomoskin.core import DataError, WireError
 from tomoskin.formats import WRITERS, Export
 from tomoskin.recording import SessionReader
-from tomoskin.server.folder import FileEntry, Folder
+from tomoskin.server.folder import Folder, Listing
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_messages import text_of
 from tomoskin.server.requests import ExportSession, GoLive, ListFiles, OpenSession
@@ -39,11 +39,11 @@ class FileHandlers:
         )
 
     def _list(self, page: Listener) -> None:
-        def answer(files: list[FileEntry]) -> None:
+        def answer(found: Listing) -> None:
             page.post(
                 text_of(
                     type="files",
-                    files=[asdict(file) for file in files],
+                    **asdict(found),
                     recording=self._recording(),
                     playing=self._playing(),
                     exporting=self._exporting,

@@ -25,6 +25,7 @@ KINDS = {
 MOST_FILES = 200
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,119}")
+_STEM = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,23 +39,44 @@ class FileEntry:
 
 
 @dataclass(frozen=True, slots=True)
+class Listing:
+    """Files that are handed out, the newest first, and how many others of their kinds there are."""
+
+    files: tuple[FileEntry, ...]
+    others: int
+
+
+@dataclass(frozen=True, slots=True)
 class Folder:
     """Files of one folder; neither those of others in it nor what links lead to."""
 
     path: Path
 
-    def list_files(self) -> list[FileEntry]:
-        """Files that are handed out, the newest first, at most :data:`MOST_FILES`."""
-        entries = []
+    def list_files(self) -> Listing:
+        """At most :data:`MOST_FILES`; those with names that no page may ask for are counted.
+
+        Raises DataError where the folder cannot be read.
+        """
+        entries, others = [], 0
         try:
             for path in self.path.iterdir():
-                if _is_offered(path.name) and path.is_file() and not path.is_symlink():
-                    about = path.stat()
-                    kind = KINDS[path.suffix]
-                    entries.append(FileEntry(path.name, kind, about.st_size, about.st_mtime))
+                if path.suffix not in KINDS or not path.is_file() or path.is_symlink():
+                    continue
+                if not _is_offered(path.name):
+                    others += 1
+                    continue
+                about = path.stat()
+                kind = KINDS[path.suffix]
+                entries.append(FileEntry(path.name, kind, about.st_size, about.st_mtime))
         except OSError as error:
             raise DataError(f"cannot be read: {error.strerror}", where="the folder") from error
-        return sorted(entries, key=lambda file: -file.written)[:MOST_FILES]
+        newest = sorted(entries, key=lambda file: -file.written)
+        return Listing(tuple(newest[:MOST_FILES]), others + len(newest[MOST_FILES:]))
+
+    def skins(self) -> list[str]:
+        """Stems of the skin files that a page may ask for, in the order of the alphabet."""
+        stems = (path.stem for path in self.path.glob("*.toml"))
+        return sorted(stem for stem in stems if _STEM.fullmatch(stem))[:MOST_FILES]
 
     def existing(self, name: str, *endings: str) -> Path:
         """A file of this folder by its name; DataError where there is none that may be had."""

@@ -8,7 +8,7 @@ from collections import deque
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from tomoskin.core import WireError
+from tomoskin.core import TomoskinError, WireError
 from tomoskin.server import page_messages
 from tomoskin.server.hub import Hub
 from tomoskin.server.requests import decode_request
@@ -74,7 +74,7 @@ class Page:
             if text is None:
                 raise WireError("expected text, got a binary message")
             self._hub.obey(self, decode_request(text))
-        except WireError as error:
+        except TomoskinError as error:
             self.post(page_messages.error(str(error)))
 
     async def _write(self) -> None:
@@ -91,6 +91,7 @@ class Page:
     async def _send(self) -> None:
         while self._outbox:
             await self._socket.send_text(self._outbox.popleft())
+            await asyncio.sleep(0)  # that the page is gone is said in the loop's next turn
         frame = self._hub.frame()
         if frame is not None and frame is not self._sent:
             await self._socket.send_bytes(frame)

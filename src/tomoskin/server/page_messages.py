@@ -7,12 +7,11 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from tomoskin import __version__
 from tomoskin.calibration import BendReading, ClassReading
-from tomoskin.core import Event, FloatArray, IntArray
+from tomoskin.core import Event, FloatArray, IntArray, encode_json
 from tomoskin.pipeline import Prepared
 from tomoskin.recording import Timeline
 from tomoskin.run import MAX_FORCE, Status
@@ -217,4 +216,4 @@ def _flat(table: FloatArray | IntArray) -> list[float]:
 
 def text_of(**fields: Any) -> str:
     """A message to a page."""
-    return msgspec.json.encode(fields).decode()
+    return encode_json(fields).decode()

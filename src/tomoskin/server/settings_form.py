@@ -7,10 +7,9 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-import msgspec
-
 from tomoskin.core import PatternError, SkinError, TomoskinError
 from tomoskin.pattern import named
+from tomoskin.server.page_messages import text_of
 from tomoskin.skin import (
     SECTIONS,
     Choice,
@@ -59,7 +58,7 @@ def schema() -> str:
         }
         for section in SECTIONS.values()
     ]
-    return msgspec.json.encode({"type": "schema", "sections": sections}).decode()
+    return text_of(type="schema", sections=sections)
 
 
 def refusal(error: TomoskinError) -> str:
@@ -68,8 +67,7 @@ def refusal(error: TomoskinError) -> str:
     section, key = place.groups() if place else (None, None)
     advice = f" ({error.hint})" if error.hint else ""
     text = error.message + advice if place else str(error)
-    fields = {"type": "settings_error", "section": section, "key": key, "message": text}
-    return msgspec.json.encode(fields).decode()
+    return text_of(type="settings_error", section=section, key=key, message=text)
 
 
 def table_of(name: str, n_electrodes: int) -> str:
@@ -87,7 +85,7 @@ def table_of(name: str, n_electrodes: int) -> str:
             hint="choose it by its name, or begin with a smaller one",
         )
     rows = {"drive": pattern.drive.tolist(), "measure": pattern.measure.tolist()}
-    return msgspec.json.encode({"type": "pattern", "name": name} | rows).decode()
+    return text_of(type="pattern", name=name, **rows)
 
 
 def altered(skin: Skin, changes: Changes) -> Skin:

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from tomoskin.core import Output, SkinError, SourceError, TomoskinError, check_outputs, write_text
+from tomoskin.core import (
+    Output,
+    SkinError,
+    SourceError,
+    TomoskinError,
+    check_outputs,
+    reach,
+    watch_stages,
+    write_text,
+)
 from tomoskin.inverse import LightTouch, LinearProblem, Spectrum
 from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned
 from tomoskin.run import Runner, commands
+from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_messages import text_of
 from tomoskin.server.requests import (
@@ -26,11 +37,21 @@ from tomoskin.server.settings_form import altered, refusal, schema, table_of
 from tomoskin.server.task import Listener
 from tomoskin.skin import Skin
 
+STAGES = ("mesh", "model", "image", "touches", "source")
+"""What a change of settings comes to, one after the other; many begin later, or end earlier."""
+
 MOST_KEPT = 100
 """Changes that can be taken back."""
 
 _GESTURE = 1.0
 """Changes of the same keys within so many s are one, as of a slider that is drawn."""
+
+
+_log = logging.getLogger(__name__)
+
+
+class _SupersededError(Exception):
+    """Something newer is asked for."""
 
 
 class History:
@@ -110,6 +131,7 @@ class SettingsHandlers:
         self._asked: Skin = hub.runner.prepared.skin
         self._history = History()
         self._working = False
+        self._stage: str | None = None
         self._took: float | None = None
         self._automatic = AutomaticAlpha()
         hub.serve(
@@ -125,8 +147,8 @@ class SettingsHandlers:
         )
 
     def greeting(self) -> Sequence[str]:
-        """The schema, and the settings as they are."""
-        return (schema(), self._message())
+        """The schema, the settings as they are, and how far a change is."""
+        return (schema(), self._message(), _progress(self._stage))
 
     def _set(self, page: Listener, request: SetSettings) -> None:
         keys = sorted((s, k) for s, keys in request.changes.items() for k in keys)
@@ -193,21 +215,43 @@ class SettingsHandlers:
 
     async def _work(self, page: Listener) -> None:
         """Prepare what is wanted until nothing newer is; what fails is taken back."""
-        while True:
+        skin = None
+        while skin is not self._asked:
             skin = self._asked
             try:
-                scaled = await asyncio.to_thread(self._bring, skin)
-                if scaled is None:
-                    self._hub.show()
-                else:
-                    self._hub.rescale(*scaled)
-                await asyncio.to_thread(self._automatic.remember, self._hub.runner.prepared)
+                with watch_stages(self._watcher(skin)):
+                    await self._follow(skin)
+            except _SupersededError:
+                continue
             except TomoskinError as error:
                 page.post(refusal(error))
-            if self._asked is skin:
-                break
-        self._working = False
+            except Exception as error:  # the next change is none the worse for it
+                _log.exception("settings could not be prepared")
+                page.post(refusal(SkinError(f"internal error, {type(error).__name__}: {error}")))
+        self._working, self._stage = False, None
         self._hub.tell([self._message()])
+
+    async def _follow(self, skin: Skin) -> None:
+        """Go on with ``skin``, and tell every page."""
+        scaled = await asyncio.to_thread(self._bring, skin)
+        if scaled is None:
+            self._hub.show()
+        else:
+            self._hub.rescale(*scaled)
+        await asyncio.to_thread(self._automatic.remember, self._hub.runner.prepared)
+
+    def _watcher(self, skin: Skin) -> Callable[[str], None]:
+        """Tells every page which stage the change to ``skin`` has come to, from any thread."""
+        loop = asyncio.get_running_loop()
+
+        def watch(stage: str) -> None:
+            if skin is not self._asked:
+                raise _SupersededError
+            if stage:
+                self._stage = stage
+                loop.call_soon_threadsafe(self._hub.tell, [_progress(stage)])
+
+        return watch
 
     def _bring(self, skin: Skin) -> tuple[Prepared, float] | None:
         """Prepare ``skin`` and have the runner go on with it; in a thread.
@@ -225,14 +269,14 @@ class SettingsHandlers:
             return scaled
         if opener is None:
             raise SourceError("the source cannot be set to another sheet or scan while it runs")
-        runner.ask(commands.Change(prepared, partial(opener, skin)))
+        reach("source")
+        _change(runner, prepared, partial(opener, skin))
         self._took = time.monotonic() - start
         return None
 
     def _message(self) -> str:
         """The settings message."""
         skin = self._present()
-        files = sorted(path.stem for path in self._hub.folder.glob("*.toml"))
         return text_of(
             type="settings",
             document=skin.document,
@@ -243,9 +287,33 @@ class SettingsHandlers:
             redo=len(self._history.future),
             busy=self._working,
             took_ms=None if self._took is None else 1e3 * self._took,
-            files=files[:200],
+            files=Folder(self._hub.folder).skins(),
             builtin=Skin.names(),
         )
+
+
+def _progress(stage: str | None) -> str:
+    """The progress message; None: nothing is being changed."""
+    done = 0 if stage is None else STAGES.index(stage)
+    return text_of(type="progress", stage=stage, done=done, stages=len(STAGES))
+
+
+def _change(runner: Runner, prepared: Prepared, open_source: commands.Opener) -> None:
+    """Go on with another sheet.
+
+    A source that is pressed from here is simulated: it is opened beside the old one, which goes on
+    meanwhile. Anything else may be the same port.
+    """
+    if not runner.twin.pressable:
+        runner.ask(commands.Change(prepared, open_source))
+        return
+    ahead = [open_source()]
+    try:
+        change = commands.Change(prepared, lambda: ahead.pop() if ahead else open_source())
+        runner.ask(change)
+    finally:
+        for unused in ahead:
+            unused.close()
 
 
 def _save(path: Path, skin: Skin, *, replace: bool) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tomoskin.core import GeometryError, WireError
+from tomoskin.core import TomoskinError, WireError
 from tomoskin.run import SetPose, SetTwin, way_to_bend
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_messages import text_of
@@ -59,11 +59,11 @@ class TwinHandlers:
             if request is self._newest:
                 try:
                     await asyncio.to_thread(self._hub.runner.ask, request)
-                except (GeometryError, WireError) as error:
+                except TomoskinError as error:
                     page.post(_refusal(error))
             self._hub.tell(self.greeting())
 
 
-def _refusal(error: GeometryError | WireError) -> str:
+def _refusal(error: TomoskinError) -> str:
     hint = f" ({error.hint})" if error.hint else ""
     return text_of(type="twin_refused", message=error.message + hint)

@@ -6,10 +6,9 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-import msgspec
 import numpy as np
 
-from tomoskin.core import Event, FloatArray, SinkError
+from tomoskin.core import Event, FloatArray, SinkError, encode_json
 from tomoskin.pattern import Pattern
 from tomoskin.sink.consumer import needed
 from tomoskin.sink.sink import Item, Moment, Stream, TouchPace
@@ -50,7 +49,7 @@ class LslSink:
     def publish(self, item: Item) -> None:
         """Push the samples of ``item``."""
         for event in (item,) if isinstance(item, Event) else item.told:
-            text = msgspec.json.encode({"kind": event.kind, "text": event.text}).decode()
+            text = encode_json({"kind": event.kind, "text": event.text}).decode()
             self._push("events", [text], item)
         if isinstance(item, Event):
             return

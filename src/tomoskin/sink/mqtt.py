@@ -7,8 +7,7 @@ from dataclasses import replace
 from typing import Any
 from urllib.parse import SplitResult, unquote, urlsplit
 
-from tomoskin.core import Event, SinkError
-from tomoskin.recording import encode_json
+from tomoskin.core import Event, SinkError, encode_json
 from tomoskin.sink.consumer import needed, options_of
 from tomoskin.sink.naming import (
     Naming,

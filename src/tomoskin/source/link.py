@@ -13,8 +13,11 @@ from tomoskin.source.agreement import LineQuality, Rated
 from tomoskin.source.command_queue import FrameCounters
 from tomoskin.source.protocol_session import ProtocolSession, Stage
 from tomoskin.source.settings import ScanSettings, Timing
-from tomoskin.source.transport import Played, Transport
+from tomoskin.source.transport import Diagnosable, Played, Transport
 from tomoskin.wire import Ack, Counters, Decoder, Info
+
+_HEARD = 256
+"""So many of the first bytes tell what speaks where no board does."""
 
 
 class Link:
@@ -22,6 +25,11 @@ class Link:
 
     Everything happens in :meth:`poll`; leaving the ``with`` block, or :meth:`close`, stops the
     board.
+
+    Attributes
+    ----------
+    diagnosis
+        Why no board answers, once it should have; None where it does, or nobody can tell.
     """
 
     def __init__(
@@ -49,6 +57,8 @@ class Link:
         self._first_rate = transport.rate if isinstance(transport, Rated) else 0
         self._session = ProtocolSession(scan, settings, self._timing, self._clock(), transport.name)
         self._closed = False
+        self._heard = b""
+        self.diagnosis: SourceError | None = None
 
     @property
     def running(self) -> bool:
@@ -86,7 +96,14 @@ class Link:
             The device speaks another protocol.
         """
         now = self._clock()
-        found = self._session.tick(now)
+        try:
+            found = self._session.tick(now)
+        except SourceError as error:
+            raise self.diagnosis or error from None
+        if self.counters.messages:
+            self.diagnosis = None
+        elif self.diagnosis is None and self._session.stage is Stage.SETTING_UP:
+            self.diagnosis = _diagnosis(self.transport, self._heard)
         self._flush()
         patience = min(timeout, self._session.deadline() - now)
         found += self._listen(max(patience, 0.0))
@@ -129,6 +146,8 @@ class Link:
         now = self._clock()
         if data and self._tap:
             self._tap(now, data)
+        if not self.counters.messages:
+            self._heard = (self._heard + data)[:_HEARD]
         if data and self._played and self._played.after_seek():
             self._decoder.forget()
             self._session.frames.expect_any()
@@ -168,3 +187,8 @@ class Link:
         data = self._session.commands.take()
         if data:
             self.transport.write(data)
+
+
+def _diagnosis(transport: Transport, heard: bytes) -> SourceError | None:
+    """The likeliest cause of nobody's having spoken, where the transport can tell."""
+    return transport.diagnose(heard) if isinstance(transport, Diagnosable) else None

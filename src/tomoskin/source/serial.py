@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import errno
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tomoskin.core import SourceError
 from tomoskin.source.registry import read_options
+from tomoskin.source.silence import BAUD, SIGN_ON, SIGN_ON_RATE, Silence, is_bootloader
 
 if TYPE_CHECKING:
     from serial import Serial
@@ -83,11 +85,10 @@ def only_board() -> str:
     )
 
 
-BAUD = 1_000_000
-"""Rate that the firmware starts with: exact at 16 MHz."""
-
 _WRITE_TIMEOUT = 1.0
 _CHUNK = 65536
+_ASKED = 0.3
+"""A bootloader answers within so many s."""
 
 
 class SerialTransport:
@@ -97,7 +98,7 @@ class SerialTransport:
         """Open ``port``; SourceError says whether it is absent, busy or forbidden."""
         import serial  # noqa: PLC0415 - only who has a board needs pyserial
 
-        self.name = f"serial:{port}"
+        self.name, self._port = f"serial:{port}", port
         self._closed = False
         try:
             self._serial: Serial = serial.Serial(
@@ -138,6 +139,22 @@ class SerialTransport:
             self._serial.baudrate = rate
         except (OSError, ValueError, TypeError) as error:
             raise self._gone(error) from None
+
+    def diagnose(self, heard: bytes) -> SourceError:
+        """Why no board answers: where nothing was ``heard``, a bootloader is asked too."""
+        board = next((port.board for port in list_ports() if port.device == self._port), "")
+        answer = b"" if heard else self._ask_bootloader()
+        return Silence(self._port, board, self.rate, heard, answer, say_ports()).cause
+
+    def _ask_bootloader(self) -> bytes:
+        """What comes when a bootloader is asked who it is."""
+        rate, answer, end = self.rate, b"", time.monotonic() + _ASKED
+        self.use_rate(SIGN_ON_RATE)
+        self.write(SIGN_ON)
+        while (left := end - time.monotonic()) > 0 and not is_bootloader(answer):
+            answer += self.read(left)
+        self.use_rate(rate)
+        return answer
 
     def close(self) -> None:
         """Close the port."""

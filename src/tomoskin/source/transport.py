@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol, runtime_checkable
 
+from tomoskin.core import SourceError
+
 
 @runtime_checkable
 class Transport(Protocol):
@@ -30,6 +32,14 @@ class Transport(Protocol):
 
     def close(self) -> None:
         """Give the device back; a second call does nothing."""
+
+
+@runtime_checkable
+class Diagnosable(Protocol):
+    """A transport that can say why no board answers behind it."""
+
+    def diagnose(self, heard: bytes) -> SourceError:
+        """The likeliest cause; ``heard``: the first bytes that came. Raises as ``read`` does."""
 
 
 @runtime_checkable

@@ -80,7 +80,7 @@ class Press:
     Raises
     ------
     GeometryError
-        When a place or radius is not finite, or the radius is not above 0.
+        When a place is not finite, or the radius no size of a face.
     ModelError
         When the force is negative or not finite.
     """
@@ -93,8 +93,7 @@ class Press:
     def __post_init__(self) -> None:
         """Check the numbers."""
         _check_place(self.x, self.y)
-        if not 0 < self.radius < math.inf:
-            raise GeometryError(f"expected a radius above 0 m, got {self.radius}", where="press")
+        Circle(self.radius)
         _check_force(self.force)
 
     @property

@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, GeometryError
 from tomoskin.mesh import Polygon
 
+LEAST_SIZE = 1e-6
+"""Of a face and of its curvature, m: far below any mesh, and its square is a number still."""
+
 
 class Shape(Protocol):
     """The face of a rigid probe in coordinates of its own, m; equal faces are solved once."""
@@ -221,5 +224,6 @@ def _within(inside: NDArray[np.bool_], height: FloatArray) -> FloatArray:
 
 
 def _check(name: str, value: float, *, curved: bool = False) -> None:
-    if not (0 < value < math.inf or (curved and value == math.inf)):
-        raise GeometryError(f"expected a {name} above 0 m, got {value}", where="probe")
+    if not (LEAST_SIZE <= value < math.inf or (curved and value == math.inf)):
+        least = f"{1e6 * LEAST_SIZE:g} µm"
+        raise GeometryError(f"expected {name} of {least} or more, got {value} m", where="probe")

@@ -49,11 +49,12 @@ class TwinSkin:
         ``rest`` is what the sheet lies on at rest, and the mesh too.
         """
         self.model = model
-        self.contact, self.material, self.bend = settings.contact, settings.material, settings.bend
+        self.material, self.bend = settings.material, settings.bend
         self.rest = rest or Plane()
         self._outline = outline
         self._points = model.mesh.centroids
         self._blur = math.sqrt(float(model.mesh.volumes.mean())) / math.sqrt(12)
+        self._ground = settings.contact, self._points, self._blur
         spread, self._random = (
             np.random.default_rng(part) for part in np.random.SeedSequence(settings.seed).spawn(2)
         )
@@ -66,6 +67,7 @@ class TwinSkin:
         self._pose: Pose = ()
         self._loaded: tuple[object, ...] = (self._presses, self._pose)
         self._stood: tuple[object, ...] = self._loaded
+        self._dented: tuple[tuple[Contact, ...], Load] = (self._presses, self._nothing)
         self._posed: tuple[Pose, FloatArray] = (self._pose, self._nothing.strain)
         self._state = MaterialState.fresh(self.material, n)
         self._conductivity: FloatArray | None = None
@@ -109,7 +111,9 @@ class TwinSkin:
         """What the cells feel under the present presses, in the present pose."""
         presses, pose = self._presses, self._pose
         if not _same((presses, pose), self._loaded):
-            dented = indent(probes_of(presses), self.contact, self._points, self._blur)
+            if presses is not self._dented[0]:
+                self._dented = presses, indent(probes_of(presses), *self._ground)
+            dented = self._dented[1]
             given = dented.depth + depth_of(pose, self._points)
             self._load = Load(strain=dented.strain + self._strain(pose), depth=given)
             self._loaded = (presses, pose)
@@ -122,16 +126,19 @@ class TwinSkin:
         return self._posed[1]
 
     def set_presses(self, presses: tuple[Contact, ...]) -> None:
-        """Replace all presses at once, from any thread.
+        """Replace all presses at once, from any thread; they are solved here.
 
         Raises
         ------
         GeometryError
-            When the centre of one is off the skin; then nothing is changed.
+            When the centre of one is off the skin, or its face cannot press; then nothing is
+            changed.
         """
         check_on_skin(presses, self._outline)
         if presses != self._presses:
-            self._presses = tuple(presses)
+            taken = tuple(presses)
+            self._dented = taken, indent(probes_of(taken), *self._ground)
+            self._presses = taken
 
     def set_pose(self, pose: Pose) -> None:
         """Bend and stretch the sheet, from any thread; ``()`` lets it lie as at rest.

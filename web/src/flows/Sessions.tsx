@@ -76,7 +76,7 @@ function View() {
   const found = files.value?.files ?? [];
   const sessions = found.filter(({ kind }) => kind === "session");
   const others = found.filter(({ kind }) => kind !== "session");
-  const { exporting = null, share = 0 } = files.value ?? {};
+  const { exporting = null, share = 0, others: unlisted = 0 } = files.value ?? {};
   return (
     <div class="flow">
       {status.value?.replay && (
@@ -118,6 +118,11 @@ function View() {
           <Other key={file.name} file={file} />
         ))}
       </ul>
+      {unlisted > 0 && (
+        <p class="hint" data-testid="unlisted">
+          {unlisted} more not listed: only the newest 200, with names of letters, digits, dot, dash and underscore, are.
+        </p>
+      )}
     </div>
   );
 }

@@ -16,6 +16,8 @@ export interface FoundFile {
 interface Files {
   readonly type: "files";
   readonly files: readonly FoundFile[];
+  /** Files of the same kinds that are left out: too many, or named as no page may ask. */
+  readonly others: number;
   readonly recording: string | null;
   readonly playing: string | null;
   readonly exporting: string | null;

@@ -7,6 +7,8 @@ import { say, send } from "../state";
 import { Field, nameOf } from "./Field";
 import {
   discard,
+  doing,
+  progress,
   redo,
   refused,
   schema,
@@ -133,7 +135,7 @@ function View() {
           Redo
         </button>
         <span class="took" data-testid="took" role="status">
-          {now.busy ? "preparing…" : took}
+          {now.busy ? (progress.value ? doing(progress.value) : "preparing") : took}
         </span>
       </div>
       {refused.value && refused.value.section === null && (

@@ -47,6 +47,14 @@ export interface Settings {
   readonly builtin: readonly string[];
 }
 
+/** How far a change has come: `done` of `stages`, and the stage that goes on; null before the first. */
+export interface Progress {
+  readonly type: "progress";
+  readonly stage: "mesh" | "model" | "image" | "touches" | "source" | null;
+  readonly done: number;
+  readonly stages: number;
+}
+
 export interface Refused {
   readonly type: "settings_error";
   readonly section: string | null;
@@ -57,6 +65,7 @@ export interface Refused {
 export const schema = signal<readonly SectionForm[]>([]);
 export const settings = signal<Settings | null>(null);
 export const refused = signal<Refused | null>(null);
+export const progress = signal<Progress | null>(null);
 /** What has been typed and is not the skin's yet, by section. */
 const drafts = signal<Readonly<Record<string, Values>>>({});
 
@@ -69,6 +78,7 @@ onMessage<Settings>("settings", (message) => {
   const open = refused.value?.section;
   drafts.value = open && drafts.value[open] ? { [open]: drafts.value[open] } : {};
 });
+onMessage<Progress>("progress", (message) => (progress.value = message));
 onMessage<Refused>("settings_error", (message) => {
   refused.value = message;
   if (message.section === null) {
@@ -76,6 +86,19 @@ onMessage<Refused>("settings_error", (message) => {
     say(message.message);
   }
 });
+
+const DOING = {
+  mesh: "meshing",
+  model: "solving the sheet",
+  image: "preparing images",
+  touches: "preparing touches",
+  source: "starting the source",
+} as const;
+
+/** What a change is doing, in words. */
+export function doing({ stage, done, stages }: Progress): string {
+  return stage ? `${DOING[stage]}, ${done + 1} of ${stages}` : "preparing";
+}
 
 /** A section's values with what has been typed. */
 export function valuesOf(section: string): Values {

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, reach
 from tomoskin.inverse.choice.alpha_choice import AlphaChoice, Curve, Evidence
 from tomoskin.inverse.linear.spectrum import Spectrum
 from tomoskin.mesh import Mesh
@@ -61,8 +61,11 @@ class LightTouch:
         size = mesh.volumes @ touches**2
         response = spectrum.analysis @ (spectrum.problem.jacobian @ touches)
         projected = spectrum.modes.conj().T @ (mesh.volumes[:, None] * touches)
-        blur = np.array([np.mean(_blur(spectrum, a, response, projected) / size) for a in alphas])
-        return cls(spectrum, alphas, 1.0 + blur, float(1.0 / np.mean(1.0 / size)))
+        blur = []
+        for alpha in alphas:
+            reach()
+            blur.append(np.mean(_blur(spectrum, alpha, response, projected) / size))
+        return cls(spectrum, alphas, 1.0 + np.array(blur), float(1.0 / np.mean(1.0 / size)))
 
     def __call__(self, noise: FloatArray) -> AlphaChoice:
         """Choice for difference data whose rows have that ``noise``, (n_meas,)."""

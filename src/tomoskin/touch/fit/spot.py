@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tomoskin.core import FloatArray, IntArray, ModelError
+from tomoskin.core import FloatArray, IntArray, ModelError, reach
 from tomoskin.forward import State
 from tomoskin.mesh import Mesh
 
@@ -244,6 +244,7 @@ class Response:
         return pressed.voltages - self.reference, slopes, answers[:, N_PARAMETERS].T
 
     def _solved(self, cells: IntArray, sigma: FloatArray) -> State:
+        reach()
         conductivity = self.state.conductivity.copy()
         conductivity[cells] = sigma
         return self.state.model.at(conductivity)

@@ -1,0 +1,39 @@
+"""A page's connection, and one that is gone."""
+
+import asyncio
+
+from starlette.websockets import WebSocket, WebSocketState
+
+from tomoskin.server import Hub
+from tomoskin.server.page_connection import Page
+
+PATIENCE = 60
+
+
+def test_a_page_that_vanishes_is_written_to_no_more(runner):
+    """Its connection says so in the loop's next turn; asyncio warns of every later write."""
+    hub, written, gone = Hub(runner, limit=1.0), [], asyncio.Event()
+    for number in range(20):
+        runner.say("test", f"event {number}")
+
+    async def receive():
+        await gone.wait()
+        return {"type": "websocket.disconnect"}
+
+    async def send(message):
+        if gone.is_set():
+            raise OSError("gone")
+        written.append(message["type"])
+        if written[0] == "websocket.send":
+            asyncio.get_running_loop().call_soon(gone.set)
+
+    async def serve():
+        async with hub.running():
+            await asyncio.sleep(0)
+            page = WebSocket({"type": "websocket"}, receive, send)
+            page.client_state = page.application_state = WebSocketState.CONNECTED
+            page.accept = lambda: asyncio.sleep(0)
+            await asyncio.wait_for(Page(page, hub).run(), PATIENCE)
+
+    asyncio.run(serve())
+    assert written == ["websocket.send"]
