@@ -1,4 +1,4 @@
-"""Touches over time: identities, latencies, false onsets, remainders, and two touches at once."""
+"""Touches over time: identities, latencies, false onsets, remainders, releases, two at once."""
 
 from __future__ import annotations
 
@@ -281,11 +281,61 @@ def _remainders(method: str, seeds: Sequence[int]) -> Report:
     )
 
 
+def _releases(method: str, seeds: Sequence[int]) -> Report:
+    rows = []
+    for electrodes, oversampling in FAST.items():
+        prepared = _prepared(electrodes, oversampling, method)
+        for kind, speed in (("still", 0.0), ("sliding", 0.05)):
+            off: list[tuple[float, float]] = []
+            moves = 0
+            for seed in seeds:
+                progress(f"releases, {electrodes} electrodes, {kind}, {method}, {seed}")
+                rng, script, starts = np.random.default_rng(seed), _HEAD.format(20), []
+                for number in range(8):
+                    starts.append(0.5 + 2.4 * number)
+                    x, y = _somewhere(rng)
+                    path = [(0.0, x, y)]
+                    if speed:  # to the middle, and stops there
+                        part = min(speed / np.hypot(x, y), 1.0)
+                        path.append((1.0, (1 - part) * x, (1 - part) * y))
+                    script += _press(f"p{number}", path, starts[-1], 1.0, rng.uniform(2, 6))
+                frames = list(_frames(prepared, script, seed))
+                for start in starts:
+                    falling = [f for f in frames if start + 1.1 <= f.time < start + 2.3]
+                    last = [f.presses[0] for f in frames if f.time < start + 1.15 and f.presses]
+                    found = [_off(t.detection, last[-1]) for f in falling for t in f.result.touches]
+                    off += [max(found)] if found else []
+                    moves += sum(kind == "move" for kind, _ in _events(falling))
+            far = np.array(off)
+            wrong = int(((far[:, 0] > 0.01) & (far[:, 1] > 3)).sum())
+            rows.append(
+                (electrodes, kind, len(off), wrong, round(1e3 * float(far[:, 0].max()), 1), moves)
+            )
+    return Report(
+        f"where a touch is while it is lifted; method {method}",
+        ("electrodes", "press", "releases", "wrong", "farthest, mm", "moves"),
+        tuple(rows),
+        (
+            "wrong: from the beginning of the fall on, off by more than 10 mm and by more than "
+            f"three of its deviations; twin, textile preset, 2 to 6 N, seeds {_listed(seeds)}",
+        ),
+    )
+
+
+def _off(found: Detection, press: tuple[float, float, float]) -> tuple[float, float]:
+    """m, and in deviations of the detection, from the press."""
+    away = np.array([found.x - press[0], found.y - press[1]])
+    covariance = [[found.sd_x**2, found.cov_xy], [found.cov_xy, found.sd_y**2]]
+    far = float(away @ np.linalg.solve(covariance, away))
+    return float(np.hypot(*away)), far**0.5
+
+
 PIECES: dict[str, Callable[[str, Sequence[int]], Report]] = {
     "identities": _identities,
     "latencies": _latencies,
     "idle": _idle,
     "remainders": _remainders,
+    "releases": _releases,
 }
 
 

@@ -33,6 +33,16 @@ def test_places_are_found_and_ellipses_hold_what_they_say(locator: Locator) -> N
     assert locator.errors.mean() == pytest.approx(np.linalg.norm(error, axis=1).mean(), rel=0.5)
 
 
+@pytest.mark.parametrize("n", [10, 40])
+def test_presses_of_one_force_are_known_from_soft_and_hard_ones(n: int) -> None:
+    """By their sizes, wherever they are, or by their labels: what is promised holds for these."""
+    dv, xy = presses(n, 0)
+    force = np.where(np.arange(n) % 2, 1.0, 3.0)
+    assert Locator.fit(dv, xy).one_force
+    assert not Locator.fit(dv * force[:, None], xy).one_force
+    assert not Locator.fit(dv, xy, strength=force).one_force
+
+
 def test_more_presses_make_it_better() -> None:
     dv, xy = presses(300, 5)
     mean = [

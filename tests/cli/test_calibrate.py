@@ -52,6 +52,7 @@ def test_what_is_learnt_is_used(tomoskin, tmp_path, presses, touched):
     assert out.startswith("40 presses; left out")
     assert "frame    7  doubtful: has the same data as press 2" in out
     assert "next press" in out
+    assert "all were about equally hard: this holds for such presses" in out
     path, xy = touched
     code, out, err = tomoskin(
         "locate", path, "--calibration", calibration, "--touches", table, "--skin", SKIN

@@ -59,7 +59,8 @@ def press_dots(site, page, count):
 
 def press_dot(site, page, done):
     told = page.told("flow", lambda m: m.get("phase") == "press" and len(m["presses"]) == done)
-    site.runner.ask(commands.HoldPresses(page, (Press(*told["dot"], FORCE, RADIUS),)))
+    force = FORCE * {"softly": 0.5, "hard": 2.0, None: 1.0}[told["effort"]]
+    site.runner.ask(commands.HoldPresses(page, (Press(*told["dot"], force, RADIUS),)))
     page.told("flow", lambda m: len(m.get("presses", ())) == done + 1)
     site.runner.ask(commands.HoldPresses(page, ()))
 
@@ -288,6 +289,8 @@ def test_presses_become_a_calibration(taught, prepared):
     assert told["ready"]
     assert told["figures"]["median_mm"] < 30
     assert len(told["figures"]["errors_mm"]) == 10
+    assert "mm pressed softly, " in told["text"], "what is promised is promised of both"
+    assert "equally hard" not in told["text"]
     found = TOUCH.read(folder / "finger.npz")
     assert found.model.presses.xy == pytest.approx(np.array(told["presses"]))
     outline = prepared.skin.outline

@@ -39,7 +39,7 @@ def looks_right(opened, name):
 
 def press_dot(opened, done):
     """Press with the pointer where the dot is; until the press is taken."""
-    opened.test_id("phase").filter(has_text="Press where").wait_for()
+    opened.test_id("phase").filter(has_text="where the dot is").wait_for()
     box = opened.page.locator(".target .core").bounding_box()
     opened.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     opened.page.mouse.down()

@@ -61,6 +61,7 @@ class LocatedTouch(Applied):
                 sd_x=sd_x,
                 sd_y=sd_y,
                 cov_xy=float(covariance[0, 1]),
+                bias=0.0,
             )
         ]
 

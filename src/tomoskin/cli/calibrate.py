@@ -132,6 +132,7 @@ def _findings(calibration: Calibration[Locator], frames: list[int]) -> dict[str,
         "guessed_mm": 1e3 * locator.guessed,
         "is_guess": locator.is_guess,
         "held_by_90_percent_ellipses": locator.held,
+        "one_force": locator.one_force,
         "drift": locator.drift,
         "next_press_mm": [x, y],
         "remarks": [
@@ -147,6 +148,11 @@ def _say(found: dict[str, Any]) -> None:
         f"{found['mean_mm']:.1f} mm (median {found['median_mm']:.1f}, 95 % {found['p95_mm']:.1f}), "
         f"and their 90 % ellipses hold {100 * found['held_by_90_percent_ellipses']:.0f} %"
     )
+    if found["one_force"]:
+        typer.echo(
+            "all were about equally hard: this holds for such presses, softer and harder ones are "
+            "missed farther; add some of both with --onto"
+        )
     for doubtful in found["remarks"][:_SHOWN]:
         frame = doubtful["frame"]
         who = "an older press" if frame is None else f"frame {frame:>4}"

@@ -166,6 +166,9 @@ class Detection:
         Whether it may be several touches, too close to separate.
     weak
         Whether it is too weak beside others to be a touch by itself: it may carry one on.
+    bias
+        Standard deviation, along each axis, of what the position is off by without any noise, m;
+        0 in a touch, whose ``sd_x`` and ``sd_y`` hold it.
     """
 
     x: float
@@ -179,6 +182,7 @@ class Detection:
     snr: float = math.nan
     close: bool = False
     weak: bool = False
+    bias: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,6 +17,10 @@ from tomoskin.touch import Region
 Phase = Literal["rest", "press", "hold", "release"]
 """Hands off; press now; hold still; let go."""
 
+Effort = Literal["softly", "hard"]
+EFFORTS: tuple[Effort, ...] = ("softly", "hard")
+"""How a press is asked for, in turn: presses of one force teach that force alone."""
+
 _REST = 10
 """Frames that the untouched skin is told from."""
 
@@ -136,10 +140,11 @@ _APART = 0.12
 
 @dataclass(frozen=True, eq=False)
 class GuidedPress:
-    """One press: the place m, and the change (n_meas,) V that it made."""
+    """One press: the place m, the change (n_meas,) V that it made, and how it was asked for."""
 
     place: tuple[float, float]
     dv: FloatArray
+    effort: Effort | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +171,9 @@ def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estima
     locator = Locator.fit(dv, xy, pattern=prepared.pattern, skin=prepared.skin)
     errors = 1e3 * locator.errors
     doubted = sorted({remark.row for remark in locator.remarks})
-    text = f"Missed by {np.median(errors):.0f} mm (median; each press left out in turn)"
+    text = f"Missed by {_by_effort(presses, errors)} (median; each press left out in turn)"
+    if locator.one_force:
+        text += ", but all were about equally hard: others are missed farther"
     if locator.is_guess:
         text += "; the middle of all presses is as good an answer: press harder"
     elif len(presses) < _FIRST:
@@ -178,6 +185,18 @@ def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estima
     }
     place = locator.next_place() if len(presses) >= _FIRST else None
     return Estimate(text, place, True, figures, locator)
+
+
+def _by_effort(presses: Sequence[GuidedPress], errors: FloatArray) -> str:
+    missed = {
+        effort: [
+            error for press, error in zip(presses, errors, strict=True) if press.effort == effort
+        ]
+        for effort in EFFORTS
+    }
+    if not all(missed.values()):
+        return f"{np.median(errors):.0f} mm"
+    return ", ".join(f"{np.median(mm):.0f} mm pressed {effort}" for effort, mm in missed.items())
 
 
 def estimate_wiring(

@@ -11,7 +11,9 @@ from tomoskin.pipeline import Prepared, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
 from tomoskin.server.guided_presses import (
+    EFFORTS,
     Dots,
+    Effort,
     Estimate,
     GuidedPress,
     Taker,
@@ -51,8 +53,13 @@ class PressFlow:
 
     def add(self, dv: FloatArray) -> None:
         """A press on the dot made the change ``dv`` (n_meas,) V; the dot moves on."""
-        self.presses.append(GuidedPress(self._dot, dv))
+        self.presses.append(GuidedPress(self._dot, dv, self.effort))
         self._dot = self._dots.next(self.presses, self.estimate)
+
+    @property
+    def effort(self) -> Effort | None:
+        """How to press the dot; None where that does not matter."""
+        return EFFORTS[len(self.presses) % len(EFFORTS)] if self.kind == "touch" else None
 
     def undo(self) -> None:
         """Take the last press back."""
@@ -81,6 +88,7 @@ class PressFlow:
             "kind": self.kind,
             "phase": self.taker.phase,
             "dot": self._dot,
+            "effort": self.effort,
             "presses": [press.place for press in self.presses],
             "thinking": self.estimating,
             "text": self.trouble or estimate.text,

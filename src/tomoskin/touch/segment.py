@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -16,6 +17,10 @@ from tomoskin.touch.tracking import HELD
 
 _BAND = 0.2
 """Cells within this fraction of a region's lowest value count as its edge."""
+
+_BIAS = 0.2
+"""Deviation, in radii of a region, of its centre from the touch without any noise: an image
+blurs otherwise near the rim. Chosen on the twin's seeds 101 to 103."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,6 +199,7 @@ class Segmenter:
             cells=cells,
             snr=snr,
             weak=snr < self.settings.snr,
+            bias=_BIAS * math.sqrt(float(self.mesh.volumes[cells].sum()) / math.pi),
         )
 
     def _extremes(

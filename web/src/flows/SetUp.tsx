@@ -109,7 +109,7 @@ const TEACHING: Readonly<Record<FlowKind, string>> = {
   wiring:
     "Which wire ends where? Press where the dot is, a few times. The answer becomes a skin file, and pictures are right.",
   touch:
-    "Teach the skin where a touch is: press where the dot is, ten times or more. From then on places come from what it has learnt, each with its uncertainty.",
+    "Teach the skin where a touch is: press where the dot is, softly and hard in turn, ten times or more. From then on places come from what it has learnt, each with its uncertainty.",
 };
 
 const PHASES: Readonly<Record<Phase, string>> = {
@@ -120,14 +120,14 @@ const PHASES: Readonly<Record<Phase, string>> = {
 };
 
 function Going({ kind }: { kind: FlowKind }) {
-  const { phase = "rest", presses = [], text, ready, thinking, figures } = flow.value;
+  const { phase = "rest", effort, presses = [], text, ready, thinking, figures } = flow.value;
   const taken = `${presses.length} press${presses.length === 1 ? "" : "es"} taken`;
   const doubtful = figures?.doubtful ?? [];
   const name = names[kind];
   return (
     <>
       <p class="lead" role="status" data-testid="phase">
-        {PHASES[phase]}
+        {phase === "press" && effort ? `Press ${effort} where the dot is` : PHASES[phase]}
       </p>
       <p data-testid="taken">
         {taken}

@@ -14,7 +14,7 @@ export function Target({ view }: { view: View }) {
   const place = dot.value;
   if (!place) return null;
   const [x, y] = toPixels(view, ...place);
-  const { phase = "rest", presses = [] } = flow.value;
+  const { phase = "rest", effort, presses = [] } = flow.value;
   return (
     <svg class={`target ${phase}`} width={view.width} height={view.height} aria-hidden="true" data-testid="dot">
       {presses.map((press, k) => {
@@ -24,7 +24,7 @@ export function Target({ view }: { view: View }) {
       <circle class="ring" cx={x} cy={y} r={20} />
       <circle class="core" cx={x} cy={y} r={7} />
       <text x={x} y={y + 40}>
-        {WORDS[phase]}
+        {phase === "press" && effort ? `Press ${effort}` : WORDS[phase]}
       </text>
     </svg>
   );

@@ -49,6 +49,8 @@ export interface Flow {
   readonly kind: FlowKind | null;
   readonly phase?: Phase;
   readonly dot?: readonly [number, number];
+  /** How to press it; null where that does not matter. */
+  readonly effort?: "softly" | "hard" | null;
   readonly presses?: readonly (readonly [number, number])[];
   readonly thinking?: boolean;
   readonly text?: string;

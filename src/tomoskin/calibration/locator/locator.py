@@ -11,7 +11,13 @@ from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
 from tomoskin.calibration.locator.posterior import FEW, Estimates
-from tomoskin.calibration.locator.presses import Features, Presses, Strength, frames
+from tomoskin.calibration.locator.presses import (
+    Features,
+    Presses,
+    Strength,
+    equally_hard,
+    frames,
+)
 from tomoskin.calibration.locator.rotations import Rotations
 from tomoskin.calibration.locator.stacking import (
     NINE_IN_TEN,
@@ -267,6 +273,12 @@ class Locator:
         """How many times as far as usual the last eighth of the presses is missed (medians)."""
         errors = self.errors
         return float(np.median(errors[-max(len(errors) // 8, 5) :]) / np.median(errors))
+
+    @property
+    def one_force(self) -> bool:
+        """Whether all presses were about equally hard: ``errors`` and covariances then tell of
+        such presses alone, and softer or harder ones are missed farther."""
+        return equally_hard(self.presses, self.region.scaled(self.presses.xy))
 
     def next_place(self) -> FloatArray:
         """(2,) m where the next labelled press tells most: the maps are least certain there."""

@@ -234,5 +234,25 @@ class Strength:
         return np.asarray(near @ values / near.sum(axis=1))
 
 
+_ALIKE = 0.28
+"""Deviation of the logarithm of presses' sizes about those near by, below which they were about
+equally hard: 0.15 for one force on the twin's textile disc (nine in ten of sets of ten presses
+below 0.26), 0.25 for two of which one is twice the other (seeds 17 and 37)."""
+
+
+def equally_hard(presses: Presses, places: FloatArray) -> bool:
+    """Whether presses at ``places`` (n, 2), in radii, were all about equally hard.
+
+    By their labels, else by how large each is beside the others near by.
+    """
+    size = _size(presses.dv)
+    if presses.strength is not None:
+        return bool(np.log(np.maximum(presses.strength, _LEAST)).std() < _ALIKE)
+    near = np.exp(-0.5 * squared_distances(places, places) / _NEAR**2)
+    np.fill_diagonal(near, 0.0)
+    beyond = size - near @ size / np.maximum(near.sum(axis=1), _LEAST)
+    return bool(beyond[near.sum(axis=1) > _LEAST].std() < _ALIKE)
+
+
 def _size(dv: FloatArray) -> FloatArray:
     return np.asarray(0.5 * np.log(np.nanmean(dv**2, axis=1) + _LEAST))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from tomoskin.core import Detection, FloatArray, Touch
 from tomoskin.touch.tracking.motion import States, region_radius
+from tomoskin.touch.tracking.position import Position
 
 _STEP = 0.012
 """A touch that slides leaves a footprint every so many metres."""
@@ -62,6 +63,8 @@ class Trace:
         Touches that have merged into it.
     beside
         The other touches as they were when this one went missing, by number.
+    held
+        Where it is held to be.
     reported_at
         (2,) m, its position in the last event.
     """
@@ -82,10 +85,12 @@ class Trace:
     others: list[Trace] = field(default_factory=list)
     beside: Mapping[int, Unmerged] = field(default_factory=dict)
     reported_at: tuple[float, float] = (0.0, 0.0)
+    held: Position = field(init=False)
 
     def __post_init__(self) -> None:
         """Leave the first footprint."""
         self.strong = self.since
+        self.held = Position.of(self.detection, size_of(self.detection), self.since)
         self._step()
 
     @property
@@ -100,6 +105,11 @@ class Trace:
         return sign_of(self.detection)
 
     @property
+    def shown(self) -> Detection:
+        """Its newest detection, where it is held to be."""
+        return self.held.of_detection(self.detection)
+
+    @property
     def members(self) -> tuple[Trace, ...]:
         """Itself and those that have merged into it, in the order of their numbers."""
         return tuple(sorted((self, *self.others), key=lambda trace: trace.number))
@@ -110,11 +120,13 @@ class Trace:
         first = self.members[0]
         merged = tuple(t.number for t in self.members) if self.others else ()
         kind = "decrease" if self.sign < 0 else "increase"
-        return Touch(first.number, kind, first.host_since, self.detection, merged)
+        return Touch(first.number, kind, first.host_since, self.shown, merged)
 
-    def see(self, detection: Detection, time: float) -> None:
-        """Take the detection of this frame."""
+    def see(self, detection: Detection, time: float, *, still: bool) -> None:
+        """Take the detection of this frame; ``still``: the last ones say nothing of it."""
         self.detection = detection
+        held = Position.of if still else self.held.after
+        self.held = held(detection, size_of(detection), time)
         self.frames += 1
         self.missing = None
         self._step()
@@ -124,6 +136,7 @@ class Trace:
     def become(self, other: Trace) -> None:
         """Go on from where ``other`` is."""
         self.detection, self.states, self.strong = other.detection, other.states, other.strong
+        self.held = other.held
         self.missing, self.low = other.missing, None
         self._step()
 

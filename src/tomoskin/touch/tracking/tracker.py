@@ -176,7 +176,7 @@ class Tracker:
         jumped = far[own, which] > motion.GATE
         for row, (trace, index, state) in enumerate(zip(own, which, after, strict=True)):
             followed = self._traces[trace]
-            followed.see(detections[index], self._now)
+            followed.see(detections[index], self._now, still=self.settings.still)
             followed.states = state
             if jumped[row]:  # its region has changed: it has not moved
                 followed.states = motion.begin(positions[row], spreads[row], self.settings)
@@ -248,13 +248,12 @@ class Tracker:
             self._happened.append(TouchEvent("release", ended, self._host))
 
     def _has_moved(self, trace: Trace) -> bool:
-        r = trace.detection
-        (x, y), sd = trace.reported_at, math.hypot(r.sd_x, r.sd_y)
-        far = math.hypot(r.x - x, r.y - y)
-        return far > _MOVED and not far < _BY_DEVIATIONS * sd
+        (x, y), held = trace.reported_at, trace.held
+        far = math.hypot(held.x - x, held.y - y)
+        return far > _MOVED and not far < _BY_DEVIATIONS * held.wavers
 
     def _report(self, kind: Happening, trace: Trace) -> None:
-        trace.reported_at = (trace.detection.x, trace.detection.y)
+        trace.reported_at = (trace.held.x, trace.held.y)
         self._happened.append(TouchEvent(kind, trace.touch, self._host))
 
 
