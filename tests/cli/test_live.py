@@ -19,7 +19,7 @@ from tomoskin.recording import Mark, SessionReader, SessionWriter, session_info
 from tomoskin.skin import Skin
 
 COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]
-PATIENCE = 60
+PATIENCE = 300
 pytestmark = pytest.mark.usefixtures("built_page")
 
 

@@ -20,7 +20,7 @@ from tomoskin.skin import Skin
 from tomoskin.source import Link, ScanSettings, SerialTransport
 from tomoskin.twin import Press, TwinSettings, TwinSkin
 
-PATIENCE = 30.0
+PATIENCE = 120.0
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 FIRMWARE = ROOT / "firmware"
 SCAN = Scan.of(Pattern.adjacent(8))
 SETTINGS = ScanSettings(oversampling=4, settling=200e-6, current_limit=0.1, adc_bits=10)
-PATIENCE = 60.0
+PATIENCE = 300.0
 """Seconds until a test gives up; a board answers within milliseconds."""
 
 

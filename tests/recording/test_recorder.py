@@ -32,7 +32,7 @@ from tomoskin.recording.recorder import IMAGE_PERIOD
 from tomoskin.sink import Capacity, Worker
 from tomoskin.wire import encode
 
-PATIENCE = 60
+PATIENCE = 300
 
 
 class Failing(io.FileIO):

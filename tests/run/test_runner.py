@@ -22,7 +22,7 @@ from tomoskin.source import Timing
 from tomoskin.twin import Press
 from tomoskin.wire import Start, Stop
 
-PATIENCE = 60
+PATIENCE = 300
 
 
 class Watch:

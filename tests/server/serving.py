@@ -10,7 +10,7 @@ from websockets.sync.client import connect
 from tomoskin.pipeline import colour_limit
 from tomoskin.server import STATIC, AccessPolicy, Hub, Server, application, listen
 
-PATIENCE = 60
+PATIENCE = 300
 
 
 class Site:

@@ -7,7 +7,7 @@ from starlette.websockets import WebSocket, WebSocketState
 from tomoskin.server import Hub
 from tomoskin.server.page_connection import Page
 
-PATIENCE = 60
+PATIENCE = 300
 
 
 def test_a_page_that_vanishes_is_written_to_no_more(runner):

@@ -9,7 +9,7 @@ from server.looks import SCRIPT
 
 FLAGS = Path(__file__).resolve().parents[2] / "scripts" / "chromium.flags"
 ARGUMENTS = FLAGS.read_text(encoding="utf-8").split()
-PATIENCE = 60_000
+PATIENCE = 300_000
 AXE = Path(__file__).resolve().parents[2] / "web" / "node_modules" / "axe-core" / "axe.min.js"
 READ = """() => {
     const { image, touches, truths, referenceReady, sequence } = window.tomoskin.last;

@@ -22,7 +22,7 @@ from tomoskin.pipeline import FrameResult
 from tomoskin.sink import Moment, Stream
 
 ROBOT = Path(__file__).resolve().parents[2] / "docs" / "robot.md"
-PATIENCE = 60
+PATIENCE = 300
 EPOCH = 1_700_000_000.0
 MESH = SKIN.mesh()
 PATTERN = SKIN.pattern()
