@@ -87,7 +87,7 @@ def _evidence(prepared: Prepared) -> Evidence:
     noise = prepared.predicted_noise()
     frames = (prepared.problem.jacobian @ change).T
     frames += noise * rng.standard_normal(frames.shape)
-    return Evidence(noise, frames, places, prepared.places)
+    return Evidence(noise, frames, places, prepared.positions)
 
 
 def _waits(prepared: Prepared) -> list[float]:
@@ -104,6 +104,6 @@ def _waits(prepared: Prepared) -> list[float]:
             next(steps)
         except StopIteration as end:
             found = end.value
-            found.noise_floor(reference)
+            found.image_noise(reference)
         taken.append(now() - began)
     return taken

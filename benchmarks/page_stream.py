@@ -77,7 +77,7 @@ def _picture(prepared: Prepared, step: int) -> FrameResult:
         sequence=0,
         host_time=0.0,
         ready=True,
-        pictured=True,
+        has_image=True,
         image=Image(1e-3 * noise, "S", mesh.identity),
         voltages=reference,
         reference=reference,

@@ -64,7 +64,7 @@ class Lab:
         self.image = image.operator
         self.by_fit = lambda: finding(fit, self.reference)
         self.by_image = lambda: finding(image, self.reference)
-        self.floor = image.noise_floor(self.reference)
+        self.floor = image.image_noise(self.reference)
         noise = fit.readout.noise / np.sqrt(2) * np.sqrt(1 + 1 / IDLE)
         self.whiten = Whitener.of(row_covariance(fit.scan, noise))
 
@@ -163,7 +163,7 @@ def _places() -> Report:
     rows = []
     for name in SKINS:
         for preset, what in SHEETS.items():
-            presses, bounds, fitted, pictured = [], [], [], []
+            presses, bounds, fitted, has_image = [], [], [], []
             for seed in SEEDS:
                 lab, random = Lab(name, preset, seed), np.random.default_rng(seed)
                 fit, image = lab.by_fit, lab.by_image
@@ -173,8 +173,8 @@ def _places() -> Report:
                     presses.append(press)
                     bounds.append(lab.bound(press))
                     fitted.append(fit().push(view))
-                    pictured.append(image().push(view))
-            found, seen = Missed.of(presses, fitted), Missed.of(presses, pictured)
+                    has_image.append(image().push(view))
+            found, seen = Missed.of(presses, fitted), Missed.of(presses, has_image)
             bound, rms = np.array(bounds), np.sqrt(np.mean(found.errors**2))
             held = found.distances < INSIDE_90
             rows.append((

@@ -83,7 +83,7 @@ def check_remainder(
     under = (distance < RADIUS).any(axis=1)
     share = imager.mesh.volumes * under / (imager.mesh.volumes @ under)
     loaded, after = (-float(share @ shown[k][1].values) for k in (2, -1))
-    floor = imager.prepared.noise_floor(Reference.of(idle))
+    floor = imager.prepared.image_noise(Reference.of(idle))
     assert floor is not None
     row = share @ floor.spread
     deviation = float(np.linalg.norm(row) * np.sqrt(2 / len(idle)))

@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
 
 def noise_of_maximum(imager: Imager, image: Image, idle: FloatArray) -> float:
     """Standard deviation of the greatest value, from the noise of two means of frames, S."""
-    floor = imager.prepared.noise_floor(Reference.of(idle))
+    floor = imager.prepared.image_noise(Reference.of(idle))
     assert floor is not None
     return float(floor.sd[np.abs(image.values).argmax()] * np.sqrt(2 / len(idle)))
 

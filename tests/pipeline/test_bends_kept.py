@@ -90,7 +90,7 @@ def test_a_recording_begun_late_begins_with_frames_of_a_straight_sheet(prepared)
         frame = Frame(number, number, 0.01 * number, 1, 0, 0, samples)
         pre_roll.frame(frame, Mark.NONE if number else Mark.REFERENCE, 0)
         readings = {BENDS.name: states[state]}
-        pre_roll.result(replace(result, ready=True, pictured=True, readings=readings))
+        pre_roll.result(replace(result, ready=True, has_image=True, readings=readings))
     frames, _, again = pre_roll.begin(0)
     assert again
     assert len(frames) == 3 * REFERENCE_FRAMES

@@ -154,8 +154,8 @@ def test_the_floor_is_the_noise_of_the_filtered_images() -> None:
     assert isinstance(following, Following)
     stage = following._imaging
     assert isinstance(stage, Filtered)
-    floor = stage._floor(np.inf)
-    alone = filtered().noise_floor(following.rest.reference)  # type: ignore[union-attr]
+    floor = stage._image_noise(np.inf)
+    alone = filtered().image_noise(following.rest.reference)  # type: ignore[union-attr]
     ratio = images.std(axis=0) / floor.sd  # type: ignore[union-attr]
     # the reference tells each row's noise from 20 frames only: as far off as that, over all rows
     assert 0.85 < np.median(ratio) < 1.15

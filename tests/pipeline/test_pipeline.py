@@ -113,7 +113,7 @@ def test_rows_at_a_rail_are_left_out_and_said(push, idle, touched, rail):
     broken[7] = rail
     result = push(broken)
     assert 0 < result.left_out <= 2
-    assert result.pictured
+    assert result.has_image
     assert "without them" in result.problem
     change = np.abs(result.image.values - whole.image.values).max()
     assert change < 0.3 * np.abs(whole.image.values).max()
@@ -127,7 +127,7 @@ def test_too_many_rows_at_a_rail_give_no_picture(push, idle, touched):
     broken = touched.copy()
     broken[::2] = 0
     result = push(broken)
-    assert not result.pictured
+    assert not result.has_image
     assert not result.image.values.any()
     assert result.touches == ()
     assert "no picture" in result.problem
@@ -158,7 +158,7 @@ def test_a_reference_of_nothing_but_rails_is_said(push, idle, touched):
     settle(push, np.zeros_like(idle))
     for _ in range(30):  # until alpha has been tuned
         result = push(touched)
-    assert not result.pictured
+    assert not result.has_image
     assert "too little is left" in result.problem
 
 

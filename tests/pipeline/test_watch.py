@@ -76,7 +76,7 @@ def away(touch):
 def test_a_touch_goes_on_when_electrodes_are_cut_off(feed, sixteen, resting, touched, cut):
     feed(touched, 10)
     results = [feed(without(sixteen, touched, *cut)) for _ in range(12)]
-    assert all(result.pictured for result in results)
+    assert all(result.has_image for result in results)
     assert not results[0].health.sick
     assert {e.electrode: e.state for e in results[1].health.sick} == dict.fromkeys(cut, "open")
     assert all(len(result.touches) == 1 and away(result.touches[0]) < 0.012 for result in results)
@@ -91,7 +91,7 @@ def test_a_touch_goes_on_when_electrodes_are_cut_off(feed, sixteen, resting, tou
 def test_when_too_many_electrodes_are_gone_it_says_so(feed, sixteen, touched):
     feed(touched, 3)
     result = feed(without(sixteen, touched, 0, 3, 6, 9, 12), 3)
-    assert not result.pictured
+    assert not result.has_image
     assert not result.touches
     assert "too little is left for a picture" in result.problem
 
@@ -158,7 +158,7 @@ def test_the_prior_knows_which_electrodes_are_gone(sixteen):
     pattern = sixteen.pattern
     floating = np.arange(16) == CUT
     directions = nuisance_directions(pattern, (pattern.drive == CUT).any(axis=1), floating)
-    left = sixteen.blind_to(directions)
+    left = sixteen.without_directions(directions)
     beside = np.argmin(
         np.linalg.norm(sixteen.mesh.centroids - sixteen.skin.electrode_centres[CUT], axis=1)
     )
@@ -168,4 +168,4 @@ def test_the_prior_knows_which_electrodes_are_gone(sixteen):
 
 def test_the_prior_stays_where_nothing_is_left(sixteen):
     everything = np.eye(sixteen.pattern.n_meas)
-    assert sixteen.blind_to(everything) is sixteen
+    assert sixteen.without_directions(everything) is sixteen

@@ -98,7 +98,7 @@ def test_nothing_to_tell():
 
 def test_flags():
     assert decode(encode_result(make(left_out=2), [], 0.0))["flags"] == 0b101
-    assert decode(encode_result(make(left_out=2, pictured=False), [], 0.0))["flags"] == 0b111
+    assert decode(encode_result(make(left_out=2, has_image=False), [], 0.0))["flags"] == 0b111
 
 
 def test_numbers_that_do_not_fit_are_held_at_their_ends():

@@ -163,7 +163,7 @@ class Followed:
         if health is not None and health.sick:
             lost = nuisance_directions(prepared.pattern, health.lost, health.floating)
             if lost.shape[1] <= MOST_NUISANCE * len(lost):  # else no image is made
-                self._prepared = prepared.blind_to(lost / self._scale[:, None])
+                self._prepared = prepared.without_directions(lost / self._scale[:, None])
         self._nuisance = Nuisance(self._prepared, self._scale, self._drift)
 
     @property
@@ -188,7 +188,7 @@ class Followed:
 
     def subspace(self) -> NuisanceSubspace:
         """See :class:`Conditioning`."""
-        return self._nuisance(self._health).blind
+        return self._nuisance(self._health).nuisance
 
     def condition(self, measured: Measured) -> Conditioned:
         """See :class:`Conditioning`."""
@@ -207,12 +207,12 @@ class Followed:
         n_excluded = int(np.count_nonzero(self._excluded))
         if n_excluded:
             values = np.where(health.lost, mean, values)
-        if subspace.blind.count > MOST_NUISANCE * len(values):
+        if subspace.nuisance.count > MOST_NUISANCE * len(values):
             return Conditioned(None, n_excluded, health)
-        dv = subspace.blind(difference(values, mean, self._prepared.operator.difference))
+        dv = subspace.nuisance(difference(values, mean, self._prepared.operator.difference))
         differences = Differences(
             dv=dv,
-            nuisance=subspace.blind.directions,
+            nuisance=subspace.nuisance.directions,
             change=values - mean,
             drift=subspace.drift,
             from_rest=measured.values - baseline.start,

@@ -193,7 +193,7 @@ class Following:
             sequence=measured.sequence,
             host_time=measured.host_time,
             ready=True,
-            pictured=conditioned.differences is not None,
+            has_image=conditioned.differences is not None,
             image=image,
             voltages=measured.values,
             reference=self._conditioning.mean,

@@ -33,19 +33,19 @@ class SingleFrame:
         subspace: NuisanceSubspace | None = None,
     ) -> None:
         self._operator = prepared.operator
-        self._floor = None if reference is None else prepared.noise_floor(reference, subspace)
+        self._noise = None if reference is None else prepared.image_noise(reference, subspace)
 
     def renew(
         self, prepared: Prepared, reference: Reference, subspace: NuisanceSubspace | None
     ) -> None:
         """Another operator or noise, or other directions of the data that say nothing."""
         self._operator = prepared.operator
-        self._floor = prepared.noise_floor(reference, subspace)
+        self._noise = prepared.image_noise(reference, subspace)
 
     def push(self, dv: FloatArray, time: float) -> ImageAndNoise:
         """Image of ``dv`` (n_meas,), measured at ``time`` s. Raises DataError for other data."""
         del time
-        return self._operator.quick(dv), self._floor
+        return self._operator.quick(dv), self._noise
 
 
 class Filtered:
@@ -84,7 +84,7 @@ class Filtered:
             return
         noise = prepared.difference_noise(reference)
         self._noise = noise if subspace is None else subspace.seen_by(np.eye(len(noise))) * noise
-        self._alone = prepared.noise_floor(reference, subspace)
+        self._alone = prepared.image_noise(reference, subspace)
         for name in ("_steady", "_settling"):
             self.__dict__.pop(name, None)
 
@@ -96,9 +96,9 @@ class Filtered:
             last = None
         if last is None or time - last.time > _GAP * self._interval:
             self._settled = time + _SETTLED * self._temporal.time_constant
-        return self._temporal.push(dv, time), self._floor(time)
+        return self._temporal.push(dv, time), self._image_noise(time)
 
-    def _floor(self, time: float) -> ImageNoise | None:
+    def _image_noise(self, time: float) -> ImageNoise | None:
         """The filter's own; until that holds, no less than that of a single frame."""
         if self._alone is None or self._steady is None:
             return self._alone

@@ -55,13 +55,13 @@ class FrameSubspace:
 
     Attributes
     ----------
-    blind
+    nuisance
         Takes it out of difference data.
     drift
         (n_meas, k) V: directions of drift and of excluded measurements alone.
     """
 
-    blind: NuisanceSubspace
+    nuisance: NuisanceSubspace
     drift: FloatArray
 
 
@@ -102,8 +102,8 @@ class Nuisance:
     def _made(self, health: Health | None) -> FrameSubspace:
         drift, excluded = self._drift.directions, self._excluded(health)
         parts = [drift[:, 1:] if self._null_space.shape[1] else drift, self._calibrated, excluded]
-        blind = self._blind(np.hstack(parts) / self._scale[:, None])
-        return FrameSubspace(blind, np.hstack([drift, excluded]))
+        subspace = self._subspace(np.hstack(parts) / self._scale[:, None])
+        return FrameSubspace(subspace, np.hstack([drift, excluded]))
 
     def _excluded(self, health: Health | None) -> FloatArray:
         pattern = self._prepared.pattern
@@ -111,13 +111,13 @@ class Nuisance:
             return np.zeros((pattern.n_meas, 0))
         return nuisance_directions(pattern, health.lost, health.floating)
 
-    def _blind(self, directions: FloatArray) -> NuisanceSubspace:
+    def _subspace(self, directions: FloatArray) -> NuisanceSubspace:
         operator, images = self._prepared.operator, self._null_space
-        blind = NuisanceSubspace.of(directions, operator.precision)
+        subspace = NuisanceSubspace.of(directions, operator.precision)
         if not images.shape[1]:
-            return blind
+            return subspace
         data = (self._prepared.problem.jacobian @ images).real
-        return blind.without_free(data, (images.T @ operator.matrix).real)
+        return subspace.without_free(data, (images.T @ operator.matrix).real)
 
 
 def _null_space(prepared: Prepared) -> FloatArray:

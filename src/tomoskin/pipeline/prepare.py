@@ -132,7 +132,7 @@ class Prepared:
         kept = (c.without(measurements) for c in self.calibrations.values())
         return reduced._with({c.kind.name: c for c in kept if c is not None})
 
-    def blind_to(self, directions: FloatArray) -> Prepared:
+    def without_directions(self, directions: FloatArray) -> Prepared:
         """The skin whose prior knows that data along ``directions`` (n_meas, k) say nothing.
 
         A prior that weighs by sensitivity then holds changes beside a lost electrode for as
@@ -150,16 +150,18 @@ class Prepared:
         operator = replace(self.problem, prior=prior).operator(self.choice.alpha)
         return replace(self, operator=operator)
 
-    def noise_floor(
-        self, reference: Reference, blind: NuisanceSubspace | None = None
+    def image_noise(
+        self, reference: Reference, subspace: NuisanceSubspace | None = None
     ) -> ImageNoise | None:
         """What the noise of a reference does to the picture; None where it is not known.
 
-        ``blind``: what the data do not tell.
+        ``subspace``: what the data do not tell.
         """
         if not reference.noise_is_known:
             return None
-        matrix = self.operator.matrix if blind is None else blind.seen_by(self.operator.matrix)
+        matrix = self.operator.matrix
+        if subspace is not None:
+            matrix = subspace.seen_by(matrix)
         spread = matrix * self.difference_noise(reference)
         return ImageNoise.of(spread, self.mesh.identity)
 
@@ -171,11 +173,11 @@ class Prepared:
         """(n_meas,) standard deviation of difference data that the read-out predicts."""
         return _predicted(self.problem, self.readout)
 
-    def places(self, image: FloatArray) -> FloatArray:
+    def positions(self, image: FloatArray) -> FloatArray:
         """(k, 2) m, where the touches of an image (n_cells,) are."""
-        picture = Image(image, self.operator.unit, self.mesh.identity)
-        found = [(reading.x, reading.y) for reading in self.segmenter(picture)]
-        return np.array(found).reshape(-1, 2)
+        shown = Image(image, self.operator.unit, self.mesh.identity)
+        centres = [(reading.x, reading.y) for reading in self.segmenter(shown)]
+        return np.array(centres).reshape(-1, 2)
 
 
 def prepare(skin: Skin, previous: Prepared | None = None) -> Prepared:
@@ -183,14 +185,12 @@ def prepare(skin: Skin, previous: Prepared | None = None) -> Prepared:
 
     Where the skin's alpha is "auto", it is chosen by the noise that its read-out predicts. Of
     ``previous``, the same body with other settings, all that these leave as it is serves again,
-    and its calibrations stay.
+    and its calibrations stay. :func:`~tomoskin.core.watch_stages` is called with its stages.
 
     Raises
     ------
     TomoskinError
         When the skin cannot be meshed, modelled or inverted; the message says which.
-
-    Its stages are told to :func:`~tomoskin.core.watch_stages`.
     """
     if previous is not None and previous.skin.body == skin.body:
         return _prepared(skin, _problem_after(previous, skin), previous)

@@ -83,7 +83,7 @@ class RecordedFrames:
             noise=noise,
             frames=self.differences[complete],
             places=None if self.positions is None else self.positions[complete],
-            locate=self.prepared.places,
+            locate=self.prepared.positions,
         )
 
 

@@ -60,7 +60,7 @@ class FrameResult:
         As in the frame that it was made from.
     ready
         Whether a reference stands; until then the image is zero and there are no touches.
-    pictured
+    has_image
         Whether enough rows were usable; where not, the image is zero and there are no touches.
     image
         Change of conductivity against the reference.
@@ -82,7 +82,7 @@ class FrameResult:
     sequence: int
     host_time: float
     ready: bool
-    pictured: bool
+    has_image: bool
     image: Image
     voltages: FloatArray
     reference: FloatArray
@@ -107,7 +107,7 @@ class FrameResult:
             sequence=measured.sequence,
             host_time=measured.host_time,
             ready=baseline is not None,
-            pictured=True,
+            has_image=True,
             image=image,
             voltages=measured.values,
             reference=reference,
@@ -135,7 +135,7 @@ class FrameResult:
         if not self.left_out:
             return self.baseline.stale if self.baseline else None
         rows = f"{self.left_out} of {len(self.voltages)} rows"
-        if not self.pictured:
+        if not self.has_image:
             return (
                 f"{rows} are at a rail of the converter or without a reference: no picture is "
                 "shown; look at the electrodes and the gain"
@@ -147,7 +147,7 @@ class FrameResult:
 
     def _sick(self, health: Health) -> str:
         """Which electrodes, why, and what becomes of the picture."""
-        if not self.pictured:
+        if not self.has_image:
             return f"{health.text}; too little is left for a picture: look at the electrodes"
         return f"{health.text}; the picture is made without {self.left_out} rows"
 

@@ -194,15 +194,9 @@ class Flow:
             or self._standstill
             or self._saturated
             or (result.problem if result else None)
-            or self._doubt(reference),
+            or _doubt(self.prepared, reference),
             board=self.board,
         )
-
-    def _doubt(self, reference: ReferenceState) -> str | None:
-        """Whether the reference is this skin's, where positions rest on its model."""
-        if any(c.kind.locates for c in self.prepared.calibrations.values()):
-            return None
-        return reference.agreement.doubt(volts=True)
 
     def _note_board(self, info: Info | None) -> None:
         if info is not self.board:
@@ -265,3 +259,10 @@ class Flow:
         self.latency.add("reconstruct", ready - begun)
         self.newest = Snapshot(result, self.twin.truth, ready - read, ready)
         self.out.put(result)
+
+
+def _doubt(prepared: Prepared, reference: ReferenceState) -> str | None:
+    """Whether the reference is this skin's, where positions rest on its model."""
+    if any(c.kind.locates for c in prepared.calibrations.values()):
+        return None
+    return reference.agreement.doubt(volts=True)

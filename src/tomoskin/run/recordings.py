@@ -66,7 +66,7 @@ class PreRoll:
 
     def result(self, result: FrameResult) -> None:
         """What was made of that frame."""
-        if self._newest is None or not result.ready or not result.pictured:
+        if self._newest is None or not result.ready or not result.has_image:
             return
         if result.touches or (result.baseline is not None and result.baseline.held):
             self._waiting.clear()

@@ -117,7 +117,7 @@ def encode_result(result: FrameResult, truth: Sequence[Contact], latency: float)
 
 
 def _header(result: FrameResult, n_touches: int, n_truth: int, latency: float) -> bytes:
-    flags = READY * result.ready | NO_PICTURE * (not result.pictured)
+    flags = READY * result.ready | NO_PICTURE * (not result.has_image)
     flags |= ROWS_LEFT_OUT * (result.left_out > 0) | BEND * (result.bend is not None)
     values = (
         b"TSK1",

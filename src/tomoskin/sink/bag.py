@@ -58,7 +58,7 @@ def _items(job: Export, prepared: Prepared) -> Iterator[Item]:
     total, due = indexed_frames(job.session), float("-inf")
     for done, result in enumerate(replayed(prepared, job.session)):
         job.advance(done, max(done + 1, total))
-        shown = result.ready and result.pictured and result.host_time >= due
+        shown = result.ready and result.has_image and result.host_time >= due
         if shown:
             due = result.host_time + job.every
         yield Moment.of(result, with_image=shown)

@@ -170,7 +170,7 @@ class SinkConsumer(Consumer):
         if isinstance(item, Event):
             return item
         due = item is self._newest and not 0 <= item.host_time - self._last_image < IMAGE_PERIOD
-        due = due and item.ready and item.pictured
+        due = due and item.ready and item.has_image
         if due:
             self._last_image = item.host_time
         return Moment.of(item, with_image=due)

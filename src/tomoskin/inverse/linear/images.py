@@ -25,9 +25,9 @@ class ImageSeries:
     Attributes
     ----------
     values
-        (n_pictured, n_cells) in ``unit``.
+        (n_images, n_cells) in ``unit``.
     frames
-        (n_pictured,) the frames that gave them.
+        (n_images,) the frames that gave them.
     dropped
         (n_dropped,) measurements excluded in most frames, and so in all.
     left_out
