@@ -113,8 +113,9 @@ def test_the_pipeline_goes_on_while_its_operator_changes(auto, idle_samples):
 
 
 def test_the_deviation_of_a_touch_is_that_of_the_operator_in_use(auto, idle_samples, monkeypatch):
-    """What noise adds to it: the bias of images apart, which does not differ between frames."""
+    """What noise adds to it: an image's bias and a sheet's play do not differ between frames."""
     monkeypatch.setattr("tomoskin.touch.segment._BIAS", 0.0)
+    monkeypatch.setattr("tomoskin.touch.tracking.position._DRAG", 1e-9)
     pipeline = Pipeline(auto, reference_frames=NEEDED)
     source = frames(auto, idle_samples, LOUD)
     for _ in range(NEEDED):
