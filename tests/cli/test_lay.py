@@ -43,7 +43,7 @@ def test_it_writes_a_skin_file(tomoskin, surface: Path) -> None:
         ({"unit": "m"}, None, "millimetres"),
         ({}, "1,2\n", "places.csv, line 1: expected three numbers"),
         ({}, "1;2;3\n", "line 1: expected three numbers"),
-        ({}, "\n", "expected lines x,y,z, got none"),
+        ({}, "\n", "is empty"),
         ({}, "-50,0,0\n50,0,0\n0,50,0\n0,0,99\n", "electrode 3: lies 99 mm off the surface"),
         ({}, "-50,0,0\n50,0,0\n0,50,0\n", "expected at least 4 electrodes, got 3"),
         (

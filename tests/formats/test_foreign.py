@@ -475,7 +475,7 @@ def test_the_interchange_table(tmp_path):
         ("v_1_0_2_3,v_1_0_2_3\n1,1\n", "each once"),
         ("v_1_0_2_3\n", "empty"),
         ("nothing,known\n1,2\n", "known text log"),
-        ("", "known text log"),
+        ("", "is empty"),
     ],
 )
 def test_tables_that_cannot_be_meant(tmp_path, text, said):

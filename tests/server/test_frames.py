@@ -24,7 +24,7 @@ def make(n_cells=5, touches=(), **changes):
         "sequence": 7,
         "host_time": 12.5,
         "ready": True,
-        "pictured": True,
+        "has_image": True,
         "image": Image(np.linspace(-1, 1, n_cells), "S", "m"),
         "voltages": np.array([0.1, 0.2, 0.3]),
         "reference": np.array([0.4, 0.5, 0.6]),
