@@ -260,7 +260,7 @@ def test_a_real_limit_on_the_files_size(tmp_path):
     """The kernel refuses to write on: the command says so, and the file is readable."""
     path = tmp_path / "x.mcap"
     command = "from tomoskin.cli import main; main()"
-    limit = 1_000_000  # a few chunks: what is lost is the one that does not fit
+    limit = 400_000  # a few chunks: what is lost is the one that does not fit
     done = subprocess.run(
         [sys.executable, "-c", command, "record", str(path), "--source", "twin:fast"],
         capture_output=True,

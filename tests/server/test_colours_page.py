@@ -41,6 +41,7 @@ def site(still):
     less, more = pressed(still, *FALL, loss=0.4), pressed(still, *RISE, loss=-0.6)
     board.free = samples_of(still, less * more / still.skin.conductivity)
     until(lambda: runner.newest.result.touches)
+    board.period = 0.3  # nothing moves, and drawing it costs time
     site = Site(runner)
     yield site
     site.stop()

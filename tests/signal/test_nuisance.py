@@ -20,9 +20,9 @@ def test_it_is_the_limit_of_ever_more_noise_along_the_directions():
     directions = RANDOM.standard_normal((12, 3))
     blind = NuisanceSubspace.of(directions, P)
     noisy = J.T @ np.linalg.inv(GRAM + 1e7 * directions @ directions.T)
-    np.testing.assert_allclose(blind.seen_by(R), noisy, atol=1e-5)
+    np.testing.assert_allclose(blind.projected(R), noisy, atol=1e-5)
     dv = RANDOM.standard_normal(12)
-    np.testing.assert_allclose(R @ blind(dv), blind.seen_by(R) @ dv, atol=1e-12)
+    np.testing.assert_allclose(R @ blind(dv), blind.projected(R) @ dv, atol=1e-12)
     shifted = dv + 1e3 * directions @ [1.0, -2.0, 0.5]
     np.testing.assert_allclose(R @ blind(shifted), R @ blind(dv), atol=1e-9)
 
@@ -31,8 +31,8 @@ def test_lost_rows_are_directions_too():
     kept = np.arange(12) > 2
     alone = J[kept].T @ np.linalg.inv(GRAM[np.ix_(kept, kept)])
     blind = NuisanceSubspace.of(np.eye(12)[:, ~kept], P)
-    np.testing.assert_allclose(blind.seen_by(R)[:, kept], alone, atol=1e-9)
-    assert not np.abs(blind.seen_by(R)[:, ~kept]).max() > 1e-9
+    np.testing.assert_allclose(blind.projected(R)[:, kept], alone, atol=1e-9)
+    assert not np.abs(blind.projected(R)[:, ~kept]).max() > 1e-9
 
 
 def test_a_free_image_is_left_out_whatever_the_data_say():
@@ -49,7 +49,7 @@ def test_a_free_image_is_left_out_whatever_the_data_say():
     dv = RANDOM.standard_normal(12)
     told = matrix @ blind(dv)
     assert np.abs(free.T @ told).max() < 1e-9
-    np.testing.assert_allclose(blind.seen_by(matrix) @ dv, told, atol=1e-9)
+    np.testing.assert_allclose(blind.projected(matrix) @ dv, told, atol=1e-9)
     changed = dv + 5.0 * seen[:, 0] + np.where(np.arange(12) < 2, 9.0, 0.0)
     np.testing.assert_allclose(matrix @ blind(changed), told, atol=1e-8)
 

@@ -57,30 +57,30 @@ def touch(
     """Learn where a touch is from presses at known places."""
     from tomoskin.formats import read_recording
 
-    whole = read_recording(recording)
-    say_notes(whole)
+    data = read_recording(recording)
+    say_notes(data)
     learn, pattern = (
-        _onto(onto, skin, recording) if onto else _anew(*_what_of(skin, recording, whole))
+        _onto(onto, skin, recording) if onto else _from_skin(*_what_of(skin, recording, data))
     )
-    whole = whole.in_order_of(pattern)
-    xy, dv = labels(whole), changes(whole, reference, pattern)
+    data = data.in_order_of(pattern)
+    xy, dv = labels(data), changes(data, reference, pattern)
     frames = labelled_frames(xy)
     calibration = learn(dv[frames], xy[frames])
     calibration.write(out, overwrite=force)
-    found = _findings(calibration, frames.tolist())
-    if found["is_guess"]:
+    facts = _findings(calibration, frames.tolist())
+    if facts["is_guess"]:
         remark(
             f"{recording}: the frames hardly tell where they were pressed: presses left out are "
-            f"missed by {found['mean_mm']:.0f} mm, and by {found['guessed_mm']:.0f} mm if the "
+            f"missed by {facts['mean_mm']:.0f} mm, and by {facts['guessed_mm']:.0f} mm if the "
             "answer is always their middle; look at --reference and the labels, or press harder"
         )
     if json:
-        emit(found)
+        emit(facts)
     else:
-        _say(found)
+        _say(facts)
 
 
-def _anew(skin: Skin | None, pattern: Pattern) -> tuple[Learn, Pattern]:
+def _from_skin(skin: Skin | None, pattern: Pattern) -> tuple[Learn, Pattern]:
     """What learns from these presses alone."""
     from tomoskin.calibration import TOUCH, Locator
 
@@ -95,10 +95,10 @@ def _anew(skin: Skin | None, pattern: Pattern) -> tuple[Learn, Pattern]:
 def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern]:
     """What learns from these presses and those of an older calibration of the same skin."""
     from tomoskin.calibration import TOUCH
-    from tomoskin.cli.choices import known_skin
+    from tomoskin.cli.choices import skin_if_any
 
     old = TOUCH.read(path)
-    if (skin := known_skin(name, recording)) is not None:
+    if (skin := skin_if_any(name, recording)) is not None:
         old.check_skin(skin)
 
     def learn(dv: FloatArray, xy: FloatArray) -> Calibration[Locator]:
@@ -108,13 +108,13 @@ def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern
     return learn, old.pattern
 
 
-def _what_of(name: str | None, path: Path, whole: Recording) -> tuple[Skin | None, Pattern]:
+def _what_of(name: str | None, path: Path, data: Recording) -> tuple[Skin | None, Pattern]:
     """The skin, where there is one, and the table of rows."""
-    from tomoskin.cli.choices import known_skin
+    from tomoskin.cli.choices import skin_if_any
     from tomoskin.pattern import Pattern
 
-    skin = known_skin(name, path)
-    return skin, skin.pattern() if skin else Pattern.from_tables(whole.drive, whole.measure)
+    skin = skin_if_any(name, path)
+    return skin, skin.pattern() if skin else Pattern.from_tables(data.drive, data.measure)
 
 
 def _findings(calibration: Calibration[Locator], frames: list[int]) -> dict[str, Any]:
@@ -142,27 +142,27 @@ def _findings(calibration: Calibration[Locator], frames: list[int]) -> dict[str,
     }
 
 
-def _say(found: dict[str, Any]) -> None:
+def _say(facts: dict[str, Any]) -> None:
     typer.echo(
-        f"{found['presses']} presses; left out of the learning they are missed by "
-        f"{found['mean_mm']:.1f} mm (median {found['median_mm']:.1f}, 95 % {found['p95_mm']:.1f}), "
-        f"and their 90 % ellipses hold {100 * found['held_by_90_percent_ellipses']:.0f} %"
+        f"{facts['presses']} presses; left out of the learning they are missed by "
+        f"{facts['mean_mm']:.1f} mm (median {facts['median_mm']:.1f}, 95 % {facts['p95_mm']:.1f}), "
+        f"and their 90 % ellipses hold {100 * facts['held_by_90_percent_ellipses']:.0f} %"
     )
-    if found["one_force"]:
+    if facts["one_force"]:
         typer.echo(
             "all were about equally hard: this holds for such presses, softer and harder ones are "
             "missed farther; add some of both with --onto"
         )
-    for doubtful in found["remarks"][:_SHOWN]:
+    for doubtful in facts["remarks"][:_SHOWN]:
         frame = doubtful["frame"]
         who = "an older press" if frame is None else f"frame {frame:>4}"
         typer.echo(f"{who}  doubtful: {doubtful['reason']}")
-    if len(found["remarks"]) > _SHOWN:
-        typer.echo(f"… and {len(found['remarks']) - _SHOWN} more: --json lists them all")
-    if found["drift"] > _DRIFTED:
+    if len(facts["remarks"]) > _SHOWN:
+        typer.echo(f"… and {len(facts['remarks']) - _SHOWN} more: --json lists them all")
+    if facts["drift"] > _DRIFTED:
         typer.echo(
-            f"the last presses are missed {found['drift']:.1f} times as far as usual: "
+            f"the last presses are missed {facts['drift']:.1f} times as far as usual: "
             "the skin has changed; press it anew"
         )
-    x, y = found["next_press_mm"]
+    x, y = facts["next_press_mm"]
     typer.echo(f"the next press tells most at x {x:+.0f} mm, y {y:+.0f} mm")

@@ -56,19 +56,19 @@ def calibrate_bend(
     chosen = skin_for_file(skin, recording)
     with Bar("preparing"):
         prepared = prepare(chosen)
-    whole = read_recording(recording).in_order_of(prepared.pattern)
-    say_notes(whole)
-    idle = idle_frames(whole, reference, prepared.pattern)
+    data = read_recording(recording).in_order_of(prepared.pattern)
+    say_notes(data)
+    idle = idle_frames(data, reference, prepared.pattern)
     if idle is None or isinstance(idle, str):
         raise DataError("expected voltages and untouched frames", where=str(recording))
     straight = Reference.of(np.asarray(idle, dtype=np.float64))
-    frames, angle, axis = _said(bend, len(whole)) if bend else _told(recording, whole)
-    examples = BendExamples.of(whole.voltages[frames] - straight.mean, angle, axis,
-                               whole.time[frames])  # fmt: skip
+    frames, angle, axis = _from_options(bend, len(data)) if bend else _from_truth(recording, data)
+    examples = BendExamples.of(data.voltages[frames] - straight.mean, angle, axis,
+                               data.time[frames])  # fmt: skip
     with Bar("learning"):
         model = BendModel.learn(examples, voltage_covariance(prepared, straight))
     BENDS.of(model, prepared.pattern, chosen).write(out, overwrite=force)
-    found = {
+    facts = {
         "frames": len(examples.angle),
         "directions": model.n_modes,
         "axes_deg": np.degrees(examples.axes).round(1).tolist(),
@@ -76,11 +76,11 @@ def calibrate_bend(
         "remembers": model.remembers,
     }
     if json:
-        emit(found)
+        emit(facts)
         return
     typer.echo(
-        f"{found['frames']} frames, {found['directions']} directions; left out of the learning, "
-        f"angles are missed by {found['error_deg']:.2f}°"
+        f"{facts['frames']} frames, {facts['directions']} directions; left out of the learning, "
+        f"angles are missed by {facts['error_deg']:.2f}°"
     )
     if model.remembers:
         typer.echo("what the sheet remembers counts: play frames in their order")
@@ -88,7 +88,7 @@ def calibrate_bend(
         typer.echo("axes are told from three directions on; here the axis is taken as given")
 
 
-def _said(given: list[str], n: int) -> tuple[list[int], FloatArray, FloatArray]:
+def _from_options(given: list[str], n: int) -> tuple[list[int], FloatArray, FloatArray]:
     """Frames, angles and axes, rad, of the options."""
     import numpy as np
 
@@ -114,7 +114,7 @@ def _said(given: list[str], n: int) -> tuple[list[int], FloatArray, FloatArray]:
     return frames, angle, axis_of
 
 
-def _told(path: Path, whole: Recording) -> tuple[list[int], FloatArray, FloatArray]:
+def _from_truth(path: Path, data: Recording) -> tuple[list[int], FloatArray, FloatArray]:
     """The same from a session's truth: frames that nothing presses, with one bend or none."""
     import numpy as np
 
@@ -125,7 +125,7 @@ def _told(path: Path, whole: Recording) -> tuple[list[int], FloatArray, FloatArr
         raise DataError("says no angles", where=str(path), hint="--bend 0=0:20 --bend 30=40:60")
     with SessionReader(path) as session:
         truth = list(session.truth())
-    at = np.searchsorted([item.host_time for item in truth], whole.time, side="right") - 1
+    at = np.searchsorted([item.host_time for item in truth], data.time, side="right") - 1
     frames, rows = [], []
     for frame, number in enumerate(at.tolist()):
         item = truth[number] if number >= 0 else None

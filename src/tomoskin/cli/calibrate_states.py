@@ -123,14 +123,14 @@ def calibrate_states(
     from tomoskin.formats import read_recording
     from tomoskin.pattern import Pattern
 
-    whole = read_recording(recording)
-    say_notes(whole)
+    data = read_recording(recording)
+    say_notes(data)
     with Bar("learning the older ones"):
         old = CLASSES.read(onto) if onto else None
     chosen, pattern = _what_of(skin, recording, old)
-    pattern = pattern or Pattern.from_tables(whole.drive, whole.measure)
-    whole = whole.in_order_of(pattern)
-    dv = changes(whole, reference, pattern)
+    pattern = pattern or Pattern.from_tables(data.drive, data.measure)
+    data = data.in_order_of(pattern)
+    dv = changes(data, reference, pattern)
     examples = marked(
         recording, dv, state or [], old.model.classifier.examples.codes if old else None
     )
@@ -144,9 +144,9 @@ def _what_of(
     name: str | None, path: Path, old: Calibration[FrameClassifier] | None
 ) -> tuple[Skin | None, Pattern | None]:
     """The skin, where there is one, and the table of rows where it is known beforehand."""
-    from tomoskin.cli.choices import known_skin
+    from tomoskin.cli.choices import skin_if_any
 
-    skin = known_skin(name, path)
+    skin = skin_if_any(name, path)
     if old is not None:
         if skin is not None:
             old.check_skin(skin)
@@ -174,14 +174,14 @@ def _report(made: Calibration[FrameClassifier], n_frames: int, fitted: bool, *, 
     classifier = made.model.classifier
     examples, codes = classifier.examples, classifier.examples.codes
     here = examples.part(examples.newest)
-    known = int(here.labelled.sum())
+    n_labelled = int(here.labelled.sum())
     if json:
         emit(
             {
                 "names": codes.names,
                 "exclusive": codes.exclusive,
                 "frames": n_frames,
-                "labelled": known,
+                "labelled": n_labelled,
                 "sessions": int(examples.session.max()) + 1,
                 "right_when_left_out": classifier.right,
             }
@@ -189,9 +189,11 @@ def _report(made: Calibration[FrameClassifier], n_frames: int, fitted: bool, *, 
         return
     kind = "states" if codes.exclusive else "flags"
     typer.echo(f"{len(codes.names)} {kind}: {', '.join(codes.names)}")
-    told = f"{100 * classifier.right:.0f} % of the labelled frames"
-    typer.echo(f"{known} of {n_frames} frames labelled; left out of the learning, {told} are right")
+    share = f"{100 * classifier.right:.0f} % of the labelled frames"
+    typer.echo(
+        f"{n_labelled} of {n_frames} frames labelled; left out of the learning, {share} are right"
+    )
     if classifier.right < _HARDLY:
         typer.echo("the labels hardly follow from the data: are they of these frames?")
-    if fitted and known < n_frames:
-        typer.echo(f"fitted to this session by {n_frames - known} frames without a label")
+    if fitted and n_labelled < n_frames:
+        typer.echo(f"fitted to this session by {n_frames - n_labelled} frames without a label")

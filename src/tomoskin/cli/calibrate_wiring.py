@@ -43,41 +43,41 @@ def calibrate_wiring(
     from tomoskin.core import write_text
     from tomoskin.formats import read_recording
 
-    whole = read_recording(recording)
-    say_notes(whole)
+    data = read_recording(recording)
+    say_notes(data)
     drawn = skin_for_file(skin, recording)
     pattern = drawn.pattern()
-    whole = whole.in_order_of(pattern)
-    xy, dv = labels(whole), changes(whole, reference, pattern)
+    data = data.in_order_of(pattern)
+    xy, dv = labels(data), changes(data, reference, pattern)
     frames = labelled_frames(xy)
-    rest, noise = _at_rest(whole, reference, pattern)
+    rest, noise = _at_rest(data, reference, pattern)
     with Bar("weighing wirings") as bar:
         answer = solve_wiring(
             dv[frames], xy[frames], drawn, reference=rest, noise=noise, progress=bar
         )
-    found = _findings(answer, drawn, frames.tolist())
+    facts = _findings(answer, drawn, frames.tolist())
     if answer.sure:
         write_text(out, answer.wiring.applied(drawn).to_toml(), overwrite=force)
     if json:
-        emit(found)
+        emit(facts)
     else:
-        _say(found)
+        _say(facts)
     if not answer.sure:
-        raise DataError(_why(answer), where=str(recording), hint=_next(found))
+        raise DataError(_why(answer), where=str(recording), hint=_next(facts))
 
 
 def _at_rest(
-    whole: Recording, reference: str | None, pattern: Pattern
+    data: Recording, reference: str | None, pattern: Pattern
 ) -> tuple[FloatArray | None, FloatArray | None]:
     """Mean and noise (n_meas,) V of the untouched skin, as far as they are known."""
     from tomoskin.signal import Reference
 
-    idle = idle_frames(whole, reference, pattern)
+    idle = idle_frames(data, reference, pattern)
     if idle is None or isinstance(idle, str):
         return None, None
-    known = Reference.of(idle.real.astype(float))
-    usable = known.noise_is_known and (known.noise > 0).all()
-    return known.mean, known.noise if usable else None
+    idle_level = Reference.of(idle.real.astype(float))
+    usable = idle_level.noise_is_known and (idle_level.noise > 0).all()
+    return idle_level.mean, idle_level.noise if usable else None
 
 
 def _findings(answer: WiringAnswer, skin: Skin, frames: list[int]) -> dict[str, Any]:
@@ -108,17 +108,17 @@ def _polarity(answer: WiringAnswer) -> str:
     return "reversed" if answer.wiring.reversed else "normal"
 
 
-def _say(found: dict[str, Any]) -> None:
-    typer.echo(f"{found['presses']} presses: {found['wiring']}")
+def _say(facts: dict[str, Any]) -> None:
+    typer.echo(f"{facts['presses']} presses: {facts['wiring']}")
     typer.echo(
-        f"probability {found['probability']:.3f}; {min(found['odds'], 1e6):.3g} times as likely as "
-        f"the next: {found['runner_up']}"
+        f"probability {facts['probability']:.3f}; {min(facts['odds'], 1e6):.3g} times as likely as "
+        f"the next: {facts['runner_up']}"
     )
-    if found["polarity"] == "not known":
+    if facts["polarity"] == "not known":
         typer.echo(
             "the polarity cannot be told: give untouched frames, or [touch] sign in the skin file"
         )
-    for remark in found["remarks"]:
+    for remark in facts["remarks"]:
         x, y = remark["looks_like_mm"]
         typer.echo(
             f"frame {remark['frame']:>4}  doubtful: looks like a press at x {x:+.0f} mm, "
@@ -134,6 +134,6 @@ def _why(answer: WiringAnswer) -> str:
     return f"these presses cannot tell: the likeliest wiring has {answer.probability:.2f}"
 
 
-def _next(found: dict[str, Any]) -> str:
-    x, y = found["next_press_mm"]
+def _next(facts: dict[str, Any]) -> str:
+    x, y = facts["next_press_mm"]
     return f"a further press tells most at x {x:+.0f} mm, y {y:+.0f} mm"

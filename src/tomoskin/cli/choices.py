@@ -30,7 +30,7 @@ def skin_for_source(skin: str | None, source: str) -> Skin:
     return Skin.load(DEFAULT_SKIN if skin is None else skin)
 
 
-def known_skin(skin: str | None, path: Path) -> Skin | None:
+def skin_if_any(skin: str | None, path: Path) -> Skin | None:
     """The skin named, or the one in the session ``path``; None where neither says one."""
     from tomoskin.formats import is_session
 

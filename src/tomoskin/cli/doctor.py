@@ -63,8 +63,8 @@ def _page() -> Iterator[Finding]:
 def _sources() -> Iterator[Finding]:
     from tomoskin.source import list_ports, source_names
 
-    known = ", ".join(source_names())
-    yield Finding("sources", bool(known), known or "none; install tomoskin again (make live)")
+    names = ", ".join(source_names())
+    yield Finding("sources", bool(names), names or "none; install tomoskin again (make live)")
     ports = ", ".join(map(str, list_ports()))
     yield Finding("serial", True, ports or "no serial port is connected")
 

@@ -15,7 +15,7 @@ from tomoskin.cli.output import Bar
 app = group("firmware")
 
 
-def _known(channels: int) -> int:
+def _checked_channels(channels: int) -> int:
     if channels not in (8, 16):
         raise typer.BadParameter(f"expected 8 or 16, got {channels}")
     return channels
@@ -27,7 +27,9 @@ def _eight_bytes(name: str | None) -> str | None:
     return name
 
 
-Channels = Annotated[int, typer.Option(help="8 or 16, as the board has.", callback=_known)]
+Channels = Annotated[
+    int, typer.Option(help="8 or 16, as the board has.", callback=_checked_channels)
+]
 Port = Annotated[str, typer.Argument(help="Such as /dev/ttyACM0.")]
 
 

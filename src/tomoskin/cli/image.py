@@ -87,10 +87,10 @@ def image(
     chosen, rule = with_alpha(own, alpha)
     chosen = with_time_constant(chosen, time_constant)
     display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
-    whole = read_recording(recording)  # what cannot be read is said before the work
+    data = read_recording(recording)  # what cannot be read is said before the work
     with Bar("preparing"):
         prepared = with_states(with_bends(prepare(chosen), bend), states, own)
-    recorded = whole.in_order_of(prepared.pattern)
+    recorded = data.in_order_of(prepared.pattern)
     say_notes(recorded)
     idle = idle_frames(recorded, reference, prepared.pattern)
     start, stop = frame_range(recorded, frames)

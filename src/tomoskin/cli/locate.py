@@ -43,39 +43,39 @@ def locate(
     from tomoskin.formats import read_recording, write_touches
 
     with Bar("learning") as bar:
-        known = TOUCH.read(calibration, bar)
-    whole = read_recording(recording)
-    say_notes(whole)
-    _check_skin(known, skin, recording)
-    whole = whole.in_order_of(known.pattern)
-    dv = changes(whole, reference, known.pattern)
-    frames = np.flatnonzero(np.isfinite(dv[:, known.model.features.rows]).any(axis=1))
+        loaded = TOUCH.read(calibration, bar)
+    data = read_recording(recording)
+    say_notes(data)
+    _check_skin(loaded, skin, recording)
+    data = data.in_order_of(loaded.pattern)
+    dv = changes(data, reference, loaded.pattern)
+    frames = np.flatnonzero(np.isfinite(dv[:, loaded.model.features.rows]).any(axis=1))
     if len(frames) < len(dv):
         typer.echo(
             f"tomoskin: {recording}: {len(dv) - len(frames)} frames hold no finite value "
             "and were left out",
             err=True,
         )
-    found = list((_several if several else _single)(known, dv[frames]))
+    located = list((_several if several else _single)(loaded, dv[frames]))
     if touches is not None:
-        rows = zip(frames.tolist(), found, strict=True)
-        timed = ((k, float(whole.time[k]), t) for k, t in rows)
+        rows = zip(frames.tolist(), located, strict=True)
+        timed = ((k, float(data.time[k]), t) for k, t in rows)
         write_touches(touches, timed, overwrite=force)
-    _report(whole, frames.tolist(), found, json=json)
+    _report(data, frames.tolist(), located, json=json)
 
 
-def _check_skin(known: Calibration[Locator], name: str | None, path: Path) -> None:
-    from tomoskin.cli.choices import known_skin
+def _check_skin(loaded: Calibration[Locator], name: str | None, path: Path) -> None:
+    from tomoskin.cli.choices import skin_if_any
 
-    if (skin := known_skin(name, path)) is not None:
-        known.check_skin(skin)
+    if (skin := skin_if_any(name, path)) is not None:
+        loaded.check_skin(skin)
 
 
-def _several(known: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
+def _several(loaded: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
     from tomoskin.calibration import Several
     from tomoskin.core import Touch
 
-    both = Several.of(known.model)
+    both = Several.of(loaded.model)
     with Bar("locating") as bar:
         for number, frame in enumerate(dv):
             bar(number, len(dv))
@@ -85,26 +85,26 @@ def _several(known: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touc
             )
 
 
-def _single(known: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
+def _single(loaded: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
     import numpy as np
 
     from tomoskin.calibration import Watch
     from tomoskin.core import Detection, Touch
 
-    locator = known.model
+    locator = loaded.model
     watch = Watch(locator)
     for start in range(0, len(dv), _BLOCK):
         part = dv[start : start + _BLOCK]
-        places, covariance = watch(part)
+        positions, covariance = watch(part)
         deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
         strength = locator.strength(part)
-        for place, sd, peak in zip(places, deviation, strength, strict=True):
+        for place, sd, peak in zip(positions, deviation, strength, strict=True):
             (x, y), (sd_x, sd_y) = place.tolist(), sd.tolist()
             nothing = np.empty(0, dtype=np.int64)
             detection = Detection(x, y, sd_x, sd_y, area=np.nan, peak=float(peak), cells=nothing)
             yield (Touch(id=1, kind="touch", since=0.0, detection=detection),)
     if len(watch.jumped):
-        jumped = "; ".join(known.pattern.row_text(row) for row in watch.jumped[:_SHOWN].tolist())
+        jumped = "; ".join(loaded.pattern.row_text(row) for row in watch.jumped[:_SHOWN].tolist())
         typer.echo(
             f"tomoskin: {len(watch.jumped)} rows have jumped since the calibration and are left "
             f"out at the end: {jumped}; presses of today mend that: "
@@ -114,15 +114,15 @@ def _single(known: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch
 
 
 def _report(
-    whole: Recording, frames: list[int], found: list[tuple[Touch, ...]], *, json: bool
+    data: Recording, frames: list[int], touches: list[tuple[Touch, ...]], *, json: bool
 ) -> None:
-    rows = [(frame, touch) for frame, some in zip(frames, found, strict=True) for touch in some]
+    rows = [(frame, touch) for frame, some in zip(frames, touches, strict=True) for touch in some]
     if json:
         emit(
             [
                 {
                     "frame": frame,
-                    "time_s": float(whole.time[frame]),
+                    "time_s": float(data.time[frame]),
                     "x_m": touch.detection.x,
                     "y_m": touch.detection.y,
                     "sd_x_m": touch.detection.sd_x,

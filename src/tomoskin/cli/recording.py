@@ -117,11 +117,11 @@ def changes(recording: Recording, reference: str | None, pattern: Pattern) -> Fl
     return np.asarray(values, dtype=np.float64)
 
 
-def labelled_frames(places: FloatArray) -> IntArray:
+def labelled_frames(positions: FloatArray) -> IntArray:
     """(k,) frames of ``places`` (n, 2) that have a label."""
     import numpy as np
 
-    return np.flatnonzero(np.isfinite(places).all(axis=1))
+    return np.flatnonzero(np.isfinite(positions).all(axis=1))
 
 
 def labels(recording: Recording) -> FloatArray:

@@ -94,7 +94,7 @@ def lay(
 
     if unit not in ("mm", "cm", "m"):
         raise DataError(f'expected mm, cm or m, got "{unit}"', where="--unit")
-    skin = laid(surface, _places(electrodes), unit=unit, like=Skin.load(like), source=str(out))
+    skin = laid(surface, _positions(electrodes), unit=unit, like=Skin.load(like), source=str(out))
     mesh = skin.mesh()
     write_text(out, skin.to_toml(), overwrite=force)
     scale = DIMENSIONS["length"]["cm"]
@@ -115,7 +115,7 @@ def _summary(skin: Skin) -> dict[str, Any]:
     }
 
 
-def _places(path: Path) -> FloatArray:
+def _positions(path: Path) -> FloatArray:
     """(n, 3) numbers of a CSV file, which may have a heading."""
     import numpy as np
 

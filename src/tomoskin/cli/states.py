@@ -42,35 +42,35 @@ def states(
 ) -> None:
     """Tell the state of each frame, or that it is none of those that were learnt."""
     from tomoskin.calibration import CLASSES
-    from tomoskin.cli.choices import known_skin
+    from tomoskin.cli.choices import skin_if_any
     from tomoskin.formats import read_recording
 
     with Bar("learning"):
-        known = CLASSES.read(calibration)
-    classifier = known.model.classifier
-    whole = read_recording(recording)
-    say_notes(whole)
-    if (chosen := known_skin(skin, recording)) is not None:
-        known.check_skin(chosen)
-    whole = whole.in_order_of(known.pattern)
-    dv = changes(whole, reference, known.pattern)
+        loaded = CLASSES.read(calibration)
+    classifier = loaded.model.classifier
+    data = read_recording(recording)
+    say_notes(data)
+    if (chosen := skin_if_any(skin, recording)) is not None:
+        loaded.check_skin(chosen)
+    data = data.in_order_of(loaded.pattern)
+    dv = changes(data, reference, loaded.pattern)
     with Bar("telling states"):
         answers = classifier.predict(dv)
         asked = classifier.most_telling(dv, min(ask, len(dv))).tolist()
     names = classifier.examples.codes.names
     if out is not None:
-        _write(out, whole, answers, names, overwrite=force)
+        _write(out, data, answers, names, overwrite=force)
     if json:
-        emit({"names": names, "frames": _documents(whole, answers), "ask": asked})
+        emit({"names": names, "frames": _documents(data, answers), "ask": asked})
     else:
         _say(answers, asked)
 
 
-def _documents(whole: Recording, answers: Answers) -> list[dict[str, Any]]:
+def _documents(data: Recording, answers: Answers) -> list[dict[str, Any]]:
     return [
         {
             "frame": frame,
-            "time_s": float(whole.time[frame]),
+            "time_s": float(data.time[frame]),
             "state": label,
             "probability": float(answers.probability[frame]),
             "unknown": bool(answers.rejected[frame]),
@@ -81,7 +81,7 @@ def _documents(whole: Recording, answers: Answers) -> list[dict[str, Any]]:
 
 
 def _write(
-    path: Path, whole: Recording, answers: Answers, names: tuple[str, ...], *, overwrite: bool
+    path: Path, data: Recording, answers: Answers, names: tuple[str, ...], *, overwrite: bool
 ) -> None:
     from tomoskin.core import written
 
@@ -91,7 +91,7 @@ def _write(
     ):
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["frame", "time_s", "state", "probability", "unknown", *names])
-        for row in _documents(whole, answers):
+        for row in _documents(data, answers):
             each = [f"{p:.4f}" for p in row["each"]]
             sure, unknown = f"{row['probability']:.4f}", int(row["unknown"])
             when = f"{row['time_s']:.6f}"
@@ -104,8 +104,8 @@ def _say(answers: Answers, asked: list[int]) -> None:
     for run in runs[:_SHOWN]:
         (first, (label, rejected, _)), (last, _) = run[0], run[-1]
         sure = min(probability for _, (_, _, probability) in run)
-        told = f"unknown (nearest: {label})" if rejected else f"{label}  {100 * sure:.0f} % or more"
-        typer.echo(f"frames {first:>4} to {last:>4}  {told}")
+        text = f"unknown (nearest: {label})" if rejected else f"{label}  {100 * sure:.0f} % or more"
+        typer.echo(f"frames {first:>4} to {last:>4}  {text}")
     if len(runs) > _SHOWN:
         typer.echo(f"… and {len(rows) - runs[_SHOWN][0][0]} frames more: --out writes them all")
     typer.echo(f"{int(answers.rejected.sum())} of {len(rows)} frames are of no known state")

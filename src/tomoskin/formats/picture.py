@@ -74,9 +74,9 @@ def plot(
         When matplotlib is not installed, the image is of another mesh, or the mesh is a volume.
     """
     how = Display() if display is None else display
-    seen = how.shown(image, mesh)
-    panel = Panel(title, seen.values, tuple(touches))
-    return _figure(Path("plot"), mesh, [panel], seen.unit, how.limit)
+    shown = how.shown(image, mesh)
+    panel = Panel(title, shown.values, tuple(touches))
+    return _figure(Path("plot"), mesh, [panel], shown.unit, how.limit)
 
 
 def rendered(path: Path, mesh: Mesh, panel: Panel, unit: str, limit: float) -> NDArray[np.uint8]:

@@ -83,7 +83,7 @@ class Filtered:
         if not reference.noise_is_known:
             return
         noise = prepared.difference_noise(reference)
-        self._noise = noise if subspace is None else subspace.seen_by(np.eye(len(noise))) * noise
+        self._noise = noise if subspace is None else subspace.projected(np.eye(len(noise))) * noise
         self._alone = prepared.image_noise(reference, subspace)
         for name in ("_steady", "_settling"):
             self.__dict__.pop(name, None)

@@ -161,7 +161,7 @@ class Prepared:
             return None
         matrix = self.operator.matrix
         if subspace is not None:
-            matrix = subspace.seen_by(matrix)
+            matrix = subspace.projected(matrix)
         spread = matrix * self.difference_noise(reference)
         return ImageNoise.of(spread, self.mesh.identity)
 

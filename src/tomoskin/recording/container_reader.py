@@ -80,9 +80,9 @@ class ContainerReader:
                 break
             if opcode == Opcode.METADATA:
                 with self._damage_at(offset):
-                    found = decode(Metadata, self._record(offset))
-                if found.name == name:
-                    return found.metadata
+                    record = decode(Metadata, self._record(offset))
+                if record.name == name:
+                    return record.metadata
         return None
 
     def attachments(self) -> Iterator[Attachment]:
@@ -94,36 +94,36 @@ class ContainerReader:
             offsets = self.summary.attachments
         for offset in offsets:
             with self._damage_at(offset):
-                found = decode(Attachment, self._record(offset))
-            yield found
+                record = decode(Attachment, self._record(offset))
+            yield record
 
-    def messages(self, wanted: frozenset[int], since: int = 0) -> Iterator[LoggedMessage]:
+    def messages(self, channels: frozenset[int], since: int = 0) -> Iterator[LoggedMessage]:
         """Messages of the channels ``wanted`` logged at ``since`` ns or later, in file order.
 
         Of a file with its end only the chunks that hold such messages are read.
         """
-        for offset in self._chunk_offsets(wanted, since):
+        for offset in self._chunk_offsets(channels, since):
             for message in self._messages_at(offset):
-                if message.channel in wanted and message.log_time >= since:
+                if message.channel in channels and message.log_time >= since:
                     yield message
 
     def last(self, channel: int) -> LoggedMessage | None:
         """The last message of a channel in the file."""
-        wanted = frozenset({channel})
+        channels = frozenset({channel})
         if self.summary is None:
-            return next(iter(deque(self.messages(wanted), maxlen=1)), None)
-        for offset in reversed(list(self._chunk_offsets(wanted, 0))):
+            return next(iter(deque(self.messages(channels), maxlen=1)), None)
+        for offset in reversed(list(self._chunk_offsets(channels, 0))):
             for message in reversed(list(self._messages_at(offset))):
                 if message.channel == channel:
                     return message
         return None
 
-    def _chunk_offsets(self, wanted: frozenset[int], since: int) -> Iterator[int]:
+    def _chunk_offsets(self, channels: frozenset[int], since: int) -> Iterator[int]:
         if self.summary is None:
             yield from (place for opcode, place in self._records() if opcode == Opcode.CHUNK)
             return
         with self._damage_at(self._end):
-            yield from self.summary.chunks(wanted, since)
+            yield from self.summary.chunks(channels, since)
 
     def _messages_at(self, offset: int) -> Iterator[LoggedMessage]:
         with self._damage_at(offset):

@@ -54,15 +54,15 @@ class References:
             since = max((time for time in self._begun if time < host_time), default=None)
             if since is None:
                 return ()
-            found: list[MarkedFrame] = []
+            frames: list[MarkedFrame] = []
             for item in session.frames(since):
-                if item.frame.host_time >= host_time or len(found) == self._count:
+                if item.frame.host_time >= host_time or len(frames) == self._count:
                     break
-                if found and item.mark & Mark.REFERENCE:
+                if frames and item.mark & Mark.REFERENCE:
                     break
                 if not item.mark & (Mark.HELD | Mark.SKIPPED):
-                    found.append(MarkedFrame(item.frame, item.mark | Mark.EARLIER))
-        return tuple(found)
+                    frames.append(MarkedFrame(item.frame, item.mark | Mark.EARLIER))
+        return tuple(frames)
 
     def _search(self, session: SessionReader, host_time: float) -> None:
         if host_time <= self._searched:

@@ -136,8 +136,8 @@ def plain(item: Any) -> dict[str, Any]:
     """A mapping or a record as plain values by name."""
     if isinstance(item, Mapping):
         return dict(item)
-    found: dict[str, Any] = msgspec.to_builtins(item, enc_hook=_number)
-    return found
+    values: dict[str, Any] = msgspec.to_builtins(item, enc_hook=_number)
+    return values
 
 
 def touches_message(host_time: float, sequence: int, touches: Sequence[Touch]) -> dict[str, Any]:

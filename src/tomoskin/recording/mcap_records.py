@@ -62,7 +62,7 @@ class Summary:
     attachments: tuple[int, ...]
     chunk_index: bytes = field(repr=False)
 
-    def chunks(self, wanted: frozenset[int], since: int = 0) -> Iterator[int]:
+    def chunks(self, channels: frozenset[int], since: int = 0) -> Iterator[int]:
         """Offsets of the chunks that hold a channel ``wanted`` and end at ``since`` ns or later.
 
         ValueError where the index does not add up. The library takes ten times as long.
@@ -76,7 +76,7 @@ class Summary:
                 break
             if last >= since:
                 on_channels = _ON_CHANNEL.iter_unpack(index[body : body + size])
-                if any(number in wanted for number, _ in on_channels):
+                if any(number in channels for number, _ in on_channels):
                     yield offset
         if place != len(index):
             raise ValueError("the index of the chunks does not add up")

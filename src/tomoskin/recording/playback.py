@@ -161,11 +161,11 @@ def pieces(items: Iterable[Item], since: float = float("-inf")) -> Iterator[Piec
     early = b""
     follows = False
     for read in reads:
-        wanted = any(item.frame.host_time >= since for item in read.frames)
-        if not follows and read.was_recorded and not wanted:
+        is_later = any(item.frame.host_time >= since for item in read.frames)
+        if not follows and read.was_recorded and not is_later:
             early = (early + read.data)[-_LONGEST:]
         elif not read.was_recorded:
-            if wanted:
+            if is_later:
                 yield Piece(read.host_time, read.data, False, tuple(read.frames))
                 follows, early = False, b""
         elif follows:

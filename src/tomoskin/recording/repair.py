@@ -135,7 +135,7 @@ def stretches(file: BinaryIO, size: int) -> Iterator[Stretch]:
 
 
 def _front(
-    found: Iterable[Stretch], skin: Skin | None, where: str
+    stretches: Iterable[Stretch], skin: Skin | None, where: str
 ) -> tuple[dict[str, str], list[Attachment]]:
     """The named strings and the attachments, wherever they are in the file.
 
@@ -144,7 +144,7 @@ def _front(
     about: dict[str, str] = {}
     attachments: dict[str, Attachment] = {}
     is_session, epoch = False, math.inf
-    for _, _, record in found:
+    for _, _, record in stretches:
         is_session |= isinstance(record, Chunk | Attachment | Metadata)
         if isinstance(record, Attachment) and record.name != OLD_INDEX_FILE:
             attachments[record.name] = record
@@ -194,10 +194,12 @@ def _epoch(about: Mapping[str, str], told: float) -> float:
     return 0.0 if math.isinf(told) else told
 
 
-def _copy(found: Iterable[Stretch], container: ContainerWriter, result: Repaired) -> Iterator[int]:
+def _copy(
+    stretches: Iterable[Stretch], container: ContainerWriter, result: Repaired
+) -> Iterator[int]:
     """Write the messages of every chunk, and note what is lost; how far it is, byte by byte."""
     after = 0
-    for start, stop, record in found:
+    for start, stop, record in stretches:
         if isinstance(record, Chunk):
             if result.lost and result.lost[-1].before is None:
                 result.lost[-1] = replace(result.lost[-1], before=record.message_start_time)

@@ -219,11 +219,11 @@ _TAILS = ("", _OPTION, _SPEED, _SPEED + _OPTION)
 
 def parse_replay(argument: str) -> tuple[Path, float, bool]:
     """File, speed and whether to begin again, of what stands behind ``replay:``."""
-    found = [m for tail in _TAILS if (m := re.fullmatch(f"(.+?){tail}", argument, re.DOTALL))]
-    if not found:
+    matches = [m for tail in _TAILS if (m := re.fullmatch(f"(.+?){tail}", argument, re.DOTALL))]
+    if not matches:
         raise SourceError("expected a session file, such as replay:run.mcap", where="replay")
     # what is called so is meant, whatever is in its name
-    match = next((m for m in found if Path(m[1]).exists()), found[-1])
+    match = next((m for m in matches if Path(m[1]).exists()), matches[-1])
     path, words = match[1], match.groupdict()
     text, option = words.get("speed", "1"), words.get("option", "loop")
     speed = math.inf if text == "max" else _number(text)

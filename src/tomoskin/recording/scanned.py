@@ -50,16 +50,16 @@ def scanned_touches(
     session: SessionReader,
 ) -> Iterator[tuple[int | None, float, tuple[Touch, ...]]]:
     """(frame, time, touches) of the recorded touches; None and host time without their frame."""
-    wanted = {(item.host_time, item.sequence) for item in session.touches()}
-    found: dict[tuple[float, int], tuple[int, float]] = {}
+    keys = {(item.host_time, item.sequence) for item in session.touches()}
+    numbers: dict[tuple[float, int], tuple[int, float]] = {}
     scan = Scan.of(session.skin.pattern())
-    for number, time, item in scanned_frames(session, scan) if wanted else ():
+    for number, time, item in scanned_frames(session, scan) if keys else ():
         key = item.frame.host_time, item.frame.sequence
-        if key in wanted:
-            found.setdefault(key, (number, time))
+        if key in keys:
+            numbers.setdefault(key, (number, time))
     for touched in session.touches():
         key = touched.host_time, touched.sequence
-        yield *found.get(key, (None, touched.host_time)), touched.touches
+        yield *numbers.get(key, (None, touched.host_time)), touched.touches
 
 
 def idle_count(session: SessionReader, scan: Scan) -> int:

@@ -79,7 +79,7 @@ class SessionReader(AbstractContextManager["SessionReader"]):
 
     def attachments(self) -> dict[str, bytes]:
         """Files inside by their name."""
-        return {found.name: found.data for found in self.container.attachments()}
+        return {attachment.name: attachment.data for attachment in self.container.attachments()}
 
     def frames(self, since: float | None = None) -> Iterator[MarkedFrame]:
         """Frames, from host time ``since`` on."""
@@ -188,10 +188,10 @@ def epoch_of(about: Mapping[str, str]) -> float | None:
 
 def _skin(container: ContainerReader) -> Skin:
     where = f"{container.where}, {SKIN_FILE}"
-    for found in container.attachments():
-        if found.name == SKIN_FILE:
+    for attachment in container.attachments():
+        if attachment.name == SKIN_FILE:
             try:
-                return Skin.from_toml(found.data.decode(), source=where)
+                return Skin.from_toml(attachment.data.decode(), source=where)
             except (SkinError, UnicodeDecodeError) as error:
                 raise DataError(
                     f"holds a skin that is none: {error}", where=container.where

@@ -139,10 +139,10 @@ class _Run:
             try:
                 self._follow(link, advance)
             except BaseException as error:  # Ctrl-C too
-                gone, whole = clock.now(), script.lead_in + script.duration
+                gone, complete = clock.now(), script.lead_in + script.duration
                 with contextlib.suppress(DataError):  # of a disk that is full, say
                     self._writer.note(
-                        gone, f"stopped after {gone:.1f} of {whole:g} s: {_why(error)}"
+                        gone, f"stopped after {gone:.1f} of {complete:g} s: {_why(error)}"
                     )
                 raise
             return Simulated(self._frames, link.frames.lost, script.duration + script.lead_in)

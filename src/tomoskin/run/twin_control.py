@@ -198,8 +198,8 @@ def _felt(
             source.set_presses((*felt, press))
             felt = (*felt, press)
         except Exception as error:  # whatever it is, the source goes on
-            known = isinstance(error, TomoskinError)
-            refusals.append(str(error) if known else f"{type(error).__name__}: {error}")
+            names = isinstance(error, TomoskinError)
+            refusals.append(str(error) if names else f"{type(error).__name__}: {error}")
     source.set_presses(felt)
     return felt, tuple(refusals)
 

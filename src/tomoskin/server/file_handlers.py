@@ -39,11 +39,11 @@ class FileHandlers:
         )
 
     def _list(self, page: Listener) -> None:
-        def answer(found: Listing) -> None:
+        def answer(file: Listing) -> None:
             page.post(
                 text_of(
                     type="files",
-                    **asdict(found),
+                    **asdict(file),
                     recording=self._recording(),
                     playing=self._playing(),
                     exporting=self._exporting,

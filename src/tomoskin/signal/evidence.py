@@ -123,7 +123,7 @@ class Reciprocity:
         rows = np.hstack([pattern.drive, pattern.measure])
         for number, row in enumerate(rows.tolist()):
             number_of[tuple(row)] = number
-        found = []
+        solution = []
         for number, (source, sink, plus, minus) in enumerate(rows.tolist()):
             for a, b, c, d, sign in (
                 (plus, minus, source, sink, 1.0),
@@ -133,8 +133,8 @@ class Reciprocity:
             ):
                 other = number_of.get((a, b, c, d), -1)
                 if other > number:
-                    found.append((number, other, sign))
-        table = np.array(found, dtype=float).reshape(-1, 3)
+                    solution.append((number, other, sign))
+        table = np.array(solution, dtype=float).reshape(-1, 3)
         first, second = table[:, :2].astype(np.int64).T
         roles = Roles.of(pattern)
         touches = (roles.drives | roles.reads)[:, first]
@@ -174,8 +174,8 @@ class Reciprocity:
         Non-negative least squares of ``squared`` (k,) − 1 on who takes part: a healthy electrode
         between two bad ones is not blamed for them.
         """
-        found, _ = nnls(self.touches.T.astype(float), np.maximum(squared - 1.0, 0.0))
-        return np.asarray(found)
+        solution, _ = nnls(self.touches.T.astype(float), np.maximum(squared - 1.0, 0.0))
+        return np.asarray(solution)
 
 
 def unchanged(

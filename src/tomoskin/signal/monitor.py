@@ -78,7 +78,7 @@ class Monitor:
     ) -> None:
         n = pattern.n_electrodes
         self._roles = Roles.of(pattern)
-        noise = _known(reference, model)
+        noise = _noise_of(reference, model)
         self._unusable = unusable | _silent(pattern, reference.mean, noise, model, unusable)
         usable = ~self._unusable
         self._groups = Groups.of(pattern, reference.mean, noise, usable)
@@ -104,7 +104,7 @@ class Monitor:
         self._good = tuple(ElectrodeHealth(e) for e in range(n))
         self._sick: dict[int, ElectrodeHealth] = {}
         self._well = Health(self._good, self._unusable, np.zeros(n, bool))
-        self._seen: tuple[bytes, bytes] | None = None
+        self._explained_key: tuple[bytes, bytes] | None = None
         self._explained: dict[int, ElectrodeHealth] = {}
         self._masked_for: object = None
         self._masks = (self._unusable, np.zeros(n, bool))
@@ -134,11 +134,11 @@ class Monitor:
         self._silent = dead[: self._groups.n_drives][self._pattern.drive_index]
         bad |= self._silent
         key = (bad.tobytes(), dead.tobytes())
-        if key != self._seen:
-            self._seen, self._explained = key, self._explain(bad, railed, dead)
-        found = more | self._explained
-        self._debounce(found, time)
-        states = {e: h.state for e, h in (found | self._sick).items()}
+        if key != self._explained_key:
+            self._explained_key, self._explained = key, self._explain(bad, railed, dead)
+        causes = more | self._explained
+        self._debounce(causes, time)
+        states = {e: h.state for e, h in (causes | self._sick).items()}
         if (key, states) != self._masked_for:
             self._masked_for = (key, states)
             self._masks = _masks(self._pattern, self._roles, bad, states, self._unusable)
@@ -147,23 +147,23 @@ class Monitor:
 
     def _explain(self, bad: Mask, railed: Mask, dead: Mask) -> dict[int, ElectrodeHealth]:
         """Electrodes that explain what is not as it should be in rows, drives and pairs."""
-        groups, found = self._groups, {}
+        groups, causes = self._groups, {}
         for electrode, state in self._roles.blamed(bad).items():
             reason = self._reason(electrode, state, railed)
-            found[electrode] = ElectrodeHealth(electrode, state, reason)
+            causes[electrode] = ElectrodeHealth(electrode, state, reason)
         for a, b in groups.pairs[dead[groups.n_drives :]].tolist():
-            if not any(e in found and found[e].state == "open" for e in (a, b)):
-                found[a] = ElectrodeHealth(a, "short", _short_text(b))
-                found[b] = ElectrodeHealth(b, "short", _short_text(a))
-        return found
+            if not any(e in causes and causes[e].state == "open" for e in (a, b)):
+                causes[a] = ElectrodeHealth(a, "short", _short_text(b))
+                causes[b] = ElectrodeHealth(b, "short", _short_text(a))
+        return causes
 
-    def _debounce(self, found: dict[int, ElectrodeHealth], time: float) -> None:
+    def _debounce(self, causes: dict[int, ElectrodeHealth], time: float) -> None:
         for e in range(len(self._good)):
-            here = e in found
+            here = e in causes
             self._blamed[e] = self._blamed[e] + 1 if here else 0
             self._cleared[e] = 0 if here else self._cleared[e] + 1
             if here and self._blamed[e] >= ENTER:
-                now, before = found[e], self._sick.get(e)
+                now, before = causes[e], self._sick.get(e)
                 if before is None or before.state != now.state:
                     self._sick[e] = replace(now, since=time)
             elif e in self._sick and self._cleared[e] >= LEAVE:
@@ -263,7 +263,7 @@ def _short_text(other: int) -> str:
     return f"it reads as E{other + 1} does under every drive; take a new reference"
 
 
-def _known(reference: Reference, model: FloatArray) -> FloatArray:
+def _noise_of(reference: Reference, model: FloatArray) -> FloatArray:
     """(n_meas,) V of noise, above zero; infinite where it is unknown, which blames no electrode."""
     if not (reference.noise_is_known and reference.noise.all()):
         return np.full(len(model), np.inf)

@@ -75,7 +75,7 @@ class NuisanceSubspace:
         """(n_meas,) ``dv`` with its part along the directions as the rest leads one to expect."""
         return np.asarray(dv - self.directions @ (self.weights @ dv))
 
-    def seen_by(self, matrix: FloatArray) -> FloatArray:
+    def projected(self, matrix: FloatArray) -> FloatArray:
         """(m, n_meas): what ``matrix`` (m, n_meas) makes of data that have been blinded."""
         return np.asarray(matrix - (matrix @ self.directions) @ self.weights)
 

@@ -216,11 +216,15 @@ class Skin:
 
 def _read(written: Mapping[str, object], source: str) -> tuple[Document, dict[str, Any]]:
     """Sections as written with their defaults, and their records."""
-    places = {name: f"{source}: {SECTIONS[name].heading}" for name in SECTIONS if name in written}
-    document = {
-        name: SECTIONS[name].complete(written[name], place) for name, place in places.items()
+    positions = {
+        name: f"{source}: {SECTIONS[name].heading}" for name in SECTIONS if name in written
     }
-    return document, {name: SECTIONS[name].read(document[name], places[name]) for name in document}
+    document = {
+        name: SECTIONS[name].complete(written[name], place) for name, place in positions.items()
+    }
+    return document, {
+        name: SECTIONS[name].read(document[name], positions[name]) for name in document
+    }
 
 
 def _canonical(content: Document) -> str:

@@ -121,11 +121,11 @@ def check_held(held: HeldScan | HeldPattern, sent: Sequence[Command], where: str
     """
     names = [field.name for field in fields(held) if field.name != "request"]
     for name in names:
-        wanted = next(getattr(command, name) for command in sent if hasattr(command, name))
-        found = getattr(held, name)
-        if wanted != found:
+        expected = next(getattr(command, name) for command in sent if hasattr(command, name))
+        held_value = getattr(held, name)
+        if expected != held_value:
             raise SourceError(
-                f"the board does not hold what was sent: {name} {found}, expected {wanted}",
+                f"the board does not hold what was sent: {name} {held_value}, expected {expected}",
                 where=where,
                 hint="nothing is driven; start again, and flash the firmware if it comes back",
             )

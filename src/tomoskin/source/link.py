@@ -97,7 +97,7 @@ class Link:
         """
         now = self._clock()
         try:
-            found = self._session.tick(now)
+            items = self._session.tick(now)
         except SourceError as error:
             raise self.diagnosis or error from None
         if self.counters.messages:
@@ -106,8 +106,8 @@ class Link:
             self.diagnosis = _diagnosis(self.transport, self._heard)
         self._flush()
         patience = min(timeout, self._session.deadline() - now)
-        found += self._listen(max(patience, 0.0))
-        return found
+        items += self._listen(max(patience, 0.0))
+        return items
 
     def connect(self) -> Info:
         """Poll until the board scans; what it said of itself. Raises as :meth:`poll` does."""
@@ -151,12 +151,12 @@ class Link:
         if data and self._played and self._played.after_seek():
             self._decoder.forget()
             self._session.frames.expect_any()
-        found = []
+        items = []
         for message in self._decoder.feed(data, now):
-            found += self._session.receive(message, now)
-        found += self._follow_rate(now)
+            items += self._session.receive(message, now)
+        items += self._follow_rate(now)
         self._flush()
-        return found
+        return items
 
     def _follow_rate(self, now: float) -> list[Event]:
         """Follow the board to another rate; fall back to a slower one on a bad line."""

@@ -56,14 +56,14 @@ def list_ports() -> tuple[Port, ...]:
     """The ports that are connected, those of known boards first."""
     from serial.tools.list_ports import comports  # noqa: PLC0415 - only who has a board needs it
 
-    found = (Port(port.device, _KNOWN.get((port.vid, port.pid), "")) for port in comports())
-    return tuple(sorted(found, key=lambda port: (port.board != _MEGA, not port.board, port.device)))
+    ports = (Port(port.device, _KNOWN.get((port.vid, port.pid), "")) for port in comports())
+    return tuple(sorted(ports, key=lambda port: (port.board != _MEGA, not port.board, port.device)))
 
 
 def say_ports() -> str:
     """The ports in words."""
-    found = ", ".join(map(str, list_ports()))
-    return f"ports here: {found}" if found else "no serial port is connected"
+    ports = ", ".join(map(str, list_ports()))
+    return f"ports here: {ports}" if ports else "no serial port is connected"
 
 
 def only_board() -> str:

@@ -186,9 +186,9 @@ def conductivity(
     return _directed(level, rise, half, cross)
 
 
-def _mixed(whole: FloatArray, parts: FloatArray, weights: tuple[float, ...]) -> FloatArray:
+def _mixed(sheet: FloatArray, parts: FloatArray, weights: tuple[float, ...]) -> FloatArray:
     """(4, n): ``parts`` (n_parts, 4, n) by their weights, and of the whole what these leave."""
-    total = (1 - sum(weights)) * whole
+    total = (1 - sum(weights)) * sheet
     for weight, part in zip(weights, parts, strict=True):
         total += weight * part
     return np.asarray(total)

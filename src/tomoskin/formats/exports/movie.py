@@ -30,7 +30,7 @@ def write_gif(path: Path, pictures: Pictures, fps: float, *, overwrite: bool = F
         raise DataError(
             "a GIF needs Pillow", where=str(path), hint="pip install 'tomoskin[plot]'"
         ) from error
-    images = (Image.fromarray(picture) for picture in pictures)
+    images = (Image.fromarray(figure) for figure in pictures)
     first = next(images)
     with written(path, overwrite=overwrite) as part:
         first.save(part, "GIF", save_all=True, append_images=images, duration=1e3 / fps, loop=0)
@@ -92,7 +92,7 @@ def _encoded(command: list[str], first: NDArray[np.uint8], rest: Pictures) -> st
 def _feed(process: Any, first: NDArray[np.uint8], rest: Pictures) -> None:
     try:
         process.stdin.write(first.tobytes())
-        for picture in rest:
-            process.stdin.write(picture.tobytes())
+        for figure in rest:
+            process.stdin.write(figure.tobytes())
     except BrokenPipeError:
         pass  # it has ended, and says why

@@ -49,14 +49,14 @@ def parse(variables: Mapping[str, Any], source: str) -> Recording:
         drive, measure = _rows(stimulation, source)
         names = _DATA
     select = variables.get("meas_select")
-    voltages = _found(variables, names, select, len(drive), source)
+    voltages = _read(variables, names, select, len(drive), source)
     if voltages is None:
         raise DataError(
             f"expected data of {len(drive)} rows among {', '.join(names)}, got the variables "
             f"{', '.join(sorted(variables))}",
             where=source,
         )
-    reference = _found(variables, _REFERENCE, select, len(drive), source)
+    reference = _read(variables, _REFERENCE, select, len(drive), source)
     recording = voltages_of(
         source,
         voltages,
@@ -76,8 +76,8 @@ def _stimulation(variables: Any) -> list[Mapping[str, Any]] | None:
     if not isinstance(variables, Mapping):
         return None
     for key in ("stimulation", "stim"):
-        found = variables.get(key)
-        listed = [found] if isinstance(found, Mapping) else found
+        names = variables.get(key)
+        listed = [names] if isinstance(names, Mapping) else names
         if isinstance(listed, list | np.ndarray) and len(listed):
             items = [item for item in listed if isinstance(item, Mapping)]
             if len(items) == len(listed) and all("stim_pattern" in item for item in items):
@@ -109,7 +109,7 @@ def _flat_rows(variables: Mapping[str, Any], source: str) -> tuple[IntArray, Int
     return drives[index.astype(int) - 1], measure
 
 
-def _found(
+def _read(
     variables: Mapping[str, Any], names: tuple[str, ...], select: Any, n_rows: int, source: str
 ) -> NDArray[Any] | None:
     """(n_frames, n_rows) of the first of ``names`` that has so many rows."""
@@ -135,10 +135,10 @@ def _times(variables: Mapping[str, Any], n: int) -> FloatArray:
 
 def _numbers(variables: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> FloatArray | None:
     """What our own export has beside; None where it is something else."""
-    found = np.asarray(variables.get(name))
-    if found.size != math.prod(shape) or found.dtype.kind not in "iuf":
+    names = np.asarray(variables.get(name))
+    if names.size != math.prod(shape) or names.dtype.kind not in "iuf":
         return None
-    return found.reshape(shape).astype(np.float64)
+    return names.reshape(shape).astype(np.float64)
 
 
 def _dense(value: Any, where: str) -> NDArray[Any]:

@@ -81,8 +81,8 @@ def _labels(arrays: Arrays, n: int, source: str) -> FloatArray | None:
     xy = real_numbers(arrays, "xy_mm", source)
     if xy.ndim == 3 and xy.shape[1] > 1:
         return None
-    places = xy.reshape(-1, 2) if xy.size % 2 == 0 else xy
-    repeats, rest = divmod(n, max(len(places), 1))
+    positions = xy.reshape(-1, 2) if xy.size % 2 == 0 else xy
+    repeats, rest = divmod(n, max(len(positions), 1))
     if rest or not repeats:
         raise DataError(f"expected xy_mm ({n}, 2), got {xy.shape}", where=source)
-    return np.asarray(_MM * np.repeat(places, repeats, axis=0))
+    return np.asarray(_MM * np.repeat(positions, repeats, axis=0))
