@@ -24,8 +24,11 @@ class Shelf:
 
     def open(self, _):
         self.calls.append("open")
-        if self._opens and (error := self._opens.popleft()) is not None:
-            raise error
+        match self._opens.popleft() if self._opens else None:
+            case threading.Event() as permission:
+                permission.wait(PATIENCE)
+            case Exception() as error:
+                raise error
 
     def publish(self, item):
         self._behave()
@@ -153,10 +156,12 @@ def test_a_sink_that_raises_is_closed_and_opened_again(running, news, monkeypatc
 def test_a_sink_that_cannot_be_opened_is_said_once_and_tried_again(running, news, monkeypatch):
     monkeypatch.setattr("tomoskin.sink.consumer._FIRST_DELAY", 0.001)
     refused = SinkError("no broker there", where="shelf")
-    sink = Shelf(news, opens=[refused] * 3)
+    both_are_there = threading.Event()
+    sink = Shelf(news, opens=[refused, refused, refused, both_are_there])
     worker = running(sink)
     worker.put(result_at(0.0))
     worker.put(EVENT)
+    both_are_there.set()
     news.until(lambda: sink.items)
     assert sink.calls.count("open") == 4
     assert news.kinds() == ["sink-away", "sink-open"]

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import (
+    MOST_ELECTRODES,
     Arrays,
     DataError,
     Detection,
@@ -233,7 +234,8 @@ class Kind(Generic[M]):
             )
         drive, measure = (electrode_table(arrays, key, where) for key in ("drive", "measure"))
         with located(where):
-            return Pattern.from_tables(drive, measure, whole_number(arrays, "n_electrodes", where))
+            n_electrodes = whole_number(arrays, "n_electrodes", where, MOST_ELECTRODES)
+            return Pattern.from_tables(drive, measure, n_electrodes)
 
 
 @dataclass(frozen=True, eq=False)

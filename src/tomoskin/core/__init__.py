@@ -40,7 +40,13 @@ if TYPE_CHECKING:
         Touch,
         Voltages,
     )
-    from tomoskin.core.typed_arrays import electrode_table, numbers, real_numbers, whole_number
+    from tomoskin.core.typed_arrays import (
+        MOST_ELECTRODES,
+        electrode_table,
+        numbers,
+        real_numbers,
+        whole_number,
+    )
 
 _HOME = {
     "AMOUNT": "colours",
@@ -49,6 +55,7 @@ _HOME = {
     "CHANGE_ON_DARK": "colours",
     "ColourScale": "colours",
     "check_fits": "memory",
+    "MOST_ELECTRODES": "typed_arrays",
     "electrode_table": "typed_arrays",
     "encode_json": "json_bytes",
     "load_arrays": "archive",
@@ -70,6 +77,7 @@ __all__ = [
     "DIMENSIONS",
     "EMPTY",
     "MAGIC",
+    "MOST_ELECTRODES",
     "RECORDING",
     "Arrays",
     "ColourScale",

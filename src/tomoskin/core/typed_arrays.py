@@ -11,7 +11,8 @@ from tomoskin.core.archive import Arrays
 from tomoskin.core.errors import DataError
 from tomoskin.core.records import FloatArray, IntArray
 
-_MOST_ELECTRODES = 1024
+MOST_ELECTRODES = 1024
+"""More are taken for damage of a file."""
 
 
 def numbers(arrays: Arrays, key: str, source: str) -> NDArray[Any]:
@@ -30,11 +31,11 @@ def real_numbers(arrays: Arrays, key: str, source: str) -> FloatArray:
     return array
 
 
-def whole_number(arrays: Arrays, key: str, where: str) -> int:
-    """Array ``key`` as one whole number."""
+def whole_number(arrays: Arrays, key: str, where: str, most: int = 1 << 31) -> int:
+    """Array ``key`` as one whole number, at most ``most``."""
     value = real_numbers(arrays, key, where)
-    if value.shape or not np.isfinite(value) or value != np.round(value):
-        raise DataError(f"expected one whole number as {key}", where=where)
+    if value.shape or value != np.round(value) or not abs(value) <= most:
+        raise DataError(f"expected one whole number as {key}, at most {most}", where=where)
     return int(value)
 
 
@@ -43,7 +44,7 @@ def electrode_table(arrays: Arrays, key: str, source: str) -> IntArray:
     table = real_numbers(arrays, key, source)
     if table.ndim != 2 or table.shape[1] != 2:
         raise DataError(f"expected {key} of shape (n_meas, 2), got {table.shape}", where=source)
-    good = (table >= 0) & (table < _MOST_ELECTRODES) & (table == np.round(table))
+    good = (table >= 0) & (table < MOST_ELECTRODES) & (table == np.round(table))
     if not good.all():
         row = int(np.argmin(good.all(axis=1)))
         raise DataError(
