@@ -17,7 +17,7 @@ COLUMNS = ("kind", "attempts", "refused", "accepted", "tracebacks", "hangs", "me
 
 
 def run(data: Path | None) -> tuple[Report, ...]:
-    """All of it, an hour; ``data`` is not needed."""
+    """All of it, a quarter of an hour; ``data`` is not needed."""
     del data
     tallies = list(_tallies())
     rows = tuple(_row(tally) for tally in tallies)

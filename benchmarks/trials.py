@@ -102,7 +102,8 @@ def _verdict(judge: Judge, number: int) -> tuple[str, str]:
         return "refused", ""
     except Exception as error:
         frame = traceback.extract_tb(error.__traceback__)[-1]
-        return "traceback", f"{type(error).__name__}: {error} ({frame.filename}:{frame.lineno})"
+        place = f"{Path(frame.filename).name}:{frame.lineno}"
+        return "traceback", f"{type(error).__name__}: {error} ({place})"
     return ("wrong", wrong) if wrong else ("accepted", "")
 
 

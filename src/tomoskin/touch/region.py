@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,9 @@ class Region:
     Inside the locator a position is measured from ``centre`` in units of ``unit``, the radius of
     the disc of the same area.
     """
+
+    FARTHEST: ClassVar = 1e6
+    """Metres from the origin at which there is no skin."""
 
     outline: FloatArray
 
@@ -60,7 +63,8 @@ class Region:
     def checked(cls, outline: FloatArray) -> Self:
         """The polygon; DataError unless it has three finite corners that enclose something."""
         good = outline.ndim == 2 and outline.shape[1:] == (2,) and len(outline) >= 3
-        if not good or not np.isfinite(outline).all() or not abs(_area(outline)) > 0:
+        good = good and bool((np.abs(outline) <= cls.FARTHEST).all())
+        if not good or not abs(_area(outline)) > 0:
             raise DataError("expected an outline of at least three corners around an area")
         return cls(outline)
 

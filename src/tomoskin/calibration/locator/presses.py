@@ -19,6 +19,13 @@ _BESIDE = 0.05
 """A label may lie so far beyond the outline, in radii of the region: it is taken for its rim."""
 
 
+_MOST = 1e12
+"""No instrument has a unit in which a change is a larger number: it counts as missing."""
+
+_LEAST_CHANGE = 1e-100
+"""Nor one in which all changes are smaller."""
+
+
 @dataclass(frozen=True, eq=False)
 class Presses:
     """Frames of a single touch each, in the order in which they were made.
@@ -54,7 +61,8 @@ class Presses:
         data, labels = frames(dv), np.asarray(xy, dtype=np.float64)
         if labels.shape != (len(data), 2):
             raise DataError(f"expected xy of shape ({len(data)}, 2), got {labels.shape}")
-        _name(np.flatnonzero(~np.isfinite(labels).all(axis=1)), "have labels that are not finite")
+        wrong = ~(np.abs(labels) <= Region.FARTHEST).all(axis=1)
+        _name(np.flatnonzero(wrong), "have labels that are no position", "labels are in metres")
         if strength is None:
             return cls(data, labels)
         force = np.asarray(strength, dtype=np.float64)
@@ -89,7 +97,7 @@ def frames(dv: ArrayLike, n_meas: int | None = None) -> FloatArray:
     data = np.atleast_2d(data).astype(np.float64)
     if data.ndim != 2 or n_meas not in (None, data.shape[1]):
         raise DataError(f"expected dv of shape (n, {n_meas or 'n_meas'}), got {data.shape}")
-    return np.where(np.isfinite(data), data, np.nan)
+    return np.where(np.abs(data) <= _MOST, data, np.nan)
 
 
 def _name(rows: ArrayLike, what: str, hint: str = "") -> None:
@@ -187,7 +195,7 @@ def _changing(dv: FloatArray) -> NDArray[np.bool_]:
     present = finite.mean(axis=0) > 1 - _MOST_MISSING
     high = np.where(finite, dv, -np.inf).max(axis=0)
     low = np.where(finite, dv, np.inf).min(axis=0)
-    return np.asarray(present & (high > low))
+    return np.asarray(present & (high - low > _LEAST_CHANGE))
 
 
 _NEAR = 0.3
