@@ -7,12 +7,16 @@ import math
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from typer.main import get_command
 
 from tomoskin.cli import main
+from tomoskin.cli.app import app
 from tomoskin.core import Image
 from tomoskin.skin import Skin
 
@@ -51,6 +55,22 @@ def test_every_benchmark_that_is_named_exists() -> None:
     named = set(re.findall(r"`tomoskin bench ([a-z_]+)", text))
     assert len(named) > 10
     assert [name for name in named if not (ROOT / "benchmarks" / f"{name}.py").is_file()] == []
+
+
+def options(command: Any) -> Iterator[str]:
+    """Of a command and of those below it."""
+    for parameter in command.params:
+        yield from parameter.opts
+    for name in command.list_commands(None) if hasattr(command, "list_commands") else ():
+        yield from options(command.get_command(None, name))
+
+
+def test_every_option_that_is_named_exists() -> None:
+    pages = [ROOT / "README.md", *DOCS.rglob("*.md")]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    named = set(re.findall(r"`(--[a-z-]+)", text))
+    assert len(named) > 15
+    assert named - set(options(get_command(app))) == {"--help"}
 
 
 @pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md"])

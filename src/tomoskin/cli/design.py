@@ -51,7 +51,7 @@ def design(
     false_alarm: Annotated[
         float, typer.Option(help="Chance of a false alarm at a place, in a frame.")
     ] = 1e-4,
-    bounds: Annotated[float, typer.Option(help="Chance that a press is found in a frame.")] = 0.95,
+    found: Annotated[float, typer.Option(help="Chance that a press is found in a frame.")] = 0.95,
     electrodes: Annotated[
         str, typer.Option(metavar="N,N", help='To compare; none: "".')
     ] = _ELECTRODES,
@@ -74,7 +74,7 @@ def design(
     chosen = Skin.load(skin)
     size = quantity(radius, "length", "--radius") if radius else None
     _check_size(size, chosen)
-    demand = Demand(size, depth, false_alarm, bounds)
+    demand = Demand(size, depth, false_alarm, found)
     with Bar("bounding") as bar:
         jobs = 1 + len(counts) * len(patterns.split(","))
         own = resolution_bounds(chosen, demand, _PLACES, _part(bar, 0, jobs))
@@ -83,7 +83,7 @@ def design(
     if out is not None:
         title = (
             f"{chosen.name}: one frame, press of radius {1e3 * radius_m:.0f} mm taking "
-            f"{100 * depth:.0f} %; noticed: {100 * bounds:g} % found, {false_alarm:g} false alarms"
+            f"{100 * depth:.0f} %; noticed: {100 * found:g} % found, {false_alarm:g} false alarms"
         )
         write_promise(out, chosen, own, title, overwrite=force)
     say_headroom(own.headroom)
@@ -91,7 +91,7 @@ def design(
         "skin": chosen.name,
         "press": {"radius_m": radius_m, "depth": depth},
         "false_alarm": false_alarm,
-        "found": bounds,
+        "found": found,
         **own.figures(),
         "compared": rows,
     }

@@ -35,7 +35,7 @@ COLUMNS = (
 )
 
 
-def write_merit(path: Path, figures: Mapping[str, Merit], *, overwrite: bool = False) -> None:
+def write_merit(path: Path, found: Mapping[str, Merit], *, overwrite: bool = False) -> None:
     """Draw a panel per figure with a curve per operator, named by the keys of ``found``.
 
     Raises
@@ -45,12 +45,12 @@ def write_merit(path: Path, figures: Mapping[str, Merit], *, overwrite: bool = F
     """
     figure = new_figure(path, 10.5, 6.0)
     for ax, (name, label, factor) in zip(figure.subplots(2, 3).ravel(), _FIGURES, strict=True):
-        for operator, merit in figures.items():
+        for operator, merit in found.items():
             shown = f"{operator} (noise figure {merit.noise_figure:.2g})"
             ax.plot(1e3 * merit.distance, factor * getattr(merit, name), ".-", label=shown)
         ax.set_ylabel(label, fontsize=8)
         ax.set_xlabel("distance from the centre (mm)", fontsize=8)
-        low = min(0.0, *(float(np.nanmin(getattr(m, name), initial=0.0)) for m in figures.values()))
+        low = min(0.0, *(float(np.nanmin(getattr(m, name), initial=0.0)) for m in found.values()))
         ax.set_ylim(bottom=1.1 * factor * low)
         ax.tick_params(labelsize=7)
         ax.grid(alpha=0.25)
@@ -58,7 +58,7 @@ def write_merit(path: Path, figures: Mapping[str, Merit], *, overwrite: bool = F
     save_figure(path, figure, overwrite=overwrite)
 
 
-def write_merit_table(path: Path, figures: Mapping[str, Merit], *, overwrite: bool = False) -> None:
+def write_merit_table(path: Path, found: Mapping[str, Merit], *, overwrite: bool = False) -> None:
     """Write a CSV file of :data:`COLUMNS`, a row for each operator and target.
 
     Raises as :func:`written` does.
@@ -69,7 +69,7 @@ def write_merit_table(path: Path, figures: Mapping[str, Merit], *, overwrite: bo
     ):
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
-        for operator, merit in figures.items():
+        for operator, merit in found.items():
             table = (merit.distance, *(getattr(merit, name) for name, _, _ in _FIGURES))
             for row in zip(*table, strict=True):
                 numbers = (merit.noise_figure, *row)

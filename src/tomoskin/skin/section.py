@@ -190,10 +190,10 @@ def toml_text(document: Document, sections: Iterable[type[Section]], version: in
     return "\n".join(lines) + "\n"
 
 
-def check_names(given: Iterable[str], names: list[str], what: str, where: str) -> None:
+def check_names(given: Iterable[str], known: list[str], what: str, where: str) -> None:
     """Raise SkinError for a name that is not ``known``, with the one that may have been meant."""
     for name in given:
-        if name not in names:
-            close = get_close_matches(name, names, n=1)
-            guess = f'did you mean "{close[0]}"?' if close else f"known: {', '.join(names)}"
+        if name not in known:
+            close = get_close_matches(name, known, n=1)
+            guess = f'did you mean "{close[0]}"?' if close else f"known: {', '.join(known)}"
             raise SkinError(f'unknown {what} "{name}"', where=where, hint=guess)

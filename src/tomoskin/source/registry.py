@@ -41,12 +41,12 @@ def open_source(spec: str, skin: Skin) -> Transport:
     )
 
 
-def read_options(argument: str, names: tuple[str, ...], where: str) -> dict[str, str]:
+def read_options(argument: str, known: tuple[str, ...], where: str) -> dict[str, str]:
     """``"seed=3,fast"`` as ``{"seed": "3", "fast": ""}``; SourceError for an unknown word."""
     options = {}
     for item in filter(None, (part.strip() for part in argument.split(","))):
         key, _, value = item.partition("=")
-        if key not in names:
-            raise SourceError(f'expected options {", ".join(names)}, got "{key}"', where=where)
+        if key not in known:
+            raise SourceError(f'expected options {", ".join(known)}, got "{key}"', where=where)
         options[key] = value
     return options

@@ -76,20 +76,18 @@ def bell(square: FloatArray) -> FloatArray:
 
 
 def spots_of(
-    positions: FloatArray, radius: FloatArray | float, depth: FloatArray | float
+    places: FloatArray, radius: FloatArray | float, depth: FloatArray | float
 ) -> FloatArray:
-    """(n, 4) spots at ``positions`` (n, 2) m, of radius m; ``depth`` is log(σ/σ₀) at the centre.
+    """(n, 4) spots at ``places`` (n, 2) m, of radius m; ``depth`` is log(σ/σ₀) at the centre.
 
     A press makes the sheet conduct less: its depth is negative.
     """
-    positions = np.asarray(positions, dtype=np.float64)
-    radius = np.broadcast_to(np.asarray(radius, dtype=np.float64), positions.shape[:1])
-    if positions.ndim != 2 or positions.shape[1] != 2 or not (radius > 0).all():
-        raise ModelError(
-            f"expected positions (n, 2) and radii above 0, got {positions.shape}, {radius}"
-        )
+    places = np.asarray(places, dtype=np.float64)
+    radius = np.broadcast_to(np.asarray(radius, dtype=np.float64), places.shape[:1])
+    if places.ndim != 2 or places.shape[1] != 2 or not (radius > 0).all():
+        raise ModelError(f"expected places (n, 2) and radii above 0, got {places.shape}, {radius}")
     content = FILLING * radius**2 * depth
-    return np.column_stack([positions, np.log(radius), content])
+    return np.column_stack([places, np.log(radius), content])
 
 
 def depth_of(spots: FloatArray) -> FloatArray:
