@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import random
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -127,9 +127,8 @@ def _live(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str, Path]]:
             yield process, started["address"].replace("http:", "ws:").replace("/?", "/ws?"), errors
         finally:
             process.terminate()
-            deadline = time.monotonic() + HANG
-            while process.poll() is None and time.monotonic() < deadline:
-                time.sleep(0.05)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(HANG)
             process.kill()
 
 

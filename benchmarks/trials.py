@@ -7,11 +7,12 @@ import io
 import multiprocessing
 import os
 import random
+import re
 import resource
 import signal
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -194,7 +195,7 @@ def _at_the_head(data: bytes, rng: random.Random) -> bytes:
 
 
 def _other_number(data: bytes, rng: random.Random) -> bytes:
-    spans = list(_numbers(data))
+    spans = [match.span() for match in re.finditer(rb"\d[\d.e+-]*", data)]
     if not spans:
         return _flipped(data, rng)
     start, end = rng.choice(spans)
@@ -215,14 +216,3 @@ def _twice_a_line(data: bytes, rng: random.Random) -> bytes:
 
 _FAULTS = (_flipped, _cut, _removed, _inserted, _repeated, _filled, _at_the_head)
 _TEXT_FAULTS = (_other_number, _other_number, _without_a_line, _twice_a_line)
-
-
-def _numbers(data: bytes) -> Iterator[tuple[int, int]]:
-    """Begin and end of every run of digits, points and exponents."""
-    start = None
-    for at, byte in enumerate(data + b" "):
-        if chr(byte) in "0123456789.-+e" and (start is not None or chr(byte).isdigit()):
-            start = at if start is None else start
-        elif start is not None:
-            yield start, at
-            start = None

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
+import numpy as np
+import pytest
 
 from tomoskin.core import encode_json
 
@@ -22,6 +24,13 @@ def test_what_is_no_utf8_is_a_question_mark_and_the_rest_as_it_is():
     }
 
 
-def test_a_hook_is_asked_either_way():
+def test_numbers_of_numpy_are_plain_either_way():
     for name in ("a", "\udcff"):
-        assert msgspec.json.decode(encode_json([Path("x"), name], str))[0] == "x"
+        content = [np.float32(1.5), np.arange(2), name]
+        assert msgspec.json.decode(encode_json(content))[:2] == [1.5, [0, 1]]
+
+
+def test_what_has_no_json_is_refused_either_way():
+    for name in ("a", "\udcff"):
+        with pytest.raises(NotImplementedError, match="expected plain values"):
+            encode_json([Path("x"), name])

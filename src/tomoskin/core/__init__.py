@@ -26,7 +26,7 @@ from tomoskin.core.written import write_text, written
 if TYPE_CHECKING:
     from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
-    from tomoskin.core.json_bytes import encode_json
+    from tomoskin.core.json_bytes import encode_json, plain_values
     from tomoskin.core.memory import check_fits, machine_memory, most_bytes
     from tomoskin.core.records import (
         ComplexArray,
@@ -63,6 +63,7 @@ _HOME = {
     "most_bytes": "memory",
     "numbers": "typed_arrays",
     "pack_arrays": "archive",
+    "plain_values": "json_bytes",
     "real_numbers": "typed_arrays",
     "save_arrays": "archive",
     "unpack_arrays": "archive",
@@ -113,6 +114,7 @@ __all__ = [
     "numbers",
     "pack_arrays",
     "parse_quantity",
+    "plain_values",
     "reach",
     "real_numbers",
     "save_arrays",

@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from typing import Any
 
 import msgspec
+import numpy as np
 
 
-def encode_json(content: Any, enc_hook: Callable[[Any], Any] | None = None) -> bytes:
-    """``content`` as JSON; ``?`` for what is no UTF-8, as some names of files are not."""
+def encode_json(content: Any) -> bytes:
+    """``content`` as JSON, numbers to the bit: null for what is not finite, ``?`` for what is no
+    UTF-8, as some names of files are not."""
     try:
-        return msgspec.json.encode(content, enc_hook=enc_hook)
+        return msgspec.json.encode(content, enc_hook=_number)
     except UnicodeEncodeError:
-        plain = msgspec.to_builtins(content, enc_hook=enc_hook)
-        return msgspec.json.encode(_legible(plain))
+        return msgspec.json.encode(_legible(msgspec.to_builtins(content, enc_hook=_number)))
+
+
+def plain_values(item: Any) -> dict[str, Any]:
+    """A mapping or a record as plain values by name."""
+    if isinstance(item, Mapping):
+        return dict(item)
+    values: dict[str, Any] = msgspec.to_builtins(item, enc_hook=_number)
+    return values
+
+
+def _number(item: Any) -> Any:
+    if isinstance(item, np.generic | np.ndarray):
+        return item.tolist()
+    raise NotImplementedError(f"expected plain values, got {type(item).__name__}")
 
 
 def _legible(item: Any) -> Any:

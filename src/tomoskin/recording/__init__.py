@@ -1,5 +1,6 @@
 """Session files: write, read, repair, replay."""
 
+from tomoskin.core import encode_json
 from tomoskin.recording.blocks import (
     Advance,
     Block,
@@ -17,7 +18,6 @@ from tomoskin.recording.layout import (
     MarkedFrame,
     RecordedTouches,
     Truth,
-    encode_json,
     touch_row,
     touches_message,
 )
@@ -43,6 +43,7 @@ from tomoskin.recording.session_reader import (
     touches_before,
 )
 from tomoskin.recording.session_writer import SessionWriter
+from tomoskin.touch import Span
 
 __all__ = [
     "OWN_FILES",
@@ -63,6 +64,7 @@ __all__ = [
     "SessionInfo",
     "SessionReader",
     "SessionWriter",
+    "Span",
     "Timeline",
     "Truth",
     "advance",

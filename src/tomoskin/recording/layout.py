@@ -12,7 +12,6 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from tomoskin import core
 from tomoskin.core import DataError, Detection, Event, Frame, Touch
 
 _CDR = b"\x00\x01\x00\x00"
@@ -127,19 +126,6 @@ class RecordedTouches:
     touches: tuple[Touch, ...]
 
 
-def encode_json(content: Mapping[str, Any]) -> bytes:
-    """JSON whose numbers come back to the bit; what is not finite becomes null."""
-    return core.encode_json(content, _number)
-
-
-def plain(item: Any) -> dict[str, Any]:
-    """A mapping or a record as plain values by name."""
-    if isinstance(item, Mapping):
-        return dict(item)
-    values: dict[str, Any] = msgspec.to_builtins(item, enc_hook=_number)
-    return values
-
-
 def touches_message(host_time: float, sequence: int, touches: Sequence[Touch]) -> dict[str, Any]:
     """A ``tomoskin.Touches``: those of the frame ``sequence``; m, m², the image's unit."""
     rows = [touch_row(touch) for touch in touches]
@@ -179,9 +165,3 @@ def _touch_of(item: dict[str, Any]) -> Touch:
     cov_xy, close, merged = (item.get(k) for k in ("cov_xy", "close", "merged"))  # format 1.0: none
     reading = Detection(*place, cov_xy=cov_xy or 0.0, close=bool(close))
     return Touch(item["id"], item["kind"], item["since"], reading, tuple(merged or ()))
-
-
-def _number(item: Any) -> Any:
-    if isinstance(item, np.generic | np.ndarray):
-        return item.tolist()
-    raise NotImplementedError(f"expected plain values, got {type(item).__name__}")

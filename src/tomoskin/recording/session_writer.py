@@ -7,15 +7,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tomoskin.core import Event, Frame, Image, PixelMap, Touch
+from tomoskin.core import Event, Frame, Image, PixelMap, Touch, encode_json, plain_values
 from tomoskin.recording import channels
 from tomoskin.recording.foxglove import grid_message, log_message, scene_message
 from tomoskin.recording.layout import (
     Mark,
     encode_frame,
-    encode_json,
     encode_raw,
-    plain,
     touches_message,
 )
 from tomoskin.recording.message_log import MessageLog
@@ -108,9 +106,9 @@ class SessionWriter(MessageLog):
         whatever else describes it; each bend one with ``kind``, ``axis`` (rad) and ``angle``
         (rad) or ``strain``.
         """
-        content = {"host_time": host_time, "presses": [plain(press) for press in presses]}
+        content = {"host_time": host_time, "presses": [plain_values(press) for press in presses]}
         if bends:
-            content["bends"] = [plain(bend) for bend in bends]
+            content["bends"] = [plain_values(bend) for bend in bends]
         self._document(channels.TRUTH, host_time, content)
 
     def event(self, event: Event) -> None:
@@ -136,7 +134,7 @@ class SessionWriter(MessageLog):
 
     def clock(self, host_time: float, fit: Any) -> None:
         """A fit of the device's clock to the host's: a mapping or record, see the schema."""
-        self._document(channels.CLOCK, host_time, {"host_time": host_time} | plain(fit))
+        self._document(channels.CLOCK, host_time, {"host_time": host_time} | plain_values(fit))
 
     def settings(self, host_time: float, settings: Mapping[str, Any]) -> None:
         """How the run was set: plain values by name."""

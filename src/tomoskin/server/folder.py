@@ -24,8 +24,11 @@ KINDS = {
 
 MOST_FILES = 200
 
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,119}")
-_STEM = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,119}"
+"""Of a file that a page may ask for: no folder, nothing hidden."""
+
+STEM = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
+"""The same without its ending."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +79,7 @@ class Folder:
     def skins(self) -> list[str]:
         """Stems of the skin files that a page may ask for, in the order of the alphabet."""
         stems = (path.stem for path in self.path.glob("*.toml"))
-        return sorted(stem for stem in stems if _STEM.fullmatch(stem))[:MOST_FILES]
+        return sorted(stem for stem in stems if re.fullmatch(STEM, stem))[:MOST_FILES]
 
     def existing(self, name: str, *endings: str) -> Path:
         """A file of this folder by its name; DataError where there is none that may be had."""
@@ -103,4 +106,4 @@ class Folder:
 
 
 def _is_offered(name: str) -> bool:
-    return _NAME.fullmatch(name) is not None and Path(name).suffix in KINDS
+    return re.fullmatch(NAME, name) is not None and Path(name).suffix in KINDS

@@ -12,14 +12,15 @@ from msgspec import Meta
 
 from tomoskin.core import WireError
 from tomoskin.run import SetPose, SetPresses, SetTwin, StrictRequest, commands
+from tomoskin.server.folder import NAME, STEM
 
 MAX_REQUEST = 32_768
 """Longest request, bytes: a pattern of some thousand rows, written out."""
 
-FileName = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,119}\Z")]
+FileName = Annotated[str, Meta(pattern=rf"^{NAME}\Z")]
 """Of a file in the session folder: no folder, nothing hidden; ``server/folder.py`` looks again."""
 
-Stem = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")]
+Stem = Annotated[str, Meta(pattern=rf"^{STEM}\Z")]
 """Of a file, without its ending: no folder, nothing hidden."""
 
 Format = Literal["touches", "csv", "npz", "mat", "h5", "parquet", "png", "gif"]

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tomoskin.core import Event, SinkError
+from tomoskin.core import Event, SinkError, encode_json
 from tomoskin.recording import (
-    encode_json,
     grid_message,
     log_message,
     scene_message,

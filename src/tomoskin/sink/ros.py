@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Detection, Event, Image, PixelMap
-from tomoskin.recording import encode_json
+from tomoskin.core import Detection, Event, Image, PixelMap, encode_json
 from tomoskin.sink.naming import (
     UNKNOWN,
     Naming,
