@@ -21,7 +21,12 @@ mod python;
 mod reference;
 pub mod residual;
 pub mod scalar;
+pub mod small;
 pub mod solve;
+pub mod spot_fit;
+#[cfg(feature = "python")]
+mod spot_python;
+pub mod spot_table;
 pub mod symbolic;
 pub mod threads;
 pub mod tiles;

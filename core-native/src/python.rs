@@ -13,6 +13,7 @@ use crate::jacobian::{Fields, Table};
 use crate::patches::Patches;
 use crate::product::Rows;
 use crate::scalar::{Scalar, c64};
+use crate::spot_python::{SeenTable, SpotTable, projected};
 use crate::{factor, jacobian, product, residual, solve, symbolic, threads};
 
 #[pyclass(frozen, module = "tomoskin_core")]
@@ -263,9 +264,12 @@ fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Symbolic>()?;
     module.add_class::<Factor>()?;
     module.add_class::<Patches>()?;
+    module.add_class::<SpotTable>()?;
+    module.add_class::<SeenTable>()?;
     #[cfg(feature = "reference")]
     module.add_class::<crate::reference::Reference>()?;
     module.add_function(wrap_pyfunction!(jacobian_rows, module)?)?;
+    module.add_function(wrap_pyfunction!(projected, module)?)?;
     module.add_function(wrap_pyfunction!(residual_of, module)?)?;
     module.add_function(wrap_pyfunction!(transposed_product, module)?)
 }

@@ -113,6 +113,8 @@ class Engine(Protocol):
         ``native`` or ``scipy``.
     reason
         Why this one runs, in words.
+    core
+        The module tomoskin_core, where this is the native one.
     """
 
     @property
@@ -120,6 +122,9 @@ class Engine(Protocol):
 
     @property
     def reason(self) -> str: ...  # noqa: D102
+
+    @property
+    def core(self) -> Any | None: ...  # noqa: D102
 
     def analyse(self, indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> Factorise:
         """Return what factorises symmetric matrices of this structure, given their values."""

@@ -22,6 +22,7 @@ class Scipy:
 
     reason: str
     name: str = "scipy"
+    core: None = None
 
     def analyse(
         self,

@@ -11,7 +11,7 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.refine import Weigh
+from tomoskin.touch.fit.refine import Fit, Solver
 from tomoskin.touch.fit.spot import CONTENT, Response, spots_of
 
 _SPACING = 0.7
@@ -19,6 +19,12 @@ _SPACING = 0.7
 
 _SIZES = (0.6, 1.0, 1.6)
 """Radii of the candidates, in median radii."""
+
+_LEAST = 0.5
+"""Deviations of the noise below which a candidate is none, whatever else could take it up."""
+
+_USEFUL = 1e-3
+"""Part of a candidate's square that the spots that are there must leave of it."""
 
 _FAINT = 0.05
 """Depth at which signatures are taken: linear, and far above rounding."""
@@ -70,30 +76,26 @@ class Matched:
         """Spots (n, 4) of these signatures (n, r)."""
         return cls(spots, signatures, np.einsum("nr,nr->n", signatures, signatures))
 
-    def weighed(self, weigh: Weigh) -> Self:
-        """The same where some directions are unknown."""
-        return self.of(self.spots, weigh(self.signatures.T).T)
-
-    def ratios(
-        self, residual: FloatArray, explained: FloatArray, sign: str
-    ) -> tuple[FloatArray, FloatArray]:
+    def ratios(self, solver: Solver, fit: Fit) -> tuple[FloatArray, FloatArray]:
         """(n,) likelihood ratio of each candidate, and (n,) its most likely content.
 
         The ratio is the square root of twice its logarithm: deviations by which the candidate
-        stands out (GLRT; Kay 1998, section 7.6.2, for a linear model in white noise), after what
-        ``explained`` (r, p), derivatives of the spots that are there already, could take up.
+        stands out (GLRT; Kay 1998, section 7.6.2, for a linear model), after what the spots of
+        ``fit`` could take up.
         """
-        size, projected = self.squares, self.signatures @ residual
-        if explained.shape[1]:
-            basis, _ = np.linalg.qr(explained)
-            taken = self.signatures @ basis
-            size = np.maximum(size - np.einsum("np,np->n", taken, taken), 0.0)
-            projected = projected - taken @ (basis.T @ residual)
-        useful = size > 1e-3 * self.squares
-        content = np.where(useful, projected / np.where(useful, size, 1.0), 0.0)
+        sign, found = solver.table.sign, self.signatures
+        residual = solver.projected(fit.unknown, fit.slopes, fit.residual[None])[0]
+        onto = found @ residual
         if sign != "both":
-            content = np.minimum(content, 0) if sign == "decrease" else np.maximum(content, 0)
-        return np.abs(content) * np.sqrt(size), content
+            onto = np.minimum(onto, 0) if sign == "decrease" else np.maximum(onto, 0)
+        likely = np.flatnonzero(onto**2 > _LEAST**2 * self.squares)
+        free = solver.projected(fit.unknown, fit.slopes, found[likely])
+        size = np.einsum("nr,nr->n", free, found[likely])
+        useful = size > _USEFUL * self.squares[likely]
+        ratio, content = np.zeros(len(found)), np.zeros(len(found))
+        content[likely[useful]] = onto[likely[useful]] / size[useful]
+        ratio[likely[useful]] = np.abs(onto[likely[useful]]) / np.sqrt(size[useful])
+        return ratio, content
 
     def spot(self, number: int, content: FloatArray) -> FloatArray:
         """(4,) candidate ``number`` with its content of ``contents`` (n,)."""

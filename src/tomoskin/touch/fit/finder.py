@@ -18,9 +18,12 @@ from tomoskin.touch.fit.candidates import Candidates, Matched
 from tomoskin.touch.fit.noise import ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.refine import Problem, SheetDomain, Weigh
+from tomoskin.touch.fit.native import NativeSolver
+from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
 from tomoskin.touch.fit.search import Search, SpotDetections, joined
+from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
 from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
+from tomoskin.touch.fit.table import ResponseTable
 
 _CELLS = 1500
 """Of the mesh that spots are fitted on: their profile is smooth, and a frame is quick."""
@@ -46,10 +49,12 @@ class SpotModel:
     ----------
     response
         The forward model with spots on it.
-    prior, sheet
-        What is likely of a spot, and where it may be.
+    prior
+        What is likely of a spot.
     candidates
         Where touches are looked for.
+    solver
+        Fits spots by a table of what one does.
     scale
         (n_meas,) 1/V by which the model's changes become difference data; ones where these are
         in volts.
@@ -57,8 +62,8 @@ class SpotModel:
 
     response: Response
     prior: SpotPrior
-    sheet: SheetDomain
     candidates: Candidates
+    solver: Solver
     scale: FloatArray
 
     @classmethod
@@ -71,14 +76,16 @@ class SpotModel:
             When the mesh has no flat coordinates.
         """
         own = ForwardModel(_mesh(skin), model.pattern, model.contact_impedance, model.current)
-        return cls._of(own.at(skin.conductivity), skin.inverse.difference == "normalised")
+        normalised = skin.inverse.difference == "normalised"
+        return cls._of(own.at(skin.conductivity), skin.touch.sign, normalised)
 
     @classmethod
-    def _of(cls, state: State, normalised: bool) -> Self:
+    def _of(cls, state: State, sign: str, normalised: bool) -> Self:
         response, mesh = Response(state), state.model.mesh
         prior, n_meas = SpotPrior.of(mesh), state.model.pattern.n_meas
         scale = 1 / np.abs(response.reference) if normalised else np.ones(n_meas)
-        return cls(response, prior, SheetDomain(mesh), Candidates.of(response, prior), scale)
+        solver = _solver(response, prior, sign)
+        return cls(response, prior, Candidates.of(response, prior), solver, scale)
 
     def fitted_to(self, reference: FloatArray) -> SpotModel:
         """The model of a sheet that conducts by direction as its ``reference`` (n_meas,) V tells.
@@ -88,7 +95,7 @@ class SpotModel:
         state = with_anisotropy(self.response.state, reference)
         if state is self.response.state:
             return self
-        return self._of(state, bool((self.scale != 1.0).any()))
+        return self._of(state, self.solver.table.sign, bool((self.scale != 1.0).any()))
 
 
 class SpotFinder:
@@ -130,13 +137,14 @@ class SpotFinder:
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
         self._before = np.zeros((0, N_PARAMETERS))
+        self._deficit = Deficit.none(len(model.solver.table.basis))
         self.renew(noise, gain)
 
     def renew(self, noise: FloatArray, gain: float = 1.0) -> None:
         """Go on with other noise, or another gain."""
         self._scale = self._model.scale * gain
         self._whiten = Whitener.of(noise / self._scale[:, None] / self._scale)
-        self._matched: OrderedDict[bytes, tuple[Whitener, Matched]] = OrderedDict()
+        self._matched: OrderedDict[bytes, tuple[WhitenedTable, Matched]] = OrderedDict()
 
     def push(self, dv: FloatArray, nuisance: FloatArray) -> list[Detection]:
         """Touches of ``dv`` (n_meas,), strongest first.
@@ -144,22 +152,23 @@ class SpotFinder:
         ``nuisance`` (n_meas, k) spans the directions along which the data tell nothing of a
         touch: a unit vector for each excluded row. There must be more rows than that.
         """
-        quiet, candidates = self._whitened(nuisance)
-        whiten, matched = self._with_residual(quiet, candidates)
+        seen, matched = self._whitened(nuisance)
         problem = Problem(
             response=self._model.response,
-            whiten=whiten,
+            solver=self._model.solver,
+            seen=seen,
             prior=self._model.prior,
-            sheet=self._model.sheet,
-            sign=self._settings.sign,
             reach=self._unrest * self._reach,
             grows=self._unrest * _GROWS,
-            data=whiten(dv / self._scale),
+            data=seen.whiten(dv / self._scale),
+            left=seen.whiten(self._residual.directions.T),
         )
-        search = Search(problem, matched, self._settings.snr, self._most, self._pace, quiet)
+        search = Search(
+            problem, matched, self._settings.snr, self._most, self._pace, self._deficit
+        )
         detected = search(self._before)
         self._unrest = self._unrest_of(detected.fit.spots)
-        self._before = detected.fit.spots
+        self._before, self._deficit = detected.fit.spots, detected.fit.deficit
         if self._fading:
             self._residual = self._residual.after(self._before, self._model.response, self._fading)
         detections = self._detections(joined(detected))
@@ -174,22 +183,16 @@ class SpotFinder:
         moved = float(np.linalg.norm((spots - self._before)[:, :2], axis=1).max())
         return min(1.0, math.hypot(_REST, moved / self._reach))
 
-    def _whitened(self, nuisance: FloatArray) -> tuple[Whitener, Matched]:
+    def _whitened(self, nuisance: FloatArray) -> tuple[WhitenedTable, Matched]:
         key = nuisance.tobytes()
         if key not in self._matched:
-            whiten = self._whiten.without(nuisance / self._scale[:, None])
-            self._matched[key] = whiten, self._model.candidates.matched(whiten)
+            whiten, model = self._whiten.without(nuisance / self._scale[:, None]), self._model
+            seen = WhitenedTable.of(model.solver, whiten, model.response.times)
+            self._matched[key] = seen, model.candidates.matched(whiten)
             if len(self._matched) > _MASKS:
                 self._matched.popitem(last=False)
         self._matched.move_to_end(key)
         return self._matched[key]
-
-    def _with_residual(self, whiten: Whitener, matched: Matched) -> tuple[Whitener, Matched]:
-        """The same where residual responses are noise."""
-        if not len(self._residual.spots):
-            return whiten, matched
-        weigh = Weigh.of(whiten(self._residual.directions.T).T)
-        return Whitener(weigh(whiten.matrix)), matched.weighed(weigh)
 
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots
@@ -215,6 +218,15 @@ class SpotFinder:
             snr=float(detected.ratio[k]),
             close=bool(detected.close[k]),
         )
+
+
+def _solver(response: Response, prior: SpotPrior, sign: str) -> Solver:
+    """Of the native engine where that runs."""
+    table, sheet = ResponseTable.of(response, prior, sign), SheetDomain(response.spots.mesh)
+    core = response.state.model.engine.core
+    if core is None:
+        return NumpySolver(table, sheet, prior)
+    return NativeSolver(core, table, sheet, prior)
 
 
 def _mesh(skin: Skin) -> Mesh:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """Steps are those of Levenberg–Marquardt; each solves the sheet once.
+    """Steps are those of Levenberg–Marquardt, by the table.
 
     Attributes
     ----------
@@ -15,6 +15,8 @@ class Pace:
         Steps from the touches of the frame before.
     glance, cold
         Steps from each of the positions where a new touch may begin, and then from the best one.
+    rounds
+        Solves of the exact model, each with a few more steps.
     tries
         New touches that are tried in a frame.
     restart
@@ -29,14 +31,15 @@ class Pace:
     warm: int
     glance: int
     cold: int
+    rounds: int
     tries: int
     restart: bool
     speed: float
     fading: float
 
 
-EXHAUSTIVE = Pace(warm=6, glance=15, cold=0, tries=5, restart=True, speed=0.0, fading=0.0)
+EXHAUSTIVE = Pace(warm=6, glance=15, cold=0, rounds=4, tries=5, restart=True, speed=0.0, fading=0.0)
 """Each frame as if it were the only one, of touches that stand still."""
 
-LIVE = Pace(warm=4, glance=1, cold=4, tries=1, restart=False, speed=0.1, fading=4.0)
+LIVE = Pace(warm=4, glance=1, cold=4, rounds=1, tries=1, restart=False, speed=0.1, fading=4.0)
 """What is not found in this frame is found in the next: one more touch a frame."""

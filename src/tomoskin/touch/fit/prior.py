@@ -61,6 +61,11 @@ class SpotPrior:
         return deviations
 
     @property
+    def middle(self) -> FloatArray:
+        """(4,) of each column; positions have none."""
+        return np.array([0.0, 0.0, math.log(self.radius), 0.0])
+
+    @property
     def weights(self) -> FloatArray:
         """(4,) 1/deviation of each column; a position is on the sheet."""
         wide = 1 / math.sqrt(self.area)
@@ -76,10 +81,22 @@ class SpotPrior:
     def held(self, spots: FloatArray, sign: str) -> FloatArray:
         """``spots`` (k, 4) with radius and content where they may be."""
         kept = spots.copy()
-        middle, margin = math.log(self.radius), 2 * self.spread
-        kept[:, LOG_RADIUS] = np.clip(kept[:, LOG_RADIUS], middle - margin, middle + margin)
-        most = _MOST_DEPTH * FILLING * np.exp(2 * kept[:, LOG_RADIUS])
-        low = np.zeros_like(most) if sign == "increase" else -most
-        high = np.zeros_like(most) if sign == "decrease" else most
-        kept[:, CONTENT] = np.clip(kept[:, CONTENT], low, high)
+        kept[:, LOG_RADIUS] = np.clip(kept[:, LOG_RADIUS], *self.log_radii)
+        low, high = self.depths(sign)
+        filling = FILLING * np.exp(2 * kept[:, LOG_RADIUS])
+        kept[:, CONTENT] = np.clip(kept[:, CONTENT], low * filling, high * filling)
         return kept
+
+    @property
+    def log_radii(self) -> tuple[float, float]:
+        """Least and largest logarithm of a radius in m."""
+        middle, margin = math.log(self.radius), 2 * self.spread
+        return middle - margin, middle + margin
+
+    @staticmethod
+    def depths(sign: str) -> tuple[float, float]:
+        """Least and largest log(σ/σ₀) at the centre: ``sign`` as in a skin's ``[touch]``."""
+        return (
+            0.0 if sign == "increase" else -_MOST_DEPTH,
+            0.0 if sign == "decrease" else _MOST_DEPTH,
+        )

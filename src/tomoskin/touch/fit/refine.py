@@ -1,87 +1,109 @@
-"""The most likely spots near a start, and their covariance: Levenberg–Marquardt."""
+"""What explains a frame, and the frame that is to be explained."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Protocol
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
-from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray
-from tomoskin.mesh import Mesh
 from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.spot import CONTENT, N_PARAMETERS, Response, X, Y
+from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, Response
+from tomoskin.touch.fit.table import ResponseTable
 
-_SETTLED = 0.02
-"""Newton decrement, squared, at which a step is too small to matter: 0.14 deviations."""
+_CERTAIN = 10.0
+"""Deviations up to which a single spot's table is exact to less than the noise."""
 
-_LEAST_DAMPING = 1e-6
+_AGAIN = 2
+"""Steps after what the table lacks has been renewed."""
 
+_EXACT = 0.1
+"""Deviations by which the exact model may differ from what a fit was made with."""
 
-_DIRECTED = 0.7
-"""Standard deviation of a spot's direction (:class:`Part`) about none."""
+_NEAR, _ALIKE = 0.1, 0.1
+"""What the table lacks holds for spots that have moved by so much of their radius, and whose
+content has changed by so much of it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Weigh:
-    """Unknown amplitudes along some directions D, marginalised (integrated out).
+class Deficit:
+    """What a table lacks, as the exact model has it: a small part that changes slowly.
 
-    Data then have the covariance 1 + DDᵀ; the inverse of its root is 1 − U(1 − 1/√(1 + s²))Uᵀ
-    with the singular vectors U and values s of D.
+    Attributes
+    ----------
+    spots
+        (k, 4) for which the exact model was solved.
+    change
+        (rank,) V by which it differs from the table, in the table's basis.
     """
 
-    vectors: FloatArray
-    less: FloatArray
-    log_size: float
+    spots: FloatArray
+    change: FloatArray
 
     @classmethod
-    def of(cls, directions: FloatArray) -> Self:
-        """Of (r, k) directions, each as long as its amplitude's deviation."""
-        vectors, sizes, _ = np.linalg.svd(directions, full_matrices=False)
-        return cls(vectors, 1 - 1 / np.sqrt(1 + sizes**2), float(np.log1p(sizes**2).sum() / 2))
+    def none(cls, rank: int) -> Deficit:
+        """Before the exact model is solved."""
+        return cls(np.zeros((0, N_PARAMETERS)), np.zeros(rank))
 
-    def __call__(self, whitened: FloatArray) -> FloatArray:
-        """(r, …) data, weighed."""
-        part = self.vectors.T @ whitened
-        part = self.less * part if part.ndim == 1 else self.less[:, None] * part
-        return np.asarray(whitened - self.vectors @ part)
+    def holds_for(self, spots: FloatArray) -> bool:
+        """Whether as many ``spots`` (k, 4) are where they were, and as strong."""
+        if len(spots) != len(self.spots):
+            return False
+        away = np.linalg.norm((spots - self.spots)[:, :2], axis=1)
+        other = np.abs((spots - self.spots)[:, CONTENT])
+        near = away <= _NEAR * np.exp(self.spots[:, LOG_RADIUS])
+        wider = np.abs((spots - self.spots)[:, LOG_RADIUS])
+        alike = (wider <= _ALIKE) & (other <= _ALIKE * np.abs(self.spots[:, CONTENT]))
+        return bool((near & alike).all())
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Spots that explain a frame.
+    """Spots that explain a frame. Unknown amplitudes along some directions are integrated out.
 
     Attributes
     ----------
     spots
         (k, 4), see :mod:`tomoskin.touch.fit.spot`.
-    predicted
-        (r,) what the spots do to the whitened data.
+    deficit
+        What the table lacks of these spots.
+    each, predicted
+        (k, r) what each spot does to the whitened data, and (r,) what all do together.
     residual
-        (r,) whitened data less that, weighed for unknown directions.
-    jacobian
-        (r, 4k) of the whitened model, weighed in the same way.
-    weigh
-        What does that.
+        (r,) whitened data less what all do.
+    slopes
+        (4k, r) derivatives of the whitened model.
+    unknown
+        (q, r) directions, each as long as its amplitude's deviation.
     normal
-        (4k, 4k) inverse of the covariance: JᵀJ and the prior.
+        (4k, 4k) inverse of the covariance: JC⁻¹Jᵀ and the prior; C = 1 + unknownᵀ unknown.
+    gradient
+        (4k,) JC⁻¹ residual.
+    misfit
+        residualᵀ C⁻¹ residual: about as many as it has entries where the model is right.
+    log_size
+        Half the logarithm of the determinant of C.
     cost
-        Half the squares of residual and prior.
+        Half the misfit and the squares of the prior.
     settled
         Whether the steps towards it came to an end.
     """
 
     spots: FloatArray
+    deficit: Deficit
+    each: FloatArray
     predicted: FloatArray
     residual: FloatArray
-    jacobian: FloatArray
-    weigh: Weigh
+    slopes: FloatArray
+    unknown: FloatArray
     normal: FloatArray
+    gradient: FloatArray
+    misfit: float
+    log_size: float
     cost: float
     settled: bool = True
 
@@ -97,11 +119,6 @@ class Fit:
         """Degrees of freedom of the residual."""
         return max(len(self.residual) - len(self.normal), 1)
 
-    @cached_property
-    def misfit(self) -> float:
-        """Squares of the residual: about as many as it has entries where the model is right."""
-        return float(self.residual @ self.residual)
-
     def log_evidence(self, prior: SpotPrior) -> float:
         """Logarithm of ∫ likelihood · prior by Laplace's method (MacKay 2003, eq. 28.5).
 
@@ -110,8 +127,71 @@ class Fit:
         n = len(self.normal)
         sign, log_det = np.linalg.slogdet(self.normal) if n else (1.0, 0.0)
         volume = (n * math.log(2 * math.pi) - log_det) / 2 if sign > 0 else -np.inf
-        likelihood = -self.misfit / 2 - self.weigh.log_size
+        likelihood = -self.misfit / 2 - self.log_size
         return likelihood + prior.log_density(self.spots) + volume
+
+
+@dataclass(frozen=True, eq=False)
+class WhitenedTable:
+    """A table as whitened data see it.
+
+    Attributes
+    ----------
+    table
+        What spots do.
+    whiten
+        Of the noise.
+    direct, timed
+        (r, rank) from a change in the table's basis to whitened data; of ``timed`` each
+        measurement counts as often as it is after the middle of the scan.
+    kept
+        What a solver keeps of that.
+    """
+
+    table: ResponseTable
+    whiten: Whitener
+    direct: FloatArray
+    timed: FloatArray
+    kept: Any
+
+    @classmethod
+    def of(cls, solver: Solver, whiten: Whitener, times: FloatArray) -> WhitenedTable:
+        """``times`` (n_meas,) of the measurements about the middle of the scan."""
+        table = solver.table
+        direct = whiten.matrix @ table.basis.T
+        timed = whiten.matrix @ (times[:, None] * table.basis.T)
+        return cls(table, whiten, direct, timed, solver.keep(direct, timed))
+
+
+class Solver(Protocol):
+    """The arithmetic of a fit by a table."""
+
+    @property
+    def table(self) -> ResponseTable:
+        """What one spot does."""
+        ...
+
+    def keep(self, direct: FloatArray, timed: FloatArray) -> Any:
+        """What it keeps of a :class:`WhitenedTable`."""
+        ...
+
+    def expanded(self, spots: FloatArray) -> FloatArray:
+        """See :meth:`ResponseTable.expanded`."""
+        ...
+
+    def settled(
+        self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int
+    ) -> Fit:
+        """The minimum of the cost near ``spots`` (k, 4), after at most so many steps."""
+        ...
+
+    def projected(self, unknown: FloatArray, free: FloatArray, rows: FloatArray) -> FloatArray:
+        """(m, r) of ``rows`` (m, r): each times P.
+
+        P = C⁻¹ less what C⁻¹ keeps of the span of ``free`` (p, r), of which any amount may be
+        there; C = 1 + unknownᵀ unknown, of directions ``unknown`` (q, r).
+        """
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,100 +200,52 @@ class Problem:
 
     ``sign`` is "decrease", "increase" or "both". Standard deviations of what a touch does within a
     scan: its way along each axis, ``reach`` m, and what it ``grows`` by, in parts of it.
+    ``left`` (q, r) are directions of residual responses, each as long as its deviation.
     """
 
     response: Response
-    whiten: Whitener
+    solver: Solver
+    seen: WhitenedTable
     prior: SpotPrior
-    sheet: SheetDomain
-    sign: str
     reach: float
     grows: float
     data: FloatArray
+    left: FloatArray
 
     def nothing(self) -> Fit:
         """The frame with no spot at all."""
         none = np.zeros((0, N_PARAMETERS))
-        slopes = np.zeros((len(self.data), 0))
-        cost = float(self.data @ self.data) / 2
-        weigh = Weigh.of(slopes)
-        return Fit(none, 0 * self.data, self.data, slopes, weigh, np.zeros((0, 0)), cost)
+        return self.solver.settled(self, none, Deficit.none(len(self.seen.table.basis)), 0)
 
-    def at(self, spots: FloatArray) -> Fit:
-        """The frame with these spots, as they are."""
-        change, jacobian, directed = self.response.expanded(spots)
-        unknown = np.hstack([_DIRECTED * directed, self._within_scan(spots, jacobian)])
-        predicted, weigh = self.whiten(change), Weigh.of(self.whiten(unknown.T).T)
-        residual, slope = weigh(self.data - predicted), weigh(self.whiten(jacobian.T).T)
-        away, weights = self.prior.away(spots), np.tile(self.prior.weights, len(spots))
-        normal = slope.T @ slope + np.diag(weights**2)
-        cost = (residual @ residual + float((away**2).sum())) / 2
-        return Fit(spots, predicted, residual, slope, weigh, normal, float(cost))
+    def refined(self, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
+        """See :meth:`Solver.settled`."""
+        return self.solver.settled(self, spots, deficit, most)
 
-    def _within_scan(self, spots: FloatArray, jacobian: FloatArray) -> FloatArray:
-        """(n_meas, 3k) V: what it does that touches move along x and y, and grow, while the rows
-        are read one after the other."""
-        if not self.reach:
-            return np.zeros((len(jacobian), 0))
-        early = self.response.times[:, None]
-        moves = early * jacobian * self.reach
-        grows = early * jacobian[:, CONTENT::N_PARAMETERS] * (self.grows * spots[:, CONTENT])
-        return np.hstack([moves[:, X::N_PARAMETERS], moves[:, Y::N_PARAMETERS], grows])
+    def corrected(self, fit: Fit, rounds: int) -> Fit:
+        """The fit with the exact model at its spots, which is solved up to so many times.
 
-    def refined(self, spots: FloatArray, most: int) -> Fit:
-        """The minimum of the cost near ``spots`` (k, 4), after at most so many steps."""
-        return self.settled(self.at(self._allowed(spots)), most)
-
-    def settled(self, best: Fit, most: int) -> Fit:
-        """The minimum of the cost near ``best``, after at most so many steps.
-
-        Levenberg (1944) and Marquardt (1963): damping relative to the diagonal.
+        A single faint spot is left as it is: what its table lacks is below the noise.
         """
-        damping = _LEAST_DAMPING
-        for _ in range(most):
-            gradient = self._gradient(best)
-            step = _solved(best.normal, gradient, damping)
-            if gradient @ step < _SETTLED:
-                return replace(best, settled=True)
-            tried = self.at(self._allowed(best.spots + step.reshape(-1, N_PARAMETERS)))
-            if tried.cost < best.cost:
-                best, damping = tried, max(damping / 10, _LEAST_DAMPING)
-            elif damping > 1e3:
-                return replace(best, settled=True)
-            else:
-                damping = max(damping * 30, 1e-2)
-        return replace(best, settled=False)
+        size = np.linalg.norm(fit.each, axis=1)
+        if not len(size) or (len(size) == 1 and size[0] < _CERTAIN):
+            return fit
+        for _ in range(rounds):
+            if fit.deficit.holds_for(fit.spots):
+                return fit
+            exact = self.seen.table.basis @ self.response.changes([fit.spots])[0]
+            change = exact - self.solver.expanded(fit.spots)[:, 0].sum(axis=0)
+            far = np.linalg.norm(self.seen.direct @ (change - fit.deficit.change))
+            deficit = Deficit(fit.spots, change)
+            if far < _EXACT:
+                return replace(fit, deficit=deficit)
+            fit = self.solver.settled(self, fit.spots, deficit, _AGAIN)
+        return fit
 
-    def _gradient(self, fit: Fit) -> FloatArray:
-        pull = self.prior.away(fit.spots) * self.prior.weights
-        return np.asarray(fit.jacobian.T @ fit.residual - pull.ravel())
+    def towards_bell(self, spots: FloatArray) -> FloatArray:
+        """(r,) what it does to the whitened data that spots are bells."""
+        return np.asarray(self.seen.direct @ self.solver.expanded(spots)[:, -1].sum(axis=0))
 
-    def _allowed(self, spots: FloatArray) -> FloatArray:
-        return self.prior.held(self.sheet.held(spots), self.sign)
-
-
-class SheetDomain:
-    """Where a touch may be: what leaves the mesh is brought back to its nearest cell."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self._centroids = mesh.centroids
-        self._tree = cKDTree(mesh.centroids)
-        corners = mesh.points[mesh.cells] - mesh.centroids[:, None]
-        self._margin = np.linalg.norm(corners, axis=2).max(axis=1)
-
-    def held(self, spots: FloatArray) -> FloatArray:
-        """``spots`` (k, 4) on the sheet."""
-        apart, cell = (np.atleast_1d(nearest) for nearest in self._tree.query(spots[:, :2]))
-        off = np.asarray(apart > self._margin[cell])
-        if not off.any():
-            return spots
-        kept = spots.copy()
-        kept[off, :2] = self._centroids[cell[off]]
-        return kept
-
-
-def _solved(normal: FloatArray, gradient: FloatArray, damping: float) -> FloatArray:
-    scale = 1 / np.sqrt(np.diag(normal))
-    even = normal * scale[:, None] * scale
-    even[np.diag_indices_from(even)] *= 1 + damping
-    return np.asarray(scale * cho_solve(cho_factor(even), scale * gradient))
+    def change(self, fit: Fit) -> FloatArray:
+        """(n_meas,) V that the spots of a fit add to the reference."""
+        alone = self.solver.expanded(fit.spots)[:, 0].sum(axis=0)
+        return np.asarray((alone + fit.deficit.change) @ self.seen.table.basis)

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.candidates import Matched
-from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.pace import Pace
-from tomoskin.touch.fit.refine import Fit, Problem
-from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, bell
+from tomoskin.touch.fit.refine import Deficit, Fit, Problem
+from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
 
 HELD = 0.6
 """Part of the ratio at which a touch begins above which one that is there stays."""
@@ -69,9 +68,8 @@ class Search:
         Touches that are looked for at most.
     pace
         How much is tried.
-    quiet
-        What makes data white where nothing has been: by that noise detections state how far they
-        stand out; by the problem's it is decided whether they are touches.
+    deficit
+        What the table lacked of the last frame's touches.
     """
 
     problem: Problem
@@ -79,7 +77,7 @@ class Search:
     least: float
     most: int
     pace: Pace
-    quiet: Whitener
+    deficit: Deficit
 
     def __call__(self, before: FloatArray) -> SpotDetections:
         """Touches of the frame; ``before`` (k, 4) are those of the last one."""
@@ -99,7 +97,8 @@ class Search:
     def _started(self, before: FloatArray) -> Fit:
         if not len(before):
             return self.problem.nothing()
-        return self.problem.refined(before[: self.most], self.pace.warm)
+        problem, spots = self.problem, before[: self.most]
+        return problem.corrected(problem.refined(spots, self.deficit, self.pace.warm), self.pace.rounds)
 
     def _pruned(self, fit: Fit) -> Fit:
         """Without the spots that have faded."""
@@ -131,7 +130,7 @@ class Search:
             best = int(ratio.argmax())
             if ratio[best] < self._threshold(fit, HELD if not len(fit.spots) else _DOUBTFUL):
                 return fit, tried
-            more = self._best(_starts(fit, self.matched.spot(best, content)))
+            more = self._best(_starts(fit, self.matched.spot(best, content)), fit.deficit)
             worth = self._ratios(more).min() >= self._threshold(fit, 1.0)
             if not worth or self._evidence(more) <= self._evidence(fit):
                 return fit, tried + 1
@@ -144,25 +143,18 @@ class Search:
         return part * self.least * float(np.hypot(1.0, misshapen / self.least))
 
     def _standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
-        return self.matched.ratios(fit.residual, fit.jacobian, self.problem.sign)
+        return self.matched.ratios(self.problem.solver, fit)
 
-    def _best(self, starts: list[FloatArray]) -> Fit:
-        fits = (self.problem.refined(start, self.pace.glance) for start in starts)
+    def _best(self, starts: list[FloatArray], deficit: Deficit) -> Fit:
+        fits = (self.problem.refined(start, deficit, self.pace.glance) for start in starts)
         best = min(fits, key=lambda fit: fit.cost)
-        return best if best.settled else self.problem.settled(best, self.pace.cold)
+        if not best.settled and self.pace.cold:
+            best = self.problem.refined(best.spots, deficit, self.pace.cold)
+        return self.problem.corrected(best, self.pace.rounds)
 
     def _ratios(self, fit: Fit) -> FloatArray:
         """(k,) size of what each spot changes that the others could not take up."""
-        k = len(fit.spots)
-        if k == 1:
-            return np.array([np.linalg.norm(fit.predicted)])
-        others = [np.delete(fit.spots, number, axis=0) for number in range(k)]
-        alone = fit.predicted - self.problem.whiten(self.problem.response.changes(others))
-        for number in range(k):
-            slope = np.delete(fit.jacobian, np.s_[4 * number : 4 * number + 4], axis=1)
-            basis, _ = np.linalg.qr(slope)
-            alone[number] -= basis @ (basis.T @ alone[number])
-        return np.asarray(np.linalg.norm(alone, axis=1))
+        return _standing(self.problem, fit, self.problem.left)
 
     def _judged(self, fit: Fit) -> SpotDetections:
         k = len(fit.spots)
@@ -170,14 +162,8 @@ class Search:
             none = np.zeros(0)
             return SpotDetections(fit, none, np.zeros((0, 0)), none.astype(bool))
         covariance = _covariance(self.problem, fit)
-        return SpotDetections(fit, self._standing(fit), covariance, self._close(fit))
-
-    def _standing(self, fit: Fit) -> FloatArray:
-        """(k,) deviations of the quiet noise by which each spot stands out."""
-        if self.quiet is self.problem.whiten:
-            return self._ratios(fit)
-        problem = replace(self.problem, whiten=self.quiet)
-        return replace(self, problem=problem)._ratios(problem.at(fit.spots))
+        ratio = _standing(self.problem, fit, self.problem.left[:0])
+        return SpotDetections(fit, ratio, covariance, self._close(fit))
 
     def _close(self, fit: Fit) -> NDArray[np.bool_]:
         """Where a candidate within a radius of a spot stands out nearly enough."""
@@ -187,6 +173,17 @@ class Search:
             return np.zeros(len(fit.spots), dtype=bool)
         apart = np.linalg.norm(fit.spots[:, None, :2] - doubtful, axis=2).min(axis=1)
         return np.asarray(apart < 2 * np.exp(fit.spots[:, LOG_RADIUS]))
+
+
+def _standing(problem: Problem, fit: Fit, left: FloatArray) -> FloatArray:
+    """(k,) deviations of the noise, with directions ``left`` (q, r), by which each stands out."""
+    k = len(fit.spots)
+    squares = np.empty(k)
+    for number in range(k):
+        others = np.delete(fit.slopes, np.s_[4 * number : 4 * number + 4], axis=0)
+        alone = fit.each[number : number + 1]
+        squares[number] = problem.solver.projected(left, others, alone)[0] @ alone[0]
+    return np.sqrt(np.maximum(squares, 0.0))
 
 
 def _starts(fit: Fit, fresh: FloatArray) -> list[FloatArray]:
@@ -211,23 +208,24 @@ def _covariance(problem: Problem, fit: Fit) -> FloatArray:
     that is not fitted but considered (Schmidt 1966). So is the part by which each row is off.
     """
     scatter = max(1.0, fit.misfit / fit.degrees)
-    other = problem.whiten(problem.response.changes([fit.spots], bell)[0])
-    wrong = fit.weigh(other - fit.predicted)
-    moved = _SHAPE_SD * (fit.covariance @ (fit.jacobian.T @ wrong))
-    return np.asarray(scatter * fit.covariance + np.outer(moved, moved) + _uneven(problem, fit))
+    onto = problem.solver.projected(fit.unknown, fit.slopes[:0], fit.slopes)
+    moved = _SHAPE_SD * (fit.covariance @ (onto @ problem.towards_bell(fit.spots)))
+    uneven = _uneven(problem, fit, onto)
+    return np.asarray(scatter * fit.covariance + np.outer(moved, moved) + uneven)
 
 
-def _uneven(problem: Problem, fit: Fit) -> FloatArray:
+def _uneven(problem: Problem, fit: Fit, onto: FloatArray) -> FloatArray:
     """What rows that answer more or less than they should add to the covariance.
 
     How much, is what the residual has beyond noise, where that is more than a sheet
     is uneven as a rule: E[rᵀr] = degrees + u²‖(1 − JΣJᵀ)E‖², E the rows' answers one by one.
+    ``onto`` is (4k, r) JC⁻¹.
     """
-    answers = problem.response.changes([fit.spots])[0]
-    each = fit.weigh(problem.whiten.matrix * answers)
-    moved = fit.covariance @ (fit.jacobian.T @ each)
-    unexplained = float(np.sum((each - fit.jacobian @ moved) ** 2))
-    beyond = max(fit.misfit - fit.degrees, 0.0) / unexplained if unexplained else 0.0
+    matrix, change = problem.seen.whiten.matrix, problem.change(fit)
+    slopes = onto @ matrix * change
+    moved = fit.covariance @ slopes
+    unexplained = float(np.sum((matrix * change) ** 2) - np.sum(slopes * moved))
+    beyond = max(fit.misfit - fit.degrees, 0.0) / unexplained if unexplained > 0 else 0.0
     return np.asarray(max(beyond, _UNEVEN**2) * (moved @ moved.T))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, IntArray, ModelError, reach
 from tomoskin.forward import State
@@ -27,7 +28,7 @@ _NARROW = 1.15
 _SPLIT = 2
 """Each side of a cell is cut into so many, for the mean of a profile over the cell."""
 
-_FEW = 250
+_FEW = 400
 """Up to so many cells a local update is faster than a new solve (1,500 cells, native engine)."""
 
 
@@ -122,6 +123,29 @@ class Part:
     directed: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class Footprints:
+    """Many spots of one radius and depth 1, one after the other.
+
+    Attributes
+    ----------
+    starts
+        (n + 1,) spot k has ``cells[starts[k]:starts[k + 1]]``.
+    cells
+        (c,) those that it may reach.
+    height, bell
+        (c,) change of log σ by the :func:`profile` and by a :func:`bell`.
+    directed
+        (2, c), see :class:`Part`.
+    """
+
+    starts: IntArray
+    cells: IntArray
+    height: FloatArray
+    bell: FloatArray
+    directed: FloatArray
+
+
 class Spots:
     """Spots on the cells of a mesh of triangles in the sheet's own flat coordinates.
 
@@ -170,6 +194,23 @@ class Spots:
             cells, depth * mean, np.stack([*towards, wider, more]), _along(-square * fall, offset)
         )
 
+    def footprints(self, points: FloatArray, radius: float) -> Footprints:
+        """Of spots at ``points`` (n, 2) m, of ``radius`` m."""
+        reach = REACH * radius
+        near = cKDTree(self.mesh.centroids).query_ball_point(points, reach + self._margin.max())
+        starts = np.cumsum([0, *(len(own) for own in near)])
+        cells = np.array([cell for own in near for cell in sorted(own)], dtype=np.int64)
+        offset = self._points[cells] - np.repeat(points, np.diff(starts), axis=0)[:, None]
+        square = np.einsum("cqd,cqd->cq", offset, offset) / reach**2
+        height, fall = _with_steepness(square)
+        return Footprints(
+            starts,
+            cells,
+            height.mean(axis=1),
+            bell(square).mean(axis=1),
+            _along(-square * fall, offset),
+        )
+
     def _squares(self, spot: FloatArray, cells: IntArray) -> tuple[FloatArray, FloatArray]:
         """(c, q) squared distances in reaches of the points of cells, and (c, q, 2) offsets, m."""
         offset = self._points[cells] - spot[:2]
@@ -216,9 +257,30 @@ class Response:
         By the local update of the forward model, or by a new solve where many cells change.
         """
         pressed = [self._pressed(*self.spots.change(spots, shape)) for spots in sets]
-        if max(len(cells) for cells, _ in pressed) <= _FEW:
-            return np.asarray(self.state.local.voltages_of(pressed) - self.reference)
-        return np.array([self._solved(*each).voltages for each in pressed]) - self.reference
+        return self.voltages(pressed) - self.reference
+
+    def voltages(self, touches: Sequence[tuple[IntArray, FloatArray]]) -> FloatArray:
+        """(b, n_meas) V of the sheet with some cells (c,) changed to a conductivity (c,)."""
+        few = np.array([len(cells) <= _FEW for cells, _ in touches], dtype=bool)
+        out = np.empty((len(touches), len(self.reference)))
+        if few.any():
+            out[few] = self.state.local.voltages_of([touches[k] for k in np.flatnonzero(few)])
+        for k in np.flatnonzero(~few):
+            out[k] = self._solved(*touches[k]).voltages
+        return out
+
+    @cached_property
+    def by_direction(self) -> tuple[FloatArray, FloatArray]:
+        """(n_meas, n_cells) V twice: derivatives by the xx = −yy and the xy of log σ of a cell."""
+        model, field = self.state.model, self.state.gradient
+        x, y = field[:, :1], field[:, 1:]
+        turned = (x + y) / math.sqrt(2), (x - y) / math.sqrt(2)
+        along, across, one, other = (
+            model.engine.jacobian(np.ascontiguousarray(part), model.pattern, model.current)
+            * self.state.conductivity
+            for part in (x, y, *turned)
+        )
+        return along - across, one - other
 
     def jacobian(self, spots: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Change (n_meas,) V of spots (k, 4), and its derivatives (n_meas, 4k) by each column.

@@ -1,0 +1,271 @@
+//! What one spot does to the voltages, from a table of splines.
+
+use pulp::{Arch, Simd, WithSimd};
+
+/// Columns of a spot: x, y, logarithm of the radius, content.
+pub const PARAMETERS: usize = 4;
+/// Directions beside them.
+pub const DIRECTIONS: usize = 2;
+/// Rows of an expansion: the change, its derivatives, its directions.
+pub const ROWS: usize = 1 + PARAMETERS + DIRECTIONS;
+
+/// A spot.
+pub type Spot = [f64; PARAMETERS];
+
+/// Points of each axis, and radii, that a spot is between.
+const NEAR: usize = 4;
+/// The change, and its slopes by x, y and the logarithm of the radius.
+const MIXED: usize = 4;
+
+/// Positions of one radius.
+#[derive(Clone, Copy, Debug)]
+pub struct Grid {
+    /// The first point, m.
+    pub origin: [f64; 2],
+    /// Between points, m.
+    pub step: f64,
+    /// Points along x and y.
+    pub shape: [usize; 2],
+    /// Number of its first point among those of all grids.
+    pub start: usize,
+}
+
+/// Spline coefficients of all grids, and between what they are.
+#[derive(Debug)]
+pub struct Table {
+    /// Logarithms of the radii in m, evenly apart.
+    pub log_radii: Vec<f64>,
+    /// One of each radius.
+    pub grids: Vec<Grid>,
+    /// Of exp(depth/4) − 1.
+    pub nodes: Vec<f64>,
+    /// By points, nodes and directions, and entries of the basis.
+    pub values: Vec<f64>,
+    /// Entries of the basis.
+    pub rank: usize,
+    /// Content of a spot of radius and depth one.
+    pub filling: f64,
+}
+
+/// Weights of four points, and the slopes of these.
+type Weights = [[f64; NEAR]; 2];
+
+impl Table {
+    /// Checks that the parts fit together.
+    ///
+    /// # Errors
+    /// When they do not.
+    pub fn checked(self) -> Result<Self, &'static str> {
+        let points: usize = self.grids.iter().map(|g| g.shape[0] * g.shape[1]).sum();
+        let planes = self.nodes.len() + DIRECTIONS;
+        if self.log_radii.len() < NEAR || self.grids.len() != self.log_radii.len() {
+            return Err("a grid for each of four radii at least");
+        }
+        if self.grids.iter().any(|g| g.shape.iter().any(|&n| n < NEAR)) {
+            return Err("four points along each axis at least");
+        }
+        if self.values.len() != points * planes * self.rank || self.nodes.is_empty() {
+            return Err("as many values as points, nodes and entries");
+        }
+        Ok(self)
+    }
+
+    /// Writes the expansion of a spot, (ROWS, rank), to `out`.
+    pub fn expand(&self, spot: &Spot, out: &mut [f64]) {
+        let width = (self.nodes.len() + DIRECTIONS) * self.rank;
+        let mut mixed = vec![0.0; MIXED * width];
+        let step = self.log_radii[1] - self.log_radii[0];
+        let place = (spot[2] - self.log_radii[0]) / step;
+        let most = (self.log_radii.len() - NEAR) as f64;
+        let first = (place.floor() - 1.0).clamp(0.0, most);
+        let [radius, wider] = cubic(place - first);
+        for level in 0..NEAR {
+            let grid = &self.grids[first as usize + level];
+            let (x, along) = grid.along(0, spot[0]);
+            let (y, across) = grid.along(1, spot[1]);
+            for i in 0..NEAR {
+                let row = (grid.start + (x + i) * grid.shape[1] + y) * width;
+                Arch::new().dispatch(Mix {
+                    points: &self.values[row..row + NEAR * width],
+                    across: &across,
+                    along: [
+                        radius[level] * along[0][i],
+                        radius[level] * along[1][i],
+                        wider[level] / step * along[0][i],
+                    ],
+                    mixed: &mut mixed,
+                });
+            }
+        }
+        self.of_depth(spot, &mixed, out);
+    }
+
+    /// From values and slopes at the nodes to those of the spot's depth.
+    fn of_depth(&self, spot: &Spot, mixed: &[f64], out: &mut [f64]) {
+        let (n, rank) = (self.nodes.len(), self.rank);
+        let filling = self.filling * (2.0 * spot[2]).exp();
+        let depth = spot[3] / filling;
+        let s = (depth / 4.0).exp_m1();
+        let plane = |row: usize, node: usize| &mixed[(row * (n + DIRECTIONS) + node) * rank..];
+        out[..ROWS * rank].fill(0.0);
+        for node in 0..n {
+            let (power, slope) = self.power(s, node);
+            let steeper = slope * (s + 1.0) / 4.0;
+            for row in 0..MIXED {
+                let target = &mut out[row * rank..(row + 1) * rank];
+                add(target, power, plane(row, node));
+            }
+            let wider = &mut out[3 * rank..4 * rank];
+            add(wider, -2.0 * depth * steeper, plane(0, node));
+            let more = &mut out[4 * rank..5 * rank];
+            add(more, steeper / filling, plane(0, node));
+        }
+        for direction in 0..DIRECTIONS {
+            let first = (1 + PARAMETERS + direction) * rank;
+            add(
+                &mut out[first..first + rank],
+                depth,
+                plane(0, n + direction),
+            );
+        }
+    }
+
+    /// Weight of a node's value at s, and its slope by s.
+    fn power(&self, s: f64, node: usize) -> (f64, f64) {
+        let others = || (0..self.nodes.len()).filter(move |&other| other != node);
+        let apart: f64 = others()
+            .map(|other| self.nodes[node] - self.nodes[other])
+            .product();
+        let product: f64 = others().map(|other| s - self.nodes[other]).product();
+        let slope: f64 = others()
+            .map(|left_out| {
+                let rest = others().filter(|&other| other != left_out);
+                rest.map(|other| s - self.nodes[other]).product::<f64>()
+            })
+            .sum();
+        (s * product / apart, (product + s * slope) / apart)
+    }
+}
+
+impl Grid {
+    /// The first of four points along an axis, their weights at a place, and the slopes, 1/m.
+    fn along(&self, axis: usize, place: f64) -> (usize, Weights) {
+        let far = (place - self.origin[axis]) / self.step;
+        let first = far.floor().clamp(1.0, (self.shape[axis] - 3) as f64);
+        let [weight, slope] = spline(far - first);
+        (first as usize - 1, [weight, slope.map(|s| s / self.step)])
+    }
+}
+
+/// Cubic B-splines at t after the second of four points, and their slopes.
+fn spline(t: f64) -> Weights {
+    let u = 1.0 - t;
+    let (t2, u2) = (t * t, u * u);
+    [
+        [
+            u2 * u / 6.0,
+            (3.0 * t2 * t - 6.0 * t2 + 4.0) / 6.0,
+            (3.0 * u2 * u - 6.0 * u2 + 4.0) / 6.0,
+            t2 * t / 6.0,
+        ],
+        [
+            -u2 / 2.0,
+            (3.0 * t2 - 4.0 * t) / 2.0,
+            (4.0 * u - 3.0 * u2) / 2.0,
+            t2 / 2.0,
+        ],
+    ]
+}
+
+/// Weights of a cubic through four points, t after the first, and their slopes.
+fn cubic(t: f64) -> Weights {
+    let far = [t, t - 1.0, t - 2.0, t - 3.0];
+    let mut out = [[0.0; NEAR]; 2];
+    for (node, apart) in [-6.0, 2.0, -2.0, 6.0].into_iter().enumerate() {
+        let [a, b, c] = match node {
+            0 => [far[1], far[2], far[3]],
+            1 => [far[0], far[2], far[3]],
+            2 => [far[0], far[1], far[3]],
+            _ => [far[0], far[1], far[2]],
+        };
+        out[0][node] = a * b * c / apart;
+        out[1][node] = (a * b + a * c + b * c) / apart;
+    }
+    out
+}
+
+#[inline(always)]
+fn add(target: &mut [f64], scale: f64, values: &[f64]) {
+    for (sum, value) in target.iter_mut().zip(values) {
+        *sum += scale * value;
+    }
+}
+
+/// Adds four points of a line across, by their weights, to the sums.
+struct Mix<'a> {
+    points: &'a [f64],
+    across: &'a Weights,
+    /// Weight of the line, and the slopes of that by x and by the logarithm of the radius.
+    along: [f64; 3],
+    mixed: &'a mut [f64],
+}
+
+impl WithSimd for Mix<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let width = self.mixed.len() / MIXED;
+        let (flat, rest) = self.mixed.split_at_mut(width);
+        let (by_x, rest) = rest.split_at_mut(width);
+        let (by_y, wider) = rest.split_at_mut(width);
+        let (p, rest) = self.points.split_at(width);
+        let (q, rest) = rest.split_at(width);
+        let (r, s) = rest.split_at(width);
+        let whole = width - width % S::F64_LANES;
+        for n in whole..width {
+            let values = [p[n], q[n], r[n], s[n]];
+            let (mut sum, mut slope) = (0.0, 0.0);
+            for number in 0..NEAR {
+                sum += self.across[0][number] * values[number];
+                slope += self.across[1][number] * values[number];
+            }
+            flat[n] += self.along[0] * sum;
+            by_x[n] += self.along[1] * sum;
+            by_y[n] += self.along[0] * slope;
+            wider[n] += self.along[2] * sum;
+        }
+        let (p, q) = (S::as_simd_f64s(p).0, S::as_simd_f64s(q).0);
+        let (r, s) = (S::as_simd_f64s(r).0, S::as_simd_f64s(s).0);
+        let (flat, by_x) = (S::as_mut_simd_f64s(flat).0, S::as_mut_simd_f64s(by_x).0);
+        let (by_y, wider) = (S::as_mut_simd_f64s(by_y).0, S::as_mut_simd_f64s(wider).0);
+        let [[w0, w1, w2, w3], [d0, d1, d2, d3]] = *self.across;
+        let (w0, w1) = (simd.splat_f64s(w0), simd.splat_f64s(w1));
+        let (w2, w3) = (simd.splat_f64s(w2), simd.splat_f64s(w3));
+        let (d0, d1) = (simd.splat_f64s(d0), simd.splat_f64s(d1));
+        let (d2, d3) = (simd.splat_f64s(d2), simd.splat_f64s(d3));
+        let here = simd.splat_f64s(self.along[0]);
+        let (x, by_radius) = (
+            simd.splat_f64s(self.along[1]),
+            simd.splat_f64s(self.along[2]),
+        );
+        let n = p.len();
+        let (q, r, s) = (&q[..n], &r[..n], &s[..n]);
+        let (flat, by_x) = (&mut flat[..n], &mut by_x[..n]);
+        let (by_y, wider) = (&mut by_y[..n], &mut wider[..n]);
+        for n in 0..n {
+            let sum = simd.mul_f64s(w0, p[n]);
+            let sum = simd.mul_add_e_f64s(w1, q[n], sum);
+            let sum = simd.mul_add_e_f64s(w2, r[n], sum);
+            let sum = simd.mul_add_e_f64s(w3, s[n], sum);
+            let slope = simd.mul_f64s(d0, p[n]);
+            let slope = simd.mul_add_e_f64s(d1, q[n], slope);
+            let slope = simd.mul_add_e_f64s(d2, r[n], slope);
+            let slope = simd.mul_add_e_f64s(d3, s[n], slope);
+            flat[n] = simd.mul_add_e_f64s(here, sum, flat[n]);
+            by_x[n] = simd.mul_add_e_f64s(x, sum, by_x[n]);
+            by_y[n] = simd.mul_add_e_f64s(here, slope, by_y[n]);
+            wider[n] = simd.mul_add_e_f64s(by_radius, sum, wider[n]);
+        }
+    }
+}

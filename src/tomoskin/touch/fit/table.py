@@ -1,0 +1,271 @@
+"""What one spot does to the voltages, tabulated: a smooth function of four numbers.
+
+Over the position it is a cubic B-spline on a grid as fine as the spot is small (de Boor 1978,
+chapter XI), over the logarithm of the radius a cubic polynomial through four nodes, over the depth
+a polynomial in exp(depth/4) − 1 without a constant. Several spots add up; what they do to each
+other is left to the exact model.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Self
+
+import numpy as np
+from scipy.ndimage import spline_filter1d
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+
+from tomoskin.core import FloatArray, IntArray, reach
+from tomoskin.touch.fit.prior import SpotPrior
+from tomoskin.touch.fit.spot import (
+    FILLING,
+    LOG_RADIUS,
+    N_PARAMETERS,
+    Footprints,
+    Response,
+    X,
+    Y,
+    depth_of,
+)
+
+STEP = 0.45
+"""Between grid points, in radii of the spot."""
+
+LOG_STEP = 0.3
+"""Between radii, in their logarithm."""
+
+PADDING = 2
+"""Grid points beyond the sheet on each side: splines need one, the filter another."""
+
+FAINT = -0.3
+"""Depth at which directions are taken; they are in proportion to it."""
+
+NEGLIGIBLE, SAMPLED = 1e-6, 3000
+"""Part of the largest change below which a direction of the data counts as none, by so many."""
+
+NEXT = 1e-4
+"""For slopes of the powers of the depth."""
+
+N_DIRECTIONS = 2
+"""Of each spot: of a stretched sheet's direction (:class:`Part`), and towards a :func:`bell`."""
+
+
+def spline(t: float) -> FloatArray:
+    """(2, 4) cubic B-splines at ``t`` after the second of four points, and their slopes."""
+    u = 1 - t
+    return np.array([
+        [u**3 / 6, (3 * t**3 - 6 * t**2 + 4) / 6, (3 * u**3 - 6 * u**2 + 4) / 6, t**3 / 6],
+        [-(u**2) / 2, (3 * t**2 - 4 * t) / 2, (4 * u - 3 * u**2) / 2, t**2 / 2],
+    ])  # fmt: skip
+
+
+def cubic(t: float) -> FloatArray:
+    """(2, 4) weights of a cubic through four points, ``t`` after the first, and their slopes."""
+    powers, slopes = np.array([1, t, t**2, t**3]), np.array([0, 1, 2 * t, 3 * t**2])
+    return np.stack([powers @ CUBIC, slopes @ CUBIC])
+
+
+CUBIC = np.linalg.inv(np.vander(np.arange(4.0), increasing=True))
+"""(4, 4) coefficients of the powers from values at 0, 1, 2 and 3."""
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """Points (4,) of one axis, their weights (4,), and the slopes of these (4,), 1/m."""
+
+    points: IntArray
+    weight: FloatArray
+    slope: FloatArray
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Positions of one radius: ``shape`` points from ``origin`` m on, every ``step`` m."""
+
+    origin: tuple[float, float]
+    step: float
+    shape: tuple[int, int]
+
+    @classmethod
+    def over(cls, points: FloatArray, step: float) -> Self:
+        """A grid that covers ``points`` (n, 2) m and two steps more."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        count = np.ceil((high - low) / step).astype(int) + 1 + 2 * PADDING
+        x, y = (low + high - (count - 1) * step) / 2
+        return cls((float(x), float(y)), step, (int(count[0]), int(count[1])))
+
+    def at(self, axis: int, place: float) -> Along:
+        """The four points of an ``axis`` that make a spline at a ``place`` m."""
+        far = (place - self.origin[axis]) / self.step
+        first = int(np.clip(math.floor(far), 1, self.shape[axis] - 3))
+        weight, slope = spline(far - first)
+        return Along(first - 1 + np.arange(4), weight, slope / self.step)
+
+    @property
+    def points(self) -> FloatArray:
+        """(n, 2) m, y fastest."""
+        x, y = (o + self.step * np.arange(n) for o, n in zip(self.origin, self.shape, strict=True))
+        return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseTable:
+    """Changes of voltages by one spot.
+
+    Attributes
+    ----------
+    log_radii
+        (n_radii,) evenly apart; a grid of positions belongs to each.
+    grids
+        Of these.
+    sign
+        Of the spots: as in a skin's ``[touch]``.
+    nodes
+        (n_nodes,) of the depth: s = exp(depth/4) − 1.
+    values
+        (n_points, n_nodes + N_DIRECTIONS, rank) V: spline coefficients, of all grids one after the
+        other: of the change divided by s at the nodes, and of directions divided by the depth.
+    basis
+        (rank, n_meas), orthonormal rows: all changes lie in their span.
+    """
+
+    log_radii: FloatArray
+    grids: tuple[Grid, ...]
+    sign: str
+    nodes: FloatArray
+    values: FloatArray
+    basis: FloatArray
+
+    @classmethod
+    def of(cls, response: Response, prior: SpotPrior, sign: str) -> Self:
+        """For spots as the ``prior`` and the ``sign`` allow them."""
+        low, high = prior.log_radii
+        log_radii = np.linspace(low, high, 1 + math.ceil((high - low) / LOG_STEP))
+        nodes = _nodes(*prior.depths(sign))
+        grids, parts = [], []
+        for log_radius in log_radii:
+            grid = Grid.over(response.spots.mesh.points, STEP * math.exp(log_radius))
+            grids.append(grid)
+            parts.append(_sampled(response, grid, math.exp(log_radius), nodes))
+        basis = _basis(parts)
+        filtered = [_filtered(p @ basis.T, g.shape) for p, g in zip(parts, grids, strict=True)]
+        return cls(log_radii, tuple(grids), sign, nodes, np.concatenate(filtered), basis)
+
+
+    def expanded(self, spots: FloatArray) -> FloatArray:
+        """(k, 1 + N_PARAMETERS + N_DIRECTIONS, rank) V of spots (k, 4), each alone.
+
+        What it changes, the derivatives of that by the spot's columns, and its directions.
+        """
+        shape = len(spots), 1 + N_PARAMETERS + N_DIRECTIONS, len(self.basis)
+        return np.array([self._expanded(spot) for spot in spots]).reshape(shape)
+
+    def _expanded(self, spot: FloatArray) -> FloatArray:
+        first, (weight, slope) = self._between(spot[LOG_RADIUS])
+        rows, parts = [], []
+        for number in range(len(weight)):
+            grid = self.grids[first + number]
+            x, y = (grid.at(axis, spot[axis]) for axis in (X, Y))
+            rows.append(self._starts[first + number] + (x.points[:, None] * grid.shape[1] + y.points).ravel())
+            here = weight[number] * np.outer(x.weight, y.weight).ravel()
+            across = weight[number] * np.stack([np.outer(x.slope, y.weight), np.outer(x.weight, y.slope)])
+            wider = slope[number] * np.outer(x.weight, y.weight).ravel()
+            parts.append(np.stack([here, *across.reshape(2, -1), wider]))
+        points, weights = np.concatenate(rows), np.concatenate(parts, axis=1)
+        near = self.values[points].reshape(len(points), -1)
+        return self._of_depth(spot, (weights @ near).reshape(4, -1, len(self.basis)))
+
+    def _of_depth(self, spot: FloatArray, mixed: FloatArray) -> FloatArray:
+        """:meth:`expanded` of values, and their slopes by x, y and log radius, at the nodes."""
+        n, depth = len(self.nodes), float(depth_of(spot))
+        s = math.expm1(depth / 4)
+        power = _powers(np.array([s, s + NEXT, s - NEXT]), self.nodes)
+        steeper = (power[1] - power[2]) / (2 * NEXT) * (s + 1) / 4
+        flat, deeper = power[0] @ mixed[:, :n], steeper @ mixed[0, :n]
+        more = deeper / (FILLING * math.exp(2 * spot[LOG_RADIUS]))
+        flat[3] -= 2 * depth * deeper
+        return np.concatenate([flat, more[None], depth * mixed[0, n:]])
+
+    def _between(self, log_radius: float) -> tuple[int, FloatArray]:
+        """The first of four radii, and (2, 4): their weights, and the slopes of these."""
+        step = self.log_radii[1] - self.log_radii[0]
+        place = (log_radius - self.log_radii[0]) / step
+        first = int(np.clip(math.floor(place) - 1, 0, len(self.log_radii) - 4))
+        return first, cubic(place - first) / np.array([[1.0], [step]])
+
+    @cached_property
+    def _starts(self) -> IntArray:
+        return np.cumsum([0, *(nx * ny for nx, ny in (grid.shape for grid in self.grids))])
+
+
+def _nodes(low: float, high: float) -> FloatArray:
+    """Chebyshev nodes of s between two depths: three on one side of none, five on both."""
+    ends, count = np.expm1(np.array([low, high]) / 4), 5 if low < 0 < high else 3
+    turn = np.cos((2 * np.arange(count) + 1) / (2 * count) * np.pi)
+    return np.asarray(ends.mean() + (ends[1] - ends[0]) / 2 * turn)
+
+
+def _sampled(response: Response, grid: Grid, radius: float, nodes: FloatArray) -> FloatArray:
+    """(n_points, n_nodes + N_DIRECTIONS, n_meas) V of spots on a grid.
+
+    Points far off the sheet have what their nearest neighbour has: splines are smooth then.
+    """
+    reach()
+    points = grid.points
+    apart, _ = cKDTree(response.spots.mesh.centroids).query(points)
+    needed = np.flatnonzero(apart < PADDING * math.sqrt(2) * grid.step)
+    feet = response.spots.footprints(points[needed], radius)
+    out = np.zeros((len(needed), len(nodes) + N_DIRECTIONS, len(response.reference)))
+    depths = 4 * np.log1p(nodes)
+    for number, (node, depth) in enumerate(zip(nodes, depths, strict=True)):
+        out[:, number] = _changes(response, feet, depth * feet.height) / node
+    out[:, -2] = _directed(response, feet)
+    faint = _powers(np.expm1(FAINT / 4), nodes) @ out[:, : len(nodes)]
+    out[:, -1] = (_changes(response, feet, FAINT * feet.bell) - faint) / FAINT
+    _, nearest = cKDTree(points[needed]).query(points)
+    return np.asarray(out[nearest])
+
+
+def _powers(s: FloatArray | float, nodes: FloatArray) -> FloatArray:
+    """(…, n_nodes) weights by which values divided by s at the nodes make the value at ``s``."""
+    s = np.asarray(s, dtype=np.float64)
+    far = s[..., None] - nodes
+    others = ~np.eye(len(nodes), dtype=bool)
+    apart = np.where(others, nodes[:, None] - nodes, 1.0).prod(axis=1)
+    left = np.where(others, far[..., None, :], 1.0).prod(axis=-1)
+    return np.asarray(s[..., None] * left / apart)
+
+
+def _changes(response: Response, feet: Footprints, change: FloatArray) -> FloatArray:
+    """(n, n_meas) V of each footprint alone; ``change`` (c,) of log σ."""
+    sigma = response.state.conductivity[feet.cells] * np.exp(change)
+    ends = [slice(*pair) for pair in pairwise(feet.starts)]
+    return response.voltages([(feet.cells[e], sigma[e]) for e in ends]) - response.reference
+
+
+def _directed(response: Response, feet: Footprints) -> FloatArray:
+    """(n_points, n_meas) V: derivative by each spot's direction, the fields as without it."""
+    along, across = response.by_direction
+    shape = len(feet.starts) - 1, along.shape[1]
+    xx, xy = (csr_array((part, feet.cells, feet.starts), shape) for part in feet.directed)
+    return np.asarray(xx @ along.T + xy @ across.T)
+
+
+def _basis(parts: list[FloatArray]) -> FloatArray:
+    """(rank, n_meas) what all changes are made of, but for a part of ``NEGLIGIBLE``."""
+    rows = np.concatenate([part[:, :-N_DIRECTIONS].reshape(-1, part.shape[2]) for part in parts])
+    rows = rows[:: max(1, len(rows) // SAMPLED)]
+    square, basis = np.linalg.eigh(rows.T @ rows)
+    return np.asarray(basis.T[square > NEGLIGIBLE**2 * square[-1]])
+
+
+def _filtered(samples: FloatArray, shape: tuple[int, int]) -> FloatArray:
+    """Spline coefficients of samples (n_points, ...) on a grid of that shape."""
+    grid = samples.reshape(*shape, -1)
+    for axis in (0, 1):
+        grid = spline_filter1d(grid, 3, axis=axis, mode="mirror")
+    return np.asarray(grid.reshape(samples.shape))
