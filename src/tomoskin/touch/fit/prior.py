@@ -12,7 +12,7 @@ from tomoskin.core import FloatArray
 from tomoskin.mesh import Mesh
 from tomoskin.touch.fit.spot import CONTENT, FILLING, LOG_RADIUS
 
-_RADIUS = 0.14
+_RADIUS = 0.11
 """Median radius, in parts of the breadth of a square as large as the sheet."""
 
 _SPREAD = 0.6

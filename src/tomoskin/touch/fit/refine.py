@@ -26,6 +26,9 @@ _LEAST_DAMPING = 1e-6
 _DIRECTED = 0.7
 """Standard deviation of a spot's direction (:class:`Part`) about none."""
 
+_RESHAPED = 0.5
+"""Standard deviation of its shape, of the way from a tail to a bell: both are one from ours."""
+
 
 @dataclass(frozen=True, eq=False)
 class Weigh:
@@ -141,8 +144,9 @@ class Problem:
 
     def at(self, spots: FloatArray) -> Fit:
         """The frame with these spots, as they are."""
-        change, jacobian, directed = self.response.expanded(spots)
-        unknown = np.hstack([_DIRECTED * directed, self._within_scan(spots, jacobian)])
+        change, jacobian, nuisances = self.response.expanded(spots)
+        amplitudes = np.tile((_DIRECTED, _RESHAPED), len(spots))
+        unknown = np.hstack([amplitudes * nuisances, self._within_scan(spots, jacobian)])
         predicted, weigh = self.whiten(change), Weigh.of(self.whiten(unknown.T).T)
         residual, slope = weigh(self.data - predicted), weigh(self.whiten(jacobian.T).T)
         away, weights = self.prior.away(spots), np.tile(self.prior.weights, len(spots))

@@ -12,7 +12,7 @@ from tomoskin.touch.fit.candidates import Matched
 from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.pace import Pace
 from tomoskin.touch.fit.refine import Fit, Problem
-from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, bell
+from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
 
 HELD = 0.6
 """Part of the ratio at which a touch begins above which one that is there stays."""
@@ -22,9 +22,6 @@ _DOUBTFUL = 0.8
 
 _MISSHAPEN = 0.02
 """A wrong profile leaves up to this part of what a touch changes: no evidence of another one."""
-
-_SHAPE_SD = 0.5
-"""How far a true profile is from ours, of the way to a bell: a standard deviation."""
 
 _UNEVEN = 0.08
 """Part by which each row answers a touch otherwise than the model's, at the least: a sheet is
@@ -207,14 +204,10 @@ def _starts(fit: Fit, fresh: FloatArray) -> list[FloatArray]:
 def _covariance(problem: Problem, fit: Fit) -> FloatArray:
     """Curvature, scaled where the data scatter more than they should; and the model's part.
 
-    What a bell instead of our profile would change moves the estimate by ΣJᵀd: a parameter
-    that is not fitted but considered (Schmidt 1966). So is the part by which each row is off.
+    The part by which each row is off is not fitted but considered (Schmidt 1966).
     """
     scatter = max(1.0, fit.misfit / fit.degrees)
-    other = problem.whiten(problem.response.changes([fit.spots], bell)[0])
-    wrong = fit.weigh(other - fit.predicted)
-    moved = _SHAPE_SD * (fit.covariance @ (fit.jacobian.T @ wrong))
-    return np.asarray(scatter * fit.covariance + np.outer(moved, moved) + _uneven(problem, fit))
+    return np.asarray(scatter * fit.covariance + _uneven(problem, fit))
 
 
 def _uneven(problem: Problem, fit: Fit) -> FloatArray:
