@@ -13,13 +13,13 @@ from tomoskin.core import Detection, FloatArray, SkinError
 from tomoskin.forward import ForwardModel, State
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
-from tomoskin.touch.fit.anisotropy import with_anisotropy
 from tomoskin.touch.fit.candidates import Candidates, Matched
 from tomoskin.touch.fit.noise import ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Problem, SheetDomain, Weigh
 from tomoskin.touch.fit.search import Search, SpotDetections, joined
+from tomoskin.touch.fit.sheet import fitted_sheet
 from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
 
 _CELLS = 1500
@@ -80,12 +80,13 @@ class SpotModel:
         scale = 1 / np.abs(response.reference) if normalised else np.ones(n_meas)
         return cls(response, prior, SheetDomain(mesh), Candidates.of(response, prior), scale)
 
-    def fitted_to(self, reference: FloatArray) -> SpotModel:
-        """The model of a sheet that conducts by direction as its ``reference`` (n_meas,) V tells.
+    def fitted_to(self, reference: FloatArray, deviation: FloatArray | float = 0.0) -> SpotModel:
+        """The model of the sheet that a ``reference`` (n_meas,) V tells of; itself where it tells
+        of an even one.
 
-        Itself where the reference tells of no direction; see :mod:`tomoskin.touch.fit.anisotropy`.
+        ``deviation`` (n_meas,) V is the reference's own; see :mod:`tomoskin.touch.fit.sheet`.
         """
-        state = with_anisotropy(self.response.state, reference)
+        state = fitted_sheet(self.response.state, reference, deviation)
         if state is self.response.state:
             return self
         return self._of(state, bool((self.scale != 1.0).any()))
