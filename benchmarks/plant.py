@@ -23,6 +23,9 @@ SOFT = 0.3
 WAVES, LENGTHS, CELLWISE = 200, (0.025, 0.06), 0.3
 """Unevenness: cosines, range of correlation lengths in m, and the part that each cell has alone."""
 
+RANGE = 0.85
+"""Part of the converter's range that the untouched sheet takes at most, as its current is set."""
+
 STEPS = (5e-4, 5e-4, 5e-4, 0.02)
 """Of x, y and radius, m, and of the fall, for the bound's derivatives."""
 
@@ -49,21 +52,23 @@ class Plant:
 
     def __init__(self, skin: Skin, mesh: Mesh, uneven: float, seed: int) -> None:
         self._random = np.random.default_rng(seed)
-        self._readout = skin.readout
+        self._readout, self._levels = skin.readout, 1 << skin.readout.adc_bits
         self.scan = Scan.of(skin.pattern())
         self.volts = Readout.of(self.scan, skin.readout)
-        self._current = skin.current
         middles = mesh.points[mesh.cells].mean(axis=1)
         sigma = skin.conductivity * np.exp(uneven * _field(middles, self._random))
         model = ForwardModel(mesh, skin.pattern(), skin.contact_impedance, skin.current)
+        largest = float(self._codes(model.at(sigma).transfer_resistance, skin.current).max())
+        self._current = skin.current * min(1.0, RANGE * self._levels / largest)
+        model = ForwardModel(mesh, skin.pattern(), skin.contact_impedance, self._current)
         self.state = model.at(sigma)
         self._points = np.einsum("qk,ckd->cqd", _inner_points(), mesh.points[mesh.cells])
 
     def frames(self, presses: Sequence[Finger], count: int = 1) -> Floats:
         """(count, n_meas) V as the read-out gives them."""
         resistance = self.state.local.transfer_resistances_of([self._pressed(presses)])[0]
-        potentials = self._potentials(resistance)
-        return np.array([self.volts(self._frame(potentials)).values for _ in range(count)])
+        codes = self._codes(resistance, self._current)
+        return np.array([self.volts(self._frame(codes)).values for _ in range(count)])
 
     def least(self, presses: Sequence[Finger], noise: Whitener) -> Floats:
         """(k,) m: root mean square error of each place that no unbiased estimate goes below.
@@ -97,21 +102,21 @@ class Plant:
         cells = np.flatnonzero(left < 1)
         return cells, self.state.conductivity[cells] * left[cells]
 
-    def _potentials(self, resistance: Floats) -> Floats:
-        """(n_samples,) V against the sink of each drive."""
+    def _codes(self, resistance: Floats, current: float) -> Floats:
+        """(n_samples,) what the converter would say without noise and steps."""
         drive, electrode = self.scan.drives[self.scan.sample_drive], self.scan.sample_electrode
         source, sink = drive.T
         seen = resistance[electrode] - resistance[sink]
-        rows = np.arange(len(drive))
-        return np.asarray(self._current * (seen[rows, source] - seen[rows, sink]))
+        rows, r = np.arange(len(drive)), self._readout
+        volts = current * (seen[rows, source] - seen[rows, sink])
+        return np.asarray((r.gain * volts + r.offset) / r.reference_voltage * self._levels)
 
-    def _frame(self, potentials: Floats) -> Frame:
+    def _frame(self, codes: Floats) -> Frame:
         """Conversions of 10 bits or so, each with its own noise, summed."""
-        r, levels = self._readout, 1 << self._readout.adc_bits
-        codes = (r.gain * potentials + r.offset) / r.reference_voltage * levels
-        noisy = codes + FIGURES.noise * self._random.standard_normal((r.oversampling, len(codes)))
-        counts = np.clip(np.floor(noisy), 0, levels - 1).sum(axis=0).astype(np.uint16)
-        return Frame(0, 0, 0.0, 1, 0, 0, counts)
+        times = self._readout.oversampling
+        noisy = codes + FIGURES.noise * self._random.standard_normal((times, len(codes)))
+        counts = np.clip(np.floor(noisy), 0, self._levels - 1).sum(axis=0)
+        return Frame(0, 0, 0.0, 1, 0, 0, counts.astype(np.uint16))
 
 
 def plant_mesh(skin: Skin) -> Mesh:

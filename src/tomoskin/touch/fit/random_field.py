@@ -23,9 +23,7 @@ def field_modes(mesh: Mesh, length: float) -> FloatArray:
     nodes = points[:: max(1, len(points) // _NODES)]
     size, vector = np.linalg.eigh(_correlation(nodes, nodes, length))
     kept = np.flatnonzero(size > 1e-6 * size[-1])[-_MODES:]
-    return np.asarray(
-        _correlation(points, nodes, length) @ (vector[:, kept] / np.sqrt(size[kept]))
-    )
+    return np.asarray(_correlation(points, nodes, length) @ (vector[:, kept] / np.sqrt(size[kept])))
 
 
 def _correlation(one: FloatArray, other: FloatArray, length: float) -> FloatArray:

@@ -2,12 +2,14 @@
 
 The logarithm of the conductivity is a Gaussian random field. How uneven it is, over which lengths,
 and how well rows follow the model is what makes the reference likeliest (evidence: MacKay 2003,
-chapter 28); the field itself is the most likely one then (Gauss–Newton).
+chapter 28); the field itself is the most likely one then. Both are found anew about the last sheet
+(Gauss–Newton).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Self
@@ -22,7 +24,7 @@ from tomoskin.touch.fit.anisotropy import anisotropy_slopes, directed
 from tomoskin.touch.fit.channels import channel_errors
 from tomoskin.touch.fit.random_field import field_modes
 
-_UNEVEN = (0.0, 0.01, 0.03, 0.06, 0.12, 0.24)
+_UNEVEN = (0.01, 0.03, 0.06, 0.12, 0.24)
 """Standard deviations of log σ over a sheet that are compared."""
 
 _LENGTHS = (0.15, 0.3)
@@ -38,10 +40,7 @@ _DIRECTED = 0.2
 _LEAST = 0.03
 """Size of an anisotropy below which an even sheet counts as isotropic."""
 
-_WILD = 2.0
-"""A row that is by more than this factor off its part of all is broken, and does not count."""
-
-_STEPS = 3
+_STEPS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,15 +50,6 @@ class _Measured:
     values: FloatArray
     deviation: FloatArray
     rows: NDArray[np.intp]
-
-    @classmethod
-    def of(cls, state: State, values: FloatArray, deviation: FloatArray | float) -> Self:
-        finite = np.isfinite(values)
-        ratio = np.where(finite, values, np.nan) / state.voltages
-        middle = np.nanmedian(ratio) if finite.any() else np.nan
-        with np.errstate(invalid="ignore"):
-            usual = finite & (ratio / middle > 1 / _WILD) & (ratio / middle < _WILD)
-        return cls(values, np.broadcast_to(deviation, values.shape), np.flatnonzero(usual))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,60 +86,67 @@ class _Linear:
         """(n, n) V² where rows are off by ``error``, in parts of them."""
         return np.asarray(self.common + np.diag((error * self.size) ** 2))
 
-    def log_evidence(self, seen: FloatArray, error: float) -> float:
-        """Of the residual where what is ``seen`` (n, k) V of a field and the channels are random."""
+    def explained(
+        self, data: FloatArray, field: FloatArray, error: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """(n_cells,) change of log σ and (2,) anisotropy, in deviations, that explain ``data`` (n,)
+        V best where ``field`` (n_cells, k) is random."""
+        columns = np.hstack([self.by_cell @ field, self.along])
+        solved = cho_solve(cho_factor(self.covariance(error)), columns)
+        normal = columns.T @ solved + np.eye(columns.shape[1])
+        amplitudes = np.linalg.solve(normal, solved.T @ data)
+        return field @ amplitudes[:-2], amplitudes[-2:]
+
+    def log_evidence(self, data: FloatArray, seen: FloatArray, error: float) -> float:
+        """Of ``data`` (n,) V where what is ``seen`` (n, k) V of a field and the channels are random."""
         own = np.hstack([seen, self.along])
         try:
             factor, _ = cho_factor(self.covariance(error) + own @ own.T, lower=True)
         except LinAlgError:
             return -math.inf
-        spread = cho_solve((factor, True), self.residual)
-        return float(-self.residual @ spread / 2 - np.log(np.diag(factor)).sum())
+        spread = cho_solve((factor, True), data)
+        return float(-data @ spread / 2 - np.log(np.diag(factor)).sum())
 
 
 def fitted_sheet(state: State, reference: FloatArray, deviation: FloatArray | float) -> State:
     """The sheet that explains a ``reference`` (n_meas,) V of this standard deviation, V, best.
 
-    ``state`` itself where nothing speaks against it. Rows that are not finite, or broken, do not
-    count, and a factor that all voltages have in common means nothing.
+    ``state`` itself where nothing speaks against it. Rows that are not finite do not count,
+    and a factor that all voltages have in common means nothing.
     """
-    measured = _Measured.of(state, reference, deviation)
-    if len(measured.rows) < len(reference) / 2:
+    finite = np.flatnonzero(np.isfinite(reference))
+    if len(finite) < len(reference) / 2:
         return state
-    field, error = _likeliest(state, _Linear.of(state, measured))
-    return _fitted(state, measured, field, error)
-
-
-def _likeliest(state: State, linear: _Linear) -> tuple[FloatArray, float]:
-    """(n_cells, k) modes of the likeliest random field, none of an even sheet; and how far rows
-    are off."""
     mesh = state.model.mesh
     breadth = math.sqrt(float(mesh.volumes.sum()))
-    none = np.zeros((len(mesh.cells), 0))
-    fields = [none, *(field_modes(mesh, part * breadth) for part in _LENGTHS)]
-    best = (-math.inf, none, 0.0)
-    for modes in fields:
-        seen = linear.by_cell @ modes
-        for uneven, error in product(_UNEVEN[1:] if modes.shape[1] else (0.0,), _ERRORS):
-            reach()
-            log_evidence = linear.log_evidence(uneven * seen, error)
-            if log_evidence > best[0]:
-                best = log_evidence, uneven * modes, error
-    return best[1], best[2]
-
-
-def _fitted(state: State, measured: _Measured, field: FloatArray, error: float) -> State:
-    """The most likely sheet where ``field`` (n_cells, k) is random: Gauss–Newton."""
-    found, now = np.zeros(field.shape[1] + 2), state
+    fields = [field_modes(mesh, part * breadth) for part in _LENGTHS]
+    measured = _Measured(reference, np.broadcast_to(deviation, reference.shape), finite)
+    uneven, anisotropy, now = np.zeros(len(mesh.cells)), np.zeros(2), state
     for _ in range(_STEPS):
         linear = _Linear.of(now, measured)
-        columns = np.hstack([linear.by_cell @ field, linear.along])
-        solved = cho_solve(cho_factor(linear.covariance(error)), columns)
-        normal = columns.T @ solved + np.eye(len(found))
-        found = np.linalg.solve(normal, solved.T @ (linear.residual + columns @ found))
-        now = _sheet(state, field @ found[:-2], _DIRECTED * found[-2:])
-    even = not field.shape[1] and math.hypot(*(_DIRECTED * found[-2:])) < _LEAST
+        data = linear.residual + linear.by_cell @ uneven + linear.along @ anisotropy
+        uneven, anisotropy = linear.explained(data, *_likeliest(fields, linear, data))
+        now = _sheet(state, uneven, _DIRECTED * anisotropy)
+    even = not uneven.any() and _DIRECTED * math.hypot(*anisotropy) < _LEAST
     return state if even else now
+
+
+def _likeliest(
+    fields: Sequence[FloatArray], linear: _Linear, data: FloatArray
+) -> tuple[FloatArray, float]:
+    """(n_cells, k) modes of the random field that makes ``data`` (n,) V likeliest, none of an even
+    sheet; and how far rows are off."""
+    none = fields[0][:, :0]
+    best = (-math.inf, none, 0.0)
+    choices = [(none, 0.0), *product(fields, _UNEVEN)]
+    for modes, size in choices:
+        reach()
+        seen = size * (linear.by_cell @ modes)
+        for error in _ERRORS:
+            log_evidence = linear.log_evidence(data, seen, error)
+            if log_evidence > best[0]:
+                best = log_evidence, size * modes, error
+    return best[1:]
 
 
 def _sheet(state: State, uneven: FloatArray, anisotropy: FloatArray) -> State:
