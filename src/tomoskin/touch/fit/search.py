@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.candidates import Matched
+from tomoskin.touch.fit.joint_starts import JointStarts
 from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.pace import Pace
 from tomoskin.touch.fit.refine import Fit, Problem
@@ -128,7 +130,8 @@ class Search:
             best = int(ratio.argmax())
             if ratio[best] < self._threshold(fit, HELD if not len(fit.spots) else _DOUBTFUL):
                 return fit, tried
-            more = self._best(_starts(fit, self.matched.spot(best, content)))
+            fresh = _starts(fit, self.matched.spot(best, content))
+            more = self._best(fresh + self._joint_starts(len(fit.spots) + 1))
             worth = self._ratios(more).min() >= self._threshold(fit, 1.0)
             if not worth or self._evidence(more) <= self._evidence(fit):
                 return fit, tried + 1
@@ -143,10 +146,26 @@ class Search:
     def _standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
         return self.matched.ratios(fit.residual, fit.jacobian, self.problem.sign)
 
+    def _joint_starts(self, count: int) -> list[FloatArray]:
+        """Sets of so many spots whatever has been found."""
+        if count < 2 or not self.pace.joint:
+            return []
+        return self._joint.sets(count, self.pace.joint)
+
+    @cached_property
+    def _joint(self) -> JointStarts:
+        problem = self.problem
+        return JointStarts.of(self.matched, problem.data, problem.prior, problem.sign)
+
     def _best(self, starts: list[FloatArray]) -> Fit:
-        fits = (self.problem.refined(start, self.pace.glance) for start in starts)
-        best = min(fits, key=lambda fit: fit.cost)
-        return best if best.settled else self.problem.settled(best, self.pace.cold)
+        """The most evident of the two that come out best after a glance."""
+        fits = [self.problem.refined(start, self.pace.glance) for start in starts]
+        fits.sort(key=lambda fit: fit.cost)
+        settled = [
+            fit if fit.settled else self.problem.settled(fit, self.pace.cold)
+            for fit in fits[: self.pace.finalists]
+        ]
+        return max(settled, key=self._evidence)
 
     def _ratios(self, fit: Fit) -> FloatArray:
         """(k,) size of what each spot changes that the others could not take up."""

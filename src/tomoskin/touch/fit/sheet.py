@@ -98,7 +98,7 @@ class _Linear:
         return field @ amplitudes[:-2], amplitudes[-2:]
 
     def log_evidence(self, data: FloatArray, seen: FloatArray, error: float) -> float:
-        """Of ``data`` (n,) V where what is ``seen`` (n, k) V of a field and the channels are random."""
+        """Of ``data`` (n,) V where the ``seen`` (n, k) V of a field, and channels, are random."""
         own = np.hstack([seen, self.along])
         try:
             factor, _ = cho_factor(self.covariance(error) + own @ own.T, lower=True)
