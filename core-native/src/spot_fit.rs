@@ -96,8 +96,9 @@ pub struct Frame<'a> {
     pub left: &'a [f64],
     /// (rank) what the table lacks.
     pub offset: &'a [f64],
-    /// Deviation of a spot's direction, of its way within the scan, m, and of its growth.
-    pub deviations: [f64; 3],
+    /// Deviation of a spot's direction, of its shape, of its way within the scan, m, and of its
+    /// growth.
+    pub deviations: [f64; 4],
 }
 
 /// Spots that explain a frame; matrices by columns.
@@ -151,7 +152,7 @@ impl Frame<'_> {
             }
         };
         let (each, jacobian) = (pick(&[0]), pick(&[1, 2, 3, 4]));
-        let unknown = self.unknown(&spots, &parts, pick(&[1 + PARAMETERS]));
+        let unknown = self.unknown(&spots, &parts, [pick(&[5]), pick(&[6])]);
         let mut predicted = offset.values;
         for column in each.values.chunks_exact(rows) {
             predicted.iter_mut().zip(column).for_each(|(p, c)| *p += c);
@@ -252,11 +253,13 @@ impl Frame<'_> {
 
     /// Directions whose amplitudes are unknown: what is left, each spot's direction, its way and
     /// growth within the scan.
-    fn unknown(&self, spots: &[Spot], parts: &[f64], own: Matrix<f64>) -> Matrix<f64> {
+    fn unknown(&self, spots: &[Spot], parts: &[f64], own: [Matrix<f64>; 2]) -> Matrix<f64> {
         let (rows, rank) = (self.seen.rows, self.table.rank);
-        let [directed, reach, grows] = self.deviations;
+        let [directed, reshaped, reach, grows] = self.deviations;
         let mut values = self.left.to_vec();
-        values.extend(own.values.iter().map(|value| directed * value));
+        for (size, directions) in [directed, reshaped].into_iter().zip(&own) {
+            values.extend(directions.values.iter().map(|value| size * value));
+        }
         if reach != 0.0 {
             let spread = PARAMETERS * rank;
             let timed: Vec<_> = parts

@@ -108,7 +108,7 @@ impl SpotTable {
         left: &Any<'py>,
         offset: &Any<'py>,
         spots: &Any<'py>,
-        deviations: [f64; 3],
+        deviations: [f64; 4],
         most: usize,
     ) -> PyResult<Found<'py>> {
         let py = data.py();

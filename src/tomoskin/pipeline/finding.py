@@ -76,7 +76,7 @@ class InData:
 def finding(prepared: Prepared, reference: Reference | None, pace: Pace = EXHAUSTIVE) -> Finder:
     """What finds the touches: the method that the skin names, unless a calibration locates them.
 
-    Fitted touches are those of a sheet that conducts by direction as its reference tells.
+    Fitted touches are those of a sheet that is as uneven and directed as its reference tells.
     ``pace`` says how much of a fit is tried in a frame.
     """
     located = any(c.kind.locates for c in prepared.calibrations.values())
@@ -117,7 +117,10 @@ class Fitting:
 
 def _spots(spots: SpotModel, reference: Reference | None) -> SpotModel:
     """On the sheet as its reference tells of it."""
-    return spots if reference is None else spots.fitted_to(reference.mean)
+    if reference is None:
+        return spots
+    deviation = np.nan_to_num(reference.noise) / np.sqrt(reference.n_frames)
+    return spots.fitted_to(reference.mean, deviation)
 
 
 def voltage_covariance(

@@ -260,7 +260,7 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
     spots = None
     reach("touches")
     if _fits(skin, calibrations):
-        kept = previous.spots if previous and _same_difference(previous.skin, skin) else None
+        kept = previous.spots if previous and _same_spots(previous.skin, skin) else None
         spots = kept or SpotModel.of(skin, model)
     return Prepared(
         skin=skin,
@@ -287,6 +287,10 @@ def _fits(skin: Skin, calibrations: Mapping[str, Calibration[Any]]) -> bool:
 
 def _same_difference(one: Skin, other: Skin) -> bool:
     return one.inverse.difference == other.inverse.difference
+
+
+def _same_spots(one: Skin, other: Skin) -> bool:
+    return _same_difference(one, other) and one.touch.sign == other.touch.sign
 
 
 def _chosen(

@@ -24,8 +24,8 @@ def skin(**touch: object) -> Skin:
 
 
 @cache
-def model() -> SpotModel:
-    s = skin()
+def model(sign: str = "decrease") -> SpotModel:
+    s = skin(sign=sign)
     return SpotModel.of(s, ForwardModel(s.mesh(), s.pattern(), s.contact_impedance, s.current))
 
 
@@ -36,7 +36,8 @@ def finder(**touch: object) -> SpotFinder:
 
 @cache
 def _prepared(**touch: object) -> SpotFinder:
-    return SpotFinder(model(), skin(**touch), skin().mesh(), covariance())
+    pressed = skin(**touch)
+    return SpotFinder(model(pressed.touch.sign), pressed, skin().mesh(), covariance())
 
 
 def data(spots: FloatArray) -> FloatArray:

@@ -13,14 +13,14 @@ from tomoskin.core import Detection, FloatArray, SkinError
 from tomoskin.forward import ForwardModel, State
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
-from tomoskin.touch.fit.anisotropy import with_anisotropy
 from tomoskin.touch.fit.candidates import Candidates, Matched
+from tomoskin.touch.fit.native import NativeSolver
 from tomoskin.touch.fit.noise import ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.native import NativeSolver
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
 from tomoskin.touch.fit.search import Search, SpotDetections, joined
+from tomoskin.touch.fit.sheet import fitted_sheet
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
 from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
 from tomoskin.touch.fit.table import ResponseTable
@@ -87,12 +87,13 @@ class SpotModel:
         solver = _solver(response, prior, sign)
         return cls(response, prior, Candidates.of(response, prior), solver, scale)
 
-    def fitted_to(self, reference: FloatArray) -> SpotModel:
-        """The model of a sheet that conducts by direction as its ``reference`` (n_meas,) V tells.
+    def fitted_to(self, reference: FloatArray, deviation: FloatArray | float = 0.0) -> SpotModel:
+        """The model of the sheet that a ``reference`` (n_meas,) V tells of; itself where it tells
+        of an even one.
 
-        Itself where the reference tells of no direction; see :mod:`tomoskin.touch.fit.anisotropy`.
+        ``deviation`` (n_meas,) V is the reference's own; see :mod:`tomoskin.touch.fit.sheet`.
         """
-        state = with_anisotropy(self.response.state, reference)
+        state = fitted_sheet(self.response.state, reference, deviation)
         if state is self.response.state:
             return self
         return self._of(state, self.solver.table.sign, bool((self.scale != 1.0).any()))
@@ -163,9 +164,7 @@ class SpotFinder:
             data=seen.whiten(dv / self._scale),
             left=seen.whiten(self._residual.directions.T),
         )
-        search = Search(
-            problem, matched, self._settings.snr, self._most, self._pace, self._deficit
-        )
+        search = Search(problem, matched, self._settings.snr, self._most, self._pace, self._deficit)
         detected = search(self._before)
         self._unrest = self._unrest_of(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit

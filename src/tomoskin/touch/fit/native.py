@@ -9,7 +9,7 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Deficit, Fit, Problem
-from tomoskin.touch.fit.solver import DIRECTED, RIDGE, SheetDomain
+from tomoskin.touch.fit.solver import DIRECTED, RESHAPED, RIDGE, SheetDomain
 from tomoskin.touch.fit.spot import FILLING
 from tomoskin.touch.fit.table import ResponseTable
 
@@ -40,11 +40,9 @@ class NativeSolver:
         """See :class:`Solver`."""
         return self._core.SeenTable(direct, timed)
 
-    def settled(
-        self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int
-    ) -> Fit:
+    def settled(self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
         """See :class:`Solver`."""
-        deviations = (DIRECTED, problem.reach, problem.grows)
+        deviations = (DIRECTED, RESHAPED, problem.reach, problem.grows)
         matrices, vectors, (misfit, log_size, cost, settled) = self._spots.settled(
             problem.seen.kept, problem.data, problem.left, deficit.change, spots, deviations, most
         )

@@ -15,10 +15,14 @@ class Pace:
         Steps from the touches of the frame before.
     glance, cold
         Steps from each of the positions where a new touch may begin, and then from the best one.
+    finalists
+        Of these positions, the best ones that are gone on with.
     rounds
         Solves of the exact model, each with a few more steps.
     tries
         New touches that are tried in a frame.
+    joint
+        Sets of as many new touches as there may be in all that are tried beside, for each number.
     restart
         Whether a frame that does not go on as it was is looked at without what was there too.
     speed
@@ -31,15 +35,39 @@ class Pace:
     warm: int
     glance: int
     cold: int
+    finalists: int
     rounds: int
     tries: int
+    joint: int
     restart: bool
     speed: float
     fading: float
 
 
-EXHAUSTIVE = Pace(warm=6, glance=15, cold=0, rounds=4, tries=5, restart=True, speed=0.0, fading=0.0)
+EXHAUSTIVE = Pace(
+    warm=6,
+    glance=5,
+    cold=15,
+    finalists=3,
+    rounds=4,
+    tries=5,
+    joint=6,
+    restart=True,
+    speed=0.0,
+    fading=0.0,
+)
 """Each frame as if it were the only one, of touches that stand still."""
 
-LIVE = Pace(warm=4, glance=1, cold=4, rounds=1, tries=1, restart=False, speed=0.1, fading=4.0)
+LIVE = Pace(
+    warm=4,
+    glance=1,
+    cold=4,
+    finalists=1,
+    rounds=1,
+    tries=1,
+    joint=0,
+    restart=False,
+    speed=0.1,
+    fading=4.0,
+)
 """What is not found in this frame is found in the next: one more touch a frame."""

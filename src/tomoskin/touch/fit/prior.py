@@ -12,11 +12,11 @@ from tomoskin.core import FloatArray
 from tomoskin.mesh import Mesh
 from tomoskin.touch.fit.spot import CONTENT, FILLING, LOG_RADIUS
 
-_RADIUS = 0.14
+_RADIUS = 0.11
 """Median radius, in parts of the breadth of a square as large as the sheet."""
 
-_SPREAD = 0.6
-"""Standard deviation of the radius's logarithm: a factor of 1.8 either way."""
+_SPREAD = 0.45
+"""Standard deviation of the radius's logarithm: a factor of 1.6 either way."""
 
 _DEPTH = 0.5
 """Standard deviation of log(σ/σ₀) at the centre of a spot of median radius, about none."""

@@ -179,9 +179,7 @@ class Solver(Protocol):
         """See :meth:`ResponseTable.expanded`."""
         ...
 
-    def settled(
-        self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int
-    ) -> Fit:
+    def settled(self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
         """The minimum of the cost near ``spots`` (k, 4), after at most so many steps."""
         ...
 
@@ -240,10 +238,6 @@ class Problem:
                 return replace(fit, deficit=deficit)
             fit = self.solver.settled(self, fit.spots, deficit, _AGAIN)
         return fit
-
-    def towards_bell(self, spots: FloatArray) -> FloatArray:
-        """(r,) what it does to the whitened data that spots are bells."""
-        return np.asarray(self.seen.direct @ self.solver.expanded(spots)[:, -1].sum(axis=0))
 
     def change(self, fit: Fit) -> FloatArray:
         """(n_meas,) V that the spots of a fit add to the reference."""

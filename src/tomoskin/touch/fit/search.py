@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.candidates import Matched
+from tomoskin.touch.fit.joint_starts import JointStarts
 from tomoskin.touch.fit.pace import Pace
 from tomoskin.touch.fit.refine import Deficit, Fit, Problem
 from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
@@ -19,11 +21,11 @@ HELD = 0.6
 _DOUBTFUL = 0.8
 """Part of that ratio from which another touch beside one is not ruled out."""
 
+_LOOK = 0.5
+"""Part of that ratio from which a further touch is looked for, in sets that are new."""
+
 _MISSHAPEN = 0.02
 """A wrong profile leaves up to this part of what a touch changes: no evidence of another one."""
-
-_SHAPE_SD = 0.5
-"""How far a true profile is from ours, of the way to a bell: a standard deviation."""
 
 _UNEVEN = 0.08
 """Part by which each row answers a touch otherwise than the model's, at the least: a sheet is
@@ -86,10 +88,17 @@ class Search:
         fit, tried = self._more(kept, tries)
         if tries > tried == 0:
             fit = self._fewer(fit)
-        if self.pace.restart and len(before) and (len(fit.spots) != len(before) or not fit.settled):
+        if len(before) and self._is_astray(fit, before, in_vain=tried > 0 and fit is kept):
             fresh, _ = self._more(self.problem.nothing(), self.pace.tries)
             fit = max(fresh, fit, key=self._evidence)
         return self._judged(fit)
+
+    def _is_astray(self, fit: Fit, before: FloatArray, *, in_vain: bool) -> bool:
+        """Whether what was there may keep the frame from being understood: another touch stands
+        out and does not fit ``in_vain``, or, at leisure, anything has changed."""
+        if not self.pace.restart:
+            return in_vain
+        return len(fit.spots) != len(before) or not fit.settled
 
     def _evidence(self, fit: Fit) -> float:
         return fit.log_evidence(self.problem.prior)
@@ -98,7 +107,8 @@ class Search:
         if not len(before):
             return self.problem.nothing()
         problem, spots = self.problem, before[: self.most]
-        return problem.corrected(problem.refined(spots, self.deficit, self.pace.warm), self.pace.rounds)
+        fit = problem.refined(spots, self.deficit, self.pace.warm)
+        return problem.corrected(fit, self.pace.rounds)
 
     def _pruned(self, fit: Fit) -> Fit:
         """Without the spots that have faded."""
@@ -128,9 +138,10 @@ class Search:
         for tried in range(min(tries, self.most - len(fit.spots))):
             ratio, content = self._standing_out(fit)
             best = int(ratio.argmax())
-            if ratio[best] < self._threshold(fit, HELD if not len(fit.spots) else _DOUBTFUL):
+            if ratio[best] < self._threshold(fit, HELD if not len(fit.spots) else _LOOK):
                 return fit, tried
-            more = self._best(_starts(fit, self.matched.spot(best, content)), fit.deficit)
+            fresh = _starts(fit, self.matched.spot(best, content))
+            more = self._best(fresh, fit.deficit, self._joint_starts(len(fit.spots) + 1))
             worth = self._ratios(more).min() >= self._threshold(fit, 1.0)
             if not worth or self._evidence(more) <= self._evidence(fit):
                 return fit, tried + 1
@@ -145,12 +156,31 @@ class Search:
     def _standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
         return self.matched.ratios(self.problem.solver, fit)
 
-    def _best(self, starts: list[FloatArray], deficit: Deficit) -> Fit:
-        fits = (self.problem.refined(start, deficit, self.pace.glance) for start in starts)
-        best = min(fits, key=lambda fit: fit.cost)
-        if not best.settled and self.pace.cold:
-            best = self.problem.refined(best.spots, deficit, self.pace.cold)
-        return self.problem.corrected(best, self.pace.rounds)
+    def _joint_starts(self, count: int) -> list[FloatArray]:
+        """Sets of so many spots whatever has been found."""
+        if count < 2 or not self.pace.joint:
+            return []
+        return self._joint.sets(count, self.pace.joint)
+
+    @cached_property
+    def _joint(self) -> JointStarts:
+        problem = self.problem
+        sign = problem.solver.table.sign
+        return JointStarts.of(self.matched, problem.data, problem.prior, sign)
+
+    def _best(self, starts: list[FloatArray], deficit: Deficit, joint: list[FloatArray]) -> Fit:
+        """The most evident of those that come out best after a glance."""
+        problem, pace = self.problem, self.pace
+        none = Deficit.none(len(deficit.change))
+        fits = [problem.refined(start, deficit, pace.glance) for start in starts]
+        fits += [problem.refined(start, none, pace.glance) for start in joint]
+        fits.sort(key=lambda fit: fit.cost)
+        settled = [
+            fit if fit.settled else problem.refined(fit.spots, fit.deficit, pace.cold)
+            for fit in fits[: pace.finalists]
+        ]
+        exact = [problem.corrected(fit, pace.rounds) for fit in settled]
+        return max(exact, key=self._evidence)
 
     def _ratios(self, fit: Fit) -> FloatArray:
         """(k,) size of what each spot changes that the others could not take up."""
@@ -204,14 +234,11 @@ def _starts(fit: Fit, fresh: FloatArray) -> list[FloatArray]:
 def _covariance(problem: Problem, fit: Fit) -> FloatArray:
     """Curvature, scaled where the data scatter more than they should; and the model's part.
 
-    What a bell instead of our profile would change moves the estimate by ΣJᵀd: a parameter
-    that is not fitted but considered (Schmidt 1966). So is the part by which each row is off.
+    The part by which each row is off is not fitted but considered (Schmidt 1966).
     """
     scatter = max(1.0, fit.misfit / fit.degrees)
     onto = problem.solver.projected(fit.unknown, fit.slopes[:0], fit.slopes)
-    moved = _SHAPE_SD * (fit.covariance @ (onto @ problem.towards_bell(fit.spots)))
-    uneven = _uneven(problem, fit, onto)
-    return np.asarray(scatter * fit.covariance + np.outer(moved, moved) + uneven)
+    return np.asarray(scatter * fit.covariance + _uneven(problem, fit, onto))
 
 
 def _uneven(problem: Problem, fit: Fit, onto: FloatArray) -> FloatArray:

@@ -23,6 +23,9 @@ _LEAST_DAMPING = 1e-6
 DIRECTED = 0.7
 """Standard deviation of a spot's direction (:class:`Part`) about none."""
 
+RESHAPED = 0.5
+"""Standard deviation of its shape, of the way from a tail to a bell: both are one from ours."""
+
 RIDGE = 1e-9
 """Part of a square that keeps the equations of slopes solvable that are in proportion."""
 
@@ -62,9 +65,7 @@ class NumpySolver:
         """See :class:`Solver`."""
         return self.table.expanded(spots)
 
-    def settled(
-        self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int
-    ) -> Fit:
+    def settled(self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
         """See :class:`Solver`.
 
         Levenberg (1944) and Marquardt (1963): damping relative to the diagonal.
@@ -93,8 +94,13 @@ class NumpySolver:
         own = parts[:, 1 : 1 + N_PARAMETERS]
         each = parts[:, 0] @ direct.T
         slopes = own.reshape(-1, direct.shape[1]) @ direct.T
-        directed = DIRECTED * parts[:, 1 + N_PARAMETERS] @ direct.T
-        unknown = np.vstack([problem.left, directed, *_within_scan(problem, spots, own)])
+        directed, reshaped = parts[:, 1 + N_PARAMETERS :].swapaxes(0, 1) @ direct.T
+        unknown = np.vstack([
+            problem.left,
+            DIRECTED * directed,
+            RESHAPED * reshaped,
+            *_within_scan(problem, spots, own),
+        ])  # fmt: skip
         predicted = each.sum(axis=0) + direct @ deficit.change
         residual = problem.data - predicted
         square, gradient, misfit, log_size = _integrated(unknown, slopes, residual)
@@ -152,7 +158,7 @@ def _integrated(
     gram, q = columns @ columns.T, len(unknown)
     own, log_size = gram[q:, q:], 0.0
     if q:
-        root = np.linalg.cholesky(np.eye(q) + gram[:q, :q])
+        root = np.asarray(np.linalg.cholesky(np.eye(q) + gram[:q, :q]))
         across = _solved_lower(root, gram[:q, q:])
         own = own - across.T @ across
         log_size = float(np.log(np.diag(root)).sum())

@@ -23,7 +23,10 @@ _SCALES = 6.0
 """A spot ends at this many of its scales."""
 
 _NARROW = 1.15
-"""Squared reaches of :func:`bell` in one of :func:`profile`: then their second moments agree."""
+"""Squared reaches of a bell in one of the spot with a tail: then their second moments agree."""
+
+_BELL = 0.5
+"""How far a spot is on the way from one with a tail to a bell."""
 
 _SPLIT = 2
 """Each side of a cell is cut into so many, for the mean of a profile over the cell."""
@@ -35,14 +38,29 @@ _FEW = 400
 def profile(square: FloatArray) -> FloatArray:
     """Height at squared distances from the centre, in squared reaches: 1 there, 0 from 1 on.
 
-    (1 + v) e⁻ᵛ, v the distance in scales: level at the centre, and exponential beyond, as a
-    stretched sheet goes back to rest on what carries it; the last part is drawn to 0 smoothly.
+    Between a spot with a tail, (1 + v) e⁻ᵛ with v the distance in scales, as a stretched sheet goes
+    back to rest on what carries it, and a bell, as soft things press: both are level at the centre.
     """
-    return _with_steepness(square)[0]
+    return _shapes(square)[0]
 
 
-def _with_steepness(square: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """:func:`profile`, and its derivative by its argument."""
+def _shapes(square: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """:func:`profile`, its derivative by its argument, and the whole way from tail to bell."""
+    (tail, tail_fall), (bell, bell_fall) = _tail(square), _bell(square)
+    size = 1.0 / (1.0 + _BELL * (_BELL_HEIGHT - 1.0))
+    way = size * (bell - tail)
+    return size * tail + _BELL * way, size * (tail_fall + _BELL * (bell_fall - tail_fall)), way
+
+
+def _bell(square: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A bell with the content and second moment of the spot with a tail, and its derivative."""
+    rest = np.maximum(1.0 - _NARROW * square, 0.0)
+    steep = _BELL_HEIGHT * rest * rest
+    return steep * rest, -3.0 * _NARROW * steep
+
+
+def _tail(square: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The spot with a tail, drawn to 0 smoothly at its end; and its derivative."""
     inside = np.minimum(square, 1.0)
     scales = _SCALES * np.sqrt(inside)
     fading, third, more = np.exp(-scales), inside**3, 1.0 + scales
@@ -57,23 +75,25 @@ def _with_steepness(square: FloatArray) -> tuple[FloatArray, FloatArray]:
     return height, fall
 
 
-def _moments() -> tuple[float, float]:
-    """Reach in radii of the disc of the same second moment, and ∫ profile in squared radii."""
+def _moments(shape: Callable[[FloatArray], FloatArray]) -> tuple[float, float]:
+    """Reach in radii of the disc of the same second moment, and ∫ shape in squared radii."""
     node, weight = np.polynomial.legendre.leggauss(64)
     u = (node + 1.0) / 2.0
-    ring = weight / 2.0 * profile(u**2) * u
+    ring = weight / 2.0 * shape(u**2) * u
     reach = math.sqrt(0.5 * float(ring.sum() / (ring @ u**2)))
     return reach, 2.0 * math.pi * float(ring.sum()) * reach**2
 
 
-REACH, FILLING = _moments()
+def _bell_height() -> float:
+    """Of the bell with the content of the spot with a tail, whose height is 1."""
+    reach, filling = _moments(lambda square: _tail(square)[0])
+    return filling / reach**2 * 4.0 * _NARROW / math.pi
+
+
+_BELL_HEIGHT = _bell_height()
+
+REACH, FILLING = _moments(profile)
 """Of a spot: where it ends, in radii, and ∫ profile over the plane, in squared radii."""
-
-
-def bell(square: FloatArray) -> FloatArray:
-    """A profile of the same content and second moment, but without the long tail."""
-    height = FILLING / REACH**2 * 4.0 * _NARROW / math.pi
-    return np.asarray(height * np.maximum(1.0 - _NARROW * square, 0.0) ** 3)
 
 
 def spots_of(
@@ -96,9 +116,6 @@ def depth_of(spots: FloatArray) -> FloatArray:
     return np.asarray(spots[..., CONTENT] / (FILLING * np.exp(2 * spots[..., LOG_RADIUS])))
 
 
-Shape = Callable[[FloatArray], FloatArray]
-
-
 @dataclass(frozen=True, eq=False)
 class Part:
     """One spot on its cells.
@@ -115,12 +132,15 @@ class Part:
         (2, c) xx = −yy and xy of a part of log σ that has a direction: a stretched sheet conducts
         otherwise along the stretch than across. Round a press that is
         depth · r|dg/dr|/2 · (r̂r̂ᵀ − 1/2): none in the middle, most on the flank.
+    reshaped
+        (c,) change of log σ by a bell instead of a spot with a tail.
     """
 
     cells: IntArray
     height: FloatArray
     slopes: FloatArray
     directed: FloatArray
+    reshaped: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,17 +153,17 @@ class Footprints:
         (n + 1,) spot k has ``cells[starts[k]:starts[k + 1]]``.
     cells
         (c,) those that it may reach.
-    height, bell
-        (c,) change of log σ by the :func:`profile` and by a :func:`bell`.
-    directed
-        (2, c), see :class:`Part`.
+    height
+        (c,) change of log σ.
+    directed, reshaped
+        (2, c) and (c,), see :class:`Part`.
     """
 
     starts: IntArray
     cells: IntArray
     height: FloatArray
-    bell: FloatArray
     directed: FloatArray
+    reshaped: FloatArray
 
 
 class Spots:
@@ -170,13 +190,13 @@ class Spots:
         self._centroids = np.ascontiguousarray(mesh.centroids.T)
         self._margin = np.linalg.norm(corners - mesh.centroids[:, None], axis=2).max(axis=1)
 
-    def change(self, spots: FloatArray, shape: Shape = profile) -> tuple[IntArray, FloatArray]:
+    def change(self, spots: FloatArray) -> tuple[IntArray, FloatArray]:
         """Cells (c,) that spots (k, 4) reach together, and (c,) the change of log σ there."""
         near = [self._near(spot) for spot in spots]
         cells, total = self._joined(near), np.zeros(len(self.mesh.cells))
         for spot, own in zip(spots, near, strict=True):
             square, _ = self._squares(spot, own)
-            total[own] += depth_of(spot) * shape(square).mean(axis=1)
+            total[own] += depth_of(spot) * profile(square).mean(axis=1)
         return cells, total[cells]
 
     def part(self, spot: FloatArray) -> Part:
@@ -184,15 +204,14 @@ class Spots:
         cells = self._near(spot)
         square, offset = self._squares(spot, cells)
         depth, reach = float(depth_of(spot)), REACH * float(np.exp(spot[LOG_RADIUS]))
-        height, fall = _with_steepness(square)
+        height, fall, way = _shapes(square)
         fall *= depth
         mean = height.mean(axis=1)
         towards = -2.0 / reach**2 / _SPLIT**2 * np.einsum("cq,cqd->dc", fall, offset)
         wider = -2.0 * (depth * mean + (fall * square).mean(axis=1))
         more = mean * (REACH**2 / FILLING / reach**2)
-        return Part(
-            cells, depth * mean, np.stack([*towards, wider, more]), _along(-square * fall, offset)
-        )
+        slopes, directed = np.stack([*towards, wider, more]), _along(-square * fall, offset)
+        return Part(cells, depth * mean, slopes, directed, depth * way.mean(axis=1))
 
     def footprints(self, points: FloatArray, radius: float) -> Footprints:
         """Of spots at ``points`` (n, 2) m, of ``radius`` m."""
@@ -202,14 +221,9 @@ class Spots:
         cells = np.array([cell for own in near for cell in sorted(own)], dtype=np.int64)
         offset = self._points[cells] - np.repeat(points, np.diff(starts), axis=0)[:, None]
         square = np.einsum("cqd,cqd->cq", offset, offset) / reach**2
-        height, fall = _with_steepness(square)
-        return Footprints(
-            starts,
-            cells,
-            height.mean(axis=1),
-            bell(square).mean(axis=1),
-            _along(-square * fall, offset),
-        )
+        height, fall, way = _shapes(square)
+        directed = _along(-square * fall, offset)
+        return Footprints(starts, cells, height.mean(axis=1), directed, way.mean(axis=1))
 
     def _squares(self, spot: FloatArray, cells: IntArray) -> tuple[FloatArray, FloatArray]:
         """(c, q) squared distances in reaches of the points of cells, and (c, q, 2) offsets, m."""
@@ -251,21 +265,22 @@ class Response:
         """(n_meas,) V without a spot."""
         return np.asarray(self.state.voltages)
 
-    def changes(self, sets: Sequence[FloatArray], shape: Shape = profile) -> FloatArray:
+    def changes(self, sets: Sequence[FloatArray]) -> FloatArray:
         """(b, n_meas) V that each of some sets of spots (k, 4) adds to the reference.
 
         By the local update of the forward model, or by a new solve where many cells change.
         """
-        pressed = [self._pressed(*self.spots.change(spots, shape)) for spots in sets]
+        pressed = [self._pressed(*self.spots.change(spots)) for spots in sets]
         return self.voltages(pressed) - self.reference
 
     def voltages(self, touches: Sequence[tuple[IntArray, FloatArray]]) -> FloatArray:
         """(b, n_meas) V of the sheet with some cells (c,) changed to a conductivity (c,)."""
-        few = np.array([len(cells) <= _FEW for cells, _ in touches], dtype=bool)
+        few = [k for k, (cells, _) in enumerate(touches) if len(cells) <= _FEW]
+        many = [k for k, (cells, _) in enumerate(touches) if len(cells) > _FEW]
         out = np.empty((len(touches), len(self.reference)))
-        if few.any():
-            out[few] = self.state.local.voltages_of([touches[k] for k in np.flatnonzero(few)])
-        for k in np.flatnonzero(~few):
+        if few:
+            out[few] = self.state.local.voltages_of([touches[k] for k in few])
+        for k in many:
             out[k] = self._solved(*touches[k]).voltages
         return out
 
@@ -290,7 +305,7 @@ class Response:
         return self.expanded(spots)[:2]
 
     def expanded(self, spots: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """As :meth:`jacobian`, and (n_meas, k) V: derivatives by a direction of each spot.
+        """As :meth:`jacobian`, and (n_meas, 2k) V: derivatives by direction and shape of each spot.
 
         See :class:`Part`.
         """
@@ -301,7 +316,8 @@ class Response:
         pressed = self.state.model.at(self.state.conductivity * np.exp(change))
         answers = np.array([_answers(pressed, part) for part in parts])
         slopes = answers[:, :N_PARAMETERS].reshape(-1, answers.shape[2]).T
-        return pressed.voltages - self.reference, slopes, answers[:, N_PARAMETERS].T
+        nuisances = answers[:, N_PARAMETERS:].reshape(-1, answers.shape[2]).T
+        return pressed.voltages - self.reference, slopes, nuisances
 
     def _solved(self, cells: IntArray, sigma: FloatArray) -> State:
         reach()
@@ -319,13 +335,14 @@ class Response:
 
 
 def _answers(pressed: State, part: Part) -> FloatArray:
-    """(5, n_meas) V: −∫ ∇u · ∂σ ∇w for a spot's four columns, and for its direction."""
+    """(6, n_meas) V: −∫ ∇u · ∂σ ∇w for a spot's four columns, its direction, and its shape."""
     field = pressed.gradient[:, :, part.cells]
     n, sigma = len(field), pressed.conductivity[part.cells]
-    flow = np.empty((N_PARAMETERS + 1, *field.shape))
-    np.multiply(field, (part.slopes * sigma)[:, None, None], out=flow[:-1])
+    flow = np.empty((N_PARAMETERS + 2, *field.shape))
+    np.multiply(field, (part.slopes * sigma)[:, None, None], out=flow[:-2])
     (x, y), (xx, xy) = field.swapaxes(0, 1), part.directed * sigma
-    flow[-1, :, 0], flow[-1, :, 1] = x * xx + y * xy, x * xy - y * xx
+    flow[-2, :, 0], flow[-2, :, 1] = x * xx + y * xy, x * xy - y * xx
+    np.multiply(field, part.reshaped * sigma, out=flow[-1])
     moved = flow.reshape(len(flow) * n, -1) @ field.reshape(n, -1).T
     return np.asarray(-pressed.model.voltages(moved.reshape(-1, n, n)))
 

@@ -32,17 +32,20 @@ from tomoskin.touch.fit.spot import (
     depth_of,
 )
 
-STEP = 0.45
+STEP = 0.5
 """Between grid points, in radii of the spot."""
 
-LOG_STEP = 0.3
+LOG_STEP = 0.35
 """Between radii, in their logarithm."""
 
 PADDING = 2
 """Grid points beyond the sheet on each side: splines need one, the filter another."""
 
 FAINT = -0.3
-"""Depth at which directions are taken; they are in proportion to it."""
+"""Near this depth it is taken what a shape does; that is in proportion to the depth."""
+
+BENT = 0.5
+"""Part of the way from a tail to a bell at which what a shape does is taken."""
 
 NEGLIGIBLE, SAMPLED = 1e-6, 3000
 """Part of the largest change below which a direction of the data counts as none, by so many."""
@@ -51,7 +54,7 @@ NEXT = 1e-4
 """For slopes of the powers of the depth."""
 
 N_DIRECTIONS = 2
-"""Of each spot: of a stretched sheet's direction (:class:`Part`), and towards a :func:`bell`."""
+"""Of each spot: of a stretched sheet's direction, and of its shape; see :class:`Part`."""
 
 
 def spline(t: float) -> FloatArray:
@@ -155,7 +158,6 @@ class ResponseTable:
         filtered = [_filtered(p @ basis.T, g.shape) for p, g in zip(parts, grids, strict=True)]
         return cls(log_radii, tuple(grids), sign, nodes, np.concatenate(filtered), basis)
 
-
     def expanded(self, spots: FloatArray) -> FloatArray:
         """(k, 1 + N_PARAMETERS + N_DIRECTIONS, rank) V of spots (k, 4), each alone.
 
@@ -168,16 +170,21 @@ class ResponseTable:
         first, (weight, slope) = self._between(spot[LOG_RADIUS])
         rows, parts = [], []
         for number in range(len(weight)):
-            grid = self.grids[first + number]
-            x, y = (grid.at(axis, spot[axis]) for axis in (X, Y))
-            rows.append(self._starts[first + number] + (x.points[:, None] * grid.shape[1] + y.points).ravel())
-            here = weight[number] * np.outer(x.weight, y.weight).ravel()
-            across = weight[number] * np.stack([np.outer(x.slope, y.weight), np.outer(x.weight, y.slope)])
-            wider = slope[number] * np.outer(x.weight, y.weight).ravel()
-            parts.append(np.stack([here, *across.reshape(2, -1), wider]))
+            points, here, across = self._at(first + number, spot)
+            rows.append(points)
+            level = [weight[number] * here, *(weight[number] * across), slope[number] * here]
+            parts.append(np.stack(level))
         points, weights = np.concatenate(rows), np.concatenate(parts, axis=1)
         near = self.values[points].reshape(len(points), -1)
         return self._of_depth(spot, (weights @ near).reshape(4, -1, len(self.basis)))
+
+    def _at(self, number: int, spot: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
+        """(16,) points of one grid, their weights (16,), and the slopes of these (2, 16)."""
+        grid = self.grids[number]
+        x, y = (grid.at(axis, spot[axis]) for axis in (X, Y))
+        points = self._starts[number] + x.points[:, None] * grid.shape[1] + y.points
+        across = np.stack([np.outer(x.slope, y.weight), np.outer(x.weight, y.slope)])
+        return points.ravel(), np.outer(x.weight, y.weight).ravel(), across.reshape(2, -1)
 
     def _of_depth(self, spot: FloatArray, mixed: FloatArray) -> FloatArray:
         """:meth:`expanded` of values, and their slopes by x, y and log radius, at the nodes."""
@@ -224,8 +231,10 @@ def _sampled(response: Response, grid: Grid, radius: float, nodes: FloatArray) -
     for number, (node, depth) in enumerate(zip(nodes, depths, strict=True)):
         out[:, number] = _changes(response, feet, depth * feet.height) / node
     out[:, -2] = _directed(response, feet)
-    faint = _powers(np.expm1(FAINT / 4), nodes) @ out[:, : len(nodes)]
-    out[:, -1] = (_changes(response, feet, FAINT * feet.bell) - faint) / FAINT
+    faint = int(np.abs(depths - FAINT).argmin())
+    bent = feet.height + BENT * feet.reshaped
+    towards = _changes(response, feet, depths[faint] * bent) - nodes[faint] * out[:, faint]
+    out[:, -1] = towards / (BENT * depths[faint])
     _, nearest = cKDTree(points[needed]).query(points)
     return np.asarray(out[nearest])
 

@@ -1,0 +1,157 @@
+"""A sheet as its reference tells of it: uneven, and conducting otherwise along than across.
+
+The logarithm of the conductivity is a Gaussian random field. How uneven it is, over which lengths,
+and how well rows follow the model is what makes the reference likeliest (evidence: MacKay 2003,
+chapter 28); the field itself is the most likely one then. Both are found anew about the last sheet
+(Gauss–Newton).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from tomoskin.core import FloatArray, reach
+from tomoskin.forward import ForwardModel, State
+from tomoskin.touch.fit.anisotropy import anisotropy_slopes, directed
+from tomoskin.touch.fit.channels import channel_errors
+from tomoskin.touch.fit.random_field import field_modes
+
+_UNEVEN = (0.01, 0.03, 0.06, 0.12, 0.24)
+"""Standard deviations of log σ over a sheet that are compared."""
+
+_LENGTHS = (0.15, 0.3)
+"""Correlation lengths that are compared, in parts of √area."""
+
+_ERRORS = (0.003, 0.01, 0.03, 0.1, 0.3)
+"""Standard deviations of rows about the model, in parts of them, that are compared: meshes,
+positions of electrodes, wires."""
+
+_DIRECTED = 0.2
+"""Standard deviation of the two numbers of an anisotropy."""
+
+_LEAST = 0.03
+"""Size of an anisotropy below which an even sheet counts as isotropic."""
+
+_STEPS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """A reference (n_meas,) V, its standard deviation (n_meas,) V, and (n,) rows that count."""
+
+    values: FloatArray
+    deviation: FloatArray
+    rows: NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """The rows that count, linear about a sheet.
+
+    ``residual`` (n,) V less the model's; ``by_cell`` (n, n_cells) V by log σ; ``along`` (n, 2) V,
+    what one deviation of an anisotropy does; ``common`` (n, n) V², covariance of what the channels
+    and a common factor do, and of the noise; ``size`` (n,) V of the model.
+    """
+
+    residual: FloatArray
+    by_cell: FloatArray
+    along: FloatArray
+    common: FloatArray
+    size: FloatArray
+
+    @classmethod
+    def of(cls, now: State, measured: _Measured) -> Self:
+        rows = measured.rows
+        size, values = now.voltages[rows], measured.values[rows]
+        factor = float(values @ size) / float(size @ size)
+        channels = channel_errors(now)[rows]
+        noise = np.diag((measured.deviation[rows] / factor) ** 2)
+        return cls(
+            residual=values / factor - size,
+            by_cell=(now.jacobian * now.conductivity)[rows],
+            along=_DIRECTED * anisotropy_slopes(now)[rows],
+            common=channels @ channels.T + np.outer(size, size) + noise,
+            size=size,
+        )
+
+    def covariance(self, error: float) -> FloatArray:
+        """(n, n) V² where rows are off by ``error``, in parts of them."""
+        return np.asarray(self.common + np.diag((error * self.size) ** 2))
+
+    def explained(
+        self, data: FloatArray, field: FloatArray, error: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """(n_cells,) change of log σ and (2,) anisotropy, in deviations, that explain ``data`` (n,)
+        V best where ``field`` (n_cells, k) is random."""
+        columns = np.hstack([self.by_cell @ field, self.along])
+        solved = cho_solve(cho_factor(self.covariance(error)), columns)
+        normal = columns.T @ solved + np.eye(columns.shape[1])
+        amplitudes = np.linalg.solve(normal, solved.T @ data)
+        return np.asarray(field @ amplitudes[:-2]), np.asarray(amplitudes[-2:])
+
+    def log_evidence(self, data: FloatArray, seen: FloatArray, error: float) -> float:
+        """Of ``data`` (n,) V where the ``seen`` (n, k) V of a field, and channels, are random."""
+        own = np.hstack([seen, self.along])
+        try:
+            factor, _ = cho_factor(self.covariance(error) + own @ own.T, lower=True)
+        except LinAlgError:
+            return -math.inf
+        spread = cho_solve((factor, True), data)
+        return float(-data @ spread / 2 - np.log(np.diag(factor)).sum())
+
+
+def fitted_sheet(state: State, reference: FloatArray, deviation: FloatArray | float) -> State:
+    """The sheet that explains a ``reference`` (n_meas,) V of this standard deviation, V, best.
+
+    ``state`` itself where nothing speaks against it. Rows that are not finite do not count,
+    and a factor that all voltages have in common means nothing.
+    """
+    finite = np.flatnonzero(np.isfinite(reference))
+    if len(finite) < len(reference) / 2:
+        return state
+    mesh = state.model.mesh
+    breadth = math.sqrt(float(mesh.volumes.sum()))
+    fields = [field_modes(mesh, part * breadth) for part in _LENGTHS]
+    measured = _Measured(reference, np.broadcast_to(deviation, reference.shape), finite)
+    uneven, anisotropy, now = np.zeros(len(mesh.cells)), np.zeros(2), state
+    for _ in range(_STEPS):
+        linear = _Linear.of(now, measured)
+        data = linear.residual + linear.by_cell @ uneven + linear.along @ anisotropy
+        uneven, anisotropy = linear.explained(data, *_likeliest(fields, linear, data))
+        now = _sheet(state, uneven, _DIRECTED * anisotropy)
+    even = not uneven.any() and _DIRECTED * math.hypot(*anisotropy) < _LEAST
+    return state if even else now
+
+
+def _likeliest(
+    fields: Sequence[FloatArray], linear: _Linear, data: FloatArray
+) -> tuple[FloatArray, float]:
+    """(n_cells, k) modes of the random field that makes ``data`` (n,) V likeliest, none of an even
+    sheet; and how far rows are off."""
+    none = fields[0][:, :0]
+    best = (-math.inf, none, 0.0)
+    choices = [(none, 0.0), *product(fields, _UNEVEN)]
+    for modes, size in choices:
+        reach()
+        seen = size * (linear.by_cell @ modes)
+        for error in _ERRORS:
+            log_evidence = linear.log_evidence(data, seen, error)
+            if log_evidence > best[0]:
+                best = log_evidence, size * modes, error
+    return best[1:]
+
+
+def _sheet(state: State, uneven: FloatArray, anisotropy: FloatArray) -> State:
+    """The sheet with that change (n_cells,) of log σ and that anisotropy."""
+    model = state.model
+    mesh = directed(model.mesh, anisotropy)
+    own = ForwardModel(mesh, model.pattern, model.contact_impedance, model.current)
+    return own.at(state.conductivity * np.exp(uneven))
