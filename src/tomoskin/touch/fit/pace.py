@@ -19,6 +19,8 @@ class Pace:
         Of these positions, the best ones that are gone on with.
     tries
         New touches that are tried in a frame.
+    look
+        Part of the likelihood ratio at which a touch begins from which a further one is tried.
     joint
         Sets of as many new touches as there may be in all that are tried beside, for each number.
     restart
@@ -35,6 +37,7 @@ class Pace:
     cold: int
     finalists: int
     tries: int
+    look: float
     joint: int
     restart: bool
     speed: float
@@ -42,11 +45,29 @@ class Pace:
 
 
 EXHAUSTIVE = Pace(
-    warm=6, glance=5, cold=15, finalists=3, tries=5, joint=6, restart=True, speed=0.0, fading=0.0
+    warm=6,
+    glance=5,
+    cold=15,
+    finalists=3,
+    tries=5,
+    look=0.5,
+    joint=6,
+    restart=True,
+    speed=0.0,
+    fading=0.0,
 )
 """Each frame as if it were the only one, of touches that stand still."""
 
 LIVE = Pace(
-    warm=4, glance=1, cold=4, finalists=1, tries=1, joint=0, restart=False, speed=0.1, fading=4.0
+    warm=4,
+    glance=1,
+    cold=4,
+    finalists=1,
+    tries=1,
+    look=0.8,
+    joint=0,
+    restart=False,
+    speed=0.1,
+    fading=4.0,
 )
 """What is not found in this frame is found in the next: one more touch a frame."""
