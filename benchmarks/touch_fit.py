@@ -76,9 +76,22 @@ class Lab:
         samples = self.board.sample(self.table, self.time)
         return self.prepared.readout(Frame(0, 0, self.time, 1, 0, 0, samples)).values
 
+    def by_fit(self) -> Finder:
+        """The finder of fitted touches, after a frame in which nothing touches."""
+        self._fit.push(self._shown(0 * self.reference.mean))
+        return self._fit
+
+    def by_image(self) -> Finder:
+        """The same of the other method."""
+        self._image.push(self._shown(0 * self.reference.mean))
+        return self._image
+
     def view(self, presses: Sequence[Press]) -> FrameView:
-        """What one frame shows; all voltages in proportion say nothing, as they do live."""
-        dv = self.volts(presses) - self.reference.mean
+        """What one frame shows."""
+        return self._shown(self.volts(presses) - self.reference.mean)
+
+    def _shown(self, dv: Floats) -> FrameView:
+        """All voltages in proportion say nothing, as they do live."""
         differences = Differences(
             dv=dv,
             nuisance=self.reference.mean[:, None],
@@ -166,14 +179,13 @@ def _places() -> Report:
             presses, bounds, fitted, has_image = [], [], [], []
             for seed in SEEDS:
                 lab, random = Lab(name, preset, seed), np.random.default_rng(seed)
-                fit, image = lab.by_fit, lab.by_image
                 for _ in range(PLACES):
                     (press,) = drawn(random, 1)
                     view = lab.view((press,))
                     presses.append(press)
                     bounds.append(lab.bound(press))
-                    fitted.append(fit().push(view))
-                    has_image.append(image().push(view))
+                    fitted.append(lab.by_fit().push(view))
+                    has_image.append(lab.by_image().push(view))
             found, seen = Missed.of(presses, fitted), Missed.of(presses, has_image)
             bound, rms = np.array(bounds), np.sqrt(np.mean(found.errors**2))
             held = found.distances < INSIDE_90

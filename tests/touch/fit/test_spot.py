@@ -65,7 +65,7 @@ def test_a_direction_is_that_of_a_tensor_on_the_whole_model() -> None:
     """Against central differences of the sheet with a tensor in its cells."""
     response = sheet()
     spot = spots_of([[0.06, 0.02]], 0.025, -0.4)
-    change, jacobian, directed = response.expanded(spot)
+    change, jacobian, nuisances = response.expanded(spot)
     assert change == pytest.approx(response.jacobian(spot)[0])
     assert jacobian == pytest.approx(response.jacobian(spot)[1])
     cells, height = response.spots.change(spot)
@@ -80,7 +80,34 @@ def test_a_direction_is_that_of_a_tensor_on_the_whole_model() -> None:
         tensor[own] += step * sigma[own, None, None] * turned
         found.append(response.state.model.at(tensor).voltages)
     slope = (found[0] - found[1]) / 2e-3
-    assert directed[:, 0] == pytest.approx(slope, abs=1e-4 * np.abs(slope).max())
+    assert nuisances[:, 0] == pytest.approx(slope, abs=1e-4 * np.abs(slope).max())
+
+
+def test_another_shape_has_the_same_content_and_second_moment() -> None:
+    response = sheet(16, 3000)
+    spot, volumes = spots_of([[0.01, 0.0]], 0.025, -0.4), response.spots.mesh.volumes
+    part = response.spots.part(spot[0])
+    square = ((response.spots.mesh.centroids[part.cells] - spot[0, :2]) ** 2).sum(axis=1)
+    content, moved = volumes[part.cells] * part.height, volumes[part.cells] * part.reshaped
+    assert abs(moved.sum()) < 0.01 * abs(content.sum())
+    assert abs(moved @ square) < 0.01 * abs(content @ square)
+    assert np.abs(moved).sum() > 0.1 * np.abs(content).sum()
+
+
+def test_a_shape_is_a_change_of_the_whole_model() -> None:
+    response = sheet()
+    spot = spots_of([[-0.03, 0.05]], 0.02, -0.4)
+    cells, height = response.spots.change(spot)
+    part = response.spots.part(spot[0])
+    sigma = response.state.conductivity.copy()
+    sigma[cells] *= np.exp(height)
+    ends = []
+    for step in (1e-3, -1e-3):
+        changed = sigma.copy()
+        changed[part.cells] *= np.exp(step * part.reshaped)
+        ends.append(response.state.model.at(changed).voltages)
+    slope = (ends[0] - ends[1]) / 2e-3
+    assert response.expanded(spot)[2][:, 1] == pytest.approx(slope, abs=1e-4 * abs(slope).max())
 
 
 def test_voltages_do_not_jump_between_cells() -> None:

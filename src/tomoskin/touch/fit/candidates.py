@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -76,11 +75,6 @@ class Matched:
     def of(cls, spots: FloatArray, signatures: FloatArray) -> Self:
         """Spots (n, 4) of these signatures (n, r)."""
         return cls(spots, signatures, np.einsum("nr,nr->n", signatures, signatures))
-
-    @cached_property
-    def gram(self) -> FloatArray:
-        """(n, n) products of the signatures."""
-        return np.asarray(self.signatures @ self.signatures.T)
 
     def ratios(self, solver: Solver, fit: Fit) -> tuple[FloatArray, FloatArray]:
         """(n,) likelihood ratio of each candidate, and (n,) its most likely content.

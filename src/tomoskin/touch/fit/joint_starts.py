@@ -13,10 +13,13 @@ import numpy as np
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.touch.fit.candidates import Matched
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.spot import CONTENT
+from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS
 
-_BEAM = 40
+_BEAM = 30
 """Sets that are gone on with for each number of touches."""
+
+_RANKED = 800
+"""Sets among which those are looked for: most differ by a neighbour only."""
 
 _ALIKE = 0.05
 """A candidate of which less than this part is its own, beside a set, adds nothing to it."""
@@ -28,8 +31,8 @@ class JointStarts:
 
     Attributes
     ----------
-    matched
-        The candidates for its noise.
+    spots
+        (n, 4) candidates.
     gram
         (n, n) products of their signatures, with the prior of the content.
     projected
@@ -38,7 +41,7 @@ class JointStarts:
         Of the touches.
     """
 
-    matched: Matched
+    spots: FloatArray
     gram: FloatArray
     projected: FloatArray
     prior: SpotPrior
@@ -46,20 +49,27 @@ class JointStarts:
 
     @classmethod
     def of(cls, matched: Matched, data: FloatArray, prior: SpotPrior, sign: str) -> JointStarts:
-        """For whitened ``data`` (r,)."""
-        gram = matched.gram + np.eye(len(matched.squares)) / prior.content**2
-        return cls(matched, gram, matched.signatures @ data, prior, sign)
+        """For whitened ``data`` (r,), of candidates of median radius."""
+        away = np.abs(matched.spots[:, LOG_RADIUS] - np.log(prior.radius))
+        chosen = np.flatnonzero(away < away.min() + 1e-9)
+        spots, signatures = matched.spots[chosen], matched.signatures[chosen]
+        gram = signatures @ signatures.T + np.eye(len(chosen)) / prior.content**2
+        return cls(spots, gram, signatures @ data, prior, sign)
 
     def sets(self, count: int, most: int) -> list[FloatArray]:
         """At most so many sets (``count``, 4) of spots, the likeliest first, not alike."""
         found = np.arange(len(self.projected))[:, None]
-        for _ in range(count - 1):
-            found = self._extended(found)
+        for number in range(1, count):
+            found = self._extended(found, most if number == count - 1 else _BEAM)
             if not len(found):
                 return []
-        return self._distinct(found, most)
+        if count == 1:
+            found = self._distinct(self._ranked(found), most)
+        spots = self.spots[found]
+        spots[:, :, CONTENT] = self._contents(found)
+        return list(spots)
 
-    def _extended(self, sets: IntArray) -> IntArray:
+    def _extended(self, sets: IntArray, most: int) -> IntArray:
         """(b, k + 1) the best of all sets (p, k) with one more, best first."""
         own = self.gram[sets[:, :, None], sets[:, None, :]]
         across = self.gram[sets]
@@ -69,11 +79,11 @@ class JointStarts:
         base = np.einsum("pk,pk->p", self.projected[sets], self._contents(sets))
         useful = left > _ALIKE * np.diag(self.gram)
         gain = base[:, None] + np.where(useful, data**2 / np.where(useful, left, 1.0), -np.inf)
-        best = np.argsort(gain, axis=None)[::-1][: 8 * _BEAM]
+        best = np.argsort(gain, axis=None)[::-1][: 2 * _RANKED]
         best = best[np.isfinite(gain.ravel()[best])]
         row, new = np.unravel_index(best, gain.shape)
         longer = np.unique(np.sort(np.column_stack([sets[row], new]), axis=1), axis=0)
-        return self._ranked(longer)[:_BEAM]
+        return self._distinct(self._ranked(longer)[:_RANKED], most)
 
     def _ranked(self, sets: IntArray) -> IntArray:
         """Those whose touches have the sign that counts, by how much they explain."""
@@ -88,21 +98,15 @@ class JointStarts:
         own = self.gram[sets[:, :, None], sets[:, None, :]]
         return np.asarray(np.linalg.solve(own, self.projected[sets][:, :, None])[:, :, 0])
 
-    def _distinct(self, sets: IntArray, most: int) -> list[FloatArray]:
-        """(k, 4) spots of the first sets of which some touch is elsewhere than in those before."""
-        sets = self._ranked(sets)
-        spots = self.matched.spots[sets].copy()
-        spots[:, :, CONTENT] = self._contents(sets)
-        kept: list[FloatArray] = []
-        for each in spots:
-            if all(_apart(each, other) > self.prior.radius for other in kept):
+    def _distinct(self, sets: IntArray, most: int) -> IntArray:
+        """(b, k) the first sets of which some touch is elsewhere than in those before."""
+        apart = np.linalg.norm(self.spots[:, None, :2] - self.spots[:, :2], axis=2)
+        kept: list[IntArray] = []
+        for each in sets:
+            between = apart[each[:, None, None], np.array(kept, dtype=int).reshape(-1, len(each)).T]
+            away = np.maximum(between.min(axis=1).max(axis=0), between.min(axis=0).max(axis=0))
+            if (away > self.prior.radius).all():
                 kept.append(each)
                 if len(kept) == most:
                     break
-        return kept
-
-
-def _apart(one: FloatArray, other: FloatArray) -> float:
-    """Largest distance from a spot of ``one`` (k, 4) to the nearest of the ``other``, m."""
-    away = np.linalg.norm(one[:, None, :2] - other[:, :2], axis=2)
-    return float(max(away.min(axis=1).max(), away.min(axis=0).max()))
+        return np.array(kept, dtype=int).reshape(-1, sets.shape[1])

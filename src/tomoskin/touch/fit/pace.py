@@ -21,6 +21,8 @@ class Pace:
         Solves of the exact model, each with a few more steps.
     tries
         New touches that are tried in a frame.
+    look
+        Part of the likelihood ratio at which a touch begins from which a further one is tried.
     joint
         Sets of as many new touches as there may be in all that are tried beside, for each number.
     restart
@@ -38,6 +40,7 @@ class Pace:
     finalists: int
     rounds: int
     tries: int
+    look: float
     joint: int
     restart: bool
     speed: float
@@ -51,6 +54,7 @@ EXHAUSTIVE = Pace(
     finalists=3,
     rounds=4,
     tries=5,
+    look=0.5,
     joint=6,
     restart=True,
     speed=0.0,
@@ -65,6 +69,7 @@ LIVE = Pace(
     finalists=1,
     rounds=1,
     tries=1,
+    look=0.8,
     joint=0,
     restart=False,
     speed=0.1,

@@ -21,9 +21,6 @@ HELD = 0.6
 _DOUBTFUL = 0.8
 """Part of that ratio from which another touch beside one is not ruled out."""
 
-_LOOK = 0.5
-"""Part of that ratio from which a further touch is looked for, in sets that are new."""
-
 _MISSHAPEN = 0.02
 """A wrong profile leaves up to this part of what a touch changes: no evidence of another one."""
 
@@ -138,7 +135,7 @@ class Search:
         for tried in range(min(tries, self.most - len(fit.spots))):
             ratio, content = self._standing_out(fit)
             best = int(ratio.argmax())
-            if ratio[best] < self._threshold(fit, HELD if not len(fit.spots) else _LOOK):
+            if ratio[best] < self._threshold(fit, self.pace.look if len(fit.spots) else HELD):
                 return fit, tried
             fresh = _starts(fit, self.matched.spot(best, content))
             more = self._best(fresh, fit.deficit, self._joint_starts(len(fit.spots) + 1))
