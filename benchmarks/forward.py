@@ -47,7 +47,7 @@ def run(data: Path | None) -> tuple[Report, ...]:
 def _promises(measured: Sequence[Measured], touch: Measured) -> list[Promise]:
     ratio = ratios(measured)
     peer = [("3k", 20), ("12k", 40), ("50k", 80)]
-    script = [("3k", 3), ("12k", 3), ("50k", 3), ("200k", 8)]
+    script = [("3k", 9), ("12k", 3), ("50k", 3), ("200k", 8)]
     rows: list[Promise] = [
         (f"pyEIT: forward at {n}, ×", ratio(n, "peer forward", "forward"), least, True)
         for n, least in peer

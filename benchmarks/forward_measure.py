@@ -84,15 +84,14 @@ def _factor_and_solve(state: State) -> dict[str, Callable[[], object]]:
     """
     model, matrix = state.model, state.model.assembly.matrix
     ready = matrix(state.conductivity, model.contacts)
-    n, n_basis = model.assembly.n_points, model.assembly.n_electrodes - 1
-    rhs = np.zeros((model.assembly.n_unknowns, n_basis))
-    rhs[n + np.arange(n_basis), np.arange(n_basis)] = 1.0
-    calls = {"own": lambda: model.factorise(ready.values).solve(rhs)}
+    n, n_points = model.assembly.n_unknowns, model.assembly.n_points
+    electrodes = np.arange(n_points, n)
+    calls = {"own": lambda: model.factorise(ready.values).columns(electrodes)}
     reference = _reference()
     if reference is None:
         return calls
-    faer = reference(len(rhs), ready.indptr, ready.indices, n_basis)
-    columns = np.ascontiguousarray(rhs.T)
+    faer = reference(n, ready.indptr, ready.indices, n - n_points)
+    columns = np.eye(n - n_points, n, n_points)
     _agree(faer.solve(ready.values, columns).T, state.basis, "faer")
     return {**calls, "faer": lambda: faer.solve(ready.values, columns)}
 

@@ -17,14 +17,16 @@ from tomoskin.forward import choose_engine
 
 
 def machine() -> dict[str, str]:
-    """Processor, cores that may be used, versions and engine: what matters for speed."""
+    """Processor, cores that may be used, versions, engine and its vector instructions."""
+    engine = choose_engine()
     return {
         "processor": _processor(),
         "cores": str(len(os.sched_getaffinity(0))),
         "python": platform.python_version(),
         "numpy": np.__version__,
         "scipy": scipy.__version__,
-        "engine": choose_engine().name,
+        "engine": engine.name,
+        "vectors": engine.vectors,
     }
 
 

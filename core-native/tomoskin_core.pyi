@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 __version__: str
 
+vector_code: str
+"""The widest vector instructions that the processor has: AVX-512, AVX2, NEON or none."""
+
 @final
 class Symbolic:
     """What the structure of a symmetric matrix fixes for each of its factors."""
@@ -39,8 +42,17 @@ class Symbolic:
 class Factor:
     """A factorised matrix."""
 
-    def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
-        """Solution (n, k), C-contiguous, for ``rhs`` (n, k) of the matrix's type, any layout."""
+    def columns(self, rows: NDArray[np.int64]) -> NDArray[Any]:
+        """Columns (n, k) of the inverse, those of ``rows`` (k,), C-contiguous."""
+
+    def checked_columns(
+        self, values: NDArray[Any], rows: NDArray[np.int64]
+    ) -> tuple[NDArray[Any], NDArray[Any], float]:
+        """Columns X of the inverse, and what they leave over of the matrix A with ``values``.
+
+        With E the columns of the identity: X (n, k), Xᵀ (E − A X), and the largest entry of
+        E − A X in size; NaN where that is no number.
+        """
 
 @final
 class Reference:
@@ -110,15 +122,6 @@ class Patches:
             When a cell does not exist or stands twice in a touch, a conductivity is not positive,
             or the system is singular.
         """
-
-def residual(
-    indptr: NDArray[np.int32],
-    indices: NDArray[np.int32],
-    data: NDArray[Any],
-    rhs: NDArray[Any],
-    x: NDArray[Any],
-) -> tuple[NDArray[Any], float]:
-    """Xᵀ (B − A X), A symmetric, and the largest entry of B − A X; NaN where X is no number."""
 
 def transposed_product(
     indptr: NDArray[np.int32],

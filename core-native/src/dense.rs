@@ -2,8 +2,7 @@
 
 use std::ops::{Index, IndexMut};
 
-use pulp::Arch;
-
+use crate::instructions::narrow;
 use crate::scalar::Scalar;
 use crate::tiles::Tiled;
 
@@ -166,5 +165,5 @@ pub fn add_product<T: Scalar>(
         None => return,
         Some(left_over) => left_over,
     };
-    Arch::new().dispatch(Tiled(product));
+    narrow(Tiled(product));
 }

@@ -4,17 +4,23 @@
 //! matrix's values and what the children's fronts left over, loses its columns to the factor, and
 //! leaves the square to its parent (Duff & Reid 1983).
 
+use std::array::from_fn;
 use std::sync::Arc;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::kernel::{eliminate, subtract_square};
+use crate::instructions::run;
+use crate::kernel::{ROWS, Shape, eliminate, subtract_square};
 use crate::scalar::Scalar;
 use crate::symbolic::{Panel, Symbolic};
+
+/// Bytes of a line of the caches.
+const LINE: usize = 64;
 
 /// L of A = L Lᵀ, panel by panel, in the order of its symbolic part.
 #[derive(Debug)]
 pub struct Factor<T> {
+    arch: Arch,
     symbolic: Arc<Symbolic>,
     values: Vec<T>,
 }
@@ -26,26 +32,37 @@ impl<T: Scalar> Factor<T> {
     /// When the number of values is not the structure's, or the real part of the matrix is not
     /// positive definite.
     pub fn new(symbolic: Arc<Symbolic>, values: &[T]) -> Result<Self, String> {
+        Self::by(Arch::new(), symbolic, values)
+    }
+
+    /// The same, all that is made of the factor included, by these vector instructions.
+    ///
+    /// # Errors
+    /// As above.
+    pub fn by(arch: Arch, symbolic: Arc<Symbolic>, values: &[T]) -> Result<Self, String> {
         if values.len() != symbolic.n_values() {
             let expected = symbolic.n_values();
             return Err(format!("expected {expected} values, got {}", values.len()));
         }
-        let mut factor = vec![T::ZERO; symbolic.factor_len()];
-        for &(to, from) in symbolic.scatter() {
-            factor[to as usize] = values[from as usize];
-        }
         let elimination = Elimination {
             symbolic: &symbolic,
-            factor: &mut factor,
+            values,
         };
-        Arch::new().dispatch(elimination).map_err(|column| {
+        let values = run(arch, elimination).map_err(|column| {
             let row = symbolic.order()[column];
             format!("the matrix is not positive definite: pivot of row {row}")
         })?;
         Ok(Self {
+            arch,
             symbolic,
-            values: factor,
+            values,
         })
+    }
+
+    /// The vector instructions.
+    #[must_use]
+    pub fn arch(&self) -> Arch {
+        self.arch
     }
 
     /// The structure.
@@ -63,59 +80,126 @@ impl<T: Scalar> Factor<T> {
 
 struct Elimination<'a, T> {
     symbolic: &'a Symbolic,
-    factor: &'a mut [T],
+    values: &'a [T],
 }
 
 impl<T: Scalar> WithSimd for Elimination<'_, T> {
-    type Output = Result<(), usize>;
+    type Output = Result<Vec<T>, usize>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let n_panels = self.symbolic.n_panels();
-        let mut left_over: Vec<Vec<T>> = vec![Vec::new(); n_panels];
-        let mut spare: Vec<Vec<T>> = Vec::new();
-        for number in 0..n_panels {
-            let panel = self.symbolic.panel(number);
-            let values = &mut self.factor[panel.values()];
-            let mut square = spare.pop().unwrap_or_default();
-            square.clear();
-            square.resize(panel.below.len().pow(2), T::ZERO);
-            for &child in panel.children {
-                let update = std::mem::take(&mut left_over[child as usize]);
-                let rows = self.symbolic.panel(child as usize).in_parent;
-                add_child(&update, rows, panel, values, &mut square);
-                spare.push(update);
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let symbolic = self.symbolic;
+        let [columns_len, squares_len] = symbolic.workspace();
+        let mut memory = vec![T::ZERO; columns_len + squares_len + LINE];
+        let begin = memory.as_ptr().align_offset(LINE).min(LINE);
+        let (columns, squares) = memory[begin..].split_at_mut(columns_len);
+        let mut factor = Vec::with_capacity(symbolic.factor_len() + ROWS);
+        let mut end = 0;
+        for number in 0..symbolic.n_panels() {
+            let panel = symbolic.panel(number);
+            let shape = panel.shape();
+            let columns = &mut columns[..shape.columns_len()];
+            let (done, free) = squares.split_at_mut(end);
+            let square = &mut free[..shape.square_len()];
+            columns.fill(T::ZERO);
+            square.fill(T::ZERO);
+            for &(to, from) in symbolic.scatter(number) {
+                columns[to as usize] = self.values[from as usize];
             }
-            eliminate(values, panel.height(), panel.width).map_err(|j| panel.start + j)?;
-            subtract_square(&mut square, values, panel.height(), panel.width);
-            left_over[number] = square;
+            let start = end - symbolic.children_len(panel);
+            let mut at = start;
+            for &child in panel.children {
+                let child = symbolic.panel(child as usize);
+                add_child(&done[at..], child, shape, columns, square);
+                at += child.shape().square_len();
+            }
+            eliminate(simd, columns, shape).map_err(|j| panel.start + j)?;
+            subtract_square(simd, square, columns, shape);
+            factor.resize(panel.values().end + ROWS, T::ZERO);
+            pack(columns, shape, &mut factor[panel.first_value..]);
+            squares.copy_within(end..end + shape.square_len(), start);
+            end = start + shape.square_len();
         }
-        Ok(())
+        factor.truncate(symbolic.factor_len());
+        Ok(factor)
     }
 }
 
-/// Adds a child's square to the front: the columns into `values`, the rest into `square`.
+/// Adds a child's square to the front of its parent, whose size is `shape`.
 #[inline(always)]
 fn add_child<T: Scalar>(
     update: &[T],
-    rows: &[u32],
-    panel: Panel<'_>,
-    values: &mut [T],
+    child: Panel<'_>,
+    shape: Shape,
+    columns: &mut [T],
     square: &mut [T],
 ) {
-    let (size, width, height) = (rows.len(), panel.width, panel.height());
-    let n_columns = rows.partition_point(|&row| (row as usize) < width);
-    for j in 0..n_columns {
-        let target = &mut values[rows[j] as usize * height..][..height];
-        for (&row, &value) in rows[j..].iter().zip(&update[j * size + j..(j + 1) * size]) {
-            target[row as usize] += value;
+    let (rows, side) = (child.in_parent, child.shape().side());
+    let inner = rows.partition_point(|&row| (row as usize) < shape.top());
+    let target = |column: u32| column as usize * shape.stride();
+    let mut j = 0;
+    while j + 4 <= inner {
+        add_columns::<4, T>(columns, target, &rows[j..], &update[j * side + j..], side);
+        j += 4;
+    }
+    while j < inner {
+        add_columns::<1, T>(columns, target, &rows[j..], &update[j * side + j..], side);
+        j += 1;
+    }
+    let target =
+        |column: u32| ((column as usize - shape.top()) * shape.side()).wrapping_sub(shape.top());
+    while j + 4 <= rows.len() {
+        add_columns::<4, T>(square, target, &rows[j..], &update[j * side + j..], side);
+        j += 4;
+    }
+    while j < rows.len() {
+        add_columns::<1, T>(square, target, &rows[j..], &update[j * side + j..], side);
+        j += 1;
+    }
+}
+
+/// Adds the first `N` columns of a child's square, from the diagonal on, to those of the front that
+/// begin at `begin` of their numbers.
+///
+/// Several at a time, since most are short; what comes above the diagonal is of no use.
+#[inline(always)]
+fn add_columns<const N: usize, T: Scalar>(
+    target: &mut [T],
+    begin: impl Fn(u32) -> usize,
+    rows: &[u32],
+    update: &[T],
+    side: usize,
+) {
+    let begins: [usize; N] = from_fn(|c| begin(rows[c]));
+    let (first, last) = (rows[0] as usize, rows[rows.len() - 1] as usize);
+    for begin in begins {
+        assert!(begin.wrapping_add(first) <= begin.wrapping_add(last));
+        assert!(begin.wrapping_add(last) < target.len());
+    }
+    assert!(update.len() >= (N - 1) * side + rows.len());
+    for (i, &row) in rows.iter().enumerate() {
+        for (c, begin) in begins.into_iter().enumerate() {
+            // SAFETY: rows ascend, and the first and the last are within what has been asserted.
+            unsafe {
+                *target.get_unchecked_mut(begin.wrapping_add(row as usize)) +=
+                    *update.get_unchecked(c * side + i);
+            }
         }
     }
-    let n_below = panel.below.len();
-    for j in n_columns..size {
-        let target = &mut square[(rows[j] as usize - width) * n_below..][..n_below];
-        for (&row, &value) in rows[j..].iter().zip(&update[j * size + j..(j + 1) * size]) {
-            target[row as usize - width] += value;
+}
+
+/// Writes a front's columns without their padding; what follows them is of no use.
+#[inline(always)]
+fn pack<T: Scalar>(columns: &[T], shape: Shape, packed: &mut [T]) {
+    let (width, below, top) = (shape.width, shape.below, shape.top());
+    for j in 0..width {
+        let column = &columns[j * shape.stride()..][..shape.stride()];
+        let target = &mut packed[j * (width + below)..];
+        // whole vectors: what is written too much is written over by what follows
+        for (part, first) in [(&column[..top], 0), (&column[top..], width)] {
+            for (at, part) in part.as_chunks::<ROWS>().0.iter().enumerate() {
+                target[first + at * ROWS..][..ROWS].copy_from_slice(part);
+            }
         }
     }
 }

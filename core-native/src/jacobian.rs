@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
+use crate::instructions::narrow;
 use crate::scalar::Scalar;
 use crate::threads::{Shared, split};
 
@@ -115,7 +116,7 @@ pub fn jacobian<T: Scalar>(fields: Fields<'_, T>, table: &Table, out: &mut [T], 
     let far = size_of_val(out) > LARGE;
     let out = Shared::new(out);
     split(fields.shape[2], GRAIN, threads, |cells| {
-        Arch::new().dispatch(Blocks {
+        narrow(Blocks {
             fields,
             table,
             cells,

@@ -1,110 +1,273 @@
-//! Dense work on one panel: small sizes by short loops, large ones by products.
+//! Dense work on one front: tiles that stay in registers for small ones, products for large ones.
+//!
+//! A front is what belongs to one panel while it is eliminated: its columns, and the square of the
+//! rows below them. Rows and columns are padded with zeros to whole vectors, so that no loop has a
+//! remainder; entries above the diagonal are of no use.
+
+use std::array::from_fn;
+
+use pulp::Simd;
 
 use crate::dense::{Target, View, add_product};
 use crate::scalar::Scalar;
 
-/// Columns that are eliminated by short loops before the rest is updated as a whole.
+/// Rows come in such numbers: whole vectors of every processor.
+pub const ROWS: usize = 8;
+/// Columns of a tile.
+const WIDE: usize = 4;
+/// Columns that are eliminated before the rest is updated as a whole.
 const BLOCK: usize = 32;
 /// From this many multiplications on, the product is the faster one.
-const LARGE: usize = 16 * 1024;
+const LARGE: usize = 64 * 1024;
 
-/// Cholesky factor, without conjugation, of a panel's first rows, and the rows below solved for it.
+/// Size of a front, and where its parts lie.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape {
+    /// Number of columns.
+    pub width: usize,
+    /// Number of rows below their diagonal block.
+    pub below: usize,
+}
+
+impl Shape {
+    /// Where the rows below begin in a column.
+    #[inline(always)]
+    pub fn top(self) -> usize {
+        self.width.next_multiple_of(ROWS)
+    }
+
+    /// From column to column of the square.
+    #[inline(always)]
+    pub fn side(self) -> usize {
+        self.below.next_multiple_of(ROWS)
+    }
+
+    /// From column to column.
+    #[inline(always)]
+    pub fn stride(self) -> usize {
+        self.top() + self.side()
+    }
+
+    /// Number of values in the columns.
+    #[inline(always)]
+    pub fn columns_len(self) -> usize {
+        self.stride() * self.width.next_multiple_of(WIDE)
+    }
+
+    /// Number of values in the square.
+    #[inline(always)]
+    pub fn square_len(self) -> usize {
+        self.side() * self.below.next_multiple_of(WIDE)
+    }
+}
+
+/// Cholesky factor, without conjugation, of the first rows of a front's columns, and the rows below
+/// solved for it; the diagonal gets the inverse of its entries.
 ///
 /// Gives the column whose pivot is not positive as an error.
 #[inline(always)]
-pub fn eliminate<T: Scalar>(panel: &mut [T], height: usize, width: usize) -> Result<(), usize> {
+pub fn eliminate<S: Simd, T: Scalar>(
+    simd: S,
+    columns: &mut [T],
+    shape: Shape,
+) -> Result<(), usize> {
+    let (width, stride) = (shape.width, shape.stride());
     for first in (0..width).step_by(BLOCK) {
         let end = width.min(first + BLOCK);
-        eliminate_block(panel, height, first, end)?;
+        for j in (first..end).step_by(WIDE) {
+            let (done, rest) = columns.split_at_mut(j * stride);
+            if j > first {
+                let begin = j - j % ROWS;
+                let source = Source {
+                    rows: &done[first * stride + begin..],
+                    factors: &done[first * stride + j..],
+                    stride,
+                    depth: j - first,
+                };
+                subtract(simd, &mut rest[begin..], stride, stride - begin, source);
+            }
+            eliminate_four(simd, rest, stride, j, WIDE.min(end - j))?;
+        }
         if end < width {
-            let (done, rest) = panel.split_at_mut(end * height);
-            let size = [height - end, width - end, end - first];
-            let target = Target::lower(&mut rest[end..], height);
-            subtract_lower(target, &done[first * height + end..], height, size);
+            let (done, rest) = columns.split_at_mut(end * stride);
+            let height = shape.top() + shape.below - end;
+            let target = Target::lower(&mut rest[end..], stride);
+            let rows = &done[first * stride + end..];
+            subtract_lower(target, rows, stride, [height, width - end, end - first]);
         }
     }
     Ok(())
 }
 
+/// Subtracts the lower triangle of L Lᵀ, L the rows below in the columns, from the square.
 #[inline(always)]
-fn eliminate_block<T: Scalar>(
-    panel: &mut [T],
-    height: usize,
-    first: usize,
-    end: usize,
-) -> Result<(), usize> {
-    for j in first..end {
-        let (done, rest) = panel[first * height..].split_at_mut((j - first) * height);
-        let column = &mut rest[j..height];
-        subtract_columns(column, done, height, j, j);
-        let pivot = column[0].pivot().ok_or(j)?;
-        column[0] = pivot;
-        let inverse = T::ONE / pivot;
-        for value in &mut column[1..] {
-            *value *= inverse;
-        }
-    }
-    Ok(())
-}
-
-/// Subtracts the lower triangle of L Lᵀ, L the panel's rows below, from the square `update`.
-#[inline(always)]
-pub fn subtract_square<T: Scalar>(update: &mut [T], panel: &[T], height: usize, width: usize) {
-    let size = height - width;
-    if size * size * width < LARGE {
-        for j in 0..size {
-            let column = &mut update[j * size + j..(j + 1) * size];
-            subtract_columns(column, panel, height, width + j, width + j);
-        }
+pub fn subtract_square<S: Simd, T: Scalar>(simd: S, square: &mut [T], columns: &[T], shape: Shape) {
+    let (below, side, stride) = (shape.below, shape.side(), shape.stride());
+    let rows = &columns[shape.top()..];
+    if below * below * shape.width >= LARGE {
+        let target = Target::lower(square, side);
+        subtract_lower(target, rows, stride, [below, below, shape.width]);
         return;
     }
-    let target = Target::lower(update, size);
-    subtract_lower(target, &panel[width..], height, [size, size, width]);
-}
-
-/// Subtracts, from a target that begins at row `from`, the columns times their entries in `row`.
-#[inline(always)]
-fn subtract_columns<T: Scalar>(
-    target: &mut [T],
-    source: &[T],
-    height: usize,
-    from: usize,
-    row: usize,
-) {
-    let mut fours = source.chunks_exact(4 * height);
-    for four in fours.by_ref() {
-        subtract_some::<4, T>(target, four, height, from, row);
-    }
-    for one in fours.remainder().chunks_exact(height) {
-        subtract_some::<1, T>(target, one, height, from, row);
+    for j in (0..below).step_by(WIDE) {
+        let begin = j - j % ROWS;
+        let source = Source {
+            rows: &rows[begin..],
+            factors: &rows[j..],
+            stride,
+            depth: shape.width,
+        };
+        let target = &mut square[j * side + begin..];
+        subtract(simd, target, side, side - begin, source);
     }
 }
 
+/// Columns of which multiples are subtracted from others.
+#[derive(Clone, Copy)]
+struct Source<'a, T> {
+    /// From the first row on that is subtracted.
+    rows: &'a [T],
+    /// From the row on in which the factors stand.
+    factors: &'a [T],
+    stride: usize,
+    /// Number of columns.
+    depth: usize,
+}
+
+/// Subtracts from four columns, `height` rows of them, the columns of the source times its factors.
 #[inline(always)]
-fn subtract_some<const K: usize, T: Scalar>(
+fn subtract<S: Simd, T: Scalar>(
+    simd: S,
     target: &mut [T],
-    source: &[T],
+    column: usize,
     height: usize,
-    from: usize,
-    row: usize,
+    source: Source<'_, T>,
 ) {
-    let n = target.len();
-    let factors: [T; K] = std::array::from_fn(|k| source[k * height + row]);
-    let rows: [&[T]; K] = std::array::from_fn(|k| &source[k * height + from..][..n]);
-    for i in 0..n {
-        let mut value = target[i];
-        for k in 0..K {
-            value -= rows[k][i] * factors[k];
+    let lanes = size_of::<T::Vector<S>>() / size_of::<T>();
+    let mut row = 0;
+    while row + 2 * lanes <= height {
+        subtract_tile::<S, T, 2>(simd, &mut target[row..], column, row, source);
+        row += 2 * lanes;
+    }
+    if row < height {
+        subtract_tile::<S, T, 1>(simd, &mut target[row..], column, row, source);
+    }
+}
+
+#[inline(always)]
+fn subtract_tile<S: Simd, T: Scalar, const TALL: usize>(
+    simd: S,
+    target: &mut [T],
+    column: usize,
+    row: usize,
+    source: Source<'_, T>,
+) {
+    let rows = &source.rows[row..];
+    let sums = tile::<S, T, TALL, WIDE>(simd, rows, source.factors, source.stride, source.depth);
+    for (c, sums) in sums.into_iter().enumerate() {
+        let values = &mut T::vectors_mut::<S>(&mut target[c * column..])[..TALL];
+        for (value, sum) in values.iter_mut().zip(sums) {
+            *value = T::less(simd, *value, sum);
         }
-        target[i] = value;
     }
+}
+
+/// Σ over `depth` columns, each `stride` after the last: its first `TALL` vectors in `rows` times
+/// its first `N` numbers in `factors`.
+#[inline(always)]
+pub fn tile<S: Simd, T: Scalar, const TALL: usize, const N: usize>(
+    simd: S,
+    rows: &[T],
+    factors: &[T],
+    stride: usize,
+    depth: usize,
+) -> [[T::Vector<S>; TALL]; N] {
+    let mut sums = [[T::zeros(simd); TALL]; N];
+    let Some(last) = depth.checked_sub(1).map(|last| last * stride) else {
+        return sums;
+    };
+    let tall = TALL * size_of::<T::Vector<S>>() / size_of::<T>();
+    assert!(rows.len() >= last + tall && factors.len() >= last + N);
+    for k in 0..depth {
+        // SAFETY: both are within what has been asserted, for the last column and so for all.
+        let (rows, factors) = unsafe {
+            let rows = rows.as_ptr().add(k * stride);
+            let factors = factors.as_ptr().add(k * stride);
+            (
+                rows.cast::<[T::Vector<S>; TALL]>().read_unaligned(),
+                factors.cast::<[T; N]>().read_unaligned(),
+            )
+        };
+        for (sums, factor) in sums.iter_mut().zip(factors) {
+            let factor = T::factor(simd, factor);
+            for (sum, row) in sums.iter_mut().zip(rows) {
+                *sum = T::plus_product(simd, row, factor, *sum);
+            }
+        }
+    }
+    sums
+}
+
+/// Eliminates columns `j` to `j` + 4, of which `count` are real; `columns` begins with the first.
+#[inline(always)]
+fn eliminate_four<S: Simd, T: Scalar>(
+    simd: S,
+    columns: &mut [T],
+    stride: usize,
+    j: usize,
+    count: usize,
+) -> Result<(), usize> {
+    let block: [&[T]; WIDE] = from_fn(|k| &columns[k * stride + j..][..WIDE]);
+    let mut factor: [[T; WIDE]; WIDE] = block.map(|column| from_fn(|i| column[i]));
+    let mut inverse = [T::ZERO; WIDE];
+    for k in 0..WIDE {
+        for d in 0..k {
+            let (done, by) = (factor[d], factor[d][k]);
+            for i in k..WIDE {
+                factor[k][i] -= done[i] * by;
+            }
+        }
+        if k < count {
+            inverse[k] = T::ONE / factor[k][k].pivot().ok_or(j + k)?;
+        }
+        for value in &mut factor[k][k + 1..] {
+            *value *= inverse[k];
+        }
+    }
+    let begin = j - j % ROWS;
+    let (first, rest) = columns.split_at_mut(stride);
+    let (second, rest) = rest.split_at_mut(stride);
+    let (third, rest) = rest.split_at_mut(stride);
+    let fourth = &mut rest[..stride];
+    let scale = inverse.map(|value| T::factor(simd, value));
+    let by = factor.map(|column| column.map(|value| T::factor(simd, -value)));
+    let first = T::vectors_mut::<S>(&mut first[begin..]);
+    let second = T::vectors_mut::<S>(&mut second[begin..]);
+    let third = T::vectors_mut::<S>(&mut third[begin..]);
+    let fourth = T::vectors_mut::<S>(&mut fourth[begin..]);
+    for (((a, b), c), d) in first.iter_mut().zip(second).zip(third).zip(fourth) {
+        *a = T::times(simd, *a, scale[0]);
+        *b = T::plus_product(simd, *a, by[0][1], *b);
+        *b = T::times(simd, *b, scale[1]);
+        *c = T::plus_product(simd, *a, by[0][2], *c);
+        *c = T::plus_product(simd, *b, by[1][2], *c);
+        *c = T::times(simd, *c, scale[2]);
+        *d = T::plus_product(simd, *a, by[0][3], *d);
+        *d = T::plus_product(simd, *b, by[1][3], *d);
+        *d = T::plus_product(simd, *c, by[2][3], *d);
+        *d = T::times(simd, *d, scale[3]);
+    }
+    for k in 0..count {
+        columns[k * stride + j + k] = inverse[k];
+    }
+    Ok(())
 }
 
 /// Subtracts L (first rows of L)ᵀ below the diagonal; `size`: rows, columns, columns of L.
-fn subtract_lower<T: Scalar>(target: Target<'_, T>, rows: &[T], height: usize, size: [usize; 3]) {
+fn subtract_lower<T: Scalar>(target: Target<'_, T>, rows: &[T], stride: usize, size: [usize; 3]) {
     let rows = View {
         values: rows,
-        strides: [1, height],
+        strides: [1, stride],
     };
     add_product(target, -1.0, rows, rows.transposed(), size);
 }

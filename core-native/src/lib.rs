@@ -1,13 +1,16 @@
 //! Sparse Cholesky factors and Jacobian rows for tomoskin.
 
+mod amalgamation;
 #[cfg(feature = "python")]
 mod arrays;
 #[cfg(target_arch = "x86_64")]
 mod assembly;
 pub mod dense;
 pub mod factor;
+pub mod instructions;
 pub mod jacobian;
 mod kernel;
+mod lanes;
 pub mod linear;
 mod ordering;
 pub mod panels;
@@ -19,7 +22,7 @@ pub mod product;
 mod python;
 #[cfg(feature = "reference")]
 mod reference;
-pub mod residual;
+mod residual;
 pub mod scalar;
 pub mod small;
 pub mod solve;

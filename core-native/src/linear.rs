@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 use crate::dense::{Matrix, Target, View, add_product};
+use crate::instructions::narrow;
 use crate::scalar::Scalar;
 
 /// Columns that are eliminated before a product updates the rest.
@@ -24,7 +25,7 @@ pub fn solve<T: Scalar>(transposed: &Matrix<T>, rhs: &mut Matrix<T>) {
     let block = if m <= SMALL { m } else { BLOCK };
     let blocks = (0..m).step_by(block.max(1)).map(|k| k..m.min(k + block));
     for columns in blocks.clone() {
-        Arch::new().dispatch(Eliminate {
+        narrow(Eliminate {
             joined: &mut joined,
             row,
             columns: columns.clone(),
@@ -38,7 +39,7 @@ pub fn solve<T: Scalar>(transposed: &Matrix<T>, rhs: &mut Matrix<T>) {
         );
     }
     for columns in blocks.rev() {
-        Arch::new().dispatch(Substitute {
+        narrow(Substitute {
             joined: &mut joined,
             row,
             columns: columns.clone(),

@@ -1,10 +1,9 @@
 //! Panels of a factor for a given order of the unknowns: which columns, and which rows below them.
 
+use crate::amalgamation::amalgamated;
+
 /// No column.
 const NONE: u32 = u32::MAX;
-
-/// Adjacent panels are merged up to this many columns with up to this part of zeros.
-const MERGE: &[(usize, f64)] = &[(2, 1.0), (8, 0.5), (32, 0.1), (usize::MAX, 0.02)];
 
 /// The structure of a symmetric matrix given in full, by columns.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +57,13 @@ impl Panels {
             starts: &column_starts,
             rows: &rows,
         };
-        let starts = merged(&tree, &column_counts(lower, &tree));
+        let (merged, starts) = amalgamated(&tree, &column_counts(lower, &tree));
+        let order: Vec<u32> = merged.iter().map(|&old| order[old as usize]).collect();
+        let (column_starts, rows) = self::lower(matrix, &order);
+        let lower = Structure {
+            starts: &column_starts,
+            rows: &rows,
+        };
         let (below_starts, below) = rows_below(lower, &starts);
         Self {
             order,
@@ -207,63 +212,6 @@ fn root(ancestor: &mut [u32], node: u32) -> u32 {
         at = std::mem::replace(&mut ancestor[at as usize], top);
     }
     top
-}
-
-#[derive(Clone, Copy)]
-struct Block {
-    start: usize,
-    width: usize,
-    below: usize,
-    zeros: usize,
-}
-
-impl Block {
-    /// Together with the block that follows, its parent in the tree; nothing where that is wasteful.
-    fn with(self, next: Self) -> Option<Self> {
-        let width = self.width + next.width;
-        let added = self.width * (next.width + next.below - self.below);
-        let zeros = self.zeros + next.zeros + added;
-        let entries = width * (width + 1) / 2 + width * next.below;
-        let allows =
-            |&(most, part): &(usize, f64)| width <= most && zeros as f64 <= part * entries as f64;
-        (added == 0 || MERGE.iter().any(allows)).then_some(Self {
-            start: self.start,
-            width,
-            below: next.below,
-            zeros,
-        })
-    }
-}
-
-/// First column of each panel, then the size: columns of one pattern, and their last child where
-/// few zeros come with it (Ashcraft & Grimes 1989).
-fn merged(parent: &[u32], counts: &[u32]) -> Vec<u32> {
-    let size = counts.len();
-    let mut blocks: Vec<Block> = Vec::new();
-    let mut start = 0;
-    while start < size {
-        let follows = |&j: &usize| parent[j - 1] == j as u32 && counts[j - 1] == counts[j] + 1;
-        let end = (start + 1..size).find(|j| !follows(j)).unwrap_or(size);
-        let mut block = Block {
-            start,
-            width: end - start,
-            below: counts[end - 1] as usize - 1,
-            zeros: 0,
-        };
-        let child = |last: &Block| (parent[start - 1] as usize) < end && last.start < start;
-        if let Some(joined) = blocks
-            .last()
-            .filter(|last| child(last))
-            .and_then(|last| last.with(block))
-        {
-            block = joined;
-            blocks.pop();
-        }
-        blocks.push(block);
-        start = end;
-    }
-    let starts = blocks.iter().map(|block| block.start as u32);
-    starts.chain([size as u32]).collect()
 }
 
 /// Rows below each panel: those of its columns and of its children.

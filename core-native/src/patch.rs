@@ -5,9 +5,10 @@
 //! system there (Woodbury), with the inverse of the base system between the nodes of the rim.
 
 use pulp::bytemuck::fill_zeroes;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 use crate::dense::Matrix;
+use crate::instructions::narrow;
 use crate::linear::solve;
 use crate::scalar::{Scalar, c64};
 
@@ -218,8 +219,7 @@ impl<T: Scalar> Workspace<T> {
         let condense = Condense {
             patch: &mut self.patch,
         };
-        Arch::new()
-            .dispatch(condense)
+        narrow(condense)
             .ok_or(Refusal::Singular)
             .map(|()| woodbury(&self.patch, &nodes, base, out))
     }

@@ -3,13 +3,13 @@
 use std::ops::Range;
 
 use ndarray::ArrayView2;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
+use crate::instructions::narrow;
+use crate::lanes::{ABREAST, Lanes};
 use crate::scalar::Scalar;
 use crate::threads::{Shared, split};
 
-/// Vectors that one pass over the matrix serves.
-pub const ABREAST: usize = 16;
 /// Results that are gathered before they are written out.
 const TILE: usize = 64;
 /// Fewer rows than this are not worth a thread.
@@ -17,19 +17,19 @@ const GRAIN: usize = 16 * 1024;
 
 /// A matrix by rows.
 #[derive(Clone, Copy)]
-pub struct Rows<'a, V = f64> {
+pub struct Rows<'a> {
     starts: &'a [i32],
     columns: &'a [i32],
-    values: &'a [V],
+    values: &'a [f64],
     n_columns: usize,
 }
 
-impl<'a, V: Copy> Rows<'a, V> {
+impl<'a> Rows<'a> {
     /// Checks the three arrays of a compressed-row matrix.
     ///
     /// # Errors
     /// When they are none.
-    pub fn new(starts: &'a [i32], columns: &'a [i32], values: &'a [V]) -> Result<Self, String> {
+    pub fn new(starts: &'a [i32], columns: &'a [i32], values: &'a [f64]) -> Result<Self, String> {
         // without early ends: these loops run for every product, and several entries at a time
         let ascending = starts
             .windows(2)
@@ -77,7 +77,7 @@ impl<'a, V: Copy> Rows<'a, V> {
 
     /// Columns and values of one row.
     #[inline(always)]
-    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, V)> {
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64)> {
         let entries = self.starts[row] as usize..self.starts[row + 1] as usize;
         let columns = self.columns[entries.clone()].iter();
         let pairs = columns.zip(&self.values[entries]);
@@ -85,19 +85,9 @@ impl<'a, V: Copy> Rows<'a, V> {
     }
 }
 
-/// One row of several vectors, in cache lines of its own.
-#[derive(Clone, Copy)]
-#[repr(align(64))]
-pub struct Lanes<T>(pub [T; ABREAST]);
-
-impl<T: Scalar> Lanes<T> {
-    /// Zeros.
-    pub const ZERO: Self = Self([T::ZERO; ABREAST]);
-}
-
 /// Up to sixteen columns from `first` on of a matrix, side by side, zero beyond its last.
 #[inline(always)]
-pub fn abreast<T: Scalar>(vectors: ArrayView2<'_, T>, first: usize) -> Vec<Lanes<T>> {
+fn abreast<T: Scalar>(vectors: ArrayView2<'_, T>, first: usize) -> Vec<Lanes<T>> {
     let (n, k) = vectors.dim();
     let count = ABREAST.min(k - first);
     let within = |i, value| if i < count { value } else { T::ZERO };
@@ -147,7 +137,7 @@ pub fn transposed_product<T: Scalar>(
                 out: &out,
                 vectors: first..first + count,
             };
-            Arch::new().dispatch(rows);
+            narrow(rows);
         });
     }
 }

@@ -3,18 +3,19 @@
 use std::sync::Arc;
 
 use numpy::{
-    Element, Ix1, Ix2, Ix3, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray2,
-    PyUntypedArrayMethods,
+    Element, Ix1, Ix2, Ix3, PyArray2, PyArrayMethods, PyReadwriteArray2, PyUntypedArrayMethods,
 };
+use pulp::Arch;
 use pyo3::prelude::*;
 
 use crate::arrays::{Any, array, contiguous, invalid, is_complex, same, unsigned};
+use crate::instructions::name;
 use crate::jacobian::{Fields, Table};
 use crate::patches::Patches;
 use crate::product::Rows;
 use crate::scalar::{Scalar, c64};
 use crate::spot_python::{SeenTable, SpotTable, projected};
-use crate::{factor, jacobian, product, residual, solve, symbolic, threads};
+use crate::{factor, jacobian, product, solve, symbolic, threads};
 
 #[pyclass(frozen, module = "tomoskin_core")]
 struct Symbolic(Arc<symbolic::Symbolic>);
@@ -64,27 +65,71 @@ enum Number {
 
 #[pymethods]
 impl Factor {
-    fn solve<'py>(&self, rhs: &Any<'py>) -> PyResult<Any<'py>> {
+    fn columns<'py>(&self, rows: &Any<'py>) -> PyResult<Any<'py>> {
         Ok(match &self.0 {
-            Number::Real(factor) => solution(factor, &array("rhs", rhs)?)?.into_any(),
-            Number::Complex(factor) => solution(factor, &array("rhs", rhs)?)?.into_any(),
+            Number::Real(factor) => columns(factor, rows)?.into_any(),
+            Number::Complex(factor) => columns(factor, rows)?.into_any(),
         })
+    }
+
+    fn checked_columns<'py>(&self, values: &Any<'py>, rows: &Any<'py>) -> PyResult<Checked<'py>> {
+        match &self.0 {
+            Number::Real(factor) => checked_columns(factor, values, rows),
+            Number::Complex(factor) => checked_columns(factor, values, rows),
+        }
     }
 }
 
-fn solution<'py, T: Scalar + Element>(
+/// Columns, what they may be off, and their largest residual.
+type Checked<'py> = (Any<'py>, Any<'py>, f64);
+
+fn columns<'py, T: Scalar + Element>(
     factor: &factor::Factor<T>,
-    rhs: &PyReadonlyArray2<'py, T>,
+    rows: &Any<'py>,
 ) -> PyResult<Bound<'py, PyArray2<T>>> {
-    let py = rhs.py();
-    same("rows of rhs", factor.symbolic().size(), rhs.shape()[0])?;
-    let out = PyArray2::<T>::zeros(py, [rhs.shape()[0], rhs.shape()[1]], false);
+    let (py, rows) = (rows.py(), rows_of(factor, rows)?);
+    // SAFETY: `columns` writes all of it before anything reads it.
+    let out = unsafe { PyArray2::<T>::new(py, [factor.symbolic().size(), rows.len()], false) };
     {
         let mut writable = out.readwrite();
-        let (rhs, x) = (rhs.as_array(), writable.as_slice_mut()?);
-        py.detach(|| solve::solve(factor, rhs, x));
+        let x = writable.as_slice_mut()?;
+        py.detach(|| solve::columns(factor, &rows, x));
     }
     Ok(out)
+}
+
+fn checked_columns<'py, T: Scalar + Element>(
+    factor: &factor::Factor<T>,
+    values: &Any<'py>,
+    rows: &Any<'py>,
+) -> PyResult<Checked<'py>> {
+    let (py, rows) = (rows.py(), rows_of(factor, rows)?);
+    let values = array::<T, Ix1>("values", values)?;
+    let values = contiguous("values", &values)?;
+    same(
+        "length of values",
+        factor.symbolic().n_values(),
+        values.len(),
+    )?;
+    // SAFETY: `checked_columns` writes all of it before anything reads it.
+    let out = unsafe { PyArray2::<T>::new(py, [factor.symbolic().size(), rows.len()], false) };
+    let lost = PyArray2::<T>::zeros(py, [rows.len(), rows.len()], false);
+    let largest = {
+        let (mut out, mut lost) = (out.readwrite(), lost.readwrite());
+        let (x, lost) = (out.as_slice_mut()?, lost.as_slice_mut()?);
+        py.detach(|| solve::checked_columns(factor, values, &rows, x, lost))
+    };
+    Ok((out.into_any(), lost.into_any(), largest))
+}
+
+/// Rows of the factorised matrix.
+fn rows_of<T: Scalar>(factor: &factor::Factor<T>, rows: &Any<'_>) -> PyResult<Vec<u32>> {
+    let size = factor.symbolic().size();
+    let rows = array::<i64, Ix1>("rows", rows)?;
+    let rows = rows.as_array();
+    let within = |&row: &i64| u32::try_from(row).ok().filter(|&row| (row as usize) < size);
+    let found: Option<Vec<u32>> = rows.iter().map(within).collect();
+    found.ok_or_else(|| invalid(format!("rows: expected numbers from 0 to {}", size - 1)))
 }
 
 #[pyfunction]
@@ -134,54 +179,6 @@ fn product_into<T: Scalar + Element>(
         .map_err(|_| invalid("out: expected a C-contiguous array"))?;
     py.detach(|| product::transposed_product(matrix, vectors, out, threads));
     Ok(())
-}
-
-#[pyfunction]
-#[pyo3(name = "residual")]
-fn residual_of<'py>(
-    indptr: &Any<'py>,
-    indices: &Any<'_>,
-    data: &Any<'_>,
-    rhs: &Any<'_>,
-    x: &Any<'_>,
-) -> PyResult<(Any<'py>, f64)> {
-    let py = indptr.py();
-    let starts = array::<i32, Ix1>("indptr", indptr)?;
-    let columns = array::<i32, Ix1>("indices", indices)?;
-    let (starts, columns) = (
-        contiguous("indptr", &starts)?,
-        contiguous("indices", &columns)?,
-    );
-    if is_complex(data) {
-        return left_over::<c64>(py, starts, columns, [data, rhs, x]);
-    }
-    left_over::<f64>(py, starts, columns, [data, rhs, x])
-}
-
-fn left_over<'py, T: Scalar + Element>(
-    py: Python<'py>,
-    starts: &[i32],
-    columns: &[i32],
-    [data, rhs, x]: [&Any<'_>; 3],
-) -> PyResult<(Any<'py>, f64)> {
-    let values = array::<T, Ix1>("data", data)?;
-    let matrix = Rows::new(starts, columns, contiguous("data", &values)?).map_err(invalid)?;
-    let (rhs, x) = (array::<T, Ix2>("rhs", rhs)?, array::<T, Ix2>("x", x)?);
-    let (n, k) = (x.shape()[0], x.shape()[1]);
-    same("rows of x", matrix.n_rows(), n)?;
-    same("rows of rhs", n, rhs.shape()[0])?;
-    same("columns of rhs", k, rhs.shape()[1])?;
-    if matrix.n_columns() > n {
-        return Err(invalid("indices: a column beyond the rows of x"));
-    }
-    let lost = PyArray2::<T>::zeros(py, [k, k], false);
-    let largest = {
-        let mut writable = lost.readwrite();
-        let values = writable.as_slice_mut()?;
-        let (rhs, x) = (rhs.as_array(), x.as_array());
-        py.detach(|| residual::residual(matrix, rhs, x, values))
-    };
-    Ok((lost.into_any(), largest))
 }
 
 #[pyfunction]
@@ -261,6 +258,7 @@ fn keep_freed_memory() {
 fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     keep_freed_memory();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("vector_code", name(Arch::new()))?;
     module.add_class::<Symbolic>()?;
     module.add_class::<Factor>()?;
     module.add_class::<Patches>()?;
@@ -270,6 +268,5 @@ fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<crate::reference::Reference>()?;
     module.add_function(wrap_pyfunction!(jacobian_rows, module)?)?;
     module.add_function(wrap_pyfunction!(projected, module)?)?;
-    module.add_function(wrap_pyfunction!(residual_of, module)?)?;
     module.add_function(wrap_pyfunction!(transposed_product, module)?)
 }

@@ -1,123 +1,159 @@
-//! What a solve leaves over, and what that may cost, in one pass over the matrix.
+//! What columns of an inverse leave over, and what that may cost, in one pass over the matrix.
 
-use ndarray::{ArrayView2, s};
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::product::{ABREAST, Lanes, Rows, abreast};
+use crate::instructions::run;
+use crate::kernel::tile;
+use crate::lanes::{ABREAST, GROUP, Lanes, flat};
 use crate::scalar::Scalar;
+use crate::symbolic::Symbolic;
 
 /// Rows whose residuals stay in the first cache while they are multiplied with the solution.
 const TILE: usize = 64;
+/// Columns of the solution in a tile of products.
+const WIDE: usize = 4;
 
-/// Writes Xᵀ (B − A X), row-major (k, k), and gives the largest entry of B − A X in size.
-///
-/// The matrix is symmetric, so that its columns are as good as its rows. B and X are (n, k); the
-/// result is NaN where one of their numbers is.
-///
-/// # Panics
-/// When a size does not fit.
-pub fn residual<T: Scalar>(
-    matrix: Rows<'_, T>,
-    rhs: ArrayView2<'_, T>,
-    x: ArrayView2<'_, T>,
-    lost: &mut [T],
-) -> f64 {
-    let (n, k) = x.dim();
-    assert!(matrix.n_rows() == n && matrix.n_columns() <= n);
-    assert!(rhs.dim() == x.dim() && lost.len() == k * k);
-    let groups = (0..k).step_by(ABREAST);
-    let known: Vec<_> = groups.clone().map(|first| abreast(x, first)).collect();
-    let mut largest = 0.0_f64;
-    for (group, first) in groups.enumerate() {
-        let mut sums = vec![[Lanes::ZERO; ABREAST]; known.len()];
-        let found = Arch::new().dispatch(Pass {
-            matrix,
-            rhs,
-            known: &known,
-            group,
-            sums: &mut sums,
-        });
-        largest = if largest > found { largest } else { found };
-        if largest.is_nan() {
-            break;
-        }
-        let count = ABREAST.min(k - first);
-        for (sum, target) in sums.as_flattened().iter().zip(lost.chunks_exact_mut(k)) {
-            target[first..first + count].copy_from_slice(&sum.0[..count]);
-        }
-    }
-    largest.sqrt()
+/// A matrix, and columns of what should be its inverse.
+pub(crate) struct Columns<'a, T> {
+    /// The matrix's structure, whose order of rows all of this is in.
+    pub symbolic: &'a Symbolic,
+    /// The matrix's values.
+    pub values: &'a [T],
+    /// In which row the unit of each column stands.
+    pub units: &'a [u32],
+    /// The columns X, sixteen at a time.
+    pub x: &'a [Vec<Lanes<T>>],
 }
 
+impl<T: Scalar> Columns<'_, T> {
+    /// Writes Xᵀ (E − A X), E the units, row-major (k, k), and gives the largest entry of E − A X in
+    /// size; NaN where a number of it is.
+    pub fn residual(&self, arch: Arch, lost: &mut [T]) -> f64 {
+        let k = self.units.len();
+        let mut largest = 0.0_f64;
+        for (group, units) in self.units.chunks(ABREAST).enumerate() {
+            let mut sums = vec![Lanes::ZERO; ABREAST * self.x.len()];
+            let found = run(
+                arch,
+                Pass {
+                    columns: self,
+                    own: &self.x[group],
+                    units,
+                    sums: &mut sums,
+                },
+            );
+            largest = if largest > found { largest } else { found };
+            if largest.is_nan() {
+                break;
+            }
+            for (sum, target) in sums.iter().zip(lost.chunks_exact_mut(k)) {
+                target[group * ABREAST..][..units.len()].copy_from_slice(&sum.0[..units.len()]);
+            }
+        }
+        largest.sqrt()
+    }
+}
+
+/// A pass over the matrix for some of the columns.
 struct Pass<'a, T> {
-    matrix: Rows<'a, T>,
-    rhs: ArrayView2<'a, T>,
-    /// The solution, by groups of columns.
-    known: &'a [Vec<Lanes<T>>],
-    /// Which of them this pass is for.
-    group: usize,
-    /// For each group, its products with the residual.
-    sums: &'a mut [[Lanes<T>; ABREAST]],
+    columns: &'a Columns<'a, T>,
+    own: &'a [Lanes<T>],
+    units: &'a [u32],
+    /// The products of each column of the solution with the residuals.
+    sums: &'a mut [Lanes<T>],
 }
 
 impl<T: Scalar> WithSimd for Pass<'_, T> {
     type Output = f64;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> f64 {
-        let mut largest = [0.0_f64; ABREAST];
-        let mut poison = 0.0_f64;
-        let (n, own) = (self.matrix.n_rows(), &self.known[self.group]);
+    fn with_simd<S: Simd>(self, simd: S) -> f64 {
+        let mut sizes = Sizes([[0.0; ABREAST]; 2]);
+        let n = self.own.len();
+        let group = GROUP * size_of::<T::Vector<S>>() / size_of::<T>();
+        let mut left = [Lanes::<T>::ZERO; TILE]; // and so are columns beyond the last
         for begin in (0..n).step_by(TILE) {
             let rows = begin..n.min(begin + TILE);
-            let given = self.rhs.slice(s![rows.clone(), ..]);
-            let mut tile = abreast(given, self.group * ABREAST);
-            for (left, row) in tile.iter_mut().zip(rows.clone()) {
-                subtract_row(left, self.matrix, row, own);
-                for (most, value) in largest.iter_mut().zip(left.0) {
-                    let size = value.norm_sqr();
-                    *most = if size > *most { size } else { *most };
-                    poison += size * 0.0; // NaN from now on where a number is not finite
+            for (left, row) in left.iter_mut().zip(rows.clone()) {
+                for at in (0..self.units.len()).step_by(group) {
+                    self.product(simd, left, at, row);
                 }
             }
-            for (sums, known) in self.sums.iter_mut().zip(self.known) {
-                add_products(sums, &known[rows.clone()], &tile);
+            for (column, &unit) in self.units.iter().enumerate() {
+                if rows.contains(&(unit as usize)) {
+                    left[unit as usize - begin].0[column] += T::ONE;
+                }
+            }
+            let left = &left[..rows.len()];
+            left.iter().for_each(|left| sizes.add(left));
+            for (sums, x) in self.sums.chunks_exact_mut(ABREAST).zip(self.columns.x) {
+                for at in (0..self.units.len()).step_by(group) {
+                    add_products::<S, T>(simd, sums, at, &x[rows.clone()], left);
+                }
             }
         }
-        largest
-            .into_iter()
-            .fold(poison, |a, b| if a > b || a.is_nan() { a } else { b })
+        sizes.largest()
     }
 }
 
+impl<T: Scalar> Pass<'_, T> {
+    /// Writes a group of vectors from `at` on of a row of − A X.
+    #[inline(always)]
+    fn product<S: Simd>(&self, simd: S, left: &mut Lanes<T>, at: usize, row: usize) {
+        let zero = T::zeros(simd);
+        let mut sums = [zero; GROUP];
+        for (column, from) in self.columns.symbolic.row(row) {
+            let value = T::factor(simd, self.columns.values[from]);
+            let known = &T::vectors::<S>(&self.own[column].0[at..])[..GROUP];
+            for (sum, &known) in sums.iter_mut().zip(known) {
+                *sum = T::plus_product(simd, known, value, *sum);
+            }
+        }
+        let left = T::vectors_mut::<S>(&mut left.0[at..]);
+        for (value, sum) in left.iter_mut().zip(sums) {
+            *value = T::less(simd, zero, sum);
+        }
+    }
+}
+
+/// The largest squares of absolute values in each column, and NaN where a number is not finite.
+struct Sizes([[f64; ABREAST]; 2]);
+
+impl Sizes {
+    #[inline(always)]
+    fn add<T: Scalar>(&mut self, row: &Lanes<T>) {
+        let [largest, poison] = &mut self.0;
+        for i in 0..ABREAST {
+            let size = row.0[i].norm_sqr();
+            largest[i] = if size > largest[i] { size } else { largest[i] };
+            poison[i] += size * 0.0;
+        }
+    }
+
+    fn largest(self) -> f64 {
+        let all = self.0.into_iter().flatten();
+        all.fold(0.0, |a, b| if a > b || a.is_nan() { a } else { b })
+    }
+}
+
+/// Adds Xᵀ R over some rows, a group of vectors of R from `at` on.
 #[inline(always)]
-fn subtract_row<T: Scalar>(
-    left: &mut Lanes<T>,
-    matrix: Rows<'_, T>,
-    row: usize,
-    known: &[Lanes<T>],
+fn add_products<S: Simd, T: Scalar>(
+    simd: S,
+    sums: &mut [Lanes<T>],
+    at: usize,
+    x: &[Lanes<T>],
+    left: &[Lanes<T>],
 ) {
-    let mut sums = *left;
-    for (column, value) in matrix.row(row) {
-        for (sum, &x) in sums.0.iter_mut().zip(&known[column].0) {
-            *sum -= value * x;
-        }
-    }
-    *left = sums;
-}
-
-/// Adds Xᵀ R over some rows: two columns of X a time, so that the sums stay in registers.
-#[inline(always)]
-fn add_products<T: Scalar>(sums: &mut [Lanes<T>; ABREAST], x: &[Lanes<T>], left: &[Lanes<T>]) {
-    for (at, pair) in sums.as_chunks_mut::<2>().0.iter_mut().enumerate() {
-        let [mut first, mut second] = *pair;
-        for (x, left) in x.iter().zip(left) {
-            let (p, q) = (x.0[2 * at], x.0[2 * at + 1]);
-            for i in 0..ABREAST {
-                first.0[i] += left.0[i] * p;
-                second.0[i] += left.0[i] * q;
+    let one = T::factor(simd, T::ONE);
+    let (x, left, depth) = (flat(x), flat(left), x.len());
+    for column in (0..ABREAST).step_by(WIDE) {
+        let products = tile::<S, T, GROUP, WIDE>(simd, &left[at..], &x[column..], ABREAST, depth);
+        for (sum, products) in sums[column..].iter_mut().zip(products) {
+            let sum = T::vectors_mut::<S>(&mut sum.0[at..]);
+            for (sum, product) in sum.iter_mut().zip(products) {
+                *sum = T::plus_product(simd, product, one, *sum);
             }
         }
-        *pair = [first, second];
     }
 }

@@ -1,7 +1,8 @@
 //! The two number types of a system matrix.
 
-use pulp::Simd;
-use pulp::bytemuck::Pod;
+use pulp::bytemuck::{Pod, cast};
+use pulp::{Scalar128b, Simd};
+use std::any::TypeId;
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
@@ -48,6 +49,37 @@ pub trait Scalar:
     /// The number times the imaginary unit; a real number, itself.
     fn turned(self) -> Self;
 
+    /// As many as a register of `S` holds.
+    type Vector<S: Simd>: Copy;
+    /// One number, ready to be multiplied with vectors.
+    type Factor<S: Simd>: Copy;
+
+    /// The whole vectors of a slice from its begin on.
+    fn vectors<S: Simd>(values: &[Self]) -> &[Self::Vector<S>];
+
+    /// The whole vectors of a slice from its begin on.
+    fn vectors_mut<S: Simd>(values: &mut [Self]) -> &mut [Self::Vector<S>];
+
+    /// Zeros.
+    fn zeros<S: Simd>(simd: S) -> Self::Vector<S>;
+
+    /// A number as a factor.
+    fn factor<S: Simd>(simd: S, value: Self) -> Self::Factor<S>;
+
+    /// a b + c, rounded once where the processor does so.
+    fn plus_product<S: Simd>(
+        simd: S,
+        a: Self::Vector<S>,
+        b: Self::Factor<S>,
+        c: Self::Vector<S>,
+    ) -> Self::Vector<S>;
+
+    /// a b.
+    fn times<S: Simd>(simd: S, a: Self::Vector<S>, b: Self::Factor<S>) -> Self::Vector<S>;
+
+    /// a − b.
+    fn less<S: Simd>(simd: S, a: Self::Vector<S>, b: Self::Vector<S>) -> Self::Vector<S>;
+
     /// Writes x b₀ + y b₁ to the first and x c₀ + y c₁ to the second, entry by entry.
     #[inline(always)]
     fn two_sums<S: Simd>(
@@ -90,6 +122,47 @@ impl Scalar for f64 {
     #[inline(always)]
     fn turned(self) -> Self {
         self
+    }
+
+    type Vector<S: Simd> = S::f64s;
+    type Factor<S: Simd> = S::f64s;
+
+    #[inline(always)]
+    fn vectors<S: Simd>(values: &[Self]) -> &[S::f64s] {
+        S::as_simd_f64s(values).0
+    }
+
+    #[inline(always)]
+    fn vectors_mut<S: Simd>(values: &mut [Self]) -> &mut [S::f64s] {
+        S::as_mut_simd_f64s(values).0
+    }
+
+    #[inline(always)]
+    fn zeros<S: Simd>(simd: S) -> S::f64s {
+        simd.splat_f64s(Self::ZERO)
+    }
+
+    #[inline(always)]
+    fn less<S: Simd>(simd: S, a: S::f64s, b: S::f64s) -> S::f64s {
+        simd.sub_f64s(a, b)
+    }
+
+    #[inline(always)]
+    fn factor<S: Simd>(simd: S, value: Self) -> S::f64s {
+        simd.splat_f64s(value)
+    }
+
+    #[inline(always)]
+    fn plus_product<S: Simd>(simd: S, a: S::f64s, b: S::f64s, c: S::f64s) -> S::f64s {
+        if TypeId::of::<S>() == TypeId::of::<Scalar128b>() {
+            return simd.add_f64s(simd.mul_f64s(a, b), c); // a fused one would be a call
+        }
+        simd.mul_add_e_f64s(a, b, c)
+    }
+
+    #[inline(always)]
+    fn times<S: Simd>(simd: S, a: S::f64s, b: S::f64s) -> S::f64s {
+        simd.mul_f64s(a, b)
     }
 
     /// By hand: the compiler works out anew in each turn how many there are.
@@ -149,5 +222,52 @@ impl Scalar for c64 {
     #[inline(always)]
     fn turned(self) -> Self {
         Self::new(-self.im, self.re)
+    }
+
+    type Vector<S: Simd> = S::c64s;
+    type Factor<S: Simd> = [S::f64s; 2];
+
+    #[inline(always)]
+    fn vectors<S: Simd>(values: &[Self]) -> &[S::c64s] {
+        S::as_simd_c64s(values).0
+    }
+
+    #[inline(always)]
+    fn vectors_mut<S: Simd>(values: &mut [Self]) -> &mut [S::c64s] {
+        S::as_mut_simd_c64s(values).0
+    }
+
+    #[inline(always)]
+    fn zeros<S: Simd>(simd: S) -> S::c64s {
+        simd.splat_c64s(Self::ZERO)
+    }
+
+    #[inline(always)]
+    fn less<S: Simd>(simd: S, a: S::c64s, b: S::c64s) -> S::c64s {
+        simd.sub_c64s(a, b)
+    }
+
+    /// (re b, re b, …) and (−im b, im b, …): a b is a times the one and a with its parts exchanged
+    /// times the other.
+    #[inline(always)]
+    fn factor<S: Simd>(simd: S, value: Self) -> [S::f64s; 2] {
+        [
+            simd.splat_f64s(value.re),
+            cast(simd.splat_c64s(Self::new(-value.im, value.im))),
+        ]
+    }
+
+    #[inline(always)]
+    fn plus_product<S: Simd>(simd: S, a: S::c64s, b: [S::f64s; 2], c: S::c64s) -> S::c64s {
+        let sum = f64::plus_product(simd, cast(a), b[0], cast(c));
+        let exchanged = cast(simd.swap_re_im_c64s(a));
+        cast(f64::plus_product(simd, exchanged, b[1], sum))
+    }
+
+    #[inline(always)]
+    fn times<S: Simd>(simd: S, a: S::c64s, b: [S::f64s; 2]) -> S::c64s {
+        let exchanged = cast(simd.swap_re_im_c64s(a));
+        let product = simd.mul_f64s(cast(a), b[0]);
+        cast(f64::plus_product(simd, exchanged, b[1], product))
     }
 }

@@ -1,190 +1,307 @@
 //! Forward and back substitution, several right-hand sides abreast.
 //!
-//! A row of the unknown holds `W` right-hand sides side by side, so that one pass over the factor
+//! A row of the unknown holds sixteen right-hand sides side by side, so that one pass over the factor
 //! serves them all. Panels whose part of the right-hand side is still zero are left out: a current
 //! into one electrode reaches only the columns on its path to the root of the elimination tree.
 
-use ndarray::ArrayView2;
-use pulp::{Arch, Simd, WithSimd};
+use std::array::from_fn;
+
+use pulp::{Simd, WithSimd};
 
 use crate::factor::Factor;
+use crate::instructions::run;
+use crate::lanes::{ABREAST, GROUP, Lanes};
+use crate::residual::Columns;
 use crate::scalar::Scalar;
 use crate::symbolic::Panel;
 
-/// Solves A X = B for B of any layout, (n, k), and row-major X.
+/// Writes columns of A⁻¹, those of these rows of A, row-major (n, k).
 ///
 /// # Panics
-/// When a size is not the factor's.
-pub fn solve<T: Scalar>(factor: &Factor<T>, rhs: ArrayView2<'_, T>, out: &mut [T]) {
-    assert!(rhs.nrows() == factor.symbolic().size() && rhs.len() == out.len());
-    let mut first = 0;
-    while first < rhs.ncols() {
-        let step = match rhs.ncols() - first {
-            1 => solve_block::<1, T>,
-            2..=4 => solve_block::<4, T>,
-            5..=8 => solve_block::<8, T>,
-            _ => solve_block::<16, T>,
-        };
-        first += step(factor, rhs, first, out);
-    }
+/// When a row does not exist, or the size is another.
+pub fn columns<T: Scalar>(factor: &Factor<T>, rows: &[u32], out: &mut [T]) {
+    assert!(out.len() == factor.symbolic().size() * rows.len());
+    blocks(factor, rows, out, drop);
 }
 
-/// Solves for up to `W` columns from `first` on; gives their number.
-fn solve_block<const W: usize, T: Scalar>(
+/// The same, with a check: `values` are the matrix's, and the rest is as [`Columns::residual`] says.
+///
+/// # Panics
+/// When a row does not exist, or a size is another.
+pub fn checked_columns<T: Scalar>(
     factor: &Factor<T>,
-    rhs: ArrayView2<'_, T>,
-    first: usize,
+    values: &[T],
+    rows: &[u32],
     out: &mut [T],
-) -> usize {
-    let columns = rhs.ncols();
-    let count = W.min(columns - first);
-    let order = factor.symbolic().order();
-    let mut x: Vec<[T; W]> = vec![[T::ZERO; W]; order.len()];
-    for (row, &from) in x.iter_mut().zip(order) {
-        for (offset, value) in row[..count].iter_mut().enumerate() {
-            *value = rhs[[from as usize, first + offset]];
-        }
-    }
-    Arch::new().dispatch(Substitution { factor, x: &mut x });
-    for (row, &to) in x.iter().zip(order) {
-        let begin = to as usize * columns + first;
-        out[begin..begin + count].copy_from_slice(&row[..count]);
-    }
-    count
+    lost: &mut [T],
+) -> f64 {
+    assert!(out.len() == factor.symbolic().size() * rows.len());
+    assert!(lost.len() == rows.len() * rows.len() && values.len() == factor.symbolic().n_values());
+    let symbolic = factor.symbolic();
+    let mut x = Vec::with_capacity(rows.len().div_ceil(ABREAST));
+    blocks(factor, rows, out, |block| x.push(block));
+    let units: Vec<u32> = rows
+        .iter()
+        .map(|&row| symbolic.place()[row as usize])
+        .collect();
+    let columns = Columns {
+        symbolic,
+        values,
+        units: &units,
+        x: &x,
+    };
+    columns.residual(factor.arch(), lost)
 }
 
-struct Substitution<'a, const W: usize, T> {
+/// Solves for sixteen columns at a time, which `keep` gets in the factor's order of rows.
+fn blocks<T: Scalar>(
+    factor: &Factor<T>,
+    rows: &[u32],
+    out: &mut [T],
+    mut keep: impl FnMut(Vec<Lanes<T>>),
+) {
+    for (number, part) in rows.chunks(ABREAST).enumerate() {
+        keep(run(
+            factor.arch(),
+            Substitution {
+                factor,
+                rows: part,
+                out: &mut out[number * ABREAST..],
+                columns: rows.len(),
+            },
+        ));
+    }
+}
+
+struct Substitution<'a, T> {
     factor: &'a Factor<T>,
-    x: &'a mut [[T; W]],
+    rows: &'a [u32],
+    /// From the first column on.
+    out: &'a mut [T],
+    /// Numbers from row to row.
+    columns: usize,
 }
 
-impl<const W: usize, T: Scalar> WithSimd for Substitution<'_, W, T> {
-    type Output = ();
+impl<T: Scalar> WithSimd for Substitution<'_, T> {
+    type Output = Vec<Lanes<T>>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let (symbolic, values) = (self.factor.symbolic(), self.factor.values());
-        for number in 0..symbolic.n_panels() {
-            let panel = symbolic.panel(number);
-            forward(panel, &values[panel.values()], self.x);
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let symbolic = self.factor.symbolic();
+        let mut x = vec![Lanes::ZERO; symbolic.size()];
+        for (column, &row) in self.rows.iter().enumerate() {
+            x[symbolic.place()[row as usize] as usize].0[column] = T::ONE;
         }
-        let mut below = Vec::new();
-        for number in (0..symbolic.n_panels()).rev() {
-            let panel = symbolic.panel(number);
-            backward(panel, &values[panel.values()], self.x, &mut below);
-        }
-    }
-}
-
-#[inline(always)]
-fn forward<const W: usize, T: Scalar>(panel: Panel<'_>, values: &[T], x: &mut [[T; W]]) {
-    let (width, height) = (panel.width, panel.height());
-    let (done, rest) = x.split_at_mut(panel.start + width);
-    let top = &mut done[panel.start..];
-    if top.as_flattened().iter().all(|&value| value == T::ZERO) {
-        return;
-    }
-    for j in 0..width {
-        let column = &values[j * height..][..height];
-        let (head, tail) = top.split_at_mut(j + 1);
-        divide(&mut head[j], column[j]);
-        for (row, &l) in tail.iter_mut().zip(&column[j + 1..]) {
-            subtract(row, l, &head[j]);
-        }
-    }
-    let offset = panel.start + width;
-    let mut pairs = panel.below.chunks_exact(2);
-    for (i, pair) in pairs.by_ref().enumerate() {
-        let rows = [pair[0] as usize - offset, pair[1] as usize - offset];
-        eliminated::<2, W, T>(rest, rows, &values[width + 2 * i..], height, top);
-    }
-    for &row in pairs.remainder() {
-        eliminated::<1, W, T>(
-            rest,
-            [row as usize - offset],
-            &values[height - 1..],
-            height,
-            top,
-        );
-    }
-}
-
-/// Subtracts from some rows what the panel's unknowns contribute; `values` begins at the first.
-#[inline(always)]
-fn eliminated<const R: usize, const W: usize, T: Scalar>(
-    x: &mut [[T; W]],
-    rows: [usize; R],
-    values: &[T],
-    height: usize,
-    top: &[[T; W]],
-) {
-    let mut sums: [[T; W]; R] = std::array::from_fn(|r| x[rows[r]]);
-    for (column, known) in values.chunks(height).zip(top) {
-        for (sum, &l) in sums.iter_mut().zip(column) {
-            subtract(sum, l, known);
-        }
-    }
-    for (row, sum) in rows.into_iter().zip(sums) {
-        x[row] = sum;
-    }
-}
-
-#[inline(always)]
-fn backward<const W: usize, T: Scalar>(
-    panel: Panel<'_>,
-    values: &[T],
-    x: &mut [[T; W]],
-    known: &mut Vec<[T; W]>,
-) {
-    let (width, height) = (panel.width, panel.height());
-    let (done, rest) = x.split_at_mut(panel.start + width);
-    let top = &mut done[panel.start..];
-    known.clear();
-    known.extend(
-        panel
-            .below
-            .iter()
-            .map(|&row| rest[row as usize - panel.start - width]),
-    );
-    let mut j = width;
-    while j >= 2 {
-        j -= 2;
-        let (first, second) = values[j * height..][..2 * height].split_at(height);
-        let (mut a, mut b) = (top[j], top[j + 1]);
-        for (rows, from, to) in [(&known[..], width, height), (&top[j + 2..], j + 2, width)] {
-            for ((row, &p), &q) in rows.iter().zip(&first[from..to]).zip(&second[from..to]) {
-                subtract(&mut a, p, row);
-                subtract(&mut b, q, row);
+        substitute(simd, self.factor, self.rows.len(), &mut x);
+        let count = self.rows.len();
+        for (row, &place) in symbolic.place().iter().enumerate() {
+            let from = &x[place as usize].0;
+            let target = &mut self.out[row * self.columns..][..count];
+            // parts of constant length and a few more, since a copy of any length is a call
+            let (most, few) = target.as_chunks_mut::<4>();
+            for (target, part) in most.iter_mut().zip(from.as_chunks::<4>().0) {
+                *target = *part;
+            }
+            for (value, &last) in few.iter_mut().zip(&from[count - count % 4..]) {
+                *value = last;
             }
         }
-        divide(&mut b, second[j + 1]);
-        subtract(&mut a, first[j + 1], &b);
-        divide(&mut a, first[j]);
-        (top[j], top[j + 1]) = (a, b);
+        x
     }
-    if j == 1 {
-        let (mut a, column) = (top[0], &values[..height]);
-        for (rows, from, to) in [(&known[..], width, height), (&top[1..], 1, width)] {
-            for (row, &l) in rows.iter().zip(&column[from..to]) {
-                subtract(&mut a, l, row);
+}
+
+/// Forward and back substitution, in place, of the first `count` of the right-hand sides.
+#[inline(always)]
+fn substitute<S: Simd, T: Scalar>(simd: S, factor: &Factor<T>, count: usize, x: &mut [Lanes<T>]) {
+    let (symbolic, values) = (factor.symbolic(), factor.values());
+    for number in 0..symbolic.n_panels() {
+        let panel = symbolic.panel(number);
+        let (done, below) = x.split_at_mut(panel.start + panel.width);
+        let top = &mut done[panel.start..];
+        if top.iter().all(Lanes::is_zero) {
+            continue;
+        }
+        let part = Part {
+            simd,
+            panel,
+            values: &values[panel.values()],
+            count,
+        };
+        for at in part.groups() {
+            part.forward(at, top, below);
+        }
+    }
+    for number in (0..symbolic.n_panels()).rev() {
+        let panel = symbolic.panel(number);
+        let (done, below) = x.split_at_mut(panel.start + panel.width);
+        let top = &mut done[panel.start..];
+        let part = Part {
+            simd,
+            panel,
+            values: &values[panel.values()],
+            count,
+        };
+        for at in part.groups() {
+            part.backward(at, top, below);
+        }
+    }
+}
+
+/// One panel's part in a substitution, a group of vectors of each row of the unknown at a time.
+struct Part<'a, S, T> {
+    simd: S,
+    panel: Panel<'a>,
+    /// The panel's values.
+    values: &'a [T],
+    /// Number of right-hand sides.
+    count: usize,
+}
+
+impl<'a, S: Simd, T: Scalar> Part<'a, S, T> {
+    /// Where each group of vectors begins in a row.
+    #[inline(always)]
+    fn groups(&self) -> impl Iterator<Item = usize> + use<S, T> {
+        (0..self.count).step_by(GROUP * size_of::<T::Vector<S>>() / size_of::<T>())
+    }
+
+    #[inline(always)]
+    fn load(row: &Lanes<T>, at: usize) -> [T::Vector<S>; GROUP] {
+        let vectors = T::vectors::<S>(&row.0[at..]);
+        from_fn(|g| vectors[g])
+    }
+
+    #[inline(always)]
+    fn store(row: &mut Lanes<T>, at: usize, values: [T::Vector<S>; GROUP]) {
+        let vectors = T::vectors_mut::<S>(&mut row.0[at..]);
+        vectors[..GROUP].copy_from_slice(&values);
+    }
+
+    /// `sums` + `factor` · `row`.
+    #[inline(always)]
+    fn added(
+        &self,
+        sums: [T::Vector<S>; GROUP],
+        factor: T,
+        row: [T::Vector<S>; GROUP],
+    ) -> [T::Vector<S>; GROUP] {
+        let factor = T::factor(self.simd, factor);
+        from_fn(|g| T::plus_product(self.simd, row[g], factor, sums[g]))
+    }
+
+    /// (`row` − `sums`) · `factor`.
+    #[inline(always)]
+    fn scaled(
+        &self,
+        row: [T::Vector<S>; GROUP],
+        sums: [T::Vector<S>; GROUP],
+        factor: T,
+    ) -> [T::Vector<S>; GROUP] {
+        let factor = T::factor(self.simd, factor);
+        from_fn(|g| T::times(self.simd, T::less(self.simd, row[g], sums[g]), factor))
+    }
+
+    #[inline(always)]
+    fn zero(&self) -> [T::Vector<S>; GROUP] {
+        [T::zeros(self.simd); GROUP]
+    }
+
+    /// Solves for the panel's unknowns, and subtracts what they contribute to the rows below.
+    #[inline(always)]
+    fn forward(&self, at: usize, top: &mut [Lanes<T>], below: &mut [Lanes<T>]) {
+        let (width, height) = (self.panel.width, self.panel.height());
+        for i in 0..width {
+            let (known, own) = top.split_at_mut(i);
+            let mut sums = self.zero();
+            for (j, known) in known.iter().enumerate() {
+                sums = self.added(sums, self.values[j * height + i], Self::load(known, at));
+            }
+            let inverse = self.values[i * height + i];
+            let row = self.scaled(Self::load(&own[0], at), sums, inverse);
+            Self::store(&mut own[0], at, row);
+        }
+        let mut rows = self.panel.below;
+        let mut values = &self.values[width..];
+        while let Some((four, rest)) = rows.split_first_chunk::<4>() {
+            self.eliminated(at, top, below, four, values);
+            (rows, values) = (rest, &values[4..]);
+        }
+        for row in rows.as_chunks::<1>().0 {
+            self.eliminated(at, top, below, row, values);
+            values = &values[1..];
+        }
+    }
+
+    /// Subtracts from some rows what the panel's unknowns contribute; `values` begins at the first.
+    #[inline(always)]
+    fn eliminated<const R: usize>(
+        &self,
+        at: usize,
+        top: &[Lanes<T>],
+        below: &mut [Lanes<T>],
+        rows: &[u32; R],
+        values: &[T],
+    ) {
+        let mut sums = [self.zero(); R];
+        let height = self.panel.height();
+        for (j, known) in top.iter().enumerate() {
+            let (known, column) = (Self::load(known, at), &values[j * height..][..R]);
+            for (sums, &factor) in sums.iter_mut().zip(column) {
+                *sums = self.added(*sums, factor, known);
             }
         }
-        divide(&mut a, column[0]);
-        top[0] = a;
+        for (&row, sums) in rows.iter().zip(sums) {
+            let row = &mut below[row as usize - self.panel.start - self.panel.width];
+            let values = Self::load(row, at);
+            let left = from_fn(|g| T::less(self.simd, values[g], sums[g]));
+            Self::store(row, at, left);
+        }
     }
-}
 
-#[inline(always)]
-fn subtract<const W: usize, T: Scalar>(row: &mut [T; W], factor: T, other: &[T; W]) {
-    for (value, &by) in row.iter_mut().zip(other) {
-        *value -= factor * by;
+    /// Solves for the panel's unknowns, those of the rows below being known.
+    #[inline(always)]
+    fn backward(&self, at: usize, top: &mut [Lanes<T>], below: &[Lanes<T>]) {
+        let mut end = self.panel.width;
+        while end >= 4 {
+            end -= 4;
+            self.substituted::<4>(at, top, below, end);
+        }
+        if end >= 2 {
+            end -= 2;
+            self.substituted::<2>(at, top, below, end);
+        }
+        if end > 0 {
+            self.substituted::<1>(at, top, below, 0);
+        }
     }
-}
 
-#[inline(always)]
-fn divide<const W: usize, T: Scalar>(row: &mut [T; W], by: T) {
-    let inverse = T::ONE / by;
-    for value in row {
-        *value *= inverse;
+    /// Solves for the `N` unknowns from `first` on.
+    #[inline(always)]
+    fn substituted<const N: usize>(
+        &self,
+        at: usize,
+        top: &mut [Lanes<T>],
+        below: &[Lanes<T>],
+        first: usize,
+    ) {
+        let (width, height) = (self.panel.width, self.panel.height());
+        let (own, known) = top[first..].split_at_mut(N);
+        let columns: [&[T]; N] = from_fn(|c| &self.values[(first + c) * height..][..height]);
+        let mut sums = [self.zero(); N];
+        for (i, known) in (first + N..width).zip(known.iter()) {
+            let known = Self::load(known, at);
+            sums = from_fn(|c| self.added(sums[c], columns[c][i], known));
+        }
+        let offset = self.panel.start + width;
+        for (i, &row) in (width..height).zip(self.panel.below) {
+            let known = Self::load(&below[row as usize - offset], at);
+            sums = from_fn(|c| self.added(sums[c], columns[c][i], known));
+        }
+        for c in (0..N).rev() {
+            let row = self.scaled(Self::load(&own[c], at), sums[c], columns[c][first + c]);
+            Self::store(&mut own[c], at, row);
+            for d in 0..c {
+                sums[d] = self.added(sums[d], columns[d][first + c], row);
+            }
+        }
     }
 }

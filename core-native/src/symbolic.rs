@@ -1,28 +1,41 @@
 //! Layout of a factor: which panels it has, and how each adds to its parent.
 
+use crate::kernel::Shape;
 use crate::ordering::analyse;
 use crate::panels::{Panels, inverse};
 
 /// What the structure of a symmetric matrix fixes for each of its factors.
 #[derive(Debug)]
 pub struct Symbolic {
-    n_values: usize,
+    /// Where each column of the matrix begins.
+    column_starts: Vec<u32>,
+    /// Rows of the matrix's entries.
+    rows: Vec<u32>,
     order: Vec<u32>,
+    /// For each row of the matrix, that of the factor.
+    place: Vec<u32>,
     /// First column of each panel, then the size.
     starts: Vec<u32>,
     /// Where each panel's `below` begins.
     below_starts: Vec<usize>,
     below: Vec<u32>,
-    /// For each entry of `below`, the row of the parent's front.
+    /// For each entry of `below`, the row of the parent's front, padding counted.
     in_parent: Vec<u32>,
     /// Where each panel's values begin.
     value_starts: Vec<usize>,
     /// For each panel, its children: `children[child_starts[p]..child_starts[p + 1]]`.
     child_starts: Vec<u32>,
     children: Vec<u32>,
-    /// (position in the factor, position in the matrix) of each value of the lower triangle.
+    /// (position in the front's columns, position in the matrix) of each value of the lower
+    /// triangle, panel by panel.
     scatter: Vec<(u32, u32)>,
+    /// Where each panel's entries of `scatter` begin.
+    scatter_starts: Vec<u32>,
+    /// What the columns of the largest front take, and all squares that there are at a time.
+    workspace: [usize; 2],
 }
+
+type Scatter = (Vec<(u32, u32)>, Vec<u32>);
 
 /// Adjacent columns of the factor that share one pattern below their diagonal block.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +46,7 @@ pub struct Panel<'a> {
     pub width: usize,
     /// Rows below the diagonal block.
     pub below: &'a [u32],
-    /// For each row below, the row of the parent's front that it adds to.
+    /// For each row below, the row of the parent's front that it adds to, padding counted.
     pub in_parent: &'a [u32],
     /// Panels whose rows below begin in these columns.
     pub children: &'a [u32],
@@ -47,6 +60,15 @@ impl Panel<'_> {
     #[must_use]
     pub fn height(&self) -> usize {
         self.width + self.below.len()
+    }
+
+    /// The size of its front.
+    #[inline(always)]
+    pub(crate) fn shape(&self) -> Shape {
+        Shape {
+            width: self.width,
+            below: self.below.len(),
+        }
     }
 
     /// Its values among those of the factor.
@@ -63,13 +85,15 @@ impl Symbolic {
     /// # Errors
     /// When the arrays are no such structure, or the factor is too large to index.
     pub fn new(size: usize, column_starts: &[u32], rows: &[u32]) -> Result<Self, String> {
-        let mut symbolic = Self::of_panels(analyse(size, column_starts, rows)?, rows.len());
+        let mut symbolic = Self::of_panels(analyse(size, column_starts, rows)?);
+        (symbolic.column_starts, symbolic.rows) = (column_starts.to_vec(), rows.to_vec());
         symbolic.link_panels();
-        symbolic.scatter = symbolic.scatter_of(column_starts, rows)?;
+        (symbolic.scatter, symbolic.scatter_starts) = symbolic.scatter_of()?;
+        symbolic.workspace = symbolic.workspace_of();
         Ok(symbolic)
     }
 
-    fn of_panels(panels: Panels, n_values: usize) -> Self {
+    fn of_panels(panels: Panels) -> Self {
         let mut value_starts = vec![0];
         let ends = panels.starts.windows(2).zip(panels.below_starts.windows(2));
         for (number, (columns, below)) in ends.enumerate() {
@@ -77,7 +101,9 @@ impl Symbolic {
             value_starts.push(value_starts[number] + width * (width + below));
         }
         Self {
-            n_values,
+            column_starts: Vec::new(),
+            rows: Vec::new(),
+            place: inverse(&panels.order),
             order: panels.order,
             starts: panels.starts,
             below_starts: panels.below_starts,
@@ -87,6 +113,8 @@ impl Symbolic {
             child_starts: Vec::new(),
             children: Vec::new(),
             scatter: Vec::new(),
+            scatter_starts: Vec::new(),
+            workspace: [0; 2],
         }
     }
 
@@ -124,6 +152,7 @@ impl Symbolic {
             next[parent] += 1;
             let (start, end) = (self.starts[parent], self.starts[parent + 1]);
             let theirs = &self.below[self.below_starts[parent]..self.below_starts[parent + 1]];
+            let top = self.panel(parent).shape().top();
             let mut at = 0;
             for entry in self.below_starts[number]..self.below_starts[number + 1] {
                 let row = self.below[entry];
@@ -131,41 +160,64 @@ impl Symbolic {
                     row - start
                 } else {
                     at += theirs[at..].partition_point(|&other| other < row);
-                    end - start + at as u32
+                    top as u32 + at as u32
                 };
             }
         }
     }
 
-    fn scatter_of(&self, column_starts: &[u32], rows: &[u32]) -> Result<Vec<(u32, u32)>, String> {
-        if u32::try_from(self.factor_len()).is_err() {
-            return Err("the factor has too many values to index".into());
-        }
-        let place = inverse(&self.order);
-        let mut row_in_front = vec![0_u32; self.size()];
-        let mut scatter = Vec::with_capacity((rows.len() + self.size()) / 2);
+    fn scatter_of(&self) -> Result<Scatter, String> {
+        let mut row_in_front = vec![0; self.size()];
+        let mut scatter = Vec::with_capacity((self.rows.len() + self.size()) / 2);
+        let mut starts = vec![0];
         for number in 0..self.n_panels() {
             let panel = self.panel(number);
+            let shape = panel.shape();
+            if u32::try_from(shape.columns_len()).is_err() {
+                return Err("the factor has too many values to index".into());
+            }
             for (i, &row) in panel.below.iter().enumerate() {
-                row_in_front[row as usize] = (panel.width + i) as u32;
+                row_in_front[row as usize] = shape.top() + i;
             }
             for j in 0..panel.width {
-                row_in_front[panel.start + j] = j as u32;
+                row_in_front[panel.start + j] = j;
             }
             for j in 0..panel.width {
-                let column = self.order[panel.start + j] as usize;
-                let first = panel.first_value + j * panel.height();
                 let done = scatter.len();
-                for from in column_starts[column]..column_starts[column + 1] {
-                    let row = place[rows[from as usize] as usize] as usize;
+                for (row, from) in self.row(panel.start + j) {
                     if row >= panel.start + j {
-                        scatter.push((first as u32 + row_in_front[row], from));
+                        let to = j * shape.stride() + row_in_front[row];
+                        scatter.push((to as u32, from as u32));
                     }
                 }
                 scatter[done..].sort_unstable();
             }
+            starts.push(scatter.len() as u32);
         }
-        Ok(scatter)
+        Ok((scatter, starts))
+    }
+
+    /// See `workspace`. Squares lie one after the other; a panel's takes the place of its children's
+    /// when it is done.
+    fn workspace_of(&self) -> [usize; 2] {
+        let (mut columns, mut squares, mut end) = (0, 0, 0);
+        for number in 0..self.n_panels() {
+            let panel = self.panel(number);
+            let square = panel.shape().square_len();
+            columns = columns.max(panel.shape().columns_len());
+            squares = squares.max(end + square);
+            end = end + square - self.children_len(panel);
+        }
+        [columns, squares]
+    }
+
+    /// What the squares of a panel's children take.
+    pub(crate) fn children_len(&self, panel: Panel<'_>) -> usize {
+        let squares = panel
+            .children
+            .iter()
+            .map(|&child| self.panel(child as usize));
+        squares.map(|child| child.shape().square_len()).sum()
     }
 
     /// Number of rows and columns.
@@ -177,7 +229,7 @@ impl Symbolic {
     /// Number of values that a matrix of this structure has.
     #[must_use]
     pub fn n_values(&self) -> usize {
-        self.n_values
+        self.rows.len()
     }
 
     /// Number of values in a factor.
@@ -192,9 +244,34 @@ impl Symbolic {
         &self.order
     }
 
-    /// (position in the factor, position in the matrix) of each value of the lower triangle.
-    pub(crate) fn scatter(&self) -> &[(u32, u32)] {
-        &self.scatter
+    /// For each row of the matrix, that of the factor.
+    pub(crate) fn place(&self) -> &[u32] {
+        &self.place
+    }
+
+    /// Columns, as the factor counts them, of the values in a row of the factor's; and where in the
+    /// matrix they stand.
+    #[inline(always)]
+    pub(crate) fn row(&self, row: usize) -> impl Iterator<Item = (usize, usize)> {
+        let row = self.order[row] as usize;
+        let entries = self.column_starts[row] as usize..self.column_starts[row + 1] as usize;
+        let columns = self.rows[entries.clone()].iter();
+        columns
+            .map(|&column| self.place[column as usize] as usize)
+            .zip(entries)
+    }
+
+    /// (position in the front's columns, position in the matrix) of each value that a panel has of
+    /// the matrix.
+    #[inline(always)]
+    pub(crate) fn scatter(&self, number: usize) -> &[(u32, u32)] {
+        let starts = &self.scatter_starts[number..number + 2];
+        &self.scatter[starts[0] as usize..starts[1] as usize]
+    }
+
+    /// What the columns of the largest front take, and all squares that there are at a time.
+    pub(crate) fn workspace(&self) -> [usize; 2] {
+        self.workspace
     }
 
     /// Number of panels.

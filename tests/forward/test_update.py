@@ -166,19 +166,23 @@ def test_columns_are_computed_once() -> None:
         base.local.voltages(cells, np.full(len(cells), factor))
     base.local.voltages(cells[:5], np.full(5, 3.0))
     # one solve of the basis, one of the touched nodes
-    assert counted.columns == [7, len(np.unique(mesh.cells[cells]))]
+    assert counted.asked == [7, len(np.unique(mesh.cells[cells]))]
 
 
 class Counted:
-    """A factor that notes how many right-hand sides each solve had."""
+    """A factor that notes how many columns each solve had."""
 
     def __init__(self, factor: Any) -> None:
         self.factor = factor
-        self.columns: list[int] = []
+        self.asked: list[int] = []
 
-    def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
-        self.columns.append(rhs.shape[1])
-        return np.asarray(self.factor.solve(rhs))
+    def columns(self, rows: IntArray) -> NDArray[Any]:
+        self.asked.append(len(rows))
+        return np.asarray(self.factor.columns(rows))
+
+    def checked_columns(self, values: NDArray[Any], rows: IntArray) -> Any:
+        self.asked.append(len(rows))
+        return self.factor.checked_columns(values, rows)
 
 
 def test_a_full_store_forgets_and_stays_exact(monkeypatch: pytest.MonkeyPatch) -> None:

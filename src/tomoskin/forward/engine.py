@@ -33,8 +33,18 @@ class Compressed:
 class Factor(Protocol):
     """A factorised symmetric matrix."""
 
-    def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
-        """Solution of shape (n_unknowns, n_rhs)."""
+    def columns(self, rows: IntArray) -> NDArray[Any]:
+        """Columns X of the inverse, (n_unknowns, n_rows)."""
+        ...
+
+    def checked_columns(
+        self, values: NDArray[Any], rows: IntArray
+    ) -> tuple[NDArray[Any], NDArray[Any], float]:
+        """The same, and what they leave over of the matrix A that has these values.
+
+        With E the columns of the identity, Xᵀ (E − A X) and the largest entry of E − A X; NaN
+        where X is no number.
+        """
         ...
 
 
@@ -115,6 +125,8 @@ class Engine(Protocol):
         Why this one runs, in words.
     core
         The module tomoskin_core, where this is the native one.
+    vectors
+        Which vector instructions factorise and solve, where that is known.
     """
 
     @property
@@ -126,14 +138,11 @@ class Engine(Protocol):
     @property
     def core(self) -> Any | None: ...  # noqa: D102
 
+    @property
+    def vectors(self) -> str: ...  # noqa: D102
+
     def analyse(self, indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> Factorise:
         """Return what factorises symmetric matrices of this structure, given their values."""
-        ...
-
-    def residual(
-        self, matrix: Compressed, rhs: NDArray[Any], solution: NDArray[Any]
-    ) -> tuple[NDArray[Any], float]:
-        """Xᵀ (B − A X), and the largest entry of B − A X; NaN where X is no number."""
         ...
 
     def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:

@@ -84,10 +84,8 @@ class State:
     def solution(self) -> Solution:
         """Voltages and potentials for every drive of the pattern."""
         model, matrix, assembly = self.model, self._matrix, self.model.assembly
-        n_basis = assembly.n_electrodes - 1
-        rhs = np.zeros((assembly.n_unknowns, n_basis), dtype=matrix.values.dtype)
-        rhs[assembly.n_points :].flat[:: n_basis + 1] = 1.0
-        basis, lost, largest = solve_checked(model.engine, matrix, self.factor, rhs)
+        electrodes = np.arange(assembly.n_points, assembly.n_unknowns)
+        basis, lost, largest = solve_checked(self.factor, matrix.values, electrodes)
         voltages = checked_voltages(
             model,
             basis[assembly.n_points :],
@@ -151,6 +149,6 @@ class State:
         model = self.model
         return LocalUpdate(
             self.solution,
-            solve=self.factor.solve,
+            columns=self.factor.columns,
             factorise=lambda changed: State(model, changed).basis,
         )

@@ -29,6 +29,11 @@ class Native:
     reason: str
     name: str = "native"
 
+    @property
+    def vectors(self) -> str:
+        """The widest that the processor has."""
+        return str(self.core.vector_code)
+
     def analyse(self, indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> Factorise:
         """Order the unknowns and lay out the factor, once for all matrices of this structure."""
         symbolic = self.core.Symbolic(len(indptr) - 1, indptr, indices)
@@ -41,15 +46,6 @@ class Native:
             return factor
 
         return factorise_natively
-
-    def residual(
-        self, matrix: Compressed, rhs: NDArray[Any], solution: NDArray[Any]
-    ) -> tuple[NDArray[Any], float]:
-        """See :class:`Engine`."""
-        residual: tuple[NDArray[Any], float] = self.core.residual(
-            matrix.indptr, matrix.indices, matrix.values, rhs, solution
-        )
-        return residual
 
     def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
         """See :class:`Engine`."""
@@ -84,17 +80,17 @@ class Native:
         """
         starts, rows = (np.array(part, dtype=np.int32) for part in ([0, 2, 4], [0, 1, 0, 1]))
         matrix = Compressed(np.array([2.0, 1.0, 1.0, 3.0]), rows, starts)
-        rhs = np.array([[3.0], [4.0]])
-        solved = self.analyse(starts, rows)(matrix.values).solve(rhs)
-        lost, _ = self.residual(matrix, rhs + 1.0, solved)
-        fields = np.empty((1, 2))
-        self.fields(matrix.matrix.tocsr(), solved, fields)
+        factor, both = self.analyse(starts, rows)(matrix.values), np.arange(2)
+        inverse = factor.columns(both)
+        _, lost, _ = factor.checked_columns(0.5 * matrix.values, both)
+        fields = np.empty((2, 2))
+        self.fields(matrix.matrix.tocsr(), inverse, fields)
         pattern = Pattern.adjacent(4)
         jacobian = self.jacobian(np.ones((4, 2, 3)), pattern, np.ones(pattern.n_drive))
         right: list[tuple[Any, Any]] = [
-            (solved, 1.0),
-            (fields, [[3.0, 4.0]]),
-            (lost, 2.0),
+            (inverse, [[0.6, -0.2], [-0.2, 0.4]]),
+            (fields, np.eye(2)),
+            (lost, 0.5 * inverse),
             (jacobian, 0.0),
         ]
         if not all(np.allclose(*pair) for pair in right):

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array
-from scipy.sparse.linalg import splu
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import SuperLU, splu
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.forward.engine import BaseState, Compressed, Factor, Factorise, Patches, singular
@@ -23,6 +23,7 @@ class Scipy:
     reason: str
     name: str = "scipy"
     core: None = None
+    vectors: str = "those of scipy's build"
 
     def analyse(
         self,
@@ -30,14 +31,7 @@ class Scipy:
         indices: NDArray[np.int32],
     ) -> Factorise:
         """See :class:`Engine`; SuperLU keeps no analysis."""
-        return lambda values: _factorise(Compressed(values, indices, indptr).matrix)
-
-    def residual(
-        self, matrix: Compressed, rhs: NDArray[Any], solution: NDArray[Any]
-    ) -> tuple[NDArray[Any], float]:
-        """See :class:`Engine`."""
-        residual = rhs - matrix.matrix @ solution
-        return solution.T @ residual, float(np.abs(residual).max())
+        return lambda values: _factorise(Compressed(values, indices, indptr))
 
     def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
         """See :class:`Engine`."""
@@ -61,7 +55,34 @@ class Scipy:
         return PlainPatches(base)
 
 
-def _factorise(matrix: csc_array) -> Factor:
+@dataclass(frozen=True, eq=False)
+class PlainFactor:
+    """A matrix's structure, and what SuperLU made of its values."""
+
+    matrix: Compressed
+    factor: SuperLU
+
+    def columns(self, rows: IntArray) -> NDArray[Any]:
+        """See the protocol."""
+        return np.asarray(self.factor.solve(self._units(rows)))
+
+    def checked_columns(
+        self, values: NDArray[Any], rows: IntArray
+    ) -> tuple[NDArray[Any], NDArray[Any], float]:
+        """See the protocol."""
+        columns = self.columns(rows)
+        matrix = Compressed(values, self.matrix.indices, self.matrix.indptr).matrix
+        residual = self._units(rows) - matrix @ columns
+        return columns, columns.T @ residual, float(np.abs(residual).max(initial=0.0))
+
+    def _units(self, rows: IntArray) -> NDArray[Any]:
+        """(n_unknowns, n_rows): columns of the identity."""
+        units = np.zeros((len(self.matrix.indptr) - 1, len(rows)), self.matrix.values.dtype)
+        units[rows, np.arange(len(rows))] = 1.0
+        return units
+
+
+def _factorise(matrix: Compressed) -> Factor:
     """Factorise a symmetric matrix, real or complex, by scipy's SuperLU.
 
     Minimum degree on AᵀA+A keeps the symmetric structure's fill low; the diagonal is a safe
@@ -73,15 +94,15 @@ def _factorise(matrix: csc_array) -> Factor:
         When the matrix is singular.
     """
     try:
-        factor: Factor = splu(
-            matrix,
+        factor = splu(
+            matrix.matrix,
             permc_spec="MMD_AT_PLUS_A",
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )
     except RuntimeError as error:
         raise singular() from error
-    return factor
+    return PlainFactor(matrix, factor)
 
 
 class PlainPatches:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.forward.engine import Compressed, Engine, Factor, singular
+from tomoskin.forward.engine import Factor, singular
 from tomoskin.forward.system import System
 
 MOST_RESIDUAL = 1e-6
@@ -22,20 +22,22 @@ _FLOOR = 1e-12
 
 
 def solve_checked(
-    engine: Engine, matrix: Compressed, factor: Factor, rhs: NDArray[Any]
+    factor: Factor, values: NDArray[Any], rows: IntArray
 ) -> tuple[NDArray[Any], NDArray[Any], float]:
-    """Solution X (n_unknowns, n_rhs), what the residual costs Xᵀ (B − A X), and its largest entry.
+    """Columns X (n_unknowns, n_rows) of the inverse of the matrix A with these values.
+
+    And what the residual costs, Xᵀ (E − A X) with E the columns of the identity; and its largest
+    entry.
 
     Raises
     ------
     ModelError
         When the residual shows that the matrix is singular to working precision.
     """
-    solution = factor.solve(rhs)
-    lost, largest = engine.residual(matrix, rhs, solution)
-    if not largest < MOST_RESIDUAL * rhs.real.max():
+    columns, lost, largest = factor.checked_columns(values, rows)
+    if not largest < MOST_RESIDUAL:
         raise singular()
-    return solution, lost, largest
+    return columns, lost, largest
 
 
 def checked_voltages(

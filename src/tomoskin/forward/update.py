@@ -28,8 +28,6 @@ from tomoskin.forward.engine import BaseState, Patches, singular
 from tomoskin.forward.solution import Solution, centred, checked_voltages
 from tomoskin.forward.touches import Touch, Touches
 
-Solve = Callable[[NDArray[Any]], NDArray[Any]]
-
 MOST_BYTES = 1 << 30
 """Columns of the inverse are kept up to this size, then they go."""
 
@@ -47,15 +45,21 @@ class LocalUpdate:
     ----------
     base
         The state that changes; nothing is computed yet.
-    solve
-        Right-hand sides (n_unknowns, n) → solutions, by the factor of the base.
+    columns
+        Nodes (n,) → columns of the base system's inverse (n_unknowns, n), by its factor.
     factorise
         The basis of another conductivity, (n_cells,), by a factor of its own.
     """
 
-    def __init__(self, base: Solution, *, solve: Solve, factorise: Solve) -> None:
+    def __init__(
+        self,
+        base: Solution,
+        *,
+        columns: Callable[[IntArray], NDArray[Any]],
+        factorise: Callable[[NDArray[Any]], NDArray[Any]],
+    ) -> None:
         self._model, self._conductivity, self._basis = base.model, base.conductivity, base.basis
-        self._solve, self._factorise = solve, factorise
+        self._columns, self._factorise = columns, factorise
         self._stored = np.zeros(base.model.assembly.n_points, dtype=bool)
 
     def warm_up(self, cells: ArrayLike | None = None) -> None:
@@ -166,7 +170,6 @@ class LocalUpdate:
             self._patches.forget()
             self._stored[:] = False
             return
-        rhs = np.zeros((len(self._basis), len(missing)), self._basis.dtype)
-        rhs[missing, np.arange(len(missing))] = 1.0
-        self._patches.keep(missing, self._solve(rhs)[: self._model.assembly.n_points])
+        columns = self._columns(missing)
+        self._patches.keep(missing, columns[: self._model.assembly.n_points])
         self._stored[missing] = True
