@@ -12,7 +12,7 @@ from tomoskin.core import Detection, FloatArray
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import Reference
 from tomoskin.source import Configuration, ScanSettings
-from tomoskin.touch import EXHAUSTIVE, Pace, SpotFinder, SpotModel, measured_covariance
+from tomoskin.touch import EXHAUSTIVE, Pace, SpotFinder, SpotModel, idle_covariance, measured_covariance
 
 
 class Finder(Protocol):
@@ -125,16 +125,18 @@ def voltage_covariance(
 ) -> FloatArray:
     """(n_meas, n_meas) V² of one frame less the reference; ``gain`` of what is predicted."""
     readout, scan = prepared.readout, prepared.scan
-    sd, frames = np.full(prepared.pattern.n_meas, np.nan), 1
-    if reference is not None:
-        sd, frames = reference.noise, reference.n_frames
     oversampling = prepared.skin.readout.oversampling
+    step = abs(gain) * readout.volts_per_count * oversampling
+    if reference is not None and reference.scatter is not None:
+        return idle_covariance(
+            scan, reference.scatter, least=reference.least, step=step, oversampling=oversampling
+        )
     return measured_covariance(
         scan,
-        sd,
-        frames,
+        np.full(prepared.pattern.n_meas, np.nan) if reference is None else reference.noise,
+        1 if reference is None else reference.n_frames,
         predicted=abs(gain) * readout.noise,
-        step=abs(gain) * readout.volts_per_count * oversampling,
+        step=step,
         oversampling=oversampling,
     )
 

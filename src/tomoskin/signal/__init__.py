@@ -21,6 +21,7 @@ from tomoskin.signal.nuisance import NuisanceSubspace
 from tomoskin.signal.readout import FIGURES, BoardFigures, Readout
 from tomoskin.signal.recording import Recording, frame_times
 from tomoskin.signal.reference import Reference
+from tomoskin.signal.scatter import Scatter
 
 __all__ = [
     "DIFFERENCES",
@@ -39,6 +40,7 @@ __all__ = [
     "Recording",
     "Reference",
     "Roles",
+    "Scatter",
     "at_one_time",
     "difference",
     "difference_noise",

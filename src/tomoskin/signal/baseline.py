@@ -9,7 +9,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.signal.health import Mask
-from tomoskin.signal.idle import Idle
+from tomoskin.signal.idle import BLOCK, Idle
 from tomoskin.signal.reference import Reference
 
 SLOWEST = 60.0
@@ -112,6 +112,8 @@ class Baseline:
         self._fading = 0.0
         self._followed = 0.0
         self._waiting: deque[tuple[FloatArray, Mask, float, float]] = deque()
+        self._scatter = reference.scatter
+        self._deviations: list[FloatArray] = []
 
     def push(self, values: FloatArray, lost: Mask, time: float, *, touched: bool) -> bool:
         """Take a frame, (n_meas,) V at ``time`` s; True where it ended a block of idle frames.
@@ -138,13 +140,19 @@ class Baseline:
         return self._learn(*self._waiting.popleft())
 
     def _learn(self, values: FloatArray, lost: Mask, time: float, step: float) -> bool:
+        deviation = values - self.mean
         if self._follows:
             self._follow(values, lost, step)
         if self._fading > 0:
             self._fading -= step
             self.idle.interrupt()
             return False
-        return self.idle.push(values, time, lost)
+        ended = self.idle.push(values, time, lost)
+        self._deviations.append(deviation)
+        if ended and self._scatter is not None:
+            self._scatter = self._scatter.after(np.array(self._deviations[-BLOCK:]), lost)
+            self._deviations.clear()
+        return ended
 
     def _follow(self, values: FloatArray, lost: Mask, step: float) -> None:
         noise = self.idle.noise**2
@@ -159,6 +167,7 @@ class Baseline:
 
     def _interrupted(self) -> bool:
         self._waiting.clear()
+        self._deviations.clear()
         self.idle.interrupt()
         return False
 
@@ -167,8 +176,8 @@ class Baseline:
         """The reference as it is now: the noise is a frame's together with the baseline's own."""
         if not self._known:
             return Reference(self.mean, self.idle.noise, self._n_frames, self._least)
-        noise = np.sqrt(self.idle.noise**2 + self._variance)
-        return Reference(self.mean, noise, max(self._n_frames, 2), self._least)
+        noise, frames = np.sqrt(self.idle.noise**2 + self._variance), max(self._n_frames, 2)
+        return Reference(self.mean, noise, frames, self._least, self._scatter)
 
     @property
     def state(self) -> BaselineState:
