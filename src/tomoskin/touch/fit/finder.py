@@ -15,10 +15,11 @@ from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
 from tomoskin.touch.fit.anisotropy import with_anisotropy
 from tomoskin.touch.fit.candidates import Candidates, Matched
+from tomoskin.touch.fit.excess import Channels, Excess, Gauge
 from tomoskin.touch.fit.noise import ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.refine import Problem, SheetDomain, Weigh
+from tomoskin.touch.fit.refine import Fit, Problem, SheetDomain, Weigh
 from tomoskin.touch.fit.search import Search, SpotDetections, joined
 from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
 
@@ -33,6 +34,9 @@ _GROWS = 0.5
 
 _REST = 0.5
 """A touch that stood still in the frame before moves, and grows, by this part of that at least."""
+
+_EXPLAINS = 0.3
+"""Part of what is beyond noise: a candidate that explains as much may be a touch not yet found."""
 
 _MASKS = 8
 """Nuisance subspaces whose whitening is kept."""
@@ -130,13 +134,15 @@ class SpotFinder:
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
         self._before = np.zeros((0, N_PARAMETERS))
+        self._channels = Channels.of(model.response.state.model.pattern)
+        self.excess = Excess.none(self._channels)
         self.renew(noise, gain)
 
     def renew(self, noise: FloatArray, gain: float = 1.0) -> None:
         """Go on with other noise, or another gain."""
         self._scale = self._model.scale * gain
         self._whiten = Whitener.of(noise / self._scale[:, None] / self._scale)
-        self._matched: OrderedDict[bytes, tuple[Whitener, Matched]] = OrderedDict()
+        self._matched: OrderedDict[bytes, tuple[Whitener, Matched, Gauge]] = OrderedDict()
 
     def push(self, dv: FloatArray, nuisance: FloatArray) -> list[Detection]:
         """Touches of ``dv`` (n_meas,), strongest first.
@@ -144,7 +150,25 @@ class SpotFinder:
         ``nuisance`` (n_meas, k) spans the directions along which the data tell nothing of a
         touch: a unit vector for each excluded row. There must be more rows than that.
         """
-        quiet, candidates = self._whitened(nuisance)
+        detected, excess, gauge = self._looked(dv, nuisance)
+        if excess is not self.excess:  # it may be no touch in the noise that there is
+            self.excess = excess
+            detected, _, _ = self._looked(dv, nuisance)
+        else:
+            self.excess = excess.faded(gauge)
+        self._unrest = self._unrest_of(detected.fit.spots)
+        self._before = detected.fit.spots
+        if self._fading:
+            self._residual = self._residual.after(self._before, self._model.response, self._fading)
+        detections = self._detections(joined(detected))
+        detections.sort(key=lambda detection: -abs(detection.peak))
+        return detections
+
+    def _looked(
+        self, dv: FloatArray, nuisance: FloatArray
+    ) -> tuple[SpotDetections, Excess, Gauge]:
+        """Touches of a frame in the noise that is known, and what noise they leave."""
+        quiet, candidates, gauge = self._whitened(nuisance)
         whiten, matched = self._with_residual(quiet, candidates)
         problem = Problem(
             response=self._model.response,
@@ -158,13 +182,16 @@ class SpotFinder:
         )
         search = Search(problem, matched, self._settings.snr, self._most, self._pace, quiet)
         detected = search(self._before)
-        self._unrest = self._unrest_of(detected.fit.spots)
-        self._before = detected.fit.spots
-        if self._fading:
-            self._residual = self._residual.after(self._before, self._model.response, self._fading)
-        detections = self._detections(joined(detected))
-        detections.sort(key=lambda detection: -abs(detection.peak))
-        return detections
+        return detected, self._excess_after(detected.fit, matched, gauge), gauge
+
+    def _excess_after(self, fit: Fit, matched: Matched, gauge: Gauge) -> Excess:
+        """The noise that what touches leave shows; as it was where one more may explain that."""
+        excess = self.excess.risen(gauge.squares(fit.residual, fit.predicted), gauge)
+        if excess is self.excess:
+            return excess
+        ratio, _ = matched.ratios(fit.residual, fit.jacobian, self._settings.sign)
+        explained = float(ratio.max()) ** 2
+        return self.excess if explained > _EXPLAINS * (fit.misfit - fit.degrees) else excess
 
     def _unrest_of(self, spots: FloatArray) -> float:
         """How much of what touches may do they have done since the frame before; 1 where there
@@ -174,11 +201,15 @@ class SpotFinder:
         moved = float(np.linalg.norm((spots - self._before)[:, :2], axis=1).max())
         return min(1.0, math.hypot(_REST, moved / self._reach))
 
-    def _whitened(self, nuisance: FloatArray) -> tuple[Whitener, Matched]:
-        key = nuisance.tobytes()
+    def _whitened(self, nuisance: FloatArray) -> tuple[Whitener, Matched, Gauge]:
+        key = nuisance.tobytes() + self.excess.key
         if key not in self._matched:
             whiten = self._whiten.without(nuisance / self._scale[:, None])
-            self._matched[key] = whiten, self._model.candidates.matched(whiten)
+            if self.excess.any:
+                weigh = Weigh.of(whiten(self.excess.directions(self._channels).T).T)
+                whiten = Whitener(weigh(whiten.matrix) / math.sqrt(self.excess.level))
+            gauge = Gauge.of(self._channels, whiten)
+            self._matched[key] = whiten, self._model.candidates.matched(whiten), gauge
             if len(self._matched) > _MASKS:
                 self._matched.popitem(last=False)
         self._matched.move_to_end(key)

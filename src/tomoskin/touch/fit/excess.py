@@ -1,0 +1,172 @@
+"""Noise beyond what was learnt: seen in what the touches of a frame leave, and believed at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.pattern import Pattern, Scan
+from tomoskin.touch.fit.noise import Whitener
+
+_LIMIT = 6.0
+"""Deviations by which the mean square of a channel's residual must exceed 1 to be more noise."""
+
+_MARGIN = 1.5
+"""What one frame shows of a variance is taken times this: it is a rough estimate."""
+
+_CALM = 16
+"""Frames without more noise after which half of what there was is forgotten."""
+
+_UNEVEN = 0.15
+"""Part of what touches change that they may leave, though the noise is as it was."""
+
+_FEWEST = 3
+_GONE = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """What may turn noisy by itself: an electrode's samples, or a measuring pair's rows.
+
+    Attributes
+    ----------
+    parts
+        (n_parts, n_meas): what one sample, or one row, does to the rows.
+    channel
+        (n_parts,) that each is of: electrodes first, then pairs.
+    names
+        Of the channels, for people.
+    """
+
+    parts: FloatArray
+    channel: IntArray
+    names: tuple[str, ...]
+
+    @classmethod
+    def of(cls, pattern: Pattern) -> Self:
+        """Of the rows of a pattern."""
+        scan, rows = Scan.of(pattern), np.arange(pattern.n_meas)
+        samples = np.zeros((scan.n_samples, pattern.n_meas))
+        samples[scan.plus, rows], samples[scan.minus, rows] = 1.0, -1.0
+        pairs, pair = np.unique(np.sort(pattern.measure, axis=1), axis=0, return_inverse=True)
+        n = pattern.n_electrodes
+        names = [f"E{e + 1}" for e in range(n)]
+        names += [f"E{a + 1} to E{b + 1}" for a, b in pairs.tolist()]
+        channel = np.concatenate([scan.sample_electrode, n + pair.reshape(-1)])
+        return cls(np.concatenate([samples, np.eye(pattern.n_meas)]), channel, tuple(names))
+
+
+@dataclass(frozen=True, eq=False)
+class Gauge:
+    """Channels as one whitening shows them.
+
+    Attributes
+    ----------
+    directions
+        (n_parts, r) of length 1.
+    means
+        (n_channels, n_parts) averages over the parts that can be seen.
+    variance
+        (n_channels,) V² of noise in a part that shows as much as all other noise in its direction.
+    limit
+        (n_channels,) mean squares beyond which a channel is noisier; infinite where too few of its
+        parts can be seen.
+    """
+
+    directions: FloatArray
+    means: FloatArray
+    variance: FloatArray
+    limit: FloatArray
+
+    @classmethod
+    def of(cls, channels: Channels, whiten: Whitener) -> Self:
+        """Of the ``channels`` in data made white by ``whiten``."""
+        seen = whiten(channels.parts)
+        squares = np.einsum("pr,pr->p", seen, seen)
+        shows = squares > 1e-6 * np.median(squares)
+        directions = seen / np.sqrt(np.where(shows, squares, 1.0))[:, None] * shows[:, None]
+        members = (channels.channel == np.arange(len(channels.names))[:, None]) & shows
+        count = members.sum(axis=1)
+        means = members / np.maximum(count, 1)[:, None]
+        variance = means @ (1 / np.where(shows, squares, np.inf))
+        spread = np.array([
+            np.linalg.norm(directions[own] @ directions[own].T) / max(len(own), 1)
+            for own in map(np.flatnonzero, members)
+        ])  # fmt: skip
+        limit = np.where(count >= _FEWEST, 1 + _LIMIT * np.sqrt(2) * spread, np.inf)
+        return cls(directions, means, variance, limit)
+
+    def squares(self, residual: FloatArray, predicted: FloatArray) -> FloatArray:
+        """(n_channels,) mean squares of a ``residual`` (r,); 1 where the noise is as it should be.
+
+        What touches that change ``predicted`` (r,) may leave is no noise.
+        """
+        left = self.means @ (self.directions @ residual) ** 2
+        if not predicted.any():
+            return np.asarray(left)
+        told = self.means @ (self.directions @ predicted) ** 2
+        return np.asarray(left - _UNEVEN**2 * (told + told.mean()))
+
+
+@dataclass(frozen=True, eq=False)
+class Excess:
+    """Noise beyond what was learnt.
+
+    Attributes
+    ----------
+    level
+        Variance of all rows, in parts of what was learnt; 1 at the least.
+    variance
+        (n_channels,) V² that each part of a channel has beside.
+    calm
+        Frames since it rose.
+    """
+
+    level: float
+    variance: FloatArray
+    calm: int = 0
+
+    @classmethod
+    def none(cls, channels: Channels) -> Self:
+        """As it was learnt."""
+        return cls(1.0, np.zeros(len(channels.names)))
+
+    @property
+    def any(self) -> bool:
+        """Whether there is some."""
+        return self.level > 1.0 or bool(self.variance.any())
+
+    @property
+    def key(self) -> bytes:
+        """The same for the same excess."""
+        return self.variance.tobytes() + np.float64(self.level).tobytes()
+
+    def directions(self, channels: Channels) -> FloatArray:
+        """(n_meas, k) V: what noisy channels do, each as long as its deviation."""
+        size = np.sqrt(self.variance)[channels.channel]
+        return np.asarray((channels.parts[size > 0] * size[size > 0][:, None]).T)
+
+    def risen(self, squares: FloatArray, gauge: Gauge) -> Excess:
+        """With what a frame shows, (n_channels,) mean squares; itself where that is no more."""
+        known = np.isfinite(gauge.limit)
+        common = float(np.median(squares[known])) if known.any() else 1.0
+        common = common if common > float(np.median(gauge.limit)) / 2 + 0.5 else 1.0
+        louder = squares > gauge.limit * common
+        if common == 1.0 and not louder.any():
+            return self
+        more = np.where(louder, _MARGIN * (squares - common) * gauge.variance, 0.0)
+        level = self.level * (common if common == 1.0 else _MARGIN * common)
+        return Excess(level, self.variance + more)
+
+    def faded(self, gauge: Gauge) -> Excess:
+        """After one more frame that showed no more noise."""
+        if not self.any:
+            return self
+        if self.calm + 1 < _CALM:
+            return replace(self, calm=self.calm + 1)
+        level, variance = 1 + (self.level - 1) / 2, self.variance / 2
+        variance = np.where(variance > _GONE * gauge.variance, variance, 0.0)
+        return Excess(level if level > 1 + _GONE else 1.0, variance)
