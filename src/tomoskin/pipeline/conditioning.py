@@ -28,6 +28,9 @@ from tomoskin.signal import (
 MOST_NUISANCE = 0.5
 """No image is made when more than this part of the data carries no information."""
 
+_RENEWAL = 16
+"""Blocks of idle frames after which the noise is taken anew, though it is as loud as before."""
+
 _NEW_NOISE = 0.1
 """Noise that has changed by more than this part makes a new noise of the image."""
 
@@ -82,9 +85,12 @@ class Conditioning(Protocol):
         """Difference data of a frame."""
         ...
 
-    def learn(self, time: float, moved: FloatArray | float, *, touched: bool) -> bool:
+    def learn(
+        self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
+    ) -> bool:
         """Take the newest frame, without what of it has ``moved`` V, for the baseline.
 
+        ``noise``: whether what it shows beside the reference is noise that may be learnt.
         True where the operator or the noise has changed.
         """
         ...
@@ -119,6 +125,7 @@ class Followed:
         self._scale = _scale(prepared, baseline.start)
         self._health = health
         self._noise_for: tuple[object, float] = (None, np.nan)
+        self._blocks, self._due = baseline.idle.blocks, 1
         self._values, self._excluded = baseline.mean, np.zeros(len(baseline.mean), bool)
         self.renew(prepared)
 
@@ -220,26 +227,36 @@ class Followed:
         )
         return Conditioned(differences, n_excluded, health)
 
-    def learn(self, time: float, moved: FloatArray | float, *, touched: bool) -> bool:
+    def learn(
+        self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
+    ) -> bool:
         """See :class:`Conditioning`."""
         health, baseline = self._health, self._baseline
         if health is None:
             return False
         values = self._values if isinstance(moved, float) else self._values - moved
-        if baseline.push(values, self._excluded, time, touched=touched):
+        if baseline.push(values, self._excluded, time, touched=touched, noise=noise):
             self._drift.learn(baseline, self._signatures)
-        noise = baseline.idle.noise
-        level = float(noise @ noise)
+        level = float(baseline.idle.noise @ baseline.idle.noise)
         sick = tuple((e.electrode, e.state) for e in health.sick)
         states = (sick, self._drift.revision)
         before, then = self._noise_for
         changed = then > 0 and abs(np.log(level / then)) > 2.0 * _NEW_NOISE
-        if states == before and not changed:
+        if states == before and not changed and not self._learnt_more():
             return False
         self._noise_for = (states, level)
         if before is not None and states != before:
             self.renew(self._given)
         return before is not None
+
+    def _learnt_more(self) -> bool:
+        """Whether idle frames tell of the noise what they did not: after one block of them, after
+        two more, and ever later."""
+        blocks = self._baseline.idle.blocks
+        if blocks - self._blocks < self._due:
+            return False
+        self._blocks, self._due = blocks, min(2 * self._due, _RENEWAL)
+        return True
 
     def _signatures(self) -> FloatArray:
         """(n_meas, n_cells) V: what a change of each cell does."""
@@ -283,9 +300,11 @@ class GivenDifferences:
         )
         return Conditioned(differences, int(np.count_nonzero(excluded)))
 
-    def learn(self, time: float, moved: FloatArray | float, *, touched: bool) -> bool:
+    def learn(
+        self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
+    ) -> bool:
         """Nothing can be learnt."""
-        del time, moved, touched
+        del time, moved, touched, noise
         return False
 
     def renew(self, prepared: Prepared) -> None:

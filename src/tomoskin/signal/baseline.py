@@ -9,7 +9,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.signal.health import Mask
-from tomoskin.signal.idle import BLOCK, Idle
+from tomoskin.signal.idle import Idle
 from tomoskin.signal.reference import Reference
 
 SLOWEST = 60.0
@@ -111,14 +111,17 @@ class Baseline:
         self._linger = 0
         self._fading = 0.0
         self._followed = 0.0
-        self._waiting: deque[tuple[FloatArray, Mask, float, float]] = deque()
+        self._waiting: deque[tuple[FloatArray, Mask, float, float, bool]] = deque()
         self._scatter = reference.scatter
         self._deviations: list[FloatArray] = []
 
-    def push(self, values: FloatArray, lost: Mask, time: float, *, touched: bool) -> bool:
+    def push(
+        self, values: FloatArray, lost: Mask, time: float, *, touched: bool, noise: bool = True
+    ) -> bool:
         """Take a frame, (n_meas,) V at ``time`` s; True where it ended a block of idle frames.
 
-        ``lost`` rows, (n_meas,) bool, say nothing; ``touched``: whether something touches.
+        ``lost`` rows, (n_meas,) bool, say nothing; ``touched``: whether something touches;
+        ``noise``: whether what it shows beside the reference may be learnt as noise.
         """
         step = 0.0 if self._time is None else min(max(time - self._time, 0.0), _LONGEST_STEP)
         self._time = time
@@ -134,12 +137,12 @@ class Baseline:
             return self._interrupted()
         self._held = 0.0
         self._followed += step
-        self._waiting.append((values, lost, time, step))
+        self._waiting.append((values, lost, time, step, noise))
         if len(self._waiting) <= _DELAY:
             return False
         return self._learn(*self._waiting.popleft())
 
-    def _learn(self, values: FloatArray, lost: Mask, time: float, step: float) -> bool:
+    def _learn(self, values: FloatArray, lost: Mask, time: float, step: float, noise: bool) -> bool:
         deviation = values - self.mean
         if self._follows:
             self._follow(values, lost, step)
@@ -148,9 +151,10 @@ class Baseline:
             self.idle.interrupt()
             return False
         ended = self.idle.push(values, time, lost)
-        self._deviations.append(deviation)
-        if ended and self._scatter is not None:
-            self._scatter = self._scatter.after(np.array(self._deviations[-BLOCK:]), lost)
+        if noise:
+            self._deviations.append(deviation)
+        if ended and self._scatter is not None and self._deviations:
+            self._scatter = self._scatter.after(np.array(self._deviations), lost)
             self._deviations.clear()
         return ended
 

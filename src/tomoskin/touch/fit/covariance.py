@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from scipy.special import ndtr, stdtrit
 
 from tomoskin.core import FloatArray
 from tomoskin.pattern import Scan
@@ -18,6 +19,14 @@ _EDGE = 1.15
 
 _MOST = 8
 """Factors at most; and no more than a third of the frames."""
+
+_TOUCHLIKE = 0.7
+"""Cosine to the signature of a touch above which a factor is one."""
+
+_TAIL = 5.0
+_DEGREES = 4
+"""Degrees of freedom of the variance along a touch's signature that a frame is worth, at the least:
+many rows tell of it. Between 4 and 100 in the cases of the benchmark."""
 
 _PASSES = 3
 """Structure and factors are fitted by turns."""
@@ -41,9 +50,21 @@ class Turned:
         first = len(self.variance) - self.factors
         return np.asarray(self.back[:, first:] * np.sqrt(self.variance[first:]))
 
+    def likeness(self, signatures: FloatArray) -> FloatArray:
+        """(k,) cosine of each factor to the nearest of ``signatures`` (n, n_meas)."""
+        turned = np.linalg.solve(self.back, signatures.T)
+        turned /= np.linalg.norm(turned, axis=0)
+        return np.asarray(np.abs(turned[len(turned) - self.factors :]).max(axis=1))
+
 
 def idle_covariance(
-    scan: Scan, scatter: Scatter, *, least: FloatArray | float, step: float, oversampling: int
+    scan: Scan,
+    scatter: Scatter,
+    *,
+    least: FloatArray | float,
+    step: float,
+    oversampling: int,
+    signatures: FloatArray | None = None,
 ) -> FloatArray:
     """(n_meas, n_meas) V²: of one frame less the reference, as idle frames scatter.
 
@@ -58,6 +79,8 @@ def idle_covariance(
     step
         Of the converter, V, of which so many readings (``oversampling``) make a sample. What
         rounding leaves is the same in all frames, and does not show in their scatter.
+    signatures
+        (n, n_meas) of touches: what is like one of them is not learnt.
     """
     blocks, variance = _blocks(scan), np.diag(scatter.matrix)
     more = np.maximum(np.square(least) - variance, 0.0)
@@ -65,7 +88,18 @@ def idle_covariance(
     size = np.sqrt(more)
     shared = row_covariance(scan, np.sqrt(0.5))
     matrix = scatter.matrix + shared * size[:, None] * size
-    return learnt_covariance(blocks, matrix, scatter.frames)
+    return _uncertain(scatter.frames) * learnt_covariance(
+        blocks, matrix, scatter.frames, signatures
+    )
+
+
+def _uncertain(frames: int) -> float:
+    """Factor by which a variance learnt from so many frames is to be taken larger.
+
+    What is divided by an estimated deviation has Student's distribution, with longer tails: at
+    ``_TAIL`` deviations it shall go beyond as rarely as a normal number.
+    """
+    return float((stdtrit(_DEGREES * frames, ndtr(-_TAIL)) / _TAIL) ** 2)
 
 
 @lru_cache(maxsize=4)
@@ -73,20 +107,25 @@ def _blocks(scan: Scan) -> Blocks:
     return Blocks.of(scan)
 
 
-def learnt_covariance(blocks: Blocks, scatter: FloatArray, frames: int) -> FloatArray:
+def learnt_covariance(
+    blocks: Blocks, scatter: FloatArray, frames: int, signatures: FloatArray | None = None
+) -> FloatArray:
     """(n_meas, n_meas) V² for a ``scatter`` (n_meas, n_meas) V² of so many independent frames.
 
     The structure of the read-out (:mod:`tomoskin.touch.fit.targets`), and in it: factors that many
     rows have in common, as hum, which stand out of the spectrum of noise (Marchenko & Pastur
     1967), with the variance that was seen; and all else drawn towards the structure as far as the
     frames bear it out (oracle-approximating shrinkage: Chen, Wiesel, Eldar & Hero 2010, which
-    betters Ledoit & Wolf 2004 for normal noise).
+    betters Ledoit & Wolf 2004 for normal noise). A factor like one of the ``signatures``,
+    (n, n_meas), is a touch that stood for a part of the frames, and no noise.
     """
     turned = _turned(blocks, scatter, frames)
     first = len(turned.variance) - turned.factors
     left = max(frames - turned.factors, 2)
     variance = turned.variance.copy()
     variance[:first] = _shrunk(variance[:first] * frames / left, left)
+    if turned.factors and signatures is not None:
+        variance[first:][turned.likeness(signatures) > _TOUCHLIKE] = 1.0
     return np.asarray((turned.back * variance) @ turned.back.T)
 
 

@@ -17,11 +17,14 @@ _LIMIT = 6.0
 _MARGIN = 1.5
 """What one frame shows of a variance is taken times this: it is a rough estimate."""
 
-_CALM = 16
-"""Frames without more noise after which half of what there was is forgotten."""
+_CALM = 8
+"""Frames without more noise after which no more is believed than they have shown."""
 
 _UNEVEN = 0.15
 """Part of what touches change that they may leave, though the noise is as it was."""
+
+_SAID = 3.0
+"""Times the usual noise, in deviations, from which it is said."""
 
 _FEWEST = 3
 _GONE = 0.2
@@ -122,17 +125,21 @@ class Excess:
     variance
         (n_channels,) V² that each part of a channel has beside.
     calm
-        Frames since it rose.
+        Frames since it rose, or was looked at anew.
+    seen
+        (n_channels,) largest mean squares in these, of noise with the excess.
     """
 
     level: float
     variance: FloatArray
-    calm: int = 0
+    calm: int
+    seen: FloatArray
 
     @classmethod
     def none(cls, channels: Channels) -> Self:
         """As it was learnt."""
-        return cls(1.0, np.zeros(len(channels.names)))
+        none = np.zeros(len(channels.names))
+        return cls(1.0, none, 0, none)
 
     @property
     def any(self) -> bool:
@@ -149,24 +156,56 @@ class Excess:
         size = np.sqrt(self.variance)[channels.channel]
         return np.asarray((channels.parts[size > 0] * size[size > 0][:, None]).T)
 
+    def exceeds(self, other: Excess) -> bool:
+        """Whether there is more of it than of the ``other``."""
+        return self.level > other.level or bool((self.variance > other.variance).any())
+
+    def text(self, channels: Channels, usual: FloatArray) -> str | None:
+        """What someone should see to, or None; ``usual`` (n_channels,) V² without the excess."""
+        if self.level > _SAID**2:
+            return (
+                f"the voltages change by {np.sqrt(self.level):.0f} times the noise of the idle "
+                "skin in a way that no touch explains: look at cables and supply, or take a new "
+                "reference"
+            )
+        times = np.sqrt(1 + self.variance / np.maximum(usual, np.finfo(float).tiny))
+        worst = int(times.argmax())
+        if times[worst] < _SAID:
+            return None
+        return (
+            f"{channels.names[worst]} wavers by {times[worst]:.0f} times the noise of the idle "
+            "skin, and counts for less: look at its cable and contact"
+        )
+
     def risen(self, squares: FloatArray, gauge: Gauge) -> Excess:
         """With what a frame shows, (n_channels,) mean squares; itself where that is no more."""
-        known = np.isfinite(gauge.limit)
-        common = float(np.median(squares[known])) if known.any() else 1.0
-        common = common if common > float(np.median(gauge.limit)) / 2 + 0.5 else 1.0
+        common = _common(squares, gauge)
+        if common <= 1 + (_common(gauge.limit, gauge) - 1) / 2:
+            common = 1.0
         louder = squares > gauge.limit * common
         if common == 1.0 and not louder.any():
             return self
         more = np.where(louder, _MARGIN * (squares - common) * gauge.variance, 0.0)
-        level = self.level * (common if common == 1.0 else _MARGIN * common)
-        return Excess(level, self.variance + more)
+        level = self.level if common == 1.0 else _MARGIN * common * self.level
+        return Excess(level, self.variance + more, 0, np.zeros_like(squares))
 
-    def faded(self, gauge: Gauge) -> Excess:
-        """After one more frame that showed no more noise."""
+    def passed(self, squares: FloatArray, gauge: Gauge) -> Excess:
+        """After a frame that showed no more: what ``_CALM`` of them do not show is forgotten."""
         if not self.any:
             return self
-        if self.calm + 1 < _CALM:
-            return replace(self, calm=self.calm + 1)
-        level, variance = 1 + (self.level - 1) / 2, self.variance / 2
+        seen, calm = np.maximum(self.seen, squares), self.calm + 1
+        if calm < _CALM:
+            return replace(self, calm=calm, seen=seen)
+        common = min(1.0, max(_common(seen, gauge), 0.0))
+        own = np.clip(seen, 0.0, 1.0) if common == 1.0 else np.ones_like(seen)
+        variance = self.variance * own
         variance = np.where(variance > _GONE * gauge.variance, variance, 0.0)
-        return Excess(level if level > 1 + _GONE else 1.0, variance)
+        level = self.level * common
+        level = level if level > 1 + _GONE else 1.0
+        return Excess(level, variance, 0, np.zeros_like(seen))
+
+
+def _common(squares: FloatArray, gauge: Gauge) -> float:
+    """The median channel's, of those that can be judged."""
+    known = np.isfinite(gauge.limit)
+    return float(np.median(squares[known])) if known.any() else 1.0

@@ -114,6 +114,14 @@ class SpotFinder:
         Between two frames, s: in it touches move and grow. 0 where rows are read all at once.
     pace
         How much is tried in a frame.
+
+    Attributes
+    ----------
+    excess
+        Noise beyond ``noise``.
+    like_touch
+        Whether the newest frame is such as a touch makes, one that presses or one that has been
+        lifted, though it may be too faint to be found: it is no noise to be learnt.
     """
 
     def __init__(
@@ -136,12 +144,15 @@ class SpotFinder:
         self._before = np.zeros((0, N_PARAMETERS))
         self._channels = Channels.of(model.response.state.model.pattern)
         self.excess = Excess.none(self._channels)
+        self._lifted: FloatArray | None = None
+        self.like_touch = False
         self.renew(noise, gain)
 
     def renew(self, noise: FloatArray, gain: float = 1.0) -> None:
         """Go on with other noise, or another gain."""
         self._scale = self._model.scale * gain
         self._whiten = Whitener.of(noise / self._scale[:, None] / self._scale)
+        self._usual = np.full(len(self._channels.names), np.inf)
         self._matched: OrderedDict[bytes, tuple[Whitener, Matched, Gauge]] = OrderedDict()
 
     def push(self, dv: FloatArray, nuisance: FloatArray) -> list[Detection]:
@@ -150,12 +161,10 @@ class SpotFinder:
         ``nuisance`` (n_meas, k) spans the directions along which the data tell nothing of a
         touch: a unit vector for each excluded row. There must be more rows than that.
         """
-        detected, excess, gauge = self._looked(dv, nuisance)
-        if excess is not self.excess:  # it may be no touch in the noise that there is
-            self.excess = excess
-            detected, _, _ = self._looked(dv, nuisance)
-        else:
-            self.excess = excess.faded(gauge)
+        detected, excess = self._looked(dv, nuisance)
+        risen, self.excess = excess.exceeds(self.excess), excess
+        if risen:  # it may be no touch in the noise that there is
+            detected, _ = self._looked(dv, nuisance)
         self._unrest = self._unrest_of(detected.fit.spots)
         self._before = detected.fit.spots
         if self._fading:
@@ -164,10 +173,8 @@ class SpotFinder:
         detections.sort(key=lambda detection: -abs(detection.peak))
         return detections
 
-    def _looked(
-        self, dv: FloatArray, nuisance: FloatArray
-    ) -> tuple[SpotDetections, Excess, Gauge]:
-        """Touches of a frame in the noise that is known, and what noise they leave."""
+    def _looked(self, dv: FloatArray, nuisance: FloatArray) -> tuple[SpotDetections, Excess]:
+        """Touches of a frame in the noise that is known, and the excess of what they leave."""
         quiet, candidates, gauge = self._whitened(nuisance)
         whiten, matched = self._with_residual(quiet, candidates)
         problem = Problem(
@@ -182,16 +189,45 @@ class SpotFinder:
         )
         search = Search(problem, matched, self._settings.snr, self._most, self._pace, quiet)
         detected = search(self._before)
-        return detected, self._excess_after(detected.fit, matched, gauge), gauge
+        explains = self._explaining(detected.fit, matched)
+        return detected, self._excess_after(detected.fit, explains, gauge)
 
-    def _excess_after(self, fit: Fit, matched: Matched, gauge: Gauge) -> Excess:
-        """The noise that what touches leave shows; as it was where one more may explain that."""
-        excess = self.excess.risen(gauge.squares(fit.residual, fit.predicted), gauge)
+    def _explaining(self, fit: Fit, matched: Matched) -> FloatArray:
+        """(n,) part of what is beyond noise that each candidate could explain, negative where that
+        takes a touch of the other sign."""
+        beyond = fit.misfit - fit.degrees
+        self.like_touch = bool(len(fit.spots))
+        if beyond <= 0:
+            return np.zeros(len(matched.spots))
+        ratio, content = matched.ratios(fit.residual, fit.jacobian, "both")
+        self.like_touch |= bool(
+            np.max(ratio**2 * (ratio > self._settings.snr)) > _EXPLAINS * beyond
+        )
+        other = {"decrease": 1.0, "increase": -1.0, "both": 0.0}[self._settings.sign]
+        return np.where(content * other > 0, -1.0, 1.0) * ratio**2 / beyond
+
+    def _excess_after(self, fit: Fit, explains: FloatArray, gauge: Gauge) -> Excess:
+        """As what the touches leave shows it; as it was where one more may explain that."""
+        squares = gauge.squares(fit.residual, fit.predicted)
+        excess = self.excess.risen(squares, gauge)
         if excess is self.excess:
-            return excess
-        ratio, _ = matched.ratios(fit.residual, fit.jacobian, self._settings.sign)
-        explained = float(ratio.max()) ** 2
-        return self.excess if explained > _EXPLAINS * (fit.misfit - fit.degrees) else excess
+            return excess.passed(squares, gauge)
+        lifted = int(explains.argmin())
+        self._lifted = None
+        if explains[lifted] < -_EXPLAINS:
+            self._lifted = self._model.candidates.spots[lifted, :2]
+        return self.excess if explains.max() > _EXPLAINS else excess
+
+    @property
+    def problem(self) -> str | None:
+        """What of the newest frame no touch explains, in a sentence, or None."""
+        if self._lifted is None or not self.excess.any:
+            return self.excess.text(self._channels, self._usual)
+        x, y = 1e3 * self._lifted
+        return (
+            f"near {x:.0f}, {y:.0f} mm the skin reads as if a press had been lifted that stood "
+            "when the reference was taken: take a new one while nothing touches"
+        )
 
     def _unrest_of(self, spots: FloatArray) -> float:
         """How much of what touches may do they have done since the frame before; 1 where there
@@ -209,6 +245,8 @@ class SpotFinder:
                 weigh = Weigh.of(whiten(self.excess.directions(self._channels).T).T)
                 whiten = Whitener(weigh(whiten.matrix) / math.sqrt(self.excess.level))
             gauge = Gauge.of(self._channels, whiten)
+            if not self.excess.any:
+                self._usual = gauge.variance
             self._matched[key] = whiten, self._model.candidates.matched(whiten), gauge
             if len(self._matched) > _MASKS:
                 self._matched.popitem(last=False)
