@@ -13,8 +13,8 @@ from tomoskin.signal.health import Mask
 MEMORY = 512
 """Frames that a scatter rests on at most: older ones fade."""
 
-_WILD = 9.0
-"""A frame counts for at most so many times the squares that one has as a rule."""
+_WILD = 6.0
+"""A value counts for at most so many deviations."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,12 +44,11 @@ class Scatter:
 
         ``lost`` rows, (n_meas,) bool, say nothing: they stay as they were.
 
-        A frame that is wild beside those known is made smaller first: a knock at a cable is not
-        the noise of all times. Noise that lasts is learnt in a few steps all the same.
+        What is wild beside those known is cut off: a knock at a cable is not the noise of all
+        times. Noise that lasts is learnt in a few steps all the same.
         """
-        usual = np.maximum(np.diag(self.matrix), np.finfo(float).tiny)
-        size = np.mean(deviations[:, ~lost] ** 2 / usual[~lost], axis=1)
-        held = deviations * np.sqrt(np.minimum(1.0, _WILD / np.maximum(size, _WILD)))[:, None]
+        most = _WILD * np.sqrt(np.diag(self.matrix))
+        held = np.clip(deviations, -most, most)
         total = self.frames + len(held)
         matrix = (self.frames * self.matrix + held.T @ held) / total
         if lost.any():

@@ -123,7 +123,7 @@ class Excess:
     level
         Variance of all rows, in parts of what was learnt; 1 at the least.
     variance
-        (n_channels,) V² that each part of a channel has beside.
+        (n_channels,) V² that each part of a channel has beside, before it is taken so many times.
     calm
         Frames since it rose, or was looked at anew.
     seen
@@ -185,7 +185,7 @@ class Excess:
         louder = squares > gauge.limit * common
         if common == 1.0 and not louder.any():
             return self
-        more = np.where(louder, _MARGIN * (squares - common) * gauge.variance, 0.0)
+        more = np.where(louder, _MARGIN * (squares - common) * gauge.variance / self.level, 0.0)
         level = self.level if common == 1.0 else _MARGIN * common * self.level
         return Excess(level, self.variance + more, 0, np.zeros_like(squares))
 
@@ -199,7 +199,7 @@ class Excess:
         common = min(1.0, max(_common(seen, gauge), 0.0))
         own = np.clip(seen, 0.0, 1.0) if common == 1.0 else np.ones_like(seen)
         variance = self.variance * own
-        variance = np.where(variance > _GONE * gauge.variance, variance, 0.0)
+        variance = np.where(variance > _GONE * gauge.variance / self.level, variance, 0.0)
         level = self.level * common
         level = level if level > 1 + _GONE else 1.0
         return Excess(level, variance, 0, np.zeros_like(seen))

@@ -207,7 +207,7 @@ class SpotFinder:
         return np.where(content * other > 0, -1.0, 1.0) * ratio**2 / beyond
 
     def _excess_after(self, fit: Fit, explains: FloatArray, gauge: Gauge) -> Excess:
-        """As what the touches leave shows it; as it was where one more may explain that."""
+        """As what the touches leave shows it; as it was where they are being found one by one."""
         squares = gauge.squares(fit.residual, fit.predicted)
         excess = self.excess.risen(squares, gauge)
         if excess is self.excess:
@@ -216,7 +216,8 @@ class SpotFinder:
         self._lifted = None
         if explains[lifted] < -_EXPLAINS:
             self._lifted = self._model.candidates.spots[lifted, :2]
-        return self.excess if explains.max() > _EXPLAINS else excess
+        goes_on = len(fit.spots) > len(self._before) and explains.max() > _EXPLAINS
+        return self.excess if goes_on else excess
 
     @property
     def problem(self) -> str | None:
