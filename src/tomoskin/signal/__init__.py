@@ -13,6 +13,7 @@ from tomoskin.signal.difference import (
     in_phase,
     undone,
 )
+from tomoskin.signal.evidence import Reciprocity
 from tomoskin.signal.headroom import Headroom
 from tomoskin.signal.health import ElectrodeHealth, Health, Roles, nuisance_directions
 from tomoskin.signal.idle import Idle
@@ -37,6 +38,7 @@ __all__ = [
     "Monitor",
     "NuisanceSubspace",
     "Readout",
+    "Reciprocity",
     "Recording",
     "Reference",
     "Roles",

@@ -1,4 +1,4 @@
-"""Noise beyond what was learnt: seen in what the touches of a frame leave, and believed at once."""
+"""Noise beyond what was learnt: seen in what no touch can do, and believed at once."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.pattern import Pattern, Scan
+from tomoskin.signal import Reciprocity
 from tomoskin.touch.fit.noise import Whitener
 
 _LIMIT = 6.0
@@ -20,8 +21,11 @@ _MARGIN = 1.5
 _CALM = 8
 """Frames without more noise after which no more is believed than they have shown."""
 
-_UNEVEN = 0.15
-"""Part of what touches change that they may leave, though the noise is as it was."""
+_MOVES = 0.8
+"""Part of what has changed since the frame before that may stand between two reciprocal rows."""
+
+_GAINS = 0.03
+"""Part by which channels may differ in gain, and so reciprocal rows in what a touch does."""
 
 _SAID = 3.0
 """Times the usual noise, in deviations, from which it is said."""
@@ -42,11 +46,15 @@ class Channels:
         (n_parts,) that each is of: electrodes first, then pairs.
     names
         Of the channels, for people.
+    apart, both
+        (n_pairs, n_meas): difference and sum of rows that exchange driven and measuring pair.
     """
 
     parts: FloatArray
     channel: IntArray
     names: tuple[str, ...]
+    apart: FloatArray
+    both: FloatArray
 
     @classmethod
     def of(cls, pattern: Pattern) -> Self:
@@ -59,15 +67,27 @@ class Channels:
         names = [f"E{e + 1}" for e in range(n)]
         names += [f"E{a + 1} to E{b + 1}" for a, b in pairs.tolist()]
         channel = np.concatenate([scan.sample_electrode, n + pair.reshape(-1)])
-        return cls(np.concatenate([samples, np.eye(pattern.n_meas)]), channel, tuple(names))
+        parts = np.concatenate([samples, np.eye(pattern.n_meas)])
+        reciprocal = Reciprocity.of(pattern)
+        one, other = (
+            np.eye(pattern.n_meas)[reciprocal.first],
+            np.eye(pattern.n_meas)[reciprocal.second],
+        )
+        other = other * reciprocal.sign[:, None]
+        return cls(parts, channel, tuple(names), one - other, one + other)
 
 
 @dataclass(frozen=True, eq=False)
 class Gauge:
-    """Channels as one whitening shows them.
+    """Channels as they show in what no touch can do, for one covariance of the noise.
+
+    Rows that exchange the driven and the measuring pair change alike, whatever is pressed
+    (Geselowitz 1971): their differences are noise, but for what moves while they are read.
 
     Attributes
     ----------
+    differs, agrees
+        (r, n_meas) 1/V: differences of the pairs, white; and the sums in the same measure.
     directions
         (n_parts, r) of length 1.
     means
@@ -79,39 +99,53 @@ class Gauge:
         parts can be seen.
     """
 
+    differs: FloatArray
+    agrees: FloatArray
     directions: FloatArray
     means: FloatArray
     variance: FloatArray
     limit: FloatArray
 
     @classmethod
-    def of(cls, channels: Channels, whiten: Whitener) -> Self:
-        """Of the ``channels`` in data made white by ``whiten``."""
-        seen = whiten(channels.parts)
-        squares = np.einsum("pr,pr->p", seen, seen)
-        shows = squares > 1e-6 * np.median(squares)
-        directions = seen / np.sqrt(np.where(shows, squares, 1.0))[:, None] * shows[:, None]
+    def of(cls, channels: Channels, covariance: FloatArray, nuisance: FloatArray) -> Self:
+        """For a ``covariance`` (n_meas, n_meas) V² of the data, and a ``nuisance`` subspace
+        (n_meas, k) V."""
+        apart, both = channels.apart, channels.both
+        whiten = _white(apart @ covariance @ apart.T, apart @ nuisance)
+        directions = whiten(channels.parts @ apart.T)
+        squares = np.einsum("pr,pr->p", directions, directions)
+        shows = squares > 1e-12 * squares.max(initial=0.0)
+        squares = np.where(shows, squares, np.inf)
+        directions = directions / np.sqrt(squares)[:, None]
         members = (channels.channel == np.arange(len(channels.names))[:, None]) & shows
         count = members.sum(axis=1)
         means = members / np.maximum(count, 1)[:, None]
-        variance = means @ (1 / np.where(shows, squares, np.inf))
         spread = np.array([
             np.linalg.norm(directions[own] @ directions[own].T) / max(len(own), 1)
             for own in map(np.flatnonzero, members)
         ])  # fmt: skip
         limit = np.where(count >= _FEWEST, 1 + _LIMIT * np.sqrt(2) * spread, np.inf)
-        return cls(directions, means, variance, limit)
+        seen = whiten.matrix @ apart, whiten.matrix @ both
+        return cls(*seen, directions, means, means @ (1 / squares), limit)
 
-    def squares(self, residual: FloatArray, predicted: FloatArray) -> FloatArray:
-        """(n_channels,) mean squares of a ``residual`` (r,); 1 where the noise is as it should be.
+    def squares(self, dv: FloatArray, moved: FloatArray) -> FloatArray:
+        """(n_channels,) mean squares of data (n_meas,) V; 1 where the noise is as it should be.
 
-        What touches that change ``predicted`` (r,) may leave is no noise.
+        ``moved`` (n_meas,) V since the frame before: of that a part may stand between two rows,
+        since one is read after the other; and of all data as much as channels differ in gain.
         """
-        left = self.means @ (self.directions @ residual) ** 2
-        if not predicted.any():
-            return np.asarray(left)
-        told = self.means @ (self.directions @ predicted) ** 2
-        return np.asarray(left - _UNEVEN**2 * (told + told.mean()))
+        seen = np.column_stack([self.differs @ dv, self.agrees @ moved, self.agrees @ dv])
+        differs, changes, gains = (self.means @ (self.directions @ seen) ** 2).T
+        allowed = _MOVES**2 * changes + _GAINS**2 * gains
+        return np.asarray(differs - (allowed + allowed.mean()) / 2)
+
+
+def _white(covariance: FloatArray, nuisance: FloatArray) -> Whitener:
+    if not len(covariance):
+        return Whitener(np.zeros((0, 0)))
+    size = np.linalg.norm(nuisance, axis=0)
+    counts = size > 1e-6 * size.max(initial=0.0)
+    return Whitener.of(covariance).without(nuisance[:, counts] / size[counts])
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,14 +185,13 @@ class Excess:
         """The same for the same excess."""
         return self.variance.tobytes() + np.float64(self.level).tobytes()
 
-    def directions(self, channels: Channels) -> FloatArray:
-        """(n_meas, k) V: what noisy channels do, each as long as its deviation."""
-        size = np.sqrt(self.variance)[channels.channel]
-        return np.asarray((channels.parts[size > 0] * size[size > 0][:, None]).T)
-
-    def exceeds(self, other: Excess) -> bool:
-        """Whether there is more of it than of the ``other``."""
-        return self.level > other.level or bool((self.variance > other.variance).any())
+    def added(self, noise: FloatArray, channels: Channels) -> FloatArray:
+        """(n_meas, n_meas) V²: ``noise`` with the excess."""
+        if not self.any:
+            return noise
+        own = self.variance[channels.channel]
+        parts = channels.parts[own > 0]
+        return np.asarray(self.level * (noise + (parts.T * own[own > 0]) @ parts))
 
     def text(self, channels: Channels, usual: FloatArray) -> str | None:
         """What someone should see to, or None; ``usual`` (n_channels,) V² without the excess."""
@@ -177,28 +210,27 @@ class Excess:
             "skin, and counts for less: look at its cable and contact"
         )
 
-    def risen(self, squares: FloatArray, gauge: Gauge) -> Excess:
-        """With what a frame shows, (n_channels,) mean squares; itself where that is no more."""
+    def after(self, squares: FloatArray, gauge: Gauge) -> Excess:
+        """With what a frame shows, (n_channels,) mean squares."""
         common = _common(squares, gauge)
         if common <= 1 + (_common(gauge.limit, gauge) - 1) / 2:
             common = 1.0
         louder = squares > gauge.limit * common
         if common == 1.0 and not louder.any():
-            return self
+            return self._passed(squares, gauge)
         more = np.where(louder, _MARGIN * (squares - common) * gauge.variance / self.level, 0.0)
         level = self.level if common == 1.0 else _MARGIN * common * self.level
         return Excess(level, self.variance + more, 0, np.zeros_like(squares))
 
-    def passed(self, squares: FloatArray, gauge: Gauge) -> Excess:
+    def _passed(self, squares: FloatArray, gauge: Gauge) -> Excess:
         """After a frame that showed no more: what ``_CALM`` of them do not show is forgotten."""
         if not self.any:
             return self
         seen, calm = np.maximum(self.seen, squares), self.calm + 1
         if calm < _CALM:
             return replace(self, calm=calm, seen=seen)
-        common = min(1.0, max(_common(seen, gauge), 0.0))
-        own = np.clip(seen, 0.0, 1.0) if common == 1.0 else np.ones_like(seen)
-        variance = self.variance * own
+        common = float(np.clip(_common(seen, gauge), 1e-12, 1.0))
+        variance = self.variance * np.clip(seen / common, 0.0, 1.0)
         variance = np.where(variance > _GONE * gauge.variance / self.level, variance, 0.0)
         level = self.level * common
         level = level if level > 1 + _GONE else 1.0

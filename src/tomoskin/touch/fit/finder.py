@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -37,6 +37,13 @@ _REST = 0.5
 
 _EXPLAINS = 0.3
 """Part of what is beyond noise: a candidate that explains as much may be a touch not yet found."""
+
+_YOUNG = 3
+"""Frames of a touch in which what it does not explain is held for noise; later it is the error of
+its model."""
+
+_CHANCE = 6.0
+"""Deviations by which the squares of a residual must be too many to be more noise."""
 
 _MASKS = 8
 """Nuisance subspaces whose whitening is kept."""
@@ -145,13 +152,15 @@ class SpotFinder:
         self._channels = Channels.of(model.response.state.model.pattern)
         self.excess = Excess.none(self._channels)
         self._lifted: FloatArray | None = None
+        self._last: FloatArray | None = None
+        self._age, self._unexplained_times = 0, 1.0
         self.like_touch = False
         self.renew(noise, gain)
 
     def renew(self, noise: FloatArray, gain: float = 1.0) -> None:
         """Go on with other noise, or another gain."""
         self._scale = self._model.scale * gain
-        self._whiten = Whitener.of(noise / self._scale[:, None] / self._scale)
+        self._noise = noise / self._scale[:, None] / self._scale
         self._usual = np.full(len(self._channels.names), np.inf)
         self._matched: OrderedDict[bytes, tuple[Whitener, Matched, Gauge]] = OrderedDict()
 
@@ -161,10 +170,15 @@ class SpotFinder:
         ``nuisance`` (n_meas, k) spans the directions along which the data tell nothing of a
         touch: a unit vector for each excluded row. There must be more rows than that.
         """
-        detected, excess = self._looked(dv, nuisance)
-        risen, self.excess = excess.exceeds(self.excess), excess
-        if risen:  # it may be no touch in the noise that there is
-            detected, _ = self._looked(dv, nuisance)
+        data, nuisance = dv / self._scale, nuisance / self._scale[:, None]
+        self._note_excess(data, nuisance)
+        detected, matched = self._searched(data, nuisance)
+        times = self._unexplained(detected.fit, matched)
+        if times > 1.0:  # it may be no touch in as much noise
+            detected, matched = self._searched(data, nuisance, times)
+        self._unexplained_times = times
+        self._age = self._age + 1 if len(detected.fit.spots) else 0
+        self._note_others(detected.fit, matched)
         self._unrest = self._unrest_of(detected.fit.spots)
         self._before = detected.fit.spots
         if self._fading:
@@ -173,9 +187,14 @@ class SpotFinder:
         detections.sort(key=lambda detection: -abs(detection.peak))
         return detections
 
-    def _looked(self, dv: FloatArray, nuisance: FloatArray) -> tuple[SpotDetections, Excess]:
-        """Touches of a frame in the noise that is known, and the excess of what they leave."""
-        quiet, candidates, gauge = self._whitened(nuisance)
+    def _searched(
+        self, data: FloatArray, nuisance: FloatArray, times: float = 1.0
+    ) -> tuple[SpotDetections, Matched]:
+        """Touches of ``data`` (n_meas,) in so many times the noise that is known."""
+        quiet, candidates, _ = self._whitened(nuisance)
+        if times != 1.0:
+            quiet = Whitener(quiet.matrix / math.sqrt(times))
+            candidates = Matched.of(candidates.spots, candidates.signatures / math.sqrt(times))
         whiten, matched = self._with_residual(quiet, candidates)
         problem = Problem(
             response=self._model.response,
@@ -185,50 +204,61 @@ class SpotFinder:
             sign=self._settings.sign,
             reach=self._unrest * self._reach,
             grows=self._unrest * _GROWS,
-            data=whiten(dv / self._scale),
+            data=whiten(data),
         )
         search = Search(problem, matched, self._settings.snr, self._most, self._pace, quiet)
-        detected = search(self._before)
-        explains = self._explaining(detected.fit, matched)
-        return detected, self._excess_after(detected.fit, explains, gauge)
+        return search(self._before), matched
 
-    def _explaining(self, fit: Fit, matched: Matched) -> FloatArray:
-        """(n,) part of what is beyond noise that each candidate could explain, negative where that
-        takes a touch of the other sign."""
+    def _unexplained(self, fit: Fit, matched: Matched) -> float:
+        """Variance of what is left of a frame before which there was no touch for long, where it is
+        beyond chance; 1 where it is not, or where further touches may still be found in it."""
+        variance = fit.misfit / fit.degrees
+        if self._age >= _YOUNG or variance < 1 + _CHANCE * math.sqrt(2 / fit.degrees):
+            return 1.0
+        ratio, _ = matched.ratios(fit.residual, fit.jacobian, self._settings.sign)
+        goes_on = ratio.max() ** 2 > _EXPLAINS * (fit.misfit - fit.degrees)
+        return 1.0 if len(fit.spots) > len(self._before) and goes_on else variance
+
+    def _note_excess(self, data: FloatArray, nuisance: FloatArray) -> None:
+        """Noise that shows in ``data`` (n_meas,) beyond what is known."""
+        _, _, gauge = self._whitened(nuisance)
+        moved = data - (data if self._last is None else self._last)
+        self._last = data
+        self.excess = self.excess.after(gauge.squares(data, moved), gauge)
+
+    def _note_others(self, fit: Fit, matched: Matched) -> None:
+        """Whether what is left of a frame is like a touch, and whether one that was lifted."""
+        self._lifted, self.like_touch = None, bool(len(fit.spots))
         beyond = fit.misfit - fit.degrees
-        self.like_touch = bool(len(fit.spots))
         if beyond <= 0:
-            return np.zeros(len(matched.spots))
+            return
         ratio, content = matched.ratios(fit.residual, fit.jacobian, "both")
-        self.like_touch |= bool(
-            np.max(ratio**2 * (ratio > self._settings.snr)) > _EXPLAINS * beyond
-        )
-        other = {"decrease": 1.0, "increase": -1.0, "both": 0.0}[self._settings.sign]
-        return np.where(content * other > 0, -1.0, 1.0) * ratio**2 / beyond
-
-    def _excess_after(self, fit: Fit, explains: FloatArray, gauge: Gauge) -> Excess:
-        """As what the touches leave shows it; as it was where they are being found one by one."""
-        squares = gauge.squares(fit.residual, fit.predicted)
-        excess = self.excess.risen(squares, gauge)
-        if excess is self.excess:
-            return excess.passed(squares, gauge)
-        lifted = int(explains.argmin())
-        self._lifted = None
-        if explains[lifted] < -_EXPLAINS:
-            self._lifted = self._model.candidates.spots[lifted, :2]
-        goes_on = len(fit.spots) > len(self._before) and explains.max() > _EXPLAINS
-        return self.excess if goes_on else excess
+        best = int(ratio.argmax())
+        if ratio[best] ** 2 < max(self._settings.snr**2, _EXPLAINS * beyond):
+            return
+        self.like_touch = True
+        if (
+            content[best] * {"decrease": 1.0, "increase": -1.0, "both": 0.0}[self._settings.sign]
+            > 0
+        ):
+            self._lifted = self._model.candidates.spots[best, :2]
 
     @property
     def problem(self) -> str | None:
         """What of the newest frame no touch explains, in a sentence, or None."""
-        if self._lifted is None or not self.excess.any:
-            return self.excess.text(self._channels, self._usual)
+        if self._lifted is None:
+            return self._noisy()
         x, y = 1e3 * self._lifted
         return (
             f"near {x:.0f}, {y:.0f} mm the skin reads as if a press had been lifted that stood "
             "when the reference was taken: take a new one while nothing touches"
         )
+
+    def _noisy(self) -> str | None:
+        if len(self._before):
+            return None
+        louder = max(self.excess.level, self._unexplained_times)
+        return replace(self.excess, level=louder).text(self._channels, self._usual)
 
     def _unrest_of(self, spots: FloatArray) -> float:
         """How much of what touches may do they have done since the frame before; 1 where there
@@ -241,11 +271,9 @@ class SpotFinder:
     def _whitened(self, nuisance: FloatArray) -> tuple[Whitener, Matched, Gauge]:
         key = nuisance.tobytes() + self.excess.key
         if key not in self._matched:
-            whiten = self._whiten.without(nuisance / self._scale[:, None])
-            if self.excess.any:
-                weigh = Weigh.of(whiten(self.excess.directions(self._channels).T).T)
-                whiten = Whitener(weigh(whiten.matrix) / math.sqrt(self.excess.level))
-            gauge = Gauge.of(self._channels, whiten)
+            noise = self.excess.added(self._noise, self._channels)
+            whiten = Whitener.of(noise).without(nuisance)
+            gauge = Gauge.of(self._channels, noise, nuisance)
             if not self.excess.any:
                 self._usual = gauge.variance
             self._matched[key] = whiten, self._model.candidates.matched(whiten), gauge

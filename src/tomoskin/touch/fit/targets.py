@@ -23,7 +23,7 @@ _FAR = 1.5
 """A row's variance is drawn towards the others' by at most so many deviations of its logarithm."""
 
 _STEPS = 30
-_LEAST = 1e-9
+_LEAST = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,13 +138,18 @@ def _by_electrode(blocks: Blocks, own: FloatArray, frames: int) -> tuple[FloatAr
             )
             for part in (explained, inverse)
         )
-        sample = sample * (seen / np.maximum(expected, np.finfo(float).tiny))
+        sample = np.clip(sample * _bounded(seen, expected), _LEAST * level, level / _LEAST)
         there = blocks.there
-        ratio = np.einsum("dii,di->", explained, there) / np.einsum("dii,di->", inverse, there)
-        row = max(row * float(ratio), _LEAST * level)
+        both = (np.einsum("dii,di->", part, there) for part in (explained, inverse))
+        row = max(row * float(_bounded(*both)), _LEAST * level)
     block = _components(blocks, sample, row) + empty
     fit = np.linalg.slogdet(block)[1].sum() + np.einsum("dij,dji->", np.linalg.inv(block), own)
     return _components(blocks, sample, row), frames * float(fit) + 2 * (n + 1)
+
+
+def _bounded(seen: FloatArray, expected: FloatArray) -> FloatArray:
+    """By how much a variance is to change in one step."""
+    return np.asarray(np.clip(seen / np.maximum(expected, np.finfo(float).tiny), 0.25, 4.0))
 
 
 def _components(blocks: Blocks, sample: FloatArray, row: float) -> FloatArray:
