@@ -28,6 +28,10 @@ from tomoskin.signal import (
 MOST_NUISANCE = 0.5
 """No image is made when more than this part of the data carries no information."""
 
+_GAIN, _ALIKE, _COUNTS = 1.25, 0.05, 0.1
+"""Another gain: the median voltage has changed by more than the first as a factor, half of all by
+the same but for the second as a part; of those that are above the third part of their rms."""
+
 _RENEWAL = 16
 """Blocks of idle frames after which the noise is taken anew, though it is as loud as before."""
 
@@ -47,11 +51,14 @@ class Conditioned:
         How many measurements are excluded, or count in a sum only.
     health
         Of the electrodes; None where there are no voltages to tell it from.
+    problem
+        What is wrong with the voltages as a whole, in a sentence, or None.
     """
 
     differences: Differences | None
     n_excluded: int
     health: Health | None = None
+    problem: str | None = None
 
 
 class Conditioning(Protocol):
@@ -216,6 +223,9 @@ class Followed:
             values = np.where(health.lost, mean, values)
         if subspace.nuisance.count > MOST_NUISANCE * len(values):
             return Conditioned(None, n_excluded, health)
+        times = _gain_of(values, mean, self._excluded)
+        if times is not None and self._prepared.skin.signal.common_modes != "projected":
+            return Conditioned(None, n_excluded, health, f"{_gain_text(times)}; nothing is shown")
         dv = subspace.nuisance(difference(values, mean, self._prepared.operator.difference))
         differences = Differences(
             dv=dv,
@@ -225,7 +235,8 @@ class Followed:
             from_rest=measured.values - baseline.start,
             excluded=health.lost,
         )
-        return Conditioned(differences, n_excluded, health)
+        problem = None if times is None else _gain_text(times)
+        return Conditioned(differences, n_excluded, health, problem)
 
     def learn(
         self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
@@ -321,6 +332,24 @@ def _scale(prepared: Prepared, reference: FloatArray) -> FloatArray:
     if prepared.operator.difference == "plain":
         return np.ones_like(reference)
     return np.abs(reference)
+
+
+def _gain_of(values: FloatArray, mean: FloatArray, excluded: NDArray[np.bool_]) -> float | None:
+    """By which factor all voltages have changed, where it is one and far from 1; else None."""
+    counts = ~excluded & (np.abs(mean) > _COUNTS * np.sqrt(np.mean(mean**2)))
+    if not counts.any():
+        return None
+    ratio = values[counts] / mean[counts]
+    times = float(np.median(ratio))
+    alike = float(np.median(np.abs(ratio - times))) < _ALIKE * abs(times)
+    return times if alike and not 1 / _GAIN < times < _GAIN else None
+
+
+def _gain_text(times: float) -> str:
+    return (
+        f"all voltages are {times:.1f} times those of the reference: look at current, supply and "
+        "gain, and take a new reference"
+    )
 
 
 def _rank(prepared: Prepared) -> IntArray:

@@ -190,11 +190,12 @@ class Following:
         touches: tuple[Touch, ...],
         readings: dict[str, Any],
     ) -> FrameResult:
+        shows = conditioned.differences is not None
         return FrameResult(
             sequence=measured.sequence,
             host_time=measured.host_time,
             ready=True,
-            has_image=conditioned.differences is not None,
+            has_image=shows,
             image=image,
             voltages=measured.values,
             reference=self._conditioning.mean,
@@ -204,5 +205,5 @@ class Following:
             health=conditioned.health,
             baseline=self._conditioning.state,
             readings=readings,
-            unexplained=self._finder.problem if conditioned.differences is not None else None,
+            unexplained=conditioned.problem or (shows and self._finder.problem) or None,
         )

@@ -15,13 +15,13 @@ from tomoskin.touch.fit.noise import Whitener
 _LIMIT = 6.0
 """Deviations by which the mean square of a channel's residual must exceed 1 to be more noise."""
 
-_MARGIN = 1.5
+_MARGIN = 2.0
 """What one frame shows of a variance is taken times this: it is a rough estimate."""
 
 _CALM = 8
 """Frames without more noise after which no more is believed than they have shown."""
 
-_MOVES = 0.8
+_MOVES = 0.5
 """Part of what has changed since the frame before that may stand between two reciprocal rows."""
 
 _GAINS = 0.03

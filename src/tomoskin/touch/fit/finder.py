@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import Detection, FloatArray, SkinError
 from tomoskin.forward import ForwardModel, State
@@ -21,7 +22,7 @@ from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Fit, Problem, SheetDomain, Weigh
 from tomoskin.touch.fit.search import Search, SpotDetections, joined
-from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
+from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, Response, depth_of
 
 _CELLS = 1500
 """Of the mesh that spots are fitted on: their profile is smooth, and a frame is quick."""
@@ -44,6 +45,11 @@ its model."""
 
 _CHANCE = 6.0
 """Deviations by which the squares of a residual must be too many to be more noise."""
+
+_LIFTED = 2.0
+"""A press has been lifted where a change of the other sign stands out by so many thresholds."""
+
+_SIGNS = {"decrease": -1.0, "increase": 1.0, "both": 0.0}
 
 _MASKS = 8
 """Nuisance subspaces whose whitening is kept."""
@@ -201,7 +207,7 @@ class SpotFinder:
             whiten=whiten,
             prior=self._model.prior,
             sheet=self._model.sheet,
-            sign=self._settings.sign,
+            sign=self._sign(whiten(data), matched),
             reach=self._unrest * self._reach,
             grows=self._unrest * _GROWS,
             data=whiten(data),
@@ -226,22 +232,33 @@ class SpotFinder:
         self._last = data
         self.excess = self.excess.after(gauge.squares(data, moved), gauge)
 
-    def _note_others(self, fit: Fit, matched: Matched) -> None:
-        """Whether what is left of a frame is like a touch, and whether one that was lifted."""
-        self._lifted, self.like_touch = None, bool(len(fit.spots))
-        beyond = fit.misfit - fit.degrees
-        if beyond <= 0:
-            return
-        ratio, content = matched.ratios(fit.residual, fit.jacobian, "both")
+    def _sign(self, data: FloatArray, matched: Matched) -> str:
+        """That of the skin's touches; "both" where a press has been lifted that was there when the
+        reference was taken, or all round it there would seem to be touches."""
+        if self._settings.sign == "both" or (self._wrong(self._before)).any():
+            return "both"
+        if len(self._before):
+            return self._settings.sign
+        ratio, content = matched.ratios(data, np.zeros((len(data), 0)), "both")
         best = int(ratio.argmax())
-        if ratio[best] ** 2 < max(self._settings.snr**2, _EXPLAINS * beyond):
-            return
-        self.like_touch = True
-        if (
-            content[best] * {"decrease": 1.0, "increase": -1.0, "both": 0.0}[self._settings.sign]
-            > 0
-        ):
-            self._lifted = self._model.candidates.spots[best, :2]
+        lifted = ratio[best] > _LIFTED * self._settings.snr and self._wrong(content[best])
+        return "both" if lifted else self._settings.sign
+
+    def _wrong(self, spots: FloatArray) -> NDArray[np.bool_]:
+        """(k,) whether each of ``spots`` (k, 4), or a content, is not of the skin's sign."""
+        content = spots[..., CONTENT] if np.ndim(spots) else spots
+        return np.asarray(content * _SIGNS[self._settings.sign] < 0)
+
+    def _note_others(self, fit: Fit, matched: Matched) -> None:
+        """Where a press has been lifted; and whether what is left of a frame is like a touch."""
+        wrong = fit.spots[self._wrong(fit.spots)]
+        self._lifted = wrong[np.abs(wrong[:, CONTENT]).argmax(), :2] if len(wrong) else None
+        self.like_touch = bool(len(fit.spots))
+        beyond = fit.misfit - fit.degrees
+        if beyond > 0:
+            ratio, _ = matched.ratios(fit.residual, fit.jacobian, "both")
+            least = max(self._settings.snr**2, _EXPLAINS * beyond)
+            self.like_touch |= bool(ratio.max() ** 2 > least)
 
     @property
     def problem(self) -> str | None:
@@ -255,7 +272,7 @@ class SpotFinder:
         )
 
     def _noisy(self) -> str | None:
-        if len(self._before):
+        if len(self._before):  # what they do not explain is their model's as a rule
             return None
         louder = max(self.excess.level, self._unexplained_times)
         return replace(self.excess, level=louder).text(self._channels, self._usual)
@@ -292,7 +309,8 @@ class SpotFinder:
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots
         depth = self._unit * np.expm1(depth_of(spots)) if len(spots) else np.zeros(0)
-        return [self._detection(spots[k], float(depth[k]), detected, k) for k in range(len(spots))]
+        shown = np.flatnonzero(~self._wrong(spots)).tolist()
+        return [self._detection(spots[k], float(depth[k]), detected, k) for k in shown]
 
     def _detection(
         self, spot: FloatArray, peak: float, detected: SpotDetections, k: int
