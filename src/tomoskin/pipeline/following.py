@@ -127,8 +127,8 @@ class Following:
             detections = applied.locate(view, detections)
         touches = self._tracker.update(detections, measured.time, measured.host_time)
         readings = self._read(view, detections, touched=bool(touches))
-        noise = not (detections or self._finder.like_touch)
-        self._learn(measured.time, touched=bool(touches), noise=noise)
+        untouched = not (detections or self._finder.like_touch)
+        self._learn(measured.time, touched=bool(touches), noise=untouched)
         return self._result(measured, conditioned, image, touches, readings)
 
     def first(self, measured: Measured) -> FrameResult:

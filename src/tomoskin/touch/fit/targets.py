@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import digamma, polygamma
 
 from tomoskin.core import FloatArray, IntArray
@@ -129,22 +130,22 @@ def _by_electrode(blocks: Blocks, own: FloatArray, frames: int) -> tuple[FloatAr
     for _ in range(_STEPS):
         block = _components(blocks, sample, row) + empty
         inverse = np.linalg.inv(block)
-        explained = inverse @ own @ inverse
         seen, expected = (
-            np.bincount(
-                blocks.electrode[read],
-                np.einsum("dis,dij,djs->ds", blocks.makes, part, blocks.makes)[read],
-                n,
-            )
-            for part in (explained, inverse)
+            _by_sample(blocks, part, read, n) for part in (inverse @ own @ inverse, inverse)
         )
         sample = np.clip(sample * _bounded(seen, expected), _LEAST * level, level / _LEAST)
         there = blocks.there
-        both = (np.einsum("dii,di->", part, there) for part in (explained, inverse))
+        both = (np.einsum("dii,di->", part, there) for part in (inverse @ own @ inverse, inverse))
         row = max(row * float(_bounded(*both)), _LEAST * level)
     block = _components(blocks, sample, row) + empty
     fit = np.linalg.slogdet(block)[1].sum() + np.einsum("dij,dji->", np.linalg.inv(block), own)
     return _components(blocks, sample, row), frames * float(fit) + 2 * (n + 1)
+
+
+def _by_sample(blocks: Blocks, part: FloatArray, read: NDArray[np.bool_], n: int) -> FloatArray:
+    """(n,) sums of aᵀ · part · a over what each electrode's samples do to the rows."""
+    sums = np.einsum("dis,dij,djs->ds", blocks.makes, part, blocks.makes)
+    return np.asarray(np.bincount(blocks.electrode[read], sums[read], n), dtype=np.float64)
 
 
 def _bounded(seen: FloatArray, expected: FloatArray) -> FloatArray:
