@@ -95,12 +95,12 @@ class InData:
     @property
     def like_touch(self) -> bool:
         """See :class:`Finder`."""
-        return self._spots.like_touch
+        return self._spots.watch.like_touch
 
     @property
     def problem(self) -> str | None:
         """See :class:`Finder`."""
-        return self._spots.problem
+        return self._spots.watch.problem
 
 
 def finding(prepared: Prepared, reference: Reference | None, pace: Pace = EXHAUSTIVE) -> Finder:

@@ -27,7 +27,7 @@ _MOVES = 0.5
 _GAINS = 0.03
 """Part by which channels may differ in gain, and so reciprocal rows in what a touch does."""
 
-_SAID = 3.0
+_SAID = 4.0
 """Times the usual noise, in deviations, from which it is said."""
 
 _FEWEST = 3

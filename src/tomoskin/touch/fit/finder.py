@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tomoskin.core import Detection, FloatArray, SkinError
 from tomoskin.forward import ForwardModel, State
@@ -16,13 +15,14 @@ from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
 from tomoskin.touch.fit.anisotropy import with_anisotropy
 from tomoskin.touch.fit.candidates import Candidates, Matched
-from tomoskin.touch.fit.excess import Channels, Excess, Gauge
+from tomoskin.touch.fit.excess import Gauge
 from tomoskin.touch.fit.noise import ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.refine import Fit, Problem, SheetDomain, Weigh
+from tomoskin.touch.fit.refine import Problem, SheetDomain, Weigh
 from tomoskin.touch.fit.search import Search, SpotDetections, joined
-from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, Response, depth_of
+from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
+from tomoskin.touch.fit.watch import Watch
 
 _CELLS = 1500
 """Of the mesh that spots are fitted on: their profile is smooth, and a frame is quick."""
@@ -35,21 +35,6 @@ _GROWS = 0.5
 
 _REST = 0.5
 """A touch that stood still in the frame before moves, and grows, by this part of that at least."""
-
-_EXPLAINS = 0.3
-"""Part of what is beyond noise: a candidate that explains as much may be a touch not yet found."""
-
-_YOUNG = 3
-"""Frames of a touch in which what it does not explain is held for noise; later it is the error of
-its model."""
-
-_CHANCE = 6.0
-"""Deviations by which the squares of a residual must be too many to be more noise."""
-
-_LIFTED = 2.0
-"""A press has been lifted where a change of the other sign stands out by so many thresholds."""
-
-_SIGNS = {"decrease": -1.0, "increase": 1.0, "both": 0.0}
 
 _MASKS = 8
 """Nuisance subspaces whose whitening is kept."""
@@ -130,11 +115,8 @@ class SpotFinder:
 
     Attributes
     ----------
-    excess
-        Noise beyond ``noise``.
-    like_touch
-        Whether the newest frame is such as a touch makes, one that presses or one that has been
-        lifted, though it may be too faint to be found: it is no noise to be learnt.
+    watch
+        What touches do not explain.
     """
 
     def __init__(
@@ -155,19 +137,14 @@ class SpotFinder:
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
         self._before = np.zeros((0, N_PARAMETERS))
-        self._channels = Channels.of(model.response.state.model.pattern)
-        self.excess = Excess.none(self._channels)
-        self._lifted: FloatArray | None = None
-        self._last: FloatArray | None = None
-        self._age, self._unexplained_times = 0, 1.0
-        self.like_touch = False
+        pattern = model.response.state.model.pattern
+        self.watch = Watch(pattern, skin.touch.sign, skin.touch.snr)
         self.renew(noise, gain)
 
     def renew(self, noise: FloatArray, gain: float = 1.0) -> None:
         """Go on with other noise, or another gain."""
         self._scale = self._model.scale * gain
         self._noise = noise / self._scale[:, None] / self._scale
-        self._usual = np.full(len(self._channels.names), np.inf)
         self._matched: OrderedDict[bytes, tuple[Whitener, Matched, Gauge]] = OrderedDict()
 
     def push(self, dv: FloatArray, nuisance: FloatArray) -> list[Detection]:
@@ -177,14 +154,12 @@ class SpotFinder:
         touch: a unit vector for each excluded row. There must be more rows than that.
         """
         data, nuisance = dv / self._scale, nuisance / self._scale[:, None]
-        self._note_excess(data, nuisance)
+        self.watch.begin(data, self._whitened(nuisance)[2])
         detected, matched = self._searched(data, nuisance)
-        times = self._unexplained(detected.fit, matched)
+        times = self.watch.unexplained(detected.fit, matched)
         if times > 1.0:  # it may be no touch in as much noise
             detected, matched = self._searched(data, nuisance, times)
-        self._unexplained_times = times
-        self._age = self._age + 1 if len(detected.fit.spots) else 0
-        self._note_others(detected.fit, matched)
+        self.watch.end(detected.fit, matched, times)
         self._unrest = self._unrest_of(detected.fit.spots)
         self._before = detected.fit.spots
         if self._fading:
@@ -207,75 +182,13 @@ class SpotFinder:
             whiten=whiten,
             prior=self._model.prior,
             sheet=self._model.sheet,
-            sign=self._sign(whiten(data), matched),
+            sign=self.watch.sign(whiten(data), matched),
             reach=self._unrest * self._reach,
             grows=self._unrest * _GROWS,
             data=whiten(data),
         )
         search = Search(problem, matched, self._settings.snr, self._most, self._pace, quiet)
         return search(self._before), matched
-
-    def _unexplained(self, fit: Fit, matched: Matched) -> float:
-        """Variance of what is left of a frame before which there was no touch for long, where it is
-        beyond chance; 1 where it is not, or where further touches may still be found in it."""
-        variance = fit.misfit / fit.degrees
-        if self._age >= _YOUNG or variance < 1 + _CHANCE * math.sqrt(2 / fit.degrees):
-            return 1.0
-        ratio, _ = matched.ratios(fit.residual, fit.jacobian, self._settings.sign)
-        goes_on = ratio.max() ** 2 > _EXPLAINS * (fit.misfit - fit.degrees)
-        return 1.0 if len(fit.spots) > len(self._before) and goes_on else variance
-
-    def _note_excess(self, data: FloatArray, nuisance: FloatArray) -> None:
-        """Noise that shows in ``data`` (n_meas,) beyond what is known."""
-        _, _, gauge = self._whitened(nuisance)
-        moved = data - (data if self._last is None else self._last)
-        self._last = data
-        self.excess = self.excess.after(gauge.squares(data, moved), gauge)
-
-    def _sign(self, data: FloatArray, matched: Matched) -> str:
-        """That of the skin's touches; "both" where a press has been lifted that was there when the
-        reference was taken, or all round it there would seem to be touches."""
-        if self._settings.sign == "both" or (self._wrong(self._before)).any():
-            return "both"
-        if len(self._before):
-            return self._settings.sign
-        ratio, content = matched.ratios(data, np.zeros((len(data), 0)), "both")
-        best = int(ratio.argmax())
-        lifted = ratio[best] > _LIFTED * self._settings.snr and self._wrong(content[best])
-        return "both" if lifted else self._settings.sign
-
-    def _wrong(self, spots: FloatArray) -> NDArray[np.bool_]:
-        """(k,) whether each of ``spots`` (k, 4), or a content, is not of the skin's sign."""
-        content = spots[..., CONTENT] if np.ndim(spots) else spots
-        return np.asarray(content * _SIGNS[self._settings.sign] < 0)
-
-    def _note_others(self, fit: Fit, matched: Matched) -> None:
-        """Where a press has been lifted; and whether what is left of a frame is like a touch."""
-        wrong = fit.spots[self._wrong(fit.spots)]
-        self._lifted = wrong[np.abs(wrong[:, CONTENT]).argmax(), :2] if len(wrong) else None
-        self.like_touch = bool(len(fit.spots))
-        beyond = fit.misfit - fit.degrees
-        if beyond > 0:
-            ratio, _ = matched.ratios(fit.residual, fit.jacobian, "both")
-            least = max(self._settings.snr**2, _EXPLAINS * beyond)
-            self.like_touch |= bool(ratio.max() ** 2 > least)
-
-    @property
-    def problem(self) -> str | None:
-        """What of the newest frame no touch explains, in a sentence, or None."""
-        if self._lifted is None:
-            return self._noisy()
-        x, y = 1e3 * self._lifted
-        return (
-            f"near {x:.0f}, {y:.0f} mm the skin reads as if a press had been lifted that stood "
-            "when the reference was taken: take a new one while nothing touches"
-        )
-
-    def _noisy(self) -> str | None:
-        if len(self._before):  # what they do not explain is their model's as a rule
-            return None
-        louder = max(self.excess.level, self._unexplained_times)
-        return replace(self.excess, level=louder).text(self._channels, self._usual)
 
     def _unrest_of(self, spots: FloatArray) -> float:
         """How much of what touches may do they have done since the frame before; 1 where there
@@ -286,13 +199,12 @@ class SpotFinder:
         return min(1.0, math.hypot(_REST, moved / self._reach))
 
     def _whitened(self, nuisance: FloatArray) -> tuple[Whitener, Matched, Gauge]:
-        key = nuisance.tobytes() + self.excess.key
+        excess, channels = self.watch.excess, self.watch.channels
+        key = nuisance.tobytes() + excess.key
         if key not in self._matched:
-            noise = self.excess.added(self._noise, self._channels)
+            noise = excess.added(self._noise, channels)
             whiten = Whitener.of(noise).without(nuisance)
-            gauge = Gauge.of(self._channels, noise, nuisance)
-            if not self.excess.any:
-                self._usual = gauge.variance
+            gauge = Gauge.of(channels, noise, nuisance)
             self._matched[key] = whiten, self._model.candidates.matched(whiten), gauge
             if len(self._matched) > _MASKS:
                 self._matched.popitem(last=False)
@@ -309,7 +221,7 @@ class SpotFinder:
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots
         depth = self._unit * np.expm1(depth_of(spots)) if len(spots) else np.zeros(0)
-        shown = np.flatnonzero(~self._wrong(spots)).tolist()
+        shown = np.flatnonzero(~self.watch.wrong(spots)).tolist()
         return [self._detection(spots[k], float(depth[k]), detected, k) for k in shown]
 
     def _detection(

@@ -129,13 +129,12 @@ def _by_electrode(blocks: Blocks, own: FloatArray, frames: int) -> tuple[FloatAr
     empty = np.eye(own.shape[1]) * (1 - blocks.there)[:, :, None]
     for _ in range(_STEPS):
         block = _components(blocks, sample, row) + empty
-        inverse = np.linalg.inv(block)
-        seen, expected = (
-            _by_sample(blocks, part, read, n) for part in (inverse @ own @ inverse, inverse)
-        )
+        inverse: FloatArray = np.asarray(np.linalg.inv(block), dtype=np.float64)
+        explained: FloatArray = np.asarray(inverse @ own @ inverse, dtype=np.float64)
+        seen, expected = (_by_sample(blocks, part, read, n) for part in (explained, inverse))
         sample = np.clip(sample * _bounded(seen, expected), _LEAST * level, level / _LEAST)
         there = blocks.there
-        both = (np.einsum("dii,di->", part, there) for part in (inverse @ own @ inverse, inverse))
+        both = (np.einsum("dii,di->", part, there) for part in (explained, inverse))
         row = max(row * float(_bounded(*both)), _LEAST * level)
     block = _components(blocks, sample, row) + empty
     fit = np.linalg.slogdet(block)[1].sum() + np.einsum("dij,dji->", np.linalg.inv(block), own)
