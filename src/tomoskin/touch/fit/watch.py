@@ -67,7 +67,7 @@ class Watch:
         """Take the data (n_meas,) of a frame: what no touch can do to them is noise."""
         if not self.excess.any:
             self._usual = gauge.variance
-        moved = data - (data if self._last is None else self._last)
+        moved = data if self._last is None else data - self._last
         self._last = data
         self.excess = self.excess.after(gauge.squares(data, moved), gauge)
 
