@@ -43,8 +43,6 @@ pub struct Prior {
     pub weight: Spot,
     /// Of the logarithm of the radius: least and largest.
     pub log_radii: [f64; 2],
-    /// Least and largest depth.
-    pub depths: [f64; 2],
     /// Content of a spot of radius and depth one.
     pub filling: f64,
 }
@@ -60,10 +58,10 @@ impl Prior {
         ]
     }
 
-    fn hold(&self, spot: &mut Spot) {
+    fn hold(&self, spot: &mut Spot, depths: [f64; 2]) {
         spot[2] = spot[2].clamp(self.log_radii[0], self.log_radii[1]);
         let filling = self.filling * (2.0 * spot[2]).exp();
-        let [low, high] = self.depths.map(|depth| depth * filling);
+        let [low, high] = depths.map(|depth| depth * filling);
         spot[3] = spot[3].clamp(low, high);
     }
 }
@@ -99,6 +97,8 @@ pub struct Frame<'a> {
     /// Deviation of a spot's direction, of its shape, of its way within the scan, m, and of its
     /// growth.
     pub deviations: [f64; 4],
+    /// Least and largest depth.
+    pub depths: [f64; 2],
 }
 
 /// Spots that explain a frame; matrices by columns.
@@ -229,7 +229,7 @@ impl Frame<'_> {
         let hold = |spot: &Spot| {
             let mut held = *spot;
             self.sheet.hold(&mut held);
-            self.prior.hold(&mut held);
+            self.prior.hold(&mut held, self.depths);
             held
         };
         spots.iter().map(hold).collect()

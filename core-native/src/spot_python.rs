@@ -29,8 +29,7 @@ type Found<'py> = (
 
 #[pymethods]
 impl SpotTable {
-    /// `grids` (n, 5): origin, step, shape; `prior` (3, 4): middle, weight, then the ranges of
-    /// log radius and depth.
+    /// `grids` (n, 5): origin, step, shape; `prior` (2, 4): middle and weight.
     #[new]
     fn new(
         log_radii: &Any<'_>,
@@ -40,6 +39,7 @@ impl SpotTable {
         filling: f64,
         sheet: &Any<'_>,
         prior: &Any<'_>,
+        log_range: [f64; 2],
     ) -> PyResult<Self> {
         let values = array::<f64, Ix3>("values", values)?;
         let nodes = array::<f64, Ix1>("nodes", nodes)?;
@@ -51,10 +51,9 @@ impl SpotTable {
         let sheet = array::<f64, Ix2>("sheet", sheet)?;
         same("columns of sheet", 3, sheet.shape()[1])?;
         let prior = array::<f64, Ix2>("prior", prior)?;
-        same("entries of prior", 3 * PARAMETERS, prior.len())?;
+        same("entries of prior", 2 * PARAMETERS, prior.len())?;
         let (sheet, prior) = (sheet.as_array(), prior.as_array());
         let row = |number: usize| -> Spot { std::array::from_fn(|i| prior[(number, i)]) };
-        let [low, high, shallow, deep] = row(2);
         let table = Table {
             log_radii: array::<f64, Ix1>("log_radii", log_radii)?
                 .as_array()
@@ -77,8 +76,7 @@ impl SpotTable {
             prior: Prior {
                 middle: row(0),
                 weight: row(1),
-                log_radii: [low, high],
-                depths: [shallow, deep],
+                log_radii: log_range,
                 filling,
             },
         })
@@ -109,6 +107,7 @@ impl SpotTable {
         offset: &Any<'py>,
         spots: &Any<'py>,
         deviations: [f64; 4],
+        depths: [f64; 2],
         most: usize,
     ) -> PyResult<Found<'py>> {
         let py = data.py();
@@ -133,6 +132,7 @@ impl SpotTable {
             left: contiguous("left", &left)?,
             offset: contiguous("offset", &offset)?,
             deviations,
+            depths,
         };
         let fit = py.detach(|| {
             let start = frame.at(frame.held(&spots))?;

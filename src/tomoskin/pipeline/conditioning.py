@@ -28,6 +28,13 @@ from tomoskin.signal import (
 MOST_NUISANCE = 0.5
 """No image is made when more than this part of the data carries no information."""
 
+_GAIN, _ALIKE, _COUNTS = 1.25, 0.05, 0.1
+"""Another gain: the median voltage has changed by more than the first as a factor, half of all by
+the same but for the second as a part; of those that are above the third part of their rms."""
+
+_RENEWAL = 16
+"""Blocks of idle frames after which the noise is taken anew, though it is as loud as before."""
+
 _NEW_NOISE = 0.1
 """Noise that has changed by more than this part makes a new noise of the image."""
 
@@ -44,11 +51,14 @@ class Conditioned:
         How many measurements are excluded, or count in a sum only.
     health
         Of the electrodes; None where there are no voltages to tell it from.
+    problem
+        What is wrong with the voltages as a whole, in a sentence, or None.
     """
 
     differences: Differences | None
     n_excluded: int
     health: Health | None = None
+    problem: str | None = None
 
 
 class Conditioning(Protocol):
@@ -82,9 +92,12 @@ class Conditioning(Protocol):
         """Difference data of a frame."""
         ...
 
-    def learn(self, time: float, moved: FloatArray | float, *, touched: bool) -> bool:
+    def learn(
+        self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
+    ) -> bool:
         """Take the newest frame, without what of it has ``moved`` V, for the baseline.
 
+        ``noise``: whether what it shows beside the reference is noise that may be learnt.
         True where the operator or the noise has changed.
         """
         ...
@@ -119,6 +132,7 @@ class Followed:
         self._scale = _scale(prepared, baseline.start)
         self._health = health
         self._noise_for: tuple[object, float] = (None, np.nan)
+        self._blocks, self._due = baseline.idle.blocks, 1
         self._values, self._excluded = baseline.mean, np.zeros(len(baseline.mean), bool)
         self.renew(prepared)
 
@@ -209,6 +223,9 @@ class Followed:
             values = np.where(health.lost, mean, values)
         if subspace.nuisance.count > MOST_NUISANCE * len(values):
             return Conditioned(None, n_excluded, health)
+        times = _gain_of(values, mean, self._excluded)
+        if times is not None and self._prepared.skin.signal.common_modes != "projected":
+            return Conditioned(None, n_excluded, health, f"{_gain_text(times)}; nothing is shown")
         dv = subspace.nuisance(difference(values, mean, self._prepared.operator.difference))
         differences = Differences(
             dv=dv,
@@ -218,28 +235,39 @@ class Followed:
             from_rest=measured.values - baseline.start,
             excluded=health.lost,
         )
-        return Conditioned(differences, n_excluded, health)
+        problem = None if times is None else _gain_text(times)
+        return Conditioned(differences, n_excluded, health, problem)
 
-    def learn(self, time: float, moved: FloatArray | float, *, touched: bool) -> bool:
+    def learn(
+        self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
+    ) -> bool:
         """See :class:`Conditioning`."""
         health, baseline = self._health, self._baseline
         if health is None:
             return False
         values = self._values if isinstance(moved, float) else self._values - moved
-        if baseline.push(values, self._excluded, time, touched=touched):
+        if baseline.push(values, self._excluded, time, touched=touched, noise=noise):
             self._drift.learn(baseline, self._signatures)
-        noise = baseline.idle.noise
-        level = float(noise @ noise)
+        level = float(baseline.idle.noise @ baseline.idle.noise)
         sick = tuple((e.electrode, e.state) for e in health.sick)
         states = (sick, self._drift.revision)
         before, then = self._noise_for
         changed = then > 0 and abs(np.log(level / then)) > 2.0 * _NEW_NOISE
-        if states == before and not changed:
+        if states == before and not changed and not self._learnt_more():
             return False
         self._noise_for = (states, level)
         if before is not None and states != before:
             self.renew(self._given)
         return before is not None
+
+    def _learnt_more(self) -> bool:
+        """Whether idle frames tell of the noise what they did not: after one block of them, after
+        two more, and ever later."""
+        blocks = self._baseline.idle.blocks
+        if blocks - self._blocks < self._due:
+            return False
+        self._blocks, self._due = blocks, min(2 * self._due, _RENEWAL)
+        return True
 
     def _signatures(self) -> FloatArray:
         """(n_meas, n_cells) V: what a change of each cell does."""
@@ -283,9 +311,11 @@ class GivenDifferences:
         )
         return Conditioned(differences, int(np.count_nonzero(excluded)))
 
-    def learn(self, time: float, moved: FloatArray | float, *, touched: bool) -> bool:
+    def learn(
+        self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
+    ) -> bool:
         """Nothing can be learnt."""
-        del time, moved, touched
+        del time, moved, touched, noise
         return False
 
     def renew(self, prepared: Prepared) -> None:
@@ -302,6 +332,24 @@ def _scale(prepared: Prepared, reference: FloatArray) -> FloatArray:
     if prepared.operator.difference == "plain":
         return np.ones_like(reference)
     return np.abs(reference)
+
+
+def _gain_of(values: FloatArray, mean: FloatArray, excluded: NDArray[np.bool_]) -> float | None:
+    """By which factor all voltages have changed, where it is one and far from 1; else None."""
+    counts = ~excluded & (np.abs(mean) > _COUNTS * np.sqrt(np.mean(mean**2)))
+    if not counts.any():
+        return None
+    ratio = values[counts] / mean[counts]
+    times = float(np.median(ratio))
+    alike = float(np.median(np.abs(ratio - times))) < _ALIKE * abs(times)
+    return times if alike and not 1 / _GAIN < times < _GAIN else None
+
+
+def _gain_text(times: float) -> str:
+    return (
+        f"all voltages are {times:.1f} times those of the reference: look at current, supply and "
+        "gain, and take a new reference"
+    )
 
 
 def _rank(prepared: Prepared) -> IntArray:

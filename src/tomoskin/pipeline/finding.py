@@ -12,7 +12,14 @@ from tomoskin.core import Detection, FloatArray
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import Reference
 from tomoskin.source import Configuration, ScanSettings
-from tomoskin.touch import EXHAUSTIVE, Pace, SpotFinder, SpotModel, measured_covariance
+from tomoskin.touch import (
+    EXHAUSTIVE,
+    Pace,
+    SpotFinder,
+    SpotModel,
+    idle_covariance,
+    measured_covariance,
+)
 
 
 class Finder(Protocol):
@@ -26,9 +33,22 @@ class Finder(Protocol):
         """Readings of a frame, strongest first."""
         ...
 
+    @property
+    def like_touch(self) -> bool:
+        """Whether the newest frame may hold a touch, though none was found."""
+        ...
+
+    @property
+    def problem(self) -> str | None:
+        """What is wrong with the newest frame, in a sentence, or None."""
+        ...
+
 
 class InImage:
     """Touches are regions of the picture."""
+
+    like_touch = False
+    problem: str | None = None
 
     def __init__(self, prepared: Prepared) -> None:
         self._segmenter = prepared.segmenter
@@ -71,6 +91,16 @@ class InData:
     def push(self, view: FrameView) -> list[Detection]:
         """See :class:`Finder`."""
         return self._spots.push(view.differences.dv, view.differences.nuisance)
+
+    @property
+    def like_touch(self) -> bool:
+        """See :class:`Finder`."""
+        return self._spots.watch.like_touch
+
+    @property
+    def problem(self) -> str | None:
+        """See :class:`Finder`."""
+        return self._spots.watch.problem
 
 
 def finding(prepared: Prepared, reference: Reference | None, pace: Pace = EXHAUSTIVE) -> Finder:
@@ -128,16 +158,23 @@ def voltage_covariance(
 ) -> FloatArray:
     """(n_meas, n_meas) V² of one frame less the reference; ``gain`` of what is predicted."""
     readout, scan = prepared.readout, prepared.scan
-    sd, frames = np.full(prepared.pattern.n_meas, np.nan), 1
-    if reference is not None:
-        sd, frames = reference.noise, reference.n_frames
     oversampling = prepared.skin.readout.oversampling
+    step = abs(gain) * readout.volts_per_count * oversampling
+    if reference is not None and reference.scatter is not None:
+        return idle_covariance(
+            scan,
+            reference.scatter,
+            least=reference.least,
+            step=step,
+            oversampling=oversampling,
+            signatures=None if prepared.spots is None else prepared.spots.candidates.signatures,
+        )
     return measured_covariance(
         scan,
-        sd,
-        frames,
+        np.full(prepared.pattern.n_meas, np.nan) if reference is None else reference.noise,
+        1 if reference is None else reference.n_frames,
         predicted=abs(gain) * readout.noise,
-        step=abs(gain) * readout.volts_per_count * oversampling,
+        step=step,
         oversampling=oversampling,
     )
 

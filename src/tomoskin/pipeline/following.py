@@ -127,7 +127,8 @@ class Following:
             detections = applied.locate(view, detections)
         touches = self._tracker.update(detections, measured.time, measured.host_time)
         readings = self._read(view, detections, touched=bool(touches))
-        self._learn(measured.time, touched=bool(touches))
+        untouched = not (detections or self._finder.like_touch)
+        self._learn(measured.time, touched=bool(touches), noise=untouched)
         return self._result(measured, conditioned, image, touches, readings)
 
     def first(self, measured: Measured) -> FrameResult:
@@ -149,10 +150,10 @@ class Following:
         }
         return {kind: reading for kind, reading in readings.items() if reading is not None}
 
-    def _learn(self, time: float, *, touched: bool) -> None:
+    def _learn(self, time: float, *, touched: bool, noise: bool) -> None:
         conditioning = self._conditioning
         moved = sum((applied.moved for applied in self._applied.values()), start=0.0)
-        changed = conditioning.learn(time, moved, touched=touched)
+        changed = conditioning.learn(time, moved, touched=touched, noise=noise)
         if changed and (reference := conditioning.reference) is not None:
             prepared = conditioning.prepared
             self._imaging.renew(prepared, reference, conditioning.subspace())
@@ -189,11 +190,12 @@ class Following:
         touches: tuple[Touch, ...],
         readings: dict[str, Any],
     ) -> FrameResult:
+        shows = conditioned.differences is not None
         return FrameResult(
             sequence=measured.sequence,
             host_time=measured.host_time,
             ready=True,
-            has_image=conditioned.differences is not None,
+            has_image=shows,
             image=image,
             voltages=measured.values,
             reference=self._conditioning.mean,
@@ -203,4 +205,5 @@ class Following:
             health=conditioned.health,
             baseline=self._conditioning.state,
             readings=readings,
+            unexplained=conditioned.problem or (shows and self._finder.problem) or None,
         )

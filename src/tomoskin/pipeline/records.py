@@ -77,6 +77,8 @@ class FrameResult:
         that stands.
     readings
         What the skin's calibrations read in it, by the name of their kind.
+    unexplained
+        What it shows that is neither touch nor noise, in a sentence, or None.
     """
 
     sequence: int
@@ -92,6 +94,7 @@ class FrameResult:
     health: Health | None = None
     baseline: BaselineState | None = None
     readings: Mapping[str, Any] = field(default_factory=dict)
+    unexplained: str | None = None
 
     @classmethod
     def at_rest(
@@ -133,7 +136,8 @@ class FrameResult:
         if self.health is not None and self.health.sick:
             return self._sick(self.health)
         if not self.left_out:
-            return self.baseline.stale if self.baseline else None
+            stale = self.baseline.stale if self.baseline else None
+            return self.unexplained or stale
         rows = f"{self.left_out} of {len(self.voltages)} rows"
         if not self.has_image:
             return (

@@ -13,6 +13,7 @@ from tomoskin.signal.difference import (
     in_phase,
     undone,
 )
+from tomoskin.signal.evidence import Reciprocity
 from tomoskin.signal.headroom import Headroom
 from tomoskin.signal.health import ElectrodeHealth, Health, Roles, nuisance_directions
 from tomoskin.signal.idle import Idle
@@ -21,6 +22,7 @@ from tomoskin.signal.nuisance import NuisanceSubspace
 from tomoskin.signal.readout import FIGURES, BoardFigures, Readout
 from tomoskin.signal.recording import Recording, frame_times
 from tomoskin.signal.reference import Reference
+from tomoskin.signal.scatter import Scatter
 
 __all__ = [
     "DIFFERENCES",
@@ -36,9 +38,11 @@ __all__ = [
     "Monitor",
     "NuisanceSubspace",
     "Readout",
+    "Reciprocity",
     "Recording",
     "Reference",
     "Roles",
+    "Scatter",
     "at_one_time",
     "difference",
     "difference_noise",

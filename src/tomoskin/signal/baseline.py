@@ -111,12 +111,17 @@ class Baseline:
         self._linger = 0
         self._fading = 0.0
         self._followed = 0.0
-        self._waiting: deque[tuple[FloatArray, Mask, float, float]] = deque()
+        self._waiting: deque[tuple[FloatArray, Mask, float, float, bool]] = deque()
+        self._scatter = reference.scatter
+        self._deviations: list[FloatArray] = []
 
-    def push(self, values: FloatArray, lost: Mask, time: float, *, touched: bool) -> bool:
+    def push(
+        self, values: FloatArray, lost: Mask, time: float, *, touched: bool, noise: bool = True
+    ) -> bool:
         """Take a frame, (n_meas,) V at ``time`` s; True where it ended a block of idle frames.
 
-        ``lost`` rows, (n_meas,) bool, say nothing; ``touched``: whether something touches.
+        ``lost`` rows, (n_meas,) bool, say nothing; ``touched``: whether something touches;
+        ``noise``: whether what it shows beside the reference may be learnt as noise.
         """
         step = 0.0 if self._time is None else min(max(time - self._time, 0.0), _LONGEST_STEP)
         self._time = time
@@ -132,19 +137,26 @@ class Baseline:
             return self._interrupted()
         self._held = 0.0
         self._followed += step
-        self._waiting.append((values, lost, time, step))
+        self._waiting.append((values, lost, time, step, noise))
         if len(self._waiting) <= _DELAY:
             return False
         return self._learn(*self._waiting.popleft())
 
-    def _learn(self, values: FloatArray, lost: Mask, time: float, step: float) -> bool:
+    def _learn(self, values: FloatArray, lost: Mask, time: float, step: float, noise: bool) -> bool:
+        deviation = values - self.mean
         if self._follows:
             self._follow(values, lost, step)
         if self._fading > 0:
             self._fading -= step
             self.idle.interrupt()
             return False
-        return self.idle.push(values, time, lost)
+        ended = self.idle.push(values, time, lost)
+        if noise:
+            self._deviations.append(deviation)
+        if ended and self._scatter is not None and self._deviations:
+            self._scatter = self._scatter.after(np.array(self._deviations), lost)
+            self._deviations.clear()
+        return ended
 
     def _follow(self, values: FloatArray, lost: Mask, step: float) -> None:
         noise = self.idle.noise**2
@@ -159,6 +171,7 @@ class Baseline:
 
     def _interrupted(self) -> bool:
         self._waiting.clear()
+        self._deviations.clear()
         self.idle.interrupt()
         return False
 
@@ -167,8 +180,8 @@ class Baseline:
         """The reference as it is now: the noise is a frame's together with the baseline's own."""
         if not self._known:
             return Reference(self.mean, self.idle.noise, self._n_frames, self._least)
-        noise = np.sqrt(self.idle.noise**2 + self._variance)
-        return Reference(self.mean, noise, max(self._n_frames, 2), self._least)
+        noise, frames = np.sqrt(self.idle.noise**2 + self._variance), max(self._n_frames, 2)
+        return Reference(self.mean, noise, frames, self._least, self._scatter)
 
     @property
     def state(self) -> BaselineState:

@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import DataError, FloatArray
+from tomoskin.signal.scatter import Scatter
 
 _QUIET = 0.5
 """A channel is never taken for quieter than this fraction of the median channel: a standard
@@ -27,6 +28,7 @@ class Reference:
     noise: FloatArray
     n_frames: int
     least: FloatArray | float = 0.0
+    scatter: Scatter | None = None
 
     @classmethod
     def of(cls, values: FloatArray, least: FloatArray | float = 0.0) -> Self:
@@ -46,7 +48,9 @@ class Reference:
                 f"expected finite voltages, got {values[frame, row]}",
                 where=f"reference frame {frame}, row {row}",
             )
-        return cls(values.mean(axis=0), np.maximum(_noise(values), least), len(values), least)
+        noise = np.maximum(_noise(values), least)
+        scatter = Scatter.of(values) if len(values) > 1 else None
+        return cls(values.mean(axis=0), noise, len(values), least, scatter)
 
     @property
     def noise_is_known(self) -> bool:

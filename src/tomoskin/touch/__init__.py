@@ -4,6 +4,7 @@ from typing import Any
 
 from tomoskin._moved import moved
 from tomoskin.touch.bounds import Demand, ResolutionBounds, Variant, resolution_bounds, variants
+from tomoskin.touch.fit.covariance import idle_covariance
 from tomoskin.touch.fit.finder import SpotFinder, SpotModel
 from tomoskin.touch.fit.noise import Whitener, measured_covariance
 from tomoskin.touch.fit.pace import EXHAUSTIVE, LIVE, Pace
@@ -34,6 +35,7 @@ __all__ = [
     "Tracker",
     "Variant",
     "Whitener",
+    "idle_covariance",
     "measured_covariance",
     "resolution_bounds",
     "spots_of",

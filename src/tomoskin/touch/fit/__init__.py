@@ -6,6 +6,7 @@ from tomoskin.touch.fit.bound import (
     least_content,
     position_bound,
 )
+from tomoskin.touch.fit.covariance import idle_covariance
 from tomoskin.touch.fit.finder import SpotFinder, SpotModel
 from tomoskin.touch.fit.noise import Whitener, measured_covariance, row_covariance
 from tomoskin.touch.fit.pace import EXHAUSTIVE, LIVE, Pace
@@ -23,6 +24,7 @@ __all__ = [
     "depth_of",
     "detection_bound",
     "fisher_information",
+    "idle_covariance",
     "least_content",
     "measured_covariance",
     "position_bound",

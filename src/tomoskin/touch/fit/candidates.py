@@ -76,14 +76,18 @@ class Matched:
         """Spots (n, 4) of these signatures (n, r)."""
         return cls(spots, signatures, np.einsum("nr,nr->n", signatures, signatures))
 
-    def ratios(self, solver: Solver, fit: Fit) -> tuple[FloatArray, FloatArray]:
+    def louder(self, times: float) -> Self:
+        """The same in so many times the noise's variance."""
+        return self.of(self.spots, self.signatures / math.sqrt(times))
+
+    def ratios(self, solver: Solver, fit: Fit, sign: str) -> tuple[FloatArray, FloatArray]:
         """(n,) likelihood ratio of each candidate, and (n,) its most likely content.
 
         The ratio is the square root of twice its logarithm: deviations by which the candidate
         stands out (GLRT; Kay 1998, section 7.6.2, for a linear model), after what the spots of
         ``fit`` could take up.
         """
-        sign, found = solver.table.sign, self.signatures
+        found = self.signatures
         residual = solver.projected(fit.unknown, fit.slopes, fit.residual[None])[0]
         onto = found @ residual
         if sign != "both":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -14,6 +14,7 @@ from tomoskin.forward import ForwardModel, State
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
 from tomoskin.touch.fit.candidates import Candidates, Matched
+from tomoskin.touch.fit.excess import Gauge
 from tomoskin.touch.fit.native import NativeSolver
 from tomoskin.touch.fit.noise import ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
@@ -24,6 +25,7 @@ from tomoskin.touch.fit.sheet import fitted_sheet
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
 from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
 from tomoskin.touch.fit.table import ResponseTable
+from tomoskin.touch.fit.watch import Watch
 
 _CELLS = 1500
 """Of the mesh that spots are fitted on: their profile is smooth, and a frame is quick."""
@@ -118,6 +120,11 @@ class SpotFinder:
         Between two frames, s: in it touches move and grow. 0 where rows are read all at once.
     pace
         How much is tried in a frame.
+
+    Attributes
+    ----------
+    watch
+        What touches do not explain.
     """
 
     def __init__(
@@ -139,13 +146,15 @@ class SpotFinder:
         self._most = min(skin.touch.max_touches, _MOST)
         self._before = np.zeros((0, N_PARAMETERS))
         self._deficit = Deficit.none(len(model.solver.table.basis))
+        pattern = model.response.state.model.pattern
+        self.watch = Watch(pattern, skin.touch.sign, skin.touch.snr)
         self.renew(noise, gain)
 
     def renew(self, noise: FloatArray, gain: float = 1.0) -> None:
         """Go on with other noise, or another gain."""
         self._scale = self._model.scale * gain
-        self._whiten = Whitener.of(noise / self._scale[:, None] / self._scale)
-        self._matched: OrderedDict[bytes, tuple[WhitenedTable, Matched]] = OrderedDict()
+        self._noise = noise / self._scale[:, None] / self._scale
+        self._matched: OrderedDict[bytes, tuple[WhitenedTable, Matched, Gauge]] = OrderedDict()
 
     def push(self, dv: FloatArray, nuisance: FloatArray) -> list[Detection]:
         """Touches of ``dv`` (n_meas,), strongest first.
@@ -153,19 +162,14 @@ class SpotFinder:
         ``nuisance`` (n_meas, k) spans the directions along which the data tell nothing of a
         touch: a unit vector for each excluded row. There must be more rows than that.
         """
-        seen, matched = self._whitened(nuisance)
-        problem = Problem(
-            response=self._model.response,
-            solver=self._model.solver,
-            seen=seen,
-            prior=self._model.prior,
-            reach=self._unrest * self._reach,
-            grows=self._unrest * _GROWS,
-            data=seen.whiten(dv / self._scale),
-            left=seen.whiten(self._residual.directions.T),
-        )
-        search = Search(problem, matched, self._settings.snr, self._most, self._pace, self._deficit)
-        detected = search(self._before)
+        data, nuisance = dv / self._scale, nuisance / self._scale[:, None]
+        self.watch.begin(data, self._whitened(nuisance)[2])
+        detected, matched = self._searched(data, nuisance)
+        solver = self._model.solver
+        times = self.watch.unexplained(solver, detected.fit, matched)
+        if times > 1.0:  # it may be no touch in as much noise
+            detected, matched = self._searched(data, nuisance, times)
+        self.watch.end(solver, detected.fit, matched, times)
         self._unrest = self._unrest_of(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
         if self._fading:
@@ -173,6 +177,28 @@ class SpotFinder:
         detections = self._detections(joined(detected))
         detections.sort(key=lambda detection: -abs(detection.peak))
         return detections
+
+    def _searched(
+        self, data: FloatArray, nuisance: FloatArray, times: float = 1.0
+    ) -> tuple[SpotDetections, Matched]:
+        """Touches of ``data`` (n_meas,) in so many times the noise that is known."""
+        seen, matched, _ = self._whitened(nuisance)
+        if times != 1.0:
+            seen, matched = seen.louder(times), matched.louder(times)
+        problem = Problem(
+            response=self._model.response,
+            solver=self._model.solver,
+            seen=seen,
+            prior=self._model.prior,
+            sign=self._settings.sign,
+            reach=self._unrest * self._reach,
+            grows=self._unrest * _GROWS,
+            data=seen.whiten(data),
+            left=seen.whiten(self._residual.directions.T),
+        )
+        problem = replace(problem, sign=self.watch.sign(problem, matched))
+        search = Search(problem, matched, self._settings.snr, self._most, self._pace, self._deficit)
+        return search(self._before), matched
 
     def _unrest_of(self, spots: FloatArray) -> float:
         """How much of what touches may do they have done since the frame before; 1 where there
@@ -182,12 +208,15 @@ class SpotFinder:
         moved = float(np.linalg.norm((spots - self._before)[:, :2], axis=1).max())
         return min(1.0, math.hypot(_REST, moved / self._reach))
 
-    def _whitened(self, nuisance: FloatArray) -> tuple[WhitenedTable, Matched]:
-        key = nuisance.tobytes()
+    def _whitened(self, nuisance: FloatArray) -> tuple[WhitenedTable, Matched, Gauge]:
+        excess, channels = self.watch.excess, self.watch.channels
+        key = nuisance.tobytes() + excess.key
         if key not in self._matched:
-            whiten, model = self._whiten.without(nuisance / self._scale[:, None]), self._model
+            model, noise = self._model, excess.added(self._noise, channels)
+            whiten = Whitener.of(noise).without(nuisance)
             seen = WhitenedTable.of(model.solver, whiten, model.response.times)
-            self._matched[key] = seen, model.candidates.matched(whiten)
+            gauge = Gauge.of(channels, noise, nuisance)
+            self._matched[key] = seen, model.candidates.matched(whiten), gauge
             if len(self._matched) > _MASKS:
                 self._matched.popitem(last=False)
         self._matched.move_to_end(key)
@@ -196,7 +225,8 @@ class SpotFinder:
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots
         depth = self._unit * np.expm1(depth_of(spots)) if len(spots) else np.zeros(0)
-        return [self._detection(spots[k], float(depth[k]), detected, k) for k in range(len(spots))]
+        shown = np.flatnonzero(~self.watch.wrong(spots)).tolist()
+        return [self._detection(spots[k], float(depth[k]), detected, k) for k in shown]
 
     def _detection(
         self, spot: FloatArray, peak: float, detected: SpotDetections, k: int

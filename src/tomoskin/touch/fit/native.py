@@ -20,8 +20,7 @@ class NativeSolver:
     def __init__(
         self, core: Any, table: ResponseTable, sheet: SheetDomain, prior: SpotPrior
     ) -> None:
-        ranges = [*prior.log_radii, *prior.depths(table.sign)]
-        self._core, self.table = core, table
+        self._core, self._prior, self.table = core, prior, table
         self._spots = core.SpotTable(
             table.log_radii,
             np.array([[*grid.origin, grid.step, *grid.shape] for grid in table.grids]),
@@ -29,7 +28,8 @@ class NativeSolver:
             table.values,
             FILLING,
             np.column_stack([sheet.centroids, sheet.margin]),
-            np.array([prior.middle, prior.weights, ranges]),
+            np.array([prior.middle, prior.weights]),
+            np.array(prior.log_radii),
         )
 
     def expanded(self, spots: FloatArray) -> FloatArray:
@@ -44,7 +44,14 @@ class NativeSolver:
         """See :class:`Solver`."""
         deviations = (DIRECTED, RESHAPED, problem.reach, problem.grows)
         matrices, vectors, (misfit, log_size, cost, settled) = self._spots.settled(
-            problem.seen.kept, problem.data, problem.left, deficit.change, spots, deviations, most
+            problem.seen.kept,
+            problem.data,
+            problem.left,
+            deficit.change,
+            spots,
+            deviations,
+            self._prior.depths(problem.sign),
+            most,
         )
         found, each, slopes, unknown, normal = matrices
         predicted, residual, gradient = vectors

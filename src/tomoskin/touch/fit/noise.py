@@ -102,10 +102,18 @@ def measured_covariance(
         variance = (n_frames * sd**2 + _FRAMES * pooled) / (n_frames + _FRAMES)
     else:
         variance = np.full(len(scan.plus), predicted**2)
-    variance = variance + 2 * _rounding(variance * oversampling / 2 / step**2) * step**2
+    variance = variance + rounding_left(variance, step, oversampling)
     size = np.sqrt(variance * (1 + 1 / max(n_frames, 1)))
     shared = row_covariance(scan, np.sqrt(0.5))
     return np.asarray(shared * size[:, None] * size)
+
+
+def rounding_left(variance: FloatArray, step: float, oversampling: int) -> FloatArray:
+    """(n_meas,) V² that rounding leaves in rows that waver by ``variance`` (n_meas,) V².
+
+    ``step`` V of the converter; so many readings (``oversampling``) make a sample.
+    """
+    return np.asarray(2 * _rounding(variance * oversampling / 2 / step**2) * step**2)
 
 
 def _rounding(variance: FloatArray) -> FloatArray:

@@ -137,7 +137,7 @@ class WhitenedTable:
 
     Attributes
     ----------
-    table
+    solver
         What spots do.
     whiten
         Of the noise.
@@ -148,7 +148,7 @@ class WhitenedTable:
         What a solver keeps of that.
     """
 
-    table: ResponseTable
+    solver: Solver
     whiten: Whitener
     direct: FloatArray
     timed: FloatArray
@@ -160,7 +160,14 @@ class WhitenedTable:
         table = solver.table
         direct = whiten.matrix @ table.basis.T
         timed = whiten.matrix @ (times[:, None] * table.basis.T)
-        return cls(table, whiten, direct, timed, solver.keep(direct, timed))
+        return cls(solver, whiten, direct, timed, solver.keep(direct, timed))
+
+    def louder(self, times: float) -> WhitenedTable:
+        """The same in so many times the noise's variance."""
+        part = 1.0 / math.sqrt(times)
+        direct, timed = part * self.direct, part * self.timed
+        whiten = Whitener(part * self.whiten.matrix)
+        return WhitenedTable(self.solver, whiten, direct, timed, self.solver.keep(direct, timed))
 
 
 class Solver(Protocol):
@@ -205,6 +212,7 @@ class Problem:
     solver: Solver
     seen: WhitenedTable
     prior: SpotPrior
+    sign: str
     reach: float
     grows: float
     data: FloatArray
@@ -213,7 +221,7 @@ class Problem:
     def nothing(self) -> Fit:
         """The frame with no spot at all."""
         none = np.zeros((0, N_PARAMETERS))
-        return self.solver.settled(self, none, Deficit.none(len(self.seen.table.basis)), 0)
+        return self.solver.settled(self, none, Deficit.none(len(self.solver.table.basis)), 0)
 
     def refined(self, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
         """See :meth:`Solver.settled`."""
@@ -230,7 +238,7 @@ class Problem:
         for _ in range(rounds):
             if fit.deficit.holds_for(fit.spots):
                 return fit
-            exact = self.seen.table.basis @ self.response.changes([fit.spots])[0]
+            exact = self.solver.table.basis @ self.response.changes([fit.spots])[0]
             change = exact - self.solver.expanded(fit.spots)[:, 0].sum(axis=0)
             far = np.linalg.norm(self.seen.direct @ (change - fit.deficit.change))
             deficit = Deficit(fit.spots, change)
@@ -242,4 +250,4 @@ class Problem:
     def change(self, fit: Fit) -> FloatArray:
         """(n_meas,) V that the spots of a fit add to the reference."""
         alone = self.solver.expanded(fit.spots)[:, 0].sum(axis=0)
-        return np.asarray((alone + fit.deficit.change) @ self.seen.table.basis)
+        return np.asarray((alone + fit.deficit.change) @ self.solver.table.basis)

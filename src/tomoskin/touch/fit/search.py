@@ -151,7 +151,7 @@ class Search:
         return part * self.least * float(np.hypot(1.0, misshapen / self.least))
 
     def _standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
-        return self.matched.ratios(self.problem.solver, fit)
+        return self.matched.ratios(self.problem.solver, fit, self.problem.sign)
 
     def _joint_starts(self, count: int) -> list[FloatArray]:
         """Sets of so many spots whatever has been found."""
@@ -162,8 +162,7 @@ class Search:
     @cached_property
     def _joint(self) -> JointStarts:
         problem = self.problem
-        sign = problem.solver.table.sign
-        return JointStarts.of(self.matched, problem.data, problem.prior, sign)
+        return JointStarts.of(self.matched, problem.data, problem.prior, problem.sign)
 
     def _best(self, starts: list[FloatArray], deficit: Deficit, joint: list[FloatArray]) -> Fit:
         """The most evident of those that come out best after a glance."""

@@ -70,7 +70,7 @@ class NumpySolver:
 
         Levenberg (1944) and Marquardt (1963): damping relative to the diagonal.
         """
-        best = replace(self._at(problem, self._held(spots), deficit), settled=False)
+        best = replace(self._at(problem, self._held(spots, problem.sign), deficit), settled=False)
         damping = _LEAST_DAMPING
         for _ in range(most):
             pull = self.prior.away(best.spots) * self.prior.weights
@@ -78,7 +78,7 @@ class NumpySolver:
             step = _solved(best.normal, gradient, damping)
             if gradient @ step < _SETTLED:
                 return replace(best, settled=True)
-            moved = self._held(best.spots + step.reshape(-1, N_PARAMETERS))
+            moved = self._held(best.spots + step.reshape(-1, N_PARAMETERS), problem.sign)
             tried = self._at(problem, moved, deficit)
             if tried.cost < best.cost:
                 best, damping = replace(tried, settled=False), max(damping / 10, _LEAST_DAMPING)
@@ -120,8 +120,8 @@ class NumpySolver:
             cost=(misfit + float((away**2).sum())) / 2,
         )
 
-    def _held(self, spots: FloatArray) -> FloatArray:
-        return self.prior.held(self.sheet.held(spots), self.table.sign)
+    def _held(self, spots: FloatArray, sign: str) -> FloatArray:
+        return self.prior.held(self.sheet.held(spots), sign)
 
     def projected(self, unknown: FloatArray, free: FloatArray, rows: FloatArray) -> FloatArray:
         """See :class:`Solver`."""

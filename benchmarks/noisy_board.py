@@ -1,0 +1,125 @@
+"""Frames of an untouched skin whose noise is as no skin file says it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import Frame
+from tomoskin.pipeline import Prepared
+
+Floats = NDArray[np.float64]
+
+PERIOD, BUSY = 0.05, 0.9
+"""Seconds between two frames, and the part of them in which samples are read."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise beside that of the read-out, of which one row has the deviation 1.
+
+    Attributes
+    ----------
+    samples, rows
+        Of each sample, in parts of the read-out's; of each row by itself, as a differential
+        board's.
+    hum, advance
+        Of the mains in a row, rms; turns by which it goes on between frames.
+    drift, walk
+        Part by which all voltages rise and fall in 300 s; of each electrode's random walk in 30 s.
+    loud, every
+        Times as loud as the others one electrode becomes, another one after so many frames.
+    """
+
+    samples: float = 1.0
+    rows: float = 0.0
+    hum: float = 0.0
+    advance: float = 0.13
+    drift: float = 0.0
+    walk: float = 0.0
+    loud: float = 1.0
+    every: int = 1000
+
+
+class NoisyBoard:
+    """A board on an untouched skin; ``volts`` (n_meas,) that a touch adds may be set."""
+
+    def __init__(self, prepared: Prepared, noise: Noise, seed: int) -> None:
+        self.prepared, self.noise = prepared, noise
+        self.random = np.random.default_rng(seed)
+        scan, readout = prepared.scan, prepared.readout
+        self.makes = np.zeros((len(scan.plus), scan.n_samples))
+        rows = np.arange(len(scan.plus))
+        self.makes[rows, scan.plus], self.makes[rows, scan.minus] = 1.0, -1.0
+        self.inverse = np.linalg.pinv(self.makes)
+        self.unit = readout.noise / readout.volts_per_count
+        self.rest = self._rest()
+        self.electrode = scan.sample_electrode
+        self.n = prepared.skin.n_electrodes
+        self.hum = (1 + 0.5 * self.random.standard_normal(self.n))[self.electrode]
+        self.mains = 2 * np.pi * (np.arange(scan.n_samples) / scan.n_samples * BUSY * PERIOD * 50.0)
+        size = self.makes @ (self.hum * np.exp(1j * self.mains))
+        self.hum *= noise.hum * self.unit / np.sqrt(np.mean(np.abs(size) ** 2) / 2)
+        self.phase = self.random.uniform(0, 2 * np.pi)
+        self.offset = np.zeros(scan.n_samples)
+        self.volts: Floats = np.zeros(len(scan.plus))
+
+    def _rest(self) -> Floats:
+        """(n_samples,) counts without noise."""
+        prepared = self.prepared
+        scan, settings = prepared.scan, prepared.skin.readout
+        potentials = prepared.model.solve(prepared.skin.conductivity).electrode_potentials
+        ground = potentials[scan.sample_drive, scan.drives[scan.sample_drive, 1]]
+        volts = settings.gain * (potentials[scan.sample_drive, scan.sample_electrode] - ground)
+        full = settings.oversampling * (2**settings.adc_bits - 1)
+        return np.asarray((volts + settings.offset) / settings.reference_voltage * full)
+
+    def loud(self, number: int) -> Floats:
+        """(n_samples,) times by which each sample wavers more."""
+        times, since = np.ones(len(self.rest)), number // self.noise.every
+        if self.noise.loud != 1.0 and since:
+            times[self.electrode == (3 * since) % self.n] = self.noise.loud
+        return times
+
+    def covariance(self, number: int) -> Floats:
+        """(n_meas, n_meas) V² of the noise of a frame, but for drift."""
+        noise, readout = self.noise, self.prepared.readout
+        sd = noise.samples * self.loud(number) / np.sqrt(2)
+        both = (self.makes * sd**2) @ self.makes.T + noise.rows**2 * np.eye(len(self.makes))
+        wave = self.makes @ (self.hum * np.exp(1j * self.mains)) / self.unit
+        both += (np.outer(wave.real, wave.real) + np.outer(wave.imag, wave.imag)) / 2
+        return np.asarray(both * readout.noise**2)
+
+    def counts(self, number: int) -> Floats:
+        """(n_samples,) of frame ``number``, before they are rounded."""
+        noise, random, time = self.noise, self.random, PERIOD * number
+        sd = noise.samples * self.loud(number) * self.unit / np.sqrt(2)
+        counts = self.rest * (1 + noise.drift * np.sin(2 * np.pi * time / 300.0))
+        counts = counts + sd * random.standard_normal(len(sd))
+        if noise.rows:
+            counts += self.inverse @ (noise.rows * self.unit * random.standard_normal(self.n_meas))
+        if noise.hum:
+            turn = self.phase + 2 * np.pi * noise.advance * number
+            counts += self.hum * np.sin(self.mains + turn)
+        if noise.walk:
+            step = noise.walk * self.unit / np.sqrt(2 * 30.0 / PERIOD)
+            self.offset += step * random.standard_normal(len(self.offset))
+            counts += self.offset
+        return counts + self.inverse @ (self.volts / self.prepared.readout.volts_per_count)
+
+    @property
+    def n_meas(self) -> int:
+        """Rows."""
+        return len(self.makes)
+
+    def frames(self, count: int, first: int = 0) -> Iterator[Frame]:
+        """Frames as the pipeline takes them."""
+        settings = self.prepared.skin.readout
+        most = settings.oversampling * (2**settings.adc_bits - 1)
+        for number in range(first, first + count):
+            samples = np.clip(np.round(self.counts(number)), 0, most).astype(np.uint16)
+            time = PERIOD * number
+            yield Frame(number, round(time * settings.tick_rate), time, 1, 0, 0, samples)

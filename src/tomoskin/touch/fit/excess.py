@@ -1,0 +1,243 @@
+"""Noise beyond what was learnt: seen in what no touch can do, and believed at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.pattern import Pattern, Scan
+from tomoskin.signal import Reciprocity
+from tomoskin.touch.fit.noise import Whitener
+
+_LIMIT = 6.0
+"""Deviations by which the mean square of a channel's residual must exceed 1 to be more noise."""
+
+_MARGIN = 2.0
+"""What one frame shows of a variance is taken times this: it is a rough estimate."""
+
+_CALM = 8
+"""Frames without more noise after which no more is believed than they have shown."""
+
+_MOVES = 0.5
+"""Part of what has changed since the frame before that may stand between two reciprocal rows."""
+
+_GAINS = 0.03
+"""Part by which channels may differ in gain, and so reciprocal rows in what a touch does."""
+
+_SAID = 4.0
+"""Times the usual noise, in deviations, from which it is said."""
+
+_FEWEST = 3
+_GONE = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """What may turn noisy by itself: an electrode's samples, or a measuring pair's rows.
+
+    Attributes
+    ----------
+    parts
+        (n_parts, n_meas): what one sample, or one row, does to the rows.
+    channel
+        (n_parts,) that each is of: electrodes first, then pairs.
+    names
+        Of the channels, for people.
+    apart, both
+        (n_pairs, n_meas): difference and sum of rows that exchange driven and measuring pair.
+    """
+
+    parts: FloatArray
+    channel: IntArray
+    names: tuple[str, ...]
+    apart: FloatArray
+    both: FloatArray
+
+    @classmethod
+    def of(cls, pattern: Pattern) -> Self:
+        """Of the rows of a pattern."""
+        scan, rows = Scan.of(pattern), np.arange(pattern.n_meas)
+        samples = np.zeros((scan.n_samples, pattern.n_meas))
+        samples[scan.plus, rows], samples[scan.minus, rows] = 1.0, -1.0
+        pairs, pair = np.unique(np.sort(pattern.measure, axis=1), axis=0, return_inverse=True)
+        n = pattern.n_electrodes
+        names = [f"E{e + 1}" for e in range(n)]
+        names += [f"E{a + 1} to E{b + 1}" for a, b in pairs.tolist()]
+        channel = np.concatenate([scan.sample_electrode, n + pair.reshape(-1)])
+        parts = np.concatenate([samples, np.eye(pattern.n_meas)])
+        reciprocal = Reciprocity.of(pattern)
+        one, other = (
+            np.eye(pattern.n_meas)[reciprocal.first],
+            np.eye(pattern.n_meas)[reciprocal.second],
+        )
+        other = other * reciprocal.sign[:, None]
+        return cls(parts, channel, tuple(names), one - other, one + other)
+
+
+@dataclass(frozen=True, eq=False)
+class Gauge:
+    """Channels as they show in what no touch can do, for one covariance of the noise.
+
+    Rows that exchange the driven and the measuring pair change alike, whatever is pressed
+    (Geselowitz 1971): their differences are noise, but for what moves while they are read.
+
+    Attributes
+    ----------
+    differs, agrees
+        (r, n_meas) 1/V: differences of the pairs, white; and the sums in the same measure.
+    directions
+        (n_parts, r) of length 1.
+    means
+        (n_channels, n_parts) averages over the parts that can be seen.
+    variance
+        (n_channels,) V² of noise in a part that shows as much as all other noise in its direction.
+    limit
+        (n_channels,) mean squares beyond which a channel is noisier; infinite where too few of its
+        parts can be seen.
+    """
+
+    differs: FloatArray
+    agrees: FloatArray
+    directions: FloatArray
+    means: FloatArray
+    variance: FloatArray
+    limit: FloatArray
+
+    @classmethod
+    def of(cls, channels: Channels, covariance: FloatArray, nuisance: FloatArray) -> Self:
+        """For a ``covariance`` (n_meas, n_meas) V² of the data, and a ``nuisance`` subspace
+        (n_meas, k) V."""
+        apart, both = channels.apart, channels.both
+        whiten = _white(apart @ covariance @ apart.T, apart @ nuisance)
+        directions = whiten(channels.parts @ apart.T)
+        squares = np.einsum("pr,pr->p", directions, directions)
+        shows = squares > 1e-12 * squares.max(initial=0.0)
+        squares = np.where(shows, squares, np.inf)
+        directions = directions / np.sqrt(squares)[:, None]
+        members = (channels.channel == np.arange(len(channels.names))[:, None]) & shows
+        count = members.sum(axis=1)
+        means = members / np.maximum(count, 1)[:, None]
+        spread = np.array([
+            np.linalg.norm(directions[own] @ directions[own].T) / max(len(own), 1)
+            for own in map(np.flatnonzero, members)
+        ])  # fmt: skip
+        limit = np.where(count >= _FEWEST, 1 + _LIMIT * np.sqrt(2) * spread, np.inf)
+        seen = whiten.matrix @ apart, whiten.matrix @ both
+        return cls(*seen, directions, means, means @ (1 / squares), limit)
+
+    def squares(self, dv: FloatArray, moved: FloatArray) -> FloatArray:
+        """(n_channels,) mean squares of data (n_meas,) V; 1 where the noise is as it should be.
+
+        ``moved`` (n_meas,) V since the frame before: of that a part may stand between two rows,
+        since one is read after the other; and of all data as much as channels differ in gain.
+        """
+        seen = np.column_stack([self.differs @ dv, self.agrees @ moved, self.agrees @ dv])
+        differs, changes, gains = (self.means @ (self.directions @ seen) ** 2).T
+        allowed = _MOVES**2 * changes + _GAINS**2 * gains
+        return np.asarray(differs - (allowed + allowed.mean()) / 2)
+
+
+def _white(covariance: FloatArray, nuisance: FloatArray) -> Whitener:
+    if not len(covariance):
+        return Whitener(np.zeros((0, 0)))
+    size = np.linalg.norm(nuisance, axis=0)
+    counts = size > 1e-6 * size.max(initial=0.0)
+    return Whitener.of(covariance).without(nuisance[:, counts] / size[counts])
+
+
+@dataclass(frozen=True, eq=False)
+class Excess:
+    """Noise beyond what was learnt.
+
+    Attributes
+    ----------
+    level
+        Variance of all rows, in parts of what was learnt; 1 at the least.
+    variance
+        (n_channels,) V² that each part of a channel has beside, before it is taken so many times.
+    calm
+        Frames since it rose, or was looked at anew.
+    seen
+        (n_channels,) largest mean squares in these, of noise with the excess.
+    """
+
+    level: float
+    variance: FloatArray
+    calm: int
+    seen: FloatArray
+
+    @classmethod
+    def none(cls, channels: Channels) -> Self:
+        """As it was learnt."""
+        none = np.zeros(len(channels.names))
+        return cls(1.0, none, 0, none)
+
+    @property
+    def any(self) -> bool:
+        """Whether there is some."""
+        return self.level > 1.0 or bool(self.variance.any())
+
+    @property
+    def key(self) -> bytes:
+        """The same for the same excess."""
+        return self.variance.tobytes() + np.float64(self.level).tobytes()
+
+    def added(self, noise: FloatArray, channels: Channels) -> FloatArray:
+        """(n_meas, n_meas) V²: ``noise`` with the excess."""
+        if not self.any:
+            return noise
+        own = self.variance[channels.channel]
+        parts = channels.parts[own > 0]
+        return np.asarray(self.level * (noise + (parts.T * own[own > 0]) @ parts))
+
+    def text(self, channels: Channels, usual: FloatArray) -> str | None:
+        """What someone should see to, or None; ``usual`` (n_channels,) V² without the excess."""
+        if self.level > _SAID**2:
+            return (
+                f"the voltages change by {np.sqrt(self.level):.0f} times the noise of the idle "
+                "skin in a way that no touch explains: look at cables and supply, or take a new "
+                "reference"
+            )
+        times = np.sqrt(1 + self.variance / np.maximum(usual, np.finfo(float).tiny))
+        worst = int(times.argmax())
+        if times[worst] < _SAID:
+            return None
+        return (
+            f"{channels.names[worst]} wavers by {times[worst]:.0f} times the noise of the idle "
+            "skin, and counts for less: look at its cable and contact"
+        )
+
+    def after(self, squares: FloatArray, gauge: Gauge) -> Excess:
+        """With what a frame shows, (n_channels,) mean squares."""
+        common = _common(squares, gauge)
+        if common <= 1 + (_common(gauge.limit, gauge) - 1) / 2:
+            common = 1.0
+        louder = squares > gauge.limit * common
+        if common == 1.0 and not louder.any():
+            return self._passed(squares, gauge)
+        more = np.where(louder, _MARGIN * (squares - common) * gauge.variance / self.level, 0.0)
+        level = self.level if common == 1.0 else _MARGIN * common * self.level
+        return Excess(level, self.variance + more, 0, np.zeros_like(squares))
+
+    def _passed(self, squares: FloatArray, gauge: Gauge) -> Excess:
+        """After a frame that showed no more: what ``_CALM`` of them do not show is forgotten."""
+        if not self.any:
+            return self
+        seen, calm = np.maximum(self.seen, squares), self.calm + 1
+        if calm < _CALM:
+            return replace(self, calm=calm, seen=seen)
+        common = float(np.clip(_common(seen, gauge), 1e-12, 1.0))
+        variance = self.variance * np.clip(seen / common, 0.0, 1.0)
+        variance = np.where(variance > _GONE * gauge.variance / self.level, variance, 0.0)
+        level = self.level * common
+        level = level if level > 1 + _GONE else 1.0
+        return Excess(level, variance, 0, np.zeros_like(seen))
+
+
+def _common(squares: FloatArray, gauge: Gauge) -> float:
+    """The median channel's, of those that can be judged."""
+    known = np.isfinite(gauge.limit)
+    return float(np.median(squares[known])) if known.any() else 1.0

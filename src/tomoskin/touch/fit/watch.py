@@ -1,0 +1,130 @@
+"""What of the frames touches do not explain: more noise, a press that has been lifted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray
+from tomoskin.pattern import Pattern
+from tomoskin.touch.fit.candidates import Matched
+from tomoskin.touch.fit.excess import Channels, Excess, Gauge
+from tomoskin.touch.fit.refine import Fit, Problem, Solver
+from tomoskin.touch.fit.spot import CONTENT
+
+_EXPLAINS = 0.3
+"""Part of what is beyond noise: a candidate that explains as much may be a touch not yet found."""
+
+_YOUNG = 3
+"""Frames of a touch in which what it does not explain is held for noise; later it is the error of
+its model."""
+
+_CHANCE = 6.0
+"""Deviations by which the squares of a residual must be too many to be more noise."""
+
+_LIFTED = 2.0
+"""A press has been lifted where a change of the other sign stands out by so many thresholds."""
+
+_SIGNS = {"decrease": -1.0, "increase": 1.0, "both": 0.0}
+
+
+class Watch:
+    """Looks at one frame after the other; those of a finder.
+
+    Parameters
+    ----------
+    pattern
+        Of the rows.
+    sign, least
+        Of the skin's touches, and deviations at which one begins.
+
+    Attributes
+    ----------
+    channels
+        What may turn noisy by itself.
+    excess
+        Noise beyond what was learnt.
+    like_touch
+        Whether the newest frame is such as a touch makes, one that presses or one that has been
+        lifted, though it may be too faint to be found: it is no noise to be learnt.
+    """
+
+    def __init__(self, pattern: Pattern, sign: str, least: float) -> None:
+        self.channels = Channels.of(pattern)
+        self.excess = Excess.none(self.channels)
+        self.like_touch = False
+        self._sign, self._least = sign, least
+        self._usual = np.full(len(self.channels.names), np.inf)
+        self._last: FloatArray | None = None
+        self._lifted: FloatArray | None = None
+        self._before = np.zeros((0, 4))
+        self._age, self._times = 0, 1.0
+
+    def begin(self, data: FloatArray, gauge: Gauge) -> None:
+        """Take the data (n_meas,) of a frame: what no touch can do to them is noise."""
+        if not self.excess.any:
+            self._usual = gauge.variance
+        moved = data if self._last is None else data - self._last
+        self._last = data
+        self.excess = self.excess.after(gauge.squares(data, moved), gauge)
+
+    def sign(self, problem: Problem, matched: Matched) -> str:
+        """Of the touches that are looked for in a frame.
+
+        The skin's; "both" where a press has been lifted that was there when the reference was
+        taken, or all round it there would seem to be touches.
+        """
+        if self._sign == "both" or self.wrong(self._before).any():
+            return "both"
+        data = problem.data
+        if len(self._before) or data @ data < len(data) + self._least**2:
+            return self._sign
+        ratio, content = matched.ratios(problem.solver, problem.nothing(), "both")
+        best = int(ratio.argmax())
+        away = content[best] * _SIGNS[self._sign] < 0
+        return "both" if away and ratio[best] > _LIFTED * self._least else self._sign
+
+    def unexplained(self, solver: Solver, fit: Fit, matched: Matched) -> float:
+        """Variance of what is left of a frame before which there was no touch for long.
+
+        1 where it is not beyond chance, or where further touches may still be found in it.
+        """
+        variance = fit.misfit / fit.degrees
+        if self._age >= _YOUNG or variance < 1 + _CHANCE * math.sqrt(2 / fit.degrees):
+            return 1.0
+        ratio, _ = matched.ratios(solver, fit, self._sign)
+        goes_on = ratio.max() ** 2 > _EXPLAINS * (fit.misfit - fit.degrees)
+        return 1.0 if len(fit.spots) > len(self._before) and goes_on else variance
+
+    def end(self, solver: Solver, fit: Fit, matched: Matched, times: float) -> None:
+        """Take what a frame was explained with, in so many times the noise that was known."""
+        self._before, self._times = fit.spots, times
+        self._age = self._age + 1 if len(fit.spots) else 0
+        wrong = fit.spots[self.wrong(fit.spots)]
+        self._lifted = wrong[np.abs(wrong[:, CONTENT]).argmax(), :2] if len(wrong) else None
+        self.like_touch = bool(len(fit.spots))
+        beyond = fit.misfit - fit.degrees
+        if beyond > 0 and not self.like_touch:
+            ratio, _ = matched.ratios(solver, fit, "both")
+            self.like_touch = bool(ratio.max() ** 2 > max(self._least**2, _EXPLAINS * beyond))
+
+    def wrong(self, spots: FloatArray) -> NDArray[np.bool_]:
+        """(k,) whether each of ``spots`` (k, 4) is not of the skin's sign."""
+        return np.asarray(spots[:, CONTENT] * _SIGNS[self._sign] < 0)
+
+    @property
+    def problem(self) -> str | None:
+        """What of the newest frame no touch explains, in a sentence, or None."""
+        if self._lifted is not None:
+            x, y = 1e3 * self._lifted
+            return (
+                f"near {x:.0f}, {y:.0f} mm the skin reads as if a press had been lifted that stood "
+                "when the reference was taken: take a new one while nothing touches"
+            )
+        if len(self._before):  # what they do not explain is their model's as a rule
+            return None
+        louder = max(self.excess.level, self._times)
+        return replace(self.excess, level=louder).text(self.channels, self._usual)
