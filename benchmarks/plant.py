@@ -131,7 +131,8 @@ def _moved(finger: Finger, column: int, step: float) -> Finger:
 
 def _field(points: Floats, random: np.random.Generator) -> Floats:
     """(n,) of unit mean square: a smooth field, and a part that differs from cell to cell."""
-    length = np.exp(random.uniform(*np.log(LENGTHS), WAVES))
+    low, high = np.log(LENGTHS).tolist()
+    length = np.exp(random.uniform(low, high, WAVES))
     waves = random.standard_normal((WAVES, 2)) / length[:, None]
     phase = random.uniform(0, 2 * np.pi, WAVES)
     smooth = np.cos(points @ waves.T + phase).sum(axis=1) * np.sqrt(2 / WAVES)

@@ -70,6 +70,7 @@ def problem(solver: Solver, spots: FloatArray, reach: float) -> Problem:
         solver=solver,
         seen=seen,
         prior=model().prior,
+        sign="decrease",
         reach=reach,
         grows=0.5,
         data=whitener()(volts),

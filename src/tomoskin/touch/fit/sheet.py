@@ -94,8 +94,8 @@ class _Linear:
         columns = np.hstack([self.by_cell @ field, self.along])
         solved = cho_solve(cho_factor(self.covariance(error)), columns)
         normal = columns.T @ solved + np.eye(columns.shape[1])
-        amplitudes = np.linalg.solve(normal, solved.T @ data)
-        return np.asarray(field @ amplitudes[:-2]), np.asarray(amplitudes[-2:])
+        amplitudes = np.asarray(np.linalg.solve(normal, solved.T @ data), np.float64)
+        return np.asarray(field @ amplitudes[:-2]), amplitudes[-2:]
 
     def log_evidence(self, data: FloatArray, seen: FloatArray, error: float) -> float:
         """Of ``data`` (n,) V where the ``seen`` (n, k) V of a field, and channels, are random."""
