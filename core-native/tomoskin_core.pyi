@@ -150,3 +150,75 @@ def jacobian(
     (n_drive, 2) source and sink, ``current`` (n_drive,), ``drive_index`` (n_meas,), ``measure``
     (n_meas, 2) plus and minus. ``threads``: as in :func:`transposed_product`.
     """
+
+@final
+class SpotTable:
+    """What one spot of four columns (x, y, logarithm of the radius, content) does: see
+    tomoskin.touch.fit.table, which makes it."""
+
+    def __new__(
+        cls,
+        log_radii: NDArray[np.float64],
+        grids: NDArray[np.float64],
+        nodes: NDArray[np.float64],
+        values: NDArray[np.float64],
+        filling: float,
+        sheet: NDArray[np.float64],
+        prior: NDArray[np.float64],
+        log_range: NDArray[np.float64],
+    ) -> SpotTable:
+        """Take what the table is made of.
+
+        ``grids`` (n, 5): origin, step and shape for each radius; ``values`` (n_points, n, rank);
+        ``sheet`` (n_cells, 3): centroids and margins; ``prior`` (2, 4): middle and weight.
+
+        Raises
+        ------
+        ValueError
+            When these do not fit together.
+        """
+
+    def expanded(self, spots: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Change, derivatives and directions (k, 7, rank) of spots (k, 4)."""
+
+    def settled(
+        self,
+        seen: SeenTable,
+        data: NDArray[np.float64],
+        left: NDArray[np.float64],
+        offset: NDArray[np.float64],
+        spots: NDArray[np.float64],
+        deviations: tuple[float, float, float, float],
+        depths: tuple[float, float],
+        most: int,
+    ) -> tuple[
+        tuple[NDArray[np.float64], ...],
+        tuple[NDArray[np.float64], ...],
+        tuple[float, float, float, bool],
+    ]:
+        """Fit spots to whitened ``data`` (r,) by at most so many steps.
+
+        Returns
+        -------
+        spots, each, slopes, unknown, normal
+            (k, 4), (k, r), (4k, r), (q, r) and (4k, 4k).
+        predicted, residual, gradient
+            (r,), (r,) and (4k,).
+        misfit, log_size, cost, settled
+            See tomoskin.touch.fit.refine.Fit.
+        """
+
+@final
+class SeenTable:
+    """A table as whitened data see it."""
+
+    def __new__(cls, direct: NDArray[np.float64], timed: NDArray[np.float64]) -> SeenTable:
+        """Of matrices (r, rank)."""
+
+def projected(
+    unknown: NDArray[np.float64],
+    free: NDArray[np.float64],
+    columns: NDArray[np.float64],
+    ridge: float,
+) -> NDArray[np.float64]:
+    """Rows (m, r), less what unknown directions (q, r) and free ones (p, r) take up."""

@@ -31,6 +31,7 @@ type Found<'py> = (
 impl SpotTable {
     /// `grids` (n, 5): origin, step, shape; `prior` (2, 4): middle and weight.
     #[new]
+    #[expect(clippy::too_many_arguments, reason = "a table has as many parts")]
     fn new(
         log_radii: &Any<'_>,
         grids: &Any<'_>,

@@ -83,15 +83,15 @@ impl Table {
             let grid = &self.grids[first as usize + level];
             let (x, along) = grid.along(0, spot[0]);
             let (y, across) = grid.along(1, spot[1]);
-            for i in 0..NEAR {
+            for (i, (&weight, &slope)) in along[0].iter().zip(&along[1]).enumerate() {
                 let row = (grid.start + (x + i) * grid.shape[1] + y) * width;
                 Arch::new().dispatch(Mix {
                     points: &self.values[row..row + NEAR * width],
                     across: &across,
                     along: [
-                        radius[level] * along[0][i],
-                        radius[level] * along[1][i],
-                        wider[level] / step * along[0][i],
+                        radius[level] * weight,
+                        radius[level] * slope,
+                        wider[level] / step * weight,
                     ],
                     mixed: &mut mixed,
                 });
@@ -226,9 +226,10 @@ impl WithSimd for Mix<'_> {
         for n in whole..width {
             let values = [p[n], q[n], r[n], s[n]];
             let (mut sum, mut slope) = (0.0, 0.0);
-            for number in 0..NEAR {
-                sum += self.across[0][number] * values[number];
-                slope += self.across[1][number] * values[number];
+            let [weights, slopes] = self.across;
+            for ((value, weight), by) in values.iter().zip(weights).zip(slopes) {
+                sum += weight * value;
+                slope += by * value;
             }
             flat[n] += self.along[0] * sum;
             by_x[n] += self.along[1] * sum;

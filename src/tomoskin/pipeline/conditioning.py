@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,13 @@ class Conditioned:
     problem: str | None = None
 
 
+class Learnt(NamedTuple):
+    """What is to be renewed after a frame: what makes images, and what finds touches."""
+
+    image: bool
+    touches: bool
+
+
 class Conditioning(Protocol):
     """What makes difference data of one frame after the other."""
 
@@ -94,11 +101,10 @@ class Conditioning(Protocol):
 
     def learn(
         self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
-    ) -> bool:
+    ) -> Learnt:
         """Take the newest frame, without what of it has ``moved`` V, for the baseline.
 
         ``noise``: whether what it shows beside the reference is noise that may be learnt.
-        True where the operator or the noise has changed.
         """
         ...
 
@@ -240,11 +246,11 @@ class Followed:
 
     def learn(
         self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
-    ) -> bool:
+    ) -> Learnt:
         """See :class:`Conditioning`."""
         health, baseline = self._health, self._baseline
         if health is None:
-            return False
+            return Learnt(image=False, touches=False)
         values = self._values if isinstance(moved, float) else self._values - moved
         if baseline.push(values, self._excluded, time, touched=touched, noise=noise):
             self._drift.learn(baseline, self._signatures)
@@ -253,12 +259,12 @@ class Followed:
         states = (sick, self._drift.revision)
         before, then = self._noise_for
         changed = then > 0 and abs(np.log(level / then)) > 2.0 * _NEW_NOISE
-        if states == before and not changed and not self._learnt_more():
-            return False
+        if states == before and not changed:
+            return Learnt(image=False, touches=self._learnt_more())
         self._noise_for = (states, level)
         if before is not None and states != before:
             self.renew(self._given)
-        return before is not None
+        return Learnt(image=before is not None, touches=before is not None)
 
     def _learnt_more(self) -> bool:
         """Whether idle frames tell of the noise what they did not: after one block of them, after
@@ -313,10 +319,10 @@ class GivenDifferences:
 
     def learn(
         self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
-    ) -> bool:
+    ) -> Learnt:
         """Nothing can be learnt."""
         del time, moved, touched, noise
-        return False
+        return Learnt(image=False, touches=False)
 
     def renew(self, prepared: Prepared) -> None:
         """See :class:`Conditioning`."""

@@ -153,11 +153,13 @@ class Following:
     def _learn(self, time: float, *, touched: bool, noise: bool) -> None:
         conditioning = self._conditioning
         moved = sum((applied.moved for applied in self._applied.values()), start=0.0)
-        changed = conditioning.learn(time, moved, touched=touched, noise=noise)
-        if changed and (reference := conditioning.reference) is not None:
-            prepared = conditioning.prepared
+        learnt = conditioning.learn(time, moved, touched=touched, noise=noise)
+        if not any(learnt) or (reference := conditioning.reference) is None:
+            return
+        prepared = conditioning.prepared
+        if learnt.image:
             self._imaging.renew(prepared, reference, conditioning.subspace())
-            self._finder.renew(prepared, reference)
+        self._finder.renew(prepared, reference)
 
     def _tune(self) -> None:
         """One step towards the alpha for the reference's noise; the old one serves meanwhile."""

@@ -112,7 +112,7 @@ def test_native_and_numpy_agree(spots: FloatArray, reach: float) -> None:
 def test_several_spots_are_those_of_the_exact_model() -> None:
     near = np.concatenate([press(-0.015, 0.0, 0.02, -0.8), press(0.025, 0.0, 0.02, -0.8)])
     frame = problem(model().solver, near, 0.0)
-    fit = frame.refined(near, Deficit.none(len(frame.seen.table.basis)), 6)
+    fit = frame.refined(near, Deficit.none(len(frame.solver.table.basis)), 6)
     exact = frame.corrected(fit, 4)
     assert exact.misfit < fit.misfit
     assert np.abs((exact.spots - near)[:, :2]).max() < 1.5e-3
