@@ -25,11 +25,11 @@ CASES = (
     ("textile-disc-16", 3000),
 )
 TIME_CONSTANTS = ("0 s", "0.2 s")
-IDLE, PRESSED, REPEATS = 30, 60, 40
+IDLE, PRESSED, REPEATS, FIT_REPEATS = 30, 60, 40, 10
 SETTLED = 20
 SEED = 1
 COLUMNS = (
-    *("electrodes", "triangles", "rows", "filter s", "bytes"),
+    *("touches by", "electrodes", "triangles", "rows", "filter s", "bytes"),
     *("p50 ms", "p99 ms", "max ms", "touches", "growth B/frame"),
 )
 
@@ -42,14 +42,16 @@ def run(data: Path | None) -> tuple[Report, ...]:
         skin = Skin.load(name).altered({"mesh": {"cells": cells}})
         for filtered in TIME_CONSTANTS:
             rows.append(row(prepare(skin.altered({"inverse": {"time_constant": filtered}}))))
+        rows.append(row(prepare(skin.altered({"touch": {"method": "fit"}})), FIT_REPEATS))
     table = Report(
         "bytes in → touches out",
         COLUMNS,
         tuple(rows),
         (
-            f"{PRESSED * REPEATS} frames with two moving presses of a twin, seed {SEED}",
+            f"{PRESSED * REPEATS} frames, {PRESSED * FIT_REPEATS} by fit, with two moving presses "
+            f"of a twin, seed {SEED}",
             f"{clock()[1]} of each",
-            "decode, voltages, difference, one-step image, segmentation, tracking",
+            "decode, voltages, difference, one-step image, touches by image or fit, tracking",
             "filter: the time constant of the Kalman filter over frames, 0 without it",
             "growth: allocated memory that stays, per frame",
         ),
@@ -57,13 +59,14 @@ def run(data: Path | None) -> tuple[Report, ...]:
     return (table,)
 
 
-def row(prepared: Prepared) -> tuple[object, ...]:
+def row(prepared: Prepared, repeats: int = REPEATS) -> tuple[object, ...]:
     """Values under ``COLUMNS``."""
     idle, pressed = _chunks(prepared)
     decoder, pipeline = Decoder(), Pipeline(prepared)
-    taken, touches = _taken(decoder, pipeline, idle, pressed, REPEATS)
+    taken, touches = _taken(decoder, pipeline, idle, pressed, repeats)
     p50, p99 = 1e3 * np.percentile(taken, (50, 99))
     return (
+        prepared.skin.touch.method,
         prepared.pattern.n_electrodes,
         len(prepared.mesh.cells),
         prepared.pattern.n_meas,

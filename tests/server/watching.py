@@ -17,6 +17,9 @@ READ = """() => {
 }"""
 
 
+TO_CLIENT = "([x, y]) => window.tomoskin.sheetToClient(x, y)"
+
+
 class Watched:
     """A page of which everything that goes wrong is noted."""
 
@@ -49,9 +52,11 @@ class Watched:
         return self.page.get_by_test_id(name)
 
     def move(self, x, y):
-        """Pointer over a place on the sheet, m."""
-        place = self.page.evaluate("([x, y]) => window.tomoskin.sheetToClient(x, y)", [x, y])
-        self.page.mouse.move(place["x"], place["y"])
+        """Pointer over a place on the sheet, m: where it is once the page stands still."""
+        before = None
+        while (place := self.page.evaluate(TO_CLIENT, [x, y])) != before:
+            self.page.mouse.move(place["x"], place["y"])
+            before = place
 
     def press(self, x, y):
         """Pointer down there, until the twin feels it and a touch is shown."""

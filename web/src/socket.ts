@@ -4,6 +4,9 @@ import type { PageMessage, ServerMessage } from "./protocol";
 
 const FIRST_WAIT = 500;
 const LONGEST_WAIT = 8000;
+/** Milliseconds in which a connection opens, or is tried again: a server that ends may leave one
+ * half open, and a browser waits for minutes. */
+const OPENS_WITHIN = 10_000;
 
 /** `refused`: the server answers but does not know this page any more (it was started again). */
 export type LinkState =
@@ -54,13 +57,18 @@ export class Connection {
     if (this.socket) return;
     const socket = new WebSocket(this.address);
     socket.binaryType = "arraybuffer";
+    const limit = window.setTimeout(() => socket.close(), OPENS_WITHIN);
     socket.onopen = () => {
+      window.clearTimeout(limit);
       this.tries = 0;
       this.lostSince = 0;
       this.listener.link({ phase: "open" });
     };
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
-    socket.onclose = () => void this.lost();
+    socket.onclose = () => {
+      window.clearTimeout(limit);
+      void this.lost();
+    };
     this.socket = socket;
   }
 

@@ -86,7 +86,8 @@ class Counting:
 
 def test_a_frame_has_a_bounded_number_of_steps() -> None:
     counting = Counting(model().solver)
-    counted = replace(model(), solver=counting)
+    counted = replace(model())
+    vars(counted)["solver"] = counting
     ours = SpotFinder(counted, skin(), skin().mesh(), covariance(), scan_time=SCAN, pace=LIVE)
     three = np.concatenate([press(-0.05, 0.0), press(0.05, 0.02), press(0.0, -0.06)])
     frames = [*[three] * 4, np.add(three, [0.01, 0.0, 0.0, 0.0]), STANDING, three]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import FloatArray
+from tomoskin.touch.fit import EXHAUSTIVE
 from tomoskin.touch.fit.native import NativeSolver
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
@@ -113,7 +114,7 @@ def test_several_spots_are_those_of_the_exact_model() -> None:
     near = np.concatenate([press(-0.015, 0.0, 0.02, -0.8), press(0.025, 0.0, 0.02, -0.8)])
     frame = problem(model().solver, near, 0.0)
     fit = frame.refined(near, Deficit.none(len(frame.solver.table.basis)), 6)
-    exact = frame.corrected(fit, 4)
+    exact = frame.corrected(fit, EXHAUSTIVE)
     assert exact.misfit < fit.misfit
     assert np.abs((exact.spots - near)[:, :2]).max() < 1.5e-3
     assert frame.change(exact) == pytest.approx(

@@ -20,10 +20,10 @@ _SPACING = 0.7
 _SIZES = (0.6, 1.0, 1.6)
 """Radii of the candidates, in median radii."""
 
-_LEAST = 0.5
+_LEAST = 1.0
 """Deviations of the noise below which a candidate is none, whatever else could take it up."""
 
-_USEFUL = 1e-3
+_USEFUL = 0.02
 """Part of a candidate's square that the spots that are there must leave of it."""
 
 _FAINT = 0.05

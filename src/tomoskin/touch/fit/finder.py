@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import OrderedDict
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -45,7 +46,7 @@ _MASKS = 8
 
 @dataclass(frozen=True, eq=False)
 class SpotModel:
-    """What is made once for a skin and pattern.
+    """What is made once for a skin and pattern; a table only where touches are fitted on it.
 
     Attributes
     ----------
@@ -53,10 +54,8 @@ class SpotModel:
         The forward model with spots on it.
     prior
         What is likely of a spot.
-    candidates
-        Where touches are looked for.
-    solver
-        Fits spots by a table of what one does.
+    sign
+        Of the touches, as in a skin's ``[touch]``.
     scale
         (n_meas,) 1/V by which the model's changes become difference data; ones where these are
         in volts.
@@ -64,8 +63,7 @@ class SpotModel:
 
     response: Response
     prior: SpotPrior
-    candidates: Candidates
-    solver: Solver
+    sign: str
     scale: FloatArray
 
     @classmethod
@@ -86,8 +84,17 @@ class SpotModel:
         response, mesh = Response(state), state.model.mesh
         prior, n_meas = SpotPrior.of(mesh), state.model.pattern.n_meas
         scale = 1 / np.abs(response.reference) if normalised else np.ones(n_meas)
-        solver = _solver(response, prior, sign)
-        return cls(response, prior, Candidates.of(response, prior), solver, scale)
+        return cls(response, prior, sign, scale)
+
+    @cached_property
+    def candidates(self) -> Candidates:
+        """Where touches are looked for."""
+        return Candidates.of(self.response, self.prior)
+
+    @cached_property
+    def solver(self) -> Solver:
+        """What fits spots by a table of what one does."""
+        return _solver(self.response, self.prior, self.sign)
 
     def fitted_to(self, reference: FloatArray, deviation: FloatArray | float = 0.0) -> SpotModel:
         """The model of the sheet that a ``reference`` (n_meas,) V tells of; itself where it tells
@@ -98,7 +105,7 @@ class SpotModel:
         state = fitted_sheet(self.response.state, reference, deviation)
         if state is self.response.state:
             return self
-        return self._of(state, self.solver.table.sign, bool((self.scale != 1.0).any()))
+        return self._of(state, self.sign, bool((self.scale != 1.0).any()))
 
 
 class SpotFinder:

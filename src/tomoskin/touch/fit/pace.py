@@ -19,6 +19,9 @@ class Pace:
         Of these positions, the best ones that are gone on with.
     rounds
         Solves of the exact model, each with a few more steps.
+    near
+        Part of radius and content by which a touch may differ before the exact model is solved
+        for it again.
     tries
         New touches that are tried in a frame.
     look
@@ -39,6 +42,7 @@ class Pace:
     cold: int
     finalists: int
     rounds: int
+    near: float
     tries: int
     look: float
     joint: int
@@ -53,6 +57,7 @@ EXHAUSTIVE = Pace(
     cold=15,
     finalists=3,
     rounds=4,
+    near=0.0,
     tries=5,
     look=0.5,
     joint=6,
@@ -68,6 +73,7 @@ LIVE = Pace(
     cold=4,
     finalists=1,
     rounds=1,
+    near=0.25,
     tries=1,
     look=0.8,
     joint=0,

@@ -11,6 +11,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.noise import Whitener
+from tomoskin.touch.fit.pace import Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, Response
 from tomoskin.touch.fit.table import ResponseTable
@@ -23,10 +24,6 @@ _AGAIN = 2
 
 _EXACT = 0.1
 """Deviations by which the exact model may differ from what a fit was made with."""
-
-_NEAR, _ALIKE = 0.1, 0.1
-"""What the table lacks holds for spots that have moved by so much of their radius, and whose
-content has changed by so much of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,15 +46,16 @@ class Deficit:
         """Before the exact model is solved."""
         return cls(np.zeros((0, N_PARAMETERS)), np.zeros(rank))
 
-    def holds_for(self, spots: FloatArray) -> bool:
-        """Whether as many ``spots`` (k, 4) are where they were, and as strong."""
+    def holds_for(self, spots: FloatArray, part: float) -> bool:
+        """Whether as many ``spots`` (k, 4) are where they were, as wide and as strong, but for a
+        ``part`` of radius and content."""
         if len(spots) != len(self.spots):
             return False
         away = np.linalg.norm((spots - self.spots)[:, :2], axis=1)
         other = np.abs((spots - self.spots)[:, CONTENT])
-        near = away <= _NEAR * np.exp(self.spots[:, LOG_RADIUS])
+        near = away <= part * np.exp(self.spots[:, LOG_RADIUS])
         wider = np.abs((spots - self.spots)[:, LOG_RADIUS])
-        alike = (wider <= _ALIKE) & (other <= _ALIKE * np.abs(self.spots[:, CONTENT]))
+        alike = (wider <= part) & (other <= part * np.abs(self.spots[:, CONTENT]))
         return bool((near & alike).all())
 
 
@@ -227,16 +225,16 @@ class Problem:
         """See :meth:`Solver.settled`."""
         return self.solver.settled(self, spots, deficit, most)
 
-    def corrected(self, fit: Fit, rounds: int) -> Fit:
-        """The fit with the exact model at its spots, which is solved up to so many times.
+    def corrected(self, fit: Fit, pace: Pace) -> Fit:
+        """The fit with the exact model at its spots, solved as often as the ``pace`` allows.
 
         A single faint spot is left as it is: what its table lacks is below the noise.
         """
         size = np.linalg.norm(fit.each, axis=1)
         if not len(size) or (len(size) == 1 and size[0] < _CERTAIN):
             return fit
-        for _ in range(rounds):
-            if fit.deficit.holds_for(fit.spots):
+        for _ in range(pace.rounds):
+            if fit.deficit.holds_for(fit.spots, pace.near):
                 return fit
             exact = self.solver.table.basis @ self.response.changes([fit.spots])[0]
             change = exact - self.solver.expanded(fit.spots)[:, 0].sum(axis=0)

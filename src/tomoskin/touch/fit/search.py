@@ -105,7 +105,7 @@ class Search:
             return self.problem.nothing()
         problem, spots = self.problem, before[: self.most]
         fit = problem.refined(spots, self.deficit, self.pace.warm)
-        return problem.corrected(fit, self.pace.rounds)
+        return problem.corrected(fit, self.pace)
 
     def _pruned(self, fit: Fit) -> Fit:
         """Without the spots that have faded."""
@@ -151,7 +151,15 @@ class Search:
         return part * self.least * float(np.hypot(1.0, misshapen / self.least))
 
     def _standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
-        return self.matched.ratios(self.problem.solver, fit, self.problem.sign)
+        if not self._matches or self._matches[-1][0] is not fit:
+            ratios = self.matched.ratios(self.problem.solver, fit, self.problem.sign)
+            self._matches.append((fit, ratios))
+        return self._matches[-1][1]
+
+    @cached_property
+    def _matches(self) -> list[tuple[Fit, tuple[FloatArray, FloatArray]]]:
+        """What candidates are to the fits that have been looked at, the newest last."""
+        return []
 
     def _joint_starts(self, count: int) -> list[FloatArray]:
         """Sets of so many spots whatever has been found."""
@@ -175,7 +183,7 @@ class Search:
             fit if fit.settled else problem.refined(fit.spots, fit.deficit, pace.cold)
             for fit in fits[: pace.finalists]
         ]
-        exact = [problem.corrected(fit, pace.rounds) for fit in settled]
+        exact = [problem.corrected(fit, pace) for fit in settled]
         return max(exact, key=self._evidence)
 
     def _ratios(self, fit: Fit) -> FloatArray:
