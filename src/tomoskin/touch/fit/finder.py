@@ -26,7 +26,7 @@ from tomoskin.touch.fit.sheet import fitted_sheet
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
 from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
 from tomoskin.touch.fit.table import ResponseTable
-from tomoskin.touch.fit.watch import Watch
+from tomoskin.touch.fit.watch import FrameWatch
 
 _CELLS = 1500
 """Of the mesh that spots are fitted on: their profile is smooth, and a frame is quick."""
@@ -154,7 +154,7 @@ class SpotFinder:
         self._before = np.zeros((0, N_PARAMETERS))
         self._deficit = Deficit.none(len(model.solver.table.basis))
         pattern = model.response.state.model.pattern
-        self.watch = Watch(pattern, skin.touch.sign, skin.touch.snr)
+        self.watch = FrameWatch(pattern, skin.touch.sign, skin.touch.snr)
         self.renew(noise, gain)
 
     def renew(self, noise: FloatArray, gain: float = 1.0) -> None:

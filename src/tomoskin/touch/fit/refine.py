@@ -245,6 +245,10 @@ class Problem:
             fit = self.solver.settled(self, fit.spots, deficit, _AGAIN)
         return fit
 
+    def evidence(self, fit: Fit) -> float:
+        """See :meth:`Fit.log_evidence`."""
+        return fit.log_evidence(self.prior)
+
     def change(self, fit: Fit) -> FloatArray:
         """(n_meas,) V that the spots of a fit add to the reference."""
         alone = self.solver.expanded(fit.spots)[:, 0].sum(axis=0)

@@ -87,7 +87,7 @@ class Search:
             fit = self._fewer(fit)
         if len(before) and self._is_astray(fit, before, in_vain=tried > 0 and fit is kept):
             fresh, _ = self._more(self.problem.nothing(), self.pace.tries)
-            fit = max(fresh, fit, key=self._evidence)
+            fit = max(fresh, fit, key=self.problem.evidence)
         return self._judged(fit)
 
     def _is_astray(self, fit: Fit, before: FloatArray, *, in_vain: bool) -> bool:
@@ -96,9 +96,6 @@ class Search:
         if not self.pace.restart:
             return in_vain
         return len(fit.spots) != len(before) or not fit.settled
-
-    def _evidence(self, fit: Fit) -> float:
-        return fit.log_evidence(self.problem.prior)
 
     def _started(self, before: FloatArray) -> Fit:
         if not len(before):
@@ -114,11 +111,8 @@ class Search:
             weakest = int(ratio.argmin())
             if ratio[weakest] >= HELD * self.least:
                 return fit
-            fit = self._without(fit, weakest)
+            fit = self._started(np.delete(fit.spots, weakest, axis=0))
         return fit
-
-    def _without(self, fit: Fit, number: int) -> Fit:
-        return self._started(np.delete(fit.spots, number, axis=0))
 
     def _fewer(self, fit: Fit) -> Fit:
         """Without the weakest of several spots, where that explains the frame as well."""
@@ -128,7 +122,9 @@ class Search:
         weakest = int(ratio.argmin())
         if fit.settled and ratio[weakest] >= self.least:
             return fit
-        return max(fit, self._without(fit, weakest), key=self._evidence)
+        return max(
+            fit, self._started(np.delete(fit.spots, weakest, axis=0)), key=self.problem.evidence
+        )
 
     def _more(self, fit: Fit, tries: int) -> tuple[Fit, int]:
         """With further spots, while they are worth it; and how many of ``tries`` were tried."""
@@ -140,7 +136,7 @@ class Search:
             fresh = _starts(fit, self.matched.spot(best, content))
             more = self._best(fresh, fit.deficit, self._joint_starts(len(fit.spots) + 1))
             worth = self._ratios(more).min() >= self._threshold(fit, 1.0)
-            if not worth or self._evidence(more) <= self._evidence(fit):
+            if not worth or self.problem.evidence(more) <= self.problem.evidence(fit):
                 return fit, tried + 1
             fit = more
         return fit, tries
@@ -184,7 +180,7 @@ class Search:
             for fit in fits[: pace.finalists]
         ]
         exact = [problem.corrected(fit, pace) for fit in settled]
-        return max(exact, key=self._evidence)
+        return max(exact, key=self.problem.evidence)
 
     def _ratios(self, fit: Fit) -> FloatArray:
         """(k,) size of what each spot changes that the others could not take up."""

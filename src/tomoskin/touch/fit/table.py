@@ -39,7 +39,7 @@ LOG_STEP = 0.35
 """Between radii, in their logarithm."""
 
 PADDING = 2
-"""Grid points beyond the sheet on each side: splines need one, the filter another."""
+"""PositionGrid points beyond the sheet on each side: splines need one, the filter another."""
 
 FAINT = -0.3
 """Near this depth it is taken what a shape does; that is in proportion to the depth."""
@@ -86,7 +86,7 @@ class Along:
 
 
 @dataclass(frozen=True)
-class Grid:
+class PositionGrid:
     """Positions of one radius: ``shape`` points from ``origin`` m on, every ``step`` m."""
 
     origin: tuple[float, float]
@@ -137,7 +137,7 @@ class ResponseTable:
     """
 
     log_radii: FloatArray
-    grids: tuple[Grid, ...]
+    grids: tuple[PositionGrid, ...]
     sign: str
     nodes: FloatArray
     values: FloatArray
@@ -151,7 +151,7 @@ class ResponseTable:
         nodes = _nodes(*prior.depths(sign))
         grids, parts = [], []
         for log_radius in log_radii:
-            grid = Grid.over(response.spots.mesh.points, STEP * math.exp(log_radius))
+            grid = PositionGrid.over(response.spots.mesh.points, STEP * math.exp(log_radius))
             grids.append(grid)
             parts.append(_sampled(response, grid, math.exp(log_radius), nodes))
         basis = _basis(parts)
@@ -216,7 +216,9 @@ def _nodes(low: float, high: float) -> FloatArray:
     return np.asarray(ends.mean() + (ends[1] - ends[0]) / 2 * turn)
 
 
-def _sampled(response: Response, grid: Grid, radius: float, nodes: FloatArray) -> FloatArray:
+def _sampled(
+    response: Response, grid: PositionGrid, radius: float, nodes: FloatArray
+) -> FloatArray:
     """(n_points, n_nodes + N_DIRECTIONS, n_meas) V of spots on a grid.
 
     Points far off the sheet have what their nearest neighbour has: splines are smooth then.

@@ -31,7 +31,7 @@ _LIFTED = 2.0
 _SIGNS = {"decrease": -1.0, "increase": 1.0, "both": 0.0}
 
 
-class Watch:
+class FrameWatch:
     """Looks at one frame after the other; those of a finder.
 
     Parameters
