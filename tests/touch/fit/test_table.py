@@ -68,7 +68,6 @@ def problem(solver: Solver, spots: FloatArray, reach: float) -> Problem:
     left = 0.05 * whitener()(data(press(0.0, 0.06))[None])
     return Problem(
         response=model().response,
-        solver=solver,
         seen=seen,
         prior=model().prior,
         sign="decrease",

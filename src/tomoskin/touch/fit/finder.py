@@ -194,7 +194,6 @@ class SpotFinder:
             seen, matched = seen.louder(times), matched.louder(times)
         problem = Problem(
             response=self._model.response,
-            solver=self._model.solver,
             seen=seen,
             prior=self._model.prior,
             sign=self._settings.sign,

@@ -207,7 +207,6 @@ class Problem:
     """
 
     response: Response
-    solver: Solver
     seen: WhitenedTable
     prior: SpotPrior
     sign: str
@@ -215,6 +214,11 @@ class Problem:
     grows: float
     data: FloatArray
     left: FloatArray
+
+    @property
+    def solver(self) -> Solver:
+        """What fits spots."""
+        return self.seen.solver
 
     def nothing(self) -> Fit:
         """The frame with no spot at all."""

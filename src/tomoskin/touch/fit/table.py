@@ -39,7 +39,7 @@ LOG_STEP = 0.35
 """Between radii, in their logarithm."""
 
 PADDING = 2
-"""PositionGrid points beyond the sheet on each side: splines need one, the filter another."""
+"""Grid points beyond the sheet on each side: splines need one, the filter another."""
 
 FAINT = -0.3
 """Near this depth it is taken what a shape does; that is in proportion to the depth."""
@@ -50,8 +50,8 @@ BENT = 0.5
 NEGLIGIBLE, SAMPLED = 1e-6, 3000
 """Part of the largest change below which a direction of the data counts as none, by so many."""
 
-NEXT = 1e-4
-"""For slopes of the powers of the depth."""
+NEAR = 4
+"""Radii that a spot is between."""
 
 N_DIRECTIONS = 2
 """Of each spot: of a stretched sheet's direction, and of its shape; see :class:`Part`."""
@@ -66,14 +66,11 @@ def spline(t: float) -> FloatArray:
     ])  # fmt: skip
 
 
-def cubic(t: float) -> FloatArray:
-    """(2, 4) weights of a cubic through four points, ``t`` after the first, and their slopes."""
-    powers, slopes = np.array([1, t, t**2, t**3]), np.array([0, 1, 2 * t, 3 * t**2])
-    return np.stack([powers @ CUBIC, slopes @ CUBIC])
-
-
-CUBIC = np.linalg.inv(np.vander(np.arange(4.0), increasing=True))
-"""(4, 4) coefficients of the powers from values at 0, 1, 2 and 3."""
+def between(nodes: FloatArray, t: float) -> FloatArray:
+    """(2, n) weights at ``t`` of the polynomial through ``nodes`` (n,), and their slopes."""
+    powers = t ** np.arange(len(nodes))
+    slopes = np.append(0.0, np.arange(1, len(nodes)) * powers[:-1])
+    return np.asarray(np.stack([powers, slopes]) @ np.linalg.inv(np.vander(nodes, increasing=True)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,9 +187,9 @@ class ResponseTable:
         """:meth:`expanded` of values, and their slopes by x, y and log radius, at the nodes."""
         n, depth = len(self.nodes), float(depth_of(spot))
         s = math.expm1(depth / 4)
-        power = _powers(np.array([s, s + NEXT, s - NEXT]), self.nodes)
-        steeper = (power[1] - power[2]) / (2 * NEXT) * (s + 1) / 4
-        flat, deeper = power[0] @ mixed[:, :n], steeper @ mixed[0, :n]
+        weight, slope = between(self.nodes, s)  # of values that are divided by s
+        flat = s * weight @ mixed[:, :n]
+        deeper = (weight + s * slope) * (s + 1) / 4 @ mixed[0, :n]
         more = deeper / (FILLING * math.exp(2 * spot[LOG_RADIUS]))
         flat[3] -= 2 * depth * deeper
         return np.concatenate([flat, more[None], depth * mixed[0, n:]])
@@ -201,8 +198,9 @@ class ResponseTable:
         """The first of four radii, and (2, 4): their weights, and the slopes of these."""
         step = self.log_radii[1] - self.log_radii[0]
         place = (log_radius - self.log_radii[0]) / step
-        first = int(np.clip(math.floor(place) - 1, 0, len(self.log_radii) - 4))
-        return first, cubic(place - first) / np.array([[1.0], [step]])
+        first = int(np.clip(math.floor(place) - 1, 0, len(self.log_radii) - NEAR))
+        weights = between(np.arange(float(NEAR)), place - first)
+        return first, weights / np.array([[1.0], [step]])
 
     @cached_property
     def _starts(self) -> IntArray:
@@ -239,16 +237,6 @@ def _sampled(
     out[:, -1] = towards / (BENT * depths[faint])
     _, nearest = cKDTree(points[needed]).query(points)
     return np.asarray(out[nearest])
-
-
-def _powers(s: FloatArray | float, nodes: FloatArray) -> FloatArray:
-    """(…, n_nodes) weights by which values divided by s at the nodes make the value at ``s``."""
-    s = np.asarray(s, dtype=np.float64)
-    far = s[..., None] - nodes
-    others = ~np.eye(len(nodes), dtype=bool)
-    apart = np.where(others, nodes[:, None] - nodes, 1.0).prod(axis=1)
-    left = np.where(others, far[..., None, :], 1.0).prod(axis=-1)
-    return np.asarray(s[..., None] * left / apart)
 
 
 def _changes(response: Response, feet: Footprints, change: FloatArray) -> FloatArray:
