@@ -10,6 +10,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -46,8 +47,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
-def pytest_configure() -> None:
-    """Hear Ctrl-C, which a shell ignores in what it starts in the background."""
+def pytest_configure(config: pytest.Config) -> None:
+    """Hear Ctrl-C, which a shell ignores in what it starts in the background; keep tables of
+    touches in one folder for all processes, and in no user's."""
+    if "TOMOSKIN_CACHE" not in os.environ:
+        folder = tempfile.TemporaryDirectory(prefix="tomoskin-tests-", ignore_cleanup_errors=True)
+        os.environ["TOMOSKIN_CACHE"] = folder.name
+        config.add_cleanup(folder.cleanup)
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 

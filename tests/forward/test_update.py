@@ -126,6 +126,23 @@ def test_many_touches_at_once_are_those_one_by_one(mesh: Mesh) -> None:
     assert mismatch(voltages[5], full(base, *touches[5])) < 1e-10
 
 
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("turn", [1.0, 1.0 + 0.3j])
+def test_many_touches_without_the_native_engine(
+    mesh: Mesh, order: int, turn: complex, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of all sizes: the small ones are stacked."""
+    monkeypatch.setenv("TOMOSKIN_ENGINE", "scipy")
+    base = state(mesh, order=order, turn=turn)
+    touches = [
+        (cells, base.conductivity[cells] * factor)
+        for factor in (0.1, 3.0)
+        for cells in (touched(mesh, count) for count in (1, 2, 9, 10, 40, 200))
+    ]
+    for voltages, (cells, sigma) in zip(base.local.voltages_of(touches), touches, strict=True):
+        assert mismatch(voltages, full(base, cells, sigma)) < 1e-10
+
+
 def test_no_touch_at_all(mesh: Mesh) -> None:
     base = state(mesh)
     assert base.local.voltages_of([]).shape == (0, base.model.pattern.n_meas)

@@ -12,15 +12,28 @@ import pytest
 
 from run.board import pressed, samples_of
 from tomoskin.core import Frame
-from tomoskin.pipeline import Pipeline
+from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.wire import Decoder, encode
 
-REFERENCE, WARM, COUNTED = 20, 60, 60
-MOST_CALLS = 900
-"""Of functions in Python and C, per frame with a touch that moves: some 670 when written."""
+REFERENCE, WARM, COUNTED = 20, 360, 60
+MOST_CALLS = {"image": 900, "fit": 2500}
+"""Of functions in Python and C, per frame with a touch that moves."""
 
-MOST_PICTURES = 15
-"""Memory that a frame may need, in pictures of eight bytes a cell: seven or eight when written."""
+MOST_IMAGES = {"image": 15, "fit": 60}
+"""Memory that a frame may need, in images of eight bytes a cell."""
+
+NEVER = {"mesh", "skin", "twin", "recording", "formats"}
+"""Rooms that no frame enters; by image not the exact model either."""
+
+
+@pytest.fixture(scope="module", params=["image", "fit"])
+def method(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def by_method(prepared, method):
+    return prepare(prepared.skin.altered({"touch": {"method": method}}))
 
 
 @pytest.fixture(scope="module")
@@ -43,9 +56,9 @@ def _noisy(row, noise):
 
 
 @pytest.fixture
-def one(prepared, chunks):
+def one(by_method, chunks):
     """Takes the next chunk from bytes to touches; the reference and the warm-up are over."""
-    decoder, pipeline = Decoder(), Pipeline(prepared, reference_frames=REFERENCE)
+    decoder, pipeline = Decoder(), Pipeline(by_method, reference_frames=REFERENCE)
 
     def take(number):
         (frame,) = decoder.feed(chunks[number], 0.1 * number)
@@ -76,15 +89,15 @@ def _profiled(one, number):
     return calls.total(), rooms
 
 
-def test_a_frame_calls_few_functions_and_never_the_model(one):
+def test_a_frame_calls_few_functions_and_never_the_model(one, method):
     found = [_profiled(one, REFERENCE + WARM + k) for k in range(COUNTED)]
-    assert 100 < median(calls for calls, _ in found) < MOST_CALLS
+    assert 100 < median(calls for calls, _ in found) < MOST_CALLS[method]
     rooms = set().union(*(rooms for _, rooms in found))
     assert rooms >= {"wire", "signal", "inverse", "touch", "pipeline"}
-    assert rooms & {"mesh", "skin", "forward", "twin", "recording", "formats"} == set()
+    assert rooms & (NEVER | ({"forward"} if method == "image" else set())) == set()
 
 
-def test_a_frame_needs_little_memory_and_keeps_none(one, prepared):
+def test_a_frame_needs_little_memory_and_keeps_none(one, prepared, method):
     tracemalloc.start()
     try:
         peaks = []
@@ -99,5 +112,5 @@ def test_a_frame_needs_little_memory_and_keeps_none(one, prepared):
     finally:
         tracemalloc.stop()
     picture = 8 * len(prepared.mesh.cells)
-    assert median(peaks) < MOST_PICTURES * picture
+    assert median(peaks) < MOST_IMAGES[method] * picture
     assert after - half < picture  # thirty frames that kept one picture each would keep thirty

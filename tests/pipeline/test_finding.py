@@ -33,8 +33,9 @@ def frames(skin, samples, count, first=0, seed=0):
         yield Frame(number, ticks, 0.05 * number, 1, 0, 0, noisy.astype(np.uint16))
 
 
-def test_the_skin_file_chooses(prepared, fitted):
-    assert isinstance(finding(prepared, None), InImage)
+def test_the_skin_file_chooses(fitted):
+    by_image = prepare(fitted.skin.altered({"touch": {"method": "image"}}))
+    assert isinstance(finding(by_image, None), InImage)
     assert isinstance(finding(fitted, None), InData)
 
 

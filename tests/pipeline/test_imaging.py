@@ -34,7 +34,11 @@ TICKS = round(INTERVAL * RATE)
 def filtered(alpha: float | str = 0.05, tau: str = f"{TAU} s") -> Prepared:
     return prepare(
         Skin.load("textile-disc-8").altered(
-            {"inverse": {"alpha": alpha, "time_constant": tau}, "signal": AS_TAKEN}
+            {
+                "inverse": {"alpha": alpha, "time_constant": tau},
+                "signal": AS_TAKEN,
+                "touch": {"method": "image"},
+            }
         )
     )
 

@@ -35,6 +35,10 @@ def push(prepared):
     return push
 
 
+SETTLED = 300
+"""Frames after a reference in which alpha and sheet follow it."""
+
+
 def settle(push, idle):
     for _ in range(NEEDED):
         push(idle)
@@ -164,6 +168,8 @@ def test_a_reference_of_nothing_but_rails_is_said(push, idle, touched):
 
 def test_memory_does_not_grow(push, idle, touched):
     settle(push, idle)
+    for _ in range(SETTLED):
+        push(idle)
     for _ in range(20):
         push(touched)
     tracemalloc.start()

@@ -19,12 +19,13 @@ from tomoskin.core.errors import (
     WireError,
 )
 from tomoskin.core.outputs import MAGIC, RECORDING, Output, check_outputs
-from tomoskin.core.stages import reach, watch_stages
+from tomoskin.core.stages import finished, reach, watch_stages
 from tomoskin.core.units import DIMENSIONS, parse_quantity
 from tomoskin.core.written import write_text, written
 
 if TYPE_CHECKING:
     from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
+    from tomoskin.core.cache import kept
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
     from tomoskin.core.json_bytes import encode_json, plain_values
     from tomoskin.core.memory import check_fits, machine_memory, most_bytes
@@ -58,6 +59,7 @@ _HOME = {
     "MOST_ELECTRODES": "typed_arrays",
     "electrode_table": "typed_arrays",
     "encode_json": "json_bytes",
+    "kept": "cache",
     "load_arrays": "archive",
     "machine_memory": "memory",
     "most_bytes": "memory",
@@ -108,6 +110,8 @@ __all__ = [
     "check_outputs",
     "electrode_table",
     "encode_json",
+    "finished",
+    "kept",
     "load_arrays",
     "machine_memory",
     "most_bytes",

@@ -6,9 +6,12 @@ what a page wants to see.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import TypeVar
+
+_T = TypeVar("_T")
 
 Watcher = Callable[[str], None]
 """Told of each stage that is reached; ``""``: the same goes on. What it raises ends the work."""
@@ -30,3 +33,13 @@ def reach(stage: str = "") -> None:
     """Say that the work has come to ``stage``, or goes on."""
     if (watcher := _watcher.get()) is not None:
         watcher(stage)
+
+
+def finished(work: Generator[None, None, _T]) -> _T:
+    """What work that stops at each ``yield`` returns in the end."""
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            result: _T = end.value
+            return result

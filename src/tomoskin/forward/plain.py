@@ -12,6 +12,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.forward.engine import BaseState, Compressed, Factor, Factorise, Patches, singular
+from tomoskin.forward.small_patches import stack_change, stacks
 from tomoskin.forward.touches import Touches
 from tomoskin.pattern import Pattern
 
@@ -138,7 +139,16 @@ class PlainPatches:
         grounded, lost = np.empty(shape, kind), np.zeros(shape, kind)
         grounded[:] = base.grounded
         missing: list[IntArray] = []
-        for number in range(len(touches)):
+        alone = np.ones(len(touches), dtype=bool)
+        for stack in stacks(base.cells, touches) if len(touches) > 1 else ():
+            alone[stack.numbers] = False
+            slots = self._slot[stack.nodes]
+            missing.append(stack.nodes[slots < 0])
+            if not len(missing[-1]):
+                between = self._columns[slots[:, :, None], stack.nodes[:, None]]
+                less, lost[stack.numbers] = stack_change(base, between, stack, touches)
+                grounded[stack.numbers] -= less
+        for number in np.flatnonzero(alone).tolist():
             index, sigma = touches[number]
             rim, change = self._condensed(index, sigma)
             missing.append(rim[self._slot[rim] < 0])

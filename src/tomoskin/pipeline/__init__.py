@@ -10,7 +10,7 @@ from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.pipeline.prepare import Prepared, colour_limit, prepare
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
 from tomoskin.pipeline.records import FrameResult, Measured, ReferenceState
-from tomoskin.pipeline.tune import tuned
+from tomoskin.pipeline.tune import tuned, tuned_image
 
 __all__ = [
     "DOUBTED",
@@ -29,6 +29,7 @@ __all__ = [
     "reconstruct",
     "recorded_frames",
     "tuned",
+    "tuned_image",
     "voltage_covariance",
 ]
 

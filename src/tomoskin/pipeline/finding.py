@@ -76,7 +76,7 @@ class InData:
         gain = _gain(model, prepared, reference)
         noise = _noise(prepared, reference, gain)
         self.model = model
-        """The sheet on which touches are fitted, as the reference tells of it."""
+        """The sheet on which touches are fitted."""
         skin, settings = prepared.skin, ScanSettings.of(prepared.skin)
         scan_time = Configuration.of(prepared.scan, settings).scan_time
         self._spots = SpotFinder(
@@ -106,13 +106,11 @@ class InData:
 def finding(prepared: Prepared, reference: Reference | None, pace: Pace = EXHAUSTIVE) -> Finder:
     """What finds the touches: the method that the skin names, unless a calibration locates them.
 
-    Fitted touches are those of a sheet that is as uneven and directed as its reference tells.
     ``pace`` says how much of a fit is tried in a frame.
     """
-    located = any(c.kind.locates for c in prepared.calibrations.values())
-    if located or prepared.spots is None or prepared.skin.touch.method != "fit":
+    if prepared.spots is None or not prepared.fits_touches:
         return InImage(prepared)
-    return InData(_spots(prepared.spots, reference), prepared, reference, pace)
+    return InData(prepared.spots, prepared, reference, pace)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,34 +121,22 @@ class Fitting:
     ----------
     prepared, reference
         The skin, and what it reads while nothing touches it, where that is known.
-    finder
-        What finds the touches of the skin itself.
     """
 
     prepared: Prepared
     reference: Reference | None
-    finder: Finder
 
     def touch_fit(self) -> TouchFit | None:
         """See :class:`tomoskin.calibration.Conditions`."""
         prepared, reference = self.prepared, self.reference
         if reference is None or prepared.spots is None:
             return None
-        finder = self.finder
-        model = finder.model if isinstance(finder, InData) else _spots(prepared.spots, reference)
+        model = prepared.spots
         gain = _voltage_ratio(model, reference)
         if prepared.skin.touch.method == "fit":
             return TouchFit(model.response, gain, lambda _, detections: detections)
         beside = InData(model, prepared, reference)
         return TouchFit(model.response, gain, lambda view, _: beside.push(view))
-
-
-def _spots(spots: SpotModel, reference: Reference | None) -> SpotModel:
-    """On the sheet as its reference tells of it."""
-    if reference is None:
-        return spots
-    deviation = np.nan_to_num(reference.noise) / np.sqrt(reference.n_frames)
-    return spots.fitted_to(reference.mean, deviation)
 
 
 def voltage_covariance(

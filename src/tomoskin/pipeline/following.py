@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from tomoskin.pipeline.finding import Finder, Fitting, finding
 from tomoskin.pipeline.imaging import Filtered, SingleFrame, imaging
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.records import FrameResult, Measured
-from tomoskin.pipeline.tune import tune
+from tomoskin.pipeline.tune import Steps, tune, tuned_sheet
 from tomoskin.signal import Reference
 from tomoskin.touch import EXHAUSTIVE, Pace, Tracker
 
@@ -65,16 +64,19 @@ class Following:
         *,
         reference: Reference | None,
     ) -> None:
+        excluded = None if rest is None else rest.without_reference
+        if reference is not None and any(c.kind.fits for c in prepared.calibrations.values()):
+            prepared = tuned_sheet(prepared, reference, excluded)  # they are applied once
         self.rest, self._setting = rest, setting
         self._prepared, self._conditioning = prepared, conditioning
         self._tracker = tracker
         self._imaging = self._new_imaging(reference)
         self._finder: Finder = finding(prepared, reference, setting.pace)
-        conditions = Fitting(prepared, reference, self._finder)
+        conditions = Fitting(prepared, reference)
         self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
-        self._tuning: Generator[None, None, Prepared] | None = None
+        self._tuning: Steps | None = None
         if reference is not None:
-            self._tuning = tune(prepared, reference)
+            self._tuning = tune(prepared, reference, excluded)
 
     @classmethod
     def from_rest(
@@ -91,6 +93,9 @@ class Following:
 
     def with_settings(self, prepared: Prepared, tracker: Tracker) -> Following:
         """One for other settings of the same body that goes on where this one is."""
+        spots = self._prepared.spots
+        if spots is not None and prepared.spots is spots.even:
+            prepared = replace(prepared, spots=spots)
         conditioning = self._conditioning
         if self.rest is not None and isinstance(conditioning, Followed):
             conditioning = conditioning.with_settings(prepared, self.rest.reference)
@@ -162,22 +167,27 @@ class Following:
         self._finder.renew(prepared, reference)
 
     def _tune(self) -> None:
-        """One step towards the alpha for the reference's noise; the old one serves meanwhile."""
+        """One step towards what the reference says; what there is serves meanwhile."""
         if self._tuning is None:
             return
         try:
-            next(self._tuning)
-        except StopIteration as end:
+            better = next(self._tuning)
+        except StopIteration:
             self._tuning = None
-            if end.value is not self._prepared:
-                self._renew(end.value)
+        else:
+            if better is not None:
+                self._renew(better)
 
     def _renew(self, prepared: Prepared) -> None:
-        self._prepared = prepared
+        before, self._prepared = self._prepared, prepared
         self._conditioning.renew(prepared)
         reference = self._conditioning.reference
         self._imaging = self._new_imaging(reference)
-        self._finder.renew(self._conditioning.prepared, reference)
+        now = self._conditioning.prepared
+        if prepared.spots is before.spots:
+            self._finder.renew(now, reference)
+        else:
+            self._finder = finding(now, reference, self._setting.pace)
 
     def _new_imaging(self, reference: Reference | None) -> SingleFrame | Filtered:
         conditioning = self._conditioning

@@ -105,6 +105,23 @@ class Prepared:
             spots = SpotModel.of(self.skin, self.model)
         return replace(self, calibrations=calibrations, spots=spots)
 
+    @property
+    def fits_touches(self) -> bool:
+        """Whether touches are fitted to the data, rather than found in the image or located."""
+        located = any(c.kind.locates for c in self.calibrations.values())
+        return self.skin.touch.method == "fit" and not located
+
+    @property
+    def needs_sheet(self) -> bool:
+        """Whether anything is fitted on the sheet that a reference shows."""
+        return self.fits_touches or any(c.kind.fits for c in self.calibrations.values())
+
+    def warm_up(self) -> None:
+        """Do what would hold up the first frames: it takes seconds the first time for a skin."""
+        if self.spots is not None and self.needs_sheet:
+            reach("touches")
+            self.spots.warm_up()
+
     @cached_property
     def no_image(self) -> Image:
         """The image of no change."""

@@ -1,19 +1,17 @@
-"""``alpha = "auto"``: the operator follows the noise that the reference shows, in small steps."""
+"""What a reference says of the operator's alpha and of the sheet, in small steps."""
 
 from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import ModelError
 from tomoskin.inverse import Assembly, Evidence, Spectrum, choose
+from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import Reference
-
-if TYPE_CHECKING:
-    from tomoskin.pipeline.prepare import Prepared
 
 _SAME = 0.05
 """An alpha that differs by less than this part is left as it is: the picture is the same."""
@@ -22,38 +20,77 @@ _STEP = 2e7
 """Multiplications of one step: about a millisecond on one core."""
 
 
-def tune(prepared: Prepared, reference: Reference) -> Generator[None, None, Prepared]:
-    """The skin prepared anew for the noise of ``reference``, a piece between each two yields.
+Mask = NDArray[np.bool_]
+"""(n_meas,) of measurements."""
 
-    Returns ``prepared`` itself where alpha was set by hand, the noise is not known or not above
-    zero, or the alpha would hardly change.
+
+Steps = Generator[Prepared | None, None, None]
+"""Pieces of work; each yields the skin where it is prepared better from now on, or None."""
+
+
+def tune(prepared: Prepared, reference: Reference, excluded: Mask | None = None) -> Steps:
+    """The skin prepared for ``reference``.
+
+    ``alpha = "auto"`` follows its noise, then touches are fitted on the sheet that it shows, which
+    does not rest on measurements that are ``excluded``.
     """
+    for better in _tune_image(prepared, reference):
+        prepared = better or prepared
+        yield better
+    yield from _tune_sheet(prepared, reference, excluded)
+
+
+def tuned(prepared: Prepared, reference: Reference) -> Prepared:
+    """As :func:`tune`, at once; ``prepared`` itself where nothing changes."""
+    return _last(prepared, tune(prepared, reference))
+
+
+def tuned_image(prepared: Prepared, reference: Reference) -> Prepared:
+    """As :func:`tuned`, the sheet left out."""
+    return _last(prepared, _tune_image(prepared, reference))
+
+
+def tuned_sheet(prepared: Prepared, reference: Reference, excluded: Mask | None = None) -> Prepared:
+    """As :func:`tuned`, the alpha left out."""
+    return _last(prepared, _tune_sheet(prepared, reference, excluded))
+
+
+def _last(prepared: Prepared, steps: Steps) -> Prepared:
+    for better in steps:
+        prepared = better or prepared
+    return prepared
+
+
+def _tune_image(prepared: Prepared, reference: Reference) -> Steps:
+    """The alpha stays where it was set by hand, where the noise is not known or not above zero,
+    or where it would hardly change."""
     if prepared.light_touch is None or not reference.noise_is_known or not reference.noise.any():
-        return prepared
+        return
     noise = prepared.difference_noise(reference)
     choice = prepared.light_touch(noise)
     if abs(np.log(choice.alpha / prepared.choice.alpha)) < _SAME:
-        return prepared
-    yield
+        return
+    yield None
     spectrum = prepared.light_touch.spectrum
     assembly = Assembly(spectrum, choice.alpha)
     rows = max(int(_STEP / len(noise) ** 2), 1)
     while not assembly.done:
         assembly.advance(rows)
-        yield
+        yield None
     reason = f"{choice.reason}, measured on {reference.n_frames} idle frames"
-    return prepared.with_alpha(replace(choice, reason=reason), spectrum, assembly.operator())
+    yield prepared.with_alpha(replace(choice, reason=reason), spectrum, assembly.operator())
 
 
-def tuned(prepared: Prepared, reference: Reference) -> Prepared:
-    """As :func:`tune`, at once."""
-    steps = tune(prepared, reference)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            found: Prepared = end.value
-            return found
+def _tune_sheet(prepared: Prepared, reference: Reference, excluded: Mask | None) -> Steps:
+    """The sheet stays where it is not asked for, or has been fitted to a reference before."""
+    spots = prepared.spots
+    if spots is None or spots.even is not None or not prepared.needs_sheet:
+        return
+    deviation = np.nan_to_num(reference.noise) / np.sqrt(reference.n_frames)
+    mean = reference.mean if excluded is None else np.where(excluded, np.nan, reference.mean)
+    fitted = yield from spots.fitting(mean, deviation)
+    if fitted is not spots:
+        yield replace(prepared, spots=fitted)
 
 
 def tuned_by_rule(prepared: Prepared, rule: str, evidence: Evidence) -> Prepared:

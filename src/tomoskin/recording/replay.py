@@ -259,7 +259,7 @@ def _stamp_of(
     same_wire = session.device().get("schema_hash", SCHEMA.hash) in {SCHEMA.hash, *OLDER.values()}
     if first.frame.configuration == configuration.identity and same_wire:
         return None
-    same_skin = skin.identity == session.skin.identity
+    same_skin = skin.body == session.skin.body
     if not same_skin or len(first.frame.samples) != configuration.n_samples:
         raise SourceError(
             f"was recorded by another scan ({first.frame.configuration:04x}) than that of "

@@ -5,10 +5,11 @@ from __future__ import annotations
 import logging
 import time
 from concurrent.futures import Future
+from contextlib import suppress
 
 from threadpoolctl import threadpool_limits
 
-from tomoskin.core import SourceError, TomoskinError
+from tomoskin.core import SourceError, TomoskinError, watch_stages
 from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
 from tomoskin.run.commands import Opener, RunCommands
@@ -18,9 +19,14 @@ from tomoskin.source import Transport
 
 _POLL = 0.05
 _WAITING = "waiting for the board to answer"
+_WARMING = "preparing the fit of touches; the first time for a skin this takes some seconds"
 _FIRST_DELAY, _LONGEST_DELAY = 0.25, 5.0
 
 _log = logging.getLogger(__name__)
+
+
+class _StoppedError(Exception):
+    """The run is to end."""
 
 
 class Loop:
@@ -53,10 +59,11 @@ class Loop:
 
     def run(self, transport: Transport | None) -> None:
         """Follow ``transport``, and what comes after it; returns at the end."""
-        self.trouble = _WAITING
         try:
             # a frame's products are small: more threads would only wait for each other
             with threadpool_limits(1):
+                self._warm_up()
+                self.trouble = _WAITING
                 while transport is not None:
                     self._follow(transport)
                     transport = self._next()
@@ -67,6 +74,17 @@ class Loop:
         finally:
             self._refuse("it is not running")
             self.commands.end()
+
+    def _warm_up(self) -> None:
+        """Do what would hold up the first frames, unless it is to stop."""
+
+        def watch(_stage: str) -> None:
+            if self._stopping:
+                raise _StoppedError
+
+        self.trouble = _WARMING
+        with suppress(_StoppedError), watch_stages(watch):
+            self.flow.prepared.warm_up()
 
     def _follow(self, transport: Transport) -> None:
         """Take frames until the source is lost or to be left."""

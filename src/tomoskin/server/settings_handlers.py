@@ -20,7 +20,7 @@ from tomoskin.core import (
     write_text,
 )
 from tomoskin.inverse import LightTouch, LinearProblem, Spectrum
-from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned
+from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned_image
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
@@ -260,9 +260,10 @@ class SettingsHandlers:
         """
         start, runner, opener = time.monotonic(), self._hub.runner, self._hub.opener
         prepared = prepare(skin, runner.prepared)
+        prepared.warm_up()
         if skin.body == runner.prepared.skin.body:
             if runner.reference is not None:
-                prepared = tuned(prepared, runner.reference)
+                prepared = tuned_image(prepared, runner.reference)
             scaled = prepared, colour_limit(prepared)
             self._took = time.monotonic() - start
             runner.ask(commands.Adopt(prepared))

@@ -87,11 +87,10 @@ class TouchSettings(Section, section="touch"):
     """How data become touches."""
 
     method: str = key(
-        Choice(("image", "fit")),
-        "image: regions of the image, by gamma1 to position. fit: position, size and "
-        "strength of up to five touches, fitted to the voltages; truer, with honest "
-        "deviations.",
-        default="image",
+        Choice(("fit", "image")),
+        "fit: position, size and strength of up to five touches, fitted to the voltages, with "
+        "honest deviations. image: the thesis's regions of the image, by gamma1 to position.",
+        default="fit",
     )
     gamma1: float = key(
         Number(0.1, 0.99),

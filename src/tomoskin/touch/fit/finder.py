@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
 import numpy as np
 
-from tomoskin.core import Detection, FloatArray, SkinError
-from tomoskin.forward import ForwardModel, State
+from tomoskin.core import Detection, FloatArray, SkinError, finished
+from tomoskin.forward import ForwardModel
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
 from tomoskin.touch.fit.candidates import Candidates, Matched
@@ -22,10 +23,11 @@ from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
 from tomoskin.touch.fit.search import Search, SpotDetections, joined
-from tomoskin.touch.fit.sheet import fitted_sheet
+from tomoskin.touch.fit.sheet import fitting_sheet
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
 from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
 from tomoskin.touch.fit.table import ResponseTable
+from tomoskin.touch.fit.tabulate import Tabulation, kept_tabulation
 from tomoskin.touch.fit.watch import FrameWatch
 
 _CELLS = 1500
@@ -59,12 +61,18 @@ class SpotModel:
     scale
         (n_meas,) 1/V by which the model's changes become difference data; ones where these are
         in volts.
+    table
+        Of an uneven sheet; None: that of :attr:`tabulation`.
+    even
+        The model that an uneven sheet's began from; None where this is it.
     """
 
     response: Response
     prior: SpotPrior
     sign: str
     scale: FloatArray
+    table: ResponseTable | None = None
+    even: SpotModel | None = None
 
     @classmethod
     def of(cls, skin: Skin, model: ForwardModel) -> Self:
@@ -77,14 +85,14 @@ class SpotModel:
         """
         own = ForwardModel(_mesh(skin), model.pattern, model.contact_impedance, model.current)
         normalised = skin.inverse.difference == "normalised"
-        return cls._of(own.at(skin.conductivity), skin.touch.sign, normalised)
-
-    @classmethod
-    def _of(cls, state: State, sign: str, normalised: bool) -> Self:
-        response, mesh = Response(state), state.model.mesh
-        prior, n_meas = SpotPrior.of(mesh), state.model.pattern.n_meas
+        response, n_meas = Response(own.at(skin.conductivity)), own.pattern.n_meas
         scale = 1 / np.abs(response.reference) if normalised else np.ones(n_meas)
-        return cls(response, prior, sign, scale)
+        return cls(response, SpotPrior.of(own.mesh), skin.touch.sign, scale)
+
+    @cached_property
+    def tabulation(self) -> Tabulation:
+        """What one spot does, tabulated: seconds of work, unless it is on disk."""
+        return kept_tabulation(self.response, self.prior, self.sign)
 
     @cached_property
     def candidates(self) -> Candidates:
@@ -94,18 +102,34 @@ class SpotModel:
     @cached_property
     def solver(self) -> Solver:
         """What fits spots by a table of what one does."""
-        return _solver(self.response, self.prior, self.sign)
+        table = self.tabulation.table if self.table is None else self.table
+        return _solver(self.response, table, self.prior)
+
+    def warm_up(self) -> None:
+        """Do what takes seconds the first time, and half a second later on, before frames come."""
+        _ = self.tabulation.lattices, self.candidates, self.solver
 
     def fitted_to(self, reference: FloatArray, deviation: FloatArray | float = 0.0) -> SpotModel:
-        """The model of the sheet that a ``reference`` (n_meas,) V tells of; itself where it tells
-        of an even one.
+        """As :meth:`fitting`, at once."""
+        return finished(self.fitting(reference, deviation))
 
-        ``deviation`` (n_meas,) V is the reference's own; see :mod:`tomoskin.touch.fit.sheet`.
+    def fitting(
+        self, reference: FloatArray, deviation: FloatArray | float = 0.0
+    ) -> Generator[None, None, SpotModel]:
+        """The model of the sheet that a ``reference`` (n_meas,) V shows, a piece between yields.
+
+        Itself where that sheet is even. ``deviation`` (n_meas,) V is the reference's own; see
+        :mod:`tomoskin.touch.fit.sheet`.
         """
-        state = fitted_sheet(self.response.state, reference, deviation)
+        state = yield from fitting_sheet(self.response.state, reference, deviation)
         if state is self.response.state:
             return self
-        return self._of(state, self.sign, bool((self.scale != 1.0).any()))
+        response = Response(state)
+        table = yield from self.tabulation.adapted(response)
+        scale = self.scale
+        if (scale != 1.0).any():
+            scale = 1 / np.abs(response.reference)
+        return replace(self, response=response, scale=scale, table=table, even=self)
 
 
 class SpotFinder:
@@ -255,9 +279,9 @@ class SpotFinder:
         )
 
 
-def _solver(response: Response, prior: SpotPrior, sign: str) -> Solver:
+def _solver(response: Response, table: ResponseTable, prior: SpotPrior) -> Solver:
     """Of the native engine where that runs."""
-    table, sheet = ResponseTable.of(response, prior, sign), SheetDomain(response.spots.mesh)
+    sheet = SheetDomain(response.spots.mesh)
     core = response.state.model.engine.core
     if core is None:
         return NumpySolver(table, sheet, prior)

@@ -9,7 +9,7 @@ chapter 28); the field itself is the most likely one then. Both are found anew a
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Self
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from tomoskin.core import FloatArray, reach
+from tomoskin.core import FloatArray, finished, reach
 from tomoskin.forward import ForwardModel, State
 from tomoskin.touch.fit.anisotropy import anisotropy_slopes, directed
 from tomoskin.touch.fit.channels import channel_errors
@@ -109,7 +109,15 @@ class _Linear:
 
 
 def fitted_sheet(state: State, reference: FloatArray, deviation: FloatArray | float) -> State:
-    """The sheet that explains a ``reference`` (n_meas,) V of this standard deviation, V, best.
+    """As :func:`fitting_sheet`, at once."""
+    return finished(fitting_sheet(state, reference, deviation))
+
+
+def fitting_sheet(
+    state: State, reference: FloatArray, deviation: FloatArray | float
+) -> Generator[None, None, State]:
+    """The sheet that explains a ``reference`` (n_meas,) V of this standard deviation, V, best; a
+    piece between each two yields.
 
     ``state`` itself where nothing speaks against it. Rows that are not finite do not count,
     and a factor that all voltages have in common means nothing.
@@ -124,8 +132,11 @@ def fitted_sheet(state: State, reference: FloatArray, deviation: FloatArray | fl
     uneven, anisotropy, now = np.zeros(len(mesh.cells)), np.zeros(2), state
     for _ in range(_STEPS):
         linear = _Linear.of(now, measured)
+        yield
         data = linear.residual + linear.by_cell @ uneven + linear.along @ anisotropy
-        uneven, anisotropy = linear.explained(data, *_likeliest(fields, linear, data))
+        likeliest = yield from _likeliest(fields, linear, data)
+        uneven, anisotropy = linear.explained(data, *likeliest)
+        yield
         now = _sheet(state, uneven, _DIRECTED * anisotropy)
     even = not uneven.any() and _DIRECTED * math.hypot(*anisotropy) < _LEAST
     return state if even else now
@@ -133,7 +144,7 @@ def fitted_sheet(state: State, reference: FloatArray, deviation: FloatArray | fl
 
 def _likeliest(
     fields: Sequence[FloatArray], linear: _Linear, data: FloatArray
-) -> tuple[FloatArray, float]:
+) -> Generator[None, None, tuple[FloatArray, float]]:
     """(n_cells, k) modes of the random field that makes ``data`` (n,) V likeliest, none of an even
     sheet; and how far rows are off."""
     none = fields[0][:, :0]
@@ -143,6 +154,7 @@ def _likeliest(
         reach()
         seen = size * (linear.by_cell @ modes)
         for error in _ERRORS:
+            yield
             log_evidence = linear.log_evidence(data, seen, error)
             if log_evidence > best[0]:
                 best = log_evidence, size * modes, error

@@ -11,44 +11,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Self
 
 import numpy as np
-from scipy.ndimage import spline_filter1d
-from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 
-from tomoskin.core import FloatArray, IntArray, reach
-from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.spot import (
-    FILLING,
-    LOG_RADIUS,
-    N_PARAMETERS,
-    Footprints,
-    Response,
-    X,
-    Y,
-    depth_of,
-)
-
-STEP = 0.5
-"""Between grid points, in radii of the spot."""
-
-LOG_STEP = 0.35
-"""Between radii, in their logarithm."""
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.touch.fit.spot import FILLING, LOG_RADIUS, N_PARAMETERS, X, Y, depth_of
 
 PADDING = 2
 """Grid points beyond the sheet on each side: splines need one, the filter another."""
-
-FAINT = -0.3
-"""Near this depth it is taken what a shape does; that is in proportion to the depth."""
-
-BENT = 0.5
-"""Part of the way from a tail to a bell at which what a shape does is taken."""
-
-NEGLIGIBLE, SAMPLED = 1e-6, 3000
-"""Part of the largest change below which a direction of the data counts as none, by so many."""
 
 NEAR = 4
 """Radii that a spot is between."""
@@ -140,21 +111,6 @@ class ResponseTable:
     values: FloatArray
     basis: FloatArray
 
-    @classmethod
-    def of(cls, response: Response, prior: SpotPrior, sign: str) -> Self:
-        """For spots as the ``prior`` and the ``sign`` allow them."""
-        low, high = prior.log_radii
-        log_radii = np.linspace(low, high, 1 + math.ceil((high - low) / LOG_STEP))
-        nodes = _nodes(*prior.depths(sign))
-        grids, parts = [], []
-        for log_radius in log_radii:
-            grid = PositionGrid.over(response.spots.mesh.points, STEP * math.exp(log_radius))
-            grids.append(grid)
-            parts.append(_sampled(response, grid, math.exp(log_radius), nodes))
-        basis = _basis(parts)
-        filtered = [_filtered(p @ basis.T, g.shape) for p, g in zip(parts, grids, strict=True)]
-        return cls(log_radii, tuple(grids), sign, nodes, np.concatenate(filtered), basis)
-
     def expanded(self, spots: FloatArray) -> FloatArray:
         """(k, 1 + N_PARAMETERS + N_DIRECTIONS, rank) V of spots (k, 4), each alone.
 
@@ -205,66 +161,3 @@ class ResponseTable:
     @cached_property
     def _starts(self) -> IntArray:
         return np.cumsum([0, *(nx * ny for nx, ny in (grid.shape for grid in self.grids))])
-
-
-def _nodes(low: float, high: float) -> FloatArray:
-    """Chebyshev nodes of s between two depths: three on one side of none, five on both."""
-    ends, count = np.expm1(np.array([low, high]) / 4), 5 if low < 0 < high else 3
-    turn = np.cos((2 * np.arange(count) + 1) / (2 * count) * np.pi)
-    return np.asarray(ends.mean() + (ends[1] - ends[0]) / 2 * turn)
-
-
-def _sampled(
-    response: Response, grid: PositionGrid, radius: float, nodes: FloatArray
-) -> FloatArray:
-    """(n_points, n_nodes + N_DIRECTIONS, n_meas) V of spots on a grid.
-
-    Points far off the sheet have what their nearest neighbour has: splines are smooth then.
-    """
-    reach()
-    points = grid.points
-    apart, _ = cKDTree(response.spots.mesh.centroids).query(points)
-    needed = np.flatnonzero(apart < PADDING * math.sqrt(2) * grid.step)
-    feet = response.spots.footprints(points[needed], radius)
-    out = np.zeros((len(needed), len(nodes) + N_DIRECTIONS, len(response.reference)))
-    depths = 4 * np.log1p(nodes)
-    for number, (node, depth) in enumerate(zip(nodes, depths, strict=True)):
-        out[:, number] = _changes(response, feet, depth * feet.height) / node
-    out[:, -2] = _directed(response, feet)
-    faint = int(np.abs(depths - FAINT).argmin())
-    bent = feet.height + BENT * feet.reshaped
-    towards = _changes(response, feet, depths[faint] * bent) - nodes[faint] * out[:, faint]
-    out[:, -1] = towards / (BENT * depths[faint])
-    _, nearest = cKDTree(points[needed]).query(points)
-    return np.asarray(out[nearest])
-
-
-def _changes(response: Response, feet: Footprints, change: FloatArray) -> FloatArray:
-    """(n, n_meas) V of each footprint alone; ``change`` (c,) of log σ."""
-    sigma = response.state.conductivity[feet.cells] * np.exp(change)
-    ends = [slice(*pair) for pair in pairwise(feet.starts)]
-    return response.voltages([(feet.cells[e], sigma[e]) for e in ends]) - response.reference
-
-
-def _directed(response: Response, feet: Footprints) -> FloatArray:
-    """(n_points, n_meas) V: derivative by each spot's direction, the fields as without it."""
-    along, across = response.by_direction
-    shape = len(feet.starts) - 1, along.shape[1]
-    xx, xy = (csr_array((part, feet.cells, feet.starts), shape) for part in feet.directed)
-    return np.asarray(xx @ along.T + xy @ across.T)
-
-
-def _basis(parts: list[FloatArray]) -> FloatArray:
-    """(rank, n_meas) what all changes are made of, but for a part of ``NEGLIGIBLE``."""
-    rows = np.concatenate([part[:, :-N_DIRECTIONS].reshape(-1, part.shape[2]) for part in parts])
-    rows = rows[:: max(1, len(rows) // SAMPLED)]
-    square, basis = np.linalg.eigh(rows.T @ rows)
-    return np.asarray(basis.T[square > NEGLIGIBLE**2 * square[-1]])
-
-
-def _filtered(samples: FloatArray, shape: tuple[int, int]) -> FloatArray:
-    """Spline coefficients of samples (n_points, ...) on a grid of that shape."""
-    grid = samples.reshape(*shape, -1)
-    for axis in (0, 1):
-        grid = spline_filter1d(grid, 3, axis=axis, mode="mirror")
-    return np.asarray(grid.reshape(samples.shape))

@@ -1,0 +1,94 @@
+"""Arrays kept on disk: made once, and made again wherever the disk fails."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tomoskin.core import Arrays, cache, kept
+
+
+class Counted:
+    """Makes an array, and counts how often."""
+
+    def __init__(self) -> None:
+        self.times = 0
+
+    def __call__(self) -> Arrays:
+        self.times += 1
+        return {"values": np.arange(3.0)}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv(cache.VARIABLE, str(tmp_path / "new"))
+    return tmp_path / "new"
+
+
+def test_it_is_made_once(folder: Path) -> None:
+    make = Counted()
+    first, second = kept("a", make), kept("a", make)
+    assert make.times == 1
+    np.testing.assert_array_equal(first["values"], second["values"])
+    assert [path.name for path in folder.iterdir()] == ["a.npz"]
+
+
+@pytest.mark.usefixtures("folder")
+def test_another_name_is_another_result() -> None:
+    make = Counted()
+    kept("a", make)
+    kept("b", make)
+    assert make.times == 2
+
+
+def test_a_torn_file_is_replaced(folder: Path) -> None:
+    make = Counted()
+    kept("a", make)
+    whole = (folder / "a.npz").read_bytes()
+    (folder / "a.npz").write_bytes(whole[:-20])
+    np.testing.assert_array_equal(kept("a", make)["values"], np.arange(3.0))
+    assert make.times == 2
+    assert (folder / "a.npz").read_bytes() == whole
+
+
+def test_a_folder_that_cannot_be_costs_time_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setenv(cache.VARIABLE, str(tmp_path / "file"))
+    make = Counted()
+    for _ in range(2):
+        np.testing.assert_array_equal(kept("a", make)["values"], np.arange(3.0))
+    assert make.times == 2
+
+
+def test_off_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(cache.VARIABLE, "off")
+    assert cache.cache_folder() is None
+    make = Counted()
+    kept("a", make)
+    kept("a", make)
+    assert make.times == 2
+
+
+def test_what_was_not_used_for_longest_goes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    make = Counted()
+    kept("old", make)
+    size = (folder / "old.npz").stat().st_size
+    monkeypatch.setattr(cache, "MOST_BYTES", 2 * size)
+    kept("used", make)
+    os.utime(folder / "old.npz", (1, 1))
+    os.utime(folder / "used.npz", (2, 2))
+    kept("new", make)
+    assert sorted(path.name for path in folder.iterdir()) == ["new.npz", "used.npz"]
+
+
+def test_the_users_own_folder_is_the_systems(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(cache.VARIABLE)
+    monkeypatch.setenv("XDG_CACHE_HOME", "/elsewhere")
+    folder = cache.cache_folder()
+    assert folder is not None
+    assert folder.name == "tomoskin"
