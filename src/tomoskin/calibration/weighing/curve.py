@@ -22,7 +22,7 @@ from tomoskin.core import FloatArray
 _HALF = np.geomspace(0.03, 300.0, 17)
 """F₀ over the median force of the labels."""
 
-_NOISE = np.geomspace(0.02, 0.6, 8)
+_NOISE = np.geomspace(0.01, 0.6, 9)
 """Deviations of log u about the curve."""
 
 _LEVEL, _SLOPE, _RADIUS = 3.0, 0.3, 0.7
@@ -76,13 +76,11 @@ class ForceCurve:
     @classmethod
     def of(cls, terms: FloatArray, depth: FloatArray, force: FloatArray) -> ForceCurve:
         """Learn from ``terms`` (n, 5), ``depth`` u (n,) and ``force`` (n,) N, all above 0."""
-        usual = float(np.median(force))
-        members = [
-            _member(terms, np.log(depth) - np.log(force / (force + half)), noise)
-            for half in _HALF * usual
-            for noise in _NOISE
-        ]
-        evidence = np.array([member[2] for member in members])
+        half = _HALF * float(np.median(force))
+        level = np.log(depth)[:, None] - np.log(force[:, None] / (force[:, None] + half))
+        members = [_members(terms, level, noise) for noise in _NOISE]
+        mean = np.concatenate([member[0] for member in members])
+        evidence = np.concatenate([member[2] for member in members])
         weight = np.exp(evidence - evidence.max())
         total = float(evidence.max() + np.log(weight.mean()))
         weight /= weight.sum()
@@ -90,11 +88,11 @@ class ForceCurve:
         logs = np.log(force)
         width = max(_WIDER * float(logs.std()), _LEAST_WIDTH)
         return cls(
-            half=np.repeat(_HALF * usual, len(_NOISE))[counts],
-            noise=np.tile(_NOISE, len(_HALF))[counts],
+            half=np.tile(half, len(_NOISE))[counts],
+            noise=np.repeat(_NOISE, len(half))[counts],
             weight=weight[counts] / weight[counts].sum(),
-            mean=np.array([member[0] for member in members])[counts],
-            covariance=np.array([member[1] for member in members])[counts],
+            mean=mean[counts],
+            covariance=np.repeat([member[1] for member in members], len(half), axis=0)[counts],
             evidence=total,
             log_force=(float(logs.mean()), width),
         )
@@ -139,16 +137,15 @@ class ForceCurve:
         return middle, low, high
 
 
-def _member(
+def _members(
     terms: FloatArray, level: FloatArray, noise: float
-) -> tuple[FloatArray, FloatArray, float]:
-    """Mean and covariance of β where ``level`` (n,) = ``terms`` β + noise, and the evidence."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Means (h, 5) and one covariance (5, 5) of β where each column of ``level`` (n, h) is
+    ``terms`` β + noise; evidence (h,)."""
     n = len(level)
-    kernel = (terms * _PRIOR) @ terms.T + noise**2 * np.eye(n)
-    factor = cho_factor(kernel, lower=True)
-    solved = cho_solve(factor, level)
-    mean = _PRIOR * (terms.T @ solved)
     carried = terms * _PRIOR
+    factor = cho_factor(carried @ terms.T + noise**2 * np.eye(n), lower=True)
+    solved = cho_solve(factor, level)
     covariance = np.diag(_PRIOR) - carried.T @ cho_solve(factor, carried)
     size = 2 * float(np.log(np.diag(factor[0])).sum())
-    return mean, covariance, -0.5 * (float(level @ solved) + size)
+    return solved.T @ carried, covariance, -0.5 * ((level * solved).sum(axis=0) + size)

@@ -10,7 +10,7 @@ import numpy as np
 
 from tomoskin.calibration.weighing.curve import ForceCurve, basis
 from tomoskin.calibration.weighing.presses import WeighedPresses, check_rising
-from tomoskin.core import DataError, Detection, FloatArray, Force
+from tomoskin.core import DataError, Detection, FloatArray, Force, IntArray
 from tomoskin.skin import MaterialMemory, MemoryState, Skin, advanced, load_of
 from tomoskin.touch import Region
 
@@ -218,17 +218,18 @@ def depth_of(peak: FloatArray, area: FloatArray, conductivity: float, radius: fl
 
 
 def without_memory(
-    memory: MaterialMemory, depth: FloatArray, press: FloatArray, time: FloatArray
+    memory: MaterialMemory, depth: FloatArray, press: IntArray, time: FloatArray
 ) -> FloatArray:
-    """(n,) depths that the touches would have had without their past, press by press."""
+    """(n, k) depths that touches of ``depth`` (n, k) would have had without their past, press by
+    press; each column by itself."""
     free = np.array(depth)
     for number in np.unique(press):
         rows = np.flatnonzero(press == number)
-        state = MemoryState.fresh(memory)
+        state = MemoryState.fresh(memory, depth.shape[1])
         before = time[rows[0]]
         for row in rows.tolist():
-            load, state = load_of(state, memory, depth[row : row + 1], time[row] - before)
-            free[row], before = load[0], time[row]
+            free[row], state = load_of(state, memory, depth[row], time[row] - before)
+            before = time[row]
     return free
 
 
@@ -244,8 +245,8 @@ def _likeliest(
     ]
     best = (-np.inf, tried[0], depth)
     for memory in tried:
-        free = np.maximum(without_memory(memory, depth, press, time), _SHALLOW * usual)
-        more = without_memory(memory, depth * (1 + _STEP), press, time)
+        both = without_memory(memory, depth[:, None] * (1, 1 + _STEP), press, time)
+        free, more = np.maximum(both, _SHALLOW * usual).T
         slope = np.maximum(more - free, 1e-6 * free) / (_STEP * free)
         curve = ForceCurve.of(terms[rows], free[rows], presses.force[rows])
         value = curve.evidence + float(np.log(slope[rows]).sum())
