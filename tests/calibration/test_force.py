@@ -118,7 +118,7 @@ def test_a_file_gives_the_same_forces(tmp_path):
     assert again.model.read((), [one], 0.0)[0] == model.read((), [one], 0.0)[0]
 
 
-def test_the_calibration_of_another_skin_is_refused(tmp_path):
+def test_the_calibration_of_another_skin_is_refused():
     skin = Skin.load("textile-disc-8")
     model = ForceModel.fit(WeighedPresses.of(*presses(2, count=6)), skin)
     calibration = FORCE.of(model, skin.pattern(), skin)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tomoskin.calibration import Calibration, ForceModel, WeighedPresses
-    from tomoskin.core import Detection, Touch
+    from tomoskin.core import Detection
     from tomoskin.pipeline import Reconstruction
 
 
@@ -129,18 +129,20 @@ def _ranges(given: Sequence[str], n: int) -> FloatArray:
 def _weighed(
     path: Path, result: Reconstruction, newtons: FloatArray, time: FloatArray
 ) -> WeighedPresses:
-    """Touches of frames with one touch; each identity is a press."""
+    """Touches of frames with one touch; a press is what one identity does until it is lifted."""
     from tomoskin.calibration import WeighedPresses
 
     rows: list[tuple[Detection, float, int, float]] = []
-    without, several = 0, 0
+    without, several, number, before = 0, 0, 0, None
     for frame, touches in zip(result.frames.tolist(), result.touches, strict=True):
         known = bool(np.isfinite(newtons[frame]))
         without += known and not touches
         several += known and len(touches) > 1
-        if len(touches) == 1:
-            (touch,) = touches
-            rows.append(_row(touch, float(newtons[frame]), float(time[frame])))
+        alone = touches[0] if len(touches) == 1 else None
+        if alone is not None:
+            number += before != alone.id
+            rows.append((alone.detection, float(newtons[frame]), number, float(time[frame])))
+        before = alone and alone.id
     if without or several:
         remark(
             f"{path}: of the frames with a force, {without} show no touch and {several} show "
@@ -148,10 +150,6 @@ def _weighed(
         )
     detections, *labels = zip(*rows, strict=True) if rows else ((), (), (), ())
     return WeighedPresses.of(detections, *(np.array(column) for column in labels))
-
-
-def _row(touch: Touch, newtons: float, time: float) -> tuple[Detection, float, int, float]:
-    return touch.detection, newtons, touch.id, time
 
 
 def _findings(calibration: Calibration[ForceModel]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -208,7 +208,9 @@ def broken_down(state: MemoryState, memory: MaterialMemory) -> FloatArray:
 def response(state: MemoryState, memory: MaterialMemory) -> FloatArray:
     """(n,) response of a material whose loads are one number each, in the unit of the load."""
     following = followed(state, memory)[0]
-    return following + broken_down(state, memory)[0] if memory.breakdown else following
+    if memory.breakdown:
+        following = following + broken_down(state, memory)[0]
+    return np.asarray(following)
 
 
 def load_of(
@@ -238,8 +240,7 @@ def load_of(
     lagging = state.lagging[:, 0]
     bends = np.sort(np.concatenate([state.load, lagging - width, lagging + width]), axis=0)
     ends = np.concatenate([bends[:1] - 1.0, bends, bends[-1:] + 1.0])
-    flat = [response(advanced(state, memory, row[None], dt), memory) for row in ends]
-    values = np.stack(flat)
+    values = np.stack([response(advanced(state, memory, row[None], dt), memory) for row in ends])
     piece = np.clip((values[1:-1] <= answer).sum(axis=0), 0, len(bends))
     column = np.arange(n)
     low, high = values[piece, column], values[piece + 1, column]
@@ -280,11 +281,6 @@ def responses(
         out[k] = response(state, memory)[0]
         state = advanced(state, memory, np.array([[load[k]]]), step)
     return gauge * out
-
-
-def scaled(memory: MaterialMemory, factor: float) -> MaterialMemory:
-    """The same memory for loads in another unit: ``factor`` of the new one to one of the old."""
-    return replace(memory, play_widths=tuple(factor * width for width in memory.play_widths))
 
 
 def _mixed(load: FloatArray, parts: FloatArray, weights: tuple[float, ...]) -> FloatArray:

@@ -6,8 +6,8 @@ usual radius. The soft layer under the sheet is squeezed solid in the end, so th
     log u = φ(position, radius)·β + log F/(F + F₀) + noise.
 
 What position and radius do is linear in β with a normal prior; F₀ and the noise are averaged,
-each by its evidence (MacKay 2003, chapter 28). The force is then read from the curve with a prior on
-log F: where the curve is flat a touch says little of its force, and the interval says so.
+each by its evidence (MacKay 2003, chapter 28). The force is then read from the curve with a prior
+on log F: where the curve is flat a touch says little of its force, and the interval says so.
 """
 
 from __future__ import annotations

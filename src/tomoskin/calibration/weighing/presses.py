@@ -140,8 +140,8 @@ def check_rising(depth: FloatArray, force: FloatArray) -> None:
     """Raise DataError where larger forces do not go with larger changes ``depth`` (n,)."""
     if np.ptp(np.log(force)) < _ALIKE or len(force) < _FEW_RANKS:
         return
-    ranks = [np.argsort(np.argsort(values)) for values in (depth, force)]
-    together = float(np.corrcoef(*ranks)[0, 1])
+    deeper, heavier = (np.argsort(np.argsort(values)).astype(float) for values in (depth, force))
+    together = float(np.corrcoef(deeper, heavier)[0, 1])
     if together < _RISES:
         raise DataError(
             "the weights contradict: touches under larger forces do not change the sheet more "
