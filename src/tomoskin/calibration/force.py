@@ -23,7 +23,7 @@ from tomoskin.calibration.kind import (
 )
 from tomoskin.calibration.weighing.model import ForceModel, PressedSpot
 from tomoskin.calibration.weighing.presses import WeighedPresses
-from tomoskin.core import Arrays, DataError, Detection, IntArray, real_numbers
+from tomoskin.core import Arrays, DataError, Detection, FloatArray, IntArray, real_numbers
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
 
@@ -67,14 +67,9 @@ def _unpack(arrays: Arrays, _pattern: Pattern, where: str, _progress: Progress) 
     if conductivity.shape or unit.shape or not (conductivity > 0 and unit > 0):
         raise DataError("expected a conductivity and a unit above 0", where=where)
     area, peak, snr, force, press, time = columns
-    nothing = np.empty(0, dtype=np.int64)
-    detections = [
-        Detection(*place, np.nan, np.nan, *rest, nothing, snr=ratio)
-        for place, rest, ratio in zip(
-            xy.tolist(), np.column_stack([area, peak]).tolist(), snr.tolist(), strict=True
-        )
-    ]
     with located(where):
+        _check_touches(xy, area, peak)
+        detections = [_detection(*row) for row in np.column_stack([xy, area, peak, snr]).tolist()]
         presses = WeighedPresses.of(detections, force, press, time)
         return ForceModel.learn(
             presses,
@@ -83,6 +78,16 @@ def _unpack(arrays: Arrays, _pattern: Pattern, where: str, _progress: Progress) 
             str(arrays.get("skin", "")),
             str(arrays.get("method", "fit")),
         )
+
+
+def _check_touches(*columns: FloatArray) -> None:
+    if not all(np.isfinite(column).all() for column in columns):
+        raise DataError("expected finite xy_m, area_m2 and peak_s of every touch")
+
+
+def _detection(x: float, y: float, area: float, peak: float, snr: float) -> Detection:
+    nothing = np.empty(0, dtype=np.int64)
+    return Detection(x, y, np.nan, np.nan, area, peak, nothing, snr=snr)
 
 
 def _check(calibration: Calibration[ForceModel], skin: Skin) -> None:

@@ -197,7 +197,8 @@ class ForceModel:
     def held(self) -> float:
         """Part of the labels within their own intervals, each press left out."""
         force = self.presses.force[self.presses.labelled]
-        _, low, high = _widened(*self.left_out.T, self.scale)
+        middle, least, most = self.left_out.T
+        _, low, high = _widened(middle, least, most, self.scale)
         return float(((low <= force) & (force <= high)).mean())
 
     def _beyond(self, snr: FloatArray) -> FloatArray:
@@ -208,7 +209,10 @@ class ForceModel:
 
     def _forces(self, terms: FloatArray, depth: FloatArray, sd: FloatArray) -> list[Force]:
         middle, low, high = _widened(*self.curve.force(terms, depth, sd), self.scale)
-        return [Force(*map(float, numbers)) for numbers in zip(middle, low, high, strict=True)]
+        return [
+            Force(float(newtons), float(least), float(most))
+            for newtons, least, most in zip(middle, low, high, strict=True)
+        ]
 
 
 def depth_of(peak: FloatArray, area: FloatArray, conductivity: float, radius: float) -> FloatArray:
