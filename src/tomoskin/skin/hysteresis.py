@@ -240,13 +240,22 @@ def load_of(
     lagging = state.lagging[:, 0]
     bends = np.sort(np.concatenate([state.load, lagging - width, lagging + width]), axis=0)
     ends = np.concatenate([bends[:1] - 1.0, bends, bends[-1:] + 1.0])
-    values = np.stack([response(advanced(state, memory, row[None], dt), memory) for row in ends])
+    tried = advanced(_repeated(state, len(ends)), memory, ends.reshape(1, -1), dt)
+    values = response(tried, memory).reshape(ends.shape)
     piece = np.clip((values[1:-1] <= answer).sum(axis=0), 0, len(bends))
     column = np.arange(n)
     low, high = values[piece, column], values[piece + 1, column]
     part = (answer - low) / np.where(high > low, high - low, 1.0)
     load = ends[piece, column] + part * (ends[piece + 1, column] - ends[piece, column])
     return load, advanced(state, memory, load[None], dt)
+
+
+def _repeated(state: MemoryState, times: int) -> MemoryState:
+    """The same pieces so many times, one after the other."""
+    return MemoryState(*(
+        np.tile(part, times)
+        for part in (state.load, state.lagging, state.prompt, state.late, state.broken)
+    ))  # fmt: skip
 
 
 def _promptness(memory: MaterialMemory, dt: float) -> float:

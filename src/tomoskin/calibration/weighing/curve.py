@@ -13,6 +13,7 @@ on log F: where the curve is flat a touch says little of its force, and the inte
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -32,7 +33,8 @@ _WIDER = 1.25
 """The prior of log F is so many times as wide as the labels are."""
 
 _LEAST_WIDTH = 0.5
-_FORCES = 241
+_COUNTS = 3e-3
+_FORCES = 161
 _BEYOND = 4.0
 _NINE_IN_TEN = (0.05, 0.95)
 
@@ -84,7 +86,7 @@ class ForceCurve:
         weight = np.exp(evidence - evidence.max())
         total = float(evidence.max() + np.log(weight.mean()))
         weight /= weight.sum()
-        counts = weight > 1e-3 * weight.max()
+        counts = weight > _COUNTS * weight.max()
         logs = np.log(force)
         width = max(_WIDER * float(logs.std()), _LEAST_WIDTH)
         return cls(
@@ -107,21 +109,25 @@ class ForceCurve:
         terms, depth, sd
             (n, 5); u (n,); its relative deviation (n,) beyond the labelled touches'.
         """
-        middle, width = self.log_force
-        grid = middle + width * np.linspace(-_BEYOND, _BEYOND, _FORCES)
-        force = np.exp(grid)
-        prior = -0.5 * ((grid - middle) / width) ** 2
-        total = np.zeros((len(depth), _FORCES))
-        logs = np.log(depth)[:, None]
-        for member in range(len(self.half)):
-            level = terms @ self.mean[member]
-            spread = np.einsum("ni,ij,nj->n", terms, self.covariance[member], terms)
-            variance = (spread + self.noise[member] ** 2 + sd**2)[:, None]
-            curve = np.log(force / (force + self.half[member]))
-            away = logs - level[:, None] - curve
-            total += self.weight[member] * np.exp(-0.5 * away**2 / variance) / np.sqrt(variance)
-        chance = np.maximum(total, 1e-300) * np.exp(prior)
+        grid, prior, curves = self._tabulated
+        level = terms @ self.mean.T
+        variance = np.einsum("ni,gij,nj->ng", terms, self.covariance, terms)
+        variance += self.noise**2 + sd[:, None] ** 2
+        away = (np.log(depth)[:, None] - level)[:, :, None] - curves
+        away *= away
+        away *= -0.5 / variance[:, :, None]
+        likely = np.einsum("ng,ngf->nf", self.weight / np.sqrt(variance), np.exp(away))
+        chance = np.maximum(likely, 1e-300) * prior
         return grid, chance / chance.sum(axis=1, keepdims=True)
+
+    @cached_property
+    def _tabulated(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Grid (f,) of log F, its prior (f,), and log F/(F + F₀) of each member (g, f)."""
+        middle, width = self.log_force
+        steps = np.linspace(-_BEYOND, _BEYOND, _FORCES)
+        force = np.exp(middle + width * steps)
+        curves = np.log(force / (force + self.half[:, None]))
+        return middle + width * steps, np.exp(-0.5 * steps**2), curves
 
     def force(
         self, terms: FloatArray, depth: FloatArray, sd: FloatArray

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -203,9 +204,13 @@ class ForceModel:
 
     def _beyond(self, snr: FloatArray) -> FloatArray:
         """Relative deviation of depths by noise, beyond that of the labelled touches."""
+        return np.sqrt(np.maximum(np.nan_to_num(1 / snr**2) - self._usual_noise, 0.0))
+
+    @cached_property
+    def _usual_noise(self) -> float:
+        """Relative variance of the labelled touches by noise; 0 where it is not known."""
         known = self.presses.snr[self.presses.labelled]
-        usual = float(np.nanmedian(1 / known**2)) if np.isfinite(known).any() else 0.0
-        return np.sqrt(np.maximum(np.nan_to_num(1 / snr**2) - usual, 0.0))
+        return float(np.nanmedian(1 / known**2)) if np.isfinite(known).any() else 0.0
 
     def _forces(self, terms: FloatArray, depth: FloatArray, sd: FloatArray) -> list[Force]:
         middle, low, high = _widened(*self.curve.force(terms, depth, sd), self.scale)
