@@ -65,6 +65,9 @@ CASES = {
     ("calibrate states", "out"): Case(
         "calibrate states {presses} --state a=0:8 --state b=8:16 --out {out}", ".npz"
     ),
+    ("calibrate force", "out"): Case(
+        "calibrate force {presses} --skin {skin} --out {out}", ".npz", ("--weight", "4=0:16")
+    ),
     ("calibrate bend", "out"): Case(
         "calibrate bend {bends} --skin {skin} --out {out}", ".npz", BENDS
     ),

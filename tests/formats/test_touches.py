@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tomoskin.core import Detection, Touch
+from tomoskin.core import Detection, Force, Touch
 from tomoskin.formats import write_touches
 from tomoskin.mesh import Cylinder, Plane
 from tomoskin.recording import SessionReader, SessionWriter, session_info
@@ -71,3 +71,22 @@ def test_on_a_surface_the_table_says_where_in_space(tmp_path: Path) -> None:
     assert np.hypot(place[:, 0], place[:, 2] + 35e-3) == pytest.approx(35e-3, rel=1e-4)
     write_touches(tmp_path / "flat.csv", [(0, 0.0, TOUCHES)], Plane())
     assert "space" not in (tmp_path / "flat.csv").read_text()
+
+
+def test_forces_stand_in_columns_of_their_own(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    weighed = replace(READING, force=Force(4.0, 3.5, 4.6))
+    guessed = replace(READING, force=Force(4.0, 1.0, 16.0, calibrated=False))
+    touches = tuple(Touch(k, "decrease", 0.5, d) for k, d in enumerate((weighed, guessed, READING)))
+    write_touches(path, [(3, 0.5, touches)], forces=True)
+    with path.open(newline="") as file:
+        rows = [
+            [row[key] for key in row if key.startswith("force")] for row in csv.DictReader(file)
+        ]
+    assert rows == [
+        ["4", "3.5", "4.6", "calibrated"],
+        ["4", "1", "16", "uncalibrated"],
+        ["", "", "", ""],
+    ]
+    write_touches(path, [(3, 0.5, touches)], overwrite=True)
+    assert "force" not in path.read_text()

@@ -115,7 +115,7 @@ def test_one_long_step_is_many_short_ones(lengths):
     pulled = loaded((0.02, 0.01, 0.003), 1e-3)
     many = after(TEXTILE, *[(pulled, dt) for dt in lengths])
     one = after(TEXTILE, (pulled, sum(lengths)))
-    assert many.late == pytest.approx(one.late, abs=1e-12)
+    assert many.memory.late == pytest.approx(one.memory.late, abs=1e-12)
     assert many.worn == pytest.approx(one.worn)
 
 

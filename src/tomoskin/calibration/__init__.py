@@ -1,4 +1,4 @@
-"""What is learnt from examples: touch positions, classes, bends, channel mapping."""
+"""What is learnt from examples: touch positions, forces, classes, bends, channel mapping."""
 
 from typing import Any
 
@@ -13,6 +13,7 @@ from tomoskin.calibration.channel_mapping.wiring import Wiring, ring_of
 from tomoskin.calibration.classes import CLASSES, ClassReading, FrameClassifier
 from tomoskin.calibration.classifier.classifier import Answers, Classifier
 from tomoskin.calibration.classifier.examples import Codes, Examples, against_rest
+from tomoskin.calibration.force import FORCE
 from tomoskin.calibration.kind import (
     Applied,
     Calibration,
@@ -27,13 +28,18 @@ from tomoskin.calibration.locator.presses import Presses
 from tomoskin.calibration.locator.watch import Watch
 from tomoskin.calibration.several import Several
 from tomoskin.calibration.touch import TOUCH
+from tomoskin.calibration.weighing.identify import MaterialFit, identify
+from tomoskin.calibration.weighing.measured import ForceProcess
+from tomoskin.calibration.weighing.model import ForceModel, LabelRemark, PressedSpot
+from tomoskin.calibration.weighing.presses import WeighedPresses
 
-KINDS: tuple[Kind[Any], ...] = (TOUCH, BENDS, CLASSES)
+KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, BENDS, CLASSES)
 """Every kind whose calibrations are applied to frames, in the order in which they are applied."""
 
 __all__ = [
     "BENDS",
     "CLASSES",
+    "FORCE",
     "KINDS",
     "TOUCH",
     "Answers",
@@ -49,18 +55,25 @@ __all__ = [
     "Conditions",
     "Differences",
     "Examples",
+    "ForceModel",
+    "ForceProcess",
     "FrameClassifier",
     "FrameView",
     "JointReference",
     "Kind",
+    "LabelRemark",
     "Locator",
+    "MaterialFit",
+    "PressedSpot",
     "Presses",
     "Several",
     "TouchFit",
     "Watch",
+    "WeighedPresses",
     "Wiring",
     "WiringAnswer",
     "against_rest",
+    "identify",
     "ring_of",
     "solve_wiring",
 ]

@@ -29,7 +29,7 @@ COMMANDS = {
     "live": "Show a skin live on a page; without options, the twin of a textile disc.",
     "record": "Record a session without a page: raw bytes, frames, touches and images.",
     "image": "Reconstruct a recording: images, and the touches in them.",
-    "calibrate": "Learn from labelled presses, states or bends.",
+    "calibrate": "Learn from labelled presses, weights, states or bends.",
     "locate": "Locate touches by a calibration: one a frame, or with --several up to two.",
     "states": "Tell the state of each frame by a calibration, or that it is none of those learnt.",
     "design": "Say what a skin can resolve before it is built.",

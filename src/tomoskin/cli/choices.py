@@ -134,6 +134,13 @@ def with_bends(prepared: Prepared, path: Path | None) -> Prepared:
     return prepared if path is None else prepared.calibrated(BENDS.read(path))
 
 
+def with_forces(prepared: Prepared, path: Path | None) -> Prepared:
+    """The skin with forces, where a calibration is named. Raises DataError for those of another."""
+    from tomoskin.calibration import FORCE
+
+    return prepared if path is None else prepared.calibrated(FORCE.read(path))
+
+
 def with_states(prepared: Prepared, path: Path | None, skin: Skin) -> Prepared:
     """The skin with its states, where a calibration is named.
 

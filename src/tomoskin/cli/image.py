@@ -16,6 +16,7 @@ from tomoskin.cli.choices import (
     skin_for_file,
     with_alpha,
     with_bends,
+    with_forces,
     with_states,
     with_time_constant,
 )
@@ -25,6 +26,7 @@ from tomoskin.cli.options import (
     BendOption,
     FramesOption,
     LimitOption,
+    NewtonsOption,
     PercentFlag,
     RecordingArgument,
     ReferenceOption,
@@ -41,6 +43,7 @@ from tomoskin.core import DataError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from tomoskin.core import Touch
     from tomoskin.formats import Display
     from tomoskin.pattern import Pattern
     from tomoskin.pipeline import Prepared, Reconstruction
@@ -66,6 +69,7 @@ def image(
     time_constant: TimeConstantOption = None,
     bend: BendOption = None,
     states: StatesOption = None,
+    newtons: NewtonsOption = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go."),
@@ -90,6 +94,7 @@ def image(
     data = read_recording(recording)  # what cannot be read is said before the work
     with Bar("preparing"):
         prepared = with_states(with_bends(prepare(chosen), bend), states, own)
+        prepared = with_forces(prepared, newtons)
     recorded = data.in_order_of(prepared.pattern)
     say_notes(recorded)
     idle = idle_frames(recorded, reference, prepared.pattern)
@@ -100,7 +105,8 @@ def image(
     times = recorded.time[result.frames].tolist()
     if touches is not None:
         rows = zip(result.frames.tolist(), times, result.touches, strict=True)
-        write_touches(touches, rows, prepared.skin.surface, overwrite=force)
+        surface, forces = prepared.skin.surface, newtons is not None
+        write_touches(touches, rows, surface, forces=forces, overwrite=force)
     if out is not None:
         WRITERS[out.suffix.lower()](out, prepared, result, display, overwrite=force)
     _warn(recording, result, prepared.pattern)
@@ -197,11 +203,17 @@ def _document(
                 "x_m": t.detection.x,
                 "y_m": t.detection.y,
                 "peak": t.detection.peak,
+                **_newtons(t),
             }
             for f, touches in zip(result.frames.tolist(), result.touches, strict=True)
             for t in touches
         ],
     }
+
+
+def _newtons(touch: Touch) -> dict[str, Any]:
+    """Its force, where a calibration tells it."""
+    return {} if touch.detection.force is None else {"force_n": asdict(touch.detection.force)}
 
 
 def _listed(frames: Sequence[object]) -> str:

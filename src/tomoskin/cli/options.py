@@ -63,6 +63,13 @@ StatesOption = Annotated[
     ),
     Reads(),
 ]
+NewtonsOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="C.npz", help="From tomoskin calibrate force: the force of each touch is told."
+    ),
+    Reads(),
+]
 
 # What of the skin is changed for this run.
 

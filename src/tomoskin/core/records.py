@@ -141,6 +141,25 @@ class Image:
         return pixels.spread(self.values)
 
 
+@dataclass(frozen=True, slots=True)
+class Force:
+    """Force of a touch across the sheet, N: its median, and an interval that nine in ten lie in.
+
+    ``calibrated`` is False where it rests on the skin file's material alone.
+    """
+
+    newtons: float
+    low: float
+    high: float
+    calibrated: bool = True
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        state = "" if self.calibrated else ", uncalibrated"
+        return f"{self.newtons:.2g} N ({self.low:.2g} to {self.high:.2g}{state})"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Detection:
     """One region of an image, before it is tracked.
@@ -169,6 +188,8 @@ class Detection:
     bias
         Standard deviation, along each axis, of what the position is off by without any noise, m;
         0 in a touch, whose ``sd_x`` and ``sd_y`` hold it.
+    force
+        N with its interval; None where no calibration tells it.
     """
 
     x: float
@@ -183,6 +204,7 @@ class Detection:
     close: bool = False
     weak: bool = False
     bias: float = 0.0
+    force: Force | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

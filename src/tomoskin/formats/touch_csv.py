@@ -15,6 +15,10 @@ HEADER = (
     *("area_m2", "peak", "kind"),
 )
 
+FORCE = ("force_n", "force_low_n", "force_high_n", "force_state")
+"""Further columns where a calibration tells forces: median, interval that nine in ten lie in, and
+"calibrated" or "uncalibrated"."""
+
 IN_SPACE = ("space_x_m", "space_y_m", "space_z_m")
 """Further columns where the sheet lies on a surface; x_m and y_m are the sheet's own (u, v)."""
 
@@ -24,12 +28,15 @@ def write_touches(
     frames: Iterable[tuple[int | None, float, tuple[Touch, ...]]],
     surface: Surface | None = None,
     *,
+    forces: bool = False,
     overwrite: bool = False,
 ) -> int:
     """Write touches of (frame, time, touches); return the number of rows.
 
     A frame is its index in the recording, from 0, and empty where that does not hold it; its time
     is the recording's own.
+
+    ``forces`` adds those of the touches, which are empty where a touch has none.
 
     A standard deviation that is not known is an empty field; the kind is :attr:`Touch.said`. On
     a ``surface`` that is not flat each row ends with the touch's place on it.
@@ -43,10 +50,11 @@ def write_touches(
         part.open("w", newline="", encoding="utf-8") as file,
     ):
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(HEADER + (IN_SPACE if on else ()))
+        table.writerow(HEADER + (FORCE if forces else ()) + (IN_SPACE if on else ()))
         for frame, time, touches in frames:
             for touch in touches:
-                table.writerow(_row(frame, time, touch) + _in_space(touch, on))
+                more = _force(touch) if forces else ()
+                table.writerow(_row(frame, time, touch) + more + _in_space(touch, on))
                 count += 1
     return count
 
@@ -56,6 +64,14 @@ def _row(frame: int | None, time: float, touch: Touch) -> tuple[object, ...]:
     place = (_number(r.x), _number(r.y), _number(r.sd_x), _number(r.sd_y))
     number = "" if frame is None else frame
     return (number, f"{time:.6f}", touch.id, *place, _number(r.area), _number(r.peak), touch.said)
+
+
+def _force(touch: Touch) -> tuple[str, ...]:
+    force = touch.detection.force
+    if force is None:
+        return ("",) * len(FORCE)
+    state = "calibrated" if force.calibrated else "uncalibrated"
+    return (*map(_number, (force.newtons, force.low, force.high)), state)
 
 
 def _in_space(touch: Touch, surface: Surface | None) -> tuple[str, ...]:

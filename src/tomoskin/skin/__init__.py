@@ -6,6 +6,18 @@ What reads it (:class:`Section`, :func:`key`, kinds of values) also reads other 
 from tomoskin.skin.body import ReadoutSettings
 from tomoskin.skin.build import SECTIONS
 from tomoskin.skin.find import read_text
+from tomoskin.skin.hysteresis import (
+    SCALAR,
+    MaterialMemory,
+    MemoryState,
+    Metric,
+    advanced,
+    broken_down,
+    followed,
+    load_of,
+    response,
+    responses,
+)
 from tomoskin.skin.kinds import (
     Choice,
     Number,
@@ -28,10 +40,14 @@ from tomoskin.skin.section import Key, Section, check_names, key, toml_tables
 from tomoskin.skin.skin import Skin
 
 __all__ = [
+    "SCALAR",
     "SECTIONS",
     "Choice",
     "InverseSettings",
     "Key",
+    "MaterialMemory",
+    "MemoryState",
+    "Metric",
     "Number",
     "NumberOrWord",
     "OneOrEach",
@@ -49,11 +65,17 @@ __all__ = [
     "ValueKind",
     "Whole",
     "Words",
+    "advanced",
+    "broken_down",
     "check_names",
+    "followed",
     "key",
     "lay",
     "literal",
+    "load_of",
     "read_text",
+    "response",
+    "responses",
     "show",
     "toml_tables",
 ]

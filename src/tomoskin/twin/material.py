@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tomoskin.core import FloatArray, ModelError
+from tomoskin.core import FloatArray
+from tomoskin.skin import (
+    MaterialMemory,
+    MemoryState,
+    Metric,
+    advanced,
+    broken_down,
+    followed,
+)
 from tomoskin.twin.dent import Load
 from tomoskin.twin.parameters import check_numbers, parameter
 
@@ -55,6 +63,13 @@ class MaterialSettings:
         0.0, "", "Relative loss of conductivity per strain, summed over all loading.", "assumed"
     )
 
+    breakdown: tuple[float, ...] = parameter(
+        (), "", "Responses to motion of the load, either way: contacts break.", "assumed"
+    )
+    breakdown_times: tuple[float, ...] = parameter(
+        (), "s", "Time constants with which they form again.", "assumed"
+    )
+
     def __post_init__(self) -> None:
         """Check the numbers."""
         check_numbers(
@@ -62,18 +77,19 @@ class MaterialSettings:
             above="thickness temperature_time spread_length",
             least="temperature_sd spread wear",
         )
-        for parts, sizes in (("creep", "creep_times"), ("play", "play_widths")):
-            self._check_series(parts, sizes)
+        _ = self.memory  # checks its own
 
-    def _check_series(self, parts: str, sizes: str) -> None:
-        weights, lengths = getattr(self, parts), getattr(self, sizes)
-        where = "MaterialSettings"
-        if len(weights) != len(lengths):
-            raise ModelError(f"expected as many {parts} as {sizes}", where=where)
-        if not all(0 < length < math.inf for length in lengths):
-            raise ModelError(f"expected {sizes} above 0, got {lengths}", where=where)
-        if not (all(w >= 0 for w in weights) and sum(weights) <= 1):
-            raise ModelError(f"expected {parts} from 0 to a sum of 1, got {weights}", where=where)
+    @property
+    def memory(self) -> MaterialMemory:
+        """What the sheet remembers, of strain and of compression alike."""
+        return MaterialMemory(
+            play=self.play,
+            play_widths=self.play_widths,
+            creep=self.creep,
+            creep_times=self.creep_times,
+            breakdown=self.breakdown,
+            breakdown_times=self.breakdown_times,
+        )
 
     @property
     def scalar(self) -> bool:
@@ -83,7 +99,15 @@ class MaterialSettings:
     @property
     def still(self) -> bool:
         """Whether time alone changes nothing."""
-        return not self.creep and self.temperature_sd == 0
+        return self.memory.still and self.temperature_sd == 0
+
+
+LOAD = Metric(((0.5, 0.5, 1.0), (1.0,)))
+"""Strain xx, yy, xy, whatever its direction, and compression: two loads, each with its own plays.
+
+A strain's size is √((xx² + yy²)/2 + xy²), the mean strain where both directions are strained
+alike.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,37 +116,22 @@ class MaterialState:
 
     Attributes
     ----------
-    felt
-        (4, n) strain xx, yy, xy and compression as the load was last.
-    lagging
-        (n_play, 4, n) where each play stands.
-    prompt
-        (4, n) the part of the load that is answered without delay: itself, with its plays.
-    late
-        (n_creep, 4, n) what each late part has reached.
+    memory
+        Of strain xx, yy, xy and compression, by :data:`LOAD`.
     worn
         (n,) mean strain, summed over all loading.
     warmer
         K above the temperature of the unloaded sheet's conductivity.
     """
 
-    felt: FloatArray
-    lagging: FloatArray
-    prompt: FloatArray
-    late: FloatArray
+    memory: MemoryState
     worn: FloatArray
     warmer: float = 0.0
 
     @classmethod
     def fresh(cls, settings: MaterialSettings, n: int) -> MaterialState:
         """A sheet of ``n`` cells that nothing has touched."""
-        return cls(
-            felt=np.zeros((4, n)),
-            lagging=np.zeros((len(settings.play), 4, n)),
-            prompt=np.zeros((4, n)),
-            late=np.zeros((len(settings.creep), 4, n)),
-            worn=np.zeros(n),
-        )
+        return cls(memory=MemoryState.fresh(settings.memory, n, LOAD), worn=np.zeros(n))
 
 
 def advance(
@@ -142,16 +151,9 @@ def advance(
     ModelError
         When dt is negative or not finite.
     """
-    if not 0 <= dt < math.inf:
-        raise ModelError(f"expected a time step of 0 s or more, got {dt}", where="twin")
     felt = np.concatenate([load.strain.T, load.depth[None] / settings.thickness])
-    lagging = _pulled(state.lagging, felt, settings)
-    prompt = _mixed(felt, lagging, settings.play)
     return MaterialState(
-        felt=felt,
-        lagging=lagging,
-        prompt=prompt,
-        late=_crept(state.late, prompt, settings, dt),
+        memory=advanced(state.memory, settings.memory, felt, dt, LOAD),
         worn=_worn(state, felt, settings),
         warmer=_warmed(state.warmer, settings, dt, chance),
     )
@@ -164,16 +166,19 @@ def conductivity(
 
     σ = σ₀ · (1 + c·compression) · exp(−wear) / (1 + α ΔT) · exp(−g·mean strain) ·
     exp(−g_across · deviator), the last a matrix exponential: positive at any strain, and the
-    gauge factors' straight line near none.
+    gauge factors' straight line near none. Breakdown adds to the mean strain: it has no direction.
 
     Parameters
     ----------
     unloaded
         (n_cells,) S.
     """
-    xx, yy, xy, squeezed = _mixed(state.prompt, state.late, settings.creep)
+    memory = settings.memory
+    xx, yy, xy, squeezed = followed(state.memory, memory)
     squeezed = np.clip(squeezed, -_MOST_COMPRESSION, _MOST_COMPRESSION)
     rise = xx + yy
+    if memory.breakdown:
+        rise += 2 * broken_down(state.memory, memory)[0]
     rise *= -settings.gauge / 2
     if settings.wear:
         rise -= settings.wear * state.worn
@@ -186,44 +191,10 @@ def conductivity(
     return _directed(level, rise, half, cross)
 
 
-def _mixed(sheet: FloatArray, parts: FloatArray, weights: tuple[float, ...]) -> FloatArray:
-    """(4, n): ``parts`` (n_parts, 4, n) by their weights, and of the whole what these leave."""
-    total = (1 - sum(weights)) * sheet
-    for weight, part in zip(weights, parts, strict=True):
-        total += weight * part
-    return np.asarray(total)
-
-
-def _pulled(lagging: FloatArray, felt: FloatArray, settings: MaterialSettings) -> FloatArray:
-    """Each play is pulled along at its ends (Krasnosel'skii & Pokrovskii 1989, chapter 1).
-
-    The strain as a whole, whatever its direction: its size is √((xx² + yy² + 2xy²)/2), the mean
-    strain where both directions are strained alike. Compression has a play of its own.
-    """
-    slack = lagging - felt
-    xx, yy, xy, squeezed = slack.swapaxes(0, 1)
-    width = np.array(settings.play_widths).reshape(-1, 1)
-    size = np.sqrt((xx * xx + yy * yy) / 2 + xy * xy)
-    slack[:, :3] *= (width / np.maximum(size, width))[:, None]
-    squeezed *= width / np.maximum(np.abs(squeezed), width)
-    slack += felt
-    return np.asarray(slack)
-
-
-def _crept(
-    late: FloatArray, target: FloatArray, settings: MaterialSettings, dt: float
-) -> FloatArray:
-    """q' = (s − q)/τ with s held: q → s + (q − s) exp(−dt/τ)."""
-    crept = late - target
-    crept *= np.exp(-dt / np.array(settings.creep_times)).reshape(-1, 1, 1)
-    crept += target
-    return np.asarray(crept)
-
-
 def _worn(state: MaterialState, felt: FloatArray, settings: MaterialSettings) -> FloatArray:
     if settings.wear == 0:
         return state.worn
-    before = state.felt
+    before = state.memory.load
     rise = (felt[0] + felt[1] - before[0] - before[1]) / 2
     return np.asarray(state.worn + np.maximum(rise, 0.0))
 

@@ -151,7 +151,22 @@ class Process:
 
     def __call__(self, squares: Distances) -> FloatArray:
         """(m, 2) answers for frames at squared distances (m, n) from the presses."""
-        return np.asarray(_kernel(self.terms, self.logs, squares) @ self.weights)
+        return np.asarray(self.covariance(squares) @ self.weights)
+
+    def covariance(self, squares: Distances) -> FloatArray:
+        """(m, n) prior covariance of inputs at squared distances (m, n), without noise."""
+        return _kernel(self.terms, self.logs, squares)
+
+    @property
+    def noise(self) -> float:
+        """Variance of the noise."""
+        return _noise(self.logs)
+
+    @property
+    def variance(self) -> float:
+        """Prior variance of an answer, without noise."""
+        firsts = np.cumsum([0, *(1 + len(term) for term in self.terms)])[:-1]
+        return float(np.exp(self.logs[firsts]).sum())
 
 
 def _noise(logs: FloatArray) -> float:

@@ -1,0 +1,1 @@
+"""Newtons from labelled presses, and what a material remembers of its load."""

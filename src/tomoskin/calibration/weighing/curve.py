@@ -1,0 +1,157 @@
+"""Newtons from how much a touch changes the sheet: a curve that flattens, and how sure it is.
+
+A touch of content c (how much conductivity it takes away in all) stands for a depth u = c/r̄², r̄ the
+usual radius. The soft layer under the sheet is squeezed solid in the end, so that
+
+    log u = φ(position, radius)·β + log F/(F + F₀) + noise.
+
+What position and radius do is linear in β with a normal prior; F₀ and the noise are averaged,
+each by its evidence (MacKay 2003, chapter 28). The force is then read from the curve with a prior
+on log F: where the curve is flat a touch says little of its force, and the interval says so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from tomoskin.core import FloatArray
+
+_HALF = np.geomspace(0.03, 300.0, 17)
+"""F₀ over the median force of the labels."""
+
+_NOISE = np.geomspace(0.01, 0.6, 9)
+"""Deviations of log u about the curve."""
+
+_LEVEL, _SLOPE, _RADIUS = 3.0, 0.3, 0.7
+"""Prior deviations of β: of the level, of each term of the position, and of log radius."""
+
+_WIDER = 1.25
+"""The prior of log F is so many times as wide as the labels are."""
+
+_LEAST_WIDTH = 0.5
+_COUNTS = 3e-3
+_FORCES = 161
+_BEYOND = 4.0
+_NINE_IN_TEN = (0.05, 0.95)
+
+
+def basis(xy: FloatArray, radius: FloatArray, unit: float) -> FloatArray:
+    """(n, 5) terms of a touch at ``xy`` (n, 2) over ``unit`` m, of log ``radius`` (n,) beside the
+    usual."""
+    x, y = (xy / unit).T
+    return np.column_stack([np.ones(len(x)), x, y, x * x + y * y - 0.5, radius])
+
+
+_PRIOR = np.array([_LEVEL, _SLOPE, _SLOPE, _SLOPE, _RADIUS]) ** 2
+
+
+@dataclass(frozen=True, eq=False)
+class ForceCurve:
+    """The curve as labelled touches tell it.
+
+    Attributes
+    ----------
+    half, noise
+        (g,) F₀ in N and deviation of log u, of each member of the average.
+    weight
+        (g,) of each, 1 together.
+    mean, covariance
+        (g, 5), (g, 5, 5) of β.
+    evidence
+        Log marginal likelihood of the labelled touches.
+    log_force
+        Mean and deviation of the prior of log F.
+    """
+
+    half: FloatArray
+    noise: FloatArray
+    weight: FloatArray
+    mean: FloatArray
+    covariance: FloatArray
+    evidence: float
+    log_force: tuple[float, float]
+
+    @classmethod
+    def of(cls, terms: FloatArray, depth: FloatArray, force: FloatArray) -> ForceCurve:
+        """Learn from ``terms`` (n, 5), ``depth`` u (n,) and ``force`` (n,) N, all above 0."""
+        half = _HALF * float(np.median(force))
+        level = np.log(depth)[:, None] - np.log(force[:, None] / (force[:, None] + half))
+        members = [_members(terms, level, noise) for noise in _NOISE]
+        mean = np.concatenate([member[0] for member in members])
+        evidence = np.concatenate([member[2] for member in members])
+        weight = np.exp(evidence - evidence.max())
+        total = float(evidence.max() + np.log(weight.mean()))
+        weight /= weight.sum()
+        counts = weight > _COUNTS * weight.max()
+        logs = np.log(force)
+        width = max(_WIDER * float(logs.std()), _LEAST_WIDTH)
+        return cls(
+            half=np.tile(half, len(_NOISE))[counts],
+            noise=np.repeat(_NOISE, len(half))[counts],
+            weight=weight[counts] / weight[counts].sum(),
+            mean=mean[counts],
+            covariance=np.repeat([member[1] for member in members], len(half), axis=0)[counts],
+            evidence=total,
+            log_force=(float(logs.mean()), width),
+        )
+
+    def posterior(
+        self, terms: FloatArray, depth: FloatArray, sd: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Grid (f,) of log F, and (n, f) probabilities on it.
+
+        Parameters
+        ----------
+        terms, depth, sd
+            (n, 5); u (n,); its relative deviation (n,) beyond the labelled touches'.
+        """
+        grid, prior, curves = self._tabulated
+        level = terms @ self.mean.T
+        variance = np.einsum("ni,gij,nj->ng", terms, self.covariance, terms)
+        variance += self.noise**2 + sd[:, None] ** 2
+        away = (np.log(depth)[:, None] - level)[:, :, None] - curves
+        away *= away
+        away *= -0.5 / variance[:, :, None]
+        likely = np.einsum("ng,ngf->nf", self.weight / np.sqrt(variance), np.exp(away))
+        chance = np.maximum(likely, 1e-300) * prior
+        return grid, chance / chance.sum(axis=1, keepdims=True)
+
+    @cached_property
+    def _tabulated(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Grid (f,) of log F, its prior (f,), and log F/(F + F₀) of each member (g, f)."""
+        middle, width = self.log_force
+        steps = np.linspace(-_BEYOND, _BEYOND, _FORCES)
+        force = np.exp(middle + width * steps)
+        curves = np.log(force / (force + self.half[:, None]))
+        return middle + width * steps, np.exp(-0.5 * steps**2), curves
+
+    def force(
+        self, terms: FloatArray, depth: FloatArray, sd: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Median, 5 % and 95 % point of the force, (n,) N each; see :meth:`posterior`."""
+        grid, chance = self.posterior(terms, depth, sd)
+        below = np.cumsum(chance, axis=1) - 0.5 * chance
+        points = [
+            np.array([np.interp(level, row, grid) for row in below])
+            for level in (0.5, *_NINE_IN_TEN)
+        ]
+        middle, low, high = np.exp(points)
+        return middle, low, high
+
+
+def _members(
+    terms: FloatArray, level: FloatArray, noise: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Means (h, 5) and one covariance (5, 5) of β where each column of ``level`` (n, h) is
+    ``terms`` β + noise; evidence (h,)."""
+    n = len(level)
+    carried = terms * _PRIOR
+    factor = cho_factor(carried @ terms.T + noise**2 * np.eye(n), lower=True)
+    solved = cho_solve(factor, level)
+    covariance = np.diag(_PRIOR) - carried.T @ cho_solve(factor, carried)
+    size = 2 * float(np.log(np.diag(factor[0])).sum())
+    return solved.T @ carried, covariance, -0.5 * ((level * solved).sum(axis=0) + size)

@@ -1,0 +1,350 @@
+"""Touches under known forces → the force of a touch, with an interval, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from tomoskin.calibration.weighing.curve import ForceCurve, basis
+from tomoskin.calibration.weighing.presses import WeighedPresses, check_rising
+from tomoskin.core import DataError, Detection, FloatArray, Force, IntArray
+from tomoskin.skin import MaterialMemory, MemoryState, Skin, advanced, load_of
+from tomoskin.touch import Region
+
+_PLAYS, _WIDTHS = (0.1, 0.25, 0.4), (0.05, 0.1, 0.2, 0.4)
+"""Plays that are tried: parts, and half widths over the usual depth."""
+
+_DEEPEST = 0.999
+"""Part of the conductivity that a touch may take away: all of it has no logarithm."""
+
+_SHALLOW = 1e-3
+"""Depth, over the usual one, below which a touch is not told from none."""
+
+_SCALES = (0.8, 1.6)
+_LONELY = 0.15
+"""Presses within so many radii of the skin are of one spot."""
+
+_FAR_OFF = 4.0
+"""A label so many half intervals from what the others say contradicts them."""
+
+_MOST_SPOTS = 32
+_STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class LabelRemark:
+    """A ``press`` by its number, or None for all, and what is wrong with it."""
+
+    press: int | None
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class PressedSpot:
+    """What one spot of the skin remembers: ``xy`` (2,) m, since ``time`` s."""
+
+    xy: FloatArray
+    time: float
+    memory: MemoryState
+
+
+@dataclass(frozen=True, eq=False)
+class ForceModel:
+    """The force of touches on one skin, for the tip that pressed it; made by :meth:`fit`.
+
+    Attributes
+    ----------
+    presses
+        What it was learnt from.
+    conductivity
+        S of the sheet at rest.
+    unit, radius
+        Radius of the skin's region, and usual radius of the labelled touches, m.
+    depth
+        Usual depth of the labelled touches.
+    memory
+        What the sheet remembers, in the unit of a touch's depth.
+    curve
+        Depth and force.
+    scale
+        By which intervals are widened, so that nine in ten of the labels lie in theirs when
+        their press is left out.
+    left_out
+        (n_labelled, 3) force, 5 % and 95 % point of each label, its press left out, N.
+    remarks
+        What is wrong with labels.
+    skin_id, method
+        Identity of the skin; how its touches were found.
+    """
+
+    presses: WeighedPresses
+    conductivity: float
+    unit: float
+    radius: float
+    depth: float
+    memory: MaterialMemory
+    curve: ForceCurve
+    scale: float
+    left_out: FloatArray
+    remarks: tuple[LabelRemark, ...]
+    skin_id: str = ""
+    method: str = "fit"
+
+    @classmethod
+    def fit(cls, presses: WeighedPresses, skin: Skin) -> Self:
+        """Learn from presses on ``skin``; see :meth:`learn`."""
+        unit = Region.of(skin).unit
+        return cls.learn(presses, skin.conductivity, unit, skin.identity, skin.touch.method)
+
+    @classmethod
+    def learn(
+        cls,
+        presses: WeighedPresses,
+        conductivity: float,
+        unit: float,
+        skin_id: str = "",
+        method: str = "fit",
+    ) -> Self:
+        """Learn curve and memory from presses on a sheet of ``conductivity`` S, ``unit`` m.
+
+        The memory is the one of several plays, or of none, at which the labels are likeliest.
+
+        Raises
+        ------
+        DataError
+            When the weights contradict, or a labelled touch makes the sheet conduct better.
+        """
+        rows = presses.labelled
+        radius = float(np.exp(np.log(_radius(presses.area[rows])).mean()))
+        depth = depth_of(presses.peak, presses.area, conductivity, radius)
+        if not (depth[rows] > 0).all():
+            row = int(rows[np.argmin(depth[rows])])
+            raise DataError(
+                f"touch {row}, under {presses.force[row]:.3g} N, makes the sheet conduct better",
+                where="force labels",
+                hint="calibrate with presses that were found as touches",
+            )
+        check_rising(depth[rows], presses.force[rows])
+        terms = basis(presses.xy, np.log(_radius(presses.area) / radius), unit)
+        usual = float(np.median(depth[rows]))
+        memory, free = _likeliest(presses, depth, usual, terms)
+        curve = ForceCurve.of(terms[rows], free[rows], presses.force[rows])
+        left_out = _left_out(presses, terms, free)
+        scale = _scale(left_out, presses.force[rows])
+        remarks = _remarks(presses, left_out, unit)
+        return cls(
+            presses, conductivity, unit, radius, usual, memory, curve, scale, left_out, remarks,
+            skin_id, method,
+        )  # fmt: skip
+
+    def read(
+        self, spots: tuple[PressedSpot, ...], detections: Sequence[Detection], time: float
+    ) -> tuple[list[Force], tuple[PressedSpot, ...]]:
+        """Forces of a frame's detections, and what the spots remember then.
+
+        ``spots`` is what they remembered after the frame before, ``()`` on a skin that nothing
+        has touched; ``time`` is the frame's, s.
+        """
+        rest = list(spots)
+        if not detections:
+            return [], self._released(rest, time)
+        xy, area, peak, snr = _columns(detections)
+        depth = np.maximum(
+            depth_of(peak, area, self.conductivity, self.radius), _SHALLOW * self.depth
+        )
+        pressed = []
+        for at, own in zip(xy, depth, strict=True):
+            before = _nearest(rest, at, 0.5 * self.radius)
+            if before is not None:
+                rest.remove(before)
+            pressed.append(self._pressed(before, at, own, time))
+        free = np.array([float(spot.memory.load[0, 0]) for spot in pressed])
+        terms = basis(xy, np.log(_radius(area) / self.radius), self.unit)
+        free = np.maximum(free, _SHALLOW * self.depth)
+        forces = self._forces(terms, free, self._beyond(snr))
+        return forces, (*pressed, *self._released(rest, time))[:_MOST_SPOTS]
+
+    def _pressed(
+        self, before: PressedSpot | None, at: FloatArray, depth: float, time: float
+    ) -> PressedSpot:
+        """The spot at ``at`` (2,) with the load that makes its ``depth`` now."""
+        state = before.memory if before else MemoryState.fresh(self.memory)
+        step = max(time - before.time, 0.0) if before else 0.0
+        _, state = load_of(state, self.memory, np.array([depth]), step)
+        return PressedSpot(at, time, state)
+
+    def _released(self, spots: Sequence[PressedSpot], time: float) -> tuple[PressedSpot, ...]:
+        """What ``spots`` that nothing touches remember."""
+        return tuple(
+            PressedSpot(
+                spot.xy,
+                time,
+                advanced(spot.memory, self.memory, np.zeros((1, 1)), max(time - spot.time, 0.0)),
+            )
+            for spot in spots
+        )
+
+    @property
+    def errors(self) -> FloatArray:
+        """(n_labelled,) relative errors of the labels, each press left out."""
+        force = self.presses.force[self.presses.labelled]
+        return np.asarray(self.left_out[:, 0] / force - 1)
+
+    @property
+    def held(self) -> float:
+        """Part of the labels within their own intervals, each press left out."""
+        force = self.presses.force[self.presses.labelled]
+        middle, least, most = self.left_out.T
+        _, low, high = _widened(middle, least, most, self.scale)
+        return float(((low <= force) & (force <= high)).mean())
+
+    def _beyond(self, snr: FloatArray) -> FloatArray:
+        """Relative deviation of depths by noise, beyond that of the labelled touches."""
+        return np.sqrt(np.maximum(np.nan_to_num(1 / snr**2) - self._usual_noise, 0.0))
+
+    @cached_property
+    def _usual_noise(self) -> float:
+        """Relative variance of the labelled touches by noise; 0 where it is not known."""
+        known = self.presses.snr[self.presses.labelled]
+        return float(np.nanmedian(1 / known**2)) if np.isfinite(known).any() else 0.0
+
+    def _forces(self, terms: FloatArray, depth: FloatArray, sd: FloatArray) -> list[Force]:
+        middle, low, high = _widened(*self.curve.force(terms, depth, sd), self.scale)
+        return [
+            Force(float(newtons), float(least), float(most))
+            for newtons, least, most in zip(middle, low, high, strict=True)
+        ]
+
+
+def depth_of(peak: FloatArray, area: FloatArray, conductivity: float, radius: float) -> FloatArray:
+    """(n,) content of touches over ``radius``²: −log σ/σ₀ of one of that radius, m²/m²."""
+    part = np.clip(np.asarray(peak) / conductivity, -_DEEPEST, None)
+    return np.asarray(-np.log1p(part) * np.asarray(area) / (np.pi * radius**2))
+
+
+def without_memory(
+    memory: MaterialMemory, depth: FloatArray, press: IntArray, time: FloatArray
+) -> FloatArray:
+    """(n, k) depths that touches of ``depth`` (n, k) would have had without their past, press by
+    press; each column by itself."""
+    free = np.array(depth)
+    for number in np.unique(press):
+        rows = np.flatnonzero(press == number)
+        state = MemoryState.fresh(memory, depth.shape[1])
+        before = time[rows[0]]
+        for row in rows.tolist():
+            free[row], state = load_of(state, memory, depth[row], time[row] - before)
+            before = time[row]
+    return free
+
+
+def _likeliest(
+    presses: WeighedPresses, depth: FloatArray, usual: float, terms: FloatArray
+) -> tuple[MaterialMemory, FloatArray]:
+    """The memory at which the labels are likeliest, and depths without it."""
+    rows, press, time = presses.labelled, presses.press, presses.time
+    tried = [MaterialMemory()] + [
+        MaterialMemory(play=(part,), play_widths=(width * usual,))
+        for part in _PLAYS
+        for width in _WIDTHS
+    ]
+    best = (-np.inf, tried[0], depth)
+    for memory in tried:
+        both = without_memory(memory, depth[:, None] * (1, 1 + _STEP), press, time)
+        free, more = np.maximum(both, _SHALLOW * usual).T
+        slope = np.maximum(more - free, 1e-6 * free) / (_STEP * free)
+        curve = ForceCurve.of(terms[rows], free[rows], presses.force[rows])
+        value = curve.evidence + float(np.log(slope[rows]).sum())
+        if value > best[0]:
+            best = (value, memory, free)
+    return best[1], best[2]
+
+
+def _left_out(presses: WeighedPresses, terms: FloatArray, free: FloatArray) -> FloatArray:
+    """(n_labelled, 3) force and interval of each label from the other presses."""
+    rows = presses.labelled
+    out = np.empty((len(rows), 3))
+    for number in np.unique(presses.press[rows]):
+        mine = presses.press[rows] == number
+        others, own = rows[~mine], rows[mine]
+        if not len(others):
+            raise DataError(
+                "all forces are of one press",
+                where="force labels",
+                hint="lift the tip between two presses, or give the presses their own numbers",
+            )
+        curve = ForceCurve.of(terms[others], free[others], presses.force[others])
+        out[mine] = np.column_stack(curve.force(terms[own], free[own], np.zeros(len(own))))
+    return out
+
+
+def _scale(left_out: FloatArray, force: FloatArray) -> float:
+    """What nine in ten labels need of their intervals (split-conformal: Vovk et al. 2005)."""
+    needed = _half_intervals(left_out, force)
+    n = len(needed)
+    return float(np.clip(np.quantile(needed, min(1.0, 0.9 * (1 + 1 / n))), *_SCALES))
+
+
+def _half_intervals(left_out: FloatArray, force: FloatArray) -> FloatArray:
+    """(n,) by how many half intervals, on the side where it lies, each force is missed."""
+    middle, low, high = np.log(left_out).T
+    away = np.log(force) - middle
+    return np.asarray(np.abs(away) / np.where(away > 0, high - middle, middle - low))
+
+
+def _widened(
+    middle: FloatArray, low: FloatArray, high: FloatArray, scale: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    return middle, middle * (low / middle) ** scale, middle * (high / middle) ** scale
+
+
+def _remarks(presses: WeighedPresses, left_out: FloatArray, unit: float) -> tuple[LabelRemark, ...]:
+    rows = presses.labelled
+    force = presses.force[rows]
+    remarks = [
+        LabelRemark(
+            int(presses.press[row]),
+            f"{presses.force[row]:.3g} N contradicts the others, which say {middle:.2g} N "
+            f"({low:.2g} to {high:.2g})",
+        )
+        for row, (middle, low, high), away in zip(
+            rows.tolist(), left_out.tolist(), _half_intervals(left_out, force), strict=True
+        )
+        if away > _FAR_OFF
+    ]
+    xy = presses.xy[rows]
+    apart = float(np.linalg.norm(xy - xy.mean(axis=0), axis=1).max())
+    if apart < _LONELY * unit:
+        remarks.append(LabelRemark(
+            None,
+            f"all presses lie within {2e3 * apart:.0f} mm: forces hold there; elsewhere the skin "
+            "may answer otherwise, and intervals are wider: press at other spots too",
+        ))  # fmt: skip
+    if np.ptp(np.log(force)) < np.log(1.5):
+        remarks.append(LabelRemark(
+            None,
+            f"all forces lie from {force.min():.3g} to {force.max():.3g} N: what others do is "
+            "guessed; use a lighter and a heavier weight too",
+        ))  # fmt: skip
+    return tuple(remarks)
+
+
+def _nearest(spots: Sequence[PressedSpot], at: FloatArray, within: float) -> PressedSpot | None:
+    near = min(spots, key=lambda spot: float(np.hypot(*(spot.xy - at))), default=None)
+    return near if near is not None and np.hypot(*(near.xy - at)) <= within else None
+
+
+def _columns(
+    detections: Sequence[Detection],
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Positions (n, 2), areas, peaks and snr (n,)."""
+    rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections])
+    return rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4]
+
+
+def _radius(area: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.maximum(area, 1e-12) / np.pi))

@@ -1,0 +1,151 @@
+"""Touches that something of known weight made, checked: what is wrong with labels, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tomoskin.core import DataError, Detection, FloatArray, IntArray
+
+_WHERE = "force labels"
+FEWEST = 5
+_MOST_NEWTONS = 100.0
+"""A finger presses with 0.1 to 50 N; a sheet that bears more is not what this is for."""
+
+_GRAMS = 1e3 / 9.80665
+_ALIKE, _FEW_RANKS = 0.05, 8
+_RISES = 0.2
+"""Rank correlation of force and change below which the weights say nothing of the force."""
+
+
+@dataclass(frozen=True, eq=False)
+class WeighedPresses:
+    """Touches in the order of time, some of them under a known force.
+
+    Attributes
+    ----------
+    xy
+        (n, 2) m.
+    area
+        (n,) m².
+    peak
+        (n,) S by which the conductivity has changed in the middle.
+    snr
+        (n,) deviations by which each stands out; NaN where that is not known.
+    force
+        (n,) N; NaN where nothing of known weight pressed.
+    press
+        (n,) number of the press that each belongs to: one contact from onset to release.
+    time
+        (n,) s.
+    """
+
+    xy: FloatArray
+    area: FloatArray
+    peak: FloatArray
+    snr: FloatArray
+    force: FloatArray
+    press: IntArray
+    time: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        detections: Sequence[Detection],
+        force: ArrayLike,
+        press: ArrayLike,
+        time: ArrayLike,
+    ) -> Self:
+        """Check touches and their labels: ``force`` (n,) N, ``press`` (n,), ``time`` (n,) s.
+
+        Raises
+        ------
+        DataError
+            For labels that do not belong together or to a press, times that go back within one,
+            fewer than five forces, forces that are no newtons, or weights that contradict.
+        """
+        newtons, times = (np.asarray(values, dtype=np.float64) for values in (force, time))
+        number = np.asarray(press)
+        n = len(detections)
+        if not newtons.shape == number.shape == times.shape == (n,):
+            raise DataError(
+                f"expected a force, a press and a time for each of {n} touches, got shapes "
+                f"{newtons.shape}, {number.shape}, {times.shape}",
+                where=_WHERE,
+            )
+        if not np.isfinite(times).all() or np.isinf(newtons).any():
+            raise DataError("expected finite times and forces", where=_WHERE)
+        order = np.lexsort((np.arange(n), number))
+        back = (np.diff(times[order]) < 0) & (np.diff(number[order]) == 0)
+        if back.any():
+            raise DataError(
+                f"the time goes back within press {number[order][int(np.argmax(back))]}",
+                where=_WHERE,
+                hint="give the touches of each press in the order in which they were made",
+            )
+        _check_newtons(newtons[np.isfinite(newtons)])
+        rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections]).reshape(n, 5)
+        return cls(
+            rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], newtons, number.astype(int), times
+        )
+
+    def __len__(self) -> int:
+        """Number of touches."""
+        return len(self.force)
+
+    @property
+    def labelled(self) -> IntArray:
+        """Touches under a known force."""
+        return np.flatnonzero(np.isfinite(self.force))
+
+    def without(self, press: int) -> Self:
+        """The same without one press."""
+        keep = self.press != press
+        return type(self)(
+            self.xy[keep], self.area[keep], self.peak[keep], self.snr[keep],
+            self.force[keep], self.press[keep], self.time[keep],
+        )  # fmt: skip
+
+
+def _check_newtons(force: FloatArray) -> None:
+    if len(force) < FEWEST:
+        raise DataError(
+            f"expected at least {FEWEST} touches under a known force, got {len(force)}",
+            where=_WHERE,
+            hint="ten presses with some weights are a start, twenty are good",
+        )
+    wrong = force <= 0
+    if wrong.any():
+        raise DataError(
+            f"expected forces above 0 N, got {force[int(np.argmax(wrong))]:g}",
+            where=_WHERE,
+            hint="leave out the label where nothing lies on the skin",
+        )
+    usual = float(np.median(force))
+    if force.max() > _MOST_NEWTONS:
+        grams = f"{force.min():.3g} to {force.max():.3g}"
+        raise DataError(
+            f"expected newtons, got {grams}: a touch has 0.1 to 50 N, so that these look like "
+            f"grams ({usual:.3g} g press with {usual / _GRAMS:.2g} N)",
+            where=_WHERE,
+            hint="1 N is the weight of 102 g: --unit g converts",
+        )
+
+
+def check_rising(depth: FloatArray, force: FloatArray) -> None:
+    """Raise DataError where larger forces do not go with larger changes ``depth`` (n,)."""
+    if np.ptp(np.log(force)) < _ALIKE or len(force) < _FEW_RANKS:
+        return
+    deeper, heavier = (np.argsort(np.argsort(values)).astype(float) for values in (depth, force))
+    together = float(np.corrcoef(deeper, heavier)[0, 1])
+    if together < _RISES:
+        raise DataError(
+            "the weights contradict: touches under larger forces do not change the sheet more "
+            f"(rank correlation {together:+.2f}, expected well above {_RISES})",
+            where=_WHERE,
+            hint="look whether labels and presses are in the same order, and use one tip for all",
+        )

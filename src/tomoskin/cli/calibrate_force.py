@@ -1,0 +1,183 @@
+"""``tomoskin calibrate force``: learn newtons from presses with known weights."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from tomoskin.cli.named_files import ForceFlag, Reads
+from tomoskin.cli.options import CalibrationOut, ReferenceOption, SkinOption
+from tomoskin.cli.output import Bar, JsonFlag, emit, remark
+from tomoskin.cli.recording import idle_frames, say_notes
+from tomoskin.core import DataError, FloatArray
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tomoskin.calibration import Calibration, ForceModel, WeighedPresses
+    from tomoskin.core import Detection
+    from tomoskin.pipeline import Reconstruction
+
+
+class Unit(StrEnum):
+    """What the labels are in."""
+
+    N = "N"
+    G = "g"
+    KG = "kg"
+
+
+_NEWTONS = {Unit.N: 1.0, Unit.G: 9.80665e-3, Unit.KG: 9.80665}
+
+
+def calibrate_force(
+    recording: Annotated[
+        Path,
+        typer.Argument(metavar="INPUT", help="Frames, with the force in some of them."),
+        Reads(),
+    ],
+    out: CalibrationOut,
+    skin: SkinOption = None,
+    weight: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FORCE=A:B",
+            help="So much pressed in frames A to B-1; once for each. Without it the file's own "
+            "force_n.",
+        ),
+    ] = None,
+    unit: Annotated[Unit, typer.Option(help="Of the forces.")] = Unit.N,
+    reference: ReferenceOption = None,
+    force: ForceFlag = False,
+    json: JsonFlag = False,
+) -> None:
+    """Learn the force of touches from presses with known weights, all by the same tip."""
+    from tomoskin.calibration import FORCE, ForceModel
+    from tomoskin.cli.choices import skin_for_file
+    from tomoskin.formats import read_recording
+    from tomoskin.pipeline import prepare, reconstruct
+
+    chosen = skin_for_file(skin, recording)
+    data = read_recording(recording)
+    newtons = _NEWTONS[unit] * _labels(recording, len(data), weight or [])
+    with Bar("preparing"):
+        prepared = prepare(chosen)
+    data = data.in_order_of(prepared.pattern)
+    say_notes(data)
+    idle = idle_frames(data, reference, prepared.pattern)
+    with Bar("finding touches") as bar:
+        result = reconstruct(prepared, data, idle, advance=bar)
+    presses = _weighed(recording, result, newtons, data.time)
+    with Bar("learning"):
+        model = ForceModel.fit(presses, chosen)
+    calibration = FORCE.of(model, prepared.pattern, chosen)
+    calibration.write(out, overwrite=force)
+    if json:
+        emit(_findings(calibration))
+    else:
+        _say(_findings(calibration))
+
+
+def _labels(path: Path, n: int, given: Sequence[str]) -> FloatArray:
+    """(n,) force in each frame, in the unit that it is given in; NaN without one."""
+    from tomoskin.core import load_arrays, real_numbers
+    from tomoskin.formats import is_session
+
+    if given:
+        return _ranges(given, n)
+    arrays = {} if is_session(path) or path.suffix.lower() != ".npz" else load_arrays(path)
+    if "force_n" not in arrays:
+        raise DataError(
+            "says no forces: expected force_n (n_frames,), NaN where nothing was weighed",
+            where=str(path),
+            hint="or --weight 4.9=40:60 --weight 9.8=80:100",
+        )
+    labels = real_numbers(arrays, "force_n", str(path))
+    if labels.shape != (n,):
+        raise DataError(f"expected {n} values of force_n, got {labels.shape}", where=str(path))
+    return labels
+
+
+def _ranges(given: Sequence[str], n: int) -> FloatArray:
+    labels = np.full(n, np.nan)
+    for text in given:
+        value, _, span = text.partition("=")
+        first, colon, last = span.partition(":")
+        try:
+            number = float(value)
+        except ValueError:
+            number = np.nan
+        if not (np.isfinite(number) and colon and first.isdigit() and last.isdigit()):
+            raise typer.BadParameter(f'expected FORCE=A:B, got "{text}"', param_hint="--weight")
+        start, stop = int(first), int(last)
+        if not 0 <= start < stop <= n:
+            raise DataError(f"expected frames within 0:{n}, got {span}", where=f"--weight {text}")
+        if np.isfinite(labels[start:stop]).any():
+            raise DataError(
+                f"frames of {span} have two forces",
+                where=f"--weight {text}",
+                hint="each frame shows one weight",
+            )
+        labels[start:stop] = number
+    return labels
+
+
+def _weighed(
+    path: Path, result: Reconstruction, newtons: FloatArray, time: FloatArray
+) -> WeighedPresses:
+    """Touches of frames with one touch; a press is what one identity does until it is lifted."""
+    from tomoskin.calibration import WeighedPresses
+
+    rows: list[tuple[Detection, float, int, float]] = []
+    without, several, number, before = 0, 0, 0, None
+    for frame, touches in zip(result.frames.tolist(), result.touches, strict=True):
+        known = bool(np.isfinite(newtons[frame]))
+        without += known and not touches
+        several += known and len(touches) > 1
+        alone = touches[0] if len(touches) == 1 else None
+        if alone is not None:
+            number += before != alone.id
+            rows.append((alone.detection, float(newtons[frame]), number, float(time[frame])))
+        before = alone and alone.id
+    if without or several:
+        remark(
+            f"{path}: of the frames with a force, {without} show no touch and {several} show "
+            "several; these were left out"
+        )
+    detections, *labels = zip(*rows, strict=True) if rows else ((), (), (), ())
+    return WeighedPresses.of(detections, *(np.array(column) for column in labels))
+
+
+def _findings(calibration: Calibration[ForceModel]) -> dict[str, Any]:
+    model = calibration.model
+    rows = model.presses.labelled
+    errors = np.abs(model.errors)
+    force = model.presses.force[rows]
+    return {
+        "touches": len(rows),
+        "presses": len(np.unique(model.presses.press[rows])),
+        "from_n": float(force.min()),
+        "to_n": float(force.max()),
+        "mean_error": float(errors.mean()),
+        "median_error": float(np.median(errors)),
+        "held_by_90_percent_intervals": model.held,
+        "memory": bool(model.memory.play),
+        "remarks": [{"press": r.press, "reason": r.reason} for r in model.remarks],
+    }
+
+
+def _say(facts: dict[str, Any]) -> None:
+    typer.echo(
+        f"{facts['touches']} touches of {facts['presses']} presses, {facts['from_n']:.2g} to "
+        f"{facts['to_n']:.2g} N; left out of the learning their forces are missed by "
+        f"{100 * facts['mean_error']:.0f} % (median {100 * facts['median_error']:.0f} %), and "
+        f"their 90 % intervals hold {100 * facts['held_by_90_percent_intervals']:.0f} %"
+    )
+    typer.echo("forces hold for the tip that pressed: another size changes the sheet otherwise")
+    for doubtful in facts["remarks"]:
+        who = "" if doubtful["press"] is None else f"press {doubtful['press']:>4}  doubtful: "
+        typer.echo(f"{who}{doubtful['reason']}")

@@ -1,0 +1,300 @@
+"""What a conductive material remembers of its load: play, creep, and a network broken by motion.
+
+One model for what simulates a sheet and for what reads it: :func:`advanced` goes from loads to
+responses, :func:`load_of` back, one step at a time, each from the state before to the state after.
+
+- **Play** (Prandtl & Ishlinskii; Krasnosel'skii & Pokrovskii 1989, chapter 1): a part of the
+  response follows the load only when that has moved on by a half width. Time changes nothing.
+- **Creep**: a part of the response comes late, q' = (s − q)/τ (Prony series).
+- **Breakdown**: any motion of the load, either way, breaks contacts between conductive particles,
+  b grows by |Δload|, and they form again, b' = −b/τ: filled elastomers rise in resistance when
+  they are stretched and once more when they are released (Payne 1962; Yamaguchi, Busfield & Thomas
+  2003, J. Polym. Sci. B 41, 2079).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import FloatArray, ModelError
+
+_WHERE = "MaterialMemory"
+
+
+@dataclass(frozen=True, slots=True)
+class MaterialMemory:
+    """Parts of a response that depend on the past of its load; without any, there is no memory.
+
+    Attributes
+    ----------
+    play, play_widths
+        Parts that lag behind by a play, and the plays' half widths in the unit of the load.
+    creep, creep_times
+        Parts that come late, and their time constants, s.
+    breakdown, breakdown_times
+        Response per motion of the load either way, and the time constants, s, with which it goes.
+
+    Raises
+    ------
+    ModelError
+        When parts and sizes differ in number, a size is not above 0, parts of play or creep are
+        negative or add up to more than 1, or a breakdown is negative.
+    """
+
+    play: tuple[float, ...] = ()
+    play_widths: tuple[float, ...] = ()
+    creep: tuple[float, ...] = ()
+    creep_times: tuple[float, ...] = ()
+    breakdown: tuple[float, ...] = ()
+    breakdown_times: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for parts, sizes, most in (
+            ("play", "play_widths", 1.0),
+            ("creep", "creep_times", 1.0),
+            ("breakdown", "breakdown_times", math.inf),
+        ):
+            _check_series(parts, getattr(self, parts), sizes, getattr(self, sizes), most)
+
+    @property
+    def still(self) -> bool:
+        """Whether time alone changes nothing."""
+        return not (self.creep or self.breakdown)
+
+    def kept(self, dt: float) -> tuple[FloatArray, FloatArray]:
+        """Parts of late responses, and of breakdowns, that are left after ``dt`` s."""
+        return (
+            np.exp(-dt / np.array(self.creep_times)),
+            np.exp(-dt / np.array(self.breakdown_times)),
+        )
+
+
+def _check_series(
+    parts: str, weights: Sequence[float], sizes: str, lengths: Sequence[float], most: float
+) -> None:
+    if len(weights) != len(lengths):
+        raise ModelError(
+            f"expected as many {parts} as {sizes}, got {len(weights)} and {len(lengths)}",
+            where=_WHERE,
+        )
+    if not all(0 < length < math.inf for length in lengths):
+        raise ModelError(f"expected {sizes} above 0, got {tuple(lengths)}", where=_WHERE)
+    if not (all(0 <= w < math.inf for w in weights) and sum(weights) <= most):
+        limit = "" if most == math.inf else f" to a sum of {most:g}"
+        raise ModelError(f"expected {parts} from 0{limit}, got {tuple(weights)}", where=_WHERE)
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """How large a load of several components is: groups of components that a play takes as one.
+
+    ``weights`` has a tuple for each group, in the order of the components: a group's size is
+    √(Σ weight · component²).
+    """
+
+    weights: tuple[tuple[float, ...], ...] = ((1.0,),)
+
+    def sizes(self, components: FloatArray) -> FloatArray:
+        """(…, n_groups, n) sizes of ``components`` (…, d, n)."""
+        sizes, start = [], 0
+        for group in self.weights:
+            part = components[..., start : start + len(group), :]
+            square = part * part
+            square *= np.array(group)[:, None]
+            sizes.append(np.sqrt(square.sum(axis=-2)))
+            start += len(group)
+        return np.stack(sizes, axis=-2)
+
+    def drawn(self, slack: FloatArray, width: FloatArray) -> None:
+        """Shorten ``slack`` (n_play, d, n) in place, group by group, to ``width`` (n_play, 1)."""
+        start = 0
+        sizes = self.sizes(slack)
+        for number, group in enumerate(self.weights):
+            size = sizes[:, number]
+            slack[:, start : start + len(group)] *= (width / np.maximum(size, width))[:, None]
+            start += len(group)
+
+
+SCALAR = Metric()
+"""Of loads that are one number each."""
+
+
+@dataclass(frozen=True, eq=False)
+class MemoryState:
+    """What ``n`` pieces of a material remember, for loads of ``d`` components.
+
+    Attributes
+    ----------
+    load
+        (d, n) as it was last.
+    lagging
+        (n_play, d, n) where each play stands.
+    prompt
+        (d, n) the part of the load that is answered without delay: itself, with its plays.
+    late
+        (n_creep, d, n) what each late part has reached.
+    broken
+        (n_breakdown, n_groups, n) motion of which the material has not recovered.
+    """
+
+    load: FloatArray
+    lagging: FloatArray
+    prompt: FloatArray
+    late: FloatArray
+    broken: FloatArray
+
+    @classmethod
+    def fresh(cls, memory: MaterialMemory, n: int = 1, metric: Metric = SCALAR) -> Self:
+        """A material that has never been loaded."""
+        d = sum(map(len, metric.weights))
+        return cls(
+            load=np.zeros((d, n)),
+            lagging=np.zeros((len(memory.play), d, n)),
+            prompt=np.zeros((d, n)),
+            late=np.zeros((len(memory.creep), d, n)),
+            broken=np.zeros((len(memory.breakdown), len(metric.weights), n)),
+        )
+
+
+def advanced(
+    state: MemoryState,
+    memory: MaterialMemory,
+    load: FloatArray,
+    dt: float,
+    metric: Metric = SCALAR,
+) -> MemoryState:
+    """The state after ``load`` (d, n) has stood for ``dt`` s; exact for any length of the step.
+
+    The load is taken to jump at the start of the step, along a straight line.
+
+    Raises
+    ------
+    ModelError
+        When dt is negative or not finite.
+    """
+    if not 0 <= dt < math.inf:
+        raise ModelError(f"expected a time step of 0 s or more, got {dt}", where=_WHERE)
+    slack = state.lagging - load
+    metric.drawn(slack, np.array(memory.play_widths).reshape(-1, 1))
+    slack += load
+    prompt = _mixed(load, slack, memory.play)
+    late_kept, broken_kept = memory.kept(dt)
+    late = state.late - prompt
+    late *= late_kept.reshape(-1, 1, 1)
+    late += prompt
+    broken = state.broken
+    if memory.breakdown:
+        moved = metric.sizes(load - state.load)
+        broken = (broken + moved) * broken_kept.reshape(-1, 1, 1)
+    return MemoryState(load, slack, prompt, late, broken)
+
+
+def followed(state: MemoryState, memory: MaterialMemory) -> FloatArray:
+    """(d, n) part of the response that follows the load, with its plays and creep."""
+    return _mixed(state.prompt, state.late, memory.creep)
+
+
+def broken_down(state: MemoryState, memory: MaterialMemory) -> FloatArray:
+    """(n_groups, n) part of the response that motion has caused."""
+    return np.asarray(np.tensordot(np.array(memory.breakdown), state.broken, 1))
+
+
+def response(state: MemoryState, memory: MaterialMemory) -> FloatArray:
+    """(n,) response of a material whose loads are one number each, in the unit of the load."""
+    following = followed(state, memory)[0]
+    if memory.breakdown:
+        following = following + broken_down(state, memory)[0]
+    return np.asarray(following)
+
+
+def load_of(
+    state: MemoryState, memory: MaterialMemory, answer: FloatArray, dt: float
+) -> tuple[FloatArray, MemoryState]:
+    """The load (n,) that makes the response ``answer`` (n,) after ``dt`` s, and the state then.
+
+    The inverse of :func:`advanced` and :func:`response`, exact: the response is a line in pieces
+    of the new load, with a bend where a play begins to be pulled and where the motion turns.
+
+    Raises
+    ------
+    ModelError
+        When dt is negative or not finite, or when the material's breakdown outweighs what follows
+        its load: then two loads have the same response.
+    """
+    least = (1 - sum(memory.play)) * _promptness(memory, dt) - _brittleness(memory, dt)
+    if not least > 0:
+        raise ModelError(
+            "a rise of this material's response may be a load or a release: its breakdown "
+            f"outweighs what follows the load by {-least:.3g} per unit of load",
+            where=_WHERE,
+            hint="read it with the breakdown left out, and wait for that to go",
+        )
+    n = len(answer)
+    width = np.array(memory.play_widths).reshape(-1, 1)
+    lagging = state.lagging[:, 0]
+    bends = np.sort(np.concatenate([state.load, lagging - width, lagging + width]), axis=0)
+    ends = np.concatenate([bends[:1] - 1.0, bends, bends[-1:] + 1.0])
+    tried = advanced(_repeated(state, len(ends)), memory, ends.reshape(1, -1), dt)
+    values = response(tried, memory).reshape(ends.shape)
+    piece = np.clip((values[1:-1] <= answer).sum(axis=0), 0, len(bends))
+    column = np.arange(n)
+    low, high = values[piece, column], values[piece + 1, column]
+    part = (answer - low) / np.where(high > low, high - low, 1.0)
+    load = ends[piece, column] + part * (ends[piece + 1, column] - ends[piece, column])
+    return load, advanced(state, memory, load[None], dt)
+
+
+def _repeated(state: MemoryState, times: int) -> MemoryState:
+    """The same pieces so many times, one after the other."""
+    return MemoryState(*(
+        np.tile(part, times)
+        for part in (state.load, state.lagging, state.prompt, state.late, state.broken)
+    ))  # fmt: skip
+
+
+def _promptness(memory: MaterialMemory, dt: float) -> float:
+    """Response per prompt part after ``dt`` s of one load."""
+    kept, _ = memory.kept(dt)
+    return 1.0 - float(np.array(memory.creep) @ kept)
+
+
+def _brittleness(memory: MaterialMemory, dt: float) -> float:
+    """Response per motion, ``dt`` s after it."""
+    _, kept = memory.kept(dt)
+    return float(np.array(memory.breakdown) @ kept)
+
+
+def responses(
+    memory: MaterialMemory, time: FloatArray, load: FloatArray, gauge: float = 1.0
+) -> FloatArray:
+    """(n,) response over a recording: ``gauge`` times that of ``load`` (n,) at ``time`` (n,) s.
+
+    Each load stands until the next one.
+
+    Raises
+    ------
+    ModelError
+        When the times go back.
+    """
+    state = MemoryState.fresh(memory)
+    out = np.empty(len(load))
+    for k, step in enumerate(np.diff(time, append=time[-1]).tolist()):
+        # What is seen at a time is the answer to the loads up to it, before it has stood.
+        state = advanced(state, memory, np.array([[load[k]]]), 0.0)
+        out[k] = response(state, memory)[0]
+        state = advanced(state, memory, np.array([[load[k]]]), step)
+    return gauge * out
+
+
+def _mixed(load: FloatArray, parts: FloatArray, weights: tuple[float, ...]) -> FloatArray:
+    """(d, n): ``parts`` (n_parts, d, n) by their weights, and of ``load`` what these leave."""
+    total = (1 - sum(weights)) * load
+    for weight, part in zip(weights, parts, strict=True):
+        total += weight * part
+    return np.asarray(total)
