@@ -77,6 +77,7 @@ export class Chip {
     const watchdog = chip.peripherals[0x40058];
     watchdog.reason = reason;
     watchdog.onWatchdogTrigger = onWatchdog;
+    this.#wakeLocked();
     this.#countExceptions();
     chip.core.PC = FLASH; // as the boot ROM does, once it has checked the second stage
   }
@@ -90,6 +91,9 @@ export class Chip {
     const { core, clock } = this.chip;
     const end = clock.nanos + nanos;
     while (clock.nanos < end && !stopped()) {
+      if (core.waiting && this.#pending) {
+        core.waiting = false; // it came before the instruction that waits: rp2040js sleeps on
+      }
       if (core.waiting) {
         clock.tick(Math.min(clock.nanosToNextAlarm || Infinity, end - clock.nanos));
         continue;
@@ -99,6 +103,18 @@ export class Chip {
       this.busy += spent;
       clock.tick(spent);
     }
+  }
+
+  get #pending() {
+    const { core } = this.chip;
+    return (core.pendingInterrupts & core.enabledInterrupts) !== 0;
+  }
+
+  /** A processor that waits with interrupts off wakes up, and takes them when they are on again. */
+  #wakeLocked() {
+    const { core } = this.chip;
+    const check = core.checkForInterrupts.bind(core);
+    core.checkForInterrupts = () => (core.waiting && core.PM ? this.#pending : check());
   }
 
   #countExceptions() {
