@@ -57,6 +57,7 @@ static struct {
     uint16_t left;
     uint32_t pid;
     bool zero_follows; /* the last packet is full: the host waits for a shorter one */
+    bool begun;
     volatile bool busy;
 } sending;
 
@@ -98,6 +99,7 @@ static void send_packet(void) {
     sending.bytes += size;
     sending.left = (uint16_t)(sending.left - size);
     sending.zero_follows = sending.left == 0u && size == PACKET;
+    sending.begun = true;
     give(USB_BUFFER_IN(EP_DATA), USB_FULL | sending.pid | size);
     sending.pid ^= USB_DATA1;
 }
@@ -106,16 +108,18 @@ static void go_on_sending(void) {
     if (sending.left != 0u || sending.zero_follows) {
         send_packet();
     } else if (sending.busy) {
-        sending.busy = false;
+        sending.busy = sending.begun = false;
         hal_wake();
     }
 }
 
-/* What was being sent when the host went away is lost. */
+/* A message that was on its way when the host went away is lost; one that had not begun waits. */
 static void forget_line(void) {
     configured = false;
-    sending.left = 0u;
-    sending.busy = sending.zero_follows = false;
+    if (sending.begun) {
+        sending.left = 0u;
+        sending.busy = sending.begun = sending.zero_follows = false;
+    }
     sending.pid = received.pid = 0u;
     received.size = 0u;
     hal_wake();
@@ -161,6 +165,7 @@ static void open_line(void) {
     forget_line();
     listen();
     configured = true;
+    REGISTER(NVIC_PENDING) = 1u << IRQ_SEND;
 }
 
 static void say_descriptor(const struct setup *setup) {
@@ -330,18 +335,17 @@ int16_t hal_uart_get(void) {
 
 void hal_uart_send(const uint8_t *bytes, uint16_t size) {
     hal_lock();
-    if (configured) { /* else it is lost, as on a wire that nobody listens to */
-        sending.bytes = bytes;
-        sending.left = size;
-        sending.busy = true;
-        REGISTER(NVIC_PENDING) = 1u << IRQ_SEND;
-    }
+    sending.bytes = bytes;
+    sending.left = size;
+    sending.busy = true;
+    REGISTER(NVIC_PENDING) = 1u << IRQ_SEND;
     hal_unlock();
 }
 
-/* The first packet: here, since copying it under a lock would hold up the scan. */
+/* The first packet, once there is a host: here, since copying it under a lock would hold up the
+   scan. */
 void on_send(void) {
-    if (sending.busy) {
+    if (configured && sending.busy && !sending.begun) {
         send_packet();
     }
 }

@@ -76,7 +76,10 @@ export class Chip {
     chip.peripherals[0x40064] = new Registers({ 8: () => POWER_ON });
     const watchdog = chip.peripherals[0x40058];
     watchdog.reason = reason;
-    watchdog.onWatchdogTrigger = onWatchdog;
+    watchdog.onWatchdogTrigger = () => {
+      watchdog.timer.enable = false; // else rp2040js calls for ever
+      onWatchdog();
+    };
     this.#wakeLocked();
     this.#countExceptions();
     chip.core.PC = FLASH; // as the boot ROM does, once it has checked the second stage
