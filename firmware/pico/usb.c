@@ -58,6 +58,7 @@ static struct {
     uint32_t pid;
     bool zero_follows; /* the last packet is full: the host waits for a shorter one */
     bool begun;
+    bool occupied; /* a packet waits for the host */
     volatile bool busy;
 } sending;
 
@@ -93,19 +94,25 @@ static void listen(void) {
     received.pid ^= USB_DATA1;
 }
 
+static void give_packet(const uint8_t *bytes, uint16_t size) {
+    copy_to(IN_DATA, bytes, size);
+    give(USB_BUFFER_IN(EP_DATA), USB_FULL | sending.pid | size);
+    sending.pid ^= USB_DATA1;
+    sending.occupied = true;
+}
+
 static void send_packet(void) {
     uint16_t size = sending.left < PACKET ? sending.left : PACKET;
-    copy_to(IN_DATA, sending.bytes, size);
+    give_packet(sending.bytes, size);
     sending.bytes += size;
     sending.left = (uint16_t)(sending.left - size);
     sending.zero_follows = sending.left == 0u && size == PACKET;
     sending.begun = true;
-    give(USB_BUFFER_IN(EP_DATA), USB_FULL | sending.pid | size);
-    sending.pid ^= USB_DATA1;
 }
 
 static void go_on_sending(void) {
-    if (sending.left != 0u || sending.zero_follows) {
+    sending.occupied = false;
+    if (sending.busy && (!sending.begun || sending.left != 0u || sending.zero_follows)) {
         send_packet();
     } else if (sending.busy) {
         sending.busy = sending.begun = false;
@@ -115,7 +122,7 @@ static void go_on_sending(void) {
 
 /* A message that was on its way when the host went away is lost; one that had not begun waits. */
 static void forget_line(void) {
-    configured = false;
+    configured = sending.occupied = false;
     if (sending.begun) {
         sending.left = 0u;
         sending.busy = sending.begun = sending.zero_follows = false;
@@ -156,6 +163,7 @@ static void refuse(void) {
 }
 
 static void open_line(void) {
+    static const uint8_t end_of_block = 0u;
     REGISTER(USB_EP_IN(EP_NOTIFY)) =
         USB_EP_ENABLE | USB_EP_INTERRUPT | USB_EP_PERIODIC | (NOTIFY_DATA - USB_MEMORY);
     REGISTER(USB_EP_IN(EP_DATA)) =
@@ -165,7 +173,7 @@ static void open_line(void) {
     forget_line();
     listen();
     configured = true;
-    REGISTER(NVIC_PENDING) = 1u << IRQ_SEND;
+    give_packet(&end_of_block, 1u); /* of what a host may have heard before a reset */
 }
 
 static void say_descriptor(const struct setup *setup) {
@@ -345,7 +353,7 @@ void hal_uart_send(const uint8_t *bytes, uint16_t size) {
 /* The first packet, once there is a host: here, since copying it under a lock would hold up the
    scan. */
 void on_send(void) {
-    if (configured && sending.busy && !sending.begun) {
+    if (configured && sending.busy && !sending.occupied) {
         send_packet();
     }
 }

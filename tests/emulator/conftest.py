@@ -1,4 +1,4 @@
-"""The real firmware and the emulators, built once; without their tools tests are skipped, loudly."""
+"""The real firmware and the emulators, built once; without their tools tests skip, loudly."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ class Pico:
     seen: Path
 
     def order(self, word: str) -> None:
-        """Pull the plug (``unplug``, ``plug``), or keep the host from reading (``stall``, ``flow``)."""
+        """Move the plug (``unplug``, ``plug``) or have the host not read (``stall``, ``flow``)."""
         stdin = self.board._process.stdin
         assert stdin is not None
         stdin.write(f"{word}\n".encode())

@@ -1,9 +1,10 @@
-"""The real image of the Pico on a simulated RP2040: handshake, scan, rate, and what keeps it safe."""
+"""The real image of the Pico on a simulated RP2040: handshake, scan, rate, safety."""
 
 from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from tomoskin.twin import TwinSettings
 from tomoskin.wire import (
     SCHEMA,
     Ack,
+    Command,
     Drive,
     Fault,
     FaultCode,
@@ -93,7 +95,11 @@ MUTANTS: dict[str, Change] = {
     "no break": ("src/switches.c", "    hal_switches_disable();\n", ""),
     "no latch": ("pico/hal_pico.c", "    REGISTER(SIO_OUT_CLR) = LATCH;\n", ""),
     "the multiplexer has no time": ("pico/converter.c", "#define DROPPED 2u", "#define DROPPED 0u"),
-    "the channel before": ("pico/converter.c", "channel << READ_SHIFT", "(channel ^ 1u) << READ_SHIFT"),
+    "the channel before": (
+        "pico/converter.c",
+        "channel << READ_SHIFT",
+        "(channel ^ 1u) << READ_SHIFT",
+    ),
     "settling by the ticks of a microsecond": (
         "pico/hal_pico.c",
         "    while (cycles_since(timer_from) < timer_cycles) {\n    }\n",
@@ -145,8 +151,8 @@ def examine(programs: PicoPrograms, folder: Path, impatience: float = PATIENCE) 
     with powered(programs, folder, "-f") as board:
         talk = Talk(SerialTransport(board.board.port))
         set_up(talk, impatience=impatience)
-        assert talk.ask(GetInfo(5), Info).unique_id == b"emulated"
-        assert talk.ask(Start(10, 5), Ack).result is Result.OK
+        assert asked(talk, GetInfo(5), impatience, Info).unique_id == b"emulated"
+        assert asked(talk, Start(10, 5)).result is Result.OK
         for number in range(30):
             frame = talk.next(Frame, impatience)
             assert frame.sequence == number
@@ -154,12 +160,12 @@ def examine(programs: PicoPrograms, folder: Path, impatience: float = PATIENCE) 
         seen = board.watch()
         assert seen["jitter"] < MOST_JITTER
         assert seen["shortestOff"] >= 1e9 * DEAD
-        assert talk.ask(SetHeartbeat(11, 10_000), Ack).result is Result.OK
+        assert asked(talk, SetHeartbeat(11, 10_000)).result is Result.OK
         board.order("unplug")
         board.until(lambda seen: not seen["connected"] and stands(board), impatience)
         board.order("plug")
-        assert talk.ask(SetHeartbeat(12, 200), Ack).result is Result.OK
-        assert talk.ask(Start(13, 5), Ack).result is Result.OK
+        assert asked(talk, SetHeartbeat(12, 200)).result is Result.OK
+        assert asked(talk, Start(13, 5)).result is Result.OK
         talk.next(Fault, impatience)
         talk.next(Hello, impatience)
         board.until(lambda seen: not seen["connected"], impatience)
@@ -175,6 +181,12 @@ def stands(board: Pico) -> bool:
     return bool(board.watch()["drives"] == before["drives"])
 
 
+def asked(talk: Talk, command: Command, patience: float = PATIENCE, kind: type = Ack) -> Any:
+    """The answer to a command, within ``patience`` s."""
+    talk.say(command)
+    return talk.next(kind, patience)
+
+
 def set_up(talk: Talk, heartbeat: int = 2000, impatience: float = PATIENCE) -> None:
     """Everything but START."""
     talk.next(Hello, impatience)
@@ -187,7 +199,7 @@ def set_up(talk: Talk, heartbeat: int = 2000, impatience: float = PATIENCE) -> N
         SetPattern(2, 5, 0, drives),
         SetHeartbeat(3, heartbeat),
     ):
-        assert talk.ask(command, Ack).result is Result.OK
+        assert asked(talk, command, impatience).result is Result.OK
 
 
 def test_nothing_is_connected_before_start_after_stop_and_in_silence(
@@ -196,18 +208,18 @@ def test_nothing_is_connected_before_start_after_stop_and_in_silence(
     with powered(pico, tmp_path, "-f") as board:
         talk = Talk(SerialTransport(board.board.port))
         set_up(talk, heartbeat=200)
-        packed = talk.ask(SetFormat(4, 5, Format.PACKED), Ack)
+        packed = asked(talk, SetFormat(4, 5, Format.PACKED))
         assert packed.result is Result.BAD_VALUE  # ten bits are too few for its converter
         assert not board.watch()["drives"]
         for request, off in ((10, Stop), (20, SafeOff)):
-            assert talk.ask(Start(request, 5), Ack).result is Result.OK
+            assert asked(talk, Start(request, 5)).result is Result.OK
             board.until(lambda seen: bool(seen["connected"] or seen["drives"]))
-            assert talk.ask(off(request + 1), Ack).result is Result.OK
+            assert asked(talk, off(request + 1)).result is Result.OK
             drives = board.watch()["drives"]
             board.until(lambda seen: not seen["connected"])
-            talk.ask(Ping(request + 2), Ack)
+            asked(talk, Ping(request + 2))
             assert board.watch()["drives"] >= drives
-        assert talk.ask(Start(30, 5), Ack).result is Result.WRONG_CONFIGURATION
+        assert asked(talk, Start(30, 5)).result is Result.WRONG_CONFIGURATION
         talk.transport.close()
         assert board.watch()["longestOn"] < 1e6
 
@@ -268,7 +280,7 @@ def test_the_watchdog_ends_a_hang(name: str, pico: PicoPrograms, tmp_path: Path)
         set_up(talk)
         talk.say(Start(10, 5))
         board.until(lambda seen: seen["resets"] == 1)
-        assert talk.next(Fault).code is FaultCode.WATCHDOG
+        assert talk.next(Fault, PATIENCE).code is FaultCode.WATCHDOG
         seen = board.watch()
         assert not seen["connected"]
         assert seen["longestOn"] < 1e9 * WATCHDOG

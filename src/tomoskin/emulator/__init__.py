@@ -17,7 +17,7 @@ from tomoskin.emulator.pico import (
     pico_image,
     write_uf2,
 )
-from tomoskin.emulator.process import BoardPrograms, BoardProcess, Front, SkinMemory
+from tomoskin.emulator.process import BoardProcess, BoardPrograms, Front, SkinMemory
 from tomoskin.emulator.program import Programs, build_elf, build_programs, firmware_image
 from tomoskin.emulator.source import BOARDS, DEFAULT, BoardKind, emulate_board
 from tomoskin.emulator.transport import EmulatorTransport

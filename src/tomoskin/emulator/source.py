@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tomoskin.emulator.pico import build_pico_programs
-from tomoskin.emulator.process import BoardPrograms, BoardProcess, Front, SkinMemory
+from tomoskin.emulator.process import BoardProcess, BoardPrograms, Front, SkinMemory
 from tomoskin.emulator.program import build_programs
 from tomoskin.emulator.transport import EmulatorTransport
 from tomoskin.source import read_options

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tomoskin.core import SourceError
-from tomoskin.emulator.process import BoardPrograms, BoardProcess, Front, SkinMemory
+from tomoskin.emulator.process import BoardProcess, BoardPrograms, Front, SkinMemory
 from tomoskin.source import SerialTransport
 from tomoskin.twin import Contact, Pose, TwinSkin
 

@@ -20,7 +20,6 @@ from tomoskin.skin import Skin
 from tomoskin.source import Transport, list_ports, open_source
 from tomoskin.wire import SCHEMA
 
-
 EMULATED = {
     "emulator" if name == DEFAULT else f"emulator:{name}": f"Real firmware, simulated {board.text}"
     for name, board in BOARDS.items()
