@@ -60,24 +60,23 @@ def test_the_real_image_would_start(pico: PicoPrograms) -> None:
 def test_another_boards_file_is_refused(
     spoil: Callable[[bytes], bytes], said: str, tmp_path: Path
 ) -> None:
-    image = tmp_path / "x.uf2"
-    image.write_bytes(spoil(pack_uf2(IMAGE)))
     with pytest.raises(SourceError, match=said):
-        write_uf2(image, drive(tmp_path / "RPI-RP2"))
+        write_uf2(spoil(pack_uf2(IMAGE)), drive(tmp_path / "RPI-RP2"))
     assert len(list((tmp_path / "RPI-RP2").iterdir())) == 1
 
 
 def test_only_a_picos_drive_is_written(tmp_path: Path) -> None:
-    image = tmp_path / "x.uf2"
-    image.write_bytes(pack_uf2(IMAGE))
+    image = pack_uf2(IMAGE)
     with pytest.raises(SourceError, match="found SAMD21"):
         write_uf2(image, drive(tmp_path / "a" / "ARDUINO", "SAMD21"))
-    with pytest.raises(SourceError, match=r"expected one boot drive of a Pico, found none.*BOOTSEL"):
+    with pytest.raises(
+        SourceError, match=r"expected one boot drive of a Pico, found none.*BOOTSEL"
+    ):
         find_boot_drive([tmp_path])
     right = drive(tmp_path / "a" / "RPI-RP2")
     assert find_boot_drive([tmp_path]) == right
     write_uf2(image, right)
-    assert (right / "x.uf2").read_bytes() == image.read_bytes()
+    assert (right / "tomoskin.uf2").read_bytes() == image
     drive(tmp_path / "b")
     with pytest.raises(SourceError, match="expected one boot drive"):
         find_boot_drive([tmp_path])
@@ -89,7 +88,7 @@ def test_the_command_line_builds_and_flashes(pico: PicoPrograms, tmp_path: Path)
     boot = drive(tmp_path / "RPI-RP2")
     words = ["firmware", "flash", str(boot), "--board", "pico", "--channels", "16"]
     assert "the Pico starts it" in CliRunner().invoke(app, words).output
-    assert (boot / pico.image.name).read_bytes() == pico.image.read_bytes()
+    assert (boot / "tomoskin.uf2").read_bytes() == pico.image.read_bytes()
     assert CliRunner().invoke(app, ["firmware", "build", "--board", "uno"]).exit_code == 2
     assert CliRunner().invoke(app, ["firmware", "flash"]).exit_code == 2
 

@@ -22,7 +22,7 @@ _SET_UP = FOLDER.parent / "scripts" / "pico.py"
 _NEEDED = ("make", "arm-none-eabi-gcc", "arm-none-eabi-objcopy", "arm-none-eabi-size")
 _PACKAGES = "make gcc-arm-none-eabi libnewlib-arm-none-eabi"
 _MOUNTS = ("/media", "/run/media", "/Volumes", "/mnt")
-_ABOUT = "INFO_UF2.TXT"
+_ABOUT, _WRITTEN = "INFO_UF2.TXT", "tomoskin.uf2"
 _LONGEST = 300.0
 
 
@@ -59,26 +59,25 @@ class PicoPrograms:
 
 def build_uf2(channels: int = 16) -> Path:
     """The firmware of a Pico with ``channels``, built if it is not up to date; SourceError."""
-    make_firmware(_NEEDED, _PACKAGES, "pico", f"CHANNELS={channels}")
-    image = (BUILD / f"tomoskin-pico-{channels}.bin").read_bytes()
-    check_boot(image, "firmware of the Pico")
+    data = pico_image(channels)
     uf2 = BUILD / f"tomoskin-pico-{channels}.uf2"
-    data = pack_uf2(image)
     if not uf2.is_file() or uf2.read_bytes() != data:
         uf2.write_bytes(data)
     return uf2
 
 
-def pico_image(channels: int) -> Path:
-    """What is written to a Pico: built in a checkout, else the wheel's image; SourceError."""
+def pico_image(channels: int) -> bytes:
+    """The UF2 for a Pico: built in a checkout, else of the wheel's image; SourceError."""
+    name = f"tomoskin-pico-{channels}.bin"
     if FOLDER.is_dir():
-        return build_uf2(channels)
-    image = IMAGES / f"tomoskin-pico-{channels}.uf2"
+        make_firmware(_NEEDED, _PACKAGES, "pico", f"CHANNELS={channels}")
+    image = (BUILD if FOLDER.is_dir() else IMAGES) / name
     if not image.is_file():
         raise SourceError(
             "this installation holds no firmware", where="firmware", hint="use a git checkout"
         )
-    return image
+    check_boot(image.read_bytes(), str(image))
+    return pack_uf2(image.read_bytes())
 
 
 def build_pico_programs() -> PicoPrograms:
@@ -92,10 +91,9 @@ def build_pico_programs() -> PicoPrograms:
     return PicoPrograms(build_uf2(), _find_node())
 
 
-def write_uf2(image: Path, drive: Path) -> None:
-    """Write ``image`` to the boot ``drive`` of a Pico; SourceError when either is another's."""
-    data = image.read_bytes()
-    unpack_uf2(data, str(image))
+def write_uf2(uf2: bytes, drive: Path) -> None:
+    """Write ``uf2`` to the boot ``drive`` of a Pico; SourceError when either is another's."""
+    unpack_uf2(uf2, "the file")
     about = drive / _ABOUT
     board = _board_of(about)
     if "RP2" not in board:
@@ -105,8 +103,8 @@ def write_uf2(image: Path, drive: Path) -> None:
             hint=_HINT,
         )
     try:
-        with (drive / image.name).open("wb") as file:
-            file.write(data)
+        with (drive / _WRITTEN).open("wb") as file:
+            file.write(uf2)
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:

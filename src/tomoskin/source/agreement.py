@@ -83,12 +83,12 @@ def check_version(board: Hello | Info, where: str) -> None:
 
 
 def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSettings:
-    """The settings that give on this board what is ``asked``; else SourceError says what it lacks."""
+    """What to set on this board for what is ``asked``; SourceError says what it lacks."""
     settings = asked.on_board(info.adc_bits)
     if settings is None:
         raise SourceError(
-            f"the skin file says that {asked.oversampling} conversions of {asked.adc_bits} bits are "
-            f"summed, the board's converter has {info.adc_bits}",
+            f"the skin file says that {asked.oversampling} conversions of {asked.adc_bits} bits "
+            f"are summed, the board's converter has {info.adc_bits}",
             where=where,
             hint="correct the skin file: every voltage would be wrong"
             if info.adc_bits < asked.adc_bits
