@@ -38,11 +38,3 @@ def test_options():
     assert read_options("seed=3, fast", ("seed", "fast"), "x") == {"seed": "3", "fast": ""}
     with pytest.raises(SourceError, match='x: expected options seed, fast, got "slow"'):
         read_options("slow", ("seed", "fast"), "x")
-
-
-@pytest.mark.parametrize("group", ["tomoskin.sources", "tomoskin.sinks"])
-def test_every_entry_point_leads_to_a_function(group):
-    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    named = tomllib.loads(text)["project"]["entry-points"][group]
-    for name, value in named.items():
-        assert callable(EntryPoint(name, value, group).load())
