@@ -33,7 +33,7 @@ class PageHook(BuildHookInterface[Any]):
         try:
             images.build(Path(self.root))
         except images.ImageError as error:
-            self.app.display_warning(f"tomoskin: no firmware in this build: {error}")
+            self.app.display_warning(f"tomoskin: firmware in this build: {error}")
 
     @property
     def _page(self) -> page_build.Page:

@@ -1,4 +1,4 @@
-"""The firmware as a wheel holds it: an image for each board, built where avr-gcc is.
+"""The firmware as a wheel holds it: images of each board whose compiler is here.
 
 Standard library only, for the build hook.
 """
@@ -13,6 +13,11 @@ from pathlib import Path
 from page import digest_of
 
 CHANNELS = (8, 16)
+BOARDS = (
+    ("avr-gcc", "image", "tomoskin-{}.hex"),
+    ("arm-none-eabi-gcc", "pico", "tomoskin-pico-{}.bin"),
+)
+"""Compiler, target of firmware/Makefile, and what it makes, by channels."""
 
 
 class ImageError(Exception):
@@ -25,31 +30,40 @@ def build(root: Path) -> None:
     Raises
     ------
     ImageError
-        Without avr-gcc, or when the build fails; stale images are removed.
+        When a build fails, or a compiler is missing: the other boards' images are there, stale
+        ones are removed.
     """
     folder, firmware = root / "src" / "tomoskin" / "emulator" / "images", root / "firmware"
     sources = [
         firmware / "Makefile",
         *sorted(firmware.glob("src/*")),
         *sorted(firmware.glob("avr/*")),
+        *sorted(firmware.glob("pico/*.*")),
     ]
     stamp, digest = folder / "sources.sha256", digest_of(root, sources)
     if stamp.is_file() and stamp.read_text(encoding="utf-8") == digest:
         return
     shutil.rmtree(folder, ignore_errors=True)
-    if shutil.which("avr-gcc") is None or shutil.which("make") is None:
-        raise ImageError("avr-gcc or make is missing")
-    for channels in CHANNELS:
-        made = subprocess.run(
-            ["make", "--silent", "-C", str(firmware), "image", f"CHANNELS={channels}"],
-            env={**os.environ, "MAKEFLAGS": ""},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if made.returncode:
-            raise ImageError(f"the build failed: {made.stderr.strip()[-500:]}")
     folder.mkdir()
-    for channels in CHANNELS:
-        shutil.copy(root / "build" / "firmware" / f"tomoskin-{channels}.hex", folder)
+    absent = [compiler for compiler, _, _ in BOARDS if shutil.which(compiler) is None]
+    for compiler, target, name in BOARDS:
+        for channels in CHANNELS if compiler not in absent else ():
+            _make(firmware, target, channels)
+            shutil.copy(root / "build" / "firmware" / name.format(channels), folder)
+    if absent:
+        raise ImageError(f"its boards' images are not in it: {' and '.join(absent)} missing")
     stamp.write_text(digest, encoding="utf-8")
+
+
+def _make(firmware: Path, target: str, channels: int) -> None:
+    if shutil.which("make") is None:
+        raise ImageError("make is missing")
+    made = subprocess.run(
+        ["make", "--silent", "-C", str(firmware), target, f"CHANNELS={channels}"],
+        env={**os.environ, "MAKEFLAGS": ""},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if made.returncode:
+        raise ImageError(f"the build failed: {made.stderr.strip()[-500:]}")

@@ -155,7 +155,7 @@ def need_node() -> Node:
     node = find_node()
     if node is None:
         raise PageError(
-            "the page needs Node (20.19, 22.12 or newer) with npm and none works here; "
+            "Node (20.19, 22.12 or newer) with npm is needed, and none works here; "
             f"install Debian's nodejs and npm, or: python3 -m pip install '{NODE_REQUIREMENT}'"
         )
     return node

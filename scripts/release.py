@@ -49,8 +49,8 @@ def pure(folder: Path) -> tuple[Path, Path]:
 def firmware_in(wheel: Path) -> str:
     """A line that says which boards' firmware a wheel holds."""
     with zipfile.ZipFile(wheel) as archive:
-        found = [Path(name).name for name in archive.namelist() if name.endswith(".hex")]
-    return f"firmware inside: {', '.join(found) or 'NONE, for want of avr-gcc'}"
+        found = [Path(name).name for name in archive.namelist() if name.endswith((".hex", ".bin"))]
+    return f"firmware inside: {', '.join(found) or 'NONE, for want of compilers'}"
 
 
 def fast(folder: Path) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tomllib
 from importlib import import_module
 from pathlib import Path
 
@@ -82,3 +83,11 @@ def test_the_flow_in_a_few_lines() -> None:
 def test_the_citation_names_this_version() -> None:
     root = Path(__file__).resolve().parent.parent
     assert f"\nversion: {tomoskin.__version__}\n" in (root / "CITATION.cff").read_text()
+
+
+def test_every_entry_point_leads_to_a_function() -> None:
+    text = (Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8")
+    for group in ("tomoskin.sources", "tomoskin.sinks"):
+        for name, value in tomllib.loads(text)["project"]["entry-points"][group].items():
+            module, _, function = value.partition(":")
+            assert callable(getattr(import_module(module), function)), name

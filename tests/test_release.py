@@ -18,6 +18,7 @@ import pytest
 
 from conftest import missing
 from tomoskin import __version__
+from tomoskin.emulator.uf2 import check_boot
 
 pytestmark = pytest.mark.slow  # make release looks at the same
 
@@ -71,12 +72,18 @@ def test_the_built_page_is_in_both(wheel: list[str], sdist: list[str]) -> None:
 def test_the_firmware_of_both_boards_is_in_both(wheel: list[str], sdist: list[str], built) -> None:
     if shutil.which("avr-gcc") is None:
         missing("the firmware in a wheel: no avr-gcc (Debian: apt-get install gcc-avr avr-libc)")
+    if shutil.which("arm-none-eabi-gcc") is None:
+        missing("the Pico's firmware in a wheel (Debian: apt-get install gcc-arm-none-eabi)")
     images = {f"{IMAGES}tomoskin-{channels}.hex" for channels in (8, 16)}
+    images |= {f"{IMAGES}tomoskin-pico-{channels}.bin" for channels in (8, 16)}
     assert images <= set(wheel)
     assert {f"src/{name}" for name in images} <= set(sdist)
     with zipfile.ZipFile(built[1]) as archive:
         for name in images:
-            assert archive.read(name).splitlines()[-1] == b":00000001FF"  # it is whole
+            if name.endswith(".hex"):
+                assert archive.read(name).splitlines()[-1] == b":00000001FF"  # it is whole
+            else:
+                check_boot(archive.read(name), name)
 
 
 def test_every_file_of_the_library_is_in_it(wheel: list[str]) -> None:

@@ -19,6 +19,8 @@
 
 #define BY_64(timer) (_BV(CS##timer##1) | _BV(CS##timer##0)) /* 4 us */
 #define RECEIVE_SIZE 128u
+#define CLOCKS_PER_CONVERSION 14u /* 13, and up to one to begin with */
+#define CLOCKS_PER_TICK 64u        /* 16 MHz */
 
 /* Set by `tomoskin firmware configure`; an EEPROM that was never written reads 0xFF. */
 struct identity {
@@ -31,6 +33,9 @@ static uint8_t reset_flags __attribute__((section(".noinit")));
 static volatile uint16_t ticks_high;
 static volatile bool awake;
 static uint8_t converter; /* ADCSRA without the start bit */
+static uint8_t conversions, conversions_left;
+static uint16_t conversion_sum;
+static uint16_t sample_ticks;
 
 static const uint8_t *volatile next_to_send;
 static volatile uint16_t left_to_send;
@@ -140,8 +145,10 @@ void hal_timer_cancel(void) {
     TCCR3B = 0u;
 }
 
-void hal_adc_prepare(uint8_t prescaler) {
+void hal_adc_prepare(uint8_t prescaler, uint8_t wanted) {
     uint8_t power = 4u;
+    conversions = wanted;
+    sample_ticks = (uint16_t)(wanted * (CLOCKS_PER_CONVERSION * prescaler / CLOCKS_PER_TICK + 1u));
     for (uint8_t by = 16u; by != prescaler && power < 7u; power++) {
         by = (uint8_t)(by << 1);
     }
@@ -150,7 +157,13 @@ void hal_adc_prepare(uint8_t prescaler) {
     ADCSRA = (uint8_t)(converter | _BV(ADIF));
 }
 
+uint16_t hal_adc_ticks(void) {
+    return sample_ticks;
+}
+
 void hal_adc_start(uint8_t channel) {
+    conversions_left = conversions;
+    conversion_sum = 0u;
     ADCSRB = channel < 8u ? 0u : _BV(MUX5);
     ADMUX = (uint8_t)(_BV(REFS0) | (channel & 7u));
     ADCSRA = (uint8_t)(converter | _BV(ADSC));
@@ -186,6 +199,10 @@ bool hal_uart_sent(void) {
 
 static uint16_t divider(uint32_t baud) {
     return (uint16_t)((F_CPU / 8u + baud / 2u) / baud - 1u);
+}
+
+bool hal_uart_up(void) {
+    return true; /* it has no way to tell */
 }
 
 bool hal_uart_can(uint32_t baud) {
@@ -250,7 +267,13 @@ ISR(TIMER3_COMPA_vect) {
 }
 
 ISR(ADC_vect) {
-    scan_on_conversion(ADC);
+    uint16_t code = ADC;
+    if (--conversions_left == 0u) {
+        scan_on_sample((uint16_t)(conversion_sum + code));
+        return;
+    }
+    ADCSRA = (uint8_t)(converter | _BV(ADSC)); /* it runs while this one is added */
+    conversion_sum = (uint16_t)(conversion_sum + code);
 }
 
 ISR(USART0_RX_vect) {

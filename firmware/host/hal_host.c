@@ -33,7 +33,8 @@ static uint64_t started;
 static uint64_t event_time; /* of the interrupt that runs; 0: none runs */
 static uint64_t timer_due = NEVER;
 static uint64_t adc_due = NEVER;
-static uint64_t conversion_ns;
+static uint64_t sample_ns;
+static uint8_t conversions;
 static uint8_t adc_channel;
 static uint8_t connected[2] = {SWITCHES_OFF, SWITCHES_OFF};
 static uint8_t addressed[2];
@@ -146,13 +147,18 @@ void hal_timer_cancel(void) {
     timer_due = NEVER;
 }
 
-void hal_adc_prepare(uint8_t prescaler) {
-    conversion_ns = prescaler * UINT64_C(13000) / 16u;
+void hal_adc_prepare(uint8_t prescaler, uint8_t wanted) {
+    conversions = wanted;
+    sample_ns = wanted * (prescaler * UINT64_C(13000) / 16u);
+}
+
+uint16_t hal_adc_ticks(void) {
+    return (uint16_t)(sample_ns / NS_PER_TICK + 1u);
 }
 
 void hal_adc_start(uint8_t channel) {
     adc_channel = channel;
-    adc_due = now_ns() + conversion_ns;
+    adc_due = now_ns() + sample_ns;
 }
 
 void hal_adc_cancel(void) {
@@ -202,6 +208,10 @@ uint16_t hal_crc16(uint16_t crc, uint8_t byte) {
     return crc16_step(crc, byte);
 }
 
+bool hal_uart_up(void) {
+    return true; /* it has no way to tell */
+}
+
 bool hal_uart_can(uint32_t baud) {
     return baud >= 9600u && baud <= FIRST_BAUD;
 }
@@ -231,7 +241,11 @@ static bool deliver(uint64_t until) {
         scan_on_timer();
     } else {
         adc_due = NEVER;
-        scan_on_conversion(skin_code(skin, connected[0], connected[1], adc_channel));
+        uint16_t sum = 0u;
+        for (uint8_t left = conversions; left != 0u; left--) {
+            sum = (uint16_t)(sum + skin_code(skin, connected[0], connected[1], adc_channel));
+        }
+        scan_on_sample(sum);
     }
     event_time = 0u;
     return true;

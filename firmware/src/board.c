@@ -101,7 +101,8 @@ static void mind_baud(void) {
 }
 
 static void mind_host(void) {
-    if (board.hello_due || board.ticks - board.heard < commands_heartbeat()) {
+    bool silent = board.ticks - board.heard >= commands_heartbeat() || !hal_uart_up();
+    if (board.hello_due || !silent) {
         return;
     }
     hal_lock();

@@ -114,7 +114,7 @@ struct verdict config_set_format(const uint8_t *payload) {
     if (!announced(get_u16(payload + AT_SET_FORMAT_CONFIGURATION))) {
         return verdict(RESULT_WRONG_CONFIGURATION, 0u);
     }
-    if (format > FORMAT_PACKED || (format == FORMAT_PACKED && config.oversampling != 1u)) {
+    if (format > FORMAT_PACKED || (format == FORMAT_PACKED && (config.oversampling != 1u || ADC_BITS != 10u))) {
         return bad(FIELD_SET_FORMAT_FORMAT);
     }
     config.format = format;

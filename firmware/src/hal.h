@@ -35,8 +35,10 @@ void hal_delay_us(uint16_t us);
 void hal_timer_set(uint16_t ticks);
 void hal_timer_cancel(void);
 
-/* Converter: scan_on_conversion(code) comes once for each start. */
-void hal_adc_prepare(uint8_t prescaler);
+/* Converter: scan_on_sample(sum) comes once for each start: the sum of as many conversions of the
+   channel as prepare said. ticks: how long a sample takes, at most. */
+void hal_adc_prepare(uint8_t prescaler, uint8_t conversions);
+uint16_t hal_adc_ticks(void);
 void hal_adc_start(uint8_t channel);
 void hal_adc_cancel(void);
 
@@ -46,6 +48,8 @@ int16_t hal_uart_get(void);
 void hal_uart_send(const uint8_t *bytes, uint16_t size);
 bool hal_uart_busy(void);
 bool hal_uart_sent(void);
+/* Whether there may be a host: false once its cable has been pulled, where the machine can tell. */
+bool hal_uart_up(void);
 bool hal_uart_can(uint32_t baud);
 void hal_uart_set_baud(uint32_t baud);
 

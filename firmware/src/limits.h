@@ -11,9 +11,13 @@
 
 #define MOST_DRIVES 128u
 #define MOST_SAMPLES 400u
-#define MOST_OVERSAMPLING 64u
 #define MOST_SETTLING_US UINT32_C(100000)
+
+#ifndef ADC_BITS
 #define ADC_BITS 10u
+#endif
+#define MOST_OVERSAMPLING (ADC_BITS > 10u ? 16u : 64u) /* the sum fits into 16 bits */
+static_assert(ADC_BITS <= 12u, "sixteen conversions fit into a sample");
 #define FIRST_BAUD UINT32_C(1000000)
 
 #define FIRMWARE_MAJOR 1u

@@ -9,8 +9,6 @@
 
 /* Longer dead times are waited for by the timer, not in the interrupt. */
 #define LONGEST_BUSY_US 50u
-#define CLOCKS_PER_CONVERSION 14u /* 13, and up to one to begin with */
-#define CLOCKS_PER_TICK 64u        /* 16 MHz */
 #define SLACK_TICKS (2u * TICKS_PER_MS)
 
 enum phase { IDLE, DEAD, SETTLING, CONVERTING };
@@ -18,10 +16,8 @@ enum phase { IDLE, DEAD, SETTLING, CONVERTING };
 static struct {
     enum phase phase;
     uint8_t channel;
-    uint8_t left; /* conversions of this sample to come */
     channel_set rest;
     uint16_t drive;
-    uint16_t sum;
     uint8_t *place; /* of the next sample */
     bool packed;
     uint8_t upper; /* bits of the samples whose lower bytes have been put, the newest on top */
@@ -42,7 +38,6 @@ static struct scan_fault fault;
 static struct {
     uint16_t drive;
     uint8_t channel;
-    uint8_t left;
     uint32_t sequence;
 } seen; /* where the guard found the scan last */
 
@@ -70,9 +65,7 @@ static uint32_t allowed_ticks(const struct drive *drive) {
     for (channel_set rest = drive->mask; rest != 0u; rest &= (channel_set)(rest - 1u)) {
         channels++;
     }
-    uint16_t conversions = (uint16_t)(channels * config.oversampling);
-    uint32_t each = (CLOCKS_PER_CONVERSION * config.prescaler) / CLOCKS_PER_TICK + 1u;
-    uint32_t converting = conversions * each;
+    uint32_t converting = (uint32_t)channels * hal_adc_ticks();
     return scan.settling_ticks + 2u * converting + SLACK_TICKS;
 }
 
@@ -170,7 +163,6 @@ static bool next_channel(void) {
         scan.channel++;
     }
     hal_adc_start(scan.channel);
-    scan.left = config.oversampling;
     return true;
 }
 
@@ -179,28 +171,20 @@ void scan_on_timer(void) {
         connect(0u);
     } else if (scan.phase == SETTLING) {
         scan.phase = CONVERTING;
-        scan.sum = 0u;
         if (!next_channel()) {
             end_drive();
         }
     }
 }
 
-void scan_on_conversion(uint16_t code) {
+void scan_on_sample(uint16_t sum) {
     if (scan.phase != CONVERTING) {
-        return;
-    }
-    /* The next conversion runs while this one is booked. */
-    if (--scan.left != 0u) {
-        hal_adc_start(scan.channel);
-        scan.sum = (uint16_t)(scan.sum + code);
         return;
     }
     scan.rest >>= 1;
     scan.channel++;
-    bool more = next_channel();
-    put_sample((uint16_t)(scan.sum + code));
-    scan.sum = 0u;
+    bool more = next_channel(); /* it runs while this one is booked */
+    put_sample(sum);
     if (!more) {
         end_drive();
     }
@@ -213,7 +197,7 @@ void scan_start(void) {
     scan.packed = config.format == FORMAT_PACKED;
     scan.group = 0u;
     scan.settling_ticks = ticks_of(config.settling);
-    hal_adc_prepare(config.prescaler);
+    hal_adc_prepare(config.prescaler, config.oversampling);
     begin_frame();
     begin_drive();
 }
@@ -230,10 +214,9 @@ bool scan_running(void) {
 
 static bool stands_still(void) {
     bool same = seen.drive == scan.drive && seen.channel == scan.channel &&
-                seen.left == scan.left && seen.sequence == scan.sequence;
+                seen.sequence == scan.sequence;
     seen.drive = scan.drive;
     seen.channel = scan.channel;
-    seen.left = scan.left;
     seen.sequence = scan.sequence;
     return same;
 }

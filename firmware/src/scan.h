@@ -27,7 +27,7 @@ struct scan_fault {
 
 /* Interrupts. */
 void scan_on_timer(void);
-void scan_on_conversion(uint16_t code);
+void scan_on_sample(uint16_t sum);
 
 /* The configuration must be complete. Under lock. */
 void scan_start(void);

@@ -85,7 +85,7 @@ bool Machine::deliver(uint64_t until) {
         scan_on_timer();
     } else {
         adc_ns = UINT64_MAX;
-        scan_on_conversion(code_of(source, sink, converted));
+        scan_on_sample(static_cast<uint16_t>(conversions * code_of(source, sink, converted)));
     }
     return true;
 }
@@ -203,11 +203,15 @@ void hal_timer_set(uint16_t ticks) {
     }
 }
 void hal_timer_cancel(void) { machine.timer_ns = UINT64_MAX; }
-void hal_adc_prepare(uint8_t prescaler) { machine.conversion_ns = prescaler * 13000u / 16u; }
+void hal_adc_prepare(uint8_t prescaler, uint8_t conversions) {
+    machine.conversions = conversions;
+    machine.sample_ns = conversions * (prescaler * 13000u / 16u);
+}
+uint16_t hal_adc_ticks(void) { return static_cast<uint16_t>(machine.sample_ns / 4000u + 1u); }
 void hal_adc_start(uint8_t channel) {
     machine.converted = channel;
     if (machine.converter_works) {
-        machine.adc_ns = machine.ns + machine.conversion_ns;
+        machine.adc_ns = machine.ns + machine.sample_ns;
     }
 }
 void hal_adc_cancel(void) { machine.adc_ns = UINT64_MAX; }
@@ -236,6 +240,7 @@ bool hal_uart_busy(void) {
 }
 bool hal_uart_sent(void) { return machine.sending.empty(); }
 uint16_t hal_crc16(uint16_t crc, uint8_t byte) { return crc16_step(crc, byte); }
+bool hal_uart_up(void) { return machine.plugged_in; }
 bool hal_uart_can(uint32_t baud) { return baud == 500000 || baud == FIRST_BAUD; }
 void hal_uart_set_baud(uint32_t baud) { machine.baud = baud; }
 

@@ -43,6 +43,7 @@ struct Machine {
     uint16_t room = 2000;  // bytes that the line takes in a round
     bool timer_works = true;
     bool converter_works = true;
+    bool plugged_in = true;
 
     int source = -1, sink = -1;  // connected now
 
@@ -58,7 +59,8 @@ struct Machine {
 
     uint64_t timer_ns = UINT64_MAX;
     uint64_t adc_ns = UINT64_MAX;
-    uint64_t conversion_ns = 0;
+    uint64_t sample_ns = 0;
+    uint8_t conversions = 0;
     int converted = 0;
     int latched_source = -1, latched_sink = -1;
     int address_source = -1, address_sink = -1;

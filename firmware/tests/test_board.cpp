@@ -293,6 +293,19 @@ TEST_F(Board, PingKeepsItAlive) {
     EXPECT_EQ(of(MSG_FAULT, machine.heard()).size(), 0u);
 }
 
+TEST_F(Board, APulledPlugSwitchesOffAtOnce) {
+    scan();
+    machine.run_us(10'000);
+    machine.heard();
+    machine.plugged_in = false;
+    machine.run_us(200);
+    EXPECT_EQ(machine.source, -1);
+    expect_off();
+    machine.plugged_in = true;
+    machine.run_us(1'000);
+    expect_fault(FAULT_HOST_SILENT, 0);
+}
+
 TEST_F(Board, DirtDoesNotKeepItAlive) {
     scan();
     for (int k = 0; k < 25; k++) {

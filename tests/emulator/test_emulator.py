@@ -15,7 +15,7 @@ from tomoskin.core import Frame, SourceError
 from tomoskin.emulator import EmulatorTransport, Programs, SkinMemory, emulate_board
 from tomoskin.emulator import program as building
 from tomoskin.emulator.process import Front
-from tomoskin.emulator.transport import front_of, open_emulator
+from tomoskin.emulator.source import front_of, open_emulator
 from tomoskin.skin import Skin
 from tomoskin.source import Link, ScanSettings, SerialTransport
 from tomoskin.twin import Press, TwinSettings, TwinSkin
@@ -88,7 +88,7 @@ def test_stop_and_closing_end_it(programs: Programs, skin: Skin, quiet: TwinSett
 
 
 def test_the_skins_own_scan(programs: Programs, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tomoskin.emulator.transport.build_programs", lambda: programs)
+    monkeypatch.setattr("tomoskin.emulator.source.programs_of", lambda _: programs)
     skin = Skin.load("textile-disc-8")
     with Link(open_emulator("seed=2", skin), SCAN, ScanSettings.of(skin)) as link:
         assert link.connect().unique_id == b"emulated"
@@ -126,7 +126,7 @@ def test_the_memory_is_the_c_structs(tmp_path: Path) -> None:
 
 
 def test_a_board_for_another_host(programs: Programs, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tomoskin.emulator.transport.build_programs", lambda: programs)
+    monkeypatch.setattr("tomoskin.emulator.source.programs_of", lambda _: programs)
     skin = Skin.load("textile-disc-8")
     with emulate_board(skin) as board, Link(SerialTransport(board.port), SCAN, SETTINGS) as link:
         frames_of(link, 2)

@@ -14,7 +14,7 @@ from emulator.test_emulator import frames_of
 from emulator.watch import CLOCK, Watch
 from firmware.boards import PATIENCE, SCAN, SETTINGS, Talk, running
 from tomoskin.emulator import Programs, SkinMemory
-from tomoskin.emulator.transport import front_of
+from tomoskin.emulator.source import front_of
 from tomoskin.pipeline import prepare
 from tomoskin.recording import SessionReader
 from tomoskin.run import Runner, commands

@@ -11,7 +11,7 @@ import pytest
 from firmware.boards import PATIENCE
 from tomoskin.core import Touch
 from tomoskin.emulator import Programs
-from tomoskin.emulator.transport import open_emulator
+from tomoskin.emulator.source import open_emulator
 from tomoskin.pipeline import FrameResult, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.skin import Skin
@@ -35,7 +35,7 @@ def test_a_press_is_found_where_it_is(
     place: tuple[float, float],
     most: float,
 ) -> None:
-    monkeypatch.setattr("tomoskin.emulator.transport.build_programs", lambda: programs)
+    monkeypatch.setattr("tomoskin.emulator.source.programs_of", lambda _: programs)
     skin = Skin.load(name)
     runner, came = Runner(prepare(skin), lambda: open_emulator("seed=1", skin)), threading.Event()
     with runner.watch(came.set):

@@ -66,13 +66,14 @@ MUTANTS = {
     "a frame overwritten while it is sent": ("scan.c", "        filling ^= 1u;\n", ""),
     "the first conversion lost": (
         "scan.c",
-        "scan.left = config.oversampling;",
-        "scan.left = (uint8_t)(config.oversampling - (config.oversampling > 1u));",
+        "hal_adc_prepare(config.prescaler, config.oversampling);",
+        "hal_adc_prepare(config.prescaler,"
+        " (uint8_t)(config.oversampling - (config.oversampling > 1u)));",
     ),
     "channels in the wrong order": (
         "scan.c",
-        "hal_adc_start(scan.channel);\n    scan.left",
-        "hal_adc_start(scan.channel ^ 1u);\n    scan.left",
+        "hal_adc_start(scan.channel);",
+        "hal_adc_start(scan.channel ^ 1u);",
     ),
     "a command run twice": ("commands.c", "if (!again)", "if (true || !again)"),
     "limiter not looked at": (

@@ -7,7 +7,7 @@ import pytest
 from emulator.conftest import programs
 from server.serving import Site
 from server.watching import distance
-from tomoskin.emulator.transport import open_emulator
+from tomoskin.emulator.source import open_emulator
 from tomoskin.run import Runner
 from tomoskin.server import TwinHandlers
 
@@ -20,7 +20,7 @@ PLACE = (0.03, 0.02)
 
 @pytest.fixture
 def site(programs, prepared, monkeypatch):
-    monkeypatch.setattr("tomoskin.emulator.transport.build_programs", lambda: programs)
+    monkeypatch.setattr("tomoskin.emulator.source.programs_of", lambda _: programs)
     runner = Runner(prepared, lambda: open_emulator("seed=1", prepared.skin))
     runner.start()
     site = Site(runner, take=TwinHandlers)

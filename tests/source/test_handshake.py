@@ -170,7 +170,8 @@ def test_a_drifted_board_is_refused_with_who_is_older(clock, change, said, where
         ({"max_drives": 7}, "needs 8 drives"),
         ({"max_samples": 47}, "needs 48 samples"),
         ({"max_oversampling": 2}, "needs 4 conversions"),
-        ({"adc_bits": 12}, "the board has 12"),
+        ({"adc_bits": 8}, "the board's converter has 8"),
+        ({"adc_bits": 13}, "the board's converter has 13 .*multiple of 8"),
         ({"current": 200_000}, "limiter is set to 200 mA, the skin may carry 100 mA"),
     ],
 )

@@ -179,6 +179,7 @@ def test_other_refusals(monkeypatch, number, said):
 
 
 MEGA, CLONE, PLAIN = (0x2341, 0x0042), (0x1A86, 0x7523), (None, None)
+PICO = (0x2E8A, 0x000A)
 
 
 @pytest.mark.parametrize(
@@ -201,6 +202,7 @@ def test_which_port_is_not_guessed(monkeypatch, there, said):
     [
         ({"/dev/ttyUSB0": CLONE, "/dev/ttyS0": PLAIN}, "/dev/ttyUSB0"),
         ({"/dev/ttyUSB0": CLONE, "/dev/ttyACM0": MEGA}, "/dev/ttyACM0"),
+        ({"/dev/ttyUSB0": CLONE, "/dev/ttyACM0": PICO}, "/dev/ttyACM0"),
     ],
 )
 def test_the_only_board_is_found(monkeypatch, there, opened):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -33,24 +34,56 @@ Channels = Annotated[
 Port = Annotated[str, typer.Argument(help="Such as /dev/ttyACM0.")]
 
 
+def _checked_board(board: str) -> str:
+    if board not in ("mega", "pico"):
+        raise typer.BadParameter(f'expected mega or pico, got "{board}"')
+    return board
+
+
+Board = Annotated[
+    str,
+    typer.Option(
+        help="mega (Arduino Mega 2560) or pico (Raspberry Pi Pico).", callback=_checked_board
+    ),
+]
+
+
 @app.command()
-def build(channels: Channels = 8) -> None:
-    """Build the firmware of an ATmega2560 board."""
-    from tomoskin.emulator import build_elf
+def build(channels: Channels = 8, board: Board = "mega") -> None:
+    """Build the firmware of a board: the ELF of an ATmega2560, the UF2 of a Pico."""
+    from tomoskin.emulator import build_elf, build_uf2
 
     with Bar("building"):
-        elf = build_elf(channels)
-    typer.echo(str(elf))
+        made = build_uf2(channels) if board == "pico" else build_elf(channels)
+    typer.echo(str(made))
 
 
 @app.command()
-def flash(port: Port, channels: Channels = 8) -> None:
-    """Write the firmware to an Arduino Mega 2560 with avrdude."""
-    from tomoskin.emulator import write_firmware
+def flash(
+    port: Annotated[
+        str | None,
+        typer.Argument(
+            help="Such as /dev/ttyACM0; of a Pico its boot drive, found where none is named."
+        ),
+    ] = None,
+    channels: Channels = 8,
+    board: Board = "mega",
+) -> None:
+    """Write the firmware to a board: to a Mega with avrdude, to a Pico's boot drive as UF2."""
+    from tomoskin.emulator import find_boot_drive, pico_image, write_firmware, write_uf2
 
+    if board == "mega" and port is None:
+        raise typer.BadParameter("expected the port of the board, such as /dev/ttyACM0")
     with Bar("writing"):
-        write_firmware(port, channels)
-    typer.echo(f"{port}: firmware for {channels} channels; next is tomoskin firmware configure")
+        if board == "mega":
+            assert port is not None
+            write_firmware(port, channels)
+        else:
+            drive = find_boot_drive() if port is None else Path(port)
+            write_uf2(pico_image(channels), drive)
+            port = str(drive)
+    after = "next is tomoskin firmware configure" if board == "mega" else "the Pico starts it"
+    typer.echo(f"{port}: firmware for {channels} channels; {after}")
 
 
 @app.command()
@@ -101,15 +134,15 @@ def configure(
 
 
 @app.command()
-def emulate(skin: NamedSkinOption = DEFAULT_SKIN) -> None:
-    """Run the firmware on a simulated ATmega2560 until Ctrl-C; its serial port is printed."""
+def emulate(skin: NamedSkinOption = DEFAULT_SKIN, board: Board = "mega") -> None:
+    """Run the firmware on a simulated board until Ctrl-C; its serial port is printed."""
     from tomoskin.emulator import emulate_board
     from tomoskin.skin import Skin
 
-    with emulate_board(Skin.load(skin)) as board:
-        typer.echo(board.port)
+    with emulate_board(Skin.load(skin), board) as process:
+        typer.echo(process.port)
         try:
-            while board.alive:
+            while process.alive:
                 time.sleep(0.2)
         except KeyboardInterrupt:
             pass

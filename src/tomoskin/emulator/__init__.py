@@ -9,25 +9,44 @@ from tomoskin.emulator.flash import (
     write_firmware,
     write_identity,
 )
-from tomoskin.emulator.process import BoardProcess, Front, SkinMemory
+from tomoskin.emulator.pico import (
+    PicoPrograms,
+    build_pico_programs,
+    build_uf2,
+    find_boot_drive,
+    pico_image,
+    write_uf2,
+)
+from tomoskin.emulator.process import BoardProcess, BoardPrograms, Front, SkinMemory
 from tomoskin.emulator.program import Programs, build_elf, build_programs, firmware_image
-from tomoskin.emulator.transport import EmulatorTransport, emulate_board
+from tomoskin.emulator.source import BOARDS, DEFAULT, BoardKind, emulate_board
+from tomoskin.emulator.transport import EmulatorTransport
 
 __all__ = [
+    "BOARDS",
+    "DEFAULT",
     "BoardIdentity",
+    "BoardKind",
     "BoardProcess",
+    "BoardPrograms",
     "EmulatorTransport",
     "Front",
+    "PicoPrograms",
     "Programs",
     "SkinMemory",
     "build_elf",
+    "build_pico_programs",
     "build_programs",
+    "build_uf2",
     "check_current",
     "emulate_board",
+    "find_boot_drive",
     "firmware_image",
+    "pico_image",
     "read_identity",
     "say_identity",
     "sense_resistor",
     "write_firmware",
     "write_identity",
+    "write_uf2",
 ]

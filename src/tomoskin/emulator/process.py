@@ -6,12 +6,13 @@ import mmap
 import struct
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
+from typing import IO, Protocol
 
 from tomoskin.core import FloatArray, SourceError
 from tomoskin.emulator.flash import BoardIdentity
-from tomoskin.emulator.program import Programs
 
 MOST_ELECTRODES = 32
 _MAGIC = 0x31306E696B736F74
@@ -73,31 +74,33 @@ class SkinMemory:
         self._map.close()
 
 
+class BoardPrograms(Protocol):
+    """The firmware of a board, and the emulator that runs it."""
+
+    def power_on(
+        self, options: Sequence[str | Path], said: IO[bytes]
+    ) -> tuple[subprocess.Popen[bytes], str]:
+        """The emulator's process, whose stderr goes to ``said``, and the board's serial port.
+
+        The port is empty when it does not start.
+        """
+
+
 class BoardProcess:
     """An emulated board; ``port`` is its serial port."""
 
     def __init__(
-        self, programs: Programs, memory: Path, current: float, *options: str | Path
+        self, programs: BoardPrograms, memory: Path, current: float, *options: str | Path
     ) -> None:
         """Power on. ``memory``: of the skin; ``current`` A: what its limiter is set to.
 
-        ``options``: further ones of the emulator, see ``firmware/emulator/emulator.c``.
+        ``options``: further ones of the emulator.
         """
         eeprom = memory.with_name("eeprom")
         eeprom.write_bytes(BoardIdentity(current, b"emulated").pack())
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
-        self._process = subprocess.Popen(
-            [
-                *(programs.emulator, "-d", "-s", memory, "-e", eeprom),
-                *options,
-                programs.elf,
-            ],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-        )
-        assert self._process.stdout is not None
-        self.port = self._process.stdout.readline().decode().strip()
+        own = ("-d", "-s", memory, "-e", eeprom)
+        self._process, self.port = programs.power_on((*own, *options), self._said)
         if not self.port:
             self.close()
             raise SourceError(f"the emulator does not start: {self.last_words}", where="emulator")

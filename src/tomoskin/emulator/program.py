@@ -5,10 +5,11 @@ from __future__ import annotations
 import fcntl
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 from tomoskin.core import SourceError
 
@@ -18,10 +19,9 @@ FOLDER = Path(__file__).resolve().parents[3] / "firmware"
 IMAGES = Path(__file__).parent / "images"
 """Where a wheel has the firmware, built: ``tomoskin-8.hex`` for a board with 8 channels."""
 
-_BUILD = FOLDER.parent / "build" / "firmware"
+BUILD = FOLDER.parent / "build" / "firmware"
 _PACKAGES = "make gcc gcc-avr avr-libc libsimavr-dev libelf-dev"
 _NEEDED = ("make", "cc", "avr-gcc", "avr-size")
-_HINT = f"on Debian: apt-get install {_PACKAGES}"
 _LONGEST = 300.0
 
 
@@ -32,11 +32,27 @@ class Programs:
     elf: Path
     emulator: Path
 
+    def power_on(
+        self, options: Sequence[str | Path], said: IO[bytes]
+    ) -> tuple[subprocess.Popen[bytes], str]:
+        """The emulator's process, and the board's serial port; empty when it does not start.
+
+        ``options``: as in ``firmware/emulator/emulator.c``; ``said``: what takes its stderr.
+        """
+        process = subprocess.Popen(
+            [self.emulator, *options, self.elf],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=said,
+        )
+        assert process.stdout is not None
+        return process, process.stdout.readline().decode().strip()
+
 
 def build_elf(channels: int = 16) -> Path:
     """The firmware of a board with ``channels``, built if it is not up to date; SourceError."""
-    _make("avr", f"CHANNELS={channels}")
-    return _BUILD / f"tomoskin-{channels}.elf"
+    make_firmware(_NEEDED, _PACKAGES, "avr", f"CHANNELS={channels}")
+    return BUILD / f"tomoskin-{channels}.elf"
 
 
 def firmware_image(channels: int) -> Path:
@@ -66,29 +82,34 @@ def build_programs() -> Programs:
         When this is no checkout, a tool is missing, or the build fails.
     """
     elf = build_elf()
-    _make("emulator")
-    return Programs(elf, _BUILD / "tomoskin-emulator")
+    make_firmware(_NEEDED, _PACKAGES, "emulator")
+    return Programs(elf, BUILD / "tomoskin-emulator")
 
 
 @contextmanager
 def build_alone() -> Iterator[None]:
     """Wait until no other process builds the firmware: two would write over each other."""
-    _BUILD.mkdir(parents=True, exist_ok=True)
-    with (_BUILD / ".lock").open("w") as lock:
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with (BUILD / ".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
 
-def _make(*arguments: str) -> None:
+def make_firmware(needed: Sequence[str], packages: str, *arguments: str) -> None:
+    """Run make in ``firmware``, which needs the programs ``needed`` of Debian's ``packages``.
+
+    Raises SourceError when this is no checkout, a program is missing, or the build fails.
+    """
+    hint = f"on Debian: apt-get install {packages}"
     if not FOLDER.is_dir():
         raise SourceError(
             "the firmware's sources are not here",
             where="firmware",
             hint="use a git checkout; tomoskin firmware flash needs none",
         )
-    absent = [tool for tool in _NEEDED if shutil.which(tool) is None]
+    absent = [tool for tool in needed if shutil.which(tool) is None]
     if absent:
-        raise SourceError(f"{', '.join(absent)} missing", where="firmware", hint=_HINT)
+        raise SourceError(f"{', '.join(absent)} missing", where="firmware", hint=hint)
     with build_alone():
         made = subprocess.run(
             ["make", "--silent", "-C", str(FOLDER), *arguments],
@@ -99,4 +120,4 @@ def _make(*arguments: str) -> None:
         )
     if made.returncode:
         lines = [line for line in made.stderr.splitlines() if "error" in line] or ["make failed"]
-        raise SourceError(f"the build failed: {lines[0]}", where="firmware", hint=_HINT)
+        raise SourceError(f"the build failed: {lines[0]}", where="firmware", hint=hint)

@@ -1,25 +1,17 @@
-"""The emulated board as a source."""
+"""Bytes of an emulated board, and the sheet before its converter."""
 
 from __future__ import annotations
 
-import math
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tomoskin.core import SourceError
-from tomoskin.emulator.process import BoardProcess, Front, SkinMemory
-from tomoskin.emulator.program import Programs, build_programs
-from tomoskin.source import SerialTransport, read_options
-from tomoskin.twin import Contact, Pose, TwinSettings, TwinSkin, read_settings
-
-if TYPE_CHECKING:
-    from tomoskin.skin import Skin
-
+from tomoskin.emulator.process import BoardProcess, BoardPrograms, Front, SkinMemory
+from tomoskin.source import SerialTransport
+from tomoskin.twin import Contact, Pose, TwinSkin
 
 _STEP = 0.01
 """Between two looks at the sheet, s."""
@@ -30,7 +22,7 @@ class EmulatorTransport:
 
     def __init__(
         self,
-        programs: Programs,
+        programs: BoardPrograms,
         sheet: TwinSkin,
         front: Front,
         clock: Callable[[], float] = time.monotonic,
@@ -109,49 +101,3 @@ class EmulatorTransport:
         if resistance is not self._written:
             self._memory.write(resistance)
             self._written = resistance
-
-
-def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
-    """``emulator``, or with options, joined by commas: ``emulator:seed=3,preset=ideal``.
-
-    The sheet is the twin's; of the twin's electronics, current, compliance, gain and noise.
-
-    Raises
-    ------
-    SourceError
-        For an unknown option, or when firmware and emulator cannot be built here.
-    """
-    options = read_options(argument, ("seed", "preset"), "emulator")
-    settings = read_settings(options, skin, "emulator")
-    return EmulatorTransport(
-        build_programs(), TwinSkin.of(skin, settings), front_of(skin, settings)
-    )
-
-
-@contextmanager
-def emulate_board(skin: Skin) -> Iterator[BoardProcess]:
-    """A board on the skin at rest, for a host that opens its port itself; SourceError."""
-    settings = TwinSettings.preset(skin.twin.preset)
-    resistance = TwinSkin.of(skin, settings).resistance()
-    with tempfile.TemporaryDirectory(prefix="tomoskin-") as folder:
-        memory = SkinMemory(Path(folder) / "skin", front_of(skin, settings), resistance)
-        board = BoardProcess(build_programs(), memory.path, skin.current)
-        try:
-            yield board
-        finally:
-            board.close()
-            memory.close()
-
-
-def front_of(skin: Skin, settings: TwinSettings) -> Front:
-    """The board of a skin, as far as the emulator knows it."""
-    compliance = settings.electronics.compliance
-    return Front(
-        current=skin.current,
-        compliance=1e300 if math.isinf(compliance) else compliance,
-        gain=skin.readout.gain,
-        offset=skin.readout.offset,
-        reference=skin.readout.reference_voltage,
-        levels=float(1 << skin.readout.adc_bits),
-        noise=settings.electronics.noise,
-    )

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tomoskin.core import SourceError
+from tomoskin.emulator import BOARDS, DEFAULT
 from tomoskin.pipeline import Prepared
 from tomoskin.recording import ReplayTransport, SessionReader, as_recorded, parse_replay
 from tomoskin.run import commands
@@ -18,6 +19,11 @@ from tomoskin.server.task import Listener
 from tomoskin.skin import Skin
 from tomoskin.source import Transport, list_ports, open_source
 from tomoskin.wire import SCHEMA
+
+EMULATED = {
+    "emulator" if name == DEFAULT else f"emulator:{name}": f"Real firmware, simulated {board.text}"
+    for name, board in BOARDS.items()
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +61,7 @@ class SourceSwitch:
 
     def offers(self) -> list[Offer]:
         """What may be connected: the first source, the twin, the emulator, the ports here."""
-        offers = {"twin": "Simulated skin (twin)", "emulator": "Real firmware, simulated board"}
+        offers = {"twin": "Simulated skin (twin)", **EMULATED}
         offers |= {f"serial:{port.device}": str(port) for port in list_ports()}
         if not self._home.startswith("replay:"):
             offers = {self._home: offers.get(self._home, self._home)} | offers

@@ -82,8 +82,18 @@ def check_version(board: Hello | Info, where: str) -> None:
     raise WireError(spoken + "this host is older", where=where, hint=_UPDATE_HOST)
 
 
-def check_board(info: Info, scan: Scan, settings: ScanSettings, where: str) -> None:
-    """Raise SourceError that says what the board lacks for this scan."""
+def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSettings:
+    """What to set on this board for what is ``asked``; SourceError says what it lacks."""
+    settings = asked.on_board(info.adc_bits)
+    if settings is None:
+        raise SourceError(
+            f"the skin file says that {asked.oversampling} conversions of {asked.adc_bits} bits "
+            f"are summed, the board's converter has {info.adc_bits}",
+            where=where,
+            hint="correct the skin file: every voltage would be wrong"
+            if info.adc_bits < asked.adc_bits
+            else f"set oversampling to a multiple of {1 << info.adc_bits - asked.adc_bits}",
+        )
     channels = 1 + int(max(scan.drives.max(), scan.sample_electrode.max()))
     needs = (
         (channels, info.channels, "electrodes", "use a skin with fewer electrodes"),
@@ -98,13 +108,6 @@ def check_board(info: Info, scan: Scan, settings: ScanSettings, where: str) -> N
                 where=where,
                 hint=hint,
             )
-    if info.adc_bits != settings.adc_bits:
-        raise SourceError(
-            f"the skin file says that the converter has {settings.adc_bits} bits, "
-            f"the board has {info.adc_bits}",
-            where=where,
-            hint="correct the skin file: every voltage would be wrong",
-        )
     if info.current > round(settings.current_limit * 1e6):
         raise SourceError(
             f"the board's current limiter is set to {info.current / 1e3:g} mA, the skin may carry "
@@ -112,6 +115,7 @@ def check_board(info: Info, scan: Scan, settings: ScanSettings, where: str) -> N
             where=where,
             hint="turn the limiter down before you connect the skin",
         )
+    return settings
 
 
 def check_held(held: HeldScan | HeldPattern, sent: Sequence[Command], where: str) -> None:

@@ -55,6 +55,15 @@ class Configuration:
             return tuple(pattern for pattern in self.patterns if pattern.first == question.first)
         return (self.scan, self.format)
 
+    def on_board(self, fitted: ScanSettings) -> Self:
+        """The same scan as a board with another converter does it: under the same identity."""
+        packing = Format.PACKED if fitted.packs else Format.SIXTEEN
+        return replace(
+            self,
+            scan=replace(self.scan, oversampling=fitted.oversampling),
+            format=replace(self.format, format=packing),
+        )
+
     @classmethod
     def of(cls, scan: Scan, settings: ScanSettings) -> Self:
         """Timing, and drives in chunks."""

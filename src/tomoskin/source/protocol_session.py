@@ -6,7 +6,7 @@ from enum import Enum, auto
 
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.pattern import Scan
-from tomoskin.source.agreement import check_board, check_held, check_version
+from tomoskin.source.agreement import check_held, check_version, fit_board
 from tomoskin.source.command_queue import CommandQueue, SequenceFilter
 from tomoskin.source.configuration import Configuration
 from tomoskin.source.settings import ScanSettings, Timing
@@ -69,7 +69,7 @@ class ProtocolSession:
     ) -> None:
         """A session that has not begun."""
         self._scan, self._settings, self._timing, self._where = scan, settings, timing, where
-        self.configuration = Configuration.of(scan, settings)
+        self.configuration = self._on_board = Configuration.of(scan, settings)
         self.frames = SequenceFilter(self.configuration)
         self.commands = CommandQueue(timing, now, where)
         self.stage = Stage.WAITING
@@ -191,9 +191,10 @@ class ProtocolSession:
         pending = self.commands.pending
         if isinstance(pending, GetInfo) and info.request == pending.request:
             check_version(info, self._where)
-            check_board(info, self._scan, self._settings, self._where)
+            fitted = fit_board(info, self._scan, self._settings, self._where)
+            self._on_board = self.configuration.on_board(fitted)
             self.info = info
-            self.commands.add(self.configuration.commands(info.minor))
+            self.commands.add(self._on_board.commands(info.minor))
             self._answered(now)
 
     def _held(self, held: HeldScan | HeldPattern, now: float) -> list[Frame | Event]:
@@ -201,7 +202,7 @@ class ProtocolSession:
         question = GetScan if isinstance(held, HeldScan) else GetPattern
         if not isinstance(pending, question) or held.request != pending.request:
             return []
-        check_held(held, self.configuration.behind(pending), self._where)
+        check_held(held, self._on_board.behind(pending), self._where)
         return self._answered(now)
 
     def _ack(self, ack: Ack, now: float) -> list[Frame | Event]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from tomoskin.core import SourceError
 from tomoskin.source.registry import read_options
-from tomoskin.source.silence import BAUD, SIGN_ON, SIGN_ON_RATE, Silence, is_bootloader
+from tomoskin.source.silence import BAUD, PICO, SIGN_ON, SIGN_ON_RATE, Silence, is_bootloader
 
 if TYPE_CHECKING:
     from serial import Serial
@@ -18,12 +18,14 @@ if TYPE_CHECKING:
 
 
 _MEGA = "Arduino Mega 2560"
+_BOARDS = (_MEGA, PICO)
 _KNOWN = {
     (0x2341, 0x0010): _MEGA,
     (0x2341, 0x0042): _MEGA,
     (0x2341, 0x0242): _MEGA,
     (0x2A03, 0x0010): _MEGA,
     (0x2A03, 0x0042): _MEGA,
+    (0x2E8A, 0x000A): PICO,
     (0x1A86, 0x7523): "CH340, as on many boards",
     (0x1A86, 0x5523): "CH341, as on many boards",
     (0x1A86, 0x55D4): "CH9102, as on many boards",
@@ -57,7 +59,9 @@ def list_ports() -> tuple[Port, ...]:
     from serial.tools.list_ports import comports  # noqa: PLC0415 - only who has a board needs it
 
     ports = (Port(port.device, _KNOWN.get((port.vid, port.pid), "")) for port in comports())
-    return tuple(sorted(ports, key=lambda port: (port.board != _MEGA, not port.board, port.device)))
+    return tuple(
+        sorted(ports, key=lambda port: (port.board not in _BOARDS, not port.board, port.device))
+    )
 
 
 def say_ports() -> str:
@@ -67,7 +71,7 @@ def say_ports() -> str:
 
 
 def only_board() -> str:
-    """The one port with a Mega 2560, or else the one with a known bridge.
+    """The one port with a Mega 2560 or a Pico, or else the one with a known bridge.
 
     Raises
     ------
@@ -75,7 +79,7 @@ def only_board() -> str:
         When there is none, or more than one: opening a port resets what is behind it.
     """
     ports = list_ports()
-    candidates = [port for port in ports if port.board == _MEGA] or [p for p in ports if p.board]
+    candidates = [port for port in ports if port.board in _BOARDS] or [p for p in ports if p.board]
     if len(candidates) == 1:
         return candidates[0].device
     raise SourceError(

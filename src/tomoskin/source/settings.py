@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self
 
 from tomoskin.core import SourceError
@@ -80,6 +80,17 @@ class ScanSettings:
     def packs(self) -> bool:
         """Whether samples fit ten bits, so that frames can be sent packed."""
         return self.oversampling == 1 and self.adc_bits == _PACKED_BITS
+
+    def on_board(self, adc_bits: int) -> Self | None:
+        """The settings that give samples of the same scale on a converter of ``adc_bits``.
+
+        A finer one sums fewer conversions: 4 of 12 bits reach as far as 16 of 10 bits. None where
+        it cannot be.
+        """
+        fewer = 1 << max(adc_bits - self.adc_bits, 0)
+        if adc_bits < self.adc_bits or self.oversampling % fewer:
+            return None
+        return replace(self, oversampling=self.oversampling // fewer, adc_bits=adc_bits)
 
     @property
     def conversion(self) -> float:

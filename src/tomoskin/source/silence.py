@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from tomoskin.core import SourceError
 
+PICO = "Raspberry Pi Pico"
+"""What a port with a Pico behind it is called: it is flashed by its boot drive, not by the port."""
+
 BAUD = 1_000_000
 """Rate that the firmware starts with: exact at 16 MHz."""
 
@@ -51,7 +54,8 @@ class Silence:
     @property
     def cause(self) -> SourceError:
         """The likeliest, and what to do."""
-        flash = f"tomoskin firmware flash {self.port}"
+        target = "--board pico" if self.board == PICO else self.port
+        flash = f"tomoskin firmware flash {target}"
         if is_bootloader(self.bootloader):
             text, hint = "the board is in its bootloader: it has no firmware", flash
         elif is_text(self.heard):

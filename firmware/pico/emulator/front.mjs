@@ -1,0 +1,117 @@
+// What the pins of firmware/pico/pins.h are connected to: switches, multiplexer, amplifier; and
+// what is seen of them. What the switches must never do is complained of.
+import { GPIOPinState } from 'rp2040js';
+
+const SOURCE_SHIFT = 2;
+const SINK_SHIFT = 7;
+const READ_SHIFT = 12;
+const FIVE_BITS = 31;
+const SOURCE_ENABLE = 17;
+const SINK_ENABLE = 18;
+const LATCH = 19;
+const AMPLIFIER = 0;
+const NONE = -1;
+const LEAST_DEAD_NS = 1000;
+const MULTIPLEXER_NS = 1500;
+const CONVERSION_NS = 2000;
+
+export class Front {
+  /** `skin` gives codes; `watch` takes what is seen; `complain` a sentence. */
+  constructor(skin, watch, complain) {
+    this.skin = skin;
+    this.watch = watch;
+    this.complain = complain;
+    this.source = this.sink = NONE;
+    this.opened = -Infinity;
+    this.since = 0;
+  }
+
+  /** Stand before a chip that has just been powered on or reset: its pins float. */
+  attach(chip, now) {
+    this.chip = chip;
+    this.now = now;
+    this.latched = 0;
+    this.read = this.before = 0;
+    this.readSince = -Infinity;
+    this.#connect(NONE, NONE);
+    for (const pin of [SOURCE_ENABLE, SINK_ENABLE, LATCH]) {
+      chip.gpio[pin].addListener(() => this.#onControl());
+    }
+    for (let bit = 0; bit < 5; bit++) {
+      chip.gpio[READ_SHIFT + bit].addListener(() => this.#onRead());
+    }
+    const done = chip.clock.createAlarm(() => chip.adc.completeADCRead(this.code, false));
+    chip.adc.onADCRead = (input) => {
+      this.code = this.#convert(input);
+      done.schedule(CONVERSION_NS);
+    };
+  }
+
+  #high(pin) {
+    return this.chip.gpio[pin].value === GPIOPinState.High;
+  }
+
+  #address(shift) {
+    return (this.chip.sio.gpioValue >>> shift) & FIVE_BITS;
+  }
+
+  #onControl() {
+    if (!this.#high(LATCH)) {
+      this.latched = this.chip.sio.gpioValue;
+    }
+    const source = this.#high(SOURCE_ENABLE) ? (this.latched >>> SOURCE_SHIFT) & FIVE_BITS : NONE;
+    const sink = this.#high(SINK_ENABLE) ? (this.latched >>> SINK_SHIFT) & FIVE_BITS : NONE;
+    const wasOn = this.source !== NONE && this.sink !== NONE;
+    if (source === this.source && sink === this.sink) {
+      return;
+    }
+    const isOn = source !== NONE && sink !== NONE;
+    if (isOn && wasOn) {
+      this.complain('make before break');
+    }
+    if (isOn && !wasOn && this.now() - this.opened < LEAST_DEAD_NS) {
+      this.complain('dead time too short');
+    }
+    if (isOn && source === sink) {
+      this.complain('source = sink');
+    }
+    this.#connect(source, sink);
+  }
+
+  #connect(source, sink) {
+    const was = this.source !== NONE || this.sink !== NONE;
+    const is = source !== NONE || sink !== NONE;
+    this.source = source;
+    this.sink = sink;
+    const now = this.now();
+    if (was && !is) {
+      this.opened = now;
+      this.watch.ended(now - this.since);
+    }
+    if (!was && is) {
+      this.watch.began(now - this.opened);
+      this.since = now;
+    }
+  }
+
+  #onRead() {
+    const read = this.#address(READ_SHIFT);
+    if (read !== this.read) {
+      this.before = this.read;
+      this.read = read;
+      this.readSince = this.now();
+      this.ordinal = 0;
+    }
+  }
+
+  /** The code of a conversion that begins now; of the channel before while the switch settles. */
+  #convert(input) {
+    if (input !== AMPLIFIER) {
+      this.complain(`converter input ${input} has nothing on it`);
+    }
+    const now = this.now();
+    const channel = now - this.readSince < MULTIPLEXER_NS ? this.before : this.read;
+    this.watch.sampled(this.source, this.sink, this.read, this.ordinal++, now - this.since);
+    return this.skin.code(this.source, this.sink, channel);
+  }
+}

@@ -1,0 +1,22 @@
+/* Pins of the Pico's board; docs/firmware.md has them as a table.
+
+   Addresses go to the switches' demultiplexers and to the multiplexer before the amplifier; the
+   enables connect when high. Pads pull down from reset on, and so does a resistor on the board. */
+#ifndef TOMOSKIN_PICO_PINS_H
+#define TOMOSKIN_PICO_PINS_H
+
+#define ADDRESS_MASK 0x1Fu /* five bits each: 32 electrodes */
+#define SOURCE_SHIFT 2u
+#define SINK_SHIFT 7u
+#define READ_SHIFT 12u
+#define SOURCE_ENABLE (1u << 17)
+#define SINK_ENABLE (1u << 18)
+#define LATCH (1u << 19) /* low takes the addresses of source and sink */
+#define FIRST_OUTPUT 2u
+#define LAST_OUTPUT 19u
+#define OUTPUTS 0x000FFFFCu
+
+#define AMPLIFIER_PIN 26u
+#define AMPLIFIER_INPUT 0u /* of the converter */
+
+#endif

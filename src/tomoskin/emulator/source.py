@@ -1,0 +1,98 @@
+"""The source ``emulator``, for the entry-point group ``tomoskin.sources``."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tomoskin.emulator.pico import build_pico_programs
+from tomoskin.emulator.process import BoardProcess, BoardPrograms, Front, SkinMemory
+from tomoskin.emulator.program import build_programs
+from tomoskin.emulator.transport import EmulatorTransport
+from tomoskin.source import read_options
+from tomoskin.twin import TwinSettings, TwinSkin, read_settings
+
+if TYPE_CHECKING:
+    from tomoskin.skin import Skin
+
+
+@dataclass(frozen=True, slots=True)
+class BoardKind:
+    """A board that is emulated: its name for people, its converter, and how its parts are built."""
+
+    text: str
+    adc_bits: int
+    build: Callable[[], BoardPrograms]
+
+
+BOARDS = {
+    "mega": BoardKind("Arduino Mega 2560", 10, build_programs),
+    "pico": BoardKind("Raspberry Pi Pico", 12, build_pico_programs),
+}
+"""By the name that options and commands give."""
+
+DEFAULT = "mega"
+"""The board where none is named."""
+
+
+def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
+    """``emulator``, ``emulator:pico``, or with options: ``emulator:pico,seed=3,preset=ideal``.
+
+    The sheet is the twin's; of the twin's electronics, current, compliance, gain and noise.
+
+    Raises
+    ------
+    SourceError
+        For an unknown option, or when firmware and emulator cannot be built here.
+    """
+    options = read_options(argument, ("seed", "preset", *BOARDS), "emulator")
+    board = next((name for name in BOARDS if name in options), DEFAULT)
+    settings = read_settings(options, skin, "emulator")
+    return EmulatorTransport(
+        programs_of(board), TwinSkin.of(skin, settings), front_of(skin, settings, board)
+    )
+
+
+@contextmanager
+def emulate_board(skin: Skin, board: str = DEFAULT) -> Iterator[BoardProcess]:
+    """A board on the skin at rest, for a host that opens its port itself; SourceError."""
+    settings = TwinSettings.preset(skin.twin.preset)
+    resistance = TwinSkin.of(skin, settings).resistance()
+    with tempfile.TemporaryDirectory(prefix="tomoskin-") as folder:
+        memory = SkinMemory(Path(folder) / "skin", front_of(skin, settings, board), resistance)
+        process = BoardProcess(programs_of(board), memory.path, skin.current)
+        try:
+            yield process
+        finally:
+            process.close()
+            memory.close()
+
+
+def programs_of(board: str) -> BoardPrograms:
+    """Firmware and emulator of one of :data:`BOARDS`, built if need be; SourceError."""
+    return BOARDS[board].build()
+
+
+def front_of(skin: Skin, settings: TwinSettings, board: str = DEFAULT) -> Front:
+    """The board before a skin, as far as the emulator knows it.
+
+    The skin file's read-out is that of the board it was made for. Another one's amplifier uses as
+    much of its own converter's scale, and is as noisy in volts.
+    """
+    compliance = settings.electronics.compliance
+    readout = skin.readout
+    bits = max(BOARDS[board].adc_bits, readout.adc_bits)
+    return Front(
+        current=skin.current,
+        compliance=1e300 if math.isinf(compliance) else compliance,
+        gain=readout.gain,
+        offset=readout.offset,
+        reference=readout.reference_voltage,
+        levels=float(1 << bits),
+        noise=settings.electronics.noise * (1 << bits - readout.adc_bits),
+    )
