@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,10 +11,12 @@ from typing import TYPE_CHECKING
 from tomoskin import __version__
 from tomoskin.core import written
 from tomoskin.pipeline import Prepared
-from tomoskin.recording import SessionReader, as_recorded, indexed_frames, replayed
+from tomoskin.recording import as_recorded, indexed_frames, replayed
+from tomoskin.sink.cdr import encode_cdr
 from tomoskin.sink.naming import Naming
-from tomoskin.sink.ros import TOPICS, RosMessage, RosView, definition, encode_cdr, type_hash
-from tomoskin.sink.sink import Item, Moment, Stream, raster
+from tomoskin.sink.ros import TOPICS, RosMessage, RosView
+from tomoskin.sink.ros_types import definition, type_hash
+from tomoskin.sink.sink import Item, Moment, Stream
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -34,7 +37,9 @@ def write_bag(job: Export, path: Path) -> None:
     from mcap.writer import CompressionType, Writer  # noqa: PLC0415 - no live run needs it
 
     prepared, naming = as_recorded(job.session), Naming()
-    view = RosView(_stream(prepared, job.session), naming)
+    stream = Stream.of(prepared, str(job.session.path), job.session.epoch)
+    stream = replace(stream, replayed=False)  # here events are those of the recording too
+    view = RosView(stream, naming)
     with written(path, overwrite=job.overwrite) as part, part.open("wb") as file:
         bag = Writer(file, compression=CompressionType.NONE)
         bag.start(profile="ros2", library=f"tomoskin {__version__}")
@@ -43,12 +48,6 @@ def write_bag(job: Export, path: Path) -> None:
             for message in view.of(item):
                 _put(bag, channels[message.topic], message)
         bag.finish()  # type: ignore[no-untyped-call]
-
-
-def _stream(prepared: Prepared, session: SessionReader) -> Stream:
-    skin = prepared.skin
-    pixels, name = raster(prepared), str(session.path)
-    return Stream(skin.name, name, prepared.pattern, pixels, session.epoch, skin.surface)
 
 
 def _items(job: Export, prepared: Prepared) -> Iterator[Item]:
@@ -69,7 +68,7 @@ def _register(bag: Writer, naming: Naming, topic: str) -> int:
     text = _BETWEEN.join(definition(kind))
     schema = bag.register_schema(kind, "ros2msg", text.encode())
     about = {"offered_qos_profiles": "", "topic_type_hash": type_hash(kind)}
-    return bag.register_channel(f"/{naming.namespace}/{topic}", "cdr", schema, about)
+    return bag.register_channel(f"/{naming.topic(topic)}", "cdr", schema, about)
 
 
 def _put(bag: Writer, channel: int, message: RosMessage) -> None:
