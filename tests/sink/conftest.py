@@ -95,7 +95,9 @@ def news():
 def robot_program(library, **changes):
     """A program of docs/robot.md, by the library that it uses."""
     blocks = re.findall(r"^```python\n(.*?)^```", ROBOT.read_text(), re.DOTALL | re.MULTILINE)
-    (program,) = (block for block in blocks if re.search(rf"^(import|from) {library}\b", block, re.M))
+    (program,) = (
+        block for block in blocks if re.search(rf"^(import|from) {library}\b", block, re.M)
+    )
     for old, new in changes.values():
         assert old in program
         program = program.replace(old, new)
