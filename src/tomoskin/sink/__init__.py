@@ -12,6 +12,7 @@ from tomoskin.sink.consumer import (
 from tomoskin.sink.contact import Contact, Contacts
 from tomoskin.sink.listener import ContactListener
 from tomoskin.sink.naming import Mount, Naming
+from tomoskin.sink.rerun import write_rerun
 from tomoskin.sink.sink import Item, Moment, Sink, Stream, epoch, raster
 from tomoskin.sink.worker import Capacity, Consumer, Worker, stop_workers
 
@@ -38,4 +39,5 @@ __all__ = [
     "sink_worker",
     "stop_workers",
     "write_bag",
+    "write_rerun",
 ]

@@ -10,7 +10,7 @@ from typing import Protocol, Self
 from tomoskin.core import Event, FloatArray, GeometryError, Image, PixelMap, Touch
 from tomoskin.mesh import Plane, Surface
 from tomoskin.pattern import Pattern
-from tomoskin.pipeline import FrameResult, Prepared
+from tomoskin.pipeline import FrameResult, Prepared, colour_limit
 from tomoskin.recording import event_of
 from tomoskin.touch import TouchEvent
 
@@ -43,6 +43,10 @@ class Stream:
         Whether frames have the times of a recording, and ``epoch`` is theirs.
     points
         (n_cells, 3) m, the middle of each cell in space; None where it is not asked for.
+    corners
+        (n_cells, 3, 3) m, those of each triangle in space; None where cells are tetrahedra.
+    limit
+        End of the symmetric scale of colours, in the image's unit.
     clock
         What host times are times of; None where they are those of a recording.
     """
@@ -55,6 +59,8 @@ class Stream:
     surface: Surface = field(default_factory=Plane)
     replayed: bool = False
     points: FloatArray | None = None
+    corners: FloatArray | None = None
+    limit: float = 1.0
     clock: Callable[[], float] | None = None
 
     @classmethod
@@ -68,7 +74,9 @@ class Stream:
             epoch=epoch() if recorded is None else recorded,
             surface=prepared.skin.surface,
             replayed=recorded is not None,
-            points=cell_points(prepared),
+            points=_cell_points(prepared),
+            corners=_corners(prepared),
+            limit=colour_limit(prepared),
             clock=time.monotonic if recorded is None else None,
         )
 
@@ -196,10 +204,18 @@ def raster(prepared: Prepared) -> PixelMap | None:
         return None
 
 
-def cell_points(prepared: Prepared) -> FloatArray:
-    """(n_cells, 3) m, the middle of each cell in space."""
-    centres = prepared.mesh.centroids
-    return centres if centres.shape[1] == 3 else prepared.skin.surface.point(centres)
+def _cell_points(prepared: Prepared) -> FloatArray:
+    return _in_space(prepared, prepared.mesh.centroids)
+
+
+def _corners(prepared: Prepared) -> FloatArray | None:
+    mesh = prepared.mesh
+    return _in_space(prepared, mesh.points)[mesh.cells] if mesh.cells.shape[1] == 3 else None
+
+
+def _in_space(prepared: Prepared, places: FloatArray) -> FloatArray:
+    """(n, 3) m of places on the sheet, or of a body."""
+    return places if places.shape[1] == 3 else prepared.skin.surface.point(places)
 
 
 def epoch() -> float:
