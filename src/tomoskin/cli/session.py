@@ -35,6 +35,7 @@ EXPORTS = {
     ".parquet": "the same for data tools",
     ".h5": "everything",
     ".npz": "an interchange file",
+    ".lerobot": "a folder, a LeRobot dataset",
     ".mat": "EIDORS' structures",
     ".vtu": "a mesh for each moment",
     ".pvd": "the same",
@@ -115,7 +116,7 @@ def export(
         Path,
         typer.Argument(
             metavar="OUT",
-            help="X.csv, .parquet, .h5, .npz, .mat, .vtu, .png, .gif, .mp4, .mcap, .rrd.",
+            help="X.csv, .parquet, .h5, .npz, .lerobot, .mat, .vtu, .png, .gif, .mp4, .mcap, .rrd.",
         ),
         Writes(EXPORTS, _exported),
     ],
