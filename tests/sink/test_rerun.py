@@ -6,6 +6,7 @@ The package is large (490 MB), so that the usual set-up leaves it out.
 from __future__ import annotations
 
 import contextlib
+import socket
 import subprocess
 import sys
 import time
@@ -101,6 +102,7 @@ def test_a_viewer_gets_the_same(tmp_path, whole):
         stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
     )  # fmt: skip
     try:
+        wait_for(viewer, port)
         sink = open_rerun(f"127.0.0.1:{port}")
         sink.open(whole)
         sink.publish(moment_at(0.25, TOUCH))
@@ -109,6 +111,27 @@ def test_a_viewer_gets_the_same(tmp_path, whole):
     finally:
         viewer.kill()
         viewer.wait(PATIENCE)
+
+
+def wait_for(viewer, port):
+    """Until the viewer listens."""
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        assert viewer.poll() is None
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)):
+            return
+        time.sleep(0.05)
+    raise AssertionError("the viewer does not listen")
+
+
+def test_a_viewer_that_is_not_there_is_said(whole, monkeypatch):
+    monkeypatch.setattr("tomoskin.sink.rerun._PATIENCE", 0.2)
+    sink = open_rerun(f"127.0.0.1:{free_port()}")
+    sink.open(whole)
+    sink.publish(moment_at(0.25, TOUCH))
+    with pytest.raises(SinkError, match="no viewer has taken it"):
+        sink.close()
+    sink.close()
 
 
 def labels_of(viewer, path):

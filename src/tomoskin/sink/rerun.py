@@ -131,8 +131,13 @@ class RerunSink:
     def close(self) -> None:
         """End the recording."""
         recording, self._recording = self._recording, None
-        if recording is not None:
+        if recording is None:
+            return
+        try:
             recording.flush(timeout_sec=_PATIENCE)
+        except RuntimeError as error:
+            raise SinkError(f"no viewer has taken it: {error}", where=self.name) from error
+        finally:
             recording.disconnect()
 
 
