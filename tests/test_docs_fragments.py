@@ -18,7 +18,7 @@ from tomoskin.twin import TwinSettings, TwinSkin
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGES = (
-    *("bodies", "imaging", "interchange", "outputs", "states"),
+    *("bodies", "imaging", "interchange", "outputs", "simulate", "states"),
     *("touch", "touch-fit", "twin", "wiring"),
 )
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)

@@ -15,8 +15,8 @@ from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.recording.replay import open_replay
 from tomoskin.run import Runner
-from tomoskin.sink import Moment
-from tomoskin.sink.naming import Naming, event_content
+from tomoskin.sink import Moment, Naming
+from tomoskin.sink.contact import event_content
 from tomoskin.skin import Skin
 
 FRAMES = 3 * REFERENCE_FRAMES

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import queue
 import re
 import socket
@@ -93,17 +92,24 @@ def news():
     return News()
 
 
-class Listener:
-    """A program of docs/robot.md in a process of its own, and the lines that it prints."""
+def robot_program(library, **changes):
+    """A program of docs/robot.md, by the library that it uses."""
+    blocks = re.findall(r"^```python\n(.*?)^```", ROBOT.read_text(), re.DOTALL | re.MULTILINE)
+    (program,) = (
+        block for block in blocks if re.search(rf"^(import|from) {library}\b", block, re.M)
+    )
+    for old, new in changes.values():
+        assert old in program
+        program = program.replace(old, new)
+    return program
 
-    def __init__(self, library, **changes):
-        blocks = re.findall(r"^```python\n(.*?)^```", ROBOT.read_text(), re.DOTALL | re.MULTILINE)
-        (program,) = (block for block in blocks if f"import {library}" in block)
-        for old, new in changes.values():
-            assert old in program
-            program = program.replace(old, new)
+
+class Listener:
+    """Python in a process of its own, and the lines that it prints."""
+
+    def __init__(self, *arguments):
         self._process = subprocess.Popen(
-            [sys.executable, "-u", "-c", program], stdout=subprocess.PIPE, text=True
+            [sys.executable, "-u", *arguments], stdout=subprocess.PIPE, text=True
         )
         self._lines = queue.SimpleQueue()
         self._reader = threading.Thread(target=self._read)
@@ -115,16 +121,23 @@ class Listener:
 
     def hears(self, publish):
         """The first line, while ``publish(n)`` goes on saying the same: it may not listen yet."""
+        return next(self.lines(publish))
+
+    def lines(self, publish):
+        """Each line; whenever there is none, ``publish(n)`` once more."""
         deadline = time.monotonic() + 3 * PATIENCE
-        line, number = None, 0
-        while line is None:
+        number = 0
+        while True:
             assert time.monotonic() < deadline
             assert self._process.poll() is None
-            publish(number)
-            number += 1
-            with contextlib.suppress(queue.Empty):
-                line = self._lines.get(timeout=0.2)
-        return line
+            try:
+                yield self._lines.get(timeout=0.2)
+            except queue.Empty:
+                publish(number)
+                number += 1
+
+    def send(self, number):
+        self._process.send_signal(number)
 
     def stop(self):
         self._process.kill()
@@ -134,14 +147,20 @@ class Listener:
 
 
 @pytest.fixture
-def listener():
-    """Start a program of docs/robot.md, by the library that it uses; it ends with the test."""
+def program():
+    """Start Python with some arguments; it ends with the test."""
     started = []
 
-    def start(library, **changes):
-        started.append(Listener(library, **changes))
+    def start(*arguments):
+        started.append(Listener(*arguments))
         return started[-1]
 
     yield start
     for one in started:
         one.stop()
+
+
+@pytest.fixture
+def listener(program):
+    """Start a program of docs/robot.md, by the library that it uses; it ends with the test."""
+    return lambda library, **changes: program("-c", robot_program(library, **changes))

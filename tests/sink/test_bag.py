@@ -1,15 +1,15 @@
-"""A session as a bag of ROS 2: read back by what the file itself says of its messages."""
+"""A session as a bag of ROS 2, read back by ``rosbags``."""
 
 from __future__ import annotations
 
 import json
-import re
 
 import pytest
 from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
 
 from cli.conftest import tomoskin
-from sink.test_ros import Cdr
 from tomoskin.recording import SessionReader, as_recorded, replayed
 
 __all__ = ["tomoskin"]
@@ -29,30 +29,6 @@ hold = "200 ms"
 at = "500 ms"
 text = "half"
 """
-LAYOUTS = {"float64": "d", "uint32": "I", "int32": "i", "uint8": "B"}
-
-
-def decode(cdr, schema):
-    """Fields by name, as the definition in the file has them."""
-    parts = re.split(r"\n=+\nMSG: (\S+)\n", schema.data.decode())
-    known = dict(zip(parts[1::2], parts[2::2], strict=True))
-
-    def value(kind):
-        if kind == "string":
-            return cdr.text()
-        return cdr.take(LAYOUTS[kind]) if kind in LAYOUTS else fields(known[kind])
-
-    def field(kind):
-        base, bracket, length = kind.rstrip("]").partition("[")
-        if not bracket:
-            return value(base)
-        return [value(base) for _ in range(int(length) if length else cdr.take("I"))]
-
-    def fields(text):
-        lines = (line.split() for line in text.splitlines())
-        return {name: field(kind) for kind, name in lines}
-
-    return fields(parts[0])
 
 
 @pytest.fixture
@@ -66,29 +42,39 @@ def bag(tomoskin, tmp_path):
     return session, bag
 
 
+def messages_of(path):
+    """(profile, messages by topic) as ``rosbags`` reads them by what the file says of its types."""
+    found = {}
+    store = get_typestore(Stores.EMPTY)
+    with AnyReader([path], default_typestore=store) as reader:
+        for connection, when, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            found.setdefault(connection.topic, []).append((when, message))
+    return found
+
+
 def test_a_bag_holds_the_touches_of_a_session(bag, tomoskin):
-    with bag[1].open("rb") as file:
-        reader = make_reader(file, validate_crcs=True)
-        assert reader.get_header().profile == "ros2"
-        found = {}
-        for schema, channel, message in reader.iter_messages():
-            assert (schema.encoding, channel.message_encoding) == ("ros2msg", "cdr")
-            cdr = Cdr(message.data)
-            content = decode(cdr, schema)
-            assert cdr.ends()
-            found.setdefault(channel.topic, []).append((message.log_time, content))
+    found = messages_of(bag[1])
     with SessionReader(bag[0]) as session:
         results = list(replayed(as_recorded(session), session))
     expected = [(round(1e9 * r.host_time), t) for r in results for t in r.touches]
     assert len(expected) > 3
     for (when, told), (time, touch) in zip(found["/tomoskin/track"], expected, strict=True):
-        assert (when, told["child_frame_id"]) == (time, f"skin/touch_{touch.id}")
-        place = told["pose"]["pose"]["position"]
-        assert (place["x"], place["y"], place["z"]) == (touch.detection.x, touch.detection.y, 0)
+        assert (when, told.child_frame_id) == (time, f"skin/touch_{touch.id}")
+        place = told.pose.pose.position
+        assert (place.x, place.y, place.z) == (touch.detection.x, touch.detection.y, 0)
     assert len(found["/tomoskin/touch"]) == len(expected)
-    texts = [json.loads(told["data"]) for _, told in found["/tomoskin/events"]]
+    contacts = [contact for _, told in found["/tomoskin/contacts"] for contact in told.contacts]
+    assert [contact.position.x for contact in contacts] == [t.detection.x for _, t in expected]
+    texts = [json.loads(told.data) for _, told in found["/tomoskin/events"]]
     assert {"note", "touch-onset"} <= {text["kind"] for text in texts}
     assert texts[0]["utc_s"] is None  # a simulation has no time of the day
-    assert 2 <= len(found["/tomoskin/image"]) <= 5
+    told = [json.loads(told.data) for _, told in found["/tomoskin/touches"]]
+    assert {row["latency_s"] for row in told} == {None}  # of a recording nothing is known of it
+    assert not told[0]["valid"]  # until the reference stands
+    assert all(row["valid"] for row in told if row["touches"])
+    assert 2 <= len(found["/tomoskin/image"]) == len(found["/tomoskin/points"]) <= 5
+    with bag[1].open("rb") as file:
+        assert make_reader(file, validate_crcs=True).get_header().profile == "ros2"
     code, _, errors = tomoskin("session", "info", bag[1])
     assert (code, "no session of tomoskin" in errors) == (1, True)

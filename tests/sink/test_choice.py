@@ -11,7 +11,7 @@ from tomoskin.sink import make_sink, sink_names
 
 
 def test_the_installed_sinks():
-    assert sink_names() == ("foxglove", "lsl", "mqtt", "ros2", "zenoh")
+    assert sink_names() == ("foxglove", "lsl", "mqtt", "rerun", "ros2", "zenoh")
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,7 @@ def test_the_installed_sinks():
         ("zenoh", "zenoh peers"),
         ("zenoh:tcp/10.0.0.1:7447,domain=3", "zenoh tcp/10.0.0.1:7447"),
         ("zenoh:namespace=left_arm", "zenoh peers"),
+        ("ros2:domain=4", "ros2 /tomoskin, domain 4"),
     ],
 )
 def test_names_say_where_results_go_but_no_password(spec, name):
@@ -38,7 +39,7 @@ def test_names_say_where_results_go_but_no_password(spec, name):
     ("spec", "said"),
     [
         ("", "there is no sink"),
-        ("kafka", "known are foxglove, lsl, mqtt, ros2, zenoh"),
+        ("kafka", "known are foxglove, lsl, mqtt, rerun, ros2, zenoh"),
         ("foxglove:port", "expected a port"),
         ("foxglove:70000", "expected a port"),
         ("foxglove:0", "expected a port"),
@@ -53,7 +54,7 @@ def test_names_say_where_results_go_but_no_password(spec, name):
         ("zenoh:tcp/a:1,tcp/b:2", "expected an endpoint"),
         ('zenoh:tcp/"', "expected an endpoint"),
         ("zenoh:namespace=left arm", "expected a namespace"),
-        ("zenoh:space=x", "expected domain=…, namespace=…, frame=…"),
+        ("zenoh:space=x", "expected domain=…, namespace=…, frame=…, parent=…, at=…"),
         ("mqtt://host/a?qos=1", "expected frame=…"),
         ("mqtt://host/a?frame=left arm", "expected a frame"),
     ],
@@ -77,6 +78,7 @@ def test_a_password_is_never_said():
         ("mqtt://host", "paho.mqtt.client", "mqtt"),
         ("lsl", "pylsl", "lsl"),
         ("zenoh", "zenoh", "zenoh"),
+        ("ros2", "cyclonedds.core", "ros2"),
     ],
 )
 def test_a_missing_extra_is_named(monkeypatch, spec, module, extra):

@@ -1,51 +1,88 @@
-"""Standard ROS 2 messages: the bytes, the types' hashes, and a node that is a stand-in.
+"""Messages of ROS 2: their fields, their bytes, and the types' hashes.
 
-No ROS 2 was there to try them on: the hashes are those of its own releases, the bytes are read
-back by the rules of CDR, and the node has rclpy's calls.
+No ROS 2 was there to try them on: hashes and bytes are compared with those of a library of others
+(``rosbags``), which holds the types of each release.
 """
 
 from __future__ import annotations
 
 import struct
-import sys
-from dataclasses import replace
-from types import ModuleType, SimpleNamespace
+from dataclasses import fields, is_dataclass, replace
 
 import msgspec
 import numpy as np
 import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
 from recording.runs import TOUCH
-from sink.conftest import EPOCH, EVENT, VALUES, moment_at, touch_of
-from tomoskin.core import Event, SinkError
+from sink.conftest import EPOCH, EVENT, MESH, VALUES, moment_at, touch_of
+from tomoskin.core import Event
 from tomoskin.mesh import Cylinder
-from tomoskin.sink import make_sink
-from tomoskin.sink.naming import Naming, SpacePose
-from tomoskin.sink.ros import (
-    IMAGE,
-    ODOMETRY,
-    POSE,
-    TEXT,
-    TOPICS,
-    TYPES,
-    RosView,
-    encode_cdr,
-    type_hash,
-)
+from tomoskin.sink import Contacts, Mount, Naming, ros_messages
+from tomoskin.sink.cdr import encode_cdr
+from tomoskin.sink.contact import contact_of
+from tomoskin.sink.ros import IMAGE, ODOMETRY, POSE, TEXT, TOPICS, RosView
+from tomoskin.sink.ros_types import TYPES, type_hash
+from tomoskin.sink.space import SpacePose
 
 
-@pytest.mark.parametrize(
-    ("kind", "digest"),
-    [
-        (TEXT, "df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"),
-        (IMAGE, "d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47"),
-        # has the covariance that our pose has
-        (ODOMETRY, "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"),
-    ],
-)
-def test_hashes_are_those_of_ros_2(kind, digest):
-    assert type_hash(kind) == f"RIHS01_{digest}"
+@pytest.fixture(scope="module", params=[Stores.ROS2_HUMBLE, Stores.ROS2_JAZZY])
+def store(request):
+    """Types of a release of ROS 2, and those of tactile_msgs, which are not in it."""
+    store = get_typestore(request.param)
+    for kind in sorted(TYPES):
+        if kind.startswith("tactile_msgs"):
+            store.register(get_types_from_msg("\n".join(definition_of(kind)), kind))
+    return store
+
+
+def definition_of(kind):
+    """Of tactile_msgs, as its authors have written it."""
+    contact = (
+        "std_msgs/Header header\nstring name\ngeometry_msgs/Point position\n"
+        "geometry_msgs/Vector3 normal\ngeometry_msgs/Wrench wrench"
+    )
+    whole = "tactile_msgs/TactileContact[] contacts"
+    return [whole if kind.endswith("Contacts") else contact]
+
+
+@pytest.mark.parametrize("kind", sorted(TYPES))
+def test_hashes_are_those_of_ros_2(store, kind):
+    assert type_hash(kind) == store.hash_rihs01(kind)
+
+
+def plain(value):
+    """A message that was read, as fields by name."""
+    if is_dataclass(value):
+        return {item.name: plain(getattr(value, item.name)) for item in fields(value)}
+    return [plain(item) for item in value] if isinstance(value, list) else value
+
+
+def same(read, written):
+    """Whether what was read has the fields that were written."""
+    if isinstance(read, dict):
+        named = {key: item for key, item in read.items() if key.islower() and key[0] != "_"}
+        return named.keys() == written.keys() and all(same(named[k], written[k]) for k in named)
+    if isinstance(read, list):
+        return len(read) == len(written) and all(map(same, read, written))
+    if isinstance(read, np.ndarray) and isinstance(written, bytes):
+        return read.tobytes() == written
+    return (
+        np.allclose(read, written, equal_nan=True) if not isinstance(read, str) else read == written
+    )
+
+
+def test_every_message_is_read_by_a_library_of_others(store, stream):
+    whole = replace(stream, points=np.column_stack([MESH.centroids, np.zeros(len(MESH.cells))]))
+    view = RosView(whole, Naming(mount=Mount("tool0", (0.1, 0.2, 0.3), (0.1, 0.2, 0.3))))
+    read = []
+    for message in [*view.of(moment_at(0.25, TOUCH, touch_of(5))), *view.of(EVENT)]:
+        kind = TOPICS[message.topic]
+        found = store.deserialize_cdr(encode_cdr(kind, message.value), kind)
+        assert same(plain(found), message.value), message.topic
+        read.append(message.topic)
+    assert set(read) == TOPICS.keys()
 
 
 class Cdr:
@@ -137,17 +174,73 @@ def test_an_orientation_is_that_of_its_axes(turn):
     assert (found.inv() * wanted).magnitude() == pytest.approx(0, abs=1e-12)
 
 
-def test_two_skins_do_not_meet(rclpy, stream):
-    sinks = [make_sink("ros2"), make_sink("ros2:namespace=left_arm,frame=left_forearm")]
-    for sink in sinks:
-        sink.open(stream)
-        sink.publish(moment_at(0.25, TOUCH))
-        sink.close()
-    headed = [(topic, msg) for topic, msg in rclpy.published if "touches" not in topic]
-    frames = {topic: msg.header.frame_id for topic, msg in headed}
-    assert frames["/tomoskin/track"] == "skin"
-    assert frames["/left_arm/track"] == "left_forearm"
-    assert {topic.rpartition("/")[2] for topic in frames} == TOPICS.keys() - {"touches", "events"}
+def test_contacts_say_where_and_which_way(stream):
+    radius, angle = 0.05, 0.6
+    touch = replace(TOUCH, detection=replace(TOUCH.detection, x=radius * angle, y=0.02))
+    curved = replace(stream, surface=Cylinder(radius), pixels=None)
+    values = messages_of(curved, moment_at(0.25, touch))
+    (contact,) = values["contacts"]["contacts"]
+    assert contact["name"] == "skin/touch_4"
+    assert [*contact["normal"].values()] == pytest.approx([np.sin(angle), 0, np.cos(angle)])
+    forces = [*contact["wrench"]["force"].values()]
+    assert np.isnan(forces).all()  # not measured, which is not zero
+    assert np.isnan([*values["wrench"]["wrench"]["force"].values()]).all()
+
+
+def test_a_wrench_is_that_of_all_touches_about_the_origin(stream):
+    touches = [replace(contact_of(stream, touch), force=2.0) for touch in (TOUCH, touch_of(5))]
+    found = replace(Contacts.of(stream, Naming(), moment_at(0.0)), touches=tuple(touches))
+    value = ros_messages.wrench(ros_messages.header(0, "skin"), found)["wrench"]
+    assert [*value["force"].values()] == [0, 0, -4]
+    x, y = TOUCH.detection.x, TOUCH.detection.y
+    assert [*value["torque"].values()] == pytest.approx([-4 * y, 4 * x, 0])
+    none = ros_messages.wrench({}, Contacts.of(stream, Naming(), moment_at(0.0)))
+    assert [*none["wrench"]["force"].values()] == [0, 0, 0]
+
+
+def test_markers_replace_those_before(stream):
+    shown = messages_of(stream, moment_at(0.25, TOUCH))["markers"]["markers"]
+    assert [(m["ns"], m["action"], m["type"]) for m in shown] == [
+        ("", 3, 0), ("touch", 0, 2), ("label", 0, 9),
+    ]  # fmt: skip
+    width = 2 * np.sqrt(TOUCH.detection.area / np.pi)
+    assert [*shown[1]["scale"].values()] == pytest.approx([width, width, 0.2 * width])
+    assert shown[2]["text"] == "4"
+
+
+def test_points_lie_on_the_surface(stream):
+    places = np.random.default_rng(3).normal(size=(len(VALUES), 3))
+    value = messages_of(replace(stream, points=places), moment_at(0.0))["points"]
+    cloud = np.frombuffer(value["data"], "<f4").reshape(value["width"], 4)
+    assert np.allclose(cloud, np.column_stack([places, VALUES]), atol=1e-6)
+    assert value["row_step"] == len(value["data"]) == value["width"] * value["point_step"]
+
+
+def test_a_report_says_whether_touches_are_valid(stream):
+    view = RosView(stream, Naming())
+    lost = replace(moment_at(0.1), valid=False, problem="electrode 3 is dead")
+    reports = {
+        moment.host_time: [m.value for m in view.of(moment) if m.topic == "/diagnostics"]
+        for moment in (moment_at(0.0), lost, replace(lost, host_time=0.9), moment_at(1.0))
+    }
+    assert [len(report) for report in reports.values()] == [1, 1, 0, 1]
+    levels = [
+        (r[0]["status"][0]["level"], r[0]["status"][0]["message"]) for r in reports.values() if r
+    ]
+    assert levels == [(0, "OK"), (2, "electrode 3 is dead"), (0, "OK")]
+
+
+def test_a_frame_on_a_robot_is_a_transform(stream):
+    turn = (0.3, -0.4, 1.2)
+    mount = Mount("tool0", (0.1, 0.2, 0.3), turn)
+    view = RosView(stream, Naming("left_arm", mount=mount))
+    (value,) = (m.value for m in view.of(moment_at(0.0)) if m.topic == "/tf_static")
+    (found,) = value["transforms"]
+    assert (found["header"]["frame_id"], found["child_frame_id"]) == ("tool0", "left_arm/skin")
+    wanted = Rotation.from_euler("xyz", turn)
+    rotation = Rotation.from_quat([*found["transform"]["rotation"].values()])
+    assert (rotation.inv() * wanted).magnitude() == pytest.approx(0, abs=1e-12)
+    assert not [m for m in RosView(stream, Naming()).of(moment_at(0.0)) if m.topic == "/tf_static"]
 
 
 def test_an_image_is_of_floats_with_the_top_row_first(stream):
@@ -161,111 +254,46 @@ def test_an_image_is_of_floats_with_the_top_row_first(stream):
     assert np.array_equal(values, expected, equal_nan=True)
 
 
-def test_texts_are_json(stream):
+def test_what_is_sent_when(stream):
     view = RosView(stream, Naming())
-    touched = {m.topic: m.value for m in view.of(moment_at(0.0, TOUCH, touch_of(5), sequence=7))}
+    sent = [
+        [m.topic for m in view.of(moment)]
+        for moment in (
+            moment_at(0.0, TOUCH), moment_at(0.1), moment_at(0.2),
+            replace(moment_at(0.3), told=(Event(0.3, "touch-release", "touch 4 ends"),)),
+            replace(moment_at(0.4), valid=False), moment_at(1.5),
+        )
+    ]  # fmt: skip
+    always = ["touches", "contacts", "wrench", "markers"]
+    assert sent[0] == ["touch", "track", *always, "image", "/diagnostics"]
+    assert sent[1] == [*always, "image"]  # the last touch has ended
+    assert sent[2] == ["image"]
+    assert sent[3] == ["events", "image"]
+    assert sent[4] == [*always, "image", "/diagnostics"]  # it cannot be said any more
+    assert sent[5] == [*always, "image", "/diagnostics"]  # once a second in any case
+
+
+def test_texts_are_json(stream):
+    view = RosView(replace(stream, clock=lambda: 0.262), Naming())
+    first = moment_at(0.25, TOUCH, touch_of(5), sequence=7)
+    touched = {m.topic: m.value for m in view.of(first)}
     told = msgspec.json.decode(touched["touches"]["data"])
-    assert (told["sequence"], [t["id"] for t in told["touches"]]) == (7, [4, 5])
-    after = [m.topic for m in view.of(moment_at(0.1))]
-    assert after == ["touches", "image"]
-    assert [m.topic for m in view.of(moment_at(0.2))] == ["image"]
-    ended = replace(moment_at(0.3), told=(Event(0.3, "touch-release", "touch 4 ends"),))
-    assert [m.topic for m in view.of(ended)] == ["events", "image"]
+    assert [t.pop("id") for t in told["touches"]] == [4, 5]
+    (found, _) = told.pop("touches")
+    assert told == {
+        "host_time": 0.25, "utc_s": EPOCH + 0.25, "skin": stream.skin, "frame_id": "skin",
+        "sequence": 7, "latency_s": 0.012, "valid": True, "problem": None,
+    }  # fmt: skip
+    assert found["position"] == [TOUCH.detection.x, TOUCH.detection.y, 0]
+    assert (found["normal"], found["covariance"], found["force"]) == ([0, 0, 1], None, None)
+    reading = replace(TOUCH.detection, sd_x=1e-3, sd_y=2e-3, cov_xy=5e-7)
+    sure = Contacts.of(stream, Naming(), moment_at(0.3, replace(TOUCH, detection=reading)))
+    expected = [[1e-6, 5e-7, 0], [5e-7, 4e-6, 0], [0, 0, 0]]
+    assert sure.touches[0].content()["covariance"] == pytest.approx(np.array(expected))
+    assert sure.latency is None  # the stream has no clock
     (event,) = view.of(EVENT)
     cdr = Cdr(encode_cdr(TEXT, event.value))
     assert msgspec.json.decode(cdr.text()) == {
         "time_s": 0.5, "kind": "connected", "text": "board 01",
         "utc_s": EPOCH + 0.5, "skin": stream.skin, "frame_id": "skin",
     }  # fmt: skip
-
-
-def message_class(kind):
-    """A class as rosidl makes it: its fields are there, no others can be set."""
-    defaults = {"string": "", "float64": 0.0}
-
-    class Message:
-        __slots__ = tuple(TYPES[kind])
-
-        def __init__(self):
-            for name, text in TYPES[kind].items():
-                nested = message_class(text)() if text in TYPES else None
-                setattr(self, name, nested or defaults.get(text, 0))
-
-    return Message
-
-
-class Rclpy(ModuleType):
-    """Stands in for rclpy, with the signatures of its calls."""
-
-    def __init__(self):
-        super().__init__("rclpy")
-        self.published, self.log = [], []
-
-    def Context(self):  # noqa: N802
-        return SimpleNamespace(ok=False)
-
-    def init(self, *, args=None, context=None, signal_handler_options=None):
-        assert args == []
-        assert signal_handler_options is None  # of a context of one's own: none
-        context.ok = True
-
-    def create_node(self, node_name, *, context=None, namespace=None):
-        assert context.ok
-        assert namespace.startswith("/")
-        self.log.append(node_name)
-
-        def create_publisher(msg_type, topic, qos_profile):
-            assert qos_profile > 0
-
-            def publish(msg):
-                assert isinstance(msg, msg_type)
-                self.published.append((f"{namespace}/{topic}", msg))
-
-            return SimpleNamespace(publish=publish)
-
-        return SimpleNamespace(
-            create_publisher=create_publisher, destroy_node=lambda: self.log.append("destroy")
-        )
-
-    def shutdown(self, *, context=None):
-        self.log.append("shutdown")
-        context.ok = False
-
-
-@pytest.fixture
-def rclpy(monkeypatch):
-    fake = Rclpy()
-    monkeypatch.setitem(sys.modules, "rclpy", fake)
-    for kind in (POSE, ODOMETRY, IMAGE, TEXT):
-        package, _, name = kind.rpartition("/")
-        module = ModuleType(package.replace("/", "."))
-        setattr(module, name, message_class(kind))
-        monkeypatch.setitem(sys.modules, package.partition("/")[0], ModuleType("package"))
-        monkeypatch.setitem(sys.modules, module.__name__, module)
-    return fake
-
-
-def test_a_node_publishes_the_same_messages(rclpy, stream):
-    sink = make_sink("ros2")
-    for _ in range(2):  # it may be opened again
-        rclpy.published.clear()
-        sink.open(stream)
-        sink.publish(moment_at(0.25, TOUCH))
-        sink.publish(EVENT)
-        sink.close()
-    topics = [topic.removeprefix("/tomoskin/") for topic, _ in rclpy.published]
-    assert topics == ["touch", "track", "touches", "image", "events"]
-    pose = rclpy.published[0][1]
-    assert pose.pose.pose.position.x == TOUCH.detection.x
-    assert pose.header.stamp.sec == int(EPOCH)
-    assert rclpy.log == ["tomoskin", "destroy", "shutdown"] * 2
-    sink.close()
-
-
-def test_without_ros_2_it_says_what_to_do(monkeypatch):
-    monkeypatch.setitem(sys.modules, "rclpy", None)
-    with pytest.raises(SinkError, match=r"rclpy.*setup\.bash.*--sink zenoh"):
-        make_sink("ros2")
-    for wrong in ("node", "namespace=left arm", "namespace=/arm", "frame=", "name=x"):
-        with pytest.raises(SinkError, match="expected"):
-            make_sink(f"ros2:{wrong}")

@@ -43,17 +43,17 @@ def test_a_subscriber_gets_ros_messages(peer, heard, stream, domain):
     sink.open(stream)
     sink.publish(moment_at(0.25, TOUCH))
     sink.publish(EVENT)
-    samples = [heard() for _ in range(5)]
+    samples = [heard() for _ in range(8)]
     sink.close()
     keys = [str(sample.key_expr) for sample in samples]
     pose = Cdr(samples[0].payload.to_bytes())
     pose.header()
     assert pose.take("d") == TOUCH.detection.x
     if domain is None:
-        names = ["touch", "track", "touches", "image", "events"]
+        names = ["touch", "track", "touches", "contacts", "wrench", "markers", "image", "events"]
         assert keys == [f"tomoskin/{name}" for name in names]
         return
-    assert keys[4] == (
+    assert keys[-1] == (
         "7/left/tomoskin/events/std_msgs::msg::dds_::String_/"
         "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
     )

@@ -35,6 +35,7 @@ EXPORTS = {
     ".parquet": "the same for data tools",
     ".h5": "everything",
     ".npz": "an interchange file",
+    ".lerobot": "a folder, a LeRobot dataset",
     ".mat": "EIDORS' structures",
     ".vtu": "a mesh for each moment",
     ".pvd": "the same",
@@ -42,6 +43,7 @@ EXPORTS = {
     ".gif": "a film",
     ".mp4": "a film",
     ".mcap": "a bag of ROS 2",
+    ".rrd": "a recording of Rerun",
 }
 """What each ending gives; more is in docs/session-file.md."""
 
@@ -113,7 +115,8 @@ def export(
     out: Annotated[
         Path,
         typer.Argument(
-            metavar="OUT", help="X.csv, .parquet, .h5, .npz, .mat, .vtu, .png, .gif, .mp4, .mcap."
+            metavar="OUT",
+            help="X.csv, .parquet, .h5, .npz, .lerobot, .mat, .vtu, .png, .gif, .mp4, .mcap, .rrd.",
         ),
         Writes(EXPORTS, _exported),
     ],
@@ -130,9 +133,9 @@ def export(
     """Convert a session: voltages, or the images that they give again."""
     from tomoskin.formats import WRITERS, Export, omitted
     from tomoskin.recording import SessionReader
-    from tomoskin.sink import write_bag
+    from tomoskin.sink import write_bag, write_rerun
 
-    write = (WRITERS | {".mcap": write_bag})[out.suffix.lower()]
+    write = (WRITERS | {".mcap": write_bag, ".rrd": write_rerun})[out.suffix.lower()]
     with SessionReader(file) as session, Bar(f"writing {out}") as bar:
         job = Export(session, every, bar, overwrite=force)
         write(job, out)

@@ -11,6 +11,7 @@ import numpy as np
 
 from tomoskin.core import DataError
 from tomoskin.formats.exports.hdf5 import write_hdf5
+from tomoskin.formats.exports.lerobot import write_lerobot
 from tomoskin.formats.exports.matlab import write_matlab
 from tomoskin.formats.exports.movie import FILMS
 from tomoskin.formats.exports.table import write_csv, write_parquet
@@ -64,6 +65,10 @@ class Export:
     def hdf5(self, path: Path) -> None:
         """Write everything."""
         write_hdf5(path, self.session, self.advance, overwrite=self.overwrite)
+
+    def lerobot(self, path: Path) -> None:
+        """Write a LeRobot dataset, a row every ``every`` s."""
+        write_lerobot(path, self.session, self.every, self.advance)
 
     def matlab(self, path: Path) -> None:
         """Write EIDORS' structures."""
@@ -131,6 +136,7 @@ WRITERS: dict[str, Callable[[Export, Path], None]] = {
     ".csv": Export.csv,
     ".parquet": Export.parquet,
     ".h5": Export.hdf5,
+    ".lerobot": Export.lerobot,
     ".npz": Export.npz,
     ".mat": Export.matlab,
     ".vtu": Export.series,

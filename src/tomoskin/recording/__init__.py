@@ -11,7 +11,13 @@ from tomoskin.recording.blocks import (
     recording_of,
 )
 from tomoskin.recording.channels import schema_of
-from tomoskin.recording.foxglove import grid_message, log_message, scene_message
+from tomoskin.recording.foxglove import (
+    grid_message,
+    log_message,
+    scene_message,
+    touch_colour,
+    touch_width,
+)
 from tomoskin.recording.info import OWN_FILES, SessionInfo, session_info
 from tomoskin.recording.layout import (
     Mark,
@@ -91,7 +97,9 @@ __all__ = [
     "schema_of",
     "session_info",
     "tick_rate",
+    "touch_colour",
     "touch_row",
+    "touch_width",
     "touches_before",
     "touches_message",
 ]

@@ -7,6 +7,7 @@ exact host time beside its fields.
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -39,6 +40,16 @@ def _see_through(levels: NDArray[np.uint8]) -> dict[str, float]:
 
 
 _FALL, _RISE = _see_through(CHANGE.table[0]), _see_through(CHANGE.table[-1])
+
+
+def touch_colour(touch: Touch) -> dict[str, float]:
+    """R, g, b and a from 0 to 1: blue for a fall, red for a rise, slightly transparent."""
+    return _RISE if touch.kind == "increase" else _FALL
+
+
+def touch_width(touch: Touch) -> float:
+    """Diameter of a disc of the touch's area, m."""
+    return 2.0 * math.sqrt(touch.detection.area / math.pi)
 
 
 def log_message(event: Event, log_time: int) -> Message:
@@ -94,7 +105,7 @@ def _size(pixels: PixelMap) -> float:
 
 def _entity(touch: Touch, surface: Surface, now: dict[str, int]) -> Message:
     detection = touch.detection
-    width = 2.0 * float(np.sqrt(detection.area / np.pi))
+    width = touch_width(touch)
     pose = _pose(*surface.point([[detection.x, detection.y]])[0].tolist())
     return {
         "timestamp": now,
@@ -108,7 +119,7 @@ def _entity(touch: Touch, surface: Surface, now: dict[str, int]) -> Message:
         **{kind: [] for kind in UNUSED},
         "spheres": [
             {"pose": pose, "size": {"x": width, "y": width, "z": 0.2 * width},
-             "color": _RISE if touch.kind == "increase" else _FALL}
+             "color": touch_colour(touch)}
         ],
         "texts": [
             {"pose": pose, "billboard": True, "font_size": _TEXT_HEIGHT, "scale_invariant": False,

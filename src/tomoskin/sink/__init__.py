@@ -9,14 +9,23 @@ from tomoskin.sink.consumer import (
     sink_report,
     sink_worker,
 )
+from tomoskin.sink.contact import Contact, Contacts
+from tomoskin.sink.listener import ContactListener
+from tomoskin.sink.naming import Mount, Naming
+from tomoskin.sink.rerun import write_rerun
 from tomoskin.sink.sink import Item, Moment, Sink, Stream, epoch, raster
 from tomoskin.sink.worker import Capacity, Consumer, Worker, stop_workers
 
 __all__ = [
     "Capacity",
     "Consumer",
+    "Contact",
+    "ContactListener",
+    "Contacts",
     "Item",
     "Moment",
+    "Mount",
+    "Naming",
     "Sink",
     "SinkConsumer",
     "SinkReport",
@@ -30,4 +39,5 @@ __all__ = [
     "sink_worker",
     "stop_workers",
     "write_bag",
+    "write_rerun",
 ]

@@ -9,14 +9,8 @@ from urllib.parse import SplitResult, unquote, urlsplit
 
 from tomoskin.core import Event, SinkError, encode_json
 from tomoskin.sink.consumer import needed, options_of
-from tomoskin.sink.naming import (
-    Naming,
-    event_content,
-    origin,
-    poses_of,
-    touch_content,
-    touches_content,
-)
+from tomoskin.sink.contact import Contacts, contact_of, event_content
+from tomoskin.sink.naming import Naming
 from tomoskin.sink.sink import Item, Stream, TouchPace
 
 DEFAULT_PORT = 1883
@@ -66,18 +60,16 @@ class MqttSink:
         if isinstance(item, Event):
             self._put("events", encode_json(event_content(self._stream, self._naming, item)))
             return
+        due = self._pace.is_due(item)
+        if not (due or item.happened):
+            return
+        contacts = Contacts.of(self._stream, self._naming, item)
         for event in item.happened:
-            content = {
-                "time_s": event.host_time,
-                "event": event.kind,
-                **origin(self._stream, self._naming, event.host_time),
-                **touch_content(event.touch, *poses_of(self._stream, (event.touch,))),
-            }
-            self._put("touch", encode_json(content))
-        if self._pace.is_due(item):
-            poses = poses_of(self._stream, item.touches)
-            content = touches_content(self._stream, self._naming, item, poses)
-            self._put("touches", encode_json(content))
+            about = {"time_s": event.host_time, "event": event.kind, **contacts.header()}
+            row = contact_of(self._stream, event.touch).content()
+            self._put("touch", encode_json(about | row))
+        if due:
+            self._put("touches", encode_json(contacts.content()))
 
     def close(self) -> None:
         """Say that we go, and go."""

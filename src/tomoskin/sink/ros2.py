@@ -1,86 +1,141 @@
-"""The sink ``ros2``: a ROS 2 node of its own, where rclpy is installed."""
+"""The sink ``ros2``: a DDS participant that ROS 2 nodes hear, with no ROS 2 on this machine."""
 
 from __future__ import annotations
 
-import importlib
+import functools
+import os
 from collections.abc import Mapping
 from typing import Any
 
 from tomoskin.core import SinkError
-from tomoskin.sink.consumer import options_of
-from tomoskin.sink.naming import Naming
-from tomoskin.sink.ros import TOPICS, RosView
+from tomoskin.sink.cdr import encode_cdr
+from tomoskin.sink.consumer import needed, options_of
+from tomoskin.sink.naming import NAMES, Naming
+from tomoskin.sink.ros import KEPT, TOPICS, RosView
+from tomoskin.sink.ros_types import TYPES, Field, dds_name, type_hash
 from tomoskin.sink.sink import Item, Stream
 
+_WHERE = "sink ros2"
 _DEPTH = 10
-"""Messages that a publisher keeps for slow subscribers."""
+"""Messages that a publisher keeps for slow subscribers, as ROS 2's own do."""
 
-Value = Mapping[str, Any]
+_BLOCKING = 100_000_000
+"""Ns that a write may wait for a slow subscriber."""
+
+_MOST_DOMAINS = 232
 
 
 class Ros2Sink:
-    """Publishes by ``rclpy``, which comes with a ROS 2 installation and not from the registry."""
+    """Publishes messages of :data:`~tomoskin.sink.ros.TOPICS` by CycloneDDS.
 
-    def __init__(self, naming: Naming) -> None:
-        self.name = f"ros2 /{naming.namespace}"
-        self._naming = naming
-        try:
-            self._rclpy: Any = importlib.import_module("rclpy")
-        except ImportError as error:
-            raise SinkError(
-                f"needs ROS 2's rclpy: {error}",
-                where="sink ros2",
-                hint="source ROS 2's setup.bash first; without ROS 2 there is --sink zenoh",
-            ) from error
-        self._kinds = {topic: _message_class(kind) for topic, kind in TOPICS.items()}
-        self._context: Any = None
-        self._node: Any = None
+    Topics, types and their hashes are as ROS 2 has them, in user data as its own middlewares put
+    them there.
+
+    Parameters
+    ----------
+    domain
+        ROS domain, 0 to 232.
+    naming
+        Of topics and frame.
+    """
+
+    def __init__(self, domain: int, naming: Naming) -> None:
+        self.name = f"ros2 /{naming.namespace}, domain {domain}"
+        self._domain, self._naming = domain, naming
+        self._dds = {
+            name: needed(f"cyclonedds.{name}", "ros2")
+            for name in ("core", "domain", "pub", "topic", "idl")
+        }
+        self._writers: dict[str, Any] = {}
 
     def open(self, stream: Stream) -> None:
-        """Start a node in a context of its own, which takes no signals."""
-        self._context = self._rclpy.Context()
-        self._rclpy.init(args=[], context=self._context)
-        self._node = self._rclpy.create_node(
-            "tomoskin", context=self._context, namespace=f"/{self._naming.namespace}"
-        )
+        """Join the domain; SinkError when there is no network for it."""
+        core = self._dds["core"]
+        try:
+            participant = self._dds["domain"].DomainParticipant(
+                self._domain, qos=core.Qos(core.Policy.Userdata(b"enclave=/;"))
+            )
+            self._writers = {topic: self._writer(participant, topic) for topic in TOPICS}
+        except core.DDSException as error:
+            raise SinkError(
+                f"cannot join domain {self._domain}: {error}",
+                where=self.name,
+                hint="CYCLONEDDS_URI names the network interface that it is to use",
+            ) from error
         self._view = RosView(stream, self._naming)
-        self._publishers = {
-            topic: self._node.create_publisher(kind, topic, _DEPTH)
-            for topic, kind in self._kinds.items()
-        }
 
     def publish(self, item: Item) -> None:
-        """Send the messages of ``item``."""
+        """Write the messages of ``item``; the source time is that of the measurement."""
         for message in self._view.of(item):
-            filled = _filled(self._kinds[message.topic](), message.value)
-            self._publishers[message.topic].publish(filled)
+            writer = self._writers[message.topic]
+            if message.topic not in KEPT and not writer.get_matched_subscriptions():
+                continue  # bytes are the dear part, and nobody listens
+            data = encode_cdr(TOPICS[message.topic], message.value)
+            writer.write(_encoded(writer.data_type)(data), message.stamp)
 
     def close(self) -> None:
-        """End the node."""
-        node, context = self._node, self._context
-        self._node = self._context = None
-        if node is not None:
-            node.destroy_node()
-        if context is not None:
-            self._rclpy.shutdown(context=context)
+        """Leave: with the last reference to a writer its participant goes too."""
+        self._writers = {}
+
+    def _writer(self, participant: Any, topic: str) -> Any:
+        core, kind = self._dds["core"], TOPICS[topic]
+        policy = core.Policy
+        kept = topic in KEPT
+        qos = core.Qos(
+            policy.Reliability.Reliable(_BLOCKING),
+            policy.History.KeepLast(1 if kept else _DEPTH),
+            policy.Durability.TransientLocal if kept else policy.Durability.Volatile,
+            policy.DataRepresentation(use_cdrv0_representation=True),
+            policy.Userdata(f"typehash={type_hash(kind)};".encode()),
+        )
+        name = f"rt/{self._naming.topic(topic)}"
+        return self._dds["pub"].DataWriter(
+            participant, self._dds["topic"].Topic(participant, name, struct_of(kind)), qos=qos
+        )
 
 
 def open_ros2(argument: str) -> Ros2Sink:
-    """``ros2``, ``ros2:namespace=NAME,frame=NAME``; SinkError for others, or without rclpy."""
-    where = "sink ros2"
-    words = filter(None, argument.split(","))
-    return Ros2Sink(Naming.of(options_of(words, ("namespace", "frame"), where), where))
+    """``ros2``, ``ros2:domain=N,namespace=NAME,frame=NAME,parent=NAME,at=X/Y/Z``; SinkError.
+
+    Without ``domain`` it is the environment's ROS_DOMAIN_ID, as for ROS 2 itself.
+    """
+    options = options_of(filter(None, argument.split(",")), ("domain", *NAMES), _WHERE)
+    text = options.get("domain", os.environ.get("ROS_DOMAIN_ID") or "0")
+    if not (text.isascii() and text.isdigit() and int(text) <= _MOST_DOMAINS):
+        raise SinkError(f'expected a domain from 0 to {_MOST_DOMAINS}, got "{text}"', where=_WHERE)
+    return Ros2Sink(int(text), Naming.of(options, _WHERE))
 
 
-def _message_class(kind: str) -> Any:
-    package, _, name = kind.rpartition("/")
-    return getattr(importlib.import_module(package.replace("/", ".")), name)
+@functools.cache
+def struct_of(kind: str) -> Any:
+    """CycloneDDS' class of a message, by its name in :data:`~tomoskin.sink.ros_types.TYPES`."""
+    idl = needed("cyclonedds.idl", "ros2")
+    fields = {name: _type_of(Field.of(text)) for name, text in TYPES[kind].items()}
+    name = dds_name(kind)
+    return idl.make_idl_struct(name.rpartition(":")[2], name.replace("::", "."), fields)
 
 
-def _filled(message: Any, value: Value) -> Any:
-    for name, part in value.items():
-        if isinstance(part, Mapping):
-            _filled(getattr(message, name), part)
-        else:
-            setattr(message, name, part)
-    return message
+def _type_of(field: Field) -> Any:
+    types = needed("cyclonedds.idl.types", "ros2")
+    plain: Mapping[str, Any] = {"string": str, "bool": bool}
+    if field.kind in TYPES:
+        kind = struct_of(field.kind)
+    else:
+        kind = plain.get(field.kind) or getattr(types, field.kind)
+    if field.length is None:
+        return kind
+    return types.array[kind, field.length] if field.length else types.sequence[kind]
+
+
+@functools.cache
+def _encoded(struct: Any) -> Any:
+    """A message that has been encoded already: CycloneDDS asks a sample for its bytes."""
+
+    class Encoded(struct):  # type: ignore[misc]
+        def __init__(self, encoded: bytes) -> None:
+            self.encoded = encoded
+
+        def serialize(self, **_: Any) -> bytes:
+            return self.encoded
+
+    return Encoded

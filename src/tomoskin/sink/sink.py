@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol, Self
 
 from tomoskin.core import Event, FloatArray, GeometryError, Image, PixelMap, Touch
 from tomoskin.mesh import Plane, Surface
 from tomoskin.pattern import Pattern
-from tomoskin.pipeline import FrameResult, Prepared
+from tomoskin.pipeline import FrameResult, Prepared, colour_limit
 from tomoskin.recording import event_of
 from tomoskin.touch import TouchEvent
+
+NO_REFERENCE = "the untouched skin has not been measured yet: leave it alone for a moment"
+
+HEARTBEAT = 1.0
+"""Seconds, by host time, after which touches are sent though nothing has changed."""
 
 _PIXELS = 48
 """Pixels along the longer side of an image for others: what a glance needs."""
@@ -35,6 +41,14 @@ class Stream:
         What the sheet lies on.
     replayed
         Whether frames have the times of a recording, and ``epoch`` is theirs.
+    points
+        (n_cells, 3) m, the middle of each cell in space; None where it is not asked for.
+    corners
+        (n_cells, 3, 3) m, those of each triangle in space; None where cells are tetrahedra.
+    limit
+        End of the symmetric scale of colours, in the image's unit.
+    clock
+        What host times are times of; None where they are those of a recording.
     """
 
     skin: str
@@ -44,6 +58,10 @@ class Stream:
     epoch: float
     surface: Surface = field(default_factory=Plane)
     replayed: bool = False
+    points: FloatArray | None = None
+    corners: FloatArray | None = None
+    limit: float = 1.0
+    clock: Callable[[], float] | None = None
 
     @classmethod
     def of(cls, prepared: Prepared, source: str, recorded: float | None = None) -> Self:
@@ -56,11 +74,23 @@ class Stream:
             epoch=epoch() if recorded is None else recorded,
             surface=prepared.skin.surface,
             replayed=recorded is not None,
+            points=_cell_points(prepared),
+            corners=_corners(prepared),
+            limit=colour_limit(prepared),
+            clock=time.monotonic if recorded is None else None,
         )
 
     def log_time(self, host_time: float) -> int:
         """Ns since 1970 of ``host_time``."""
         return round(1e9 * (host_time + self.epoch))
+
+    def utc(self, host_time: float) -> float | None:
+        """S since 1970 of ``host_time``; None in a simulation, which has no time of the day."""
+        return round(host_time + self.epoch, 6) if self.epoch else None
+
+    def latency(self, host_time: float) -> float | None:
+        """S from ``host_time`` until now; None for what was recorded."""
+        return None if self.clock is None else round(self.clock() - host_time, 6)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,6 +111,10 @@ class Moment:
         What happened to touches in this frame: onset, move, release, merge, split.
     told
         The same in words.
+    valid
+        Whether a reference stands and enough electrodes work, so that no touch means none.
+    problem
+        What is wrong, in a sentence, or None.
     image
         Change of conductivity; None where a newer frame waits, or one was sent a moment ago.
     """
@@ -94,6 +128,8 @@ class Moment:
     image: Image | None
     happened: tuple[TouchEvent, ...] = ()
     told: tuple[Event, ...] = ()
+    valid: bool = True
+    problem: str | None = None
 
     @classmethod
     def of(cls, result: FrameResult, *, with_image: bool) -> Self:
@@ -108,6 +144,8 @@ class Moment:
             image=result.image if with_image else None,
             happened=result.events,
             told=tuple(map(event_of, result.events)),
+            valid=result.ready and result.has_image,
+            problem=result.problem if result.ready else NO_REFERENCE,
         )
 
 
@@ -138,22 +176,23 @@ class Sink(Protocol):
 class TouchPace:
     """Which frames' touches are worth sending.
 
-    A touch that begins or ends is sent at once, what it does meanwhile every ``period`` s.
-    Frames without touches are sent only after some, once: then the last touch has ended.
+    A touch that begins or ends is sent at once, and so is whether touches are valid; what they do
+    meanwhile every ``period`` s. Of frames without touches one a second is sent: who listens can
+    tell a skin that nothing touches from one that is silent.
     """
 
     period: float = 0.0
-    _ids: tuple[int, ...] = ()
+    _state: tuple[object, ...] = ()
     _last: float = float("-inf")
 
     def is_due(self, moment: Moment) -> bool:
         """Whether to send the touches of ``moment``; it counts as sent if so."""
-        ids = tuple(touch.id for touch in moment.touches)
-        if ids == self._ids:
-            waited = moment.host_time - self._last
-            if not ids or 0 <= waited < self.period:
-                return False
-        self._ids, self._last = ids, moment.host_time
+        state = (moment.valid, *(touch.id for touch in moment.touches))
+        waited = moment.host_time - self._last
+        period = self.period if moment.touches else HEARTBEAT
+        if state == self._state and 0 <= waited < period:
+            return False
+        self._state, self._last = state, moment.host_time
         return True
 
 
@@ -163,6 +202,20 @@ def raster(prepared: Prepared) -> PixelMap | None:
         return prepared.mesh.pixels(_PIXELS)
     except GeometryError:
         return None
+
+
+def _cell_points(prepared: Prepared) -> FloatArray:
+    return _in_space(prepared, prepared.mesh.centroids)
+
+
+def _corners(prepared: Prepared) -> FloatArray | None:
+    mesh = prepared.mesh
+    return _in_space(prepared, mesh.points)[mesh.cells] if mesh.cells.shape[1] == 3 else None
+
+
+def _in_space(prepared: Prepared, places: FloatArray) -> FloatArray:
+    """(n, 3) m of places on the sheet, or of a body."""
+    return places if places.shape[1] == 3 else prepared.skin.surface.point(places)
 
 
 def epoch() -> float:

@@ -7,9 +7,11 @@ from collections import Counter
 from typing import Any
 
 from tomoskin.core import SinkError
+from tomoskin.sink.cdr import encode_cdr
 from tomoskin.sink.consumer import needed, options_of
-from tomoskin.sink.naming import Naming
-from tomoskin.sink.ros import TOPICS, RosMessage, RosView, encode_cdr, type_hash
+from tomoskin.sink.naming import NAMES, Naming
+from tomoskin.sink.ros import TOPICS, RosMessage, RosView
+from tomoskin.sink.ros_types import dds_name, type_hash
 from tomoskin.sink.sink import Item, Stream
 
 _WHERE = "sink zenoh"
@@ -85,11 +87,11 @@ class ZenohSink:
 
 
 def open_zenoh(argument: str) -> ZenohSink:
-    """``zenoh:ENDPOINT,domain=N,namespace=NAME,frame=NAME``; each may be left out."""
+    """``zenoh:ENDPOINT,domain=N`` and the options of a naming; each may be left out."""
     words = [word for word in argument.split(",") if word]
     endpoints = [word for word in words if "=" not in word]
     named = [word for word in words if "=" in word]
-    options = options_of(named, ("domain", "namespace", "frame"), _WHERE)
+    options = options_of(named, ("domain", *NAMES), _WHERE)
     domain = options.get("domain", "0")
     bad = [word for word in endpoints if "/" not in word or '"' in word] + endpoints[1:]
     if bad or not (domain.isascii() and domain.isdigit()):
@@ -104,9 +106,5 @@ def open_zenoh(argument: str) -> ZenohSink:
 
 def _key(naming: Naming, topic: str, domain: int | None) -> str:
     """As the bridge has it, or as ``rmw_zenoh`` does: domain, topic, type and its hash."""
-    full = f"{naming.namespace}/{topic}"
-    if domain is None:
-        return full
-    kind = TOPICS[topic]
-    package, _, name = kind.rpartition("/")
-    return f"{domain}/{full}/{package.replace('/', '::')}::dds_::{name}_/{type_hash(kind)}"
+    full, kind = naming.topic(topic), TOPICS[topic]
+    return full if domain is None else f"{domain}/{full}/{dds_name(kind)}/{type_hash(kind)}"

@@ -22,6 +22,7 @@ from tomoskin.twin.shape import FACES, Circle, Face, Finger, Shape, Square
 from tomoskin.twin.shards import SetPlan, make_shard
 from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.source import make_electronics, make_twin, open_twin, read_settings
+from tomoskin.twin.stepped import Step, SteppedSkin
 from tomoskin.twin.transport import Clock, TwinTransport, VirtualClock, WallClock
 
 __all__ = [
@@ -66,6 +67,8 @@ __all__ = [
     "SetPlan",
     "Shape",
     "Square",
+    "Step",
+    "SteppedSkin",
     "Stretched",
     "TwinDevice",
     "TwinElectronics",
