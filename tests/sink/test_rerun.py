@@ -6,6 +6,8 @@ The package is large (490 MB), so that the usual set-up leaves it out.
 from __future__ import annotations
 
 import contextlib
+import os
+import signal
 import socket
 import subprocess
 import sys
@@ -99,7 +101,7 @@ def test_a_viewer_gets_the_same(tmp_path, whole):
     path, port = tmp_path / "heard.rrd", free_port()
     viewer = subprocess.Popen(
         [sys.executable, "-m", "rerun", "--save", str(path), "--port", str(port)],
-        stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True,
     )  # fmt: skip
     try:
         wait_for(viewer, port)
@@ -109,7 +111,7 @@ def test_a_viewer_gets_the_same(tmp_path, whole):
         sink.close()
         assert labels_of(viewer, path) == ["4"]
     finally:
-        viewer.kill()
+        os.killpg(viewer.pid, signal.SIGKILL)  # it has started another program, which is the viewer
         viewer.wait(PATIENCE)
 
 
