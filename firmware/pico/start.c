@@ -40,12 +40,12 @@ __attribute__((section(".ram_vectors"), used, aligned(256))) static const vector
 
 /* In flash: copies all the rest. */
 __attribute__((section(".first"), noreturn, used)) void start(void) {
-    const uint32_t *from = &image_source;
-    for (volatile uint32_t *to = &image_start; to < &image_end; to++) {
-        *to = *from++;
+    uint32_t from = (uint32_t)&image_source;
+    for (uint32_t to = (uint32_t)&image_start; to < (uint32_t)&image_end; to += 4u, from += 4u) {
+        REGISTER(to) = REGISTER(from);
     }
-    for (volatile uint32_t *to = &bss_start; to < &bss_end; to++) {
-        *to = 0u;
+    for (uint32_t to = (uint32_t)&bss_start; to < (uint32_t)&bss_end; to += 4u) {
+        REGISTER(to) = 0u;
     }
     REGISTER(VECTOR_TABLE) = (uint32_t)vectors;
     int (*volatile in_ram)(void) = main; /* too far for a plain call */
