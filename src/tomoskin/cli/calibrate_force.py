@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tomoskin.calibration import Calibration, ForceModel, WeighedPresses
-    from tomoskin.core import Detection
+    from tomoskin.core import Detection, Touch
     from tomoskin.pipeline import Reconstruction
 
 
@@ -129,20 +129,21 @@ def _ranges(given: Sequence[str], n: int) -> FloatArray:
 def _weighed(
     path: Path, result: Reconstruction, newtons: FloatArray, time: FloatArray
 ) -> WeighedPresses:
-    """Touches of frames with one touch; a press is what one identity does until it is lifted."""
+    """Touches of frames with one touch; a press is what one does at one spot until it is lifted."""
     from tomoskin.calibration import WeighedPresses
 
     rows: list[tuple[Detection, float, int, float]] = []
-    without, several, number, before = 0, 0, 0, None
+    without, several, number = 0, 0, 0
+    before: Touch | None = None
     for frame, touches in zip(result.frames.tolist(), result.touches, strict=True):
         known = bool(np.isfinite(newtons[frame]))
         without += known and not touches
         several += known and len(touches) > 1
         alone = touches[0] if len(touches) == 1 else None
         if alone is not None:
-            number += before != alone.id
+            number += before is None or not _goes_on(before, alone)
             rows.append((alone.detection, float(newtons[frame]), number, float(time[frame])))
-        before = alone and alone.id
+        before = alone
     if without or several:
         remark(
             f"{path}: of the frames with a force, {without} show no touch and {several} show "
@@ -150,6 +151,13 @@ def _weighed(
         )
     detections, *labels = zip(*rows, strict=True) if rows else ((), (), (), ())
     return WeighedPresses.of(detections, *(np.array(column) for column in labels))
+
+
+def _goes_on(before: Touch, touch: Touch) -> bool:
+    """Whether it is the press of the frame before: the same touch within its own radius."""
+    was, now = before.detection, touch.detection
+    apart = np.hypot(now.x - was.x, now.y - was.y)
+    return before.id == touch.id and bool(apart**2 <= now.area / np.pi)
 
 
 def _findings(calibration: Calibration[ForceModel]) -> dict[str, Any]:

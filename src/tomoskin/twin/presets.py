@@ -98,8 +98,8 @@ SOURCES = {
     "7688), 2.4 (others)",
     "play": "textile: so that a press of 4 N and 15 mm runs through a loop of 12.5 % of its "
     "response, published for a knit (preprints.org 202308.0816; 3 % for the best: Bozali et al.)",
-    "breakdown": "none for a knit; a strip of carbon-filled silicone has about as much of it as it "
-    "has gauge, half of which goes within 3 s (docs/force.md)",
+    "breakdown": "none for a knit; a strip of carbon-filled silicone: 1.4, three quarters of it "
+    "with 3 s (docs/force.md)",
     "hum_frequency": "Europe; 60 Hz in America",
     "temperature_coefficient": "silver 0.38 %/K; salt water about −2 %/K (handbooks)",
     "modulus": "foam and gel assumed; tank: ρg · thickness (Archimedes)",

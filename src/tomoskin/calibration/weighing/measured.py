@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cho_factor, cho_solve, eigh
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from tomoskin.calibration.locator.presses import Features, frames
 from tomoskin.calibration.locator.process import Process, squared_distances
@@ -23,7 +23,7 @@ _ROUNDING = 1e-9
 _FEWEST = 20
 _WHERE = "force labels"
 _NINE_IN_TEN = 0.9
-_HALF = float(norm.ppf(0.5 + _NINE_IN_TEN / 2))
+_HALF = float(ndtri(0.5 + _NINE_IN_TEN / 2))
 _RECENT, _LEAST = 8, 30
 """The last eighth of the presses, or so many, tell whether the skin has changed."""
 
