@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from tomoskin.calibration.locator.posterior import FEW, Estimates
+from tomoskin.calibration.locator.posterior import FEW, Estimates, widening
 from tomoskin.calibration.locator.presses import (
     Features,
     Presses,
@@ -51,6 +51,16 @@ _CHANGED = 2.5
 _GUESS, _GUESS_OF_FEW = 0.75, 2.5
 """Part of a guess's error above which nothing was learnt; less by the second over the number of
 presses. Noise gives 0.5 to 0.85 with 8 presses, 0.8 to 0.92 with 10, 0.93 to 0.99 from 20 on."""
+
+
+_WIDEST = 1.0
+"""Deviation, in radii of the region, at which nothing is known of a place."""
+
+
+def _bounded(covariance: FloatArray) -> FloatArray:
+    """Covariances (n, 2, 2), none larger than not knowing the place."""
+    size = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 2)
+    return np.asarray(covariance * np.minimum(_WIDEST / size, 1.0)[:, None, None] ** 2)
 
 
 def _silent(_done: float, _total: float) -> None:
@@ -198,15 +208,17 @@ class Locator:
     def predict(self, dv: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Place (n, 2) m and its covariance (n, 2, 2) m² for frames (n, n_meas).
 
-        Values that are not finite are left out. Raises DataError for another number of rows, and
-        for a frame without any value that is used.
+        A frame that fits the presses worse than they fit each other has a larger covariance. Values
+        that are not finite are left out. Raises DataError for another number of rows, and for a
+        frame without any value that is used.
         """
         data = self.features(frames(dv, self.presses.dv.shape[1]))
-        guess, spread = self.estimates(data)
+        guess, spread, strangeness = self.estimates(data)
         by_expert = self.stacking.by_expert(data, guess)
         answer = self.stacking.combined(by_expert)
         covariance = self.calibrated(spread, disagreement_of(by_expert, answer))
-        return self.region.metres(answer), self.region.unit**2 * covariance
+        wide = _bounded(widening(strangeness)[:, None, None] * covariance)
+        return self.region.metres(answer), self.region.unit**2 * wide
 
     def strength(self, dv: ArrayLike) -> FloatArray:
         """(n,) strength of each frame's touch.
