@@ -11,6 +11,7 @@ from tomoskin.calibration.bends import BENDS
 from tomoskin.calibration.channel_mapping.solve import WiringAnswer, solve_wiring
 from tomoskin.calibration.channel_mapping.wiring import Wiring, ring_of
 from tomoskin.calibration.classes import CLASSES, ClassReading, FrameClassifier
+from tomoskin.calibration.classifier.alignment import Alignment
 from tomoskin.calibration.classifier.classifier import Answers, Classifier
 from tomoskin.calibration.classifier.examples import Codes, Examples, against_rest
 from tomoskin.calibration.kind import (
@@ -24,6 +25,7 @@ from tomoskin.calibration.kind import (
 )
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
+from tomoskin.calibration.locator.session import SessionAlignment
 from tomoskin.calibration.locator.watch import Watch
 from tomoskin.calibration.several import Several
 from tomoskin.calibration.touch import TOUCH
@@ -36,6 +38,7 @@ __all__ = [
     "CLASSES",
     "KINDS",
     "TOUCH",
+    "Alignment",
     "Answers",
     "Applied",
     "BendExamples",
@@ -55,6 +58,7 @@ __all__ = [
     "Kind",
     "Locator",
     "Presses",
+    "SessionAlignment",
     "Several",
     "TouchFit",
     "Watch",

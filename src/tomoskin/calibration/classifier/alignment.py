@@ -22,6 +22,9 @@ _MARGIN = 0.12
 _RELIABLE = 0.5
 """Expected part of the frames that are right, below which nothing is said of any."""
 
+_PRIOR_FRAMES = (1.0, 0.01)
+"""Frames that the templates found without labels count as beside the labelled ones, as tried."""
+
 _DRAWS = 3
 _CONTRADICTED = 0.25
 """Part of the labels of a flag that the fit may contradict beyond what it expects."""
@@ -39,7 +42,7 @@ class Alignment:
     holds
         Whether what is said of its frames can be believed.
     reliability
-        Expected part of the frames whose combination is right, 0 to 1: that of sessions drawn
+        Expected part of the frames whose combination is right, 0 to 1: median of sessions drawn
         from what was fitted, as many frames each (parametric bootstrap).
     grown
         Size of the templates against those learnt before.
@@ -115,9 +118,10 @@ def _from_labels(named: Mixture, x: FloatArray, numbers: IntArray) -> Iterator[M
                 effects = named.templates[1:].copy()
                 effects[name] = flag @ left / (flag @ flag)
                 yield named.about(x, numbers, effects)
-    weigh = design.T @ design + np.eye(design.shape[1])
-    pull = design.T @ (x - x.mean(axis=0)) + named.templates[1:]
-    yield named.about(x, numbers, np.linalg.solve(weigh, pull))
+    for frames in _PRIOR_FRAMES:
+        weigh = design.T @ design + frames * np.eye(design.shape[1])
+        pull = design.T @ (x - x.mean(axis=0)) + frames * named.templates[1:]
+        yield named.about(x, numbers, np.linalg.solve(weigh, pull))
 
 
 def _doubts(prior: Mixture, fitted: Mixture, rest: FloatArray | None) -> tuple[str, ...]:
@@ -194,7 +198,7 @@ def _contradictions(free: Mixture, x: FloatArray, numbers: IntArray) -> tuple[st
 
 
 def _reliability(prior: Mixture, fitted: Mixture, n: int, labels: int) -> float:
-    """Part of n frames that would be right, were ``fitted`` true and ``prior`` all that is known.
+    """Median part of n frames that would be right, were ``fitted`` true and ``prior`` all that is known.
 
     Frames are drawn from ``fitted`` and fitted as the session was, so many with ``labels``
     (parametric bootstrap: Efron & Tibshirani 1993); seeds are fixed, so that a file gives the
@@ -208,4 +212,4 @@ def _reliability(prior: Mixture, fitted: Mixture, n: int, labels: int) -> float:
         x = fitted.means[truth] + rng.normal(size=(n, len(root))) @ root.T
         again = _fitted(prior, x, np.where(np.arange(n) < labels, truth, -1))
         right.append(float((again.distances(x).argmin(axis=1) == truth)[labels:].mean()))
-    return float(np.mean(right))
+    return float(np.median(right))

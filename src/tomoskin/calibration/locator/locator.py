@@ -17,8 +17,10 @@ from tomoskin.calibration.locator.presses import (
     Strength,
     equally_hard,
     frames,
+    mean_about,
 )
 from tomoskin.calibration.locator.rotations import Rotations
+from tomoskin.calibration.locator.session import SessionAlignment
 from tomoskin.calibration.locator.stacking import (
     NINE_IN_TEN,
     CalibratedCovariance,
@@ -217,8 +219,39 @@ class Locator:
         by_expert = self.stacking.by_expert(data, guess)
         answer = self.stacking.combined(by_expert)
         covariance = self.calibrated(spread, disagreement_of(by_expert, answer))
-        wide = _bounded(widening(strangeness)[:, None, None] * covariance)
+        wide = widening(strangeness)[:, None, None] * covariance + self._label_spread(answer)
+        wide = _bounded(wide)
         return self.region.metres(answer), self.region.unit**2 * wide
+
+    def _label_spread(self, positions: FloatArray) -> FloatArray | float:
+        """(n, 2, 2) usual covariance of the labels about ``positions`` (n, 2), both in radii."""
+        presses = self.presses
+        if presses.spread is None:
+            return 0.0
+        spread = presses.spread / self.region.unit**2
+        return mean_about(positions, self.region.scaled(presses.xy), spread)
+
+    def in_session(self, dv: ArrayLike, xy: ArrayLike | None = None) -> Self:
+        """Locator for another session, from its frames (n, n_meas) of one touch each.
+
+        ``xy`` (n, 2) m where a label is known, rows of NaN otherwise. Where the session is as the
+        calibration was, or cannot be aligned, the locator stays as it was: see
+        :class:`SessionAlignment`, which says so. Raises DataError as that does.
+        """
+        alignment = SessionAlignment.of(self, dv, xy)
+        return self.aligned(alignment) if alignment.holds and alignment.needed else self
+
+    def strangeness(self, dv: ArrayLike) -> FloatArray:
+        """(n,) how many times worse than left-out presses frames (n, n_meas) fit the maps.
+
+        About one where nothing has changed. Raises DataError as :meth:`predict`.
+        """
+        return self.estimates(self.features(frames(dv, self.presses.dv.shape[1])))[2]
+
+    def aligned(self, alignment: SessionAlignment, progress: Advance = _silent) -> Self:
+        """Locator that has learnt from the frames of an alignment, with their labels."""
+        presses = alignment.presses
+        return self.learn(presses, self.region, self.pattern, self.skin_id, progress)
 
     def strength(self, dv: ArrayLike) -> FloatArray:
         """(n,) strength of each frame's touch.
