@@ -94,7 +94,7 @@ def test_touches_on_a_part_of_the_skin_are_not_spread_over_all_of_it(locator: Lo
     assert locator.in_session(dv[part]) is locator
 
 
-def test_a_file_keeps_estimated_labels(locator: Locator, tmp_path: Path) -> None:
+def test_a_file_keeps_estimated_labels(tmp_path: Path) -> None:
     dv, _ = today(80, 5)
     pattern = Pattern.adjacent(8)
     aligned = Locator.fit(*presses(150, 0), pattern=pattern).in_session(dv)

@@ -1,7 +1,8 @@
 """The kind of calibration that tells where a touch is, from labelled presses.
 
 Keys of the .npz: ``kind``, ``version``; ``dv`` (n, n_meas), ``xy_m`` (n, 2), optional ``strength``
-(n,), optional ``spread_m2`` (n, 2, 2) of labels that were estimated; ``outline_m`` (k, 2); ``drive``, ``measure`` (n_meas, 2), ``n_electrodes``; ``pattern``,
+(n,) and, of labels that were estimated, ``spread_m2`` (n, 2, 2); ``outline_m`` (k, 2); ``drive``,
+``measure`` (n_meas, 2), ``n_electrodes``; ``pattern``,
 ``skin`` identities, ``skin_name``. What was learnt is learnt again when the file is read, which
 gives the same locator: a file outlives the method.
 """
@@ -76,7 +77,7 @@ def _pack(locator: Locator) -> Arrays:
     }
     presses = locator.presses
     optional = {"strength": presses.strength, "spread_m2": presses.spread}
-    return arrays | {key: values for key, values in optional.items() if values is not None}
+    return {**arrays, **{key: v for key, v in optional.items() if v is not None}}
 
 
 def _unpack(arrays: Arrays, pattern: Pattern, where: str, progress: Progress) -> Locator:

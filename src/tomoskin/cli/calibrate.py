@@ -118,9 +118,7 @@ def _labels_if_any(data: Recording) -> FloatArray:
     return np.full((len(data.time), 2), np.nan) if data.labels is None else data.labels
 
 
-def _onto(
-    path: Path, name: str | None, recording: Path, *, aligns: bool
-) -> tuple[Learn, Pattern]:
+def _onto(path: Path, name: str | None, recording: Path, *, aligns: bool) -> tuple[Learn, Pattern]:
     """What learns from these presses and an older calibration of the same skin.
 
     It ``aligns`` that one to frames of which few have a label, or adds labelled presses to its own.

@@ -216,9 +216,7 @@ def widening(strangeness: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(strangeness, 1.0) ** _WIDENS)
 
 
-def _likeliest(
-    positions: FloatArray, features: FloatArray, directions: FloatArray
-) -> ResponseMaps:
+def _likeliest(positions: FloatArray, features: FloatArray, directions: FloatArray) -> ResponseMaps:
     """Maps of the length scale of the largest evidence, climbed to from the middle one."""
 
     @cache

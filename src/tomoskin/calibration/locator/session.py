@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
+from tomoskin.calibration.locator.posterior import BoolArray
 from tomoskin.calibration.locator.presses import Presses, frames
 from tomoskin.calibration.locator.process import squared_distances
 from tomoskin.calibration.locator.topographic import (
@@ -21,7 +22,6 @@ from tomoskin.core import DataError, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from tomoskin.calibration.locator.locator import Locator
-    from tomoskin.touch import Region
 
 _FEWEST = 50
 """Frames of a session from which it can be aligned."""
@@ -131,7 +131,7 @@ class SessionAlignment:
         region, grid = locator.region, locator.region.lattice(_PLACES)
         before, features = _learnt(locator, grid)
         theirs = SessionFeatures.of(dv)
-        known = np.isfinite(xy).all(axis=1)
+        known: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
         named = np.full(len(dv), -1)
         if known.any():
             named[known] = _numbers(region.scaled(xy[known]), grid)
@@ -229,7 +229,7 @@ def _surface(
 
 
 def _numbers(positions: FloatArray, grid: FloatArray) -> IntArray:
-    return squared_distances(positions, grid).argmin(axis=1)
+    return np.asarray(squared_distances(positions, grid).argmin(axis=1))
 
 
 def _entropy(part: FloatArray) -> float:
