@@ -198,7 +198,7 @@ def _contradictions(free: Mixture, x: FloatArray, numbers: IntArray) -> tuple[st
 
 
 def _reliability(prior: Mixture, fitted: Mixture, n: int, labels: int) -> float:
-    """Median part of n frames that would be right, were ``fitted`` true and ``prior`` all that is known.
+    """Median part of n frames that would be right, were ``fitted`` true and ``prior`` known.
 
     Frames are drawn from ``fitted`` and fitted as the session was, so many with ``labels``
     (parametric bootstrap: Efron & Tibshirani 1993); seeds are fixed, so that a file gives the
