@@ -86,7 +86,8 @@ def touch(
     frames = np.arange(len(dv)) if unlabelled else labelled_frames(xy)
     calibration = learn(dv[frames], xy[frames])
     calibration.write(out, overwrite=force)
-    facts = _findings(calibration, frames.tolist())
+    learnt = np.array_equal(calibration.model.presses.dv[-1], dv[frames[-1]], equal_nan=True)
+    facts = _findings(calibration, frames.tolist() if learnt else [])
     if facts["is_guess"]:
         remark(
             f"{recording}: the frames hardly tell where they were pressed: presses left out are "
@@ -167,7 +168,7 @@ def _findings(calibration: Calibration[Locator], frames: list[int]) -> dict[str,
     import numpy as np
 
     locator = calibration.model
-    older = max(len(locator.presses) - len(frames), 0)
+    older = len(locator.presses) - len(frames)
     errors = 1e3 * locator.errors
     x, y = (1e3 * locator.next_place()).tolist()
     return {
