@@ -76,6 +76,15 @@ def test_what_has_changed_is_said(locator: Locator) -> None:
     assert locator.in_session(presses(120, 6)[0]) is locator
 
 
+def test_labels_of_a_session_as_before_are_added(locator: Locator) -> None:
+    dv, xy = presses(60, 6)
+    some = np.full(xy.shape, np.nan)
+    some[:5] = xy[:5]
+    more = locator.in_session(dv, some)
+    assert len(more.presses) == len(locator.presses) + 5
+    assert more.presses.spread is None
+
+
 def test_what_is_another_skin_is_not_aligned(locator: Locator) -> None:
     """Each row answers elsewhere than it did: its order has been scrambled."""
     dv = presses(200, 5)[0][:, np.random.default_rng(3).permutation(40)]

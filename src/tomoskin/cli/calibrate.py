@@ -152,7 +152,7 @@ def _aligned(locator: Locator, dv: FloatArray, xy: FloatArray) -> Locator:
     for finding in alignment.findings:
         remark(finding)
     with Bar("learning") as bar:
-        return locator.aligned(alignment, bar) if alignment.needed else locator
+        return locator.aligned(alignment, bar)
 
 
 def _what_of(name: str | None, path: Path, data: Recording) -> tuple[Skin | None, Pattern]:

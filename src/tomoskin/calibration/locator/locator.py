@@ -235,11 +235,11 @@ class Locator:
         """Locator for another session, from its frames (n, n_meas) of one touch each.
 
         ``xy`` (n, 2) m where a label is known, rows of NaN otherwise. Where the session is as the
-        calibration was, or cannot be aligned, the locator stays as it was: see
-        :class:`SessionAlignment`, which says so. Raises DataError as that does.
+        calibration was only labels are added, and where it cannot be aligned the locator stays
+        as it was: see :class:`SessionAlignment`, which says so. Raises DataError as that does.
         """
         alignment = SessionAlignment.of(self, dv, xy)
-        return self.aligned(alignment) if alignment.holds and alignment.needed else self
+        return self.aligned(alignment) if alignment.holds else self
 
     def strangeness(self, dv: ArrayLike) -> FloatArray:
         """(n,) how many times worse than left-out presses frames (n, n_meas) fit the maps.
@@ -249,8 +249,13 @@ class Locator:
         return self.estimates(self.features(frames(dv, self.presses.dv.shape[1])))[2]
 
     def aligned(self, alignment: SessionAlignment, progress: Advance = _silent) -> Self:
-        """Locator that has learnt from the frames of an alignment, with their labels."""
-        presses = alignment.presses
+        """Locator that has learnt from the frames of an alignment, with their labels.
+
+        Where that is not needed, the labels that were given are added to its own.
+        """
+        presses, given = alignment.presses, alignment.labelled
+        if not alignment.needed:
+            return self.updated(given.dv, given.xy) if len(given) else self
         return self.learn(presses, self.region, self.pattern, self.skin_id, progress)
 
     def strength(self, dv: ArrayLike) -> FloatArray:

@@ -155,8 +155,14 @@ class SessionAlignment:
 
     @property
     def needed(self) -> bool:
-        """Whether the frames fit the calibration worse than its own presses do, or have labels."""
-        return self.strangeness > _AS_BEFORE or not np.isnan(self.missed)
+        """Whether the frames fit the calibration worse than its own presses do."""
+        return self.strangeness > _AS_BEFORE
+
+    @property
+    def labelled(self) -> Presses:
+        """The frames whose label was given."""
+        chosen = ~self.presses.spreads.any(axis=(1, 2))
+        return Presses.of_more(self.presses.dv[chosen], self.presses.xy[chosen])
 
     @property
     def findings(self) -> tuple[str, ...]:
