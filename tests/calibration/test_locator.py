@@ -62,7 +62,7 @@ def test_the_posterior_of_maps_of_known_noise_holds_what_it_says() -> None:
     basis = Basis.of(likeness, xy)
     drawn = basis(xy) @ rng.normal(size=(len(basis.root.T), 6))
     features = drawn + 0.3 * rng.normal(size=drawn.shape)
-    maps = ResponseMaps.of(likeness, xy[:300], features[:300])
+    maps = ResponseMaps.of(likeness, xy[:300], features[:300], np.eye(features.shape[1]))
     side = np.linspace(-1.1, 1.1, 45)
     grid = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     grid = grid[np.linalg.norm(grid, axis=1) < 1.0]

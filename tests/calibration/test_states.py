@@ -216,3 +216,88 @@ def six_points(data_dir: Path, number: int) -> tuple[FloatArray, FloatArray]:
         mean = np.eye(reading.max() + 1)[reading.ravel()] / 8
         before, after = (kept[key].astype(float) @ mean for key in ("rms_before", "rms_after"))
         return against_rest(after, before), kept["pressed"].astype(float)
+
+
+def test_a_session_whose_names_cannot_be_carried_over_is_said_to_be_so() -> None:
+    """Every response has another sign: without labels each flag would be named by its opposite."""
+    flags, asked = random_flags(300, 4, 0), random_flags(300, 4, 1)
+    known = Classifier.fit(sheet(0, flags), flags)
+    today = -sheet(2, asked)
+    lost = known.in_session(today)
+    answers = lost.predict(today)
+    assert lost.alignment is not None
+    assert not lost.alignment.holds
+    assert "untouched frame would have flags set" in lost.alignment.text
+    assert answers.rejected.all()
+    assert answers.probability.max() < 0.1
+    np.testing.assert_array_equal(answers.flags, known.predict(today).flags)
+
+
+def test_ten_labels_mend_a_session_that_cannot_be_aligned() -> None:
+    flags, asked = random_flags(300, 4, 0), random_flags(300, 4, 1)
+    known = Classifier.fit(sheet(0, flags), flags)
+    today = np.roll(sheet(2, asked), 7, axis=1)  # the rows of another electrode order
+    assert hit(known.in_session(today).predict(today).flags, asked) < 0.3
+    some = np.full(asked.shape, np.nan)
+    some[:10] = asked[:10]
+    mended = known.in_session(today, some)
+    answers = mended.predict(today)
+    assert mended.alignment is not None
+    assert mended.alignment.holds
+    assert hit(answers.flags, asked) > 0.9
+    assert abs(answers.probability.mean() - hit(answers.flags, asked)) < 0.1
+
+
+def test_states_of_which_one_holds_are_named_by_labels() -> None:
+    flags, _ = one_of(150, 0)
+    known = Classifier.fit(sheet(0, flags), [NAMES[k] for k in flags.argmax(axis=1)])
+    asked, names = one_of(150, 1)
+    today = np.roll(sheet(1, asked), 11, axis=1)
+    some = np.full(asked.shape, np.nan)
+    some[:10] = asked[:10]
+    told = known.in_session(today, some).predict(today).label
+    assert np.mean([a == b for a, b in zip(told, names, strict=True)]) > 0.9
+
+
+def test_a_session_that_aligns_says_how_sure_that_is() -> None:
+    flags, asked = random_flags(300, 4, 0), random_flags(300, 4, 1)
+    known = Classifier.fit(sheet(0, flags), flags)
+    fitted = known.in_session(sheet(2, asked, size=0.5, turn=0.4))
+    assert known.alignment is None
+    assert fitted.alignment is not None
+    assert fitted.alignment.holds
+    assert fitted.alignment.reliability > 0.9
+    assert 0.3 < fitted.alignment.grown < 0.8
+    assert "aligned" in fitted.alignment.text
+
+
+@pytest.mark.data
+def test_six_points_whose_rows_are_those_of_other_electrodes(data_dir: Path) -> None:
+    """Turned by half a round, nothing fits: it is said, and ten labels are enough."""
+    (learnt, flags), (asked, truth) = (six_points(data_dir, number) for number in (1, 2))
+    today = turned_by_four(data_dir, asked)
+    known = Classifier.fit(learnt, flags)
+    lost = known.in_session(today)
+    assert lost.alignment is not None
+    assert not lost.alignment.holds
+    assert lost.predict(today).rejected.all()
+    some = np.full(truth.shape, np.nan)
+    chosen = np.random.default_rng(0).permutation(len(truth))[:10]
+    some[chosen] = truth[chosen]
+    answers = known.in_session(today, some).predict(today)
+    rest = np.setdiff1d(np.arange(len(truth)), chosen)
+    assert hit(answers.flags[rest], truth[rest]) > 0.8
+    assert abs(answers.probability.mean() - hit(answers.flags[rest], truth[rest])) < 0.1
+
+
+def turned_by_four(data_dir: Path, dv: FloatArray) -> FloatArray:
+    """Readings (n, 210) as if each electrode stood where the opposite one was."""
+    with np.load(data_dir / "eskin_membrane8_sixpoint" / "batch1.npz") as kept:
+        pairs = np.sort(np.stack([kept["inj"], kept["meas"]], axis=1), axis=2) @ [8, 1]
+    codes = np.unique(np.sort(pairs, axis=1), axis=0)
+    electrodes = (np.stack([codes // 8, codes % 8], axis=-1) + 4) % 8
+    turned = np.sort(np.sort(electrodes, axis=2) @ [8, 1], axis=1)
+    row = {tuple(code): k for k, code in enumerate(codes.tolist())}
+    out = np.empty_like(dv)
+    out[:, [row[tuple(code)] for code in turned.tolist()]] = dv
+    return out

@@ -7,14 +7,23 @@ import numpy as np
 import pytest
 
 from tomoskin.pattern import Pattern
+from tomoskin.skin import Skin
 
 SKIN = "textile-disc-8"
 PATTERN = Pattern.adjacent(8)
 
 
-def frames(n, seed):
+def everywhere(n, seed):
+    """Places all over the skin."""
+    rim = Skin.load(SKIN).mesh().points.max()
     rng = np.random.default_rng(seed)
-    xy = rng.uniform(-0.05, 0.05, (n, 2))
+    radius, angle = rim * np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def frames(n, seed, xy=None):
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform(-0.05, 0.05, (n, 2)) if xy is None else xy
     waves = np.random.default_rng(9).normal(scale=30.0, size=(2, PATTERN.n_meas))
     return np.sin(xy @ waves) + 0.02 * rng.normal(size=(n, PATTERN.n_meas)), xy
 
@@ -140,6 +149,33 @@ def test_presses_are_added_to_an_older_calibration(tomoskin, tmp_path, presses):
     )
     assert code == 1
     assert 'is of another skin: learnt on "textile-disc-8", asked for on "textile-' in err
+
+
+def test_touches_without_labels_align_an_older_calibration(tomoskin, tmp_path):
+    old, new, path, presses = (tmp_path / f"{name}.npz" for name in ("old", "new", "all", "known"))
+    dv, xy = frames(100, 3, everywhere(100, 3))
+    np.savez(presses, dv=dv, xy_m=xy, drive=PATTERN.drive, measure=PATTERN.measure)
+    assert tomoskin("calibrate", "touch", presses, "--skin", SKIN, "--out", old)[0] == 0
+    dv, xy = frames(120, 5, everywhere(120, 5))
+    gains = 2 * np.exp(0.4 * np.random.default_rng(1).normal(size=PATTERN.n_meas))
+    np.savez(path, dv=dv * gains, drive=PATTERN.drive, measure=PATTERN.measure)
+    code, out, err = tomoskin(
+        *("calibrate", "touch", path, "--onto", old, "--unlabelled", "--out", new)
+    )
+    assert code == 0
+    assert out.startswith("120 presses")
+    assert "times as large as in the calibration" in err
+    missed = {}
+    for calibration in (old, new):
+        code, out, err = tomoskin("locate", path, "--calibration", calibration, "--json")
+        assert code == 0
+        told = np.array([[row["x_m"], row["y_m"]] for row in json.loads(out)])
+        missed[calibration] = np.median(np.linalg.norm(told - xy, axis=1))
+        assert ("Ellipses are widened" in err) == (calibration == old)
+    assert missed[new] < 0.8 * missed[old]
+    code, _, err = tomoskin("calibrate", "touch", path, "--unlabelled", "--out", tmp_path / "x.npz")
+    assert code == 1
+    assert "--onto" in err
 
 
 def test_a_calibration_of_another_skin_is_refused(tomoskin, tmp_path, presses, touched):

@@ -11,6 +11,7 @@ from tomoskin.calibration.bends import BENDS
 from tomoskin.calibration.channel_mapping.solve import WiringAnswer, solve_wiring
 from tomoskin.calibration.channel_mapping.wiring import Wiring, ring_of
 from tomoskin.calibration.classes import CLASSES, ClassReading, FrameClassifier
+from tomoskin.calibration.classifier.alignment import Alignment
 from tomoskin.calibration.classifier.classifier import Answers, Classifier
 from tomoskin.calibration.classifier.examples import Codes, Examples, against_rest
 from tomoskin.calibration.force import FORCE
@@ -25,6 +26,7 @@ from tomoskin.calibration.kind import (
 )
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
+from tomoskin.calibration.locator.session import SessionAlignment
 from tomoskin.calibration.locator.watch import Watch
 from tomoskin.calibration.several import Several
 from tomoskin.calibration.touch import TOUCH
@@ -42,6 +44,7 @@ __all__ = [
     "FORCE",
     "KINDS",
     "TOUCH",
+    "Alignment",
     "Answers",
     "Applied",
     "BendExamples",
@@ -66,6 +69,7 @@ __all__ = [
     "MaterialFit",
     "PressedSpot",
     "Presses",
+    "SessionAlignment",
     "Several",
     "TouchFit",
     "Watch",

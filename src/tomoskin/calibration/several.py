@@ -163,14 +163,14 @@ class Several:
 
     def _likely(self, frame: FloatArray, expected: NDArray[np.float32]) -> FloatArray:
         away = expected - frame.astype(np.float32) @ self._whiten
-        k = len(frame)
+        k = away.shape[1]
         misfit = np.einsum("gk,gk->g", away, away).astype(np.float64)
         return np.asarray(-self.locator.estimates.powers[0] * k * np.log1p(misfit / k))
 
     @cached_property
     def _whiten(self) -> NDArray[np.float32]:
         """(k, k) to coordinates in which features err about the maps independently, by 1."""
-        whiten = _maps(self.locator).coregion.whiten / np.sqrt(self.variance)
+        whiten = _maps(self.locator).whiten / np.sqrt(self.variance)
         return np.asarray(whiten, dtype=np.float32)
 
     @cached_property

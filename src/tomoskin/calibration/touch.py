@@ -1,7 +1,8 @@
 """The kind of calibration that tells where a touch is, from labelled presses.
 
 Keys of the .npz: ``kind``, ``version``; ``dv`` (n, n_meas), ``xy_m`` (n, 2), optional ``strength``
-(n,); ``outline_m`` (k, 2); ``drive``, ``measure`` (n_meas, 2), ``n_electrodes``; ``pattern``,
+(n,) and, of labels that were estimated, ``spread_m2`` (n, 2, 2); ``outline_m`` (k, 2); ``drive``,
+``measure`` (n_meas, 2), ``n_electrodes``; ``pattern``,
 ``skin`` identities, ``skin_name``. What was learnt is learnt again when the file is read, which
 gives the same locator: a file outlives the method.
 """
@@ -74,17 +75,21 @@ def _pack(locator: Locator) -> Arrays:
         "pattern": np.array(locator.pattern_id),
         "skin": np.array(locator.skin_id),
     }
-    strength = locator.presses.strength
-    return arrays if strength is None else {**arrays, "strength": strength}
+    presses = locator.presses
+    optional = {"strength": presses.strength, "spread_m2": presses.spread}
+    return {**arrays, **{key: v for key, v in optional.items() if v is not None}}
 
 
 def _unpack(arrays: Arrays, pattern: Pattern, where: str, progress: Progress) -> Locator:
-    strength = real_numbers(arrays, "strength", where) if "strength" in arrays else None
+    strength, spread = (
+        real_numbers(arrays, key, where) if key in arrays else None
+        for key in ("strength", "spread_m2")
+    )
     dv = real_numbers(arrays, "dv", where)
     if dv.shape[1:] != (pattern.n_meas,):
         raise DataError(f"expected {pattern.n_meas} rows of dv", where=where)
     with located(where):
-        presses = Presses.of(dv, real_numbers(arrays, "xy_m", where), strength)
+        presses = Presses.of(dv, real_numbers(arrays, "xy_m", where), strength, spread)
         region = Region.checked(real_numbers(arrays, "outline_m", where))
         skin_id = str(arrays.get("skin", ""))
         return Locator.learn(presses.within(region), region, pattern, skin_id, progress)

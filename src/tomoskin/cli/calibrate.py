@@ -52,24 +52,44 @@ def touch(
         ),
         Reads(),
     ] = None,
+    unlabelled: Annotated[
+        bool,
+        typer.Option(
+            "--unlabelled",
+            help="With --onto: frames without a label are touches too, all over the skin; they "
+            "align the old calibration to today, and labels are not needed.",
+        ),
+    ] = False,
     reference: ReferenceOption = None,
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
     """Learn where a touch is from presses at known places."""
+    import numpy as np
+
+    from tomoskin.core import DataError
     from tomoskin.formats import read_recording
 
     data = read_recording(recording)
     say_notes(data)
+    if unlabelled and not onto:
+        raise DataError(
+            "--unlabelled aligns an older calibration, and none is given",
+            hint="name it: --onto OLD.npz",
+        )
     learn, pattern = (
-        _onto(onto, skin, recording) if onto else _from_skin(*_what_of(skin, recording, data))
+        _onto(onto, skin, recording, aligns=unlabelled)
+        if onto
+        else _from_skin(*_what_of(skin, recording, data))
     )
     data = data.in_order_of(pattern)
-    xy, dv = labels(data), changes(data, reference, pattern)
-    frames = labelled_frames(xy)
+    dv = changes(data, reference, pattern)
+    xy = _labels_if_any(data) if unlabelled else labels(data)
+    frames = np.arange(len(dv)) if unlabelled else labelled_frames(xy)
     calibration = learn(dv[frames], xy[frames])
     calibration.write(out, overwrite=force)
-    facts = _findings(calibration, frames.tolist())
+    learnt = np.array_equal(calibration.model.presses.dv[-1], dv[frames[-1]], equal_nan=True)
+    facts = _findings(calibration, frames.tolist() if learnt else [])
     if facts["is_guess"]:
         remark(
             f"{recording}: the frames hardly tell where they were pressed: presses left out are "
@@ -94,8 +114,18 @@ def _from_skin(skin: Skin | None, pattern: Pattern) -> tuple[Learn, Pattern]:
     return learn, pattern
 
 
-def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern]:
-    """What learns from these presses and those of an older calibration of the same skin."""
+def _labels_if_any(data: Recording) -> FloatArray:
+    """(n_frames, 2) m, rows of NaN where there is no label."""
+    import numpy as np
+
+    return np.full((len(data.time), 2), np.nan) if data.labels is None else data.labels
+
+
+def _onto(path: Path, name: str | None, recording: Path, *, aligns: bool) -> tuple[Learn, Pattern]:
+    """What learns from these presses and an older calibration of the same skin.
+
+    It ``aligns`` that one to frames of which few have a label, or adds labelled presses to its own.
+    """
     from tomoskin.calibration import TOUCH
     from tomoskin.cli.choices import skin_if_any
 
@@ -107,7 +137,24 @@ def _onto(path: Path, name: str | None, recording: Path) -> tuple[Learn, Pattern
         with Bar("learning") as bar:
             return old.with_model(old.model.updated(dv, xy).settled_anew(bar))
 
-    return learn, old.pattern
+    def align(dv: FloatArray, xy: FloatArray) -> Calibration[Locator]:
+        return old.with_model(_aligned(old.model, dv, xy))
+
+    return (align if aligns else learn), old.pattern
+
+
+def _aligned(locator: Locator, dv: FloatArray, xy: FloatArray) -> Locator:
+    """The locator for the session of these frames; what has changed is said."""
+    from tomoskin.calibration import SessionAlignment
+    from tomoskin.core import DataError
+
+    alignment = SessionAlignment.of(locator, dv, xy)
+    if not alignment.holds:
+        raise DataError("; ".join(alignment.findings))
+    for finding in alignment.findings:
+        remark(finding)
+    with Bar("learning") as bar:
+        return locator.aligned(alignment, bar)
 
 
 def _what_of(name: str | None, path: Path, data: Recording) -> tuple[Skin | None, Pattern]:

@@ -15,7 +15,7 @@ from tomoskin.cli.recording import changes, say_notes
 from tomoskin.core import DataError, FloatArray
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import Calibration, Codes, Examples, FrameClassifier
+    from tomoskin.calibration import Alignment, Calibration, Codes, Examples, FrameClassifier
     from tomoskin.core import Arrays
     from tomoskin.pattern import Pattern
     from tomoskin.skin import Skin
@@ -184,6 +184,7 @@ def _report(made: Calibration[FrameClassifier], n_frames: int, fitted: bool, *, 
                 "labelled": n_labelled,
                 "sessions": int(examples.session.max()) + 1,
                 "right_when_left_out": classifier.right,
+                "alignment": _alignment(classifier.alignment),
             }
         )
         return
@@ -195,5 +196,16 @@ def _report(made: Calibration[FrameClassifier], n_frames: int, fitted: bool, *, 
     )
     if classifier.right < _HARDLY:
         typer.echo("the labels hardly follow from the data: are they of these frames?")
-    if fitted and n_labelled < n_frames:
-        typer.echo(f"fitted to this session by {n_frames - n_labelled} frames without a label")
+    if fitted and classifier.alignment is not None:
+        typer.echo(classifier.alignment.text)
+
+
+def _alignment(alignment: Alignment | None) -> dict[str, object] | None:
+    if alignment is None:
+        return None
+    return {
+        "holds": alignment.holds,
+        "reliability": alignment.reliability,
+        "grown": alignment.grown,
+        "reasons": list(alignment.reasons),
+    }

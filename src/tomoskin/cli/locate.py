@@ -10,7 +10,7 @@ import typer
 
 from tomoskin.cli.named_files import ForceFlag, Reads
 from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption, TouchesOut
-from tomoskin.cli.output import Bar, JsonFlag, emit
+from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.recording import changes, say_notes
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 _BLOCK = 256
 _SHOWN = 20
+_STRANGE = 1.5
+"""How many times worse than its own presses frames may fit a calibration unsaid."""
 
 
 def locate(
@@ -56,12 +58,25 @@ def locate(
             "and were left out",
             err=True,
         )
+    _say_strange(loaded.model, dv[frames])
     located = list((_several if several else _single)(loaded, dv[frames]))
     if touches is not None:
         rows = zip(frames.tolist(), located, strict=True)
         timed = ((k, float(data.time[k]), t) for k, t in rows)
         write_touches(touches, timed, overwrite=force)
     _report(data, frames.tolist(), located, json=json)
+
+
+def _say_strange(locator: Locator, dv: FloatArray) -> None:
+    """Say where the frames fit the calibration worse than its own presses do."""
+    import numpy as np
+
+    if len(dv) and (times := float(np.median(locator.strangeness(dv)))) > _STRANGE:
+        remark(
+            f"frames fit the calibration {times:.1f} times worse than its own presses do: the "
+            "skin, its electrodes or its gains have changed. Ellipses are widened. Touch the skin "
+            "all over and align it: tomoskin calibrate touch --onto C.npz --unlabelled"
+        )
 
 
 def _check_skin(loaded: Calibration[Locator], name: str | None, path: Path) -> None:

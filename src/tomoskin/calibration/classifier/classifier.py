@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
+from tomoskin.calibration.classifier.alignment import Alignment, aligned, shows
 from tomoskin.calibration.classifier.examples import Codes, Examples
 from tomoskin.calibration.classifier.mixture import (
     Mixture,
@@ -26,6 +27,7 @@ _KNOWN = 0.99
 """Part of the frames of known states that are not called unknown."""
 
 _SHARPNESS = np.geomspace(0.05, 1.6, 16)
+_TEMPERED = np.geomspace(1e-3, 1.6, 60)
 _ENOUGH = 10
 """Unlabelled frames of a session below which it is not fitted."""
 
@@ -58,6 +60,8 @@ class Classifier:
     right
         Part of the labelled frames of the newest session that has them all whose state is told
         when they are left out of the learning.
+    alignment
+        How the newest session was taken over; None where it has all its labels.
     """
 
     examples: Examples
@@ -68,6 +72,7 @@ class Classifier:
     sharpness: float
     limit: float
     right: float
+    alignment: Alignment | None = None
 
     @classmethod
     def fit(
@@ -131,11 +136,44 @@ class Classifier:
         newest = self.examples.part(self.examples.newest)
         x = self.subspace.whitened(newest.dv) @ self.subspace.axes
         numbers = self.examples.codes.numbers(newest.flags)
-        start = self.mixture.moved_to(x) if len(x) >= _ENOUGH else self.mixture
-        mixture = start.adapted(x, numbers)
-        strange = _compared(self.subspace, mixture, newest.dv)[1]
+        older = self.examples.part(~self.examples.newest)
+        if len(x) < _ENOUGH or not older.labelled.any():
+            return self._with(self.mixture.adapted(x, numbers), newest.dv, usual)
+        fitted, alignment = aligned(self.mixture, x, numbers, self._rest())
+        made = self._with(fitted, newest.dv, usual)
+        if alignment.holds:
+            sharpness = min(self.sharpness, _tempered(fitted.distances(x), alignment.reliability))
+            return replace(made, sharpness=sharpness, alignment=alignment)
+        before = type(self).learn(older, (self.pattern_id, self.skin_id))
+        better = max((before, made), key=lambda known: known._flags_right(newest))
+        return replace(better, examples=self.examples, alignment=alignment)
+
+    def _with(self, mixture: Mixture, dv: FloatArray, usual: FloatArray) -> Self:
+        """With a mixture fitted to frames (n, n_meas); ``usual`` (m,) strangeness of known ones."""
+        strange = _compared(self.subspace, mixture, dv)[1]
         limit = self.limit * max(float(np.median(strange) / np.median(usual)), 1.0)
         return replace(self, mixture=mixture, limit=limit)
+
+    def _flags_right(self, examples: Examples) -> float:
+        """Part of the flags of labelled examples that are told, 0 where none has a label."""
+        some = examples.part(examples.labelled)
+        return float((self.predict(some.dv).flags == some.flags).mean()) if len(some) else 0.0
+
+    def _rest(self) -> FloatArray | None:
+        """(1, d) an untouched frame of the newest session; None where that has had flags set."""
+        zeros = np.zeros((1, self.examples.dv.shape[1]))
+        if self.examples.codes.exclusive:
+            return None
+        taught = self.examples.taught()
+        for number in np.unique(taught.session):
+            middle = session_mean(self.examples.dv[self.examples.session == number])
+            group = np.zeros(int((taught.session == number).sum()), dtype=np.int64)
+            x = self.subspace.whitened(taught.dv[taught.session == number], middle)
+            flags = taught.flags[taught.session == number]
+            mixture = Mixture.of(self.mixture.table, x @ self.subspace.axes, flags, group)
+            if shows(mixture, self.subspace.whitened(zeros, middle) @ self.subspace.axes):
+                return None
+        return np.asarray(self.subspace.whitened(zeros) @ self.subspace.axes)
 
     def predict(self, dv: ArrayLike) -> Answers:
         """What frames (n, n_meas) show; values that are not finite are left out.
@@ -145,23 +183,26 @@ class Classifier:
         codes = self.examples.codes
         data = frames(dv, self.examples.dv.shape[1])
         distances, strange = _compared(self.subspace, self.mixture, data)
-        weights = posterior(distances, self.sharpness)
-        best = weights.argmax(axis=1)
+        lost = self.alignment is not None and not self.alignment.holds
+        weights = posterior(distances, 0.0 if lost else self.sharpness)
+        best = distances.argmin(axis=1)
         empty = ~np.isfinite(data).any(axis=1)
         return Answers(
             codes.table[best],
             tuple(codes.text(int(number)) for number in best),
             weights.max(axis=1),
             weights @ codes.table,
-            (strange > self.limit) | empty,
+            (strange > self.limit) | empty | lost,
         )
 
     def in_session(self, dv: ArrayLike, flags: ArrayLike | None = None) -> Self:
         """Classifier for a new session, from its frames (n, n_meas), labelled or not.
 
         ``flags`` (n, f) as far as they are known, rows of NaN otherwise. The frames should show
-        the states as they come: which ones they show is found while the rest is fitted. Raises
-        DataError as :meth:`fit`, and for fewer than ten frames without a label.
+        the states as they come: which ones they show is found while the rest is fitted. Where
+        that cannot be believed (:attr:`alignment`), the classifier stays as it was and calls the
+        session's frames unknown. Raises DataError as :meth:`fit`, and for fewer than ten frames
+        without a label.
         """
         codes = self.examples.codes
         data = frames(dv, self.examples.dv.shape[1])
@@ -234,6 +275,12 @@ def _sharpness(distances: FloatArray, truth: IntArray) -> float:
     rows = np.arange(len(truth))
     likely = [np.log(posterior(distances, s)[rows, truth] + 1e-12).mean() for s in _SHARPNESS]
     return float(_SHARPNESS[int(np.argmax(likely))])
+
+
+def _tempered(distances: FloatArray, reliability: float) -> float:
+    """Temperature of the probabilities at which their mean is at most ``reliability``."""
+    said = np.array([posterior(distances, s).max(axis=1).mean() for s in _TEMPERED])
+    return float(_TEMPERED[max(int((said <= reliability).sum()) - 1, 0)])
 
 
 def _limit(strange: FloatArray) -> float:

@@ -132,6 +132,11 @@ class Mixture:
         return cls(table, templates, shrunk(left))
 
     @property
+    def exclusive(self) -> bool:
+        """Whether exactly one name holds in each combination."""
+        return len(self.table) == self.table.shape[1] and bool((self.table.sum(axis=1) == 1).all())
+
+    @property
     def means(self) -> FloatArray:
         """(k, d) frame of each combination."""
         return np.asarray(self.templates[0] + self.table @ self.templates[1:])
@@ -142,6 +147,28 @@ class Mixture:
         own = (x * cho_solve(cho_factor(self.covariance, lower=True), x.T).T).sum(axis=1)
         cross = x @ solved
         return np.asarray(own[:, None] - 2 * cross + (self.means.T * solved).sum(axis=0))
+
+    def renamed(self, order: IntArray, sign: FloatArray) -> Self:
+        """The same with template ``order[j]`` under the j-th name; where ``sign`` (f,) is −1 the
+        flag is set where it was not."""
+        effect = sign[:, None] * self.templates[1:][order]
+        first = self.templates[0] - effect[sign < 0].sum(axis=0)
+        return type(self)(self.table, np.vstack([first, effect]), self.covariance)
+
+    def about(self, x: FloatArray, numbers: IntArray, effects: FloatArray) -> Self:
+        """The same with other templates ``effects`` (f, d), about frames x (n, d) of combinations
+        ``numbers`` (n,)."""
+        first = (x - self.table[numbers] @ effects).mean(axis=0)
+        return type(self)(self.table, np.vstack([first, effects]), self.covariance)
+
+    def log_likelihood(self, x: FloatArray, numbers: IntArray) -> float:
+        """Of frames x (n, d), up to a constant; ``numbers`` (n,) as in :meth:`adapted`."""
+        distances = self.distances(x)
+        some = np.flatnonzero(numbers >= 0)
+        near = distances.min(axis=1)
+        total = -0.5 * near + np.log(np.exp(-0.5 * (distances - near[:, None])).mean(axis=1))
+        total[some] = -0.5 * distances[some, numbers[some]] - np.log(len(self.table))
+        return float(total.sum() - 0.5 * len(x) * np.linalg.slogdet(self.covariance)[1])
 
     def moved_to(self, x: FloatArray) -> Self:
         """The same with the mean and size of frames x (n, d) of a session without labels.

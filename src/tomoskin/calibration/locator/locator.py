@@ -10,15 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from tomoskin.calibration.locator.posterior import FEW, Estimates
+from tomoskin.calibration.locator.posterior import FEW, Estimates, widening
 from tomoskin.calibration.locator.presses import (
     Features,
     Presses,
     Strength,
     equally_hard,
     frames,
+    mean_about,
 )
 from tomoskin.calibration.locator.rotations import Rotations
+from tomoskin.calibration.locator.session import SessionAlignment
 from tomoskin.calibration.locator.stacking import (
     NINE_IN_TEN,
     CalibratedCovariance,
@@ -51,6 +53,16 @@ _CHANGED = 2.5
 _GUESS, _GUESS_OF_FEW = 0.75, 2.5
 """Part of a guess's error above which nothing was learnt; less by the second over the number of
 presses. Noise gives 0.5 to 0.85 with 8 presses, 0.8 to 0.92 with 10, 0.93 to 0.99 from 20 on."""
+
+
+_WIDEST = 1.0
+"""Deviation, in radii of the region, at which nothing is known of a place."""
+
+
+def _bounded(covariance: FloatArray) -> FloatArray:
+    """Covariances (n, 2, 2), none larger than not knowing the place."""
+    size = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 2)
+    return np.asarray(covariance * np.minimum(_WIDEST / size, 1.0)[:, None, None] ** 2)
 
 
 def _silent(_done: float, _total: float) -> None:
@@ -198,15 +210,53 @@ class Locator:
     def predict(self, dv: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Place (n, 2) m and its covariance (n, 2, 2) m² for frames (n, n_meas).
 
-        Values that are not finite are left out. Raises DataError for another number of rows, and
-        for a frame without any value that is used.
+        A frame that fits the presses worse than they fit each other has a larger covariance. Values
+        that are not finite are left out. Raises DataError for another number of rows, and for a
+        frame without any value that is used.
         """
         data = self.features(frames(dv, self.presses.dv.shape[1]))
-        guess, spread = self.estimates(data)
+        guess, spread, strangeness = self.estimates(data)
         by_expert = self.stacking.by_expert(data, guess)
         answer = self.stacking.combined(by_expert)
         covariance = self.calibrated(spread, disagreement_of(by_expert, answer))
-        return self.region.metres(answer), self.region.unit**2 * covariance
+        wide = widening(strangeness)[:, None, None] * covariance + self._label_spread(answer)
+        wide = _bounded(wide)
+        return self.region.metres(answer), self.region.unit**2 * wide
+
+    def _label_spread(self, positions: FloatArray) -> FloatArray | float:
+        """(n, 2, 2) usual covariance of the labels about ``positions`` (n, 2), both in radii."""
+        presses = self.presses
+        if presses.spread is None:
+            return 0.0
+        spread = presses.spread / self.region.unit**2
+        return mean_about(positions, self.region.scaled(presses.xy), spread)
+
+    def in_session(self, dv: ArrayLike, xy: ArrayLike | None = None) -> Self:
+        """Locator for another session, from its frames (n, n_meas) of one touch each.
+
+        ``xy`` (n, 2) m where a label is known, rows of NaN otherwise. Where the session is as the
+        calibration was only labels are added, and where it cannot be aligned the locator stays
+        as it was: see :class:`SessionAlignment`, which says so. Raises DataError as that does.
+        """
+        alignment = SessionAlignment.of(self, dv, xy)
+        return self.aligned(alignment) if alignment.holds else self
+
+    def strangeness(self, dv: ArrayLike) -> FloatArray:
+        """(n,) how many times worse than left-out presses frames (n, n_meas) fit the maps.
+
+        About one where nothing has changed. Raises DataError as :meth:`predict`.
+        """
+        return self.estimates(self.features(frames(dv, self.presses.dv.shape[1])))[2]
+
+    def aligned(self, alignment: SessionAlignment, progress: Advance = _silent) -> Self:
+        """Locator that has learnt from the frames of an alignment, with their labels.
+
+        Where that is not needed, the labels that were given are added to its own.
+        """
+        presses, given = alignment.presses, alignment.labelled
+        if not alignment.needed:
+            return self.updated(given.dv, given.xy) if len(given) else self
+        return self.learn(presses, self.region, self.pattern, self.skin_id, progress)
 
     def strength(self, dv: ArrayLike) -> FloatArray:
         """(n,) strength of each frame's touch.

@@ -107,16 +107,36 @@ def _shrunk(scatter: FloatArray, n: int) -> FloatArray:
 
 _ROUNDING = 1e-9
 
+_MANY, _DIRECTIONS = 256, 128
+"""Of more features than that, maps and noise are learnt in so many directions: the work grows
+with their cube."""
+
+
+def principal(features: FloatArray) -> FloatArray:
+    """(k, d) orthonormal directions of the largest variance of features (n, k); all where they
+    are few."""
+    centred = features - features.mean(axis=0)
+    n, k = centred.shape
+    d = min(_DIRECTIONS, n - 1)
+    if k <= _MANY:
+        return np.eye(k)
+    if k <= n:
+        return np.asarray(eigh(centred.T @ centred, subset_by_index=(k - d, k - 1))[1])
+    size, left = eigh(centred @ centred.T, subset_by_index=(n - d, n - 1))
+    kept = size > _ROUNDING * size[-1]
+    return np.asarray(centred.T @ (left[:, kept] / np.sqrt(size[kept])))
+
 
 @dataclass(frozen=True, eq=False)
 class ResponseMaps:
     """A matrix-variate Gaussian process from place to features.
 
     Cov(features) = likeness ⊗ A + 1 ⊗ S: the rows' maps are alike where A says so, and their
-    noise is correlated by S.
+    noise is correlated by S. Features count along ``directions`` (k, d) only.
     """
 
     mean: FloatArray
+    directions: FloatArray
     basis: Basis
     data: Projected
     axes: FloatArray
@@ -128,6 +148,7 @@ class ResponseMaps:
         likeness: Likeness,
         positions: FloatArray,
         features: FloatArray,
+        directions: FloatArray,
         coregion: Coregion | None = None,
     ) -> Self:
         """Maps for ``features`` (n, k) of presses at ``positions`` (n, 2).
@@ -135,7 +156,7 @@ class ResponseMaps:
         How the rows answer together is learnt, unless ``coregion`` knows it.
         """
         mean = features.mean(axis=0)
-        centred = features - mean
+        centred = (features - mean) @ directions
         basis = Basis.of(likeness, positions)
         values = basis(positions)
         weights, axes = np.linalg.eigh(values.T @ values)
@@ -143,9 +164,9 @@ class ResponseMaps:
         weights, axes = weights[keep], axes[:, keep]
         rows = (axes / np.sqrt(weights)).T @ (values.T @ centred)
         n_rest = len(positions) - len(weights)
-        rest = centred.T @ centred - rows.T @ rows if n_rest else np.zeros(2 * (len(mean),))
+        rest = centred.T @ centred - rows.T @ rows if n_rest else np.zeros(2 * (centred.shape[1],))
         data = Projected(weights, rows, rest, n_rest)
-        return cls(mean, basis, data, axes, coregion or Coregion.of(data))
+        return cls(mean, directions, basis, data, axes, coregion or Coregion.of(data))
 
     @property
     def evidence(self) -> float:
@@ -153,11 +174,11 @@ class ResponseMaps:
         return self.coregion.evidence
 
     def whitened(self, features: FloatArray) -> FloatArray:
-        """(n, k) coordinates in which the noise is independent with variance 1."""
-        return np.asarray((features - self.mean) @ self.coregion.whiten)
+        """(n, d) coordinates in which the noise is independent with variance 1."""
+        return np.asarray((features - self.mean) @ self.whiten)
 
     def at(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance, both (n, k), of the whitened features of a press at ``positions``."""
+        """Mean and variance, both (n, d), of the whitened features of a press at ``positions``."""
         at = self.basis(positions) @ self.axes
         mean_of, variance_of = self._solved
         gain = self.coregion.gain
@@ -169,8 +190,13 @@ class ResponseMaps:
         return np.asarray(self.at(positions)[0] @ self._unwhiten + self.mean)
 
     @cached_property
+    def whiten(self) -> FloatArray:
+        """(k, d) what takes features to :meth:`whitened` ones."""
+        return np.asarray(self.directions @ self.coregion.whiten)
+
+    @cached_property
     def _unwhiten(self) -> FloatArray:
-        return np.asarray(np.linalg.inv(self.coregion.whiten))
+        return np.asarray(np.linalg.inv(self.coregion.whiten) @ self.directions.T)
 
     @cached_property
     def _solved(self) -> tuple[FloatArray, FloatArray]:

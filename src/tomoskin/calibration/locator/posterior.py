@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import product
-from typing import Self
+from typing import Self, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tomoskin.calibration.locator.maps import ResponseMaps
+from tomoskin.calibration.locator.maps import ResponseMaps, principal
 from tomoskin.calibration.locator.per_channel import ChannelLikelihood, ChannelMaps
 from tomoskin.calibration.locator.process import LENGTHS, Likeness, squared_distances
 from tomoskin.calibration.locator.rotations import Rotations
 from tomoskin.core import FloatArray
+
+BoolArray = NDArray[np.bool_]
 
 POWERS = 1 / np.array([1, 1.5, 2, 3, 4, 6, 9, 14, 20, 30, 45, 70])
 """To which a likelihood may be raised: rows err together in ways that maps do not know."""
@@ -48,12 +51,20 @@ class GridLikelihood:
             maps, np.ascontiguousarray(1 / variance.T), answer.T.copy(), offset, 0.5 * volume
         )
 
-    def __call__(self, features: FloatArray) -> FloatArray:
-        """(n, g) log-likelihood of each place, up to a constant of the frame."""
+    def misfit(self, features: FloatArray) -> FloatArray:
+        """(n, g) mean square of what frames (n, k) differ by from each place's answer, in units
+        of the noise."""
         f = self.maps.whitened(features)
-        k = f.shape[1]
-        misfit = (f * f) @ self.precision - 2 * (f @ self.answer) + self.offset
-        return np.asarray(-k * np.log1p(np.maximum(misfit, 0.0) / k) - self.volume)
+        total = (f * f) @ self.precision - 2 * (f @ self.answer) + self.offset
+        return np.asarray(np.maximum(total, 0.0) / f.shape[1])
+
+    def of_misfit(self, misfit: FloatArray) -> FloatArray:
+        """(n, g) log-likelihood of each place, up to a constant of the frame."""
+        return np.asarray(-len(self.precision) * np.log1p(misfit) - self.volume)
+
+    def __call__(self, features: FloatArray) -> FloatArray:
+        """The same of frames (n, k)."""
+        return self.of_misfit(self.misfit(features))
 
 
 def pooled(log_likelihoods: Sequence[FloatArray], powers: FloatArray) -> FloatArray:
@@ -106,13 +117,19 @@ _NEAR = 0.5
 Likelihood = Callable[[FloatArray], FloatArray]
 """Features (n, k) → log-likelihood (n, g) of the grid's positions."""
 
+L = TypeVar("L", bound=Likelihood)
+
+_WIDENS = 1.5
+"""Power of a frame's strangeness by which its covariance grows: chosen on the two sessions of
+eskin_hydrogel_round, learnt from 200 presses of one and asked on the other."""
+
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
     """Posterior mean and covariance of a place.
 
     ``powers`` weigh the log-likelihoods of ``likelihood``, and of ``per_channel`` where that
-    stands.
+    stands. ``usual`` is the least misfit over the grid that half of the left-out presses have.
     ``left_out`` (n, 2) and ``left_out_spread`` (n, 2, 2) are those of the presses themselves,
     each from maps learnt without it and some others.
     """
@@ -121,6 +138,7 @@ class Estimates:
     likelihood: GridLikelihood
     per_channel: ChannelLikelihood | None
     powers: FloatArray
+    usual: float
     left_out: FloatArray
     left_out_spread: FloatArray
 
@@ -137,18 +155,22 @@ class Estimates:
 
         Maps that are ``like`` others have their length scale and coregionalisation.
         """
+        directions = like.directions if like else principal(features)
         coregion = like.coregion if like else None
-        lengths = [like.basis.likeness] if like else map(Likeness, LENGTHS)
-        maps = max(
-            (ResponseMaps.of(x, positions, features, coregion) for x in lengths),
-            key=lambda m: m.evidence,
-        )
+        if like:
+            maps = ResponseMaps.of(like.basis.likeness, positions, features, directions, coregion)
+        else:
+            maps = _likeliest(positions, features, directions)
         together = maps.basis.likeness
 
         def joint(some: FloatArray, theirs: FloatArray) -> GridLikelihood:
-            return GridLikelihood.of(ResponseMaps.of(together, some, theirs, coregion), grid)
+            learnt = ResponseMaps.of(together, some, theirs, directions, coregion)
+            return GridLikelihood.of(learnt, grid)
 
-        parts = [_left_out(joint, positions, features)]
+        folds = _folds(positions)
+        of_others = _without(joint, folds, positions, features)
+        misfit = _read(folds, [part.misfit(x) for part, x in of_others])
+        parts = [of_others[0][0].of_misfit(misfit)]
         alone = None
         if len(positions) < FEW:
             alone = channels = ChannelMaps.of(positions, features, rotations)
@@ -156,18 +178,25 @@ class Estimates:
             def single(some: FloatArray, theirs: FloatArray) -> ChannelLikelihood:
                 return ChannelLikelihood.of(channels.again(some, theirs), grid)
 
-            parts.append(_left_out(single, positions, features))
+            alone_of_others = _without(single, folds, positions, features)
+            parts.append(_read(folds, [part(x) for part, x in alone_of_others]))
         powers = powers_of(parts, grid, positions)
         left_out = moments(pooled(parts, powers), grid)
         per_channel = ChannelLikelihood.of(alone, grid) if alone and powers[1] else None
-        return cls(grid, GridLikelihood.of(maps, grid), per_channel, powers, *left_out)
+        usual = float(np.median(misfit.min(axis=1)))
+        return cls(grid, GridLikelihood.of(maps, grid), per_channel, powers, usual, *left_out)
 
-    def __call__(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean (n, 2) and covariance (n, 2, 2) for frames (n, k)."""
-        parts = [self.likelihood(features)]
+    def __call__(self, features: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Mean (n, 2), covariance (n, 2, 2) and strangeness (n,) of frames (n, k).
+
+        A frame is strange by its least misfit over the grid, in parts of the usual one.
+        """
+        misfit = self.likelihood.misfit(features)
+        parts = [self.likelihood.of_misfit(misfit)]
         if self.per_channel is not None:
             parts.append(self.per_channel(features))
-        return moments(pooled(parts, self.powers), self.grid)
+        mean, covariance = moments(pooled(parts, self.powers), self.grid)
+        return mean, covariance, misfit.min(axis=1) / self.usual
 
     @cached_property
     def least_known(self) -> FloatArray:
@@ -179,12 +208,32 @@ class Estimates:
         return np.asarray(self.grid[int(self.likelihood.volume.argmax())])
 
 
-def _left_out(
-    learn: Callable[[FloatArray, FloatArray], Likelihood],
-    positions: FloatArray,
-    features: FloatArray,
-) -> FloatArray:
-    """(n, g) log-likelihood of each press, from what was learnt without its fold.
+def widening(strangeness: FloatArray) -> FloatArray:
+    """(n,) by which the covariances of frames grow that fit the maps worse than left-out presses.
+
+    Such frames are of a skin that has changed, or of no single touch.
+    """
+    return np.asarray(np.maximum(strangeness, 1.0) ** _WIDENS)
+
+
+def _likeliest(positions: FloatArray, features: FloatArray, directions: FloatArray) -> ResponseMaps:
+    """Maps of the length scale of the largest evidence, climbed to from the middle one."""
+
+    @cache
+    def of(number: int) -> ResponseMaps:
+        return ResponseMaps.of(Likeness(LENGTHS[number]), positions, features, directions)
+
+    best = len(LENGTHS) // 2
+    while True:
+        near = range(max(best - 1, 0), min(best + 2, len(LENGTHS)))
+        higher = max(near, key=lambda number: of(number).evidence)
+        if higher == best:
+            return of(best)
+        best = higher
+
+
+def _folds(positions: FloatArray) -> list[BoolArray]:
+    """(n,) which presses are left out together.
 
     Folds are stretches of time, so that they are as strange to each other as presses to come; but
     where presses follow each other over the skin, a stretch of time is a part of the skin.
@@ -193,9 +242,22 @@ def _left_out(
     folds = min(_FOLDS[n >= _SCARCE], n)
     order = np.arange(n)
     fold = order * folds // n if _in_any_order(positions) else order % folds
-    parts = [fold == k for k in range(folds)]
-    values = [learn(positions[~out], features[~out])(features[out]) for out in parts]
-    order = np.argsort(np.concatenate([np.flatnonzero(out) for out in parts]))
+    return [fold == k for k in range(folds)]
+
+
+def _without(
+    learn: Callable[[FloatArray, FloatArray], L],
+    folds: Sequence[BoolArray],
+    positions: FloatArray,
+    features: FloatArray,
+) -> list[tuple[L, FloatArray]]:
+    """What was learnt without each fold, and the features of that fold."""
+    return [(learn(positions[~out], features[~out]), features[out]) for out in folds]
+
+
+def _read(folds: Sequence[BoolArray], values: Sequence[FloatArray]) -> FloatArray:
+    """(n, g) values of each fold, in the order of the presses."""
+    order = np.argsort(np.concatenate([np.flatnonzero(out) for out in folds]))
     return np.asarray(np.concatenate(values)[order])
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -31,15 +31,23 @@ class Presses:
     """Frames of a single touch each, in the order in which they were made.
 
     ``dv`` (n, n_meas) V or instrument units, NaN where a value is missing; ``xy`` (n, 2) m;
-    ``strength`` (n,) in any unit, or None.
+    ``strength`` (n,) in any unit, or None. ``spread`` (n, 2, 2) m² covariance of the labels where
+    they were estimated, None where they are all known.
     """
 
     dv: FloatArray
     xy: FloatArray
     strength: FloatArray | None = None
+    spread: FloatArray | None = None
 
     @classmethod
-    def of(cls, dv: ArrayLike, xy: ArrayLike, strength: ArrayLike | None = None) -> Self:
+    def of(
+        cls,
+        dv: ArrayLike,
+        xy: ArrayLike,
+        strength: ArrayLike | None = None,
+        spread: ArrayLike | None = None,
+    ) -> Self:
         """Check the shapes and labels.
 
         Raises
@@ -48,6 +56,8 @@ class Presses:
             For shapes that do not belong together, labels that are not finite, too few presses.
         """
         presses = cls.of_more(dv, xy, strength)
+        if spread is not None:
+            presses = replace(presses, spread=_checked_spread(spread, len(presses)))
         if len(presses) < _FEWEST:
             raise DataError(
                 f"expected at least {_FEWEST} labelled presses, got {len(presses)}",
@@ -86,7 +96,22 @@ class Presses:
             raise DataError(f"expected {self.dv.shape[1]} rows, got {other.dv.shape[1]}")
         both = self.strength is not None and other.strength is not None
         strength = np.append(self.strength, other.strength) if both else None  # type: ignore[arg-type]
-        return type(self)(np.vstack([self.dv, other.dv]), np.vstack([self.xy, other.xy]), strength)
+        dv, xy = np.vstack([self.dv, other.dv]), np.vstack([self.xy, other.xy])
+        if self.spread is None and other.spread is None:
+            return type(self)(dv, xy, strength)
+        return type(self)(dv, xy, strength, np.concatenate([self.spreads, other.spreads]))
+
+    @property
+    def spreads(self) -> FloatArray:
+        """(n, 2, 2) m² covariance of the labels, 0 where they are known."""
+        return np.zeros((len(self), 2, 2)) if self.spread is None else self.spread
+
+
+def _checked_spread(spread: ArrayLike, n: int) -> FloatArray:
+    given = np.asarray(spread, dtype=np.float64)
+    if given.shape != (n, 2, 2) or not np.isfinite(given).all():
+        raise DataError(f"expected {n} finite covariances of labels (n, 2, 2), got {given.shape}")
+    return given
 
 
 def frames(dv: ArrayLike, n_meas: int | None = None) -> FloatArray:
@@ -238,8 +263,14 @@ class Strength:
 
     def usual(self, positions: FloatArray, values: FloatArray) -> FloatArray:
         """(m,) mean of the presses' ``values`` (n,) about ``positions`` (m, 2)."""
-        near = np.exp(-0.5 * squared_distances(positions, self.positions) / _NEAR**2) + _LEAST
-        return np.asarray(near @ values / near.sum(axis=1))
+        return mean_about(positions, self.positions, values)
+
+
+def mean_about(positions: FloatArray, presses: FloatArray, values: FloatArray) -> FloatArray:
+    """(m, …) mean of the ``values`` (n, …) of ``presses`` (n, 2) about ``positions`` (m, 2), in
+    radii of the region."""
+    near = np.exp(-0.5 * squared_distances(positions, presses) / _NEAR**2) + _LEAST
+    return np.asarray(np.tensordot(near / near.sum(axis=1, keepdims=True), values, 1))
 
 
 _ALIKE = 0.28

@@ -28,9 +28,16 @@ _MOST = 300
 _ROUNDING = 1e-9
 
 
-def squared_distances(a: FloatArray, b: FloatArray) -> FloatArray:
+def squared_norms(a: FloatArray) -> FloatArray:
+    """(n,) of the rows of ``a`` (n, d)."""
+    return np.asarray(np.einsum("nd,nd->n", a, a))
+
+
+def squared_distances(
+    a: FloatArray, b: FloatArray, norms_of_b: FloatArray | None = None
+) -> FloatArray:
     """(n, m) squared distances between the rows of ``a`` (n, d) and ``b`` (m, d)."""
-    square = (a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1)
+    square = squared_norms(a)[:, None] + (squared_norms(b) if norms_of_b is None else norms_of_b)
     return np.asarray(np.maximum(square - 2 * (a @ b.T), 0.0))
 
 

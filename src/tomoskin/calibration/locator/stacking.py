@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 from scipy.optimize import minimize, nnls
 from scipy.special import chdtri
 
-from tomoskin.calibration.locator.process import Distances, Process, squared_distances
+from tomoskin.calibration.locator.process import (
+    Distances,
+    Process,
+    squared_distances,
+    squared_norms,
+)
 from tomoskin.core import FloatArray
 
 _SPREAD = 1e-3
@@ -196,10 +202,14 @@ class Stacking:
         """(n, 2) what each press would be told without itself."""
         return self.combined(self.left_out_by_expert)
 
+    @cached_property
+    def _norms(self) -> FloatArray:
+        return squared_norms(self.features)
+
     def by_expert(self, features: FloatArray, estimates: FloatArray) -> FloatArray:
         """(experts, m, 2) what each says of frames, the maps first."""
         squares = {
-            "features": squared_distances(features, self.features) / self.unit,
+            "features": squared_distances(features, self.features, self._norms) / self.unit,
             "estimate": squared_distances(estimates, self.estimates) / _NEAR**2,
         }
         return np.stack([estimates, *(expert(squares, estimates) for expert in self.experts)])

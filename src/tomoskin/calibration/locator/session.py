@@ -1,0 +1,255 @@
+"""A locator in another session: how far its frames are from the presses, and where they were."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from threadpoolctl import threadpool_limits
+
+from tomoskin.calibration.locator.posterior import BoolArray
+from tomoskin.calibration.locator.presses import Presses, frames
+from tomoskin.calibration.locator.process import squared_distances
+from tomoskin.calibration.locator.topographic import (
+    TopographicMap,
+    learnt_surface,
+    likeliest_power,
+    surface_basis,
+)
+from tomoskin.core import DataError, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from tomoskin.calibration.locator.locator import Locator
+
+_FEWEST = 50
+"""Frames of a session from which it can be aligned."""
+
+_LEARNT_ON = 800
+"""Presses of the calibration that make its maps here."""
+
+_PLACES, _FOLDS = 600, 3
+
+_COVERED = 0.5
+"""Part of the sheet that touches must cover to be taken for spread over all of it."""
+
+_MOVED = 0.22
+"""Mean way, in radii of the region, by which an alignment may move the touches. On the public
+sets sessions of one kind of skin moved by 0.06 to 0.14, other patterns of it by 0.34 to 0.42."""
+
+_AGREE = 0.35
+"""Mean distance, in radii of the region, by which given labels may be missed."""
+
+_FLOOR = 0.01
+"""Deviation, in radii of the region, that every estimated label has at least."""
+
+_AS_BEFORE = 1.5
+"""Strangeness up to which a session is as the calibration was: learnt maps are better then."""
+
+_GAIN, _NOISE = 1.25, 2.0
+"""Change of a channel's gain, and growth of the noise, from which they are said."""
+
+
+@dataclass(frozen=True, eq=False)
+class SessionFeatures:
+    """arsinh(dv / scale) about its mean, both of one session: gains and offsets drop out.
+
+    ``scale``, ``mean`` (n_meas,).
+    """
+
+    scale: FloatArray
+    mean: FloatArray
+
+    @classmethod
+    def of(cls, dv: FloatArray) -> Self:
+        """Of frames (n, n_meas) of one touch each, NaN where a value is missing."""
+        finite = np.where(np.isfinite(dv), np.abs(dv), 0.0)
+        scale = np.maximum(np.median(finite, axis=0), 1e-3 * max(float(np.median(finite)), 1e-99))
+        values = np.where(np.isfinite(dv), np.arcsinh(dv / scale), np.nan)
+        count = np.maximum(np.isfinite(values).sum(axis=0), 1)
+        return cls(scale, np.asarray(np.nansum(values, axis=0) / count))
+
+    def __call__(self, dv: FloatArray) -> FloatArray:
+        """(n, n_meas), 0 where a value is missing."""
+        return np.nan_to_num(np.arcsinh(dv / self.scale) - self.mean)
+
+
+@dataclass(frozen=True, eq=False)
+class SessionAlignment:
+    """Frames of another session against a calibration, made by :meth:`of`.
+
+    Attributes
+    ----------
+    presses
+        The frames with their labels, estimated ones with their covariance.
+    gains
+        (n_meas,) size of each channel's changes, in parts of that in the calibration.
+    moved
+        Mean distance, in radii of the region, by which the alignment has moved the touches.
+    noise
+        By how much the variance of what the maps leave has grown.
+    covered
+        Part of the sheet over which the touches are spread.
+    missed
+        Mean m by which given labels are missed; NaN where none is given.
+    strangeness
+        How many times worse than the calibration's own presses the frames fit it (medians).
+    holds
+        Whether the positions can be believed.
+    """
+
+    presses: Presses
+    gains: FloatArray
+    moved: float
+    noise: float
+    covered: float
+    missed: float
+    strangeness: float
+    holds: bool
+
+    @classmethod
+    def of(cls, locator: Locator, dv: ArrayLike, xy: ArrayLike | None = None) -> Self:
+        """Align frames (n, n_meas) of one touch each; ``xy`` (n, 2) m, NaN where not known.
+
+        Raises DataError for fewer than fifty frames, and arrays that do not belong together.
+        """
+        data = frames(dv, locator.presses.dv.shape[1])
+        labels = np.full((len(data), 2), np.nan) if xy is None else np.asarray(xy, dtype=float)
+        if labels.shape != (len(data), 2):
+            raise DataError(f"expected xy of shape ({len(data)}, 2), got {labels.shape}")
+        if len(data) < _FEWEST:
+            raise DataError(
+                f"expected at least {_FEWEST} touches of the session, got {len(data)}",
+                hint="touch everywhere, or press ten known positions",
+            )
+        with threadpool_limits(1):
+            return cls._of(locator, data, labels)
+
+    @classmethod
+    def _of(cls, locator: Locator, dv: FloatArray, xy: FloatArray) -> Self:
+        region, grid = locator.region, locator.region.lattice(_PLACES)
+        before, features = _learnt(locator, grid)
+        theirs = SessionFeatures.of(dv)
+        known: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
+        named = np.full(len(dv), -1)
+        if known.any():
+            named[known] = _numbers(region.scaled(xy[known]), grid)
+        white = theirs(dv) @ features.whiten + before.middle
+        start = before.surface.posterior(white)
+        covered = float(np.exp(_entropy(start.mean(axis=0))) / len(grid))
+        fit, noise = before.surface.fitted(white, named, everywhere=covered > _COVERED)
+        grown = noise / before.noise
+        mean = fit.posterior(white) @ grid
+        moved = float(np.linalg.norm(mean - start @ grid, axis=1).mean())
+        missed = _missed(mean[known], region.scaled(xy[known]))
+        believed = moved < _MOVED and covered > _COVERED
+        holds = believed if np.isnan(missed) else missed < _AGREE
+        spread = _spread(fit.tempered(grown).posterior(white), mean, grid)
+        spread[known] = 0.0
+        label = np.where(known[:, None], xy, region.metres(mean))
+        presses = Presses.of(dv, label, spread=region.unit**2 * spread)
+        gains = theirs.scale / features.session.scale
+        strange = float(np.median(locator.strangeness(dv)))
+        return cls(presses, gains, moved, grown, covered, region.unit * missed, strange, holds)
+
+    @property
+    def needed(self) -> bool:
+        """Whether the frames fit the calibration worse than its own presses do."""
+        return self.strangeness > _AS_BEFORE
+
+    @property
+    def labelled(self) -> Presses:
+        """The frames whose label was given."""
+        chosen = ~self.presses.spreads.any(axis=(1, 2))
+        return Presses.of_more(self.presses.dv[chosen], self.presses.xy[chosen])
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What differs from the calibration, and what would mend it, in words."""
+        if not self.needed:
+            return ("the session is as the calibration was",)
+        found = []
+        middle = float(np.median(self.gains))
+        uneven = float(np.exp(np.abs(np.log(self.gains / middle)).mean()))
+        if max(middle, 1 / middle) > _GAIN:
+            found.append(f"changes are {middle:.2g} times as large as in the calibration")
+        if uneven > _GAIN:
+            found.append(f"the channels' gains have changed by a factor of {uneven:.2g}, unevenly")
+        if self.noise > _NOISE:
+            found.append(f"what the maps leave has grown {self.noise:.2g} times in variance")
+        if self.covered <= _COVERED:
+            found.append(f"touches cover {self.covered:.0%} of the sheet: touch all of it")
+        if not self.holds:
+            found.append(
+                "the session cannot be aligned with the calibration: touch all of the skin, press "
+                "ten known positions as well, or calibrate anew"
+            )
+        return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Before:
+    """Maps of a calibration in its own whitened features; ``middle`` (k,) of a sheet that is
+    touched everywhere; ``noise`` of its own frames without their labels."""
+
+    surface: TopographicMap
+    middle: FloatArray
+    noise: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Whitened:
+    """Features of one ``session``, and what whitens them, (n_meas, k)."""
+
+    session: SessionFeatures
+    whiten: FloatArray
+
+
+def _learnt(locator: Locator, grid: FloatArray) -> tuple[_Before, _Whitened]:
+    presses = locator.presses
+    chosen = np.unique(np.linspace(0, len(presses) - 1, _LEARNT_ON).astype(int))
+    dv, positions = presses.dv[chosen], locator.region.scaled(presses.xy[chosen])
+    fold = np.arange(len(dv)) % _FOLDS
+    parts = []
+    for k in range(_FOLDS):
+        surface, used, middle = _surface(dv[fold != k], positions[fold != k], grid)
+        white = SessionFeatures.of(dv[fold == k])(dv[fold == k]) @ used.whiten + middle
+        parts.append((surface, white, _numbers(positions[fold == k], grid)))
+    power = likeliest_power(parts)
+    surface, used, middle = _surface(dv, positions, grid)
+    surface = replace(surface, power=power)
+    white = used.session(dv) @ used.whiten + middle
+    _, noise = surface.fitted(white, np.full(len(dv), -1), everywhere=True)
+    return _Before(surface, middle, noise), used
+
+
+def _surface(
+    dv: FloatArray, positions: FloatArray, grid: FloatArray
+) -> tuple[TopographicMap, _Whitened, FloatArray]:
+    session, basis = SessionFeatures.of(dv), surface_basis(grid)
+    coefficients, whiten = learnt_surface(basis, positions, session(dv))
+    values = basis(grid)
+    surface = TopographicMap(values, coefficients, np.ones(whiten.shape[1]), 1.0)
+    return surface, _Whitened(session, whiten), (values @ coefficients).mean(axis=0)
+
+
+def _numbers(positions: FloatArray, grid: FloatArray) -> IntArray:
+    return np.asarray(squared_distances(positions, grid).argmin(axis=1))
+
+
+def _entropy(part: FloatArray) -> float:
+    return float(-(part * np.log(np.maximum(part, 1e-300))).sum())
+
+
+def _missed(answers: FloatArray, labels: FloatArray) -> float:
+    return float(np.linalg.norm(answers - labels, axis=1).mean()) if len(labels) else np.nan
+
+
+def _spread(weights: FloatArray, mean: FloatArray, grid: FloatArray) -> FloatArray:
+    """(n, 2, 2) mean square of the grid's positions about ``mean`` (n, 2)."""
+    second = (weights @ (grid[:, :, None] * grid[:, None, :]).reshape(-1, 4)).reshape(-1, 2, 2)
+    middle = weights @ grid
+    about = second - middle[:, :, None] * middle[:, None]
+    off = middle - mean
+    return np.asarray(about + off[:, :, None] * off[:, None] + _FLOOR**2 * np.eye(2))
