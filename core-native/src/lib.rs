@@ -26,7 +26,9 @@ mod residual;
 pub mod scalar;
 pub mod small;
 pub mod solve;
+pub mod spot_algebra;
 pub mod spot_fit;
+pub mod spot_match;
 #[cfg(feature = "python")]
 mod spot_python;
 pub mod spot_table;

@@ -1,11 +1,16 @@
 //! What Python sees of spots.
 
-use numpy::{Ix1, Ix2, Ix3, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{
+    Ix1, Ix2, Ix3, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2,
+    PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::arrays::{Any, array, contiguous, invalid, same};
 use crate::dense::Matrix;
-use crate::spot_fit::{self, Frame, Prior, Seen, Sheet};
+use crate::spot_algebra::{Beside, Metric};
+use crate::spot_fit::{Frame, Prior, Seen, Sheet};
+use crate::spot_match::{self, Limits, Signatures};
 use crate::spot_table::{DIRECTIONS, Grid, PARAMETERS, ROWS, Spot, Table};
 
 /// A table of spots, and where they may be.
@@ -92,7 +97,7 @@ impl SpotTable {
             let mut writable = out.readwrite();
             let parts = writable.as_slice_mut()?.chunks_exact_mut(size.max(1));
             for (spot, part) in spots.iter().zip(parts) {
-                self.table.expand(spot, part);
+                self.table.expand(spot, ROWS, part);
             }
         }
         Ok(out)
@@ -104,6 +109,7 @@ impl SpotTable {
         &self,
         seen: &SeenTable,
         data: &Any<'py>,
+        rest: f64,
         left: &Any<'py>,
         offset: &Any<'py>,
         spots: &Any<'py>,
@@ -121,7 +127,7 @@ impl SpotTable {
         same(
             "entries of the table seen",
             self.table.rank * seen.0.rows,
-            seen.0.direct.len(),
+            seen.0.timed.len(),
         )?;
         let spots = spots_of(spots)?;
         let frame = Frame {
@@ -130,15 +136,13 @@ impl SpotTable {
             sheet: &self.sheet,
             prior: &self.prior,
             data: contiguous("data", &data)?,
+            rest,
             left: contiguous("left", &left)?,
             offset: contiguous("offset", &offset)?,
             deviations,
             depths,
         };
-        let fit = py.detach(|| {
-            let start = frame.at(frame.held(&spots))?;
-            Some(frame.settled(start, most))
-        });
+        let fit = py.detach(|| frame.settled(&spots, most));
         let fit = fit.ok_or_else(|| invalid("spots: not comparable with the data"))?;
         let k = fit.spots.len();
         let spots = Matrix {
@@ -146,12 +150,18 @@ impl SpotTable {
             height: PARAMETERS,
         };
         debug_assert_eq!(spots.width(), k);
-        let matrices = [spots, fit.each, fit.jacobian, fit.unknown, fit.normal];
+        let matrices = [
+            spots,
+            fit.each,
+            fit.jacobian,
+            fit.metric.unknown,
+            fit.normal,
+        ];
         let vectors = [fit.predicted, fit.residual, fit.gradient];
         Ok((
             matrices.map(|matrix| by_rows(py, matrix)),
             vectors.map(|vector| PyArray1::from_vec(py, vector)),
-            (fit.misfit, fit.log_size, fit.cost, fit.settled),
+            (fit.misfit, fit.metric.log_size, fit.cost, fit.settled),
         ))
     }
 }
@@ -162,10 +172,13 @@ impl SeenTable {
     fn new(direct: &Any<'_>, timed: &Any<'_>) -> PyResult<Self> {
         let direct = array::<f64, Ix2>("direct", direct)?;
         let timed = array::<f64, Ix2>("timed", timed)?;
-        same("rows of timed", direct.shape()[0], timed.shape()[0])?;
         same("columns of timed", direct.shape()[1], timed.shape()[1])?;
+        if direct.shape()[0] > timed.shape()[0] {
+            return Err(invalid("direct: no more rows than timed"));
+        }
         Ok(Self(Seen {
-            rows: direct.shape()[0],
+            rows: timed.shape()[0],
+            narrow: direct.shape()[0],
             direct: direct.as_array().t().iter().copied().collect(),
             timed: timed.as_array().t().iter().copied().collect(),
         }))
@@ -181,23 +194,107 @@ pub(crate) fn projected<'py>(
     ridge: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let py = columns.py();
-    let unknown = array::<f64, Ix2>("unknown", unknown)?;
-    let free = array::<f64, Ix2>("free", free)?;
-    let columns = array::<f64, Ix2>("columns", columns)?;
+    let [unknown, free, columns] =
+        directions([("unknown", unknown), ("free", free), ("columns", columns)])?;
     let rows = columns.shape()[1];
-    same("length of unknown", rows, unknown.shape()[1])?;
-    same("length of free", rows, free.shape()[1])?;
-    if rows == 0 {
-        return Err(invalid("columns: expected entries"));
-    }
     let parts = [
         contiguous("unknown", &unknown)?,
         contiguous("free", &free)?,
         contiguous("columns", &columns)?,
     ];
-    let out = py.detach(|| spot_fit::projected(parts, rows, ridge));
+    let [unknown, free, columns] = parts;
+    let out = py.detach(|| {
+        let beside = Beside::of(unknown, free, rows, ridge)?;
+        Some(beside.projected(columns, rows))
+    });
     let out = out.ok_or_else(|| invalid("free: directions in proportion"))?;
     Ok(by_rows(py, out))
+}
+
+/// Squares of what each spot changes beside the others; left, slopes and each (…, rows).
+#[pyfunction]
+pub(crate) fn standing<'py>(
+    left: &Any<'py>,
+    slopes: &Any<'py>,
+    each: &Any<'py>,
+    ridge: f64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let py = each.py();
+    let [left, slopes, each] = directions([("left", left), ("slopes", slopes), ("each", each)])?;
+    same(
+        "rows of slopes",
+        PARAMETERS * each.shape()[0],
+        slopes.shape()[0],
+    )?;
+    let unknown = Matrix {
+        values: contiguous("left", &left)?.to_vec(),
+        height: each.shape()[1],
+    };
+    let parts = [contiguous("slopes", &slopes)?, contiguous("each", &each)?];
+    let out = py.detach(|| spot_match::standing(&Metric::of(unknown)?, parts, ridge));
+    let out = out.ok_or_else(|| invalid("slopes: directions in proportion"))?;
+    Ok(PyArray1::from_vec(py, out))
+}
+
+/// Likelihood ratios and contents of candidates, signatures (n, narrow) of squares (n), in a
+/// residual (rows) with unknown and free directions (…, rows); `limits`: see the module.
+#[pyfunction]
+pub(crate) fn standing_out<'py>(
+    signatures: &Any<'py>,
+    squares: &Any<'py>,
+    unknown: &Any<'py>,
+    free: &Any<'py>,
+    residual: &Any<'py>,
+    limits: (f64, f64, f64, f64, f64),
+) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
+    let py = residual.py();
+    let signatures = array::<f64, Ix2>("signatures", signatures)?;
+    let squares = array::<f64, Ix1>("squares", squares)?;
+    let residual = array::<f64, Ix1>("residual", residual)?;
+    let [unknown, free] = directions([("unknown", unknown), ("free", free)])?;
+    same("signatures", squares.len(), signatures.shape()[0])?;
+    same("length of unknown", residual.len(), unknown.shape()[1])?;
+    if signatures.shape()[1] == 0 || signatures.shape()[1] > residual.len() {
+        return Err(invalid("signatures: as many columns as rows at most"));
+    }
+    let parts = [
+        contiguous("unknown", &unknown)?,
+        contiguous("free", &free)?,
+        contiguous("residual", &residual)?,
+    ];
+    let seen = Signatures {
+        values: contiguous("signatures", &signatures)?,
+        narrow: signatures.shape()[1],
+        squares: contiguous("squares", &squares)?,
+    };
+    let (low, high, least, useful, ridge) = limits;
+    let limits = Limits {
+        content: [low, high],
+        least,
+        useful,
+        ridge,
+    };
+    let out = py.detach(|| spot_match::standing_out(seen, parts, limits));
+    let out = out.ok_or_else(|| invalid("free: directions in proportion"))?;
+    Ok(out.map(|values| PyArray1::from_vec(py, values)))
+}
+
+/// Arrays of as many columns, which are there.
+fn directions<'py, const N: usize>(
+    named: [(&'static str, &Any<'py>); N],
+) -> PyResult<[PyReadonlyArray2<'py, f64>; N]> {
+    let arrays: Vec<_> = named
+        .iter()
+        .map(|(name, value)| array::<f64, Ix2>(name, value))
+        .collect::<PyResult<_>>()?;
+    let rows = arrays.first().map_or(0, |first| first.shape()[1]);
+    for (found, (name, _)) in arrays.iter().zip(&named) {
+        same(&format!("length of {name}"), rows, found.shape()[1])?;
+    }
+    if rows == 0 {
+        return Err(invalid("directions: expected entries"));
+    }
+    arrays.try_into().map_err(|_| invalid("directions"))
 }
 
 /// A matrix by columns as the rows of an array.

@@ -9,9 +9,8 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.refine import Fit, Solver
+from tomoskin.touch.fit.refine import Fit, Limits, Solver, WhitenedTable
 from tomoskin.touch.fit.spot import CONTENT, Response, spots_of
 
 _SPACING = 0.7
@@ -58,14 +57,14 @@ class Candidates:
         spots[:, CONTENT] = 1.0
         return cls(spots, changes / content[:, None])
 
-    def matched(self, whiten: Whitener) -> Matched:
+    def matched(self, seen: WhitenedTable) -> Matched:
         """The same for one noise."""
-        return Matched.of(self.spots, whiten(self.signatures))
+        return Matched.of(self.spots, self.signatures @ seen.matrix[: seen.narrow].T)
 
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """Candidates, their whitened signatures (n, r), and (n,) the squares of these."""
+    """Candidates, their whitened signatures (n, narrow), and (n,) the squares of these."""
 
     spots: FloatArray
     signatures: FloatArray
@@ -73,7 +72,7 @@ class Matched:
 
     @classmethod
     def of(cls, spots: FloatArray, signatures: FloatArray) -> Self:
-        """Spots (n, 4) of these signatures (n, r)."""
+        """Spots (n, 4) of these signatures (n, narrow)."""
         return cls(spots, signatures, np.einsum("nr,nr->n", signatures, signatures))
 
     def louder(self, times: float) -> Self:
@@ -87,19 +86,10 @@ class Matched:
         stands out (GLRT; Kay 1998, section 7.6.2, for a linear model), after what the spots of
         ``fit`` could take up.
         """
-        found = self.signatures
-        residual = solver.projected(fit.unknown, fit.slopes, fit.residual[None])[0]
-        onto = found @ residual
-        if sign != "both":
-            onto = np.minimum(onto, 0) if sign == "decrease" else np.maximum(onto, 0)
-        likely = np.flatnonzero(onto**2 > _LEAST**2 * self.squares)
-        free = solver.projected(fit.unknown, fit.slopes, found[likely])
-        size = np.einsum("nr,nr->n", free, found[likely])
-        useful = size > _USEFUL * self.squares[likely]
-        ratio, content = np.zeros(len(found)), np.zeros(len(found))
-        content[likely[useful]] = onto[likely[useful]] / size[useful]
-        ratio[likely[useful]] = np.abs(onto[likely[useful]]) / np.sqrt(size[useful])
-        return ratio, content
+        low = 0.0 if sign == "increase" else -math.inf
+        high = 0.0 if sign == "decrease" else math.inf
+        limits = Limits(low, high, _LEAST, _USEFUL)
+        return solver.standing_out(self.signatures, self.squares, fit, limits)
 
     def spot(self, number: int, content: FloatArray) -> FloatArray:
         """(4,) candidate ``number`` with its content of ``contents`` (n,)."""

@@ -192,6 +192,7 @@ class SpotFinder:
         seen, matched, _ = self._whitened(nuisance)
         if times != 1.0:
             seen, matched = seen.louder(times), matched.louder(times)
+        whitened, rest = seen.whitened(data)
         problem = Problem(
             response=self._model.response,
             seen=seen,
@@ -199,8 +200,9 @@ class SpotFinder:
             sign=self._settings.sign,
             reach=self._unrest * self._reach,
             grows=self._unrest * _GROWS,
-            data=seen.whiten(data),
-            left=seen.whiten(self._residual.directions.T),
+            data=whitened,
+            rest=rest,
+            left=self._residual.directions.T @ seen.matrix.T,
         )
         problem = replace(problem, sign=self.watch.sign(problem, matched))
         search = Search(problem, matched, self._settings.snr, self._most, self._pace, self._deficit)
@@ -222,7 +224,7 @@ class SpotFinder:
             whiten = Whitener.of(noise).without(nuisance)
             seen = WhitenedTable.of(model.solver, whiten, model.response.times)
             gauge = Gauge.of(channels, noise, nuisance)
-            self._matched[key] = seen, model.candidates.matched(whiten), gauge
+            self._matched[key] = seen, model.candidates.matched(seen), gauge
             if len(self._matched) > _MASKS:
                 self._matched.popitem(last=False)
         self._matched.move_to_end(key)

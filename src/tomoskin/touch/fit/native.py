@@ -8,7 +8,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.refine import Deficit, Fit, Problem
+from tomoskin.touch.fit.refine import Deficit, Fit, Limits, Problem
 from tomoskin.touch.fit.solver import DIRECTED, RESHAPED, RIDGE, SheetDomain
 from tomoskin.touch.fit.spot import FILLING
 from tomoskin.touch.fit.table import ResponseTable
@@ -46,6 +46,7 @@ class NativeSolver:
         matrices, vectors, (misfit, log_size, cost, settled) = self._spots.settled(
             problem.seen.kept,
             problem.data,
+            problem.rest,
             problem.left,
             deficit.change,
             spots,
@@ -68,9 +69,24 @@ class NativeSolver:
             misfit=misfit,
             log_size=log_size,
             cost=cost,
+            degrees=max(len(problem.seen.full) - len(gradient), 1),
             settled=settled,
         )
 
     def projected(self, unknown: FloatArray, free: FloatArray, rows: FloatArray) -> FloatArray:
         """See :class:`Solver`."""
         return np.asarray(self._core.projected(unknown, free, rows, RIDGE))
+
+    def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
+        """See :class:`Solver`."""
+        return np.asarray(self._core.standing(left, fit.slopes, fit.each, RIDGE))
+
+    def standing_out(
+        self, signatures: FloatArray, squares: FloatArray, fit: Fit, limits: Limits
+    ) -> tuple[FloatArray, FloatArray]:
+        """See :class:`Solver`."""
+        numbers = (limits.low, limits.high, limits.least, limits.useful, RIDGE)
+        ratio, content = self._core.standing_out(
+            signatures, squares, fit.unknown, fit.slopes, fit.residual, numbers
+        )
+        return ratio, content

@@ -22,6 +22,9 @@ _CERTAIN = 10.0
 _AGAIN = 2
 """Steps after what the table lacks has been renewed."""
 
+_UNSEEN = 0.1
+"""Deviations, in the mean over strong touches, that are left out of what changes show along."""
+
 _EXACT = 0.1
 """Deviations by which the exact model may differ from what a fit was made with."""
 
@@ -70,13 +73,13 @@ class Fit:
     deficit
         What the table lacks of these spots.
     each, predicted
-        (k, r) what each spot does to the whitened data, and (r,) what all do together.
+        (k, c) what each spot does to the whitened data, and (c,) what all do together.
     residual
-        (r,) whitened data less what all do.
+        (c,) whitened data less what all do.
     slopes
-        (4k, r) derivatives of the whitened model.
+        (4k, c) derivatives of the whitened model.
     unknown
-        (q, r) directions, each as long as its amplitude's deviation.
+        (q, c) directions, each as long as its amplitude's deviation.
     normal
         (4k, 4k) inverse of the covariance: JC⁻¹Jᵀ and the prior; C = 1 + unknownᵀ unknown.
     gradient
@@ -87,6 +90,8 @@ class Fit:
         Half the logarithm of the determinant of C.
     cost
         Half the misfit and the squares of the prior.
+    degrees
+        Degrees of freedom of the residual.
     settled
         Whether the steps towards it came to an end.
     """
@@ -103,6 +108,7 @@ class Fit:
     misfit: float
     log_size: float
     cost: float
+    degrees: int
     settled: bool = True
 
     @cached_property
@@ -111,11 +117,6 @@ class Fit:
         scale = 1 / np.sqrt(np.diag(self.normal))
         even = np.linalg.inv(self.normal * scale[:, None] * scale)
         return np.asarray(even * scale[:, None] * scale)
-
-    @property
-    def degrees(self) -> int:
-        """Degrees of freedom of the residual."""
-        return max(len(self.residual) - len(self.normal), 1)
 
     def log_evidence(self, prior: SpotPrior) -> float:
         """Logarithm of ∫ likelihood · prior by Laplace's method (MacKay 2003, eq. 28.5).
@@ -131,23 +132,33 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class WhitenedTable:
-    """A table as whitened data see it.
+    """A table as whitened data see it: along the c axes that touches can change at all.
+
+    Changes are smooth, and show above the noise along few axes. Along the others data are
+    noise whatever touches; only their square counts.
 
     Attributes
     ----------
     solver
         What spots do.
-    whiten
-        Of the noise.
+    matrix
+        (c, n_meas) 1/V, from data to whitened data along the axes.
+    full
+        (r, n_meas) 1/V, to all of them.
+    narrow
+        Axes that changes show along, the first ones; the others are those of a change that
+        moves on while the measurements are taken.
     direct, timed
-        (r, rank) from a change in the table's basis to whitened data; of ``timed`` each
+        (c, rank) from a change in the table's basis to whitened data; of ``timed`` each
         measurement counts as often as it is after the middle of the scan.
     kept
         What a solver keeps of that.
     """
 
     solver: Solver
-    whiten: Whitener
+    matrix: FloatArray
+    full: FloatArray
+    narrow: int
     direct: FloatArray
     timed: FloatArray
     kept: Any
@@ -155,17 +166,56 @@ class WhitenedTable:
     @classmethod
     def of(cls, solver: Solver, whiten: Whitener, times: FloatArray) -> WhitenedTable:
         """``times`` (n_meas,) of the measurements about the middle of the scan."""
-        table = solver.table
-        direct = whiten.matrix @ table.basis.T
-        timed = whiten.matrix @ (times[:, None] * table.basis.T)
-        return cls(solver, whiten, direct, timed, solver.keep(direct, timed))
+        full, table = whiten.matrix, solver.table
+        direct, timed = full @ table.basis.T, full @ (times[:, None] * table.basis.T)
+        axes = _axes(direct @ table.typical)
+        more = _axes(_less(timed @ table.typical, axes))
+        both, narrow = np.column_stack([axes, more]), axes.shape[1]
+        direct = both.T @ direct
+        direct[narrow:] = 0.0
+        return cls._kept(solver, both.T @ full, full, narrow, direct, both.T @ timed)
+
+    @classmethod
+    def _kept(
+        cls,
+        solver: Solver,
+        matrix: FloatArray,
+        full: FloatArray,
+        narrow: int,
+        direct: FloatArray,
+        timed: FloatArray,
+    ) -> WhitenedTable:
+        kept = solver.keep(direct[:narrow], timed)
+        return cls(solver, matrix, full, narrow, direct, timed, kept)
 
     def louder(self, times: float) -> WhitenedTable:
         """The same in so many times the noise's variance."""
         part = 1.0 / math.sqrt(times)
-        direct, timed = part * self.direct, part * self.timed
-        whiten = Whitener(part * self.whiten.matrix)
-        return WhitenedTable(self.solver, whiten, direct, timed, self.solver.keep(direct, timed))
+        matrix, full, direct, timed = (
+            part * m for m in (self.matrix, self.full, self.direct, self.timed)
+        )
+        return self._kept(self.solver, matrix, full, self.narrow, direct, timed)
+
+    def whitened(self, data: FloatArray) -> tuple[FloatArray, float]:
+        """(c,) of data (n_meas,) V along the axes, and the square of the rest."""
+        every, along = self.full @ data, self.matrix @ data
+        return along, max(float(every @ every - along @ along), 0.0)
+
+    @cached_property
+    def squares(self) -> FloatArray:
+        """(n_meas,) 1/V²: of what each measurement alone is, whitened."""
+        return np.asarray((self.full**2).sum(axis=0))
+
+
+def _axes(typical: FloatArray) -> FloatArray:
+    """(r, c) orthonormal: along them ``typical`` changes (r, n) are but for ``_UNSEEN``."""
+    square, vectors = np.linalg.eigh(typical.T @ typical)
+    dropped = int(np.searchsorted(np.cumsum(np.maximum(square, 0.0)), _UNSEEN**2))
+    return np.asarray(typical @ (vectors[:, dropped:] / np.sqrt(square[dropped:])))
+
+
+def _less(columns: FloatArray, axes: FloatArray) -> FloatArray:
+    return np.asarray(columns - axes @ (axes.T @ columns))
 
 
 class Solver(Protocol):
@@ -185,25 +235,62 @@ class Solver(Protocol):
         ...
 
     def settled(self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
-        """The minimum of the cost near ``spots`` (k, 4), after at most so many steps."""
+        """The minimum of the cost near ``spots`` (k, 4), after at most so many steps.
+
+        What is unknown of the spots is taken as it is at the first ones, and anew where steps
+        with that end.
+        """
         ...
 
     def projected(self, unknown: FloatArray, free: FloatArray, rows: FloatArray) -> FloatArray:
-        """(m, r) of ``rows`` (m, r): each times P.
+        """(m, c) of ``rows`` (m, c): each times P.
 
-        P = C⁻¹ less what C⁻¹ keeps of the span of ``free`` (p, r), of which any amount may be
-        there; C = 1 + unknownᵀ unknown, of directions ``unknown`` (q, r).
+        P = C⁻¹ less what C⁻¹ keeps of the span of ``free`` (p, c), of which any amount may be
+        there; C = 1 + unknownᵀ unknown, of directions ``unknown`` (q, c).
         """
         ...
+
+    def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
+        """(k,) square of what each spot of a fit changes that the slopes of the others could not
+        take up, in noise with unknown directions ``left`` (q, c)."""
+        ...
+
+    def standing_out(
+        self, signatures: FloatArray, squares: FloatArray, fit: Fit, limits: Limits
+    ) -> tuple[FloatArray, FloatArray]:
+        """See :meth:`tomoskin.touch.fit.candidates.Matched.ratios`; of ``signatures``
+        (n, narrow) with ``squares`` (n,)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What counts of candidates.
+
+    Attributes
+    ----------
+    low, high
+        Of the content: no candidate goes beyond 0 on the side that is 0.
+    least
+        Deviations of the noise below which a candidate is none.
+    useful
+        Part of a candidate's square that the spots of a fit must leave of it.
+    """
+
+    low: float
+    high: float
+    least: float
+    useful: float
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Whitened data (r,) of one frame, and what they are explained with.
+    """Whitened data (c,) of one frame, and what they are explained with.
 
+    ``rest`` is the square of what the data have along no axis of theirs.
     ``sign`` is "decrease", "increase" or "both". Standard deviations of what a touch does within a
     scan: its way along each axis, ``reach`` m, and what it ``grows`` by, in parts of it.
-    ``left`` (q, r) are directions of residual responses, each as long as its deviation.
+    ``left`` (q, c) are directions of residual responses, each as long as its deviation.
     """
 
     response: Response
@@ -213,7 +300,13 @@ class Problem:
     reach: float
     grows: float
     data: FloatArray
+    rest: float
     left: FloatArray
+
+    @property
+    def square(self) -> float:
+        """Of all whitened data."""
+        return float(self.data @ self.data) + self.rest
 
     @property
     def solver(self) -> Solver:

@@ -206,14 +206,8 @@ class Search:
 
 
 def _standing(problem: Problem, fit: Fit, left: FloatArray) -> FloatArray:
-    """(k,) deviations of the noise, with directions ``left`` (q, r), by which each stands out."""
-    k = len(fit.spots)
-    squares = np.empty(k)
-    for number in range(k):
-        others = np.delete(fit.slopes, np.s_[4 * number : 4 * number + 4], axis=0)
-        alone = fit.each[number : number + 1]
-        squares[number] = problem.solver.projected(left, others, alone)[0] @ alone[0]
-    return np.sqrt(np.maximum(squares, 0.0))
+    """(k,) deviations of the noise, with directions ``left`` (q, c), by which each stands out."""
+    return np.sqrt(problem.solver.standing(left, fit))
 
 
 def _starts(fit: Fit, fresh: FloatArray) -> list[FloatArray]:
@@ -246,12 +240,12 @@ def _uneven(problem: Problem, fit: Fit, onto: FloatArray) -> FloatArray:
 
     How much, is what the residual has beyond noise, where that is more than a sheet
     is uneven as a rule: E[rᵀr] = degrees + u²‖(1 − JΣJᵀ)E‖², E the rows' answers one by one.
-    ``onto`` is (4k, r) JC⁻¹.
+    ``onto`` is (4k, c) JC⁻¹.
     """
-    matrix, change = problem.seen.whiten.matrix, problem.change(fit)
-    slopes = onto @ matrix * change
+    change = problem.change(fit)
+    slopes = onto @ problem.seen.matrix * change
     moved = fit.covariance @ slopes
-    unexplained = float(np.sum((matrix * change) ** 2) - np.sum(slopes * moved))
+    unexplained = float(problem.seen.squares @ change**2 - np.sum(slopes * moved))
     beyond = max(fit.misfit - fit.degrees, 0.0) / unexplained if unexplained > 0 else 0.0
     return np.asarray(max(beyond, _UNEVEN**2) * (moved @ moved.T))
 

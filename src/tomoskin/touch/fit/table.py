@@ -47,7 +47,7 @@ FAINT = -0.3
 BENT = 0.5
 """Part of the way from a tail to a bell at which what a shape does is taken."""
 
-NEGLIGIBLE, SAMPLED = 1e-6, 3000
+NEGLIGIBLE, SAMPLED = 3e-5, 3000
 """Part of the largest change below which a direction of the data counts as none, by so many."""
 
 NEAR = 4
@@ -201,6 +201,14 @@ class ResponseTable:
         first = int(np.clip(math.floor(place) - 1, 0, len(self.log_radii) - NEAR))
         weights = between(np.arange(float(NEAR)), place - first)
         return first, weights / np.array([[1.0], [step]])
+
+    @cached_property
+    def typical(self) -> FloatArray:
+        """(rank, rank) V whose rows' squares are the mean ones of spots of all depths."""
+        n = len(self.nodes)
+        strong = (self.values[:, :n] * self.nodes[:, None]).reshape(-1, len(self.basis))
+        square, vectors = np.linalg.eigh(strong.T @ strong / len(strong))
+        return np.asarray(vectors * np.sqrt(np.maximum(square, 0.0)))
 
     @cached_property
     def _starts(self) -> IntArray:
