@@ -31,6 +31,8 @@ pub mod spot_fit;
 pub mod spot_match;
 #[cfg(feature = "python")]
 mod spot_python;
+pub mod spot_search;
+
 pub mod spot_table;
 pub mod symbolic;
 pub mod threads;

@@ -6,7 +6,7 @@ use crate::spot_algebra::{Metric, solved};
 use crate::spot_table::{PARAMETERS, ROWS, SLOPES, Spot, Table};
 
 /// Squared Newton decrement at which a step is too small to matter.
-const SETTLED: f64 = 0.02;
+const SETTLED: f64 = 0.05;
 const LEAST_DAMPING: f64 = 1e-6;
 const MOST_DAMPING: f64 = 1e3;
 

@@ -1,8 +1,8 @@
 //! How far spots stand out of the noise, and candidates out of what spots leave.
 
 use crate::dense::Matrix;
-use crate::small::dots;
-use crate::spot_algebra::{Beside, Metric, eliminated, forward};
+use crate::small::{dots, product};
+use crate::spot_algebra::{Beside, Metric, backward, eliminated, forward};
 use crate::spot_table::PARAMETERS;
 
 /// Candidates as whitened data see them.
@@ -90,4 +90,84 @@ pub fn standing(metric: &Metric, [slopes, each]: [&[f64]; 2], ridge: f64) -> Opt
             Some((own[(mine, mine)] - taken).max(0.0))
         })
         .collect()
+}
+
+/// What is seen of each measurement of its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Measurements<'a> {
+    /// (n_meas, rows) by columns: from data to whitened data.
+    pub matrix: &'a [f64],
+    /// (n_meas) squares of what each measurement alone is, all whitened data counted.
+    pub squares: &'a [f64],
+    /// (n_meas) what all spots change.
+    pub change: &'a [f64],
+}
+
+/// How well a fit explains its frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Quality {
+    /// residualᵀ C⁻¹ residual.
+    pub misfit: f64,
+    /// Degrees of freedom of the residual.
+    pub degrees: f64,
+    /// Part by which each measurement answers a spot otherwise than the model's, at the least.
+    pub uneven: f64,
+}
+
+/// Covariance of all parameters (4k, 4k): the curvature's, scaled where the data scatter more than
+/// they should, and the part of measurements that answer otherwise than the model's.
+///
+/// `onto` (rows, 4k): slopes times C⁻¹. `None` where the normal matrix is not positive.
+pub fn covariance(
+    normal: &Matrix<f64>,
+    onto: &Matrix<f64>,
+    seen: Measurements<'_>,
+    quality: Quality,
+) -> Option<Matrix<f64>> {
+    let (n, n_meas) = (normal.height, seen.change.len());
+    let own = inverse(normal)?;
+    let mut answers = product(seen.matrix, n_meas, &onto.values);
+    for column in answers.values.chunks_exact_mut(n_meas) {
+        let both = column.iter_mut().zip(seen.change);
+        both.for_each(|(value, change)| *value *= change);
+    }
+    let square = dots(&answers.values, &answers.values, n_meas);
+    let moved = dots(&own.values, &square.values, n);
+    let taken: f64 = (0..n).map(|i| moved[(i, i)]).sum();
+    let all = seen.squares.iter().zip(seen.change);
+    let unexplained = all.map(|(s, c)| s * c * c).sum::<f64>() - taken;
+    let Quality {
+        misfit,
+        degrees,
+        uneven,
+    } = quality;
+    let beyond = if unexplained > 0.0 {
+        (misfit - degrees).max(0.0) / unexplained
+    } else {
+        0.0
+    };
+    let part = beyond.max(uneven * uneven);
+    let scatter = (misfit / degrees).max(1.0);
+    // own is symmetric: own · square · own
+    let turned = Matrix::from_fn(n, n, |i, j| moved[(j, i)]);
+    let considered = dots(&turned.values, &own.values, n);
+    Some(Matrix::from_fn(n, n, |i, j| {
+        scatter * own[(i, j)] + part * considered[(i, j)]
+    }))
+}
+
+/// Of a symmetric positive matrix whose columns differ in size.
+fn inverse(matrix: &Matrix<f64>) -> Option<Matrix<f64>> {
+    let n = matrix.height;
+    let scale: Vec<f64> = (0..n).map(|i| 1.0 / matrix[(i, i)].sqrt()).collect();
+    let mut root = Matrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    eliminated(&mut root, n)?;
+    let mut out = Matrix::from_fn(n, n, |i, j| if i == j { scale[i] } else { 0.0 });
+    for column in out.values.chunks_exact_mut(n.max(1)) {
+        forward(&root, column);
+        backward(&root, column);
+        let both = column.iter_mut().zip(&scale);
+        both.for_each(|(value, scale)| *value *= scale);
+    }
+    Some(out)
 }

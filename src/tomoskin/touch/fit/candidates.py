@@ -86,16 +86,20 @@ class Matched:
         stands out (GLRT; Kay 1998, section 7.6.2, for a linear model), after what the spots of
         ``fit`` could take up.
         """
-        low = 0.0 if sign == "increase" else -math.inf
-        high = 0.0 if sign == "decrease" else math.inf
-        limits = Limits(low, high, _LEAST, _USEFUL)
-        return solver.standing_out(self.signatures, self.squares, fit, limits)
+        return solver.standing_out(self.signatures, self.squares, fit, limits_of(sign))
 
     def spot(self, number: int, content: FloatArray) -> FloatArray:
         """(4,) candidate ``number`` with its content of ``contents`` (n,)."""
         chosen = self.spots[number].copy()
         chosen[CONTENT] = content[number]
         return np.asarray(chosen)
+
+
+def limits_of(sign: str) -> Limits:
+    """What counts of candidates for touches of this ``sign``."""
+    low = 0.0 if sign == "increase" else -math.inf
+    high = 0.0 if sign == "decrease" else math.inf
+    return Limits(low, high, _LEAST, _USEFUL)
 
 
 def _grid(inside: FloatArray, step: float) -> FloatArray:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.pattern import Pattern, Scan
@@ -89,9 +90,10 @@ class Gauge:
     differs, agrees
         (r, n_meas) 1/V: differences of the pairs, white; and the sums in the same measure.
     directions
-        (n_parts, r) of length 1.
-    means
-        (n_channels, n_parts) averages over the parts that can be seen.
+        (n_seen, r) of length 1, of the parts that can be seen, one channel's after the other.
+        These three in single precision: they are read through in each frame.
+    starts, count
+        (n_channels,) its first part among these, and how many it has.
     variance
         (n_channels,) V² of noise in a part that shows as much as all other noise in its direction.
     limit
@@ -99,10 +101,11 @@ class Gauge:
         parts can be seen.
     """
 
-    differs: FloatArray
-    agrees: FloatArray
-    directions: FloatArray
-    means: FloatArray
+    differs: NDArray[np.float32]
+    agrees: NDArray[np.float32]
+    directions: NDArray[np.float32]
+    starts: IntArray
+    count: IntArray
     variance: FloatArray
     limit: FloatArray
 
@@ -117,16 +120,16 @@ class Gauge:
         shows = squares > 1e-12 * squares.max(initial=0.0)
         squares = np.where(shows, squares, np.inf)
         directions = directions / np.sqrt(squares)[:, None]
-        members = (channels.channel == np.arange(len(channels.names))[:, None]) & shows
-        count = members.sum(axis=1)
-        means = members / np.maximum(count, 1)[:, None]
-        spread = np.array([
-            np.linalg.norm(directions[own] @ directions[own].T) / max(len(own), 1)
-            for own in map(np.flatnonzero, members)
-        ])  # fmt: skip
+        order = np.argsort(channels.channel, kind="stable")
+        order = order[shows[order]]
+        count = np.bincount(channels.channel[order], minlength=len(channels.names))
+        starts = np.cumsum(count) - count
+        own = [directions[order[a : a + n]] for a, n in zip(starts, count, strict=True)]
+        spread = np.array([np.linalg.norm(d @ d.T) / max(len(d), 1) for d in own])
         limit = np.where(count >= _FEWEST, 1 + _LIMIT * np.sqrt(2) * spread, np.inf)
-        seen = whiten.matrix @ apart, whiten.matrix @ both
-        return cls(*seen, directions, means, means @ (1 / squares), limit)
+        each = (whiten.matrix @ apart, whiten.matrix @ both, directions[order])
+        variance = _means(1 / squares[order], starts, count)
+        return cls(*(part.astype(np.float32) for part in each), starts, count, variance, limit)
 
     def squares(self, dv: FloatArray, moved: FloatArray) -> FloatArray:
         """(n_channels,) mean squares of data (n_meas,) V; 1 where the noise is as it should be.
@@ -134,10 +137,22 @@ class Gauge:
         ``moved`` (n_meas,) V since the frame before: of that a part may stand between two rows,
         since one is read after the other; and of all data as much as channels differ in gain.
         """
-        seen = np.column_stack([self.differs @ dv, self.agrees @ moved, self.agrees @ dv])
-        differs, changes, gains = (self.means @ (self.directions @ seen) ** 2).T
+        single, both = dv.astype(np.float32), np.column_stack([moved, dv]).astype(np.float32)
+        seen = np.column_stack([self.differs @ single, self.agrees @ both])
+        along = (self.directions @ seen).astype(np.float64)
+        differs, changes, gains = _means(along * along, self.starts, self.count).T
         allowed = _MOVES**2 * changes + _GAINS**2 * gains
         return np.asarray(differs - (allowed + allowed.mean()) / 2)
+
+
+def _means(values: FloatArray, starts: IntArray, count: IntArray) -> FloatArray:
+    """(n_channels, …) means of ``values`` (n, …) over each channel's; 0 where it has none."""
+    out = np.zeros((len(count), *values.shape[1:]))
+    some = count > 0
+    if some.any():
+        sums = np.add.reduceat(values, starts[some])
+        out[some] = (sums.T / count[some]).T
+    return out
 
 
 def _white(covariance: FloatArray, nuisance: FloatArray) -> Whitener:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -54,12 +54,14 @@ class Deficit:
         ``part`` of radius and content."""
         if len(spots) != len(self.spots):
             return False
-        away = np.linalg.norm((spots - self.spots)[:, :2], axis=1)
-        other = np.abs((spots - self.spots)[:, CONTENT])
-        near = away <= part * np.exp(self.spots[:, LOG_RADIUS])
-        wider = np.abs((spots - self.spots)[:, LOG_RADIUS])
-        alike = (wider <= part) & (other <= part * np.abs(self.spots[:, CONTENT]))
-        return bool((near & alike).all())
+        return all(map(partial(_alike, part), spots.tolist(), self.spots.tolist()))
+
+
+def _alike(part: float, spot: list[float], other: list[float]) -> bool:
+    """Whether a ``spot`` is where the other one was, but for a ``part`` of that."""
+    x, y, log_radius, content = (here - there for here, there in zip(spot, other, strict=True))
+    near = math.hypot(x, y) <= part * math.exp(other[LOG_RADIUS])
+    return near and abs(log_radius) <= part and abs(content) <= part * abs(other[CONTENT])
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +153,8 @@ class WhitenedTable:
     direct, timed
         (c, rank) from a change in the table's basis to whitened data; of ``timed`` each
         measurement counts as often as it is after the middle of the scan.
+    squares
+        (n_meas,) 1/V²: of what each measurement alone is, whitened.
     kept
         What a solver keeps of that.
     """
@@ -161,6 +165,7 @@ class WhitenedTable:
     narrow: int
     direct: FloatArray
     timed: FloatArray
+    squares: FloatArray
     kept: Any
 
     @classmethod
@@ -185,8 +190,9 @@ class WhitenedTable:
         direct: FloatArray,
         timed: FloatArray,
     ) -> WhitenedTable:
-        kept = solver.keep(direct[:narrow], timed)
-        return cls(solver, matrix, full, narrow, direct, timed, kept)
+        squares = (full**2).sum(axis=0)
+        kept = solver.keep(direct[:narrow], timed, matrix, squares)
+        return cls(solver, matrix, full, narrow, direct, timed, squares, kept)
 
     def louder(self, times: float) -> WhitenedTable:
         """The same in so many times the noise's variance."""
@@ -200,11 +206,6 @@ class WhitenedTable:
         """(c,) of data (n_meas,) V along the axes, and the square of the rest."""
         every, along = self.full @ data, self.matrix @ data
         return along, max(float(every @ every - along @ along), 0.0)
-
-    @cached_property
-    def squares(self) -> FloatArray:
-        """(n_meas,) 1/V²: of what each measurement alone is, whitened."""
-        return np.asarray((self.full**2).sum(axis=0))
 
 
 def _axes(typical: FloatArray) -> FloatArray:
@@ -226,8 +227,10 @@ class Solver(Protocol):
         """What one spot does."""
         ...
 
-    def keep(self, direct: FloatArray, timed: FloatArray) -> Any:
-        """What it keeps of a :class:`WhitenedTable`."""
+    def keep(
+        self, direct: FloatArray, timed: FloatArray, matrix: FloatArray, squares: FloatArray
+    ) -> Any:
+        """What it keeps of a :class:`WhitenedTable`; ``direct`` (narrow, rank)."""
         ...
 
     def expanded(self, spots: FloatArray) -> FloatArray:
@@ -242,14 +245,6 @@ class Solver(Protocol):
         """
         ...
 
-    def projected(self, unknown: FloatArray, free: FloatArray, rows: FloatArray) -> FloatArray:
-        """(m, c) of ``rows`` (m, c): each times P.
-
-        P = C⁻¹ less what C⁻¹ keeps of the span of ``free`` (p, c), of which any amount may be
-        there; C = 1 + unknownᵀ unknown, of directions ``unknown`` (q, c).
-        """
-        ...
-
     def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
         """(k,) square of what each spot of a fit changes that the slopes of the others could not
         take up, in noise with unknown directions ``left`` (q, c)."""
@@ -261,6 +256,32 @@ class Solver(Protocol):
         """See :meth:`tomoskin.touch.fit.candidates.Matched.ratios`; of ``signatures``
         (n, narrow) with ``squares`` (n,)."""
         ...
+
+
+    def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
+        """As :meth:`standing` in noise alone, and (4k, 4k) the covariance of all parameters.
+
+        The covariance is the curvature's, scaled where the data scatter more than they should, and
+        the part by which each measurement answers otherwise than the model's, ``uneven`` at the
+        least: that is not fitted but considered (Schmidt 1966). How much it is, is what the
+        residual has beyond noise, E[rᵀr] = degrees + u²‖(1 − JΣJᵀ)E‖², E the measurements'
+        answers one by one.
+        """
+        ...
+
+    def searched(self, question: Question, before: FloatArray) -> Answer | None:
+        """What :class:`tomoskin.touch.fit.search.Search` finds in a frame before which there were
+        touches ``before`` (k, 4), in one call; None where this solver has none for that pace."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """A fit, and the likelihood ratios (n,) and contents (n,) of candidates beside it, where these
+    have been looked at."""
+
+    fit: Fit
+    others: tuple[FloatArray, FloatArray] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,6 +302,46 @@ class Limits:
     high: float
     least: float
     useful: float
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """What counts as a touch.
+
+    Attributes
+    ----------
+    least
+        Likelihood ratio, in deviations, at which one begins.
+    held
+        Part of that at which one stays.
+    sure
+        Times that ratio from which no frame is explained better without the touch.
+    misshapen
+        Part of what touches change that a wrong profile may leave: no evidence of another one.
+    """
+
+    least: float
+    held: float
+    sure: float
+    misshapen: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Question:
+    """What is looked for in one frame.
+
+    ``candidates`` are spots (n, 4) of content 1, their whitened signatures (n, narrow) and the
+    squares (n,) of these; ``most`` touches are looked for; ``deficit``: what the table lacked of
+    the last frame's.
+    """
+
+    problem: Problem
+    candidates: tuple[FloatArray, FloatArray, FloatArray]
+    limits: Limits
+    rules: Rules
+    pace: Pace
+    most: int
+    deficit: Deficit
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,17 +383,17 @@ class Problem:
         """See :meth:`Solver.settled`."""
         return self.solver.settled(self, spots, deficit, most)
 
-    def corrected(self, fit: Fit, pace: Pace) -> Fit:
-        """The fit with the exact model at its spots, solved as often as the ``pace`` allows.
+    def corrected(self, fit: Fit, rounds: int, near: float) -> Fit:
+        """The fit with the exact model at its spots, solved so often at most, and not where it has
+        been for spots as ``near``.
 
         A single faint spot is left as it is: what its table lacks is below the noise.
         """
-        size = np.linalg.norm(fit.each, axis=1)
-        if not len(size) or (len(size) == 1 and size[0] < _CERTAIN):
+        if not rounds or not len(fit.spots) or fit.deficit.holds_for(fit.spots, near):
             return fit
-        for _ in range(pace.rounds):
-            if fit.deficit.holds_for(fit.spots, pace.near):
-                return fit
+        if len(fit.spots) == 1 and np.linalg.norm(fit.each) < _CERTAIN:
+            return fit
+        for _ in range(rounds):
             exact = self.solver.table.basis @ self.response.changes([fit.spots])[0]
             change = exact - self.solver.expanded(fit.spots)[:, 0].sum(axis=0)
             far = np.linalg.norm(self.seen.direct @ (change - fit.deficit.change))
@@ -340,13 +401,10 @@ class Problem:
             if far < _EXACT:
                 return replace(fit, deficit=deficit)
             fit = self.solver.settled(self, fit.spots, deficit, _AGAIN)
+            if fit.deficit.holds_for(fit.spots, near):
+                break
         return fit
 
     def evidence(self, fit: Fit) -> float:
         """See :meth:`Fit.log_evidence`."""
         return fit.log_evidence(self.prior)
-
-    def change(self, fit: Fit) -> FloatArray:
-        """(n_meas,) V that the spots of a fit add to the reference."""
-        alone = self.solver.expanded(fit.spots)[:, 0].sum(axis=0)
-        return np.asarray((alone + fit.deficit.change) @ self.solver.table.basis)

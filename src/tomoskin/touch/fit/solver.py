@@ -11,12 +11,12 @@ from scipy.spatial import cKDTree
 from tomoskin.core import FloatArray
 from tomoskin.mesh import Mesh
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.refine import Deficit, Fit, Limits, Problem
+from tomoskin.touch.fit.refine import Deficit, Fit, Limits, Problem, Question
 from tomoskin.touch.fit.spot import CONTENT, N_PARAMETERS, X, Y
 from tomoskin.touch.fit.table import ResponseTable
 
-_SETTLED = 0.02
-"""Newton decrement, squared, at which a step is too small to matter: 0.14 deviations."""
+_SETTLED = 0.05
+"""Newton decrement, squared, at which a step is too small to matter: 0.22 deviations."""
 
 _LEAST_DAMPING, _MOST_DAMPING = 1e-6, 1e3
 
@@ -58,7 +58,9 @@ class NumpySolver:
     sheet: SheetDomain
     prior: SpotPrior
 
-    def keep(self, direct: FloatArray, timed: FloatArray) -> None:
+    def keep(
+        self, direct: FloatArray, timed: FloatArray, matrix: FloatArray, squares: FloatArray
+    ) -> None:
         """See :class:`Solver`; nothing."""
 
     def expanded(self, spots: FloatArray) -> FloatArray:
@@ -167,9 +169,21 @@ class NumpySolver:
     def _held(self, spots: FloatArray, sign: str) -> FloatArray:
         return self.prior.held(self.sheet.held(spots), sign)
 
-    def projected(self, unknown: FloatArray, free: FloatArray, rows: FloatArray) -> FloatArray:
+    def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
         """See :class:`Solver`."""
-        return _Beside.of(unknown, free).projected(rows)
+        seen, table = problem.seen, self.table
+        change = (table.expanded(fit.spots)[:, 0].sum(axis=0) + fit.deficit.change) @ table.basis
+        onto = _Beside.of(fit.unknown, fit.slopes[:0]).projected(fit.slopes)
+        answers = onto @ seen.matrix * change
+        moved = fit.covariance @ answers
+        unexplained = float(seen.squares @ change**2 - np.sum(answers * moved))
+        beyond = max(fit.misfit - fit.degrees, 0.0) / unexplained if unexplained > 0 else 0.0
+        scatter = max(1.0, fit.misfit / fit.degrees)
+        covariance = scatter * fit.covariance + max(beyond, uneven**2) * (moved @ moved.T)
+        return self.standing(fit.unknown[:0], fit), covariance
+
+    def searched(self, question: Question, before: FloatArray) -> None:
+        """See :class:`Solver`."""
 
     def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
         """See :class:`Solver`."""
@@ -264,7 +278,8 @@ class Descent:
 
 @dataclass(frozen=True, eq=False)
 class _Beside:
-    """What is left of rows beside directions; see :meth:`Solver.projected`.
+    """What is left of rows beside directions: C⁻¹ less what that keeps of the span of free ones, of
+    which any amount may be there. C = 1 + DᵀD of unknown directions D.
 
     ``both`` (q + p, c) are unknown and free ones, each scaled to length 1 in C; ``root`` is the
     lower one of their products.
