@@ -29,6 +29,7 @@ pub mod solve;
 pub mod spot_algebra;
 pub mod spot_fit;
 pub mod spot_match;
+mod spot_match_python;
 #[cfg(feature = "python")]
 mod spot_python;
 pub mod spot_search;

@@ -14,7 +14,8 @@ use crate::jacobian::{Fields, Table};
 use crate::patches::Patches;
 use crate::product::Rows;
 use crate::scalar::{Scalar, c64};
-use crate::spot_python::{SeenTable, SpotTable, standing, standing_out};
+use crate::spot_match_python::{standing, standing_out};
+use crate::spot_python::{SeenTable, SpotTable};
 use crate::{factor, jacobian, product, solve, symbolic, threads};
 
 #[pyclass(frozen, module = "tomoskin_core")]

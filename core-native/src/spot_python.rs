@@ -206,7 +206,7 @@ impl SpotTable {
         offset: &Any<'py>,
         quality: [f64; 3],
         ridge: f64,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
+    ) -> PyResult<Judged<'py>> {
         let py = offset.py();
         let [spots, each, slopes, unknown, normal] = fit;
         let spots = spots_of(&spots)?;
@@ -266,6 +266,9 @@ impl SpotTable {
         product(&seen.basis, seen.squares.len(), &sum).values
     }
 }
+
+/// Squares of what spots change, and a covariance.
+type Judged<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 
 /// Likelihood ratios and contents of candidates.
 type Others<'py> = [Bound<'py, PyArray1<f64>>; 2];
@@ -333,7 +336,7 @@ fn fitted(py: Python<'_>, fit: Fit) -> Fitted<'_> {
     )
 }
 
-fn signatures_of<'a>(
+pub(crate) fn signatures_of<'a>(
     signatures: &'a PyReadonlyArray2<'_, f64>,
     squares: &'a PyReadonlyArray1<'_, f64>,
     rows: usize,
@@ -349,7 +352,7 @@ fn signatures_of<'a>(
     })
 }
 
-fn limits_of([low, high, least, useful, ridge]: [f64; 5]) -> Limits {
+pub(crate) fn limits_of([low, high, least, useful, ridge]: [f64; 5]) -> Limits {
     Limits {
         content: [low, high],
         least,
@@ -396,62 +399,8 @@ impl SeenTable {
     }
 }
 
-/// Squares of what each spot changes beside the others; left, slopes and each (…, rows).
-#[pyfunction]
-pub(crate) fn standing<'py>(
-    left: &Any<'py>,
-    slopes: &Any<'py>,
-    each: &Any<'py>,
-    ridge: f64,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let py = each.py();
-    let [left, slopes, each] = directions([("left", left), ("slopes", slopes), ("each", each)])?;
-    same(
-        "rows of slopes",
-        PARAMETERS * each.shape()[0],
-        slopes.shape()[0],
-    )?;
-    let unknown = Matrix {
-        values: contiguous("left", &left)?.to_vec(),
-        height: each.shape()[1],
-    };
-    let parts = [contiguous("slopes", &slopes)?, contiguous("each", &each)?];
-    let out = py.detach(|| spot_match::standing(&Metric::of(unknown)?, parts, ridge));
-    let out = out.ok_or_else(|| invalid("slopes: directions in proportion"))?;
-    Ok(PyArray1::from_vec(py, out))
-}
-
-/// Likelihood ratios and contents of candidates, signatures (n, narrow) of squares (n), in a
-/// residual (rows) with unknown and free directions (…, rows); `limits`: see the module.
-#[pyfunction]
-pub(crate) fn standing_out<'py>(
-    signatures: &Any<'py>,
-    squares: &Any<'py>,
-    unknown: &Any<'py>,
-    free: &Any<'py>,
-    residual: &Any<'py>,
-    limits: [f64; 5],
-) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
-    let py = residual.py();
-    let signatures = array::<f64, Ix2>("signatures", signatures)?;
-    let squares = array::<f64, Ix1>("squares", squares)?;
-    let residual = array::<f64, Ix1>("residual", residual)?;
-    let [unknown, free] = directions([("unknown", unknown), ("free", free)])?;
-    same("length of unknown", residual.len(), unknown.shape()[1])?;
-    let parts = [
-        contiguous("unknown", &unknown)?,
-        contiguous("free", &free)?,
-        contiguous("residual", &residual)?,
-    ];
-    let seen = signatures_of(&signatures, &squares, residual.len())?;
-    let limits = limits_of(limits);
-    let out = py.detach(|| spot_match::standing_out(seen, parts, limits));
-    let out = out.ok_or_else(|| invalid("free: directions in proportion"))?;
-    Ok(out.map(|values| PyArray1::from_vec(py, values)))
-}
-
 /// Arrays of as many columns, which are there.
-fn directions<'py, const N: usize>(
+pub(crate) fn directions<'py, const N: usize>(
     named: [(&'static str, &Any<'py>); N],
 ) -> PyResult<[PyReadonlyArray2<'py, f64>; N]> {
     let arrays: Vec<_> = named

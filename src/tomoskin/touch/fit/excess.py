@@ -99,6 +99,8 @@ class Gauge:
     limit
         (n_channels,) mean squares beyond which a channel is noisier; infinite where too few of its
         parts can be seen.
+    judged
+        Numbers of the channels that can be judged.
     """
 
     differs: NDArray[np.float32]
@@ -108,6 +110,7 @@ class Gauge:
     count: IntArray
     variance: FloatArray
     limit: FloatArray
+    judged: IntArray
 
     @classmethod
     def of(cls, channels: Channels, covariance: FloatArray, nuisance: FloatArray) -> Self:
@@ -127,9 +130,12 @@ class Gauge:
         own = [directions[order[a : a + n]] for a, n in zip(starts, count, strict=True)]
         spread = np.array([np.linalg.norm(d @ d.T) / max(len(d), 1) for d in own])
         limit = np.where(count >= _FEWEST, 1 + _LIMIT * np.sqrt(2) * spread, np.inf)
+        judged = np.flatnonzero(np.isfinite(limit))
         each = (whiten.matrix @ apart, whiten.matrix @ both, directions[order])
         variance = _means(1 / squares[order], starts, count)
-        return cls(*(part.astype(np.float32) for part in each), starts, count, variance, limit)
+        return cls(
+            *(part.astype(np.float32) for part in each), starts, count, variance, limit, judged
+        )
 
     def squares(self, dv: FloatArray, moved: FloatArray) -> FloatArray:
         """(n_channels,) mean squares of data (n_meas,) V; 1 where the noise is as it should be.
@@ -254,5 +260,6 @@ class Excess:
 
 def _common(squares: FloatArray, gauge: Gauge) -> float:
     """The median channel's, of those that can be judged."""
-    known = np.isfinite(gauge.limit)
-    return float(np.median(squares[known])) if known.any() else 1.0
+    ordered = sorted(squares[gauge.judged].tolist())
+    n = len(ordered)
+    return (ordered[(n - 1) // 2] + ordered[n // 2]) / 2 if n else 1.0

@@ -153,10 +153,6 @@ class WhitenedTable:
     direct, timed
         (c, rank) from a change in the table's basis to whitened data; of ``timed`` each
         measurement counts as often as it is after the middle of the scan.
-    squares
-        (n_meas,) 1/V²: of what each measurement alone is, whitened.
-    kept
-        What a solver keeps of that.
     """
 
     solver: Solver
@@ -165,8 +161,6 @@ class WhitenedTable:
     narrow: int
     direct: FloatArray
     timed: FloatArray
-    squares: FloatArray
-    kept: Any
 
     @classmethod
     def of(cls, solver: Solver, whiten: Whitener, times: FloatArray) -> WhitenedTable:
@@ -178,21 +172,7 @@ class WhitenedTable:
         both, narrow = np.column_stack([axes, more]), axes.shape[1]
         direct = both.T @ direct
         direct[narrow:] = 0.0
-        return cls._kept(solver, both.T @ full, full, narrow, direct, both.T @ timed)
-
-    @classmethod
-    def _kept(
-        cls,
-        solver: Solver,
-        matrix: FloatArray,
-        full: FloatArray,
-        narrow: int,
-        direct: FloatArray,
-        timed: FloatArray,
-    ) -> WhitenedTable:
-        squares = (full**2).sum(axis=0)
-        kept = solver.keep(direct[:narrow], timed, matrix, squares)
-        return cls(solver, matrix, full, narrow, direct, timed, squares, kept)
+        return cls(solver, both.T @ full, full, narrow, direct, both.T @ timed)
 
     def louder(self, times: float) -> WhitenedTable:
         """The same in so many times the noise's variance."""
@@ -200,7 +180,17 @@ class WhitenedTable:
         matrix, full, direct, timed = (
             part * m for m in (self.matrix, self.full, self.direct, self.timed)
         )
-        return self._kept(self.solver, matrix, full, self.narrow, direct, timed)
+        return WhitenedTable(self.solver, matrix, full, self.narrow, direct, timed)
+
+    @cached_property
+    def squares(self) -> FloatArray:
+        """(n_meas,) 1/V²: of what each measurement alone is, whitened."""
+        return np.asarray((self.full**2).sum(axis=0))
+
+    @cached_property
+    def kept(self) -> Any:
+        """What its solver keeps of it."""
+        return self.solver.keep(self.direct[: self.narrow], self.timed, self.matrix, self.squares)
 
     def whitened(self, data: FloatArray) -> tuple[FloatArray, float]:
         """(c,) of data (n_meas,) V along the axes, and the square of the rest."""
@@ -256,7 +246,6 @@ class Solver(Protocol):
         """See :meth:`tomoskin.touch.fit.candidates.Matched.ratios`; of ``signatures``
         (n, narrow) with ``squares`` (n,)."""
         ...
-
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
         """As :meth:`standing` in noise alone, and (4k, 4k) the covariance of all parameters.

@@ -109,9 +109,7 @@ class Search:
         candidates = matched.spots, matched.signatures, matched.squares
         rules = Rules(self.least, HELD, _SURE, _MISSHAPEN)
         limits = limits_of(self.problem.sign)
-        return Question(
-            self.problem, candidates, limits, rules, self.pace, self.most, self.deficit
-        )
+        return Question(self.problem, candidates, limits, rules, self.pace, self.most, self.deficit)
 
     def found(self, before: FloatArray) -> Fit:
         """The fit of the touches, before the exact model is asked for the last time."""
