@@ -83,7 +83,7 @@ def problem(solver: Solver, spots: FloatArray, reach: float) -> Problem:
     )
 
 
-def solvers() -> tuple[NativeSolver, NumpySolver]:
+def solvers() -> tuple[Solver, Solver]:
     """Of the same table, natively and by numpy."""
     native = model().solver
     if not isinstance(native, NativeSolver):

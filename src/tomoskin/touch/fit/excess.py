@@ -130,11 +130,15 @@ class Gauge:
         own = [directions[order[a : a + n]] for a, n in zip(starts, count, strict=True)]
         spread = np.array([np.linalg.norm(d @ d.T) / max(len(d), 1) for d in own])
         limit = np.where(count >= _FEWEST, 1 + _LIMIT * np.sqrt(2) * spread, np.inf)
-        judged = np.flatnonzero(np.isfinite(limit))
-        each = (whiten.matrix @ apart, whiten.matrix @ both, directions[order])
-        variance = _means(1 / squares[order], starts, count)
         return cls(
-            *(part.astype(np.float32) for part in each), starts, count, variance, limit, judged
+            differs=(whiten.matrix @ apart).astype(np.float32),
+            agrees=(whiten.matrix @ both).astype(np.float32),
+            directions=directions[order].astype(np.float32),
+            starts=starts,
+            count=count,
+            variance=_means(1 / squares[order], starts, count),
+            limit=limit,
+            judged=np.flatnonzero(np.isfinite(limit)),
         )
 
     def squares(self, dv: FloatArray, moved: FloatArray) -> FloatArray:

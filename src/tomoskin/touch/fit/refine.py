@@ -167,8 +167,8 @@ class WhitenedTable:
         """``times`` (n_meas,) of the measurements about the middle of the scan."""
         full, table = whiten.matrix, solver.table
         direct, timed = full @ table.basis.T, full @ (times[:, None] * table.basis.T)
-        axes = _axes(direct @ table.typical)
-        more = _axes(_less(timed @ table.typical, axes))
+        axes = _axes(direct @ table.typical, least=1)
+        more = _axes(_less(timed @ table.typical, axes), least=0)
         both, narrow = np.column_stack([axes, more]), axes.shape[1]
         direct = both.T @ direct
         direct[narrow:] = 0.0
@@ -198,10 +198,12 @@ class WhitenedTable:
         return along, max(float(every @ every - along @ along), 0.0)
 
 
-def _axes(typical: FloatArray) -> FloatArray:
-    """(r, c) orthonormal: along them ``typical`` changes (r, n) are but for ``_UNSEEN``."""
+def _axes(typical: FloatArray, least: int) -> FloatArray:
+    """(r, c) orthonormal: along them ``typical`` changes (r, n) are but for ``_UNSEEN``; so many at
+    the ``least``, in whatever noise."""
     square, vectors = np.linalg.eigh(typical.T @ typical)
     dropped = int(np.searchsorted(np.cumsum(np.maximum(square, 0.0)), _UNSEEN**2))
+    dropped = min(dropped, len(square) - least)
     return np.asarray(typical @ (vectors[:, dropped:] / np.sqrt(square[dropped:])))
 
 
