@@ -25,11 +25,12 @@ CASES = (
     ("textile-disc-16", 3000),
 )
 TIME_CONSTANTS = ("0 s", "0.2 s")
+BY_FIT = (1, 2, 3)
 IDLE, PRESSED, REPEATS, FIT_REPEATS = 30, 60, 40, 10
 SETTLED = 20
 SEED = 1
 COLUMNS = (
-    *("touches by", "electrodes", "triangles", "rows", "filter s", "bytes"),
+    *("touches by", "presses", "electrodes", "triangles", "rows", "filter s", "bytes"),
     *("p50 ms", "p99 ms", "max ms", "touches", "growth B/frame"),
 )
 
@@ -42,14 +43,15 @@ def run(data: Path | None) -> tuple[Report, ...]:
         skin = Skin.load(name).altered({"mesh": {"cells": cells}})
         for filtered in TIME_CONSTANTS:
             rows.append(row(prepare(skin.altered({"inverse": {"time_constant": filtered}}))))
-        rows.append(row(prepare(skin.altered({"touch": {"method": "fit"}})), FIT_REPEATS))
+        fitted = prepare(skin.altered({"touch": {"method": "fit"}}))
+        rows += [row(fitted, FIT_REPEATS, presses) for presses in BY_FIT]
     table = Report(
         "bytes in → touches out",
         COLUMNS,
         tuple(rows),
         (
-            f"{PRESSED * REPEATS} frames, {PRESSED * FIT_REPEATS} by fit, with two moving presses "
-            f"of a twin, seed {SEED}",
+            f"{PRESSED * REPEATS} frames, {PRESSED * FIT_REPEATS} by fit, with presses of a twin "
+            f"that go round by 5 mm a frame, seed {SEED}",
             f"{clock()[1]} of each",
             "decode, voltages, difference, one-step image, touches by image or fit, tracking",
             "filter: the time constant of the Kalman filter over frames, 0 without it",
@@ -59,14 +61,15 @@ def run(data: Path | None) -> tuple[Report, ...]:
     return (table,)
 
 
-def row(prepared: Prepared, repeats: int = REPEATS) -> tuple[object, ...]:
+def row(prepared: Prepared, repeats: int = REPEATS, presses: int = 2) -> tuple[object, ...]:
     """Values under ``COLUMNS``."""
-    idle, pressed = _chunks(prepared)
+    idle, pressed = _chunks(prepared, presses)
     decoder, pipeline = Decoder(), Pipeline(prepared)
     taken, touches = _taken(decoder, pipeline, idle, pressed, repeats)
     p50, p99 = 1e3 * np.percentile(taken, (50, 99))
     return (
         prepared.skin.touch.method,
+        presses,
         prepared.pattern.n_electrodes,
         len(prepared.mesh.cells),
         prepared.pattern.n_meas,
@@ -82,7 +85,7 @@ def row(prepared: Prepared, repeats: int = REPEATS) -> tuple[object, ...]:
 
 def p50(prepared: Prepared, repeats: int) -> float:
     """Median of a frame, ms."""
-    idle, pressed = _chunks(prepared)
+    idle, pressed = _chunks(prepared, 2)
     taken, _ = _taken(Decoder(), Pipeline(prepared), idle, pressed, repeats)
     return 1e3 * float(np.median(taken))
 
@@ -127,20 +130,20 @@ def _growth(decoder: Decoder, pipeline: Pipeline, chunks: list[bytes]) -> float:
     return (after - before) / (5 * len(chunks))
 
 
-def _chunks(prepared: Prepared) -> tuple[list[bytes], list[bytes]]:
-    """Encoded frames of an idle twin, then of one with two presses that circle."""
+def _chunks(prepared: Prepared, presses: int) -> tuple[list[bytes], list[bytes]]:
+    """Encoded frames of an idle twin, then of one with so many presses that circle."""
     transport = open_twin(f"fast,seed={SEED}", prepared.skin)
     settings = ScanSettings.of(prepared.skin)
     with Link(transport, prepared.scan, settings) as link:
         idle = _take(link, IDLE)
         pressed = []
         for step in range(PRESSED):
-            angle = 2 * np.pi * step / PRESSED
-            place = 0.05 * np.array([np.cos(angle), np.sin(angle)])
+            turns = step / PRESSED + np.arange(presses) / presses
+            places = 0.05 * np.exp(2j * np.pi * turns)
             transport.set_presses(
                 tuple(
-                    Press(x=float(s * place[0]), y=float(s * place[1]), force=4.0, radius=0.012)
-                    for s in (1, -1)
+                    Press(x=float(at.real), y=float(at.imag), force=4.0, radius=0.012)
+                    for at in places
                 )
             )
             pressed += _take(link, 2)[1:]

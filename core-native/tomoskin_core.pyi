@@ -151,6 +151,26 @@ def jacobian(
     (n_meas, 2) plus and minus. ``threads``: as in :func:`transposed_product`.
     """
 
+Frame = tuple[
+    NDArray[np.float64],
+    float,
+    NDArray[np.float64],
+    NDArray[np.float64],
+    tuple[float, float, float, float],
+    tuple[float, float],
+]
+"""Whitened data (c,), the square of their rest, directions (q, c) that are left, an offset (rank,),
+deviations of direction, shape, way and growth, and the least and largest depth."""
+
+Fitted = tuple[
+    list[NDArray[np.float64]],
+    list[NDArray[np.float64]],
+    tuple[float, float, float, bool],
+]
+"""Spots (k, 4), each (k, c), slopes (4k, c), unknown (q, c), normal (4k, 4k); predicted (c,),
+residual (c,), gradient (4k,); misfit, log_size, cost, settled: see
+tomoskin.touch.fit.refine.Fit."""
+
 @final
 class SpotTable:
     """What one spot of four columns (x, y, logarithm of the radius, content) does: see
@@ -182,43 +202,91 @@ class SpotTable:
         """Change, derivatives and directions (k, 7, rank) of spots (k, 4)."""
 
     def settled(
+        self, seen: SeenTable, frame: Frame, spots: NDArray[np.float64], most: int
+    ) -> Fitted:
+        """Fit spots (k, 4) to a frame by at most so many steps."""
+
+    def searched(
         self,
         seen: SeenTable,
-        data: NDArray[np.float64],
-        left: NDArray[np.float64],
-        offset: NDArray[np.float64],
+        frame: Frame,
         spots: NDArray[np.float64],
-        deviations: tuple[float, float, float, float],
-        depths: tuple[float, float],
-        most: int,
-    ) -> tuple[
-        tuple[NDArray[np.float64], ...],
-        tuple[NDArray[np.float64], ...],
-        tuple[float, float, float, bool],
-    ]:
-        """Fit spots to whitened ``data`` (r,) by at most so many steps.
+        candidates: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+        limits: tuple[float, float, float, float, float],
+        pace: tuple[int, int, int, int, int, int, bool],
+        rules: tuple[float, float, float, float, float, float, float],
+    ) -> tuple[Fitted, bool, list[NDArray[np.float64]] | None]:
+        """Find the touches of a frame; the last one's were ``spots`` (k, 4).
+
+        Parameters
+        ----------
+        candidates
+            (n, 4) of content 1, signatures (n, narrow), and the squares (n,) of these.
+        limits
+            See :func:`standing_out`.
+        pace
+            Steps warm, at a glance and cold; finalists, tries, touches at most, restart.
+        rules
+            least, held, look, sure, rare, misshapen, and the logarithm of a spot's prior volume.
 
         Returns
         -------
-        spots, each, slopes, unknown, normal
-            (k, 4), (k, r), (4k, r), (q, r) and (4k, 4k).
-        predicted, residual, gradient
-            (r,), (r,) and (4k,).
-        misfit, log_size, cost, settled
-            See tomoskin.touch.fit.refine.Fit.
+        fit
+            Of the touches.
+        bare
+            Whether that is without the frame's offset.
+        others
+            Likelihood ratios (n,) and contents (n,) of the candidates beside it, or None.
+        """
+
+    def judged(
+        self,
+        seen: SeenTable,
+        fit: tuple[NDArray[np.float64], ...],
+        offset: NDArray[np.float64],
+        quality: tuple[float, float, float],
+        ridge: float,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Squares (k,) of what spots change beside each other, and their covariance (4k, 4k).
+
+        ``fit``: spots, each, slopes, unknown and normal; ``offset`` (rank,) what the table lacks of
+        them; ``quality``: misfit, degrees of freedom, uneven.
         """
 
 @final
 class SeenTable:
     """A table as whitened data see it."""
 
-    def __new__(cls, direct: NDArray[np.float64], timed: NDArray[np.float64]) -> SeenTable:
-        """Of matrices (r, rank)."""
+    def __new__(
+        cls,
+        direct: NDArray[np.float64],
+        timed: NDArray[np.float64],
+        matrix: NDArray[np.float64],
+        basis: NDArray[np.float64],
+        squares: NDArray[np.float64],
+    ) -> SeenTable:
+        """Of (narrow, rank), (c, rank), (c, n_meas), (rank, n_meas) and (n_meas,)."""
 
-def projected(
-    unknown: NDArray[np.float64],
-    free: NDArray[np.float64],
-    columns: NDArray[np.float64],
+def standing(
+    left: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+    each: NDArray[np.float64],
     ridge: float,
 ) -> NDArray[np.float64]:
-    """Rows (m, r), less what unknown directions (q, r) and free ones (p, r) take up."""
+    """Squares (k,) of what each of k spots changes, ``each`` (k, c), that the ``slopes`` (4k, c) of
+    the others could not take up, in noise with unknown directions ``left`` (q, c)."""
+
+def standing_out(
+    signatures: NDArray[np.float64],
+    squares: NDArray[np.float64],
+    unknown: NDArray[np.float64],
+    free: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    limits: tuple[float, float, float, float, float],
+) -> list[NDArray[np.float64]]:
+    """Likelihood ratios (n,) and contents (n,) of candidates in a residual (c,).
+
+    ``unknown`` (q, c) and ``free`` (p, c) directions take up what they can; ``limits``: least and
+    largest content by sign, deviations and part of its square below which a candidate is none, and
+    the part of a square that keeps equations solvable.
+    """

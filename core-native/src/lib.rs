@@ -26,9 +26,14 @@ mod residual;
 pub mod scalar;
 pub mod small;
 pub mod solve;
+pub mod spot_algebra;
 pub mod spot_fit;
+pub mod spot_match;
+mod spot_match_python;
 #[cfg(feature = "python")]
 mod spot_python;
+pub mod spot_search;
+
 pub mod spot_table;
 pub mod symbolic;
 pub mod threads;

@@ -14,7 +14,8 @@ use crate::jacobian::{Fields, Table};
 use crate::patches::Patches;
 use crate::product::Rows;
 use crate::scalar::{Scalar, c64};
-use crate::spot_python::{SeenTable, SpotTable, projected};
+use crate::spot_match_python::{standing, standing_out};
+use crate::spot_python::{SeenTable, SpotTable};
 use crate::{factor, jacobian, product, solve, symbolic, threads};
 
 #[pyclass(frozen, module = "tomoskin_core")]
@@ -267,6 +268,7 @@ fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     #[cfg(feature = "reference")]
     module.add_class::<crate::reference::Reference>()?;
     module.add_function(wrap_pyfunction!(jacobian_rows, module)?)?;
-    module.add_function(wrap_pyfunction!(projected, module)?)?;
+    module.add_function(wrap_pyfunction!(standing, module)?)?;
+    module.add_function(wrap_pyfunction!(standing_out, module)?)?;
     module.add_function(wrap_pyfunction!(transposed_product, module)?)
 }

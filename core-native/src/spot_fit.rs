@@ -1,11 +1,12 @@
 //! The most likely spots near a start: Levenberg–Marquardt, with unknown directions integrated out.
 
 use crate::dense::Matrix;
-use crate::small::{add_sums, dots, product};
-use crate::spot_table::{PARAMETERS, ROWS, Spot, Table};
+use crate::small::product;
+use crate::spot_algebra::{Metric, solved};
+use crate::spot_table::{PARAMETERS, ROWS, SLOPES, Spot, Table};
 
 /// Squared Newton decrement at which a step is too small to matter.
-const SETTLED: f64 = 0.02;
+const SETTLED: f64 = 0.05;
 const LEAST_DAMPING: f64 = 1e-6;
 const MOST_DAMPING: f64 = 1e3;
 
@@ -71,9 +72,11 @@ impl Prior {
 pub struct Seen {
     /// Whitened rows.
     pub rows: usize,
-    /// (rows, rank) by columns: from a change to whitened data.
+    /// The first ones: changes show in no others.
+    pub narrow: usize,
+    /// (narrow, rank) by columns: from a change to whitened data.
     pub direct: Vec<f64>,
-    /// The same where each measurement counts as it is after the middle of the scan.
+    /// (rows, rank), the same where each measurement counts as it is after the middle of the scan.
     pub timed: Vec<f64>,
 }
 
@@ -90,6 +93,8 @@ pub struct Frame<'a> {
     pub prior: &'a Prior,
     /// (rows).
     pub data: &'a [f64],
+    /// Square of what of the data is in no row.
+    pub rest: f64,
     /// (left, rows), one direction after the other.
     pub left: &'a [f64],
     /// (rank) what the table lacks.
@@ -114,114 +119,194 @@ pub struct Fit {
     pub residual: Vec<f64>,
     /// (rows, 4k).
     pub jacobian: Matrix<f64>,
-    /// (rows, q).
-    pub unknown: Matrix<f64>,
+    /// Of the directions whose amplitudes are not known.
+    pub metric: Metric,
     /// (4k, 4k).
     pub normal: Matrix<f64>,
     /// (4k), without the prior's.
     pub gradient: Vec<f64>,
     /// residualᵀ C⁻¹ residual.
     pub misfit: f64,
-    /// Half the logarithm of the determinant of C.
-    pub log_size: f64,
     /// Half the misfit and the prior's squares.
     pub cost: f64,
     /// Whether the steps came to an end.
     pub settled: bool,
 }
 
+/// The cost of some spots, and how it bends.
+struct Slope {
+    spots: Vec<Spot>,
+    /// (4k, 4k).
+    normal: Matrix<f64>,
+    /// (4k), downhill.
+    gradient: Vec<f64>,
+    cost: f64,
+}
+
+/// Where steps have led.
+struct Descent {
+    spots: Vec<Spot>,
+    /// How many were tried.
+    steps: usize,
+    /// Whether there is nothing to gain.
+    settled: bool,
+}
+
 impl Frame<'_> {
     /// The frame with these spots, as they are; `None` where they cannot be compared with it.
     pub fn at(&self, spots: Vec<Spot>) -> Option<Fit> {
         let (rank, rows, k) = (self.table.rank, self.seen.rows, spots.len());
-        let mut parts = vec![0.0; k * ROWS * rank];
-        for (spot, part) in spots
-            .iter()
-            .zip(parts.chunks_exact_mut((ROWS * rank).max(1)))
-        {
-            self.table.expand(spot, part);
-        }
-        let offset = self.whitened(&self.seen.direct, self.offset);
-        let seen = self.whitened(&self.seen.direct, &parts);
-        let pick = |wanted: &[usize]| -> Matrix<f64> {
-            let columns = (0..k).flat_map(|spot| wanted.iter().map(move |row| spot * ROWS + row));
-            let values = columns.flat_map(|column| &seen.values[column * rows..][..rows]);
-            Matrix {
-                values: values.copied().collect(),
-                height: rows,
-            }
-        };
-        let (each, jacobian) = (pick(&[0]), pick(&[1, 2, 3, 4]));
-        let unknown = self.unknown(&spots, &parts, [pick(&[5]), pick(&[6])]);
-        let mut predicted = offset.values;
-        for column in each.values.chunks_exact(rows) {
-            predicted.iter_mut().zip(column).for_each(|(p, c)| *p += c);
-        }
-        let residual: Vec<f64> = self
-            .data
-            .iter()
-            .zip(&predicted)
-            .map(|(d, p)| d - p)
-            .collect();
-        let (own, log_size) = integrated(&unknown, &jacobian, &residual)?;
+        let parts = self.expanded(&spots, ROWS);
+        let seen = self.whitened(&parts);
+        let pick = |first: usize, count: usize| picked(&seen, ROWS, first, count);
+        let (each, jacobian) = (pick(0, 1), pick(1, PARAMETERS));
+        let unknown = self.unknown(&spots, &parts, [pick(SLOPES, 1), pick(SLOPES + 1, 1)]);
+        debug_assert_eq!(parts.len(), k * ROWS * rank);
+        let predicted = self.predicted(&each);
+        let residual = self.residual(&predicted);
+        let metric = Metric::of(unknown)?;
+        let own = metric.products(&[&jacobian.values[..], &residual].concat());
         let n = k * PARAMETERS;
-        let mut normal = Matrix::from_fn(n, n, |i, j| own[(i.max(j), i.min(j))]);
-        let mut prior = 0.0;
-        for (number, spot) in spots.iter().enumerate() {
-            prior += self.prior.away(spot).iter().map(|a| a * a).sum::<f64>();
-            for (column, weight) in self.prior.weight.iter().enumerate() {
-                let place = number * PARAMETERS + column;
-                normal[(place, place)] += weight * weight;
-            }
-        }
-        let (gradient, misfit) = ((0..n).map(|j| own[(n, j)]).collect(), own[(n, n)]);
-        Some(Fit {
+        let misfit = self.rest + own[(n, n)];
+        let cost = (misfit + self.prior_squares(&spots)) / 2.0;
+        debug_assert_eq!(residual.len(), rows);
+        cost.is_finite().then(|| Fit {
+            normal: self.normal(&own, k),
+            gradient: (0..n).map(|j| own[(n, j)]).collect(),
             spots,
             each,
             predicted,
             residual,
             jacobian,
-            unknown,
-            normal,
-            gradient,
+            metric,
             misfit,
-            log_size,
-            cost: (misfit + prior) / 2.0,
-            settled: true,
+            cost,
+            settled: false,
         })
     }
 
-    /// The minimum of the cost near a fit, after at most so many steps.
-    pub fn settled(&self, mut best: Fit, most: usize) -> Fit {
-        let mut damping = LEAST_DAMPING;
-        best.settled = false;
-        for _ in 0..most {
-            let gradient = self.gradient(&best);
-            let Some(step) = solved(&best.normal, &gradient, damping) else {
+    /// The minimum of the cost near spots, after at most so many steps.
+    ///
+    /// What is unknown of the spots is taken as it is at the first ones, and anew where steps with
+    /// that end.
+    pub fn settled(&self, spots: &[Spot], most: usize) -> Option<Fit> {
+        let mut best = self.at(self.held(spots))?;
+        let mut left = most;
+        while left > 0 {
+            let descent = self.descended(&best, left);
+            best.settled = descent.settled;
+            if descent.spots == best.spots {
+                break;
+            }
+            left -= descent.steps;
+            let Some(next) = self.at(descent.spots) else {
                 break;
             };
-            let decrement: f64 = gradient.iter().zip(&step).map(|(g, s)| g * s).sum();
-            if decrement < SETTLED {
-                best.settled = true;
-                break;
-            }
-            let tried = self.at(self.moved(&best.spots, &step));
-            match tried.filter(|tried| tried.cost < best.cost) {
-                Some(better) => {
-                    best = Fit {
-                        settled: false,
-                        ..better
-                    };
-                    damping = (damping / 10.0).max(LEAST_DAMPING);
-                }
-                None if damping > MOST_DAMPING => {
-                    best.settled = true;
-                    break;
-                }
-                None => damping = (damping * 30.0).max(1e-2),
+            best = next;
+            best.settled = self.is_settled(&best);
+        }
+        Some(best)
+    }
+
+    /// Whether a step by the fit's own metric would be too small to matter.
+    fn is_settled(&self, fit: &Fit) -> bool {
+        let gradient = self.pulled(&fit.spots, fit.gradient.iter().copied());
+        solved(&fit.normal, &gradient, LEAST_DAMPING)
+            .is_some_and(|step| dot(&gradient, &step) < SETTLED)
+    }
+
+    /// Steps from a fit down to where its metric sees nothing to gain.
+    fn descended(&self, fit: &Fit, most: usize) -> Descent {
+        let mut best = Slope {
+            spots: fit.spots.clone(),
+            normal: fit.normal.clone(),
+            gradient: self.pulled(&fit.spots, fit.gradient.iter().copied()),
+            cost: fit.cost,
+        };
+        let mut damping = LEAST_DAMPING;
+        for steps in 0..most {
+            let step = solved(&best.normal, &best.gradient, damping);
+            let far = |step: &Vec<f64>| dot(&best.gradient, step) >= SETTLED;
+            let Some(step) = step.filter(far) else {
+                return Descent {
+                    spots: best.spots,
+                    steps,
+                    settled: true,
+                };
+            };
+            let tried = self.slope(&fit.metric, self.moved(&best.spots, &step));
+            if tried.cost < best.cost {
+                best = tried;
+                damping = (damping / 10.0).max(LEAST_DAMPING);
+            } else if damping > MOST_DAMPING {
+                return Descent {
+                    spots: best.spots,
+                    steps,
+                    settled: true,
+                };
+            } else {
+                damping = (damping * 30.0).max(1e-2);
             }
         }
-        best
+        Descent {
+            spots: best.spots,
+            steps: most,
+            settled: false,
+        }
+    }
+
+    /// The cost of spots by the metric of others.
+    fn slope(&self, metric: &Metric, spots: Vec<Spot>) -> Slope {
+        let (k, n) = (spots.len(), spots.len() * PARAMETERS);
+        let seen = self.whitened(&self.expanded(&spots, SLOPES));
+        let each = picked(&seen, SLOPES, 0, 1);
+        let mut columns = picked(&seen, SLOPES, 1, PARAMETERS).values;
+        columns.extend(self.residual(&self.predicted(&each)));
+        let own = metric.products(&columns);
+        let misfit = self.rest + own[(n, n)];
+        Slope {
+            normal: self.normal(&own, k),
+            gradient: self.pulled(&spots, (0..n).map(|j| own[(n, j)])),
+            cost: (misfit + self.prior_squares(&spots)) / 2.0,
+            spots,
+        }
+    }
+
+    /// (k, rows, rank) of spots.
+    fn expanded(&self, spots: &[Spot], rows: usize) -> Vec<f64> {
+        let size = rows * self.table.rank;
+        let mut parts = vec![0.0; spots.len() * size];
+        for (spot, part) in spots.iter().zip(parts.chunks_exact_mut(size.max(1))) {
+            self.table.expand(spot, rows, part);
+        }
+        parts
+    }
+
+    fn predicted(&self, each: &Matrix<f64>) -> Vec<f64> {
+        let mut predicted = self.whitened(self.offset).values;
+        for column in each.values.chunks_exact(self.seen.rows) {
+            predicted.iter_mut().zip(column).for_each(|(p, c)| *p += c);
+        }
+        predicted
+    }
+
+    fn residual(&self, predicted: &[f64]) -> Vec<f64> {
+        let both = self.data.iter().zip(predicted);
+        both.map(|(data, predicted)| data - predicted).collect()
+    }
+
+    /// The prior's part of the normal matrix added to that of the data.
+    fn normal(&self, own: &Matrix<f64>, k: usize) -> Matrix<f64> {
+        let n = k * PARAMETERS;
+        Matrix::from_fn(n, n, |i, j| {
+            let weight = self.prior.weight[j % PARAMETERS];
+            own[(i.max(j), i.min(j))] + if i == j { weight * weight } else { 0.0 }
+        })
+    }
+
+    fn prior_squares(&self, spots: &[Spot]) -> f64 {
+        let away = spots.iter().flat_map(|spot| self.prior.away(spot));
+        away.map(|a| a * a).sum()
     }
 
     /// Spots where they may be.
@@ -243,12 +328,13 @@ impl Frame<'_> {
         self.held(&moved)
     }
 
-    fn gradient(&self, fit: &Fit) -> Vec<f64> {
-        let pull = fit.spots.iter().flat_map(|spot| {
+    /// The gradient with the prior's part.
+    fn pulled(&self, spots: &[Spot], gradient: impl Iterator<Item = f64>) -> Vec<f64> {
+        let pull = spots.iter().flat_map(|spot| {
             let away = self.prior.away(spot);
             (0..PARAMETERS).map(move |column| away[column] * self.prior.weight[column])
         });
-        fit.gradient.iter().zip(pull).map(|(g, p)| g - p).collect()
+        gradient.zip(pull).map(|(g, p)| g - p).collect()
     }
 
     /// Directions whose amplitudes are unknown: what is left, each spot's direction, its way and
@@ -264,7 +350,7 @@ impl Frame<'_> {
             let spread = PARAMETERS * rank;
             let timed: Vec<_> = parts
                 .chunks_exact((ROWS * rank).max(1))
-                .map(|part| self.whitened(&self.seen.timed, &part[rank..rank + spread]))
+                .map(|part| product(&self.seen.timed, rows, &part[rank..rank + spread]))
                 .collect();
             for (column, size) in [(0, Some(reach)), (1, Some(reach)), (3, None)] {
                 for (spot, slopes) in spots.iter().zip(&timed) {
@@ -281,143 +367,29 @@ impl Frame<'_> {
     }
 
     /// (rows, n) of n changes in the basis.
-    fn whitened(&self, matrix: &[f64], changes: &[f64]) -> Matrix<f64> {
-        product(matrix, self.seen.rows, changes)
-    }
-}
-
-/// [J r]ᵀ C⁻¹ [J r], its lower half, and half the logarithm of C's determinant.
-///
-/// C = 1 + DDᵀ, and its inverse 1 − D(1 + DᵀD)⁻¹Dᵀ (Woodbury 1950); D is what is unknown.
-fn integrated(
-    unknown: &Matrix<f64>,
-    jacobian: &Matrix<f64>,
-    residual: &[f64],
-) -> Option<(Matrix<f64>, f64)> {
-    let (rows, q) = (residual.len(), unknown.width());
-    let columns = [&unknown.values, &jacobian.values, residual].concat();
-    let mut gram = dots(&columns, &columns, rows);
-    let n = gram.height;
-    for i in 0..q {
-        gram[(i, i)] += 1.0;
-    }
-    let log_size = eliminated(&mut gram, q)?;
-    let own = Matrix::from_fn(n - q, n - q, |i, j| gram[(q + i, q + j)]);
-    Some((own, log_size))
-}
-
-/// Eliminates the first q unknowns of a symmetric matrix, of which the lower half counts, and
-/// gives half the logarithm of their determinant; `None` where it is not positive.
-fn eliminated(matrix: &mut Matrix<f64>, q: usize) -> Option<f64> {
-    let (n, mut log_size) = (matrix.height, 0.0);
-    for pivot in 0..q {
-        let square = matrix[(pivot, pivot)];
-        if !(square > 0.0 && square.is_finite()) {
-            return None;
+    fn whitened(&self, changes: &[f64]) -> Matrix<f64> {
+        let (rows, narrow) = (self.seen.rows, self.seen.narrow);
+        let seen = product(&self.seen.direct, narrow, changes);
+        let mut out = Matrix::zeros(rows, seen.width());
+        let columns = out.values.chunks_exact_mut(rows);
+        for (target, column) in columns.zip(seen.values.chunks_exact(narrow)) {
+            target[..narrow].copy_from_slice(column);
         }
-        let root = square.sqrt();
-        log_size += root.ln();
-        let (done, rest) = matrix.values.split_at_mut((pivot + 1) * n);
-        let column = &mut done[pivot * n..];
-        column[pivot] = root;
-        column[pivot + 1..]
-            .iter_mut()
-            .for_each(|value| *value /= root);
-        for (number, other) in rest.chunks_exact_mut(n).enumerate() {
-            let j = pivot + 1 + number;
-            let scale = column[j];
-            for (value, below) in other[j..].iter_mut().zip(&column[j..]) {
-                *value -= scale * below;
-            }
-        }
-    }
-    Some(log_size)
-}
-
-/// Solution of a symmetric positive system whose scaled diagonal is damped.
-fn solved(normal: &Matrix<f64>, gradient: &[f64], damping: f64) -> Option<Vec<f64>> {
-    let n = gradient.len();
-    let scale: Vec<f64> = (0..n).map(|i| 1.0 / normal[(i, i)].sqrt()).collect();
-    let mut root = Matrix::from_fn(n, n, |i, j| {
-        let even = normal[(i, j)] * scale[i] * scale[j];
-        if i == j { even * (1.0 + damping) } else { even }
-    });
-    eliminated(&mut root, n)?;
-    let mut x: Vec<f64> = gradient.iter().zip(&scale).map(|(g, s)| g * s).collect();
-    forward(&root, &mut x);
-    backward(&root, &mut x);
-    Some(x.iter().zip(&scale).map(|(x, s)| x * s).collect())
-}
-
-/// Solves with the lower root of a matrix, in place.
-fn forward(root: &Matrix<f64>, x: &mut [f64]) {
-    for (i, column) in root.values.chunks_exact(root.height.max(1)).enumerate() {
-        x[i] /= column[i];
-        let value = x[i];
-        for (entry, below) in x[i + 1..].iter_mut().zip(&column[i + 1..]) {
-            *entry -= below * value;
-        }
+        out
     }
 }
 
-/// Solves with the transposed lower root of a matrix, in place.
-fn backward(root: &Matrix<f64>, x: &mut [f64]) {
-    for (i, column) in root
-        .values
-        .chunks_exact(root.height.max(1))
-        .enumerate()
-        .rev()
-    {
-        let below = column[i + 1..].iter().zip(&x[i + 1..]);
-        let sum: f64 = below.map(|(a, b)| a * b).sum();
-        x[i] = (x[i] - sum) / column[i];
-    }
+fn dot(one: &[f64], other: &[f64]) -> f64 {
+    one.iter().zip(other).map(|(a, b)| a * b).sum()
 }
 
-/// Rows times P: C⁻¹ less what C⁻¹ keeps of the span of `free`; C = 1 + unknown unknownᵀ.
-///
-/// All are (rows, …) by columns; `None` where the span is not one.
-pub fn projected(
-    [unknown, free, columns]: [&[f64]; 3],
-    rows: usize,
-    ridge: f64,
-) -> Option<Matrix<f64>> {
-    let [q, p] = [unknown, free].map(|part| part.len() / rows);
-    let both = [unknown, free].concat();
-    let mut square = dots(&both, &both, rows);
-    for i in 0..q {
-        square[(i, i)] += 1.0;
-    }
-    let scale: Vec<f64> = (0..q + p)
-        .map(|i| 1.0 / square[(i, i)].max(1e-300).sqrt())
-        .collect();
-    let mut root = Matrix::from_fn(q + p, q + p, |i, j| square[(i, j)] * scale[i] * scale[j]);
-    for i in 0..q + p {
-        root[(i, i)] += ridge;
-    }
-    eliminated(&mut root, q + p)?;
-    let mut taken = dots(&both, columns, rows);
-    for column in taken.values.chunks_exact_mut((q + p).max(1)) {
-        column
-            .iter_mut()
-            .zip(&scale)
-            .for_each(|(value, s)| *value *= s);
-        forward(&root, column);
-        backward(&root, column);
-        column
-            .iter_mut()
-            .zip(&scale)
-            .for_each(|(value, s)| *value *= s);
-    }
-    let mut values = columns.to_vec();
-    for (target, factors) in values
-        .chunks_exact_mut(rows)
-        .zip(taken.values.chunks_exact((q + p).max(1)))
-    {
-        add_sums(target, -1.0, both.chunks_exact(rows), factors);
-    }
-    Some(Matrix {
-        values,
+/// Of expansions of so many columns each, (rows, …): `count` from the `first` on.
+fn picked(seen: &Matrix<f64>, columns: usize, first: usize, count: usize) -> Matrix<f64> {
+    let rows = seen.height;
+    let each = seen.values.chunks_exact(columns * rows);
+    let wanted = each.flat_map(|part| &part[first * rows..(first + count) * rows]);
+    Matrix {
+        values: wanted.copied().collect(),
         height: rows,
-    })
+    }
 }

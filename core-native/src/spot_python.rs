@@ -1,12 +1,19 @@
 //! What Python sees of spots.
 
-use numpy::{Ix1, Ix2, Ix3, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{
+    Ix1, Ix2, Ix3, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1,
+    PyReadonlyArray2, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::arrays::{Any, array, contiguous, invalid, same};
 use crate::dense::Matrix;
-use crate::spot_fit::{self, Frame, Prior, Seen, Sheet};
-use crate::spot_table::{DIRECTIONS, Grid, PARAMETERS, ROWS, Spot, Table};
+use crate::small::product;
+use crate::spot_algebra::{Beside, Metric};
+use crate::spot_fit::{Fit, Frame, Prior, Seen, Sheet};
+use crate::spot_match::{self, Limits, Measurements, Quality, Signatures};
+use crate::spot_search::{Found, Pace, Rules, Search};
+use crate::spot_table::{DIRECTIONS, Grid, PARAMETERS, ROWS, SLOPES, Spot, Table};
 
 /// A table of spots, and where they may be.
 #[pyclass(frozen, module = "tomoskin_core")]
@@ -18,10 +25,16 @@ pub(crate) struct SpotTable {
 
 /// A table as whitened data see it.
 #[pyclass(frozen, module = "tomoskin_core")]
-pub(crate) struct SeenTable(Seen);
+pub(crate) struct SeenTable {
+    seen: Seen,
+    /// (n_meas, rows) and (n_meas, rank) by columns, and (n_meas).
+    matrix: Vec<f64>,
+    basis: Vec<f64>,
+    squares: Vec<f64>,
+}
 
 /// Spots, and what they do: arrays by rows, as Python has them.
-type Found<'py> = (
+type Fitted<'py> = (
     [Bound<'py, PyArray2<f64>>; 5],
     [Bound<'py, PyArray1<f64>>; 3],
     (f64, f64, f64, bool),
@@ -92,112 +105,316 @@ impl SpotTable {
             let mut writable = out.readwrite();
             let parts = writable.as_slice_mut()?.chunks_exact_mut(size.max(1));
             for (spot, part) in spots.iter().zip(parts) {
-                self.table.expand(spot, part);
+                self.table.expand(spot, ROWS, part);
             }
         }
         Ok(out)
     }
 
     /// The minimum near `spots` (k, 4), after at most so many steps; none: at the spots.
-    #[expect(clippy::too_many_arguments, reason = "a frame has as many parts")]
     fn settled<'py>(
         &self,
         seen: &SeenTable,
-        data: &Any<'py>,
-        left: &Any<'py>,
-        offset: &Any<'py>,
+        frame: FrameArrays<'py>,
         spots: &Any<'py>,
-        deviations: [f64; 4],
-        depths: [f64; 2],
         most: usize,
-    ) -> PyResult<Found<'py>> {
-        let py = data.py();
-        let data = array::<f64, Ix1>("data", data)?;
-        let left = array::<f64, Ix2>("left", left)?;
+    ) -> PyResult<Fitted<'py>> {
+        let (py, spots) = (frame.0.py(), spots_of(spots)?);
+        let arrays = Arrays::of(self, seen, &frame)?;
+        let frame = arrays.frame(self, seen, &frame)?;
+        let fit = py.detach(|| frame.settled(&spots, most));
+        let fit = fit.ok_or_else(|| invalid("spots: not comparable with the data"))?;
+        Ok(fitted(py, fit))
+    }
+
+    /// Touches of a frame that before held `spots` (k, 4), and whether they are fitted without
+    /// the frame's offset.
+    ///
+    /// `candidates`: spots (n, 4), signatures (n, narrow), squares (n); `limits`: see
+    /// `standing_out`; `pace` and `rules` in the order of their fields.
+    #[expect(clippy::too_many_arguments, reason = "a search has as many parts")]
+    fn searched<'py>(
+        &self,
+        seen: &SeenTable,
+        frame: FrameArrays<'py>,
+        spots: &Any<'py>,
+        candidates: (Any<'py>, Any<'py>, Any<'py>),
+        limits: [f64; 5],
+        pace: (usize, usize, usize, usize, usize, usize, bool),
+        rules: [f64; 7],
+    ) -> PyResult<(Fitted<'py>, bool, Option<Others<'py>>)> {
+        let (py, spots) = (frame.0.py(), spots_of(spots)?);
+        let arrays = Arrays::of(self, seen, &frame)?;
+        let frame = arrays.frame(self, seen, &frame)?;
+        let places = array::<f64, Ix2>("candidates", &candidates.0)?;
+        let signatures = array::<f64, Ix2>("signatures", &candidates.1)?;
+        let squares = array::<f64, Ix1>("squares", &candidates.2)?;
+        same("columns of candidates", PARAMETERS, places.shape()[1])?;
+        same("candidates", squares.len(), places.shape()[0])?;
+        let nothing = vec![0.0; self.table.rank];
+        let bare = Frame {
+            offset: &nothing,
+            ..frame
+        };
+        let left = Matrix {
+            values: frame.left.to_vec(),
+            height: seen.seen.rows,
+        };
+        let left = Metric::of(left).ok_or_else(|| invalid("left: expected finite directions"))?;
+        let (warm, glance, cold, finalists, tries, most, restart) = pace;
+        let [least, held, look, sure, rare, misshapen, volume] = rules;
+        let search = Search {
+            frames: [frame, bare],
+            left: &left,
+            candidates: contiguous("candidates", &places)?.as_chunks().0,
+            signatures: signatures_of(&signatures, &squares, seen.seen.rows)?,
+            limits: limits_of(limits),
+            pace: Pace {
+                warm,
+                glance,
+                cold,
+                finalists,
+                tries,
+                most,
+                restart,
+            },
+            rules: Rules {
+                least,
+                held,
+                look,
+                sure,
+                rare,
+                misshapen,
+                volume,
+            },
+        };
+        let found = py.detach(|| search.found(&spots));
+        let found = found.ok_or_else(|| invalid("spots: not comparable with the data"))?;
+        let Found { fit, bare, others } = found;
+        let others = others.map(|both| both.map(|values| PyArray1::from_vec(py, values)));
+        Ok((fitted(py, fit), bare, others))
+    }
+
+    /// Squares of what each spot of a fit changes beside the others, and the covariance (4k, 4k).
+    ///
+    /// `fit`: spots, each, slopes, unknown and normal; `offset` (rank) what the table lacks of
+    /// them; `quality` in the order of its fields.
+    fn judged<'py>(
+        &self,
+        seen: &SeenTable,
+        fit: [Any<'py>; 5],
+        offset: &Any<'py>,
+        quality: [f64; 3],
+        ridge: f64,
+    ) -> PyResult<Judged<'py>> {
+        let py = offset.py();
+        let [spots, each, slopes, unknown, normal] = fit;
+        let spots = spots_of(&spots)?;
+        let [each, slopes, unknown] =
+            directions([("each", &each), ("slopes", &slopes), ("unknown", &unknown)])?;
+        let normal = array::<f64, Ix2>("normal", &normal)?;
         let offset = array::<f64, Ix1>("offset", offset)?;
-        same("length of data", seen.0.rows, data.len())?;
-        same("columns of left", seen.0.rows, left.shape()[1])?;
+        let n = PARAMETERS * spots.len();
+        same("length of each", seen.seen.rows, each.shape()[1])?;
+        same("rows of each", spots.len(), each.shape()[0])?;
+        same("rows of slopes", n, slopes.shape()[0])?;
+        same("rows of normal", n, normal.shape()[0])?;
+        same("columns of normal", n, normal.shape()[1])?;
         same("length of offset", self.table.rank, offset.len())?;
+        let (each, slopes) = (contiguous("each", &each)?, contiguous("slopes", &slopes)?);
+        let unknown = contiguous("unknown", &unknown)?;
+        let offset = contiguous("offset", &offset)?;
+        let normal = Matrix {
+            values: contiguous("normal", &normal)?.to_vec(),
+            height: n,
+        };
+        let [misfit, degrees, uneven] = quality;
+        let quality = Quality {
+            misfit,
+            degrees,
+            uneven,
+        };
+        let out = py.detach(|| {
+            let alone = Metric::of(Matrix::zeros(seen.seen.rows, 0))?;
+            let squares = spot_match::standing(&alone, [slopes, each], ridge)?;
+            let onto = Beside::of(unknown, &[], seen.seen.rows, ridge)?;
+            let onto = onto.projected(slopes, seen.seen.rows);
+            let change = self.change(seen, &spots, offset);
+            let measurements = Measurements {
+                matrix: &seen.matrix,
+                squares: &seen.squares,
+                change: &change,
+            };
+            let covariance = spot_match::covariance(&normal, &onto, measurements, quality)?;
+            Some((squares, covariance))
+        });
+        let (squares, covariance) = out.ok_or_else(|| invalid("normal: not positive"))?;
+        Ok((PyArray1::from_vec(py, squares), by_rows(py, covariance)))
+    }
+}
+
+impl SpotTable {
+    /// (n_meas) what spots change, with what the table lacks of them.
+    fn change(&self, seen: &SeenTable, spots: &[Spot], offset: &[f64]) -> Vec<f64> {
+        let rank = self.table.rank;
+        let (mut sum, mut part) = (offset.to_vec(), vec![0.0; SLOPES * rank]);
+        for spot in spots {
+            self.table.expand(spot, SLOPES, &mut part);
+            let both = sum.iter_mut().zip(&part[..rank]);
+            both.for_each(|(sum, value)| *sum += value);
+        }
+        product(&seen.basis, seen.squares.len(), &sum).values
+    }
+}
+
+/// Squares of what spots change, and a covariance.
+type Judged<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
+
+/// Likelihood ratios and contents of candidates.
+type Others<'py> = [Bound<'py, PyArray1<f64>>; 2];
+
+/// Whitened data of a frame, the square of their rest, directions that are left, an offset,
+/// deviations and depths; see `Frame`.
+type FrameArrays<'py> = (Any<'py>, f64, Any<'py>, Any<'py>, [f64; 4], [f64; 2]);
+
+/// A frame's arrays, checked.
+struct Arrays<'py> {
+    data: PyReadonlyArray1<'py, f64>,
+    left: PyReadonlyArray2<'py, f64>,
+    offset: PyReadonlyArray1<'py, f64>,
+}
+
+impl<'py> Arrays<'py> {
+    fn of(table: &SpotTable, seen: &SeenTable, frame: &FrameArrays<'py>) -> PyResult<Self> {
+        let data = array::<f64, Ix1>("data", &frame.0)?;
+        let left = array::<f64, Ix2>("left", &frame.2)?;
+        let offset = array::<f64, Ix1>("offset", &frame.3)?;
+        same("length of data", seen.seen.rows, data.len())?;
+        same("columns of left", seen.seen.rows, left.shape()[1])?;
+        same("length of offset", table.table.rank, offset.len())?;
         same(
             "entries of the table seen",
-            self.table.rank * seen.0.rows,
-            seen.0.direct.len(),
+            table.table.rank * seen.seen.rows,
+            seen.seen.timed.len(),
         )?;
-        let spots = spots_of(spots)?;
-        let frame = Frame {
-            table: &self.table,
-            seen: &seen.0,
-            sheet: &self.sheet,
-            prior: &self.prior,
-            data: contiguous("data", &data)?,
-            left: contiguous("left", &left)?,
-            offset: contiguous("offset", &offset)?,
-            deviations,
-            depths,
-        };
-        let fit = py.detach(|| {
-            let start = frame.at(frame.held(&spots))?;
-            Some(frame.settled(start, most))
-        });
-        let fit = fit.ok_or_else(|| invalid("spots: not comparable with the data"))?;
-        let k = fit.spots.len();
-        let spots = Matrix {
-            values: fit.spots.concat(),
-            height: PARAMETERS,
-        };
-        debug_assert_eq!(spots.width(), k);
-        let matrices = [spots, fit.each, fit.jacobian, fit.unknown, fit.normal];
-        let vectors = [fit.predicted, fit.residual, fit.gradient];
-        Ok((
-            matrices.map(|matrix| by_rows(py, matrix)),
-            vectors.map(|vector| PyArray1::from_vec(py, vector)),
-            (fit.misfit, fit.log_size, fit.cost, fit.settled),
-        ))
+        Ok(Self { data, left, offset })
+    }
+
+    fn frame<'a>(
+        &'a self,
+        table: &'a SpotTable,
+        seen: &'a SeenTable,
+        frame: &FrameArrays<'py>,
+    ) -> PyResult<Frame<'a>> {
+        Ok(Frame {
+            table: &table.table,
+            seen: &seen.seen,
+            sheet: &table.sheet,
+            prior: &table.prior,
+            data: contiguous("data", &self.data)?,
+            rest: frame.1,
+            left: contiguous("left", &self.left)?,
+            offset: contiguous("offset", &self.offset)?,
+            deviations: frame.4,
+            depths: frame.5,
+        })
+    }
+}
+
+fn fitted(py: Python<'_>, fit: Fit) -> Fitted<'_> {
+    let spots = Matrix {
+        values: fit.spots.concat(),
+        height: PARAMETERS,
+    };
+    let unknown = fit.metric.unknown;
+    let matrices = [spots, fit.each, fit.jacobian, unknown, fit.normal];
+    let vectors = [fit.predicted, fit.residual, fit.gradient];
+    (
+        matrices.map(|matrix| by_rows(py, matrix)),
+        vectors.map(|vector| PyArray1::from_vec(py, vector)),
+        (fit.misfit, fit.metric.log_size, fit.cost, fit.settled),
+    )
+}
+
+pub(crate) fn signatures_of<'a>(
+    signatures: &'a PyReadonlyArray2<'_, f64>,
+    squares: &'a PyReadonlyArray1<'_, f64>,
+    rows: usize,
+) -> PyResult<Signatures<'a>> {
+    same("signatures", squares.len(), signatures.shape()[0])?;
+    if signatures.shape()[1] == 0 || signatures.shape()[1] > rows {
+        return Err(invalid("signatures: as many columns as rows at most"));
+    }
+    Ok(Signatures {
+        values: contiguous("signatures", signatures)?,
+        narrow: signatures.shape()[1],
+        squares: contiguous("squares", squares)?,
+    })
+}
+
+pub(crate) fn limits_of([low, high, least, useful, ridge]: [f64; 5]) -> Limits {
+    Limits {
+        content: [low, high],
+        least,
+        useful,
+        ridge,
     }
 }
 
 #[pymethods]
 impl SeenTable {
     #[new]
-    fn new(direct: &Any<'_>, timed: &Any<'_>) -> PyResult<Self> {
+    fn new(
+        direct: &Any<'_>,
+        timed: &Any<'_>,
+        matrix: &Any<'_>,
+        basis: &Any<'_>,
+        squares: &Any<'_>,
+    ) -> PyResult<Self> {
         let direct = array::<f64, Ix2>("direct", direct)?;
         let timed = array::<f64, Ix2>("timed", timed)?;
-        same("rows of timed", direct.shape()[0], timed.shape()[0])?;
         same("columns of timed", direct.shape()[1], timed.shape()[1])?;
-        Ok(Self(Seen {
-            rows: direct.shape()[0],
+        if direct.shape()[0] > timed.shape()[0] {
+            return Err(invalid("direct: no more rows than timed"));
+        }
+        let seen = Seen {
+            rows: timed.shape()[0],
+            narrow: direct.shape()[0],
             direct: direct.as_array().t().iter().copied().collect(),
             timed: timed.as_array().t().iter().copied().collect(),
-        }))
+        };
+        let matrix = array::<f64, Ix2>("matrix", matrix)?;
+        let basis = array::<f64, Ix2>("basis", basis)?;
+        let squares = array::<f64, Ix1>("squares", squares)?;
+        same("rows of matrix", seen.rows, matrix.shape()[0])?;
+        same("rows of basis", direct.shape()[1], basis.shape()[0])?;
+        same("columns of matrix", squares.len(), matrix.shape()[1])?;
+        same("columns of basis", squares.len(), basis.shape()[1])?;
+        Ok(Self {
+            seen,
+            matrix: matrix.as_array().iter().copied().collect(),
+            basis: basis.as_array().iter().copied().collect(),
+            squares: squares.as_array().to_vec(),
+        })
     }
 }
 
-/// Unknown, free and columns, each (…, rows) one after the other; see the module.
-#[pyfunction]
-pub(crate) fn projected<'py>(
-    unknown: &Any<'py>,
-    free: &Any<'py>,
-    columns: &Any<'py>,
-    ridge: f64,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let py = columns.py();
-    let unknown = array::<f64, Ix2>("unknown", unknown)?;
-    let free = array::<f64, Ix2>("free", free)?;
-    let columns = array::<f64, Ix2>("columns", columns)?;
-    let rows = columns.shape()[1];
-    same("length of unknown", rows, unknown.shape()[1])?;
-    same("length of free", rows, free.shape()[1])?;
-    if rows == 0 {
-        return Err(invalid("columns: expected entries"));
+/// Arrays of as many columns, which are there.
+pub(crate) fn directions<'py, const N: usize>(
+    named: [(&'static str, &Any<'py>); N],
+) -> PyResult<[PyReadonlyArray2<'py, f64>; N]> {
+    let arrays: Vec<_> = named
+        .iter()
+        .map(|(name, value)| array::<f64, Ix2>(name, value))
+        .collect::<PyResult<_>>()?;
+    let rows = arrays.first().map_or(0, |first| first.shape()[1]);
+    for (found, (name, _)) in arrays.iter().zip(&named) {
+        same(&format!("length of {name}"), rows, found.shape()[1])?;
     }
-    let parts = [
-        contiguous("unknown", &unknown)?,
-        contiguous("free", &free)?,
-        contiguous("columns", &columns)?,
-    ];
-    let out = py.detach(|| spot_fit::projected(parts, rows, ridge));
-    let out = out.ok_or_else(|| invalid("free: directions in proportion"))?;
-    Ok(by_rows(py, out))
+    if rows == 0 {
+        return Err(invalid("directions: expected entries"));
+    }
+    arrays.try_into().map_err(|_| invalid("directions"))
 }
 
 /// A matrix by columns as the rows of an array.

@@ -6,8 +6,10 @@ use pulp::{Arch, Simd, WithSimd};
 pub const PARAMETERS: usize = 4;
 /// Directions beside them.
 pub const DIRECTIONS: usize = 2;
-/// Rows of an expansion: the change, its derivatives, its directions.
-pub const ROWS: usize = 1 + PARAMETERS + DIRECTIONS;
+/// Rows of an expansion: the change and its derivatives.
+pub const SLOPES: usize = 1 + PARAMETERS;
+/// And its directions.
+pub const ROWS: usize = SLOPES + DIRECTIONS;
 
 /// A spot.
 pub type Spot = [f64; PARAMETERS];
@@ -70,10 +72,13 @@ impl Table {
         Ok(self)
     }
 
-    /// Writes the expansion of a spot, (ROWS, rank), to `out`.
-    pub fn expand(&self, spot: &Spot, out: &mut [f64]) {
-        let width = (self.nodes.len() + DIRECTIONS) * self.rank;
-        let mut mixed = vec![0.0; MIXED * width];
+    /// Writes the expansion of a spot, (rows, rank), to `out`: `rows` are ROWS, or SLOPES where its
+    /// directions are not needed.
+    pub fn expand(&self, spot: &Spot, rows: usize, out: &mut [f64]) {
+        let n = self.nodes.len();
+        let planes = n + rows - SLOPES;
+        let (width, used) = ((n + DIRECTIONS) * self.rank, planes * self.rank);
+        let mut mixed = vec![0.0; MIXED * used];
         let step = self.log_radii[1] - self.log_radii[0];
         let place = (spot[2] - self.log_radii[0]) / step;
         let most = (self.log_radii.len() - NEAR) as f64;
@@ -85,8 +90,9 @@ impl Table {
             let (y, across) = grid.along(1, spot[1]);
             for (i, (&weight, &slope)) in along[0].iter().zip(&along[1]).enumerate() {
                 let row = (grid.start + (x + i) * grid.shape[1] + y) * width;
+                let points = &self.values[row..row + NEAR * width];
                 Arch::new().dispatch(Mix {
-                    points: &self.values[row..row + NEAR * width],
+                    points: std::array::from_fn(|k| &points[k * width..][..used]),
                     across: &across,
                     along: [
                         radius[level] * weight,
@@ -97,17 +103,17 @@ impl Table {
                 });
             }
         }
-        self.of_depth(spot, &mixed, out);
+        self.of_depth(spot, planes, &mixed, out);
     }
 
     /// From values and slopes at the nodes to those of the spot's depth.
-    fn of_depth(&self, spot: &Spot, mixed: &[f64], out: &mut [f64]) {
+    fn of_depth(&self, spot: &Spot, planes: usize, mixed: &[f64], out: &mut [f64]) {
         let (n, rank) = (self.nodes.len(), self.rank);
         let filling = self.filling * (2.0 * spot[2]).exp();
         let depth = spot[3] / filling;
         let s = (depth / 4.0).exp_m1();
-        let plane = |row: usize, node: usize| &mixed[(row * (n + DIRECTIONS) + node) * rank..];
-        out[..ROWS * rank].fill(0.0);
+        let plane = |row: usize, node: usize| &mixed[(row * planes + node) * rank..];
+        out.fill(0.0);
         for node in 0..n {
             let (power, slope) = self.power(s, node);
             let steeper = slope * (s + 1.0) / 4.0;
@@ -120,8 +126,8 @@ impl Table {
             let more = &mut out[4 * rank..5 * rank];
             add(more, steeper / filling, plane(0, node));
         }
-        for direction in 0..DIRECTIONS {
-            let first = (1 + PARAMETERS + direction) * rank;
+        for direction in 0..planes - n {
+            let first = (SLOPES + direction) * rank;
             add(
                 &mut out[first..first + rank],
                 depth,
@@ -203,7 +209,7 @@ fn add(target: &mut [f64], scale: f64, values: &[f64]) {
 
 /// Adds four points of a line across, by their weights, to the sums.
 struct Mix<'a> {
-    points: &'a [f64],
+    points: [&'a [f64]; NEAR],
     across: &'a Weights,
     /// Weight of the line, and the slopes of that by x and by the logarithm of the radius.
     along: [f64; 3],
@@ -219,9 +225,7 @@ impl WithSimd for Mix<'_> {
         let (flat, rest) = self.mixed.split_at_mut(width);
         let (by_x, rest) = rest.split_at_mut(width);
         let (by_y, wider) = rest.split_at_mut(width);
-        let (p, rest) = self.points.split_at(width);
-        let (q, rest) = rest.split_at(width);
-        let (r, s) = rest.split_at(width);
+        let [p, q, r, s] = self.points;
         let whole = width - width % S::F64_LANES;
         for n in whole..width {
             let values = [p[n], q[n], r[n], s[n]];

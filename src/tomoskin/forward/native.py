@@ -92,7 +92,7 @@ class Native:
             (fields, np.eye(2)),
             (lost, 0.5 * inverse),
             (jacobian, 0.0),
-            (self.core.projected(np.eye(2)[:1], np.eye(2)[1:], np.eye(2), 0.0), [[0.5, 0], [0, 0]]),
+            (self.core.standing(np.eye(2)[:1], np.ones((4, 2)), np.eye(2)[:1], 0.0), 0.5),
         ]
         if not all(np.allclose(*pair) for pair in right):
             raise ModelError("its results are wrong")

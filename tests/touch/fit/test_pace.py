@@ -10,7 +10,7 @@ import pytest
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.touch import EXHAUSTIVE, LIVE, Pace, SpotFinder
-from tomoskin.touch.fit.refine import Deficit, Fit, Problem, Solver
+from tomoskin.touch.fit.refine import Answer, Deficit, Fit, Limits, Problem, Question, Solver
 from touch.fit.scene import covariance, noise
 from touch.fit.test_finder import NOTHING, data, model, place, press, skin, spread
 
@@ -70,14 +70,25 @@ class Counting:
     def __init__(self, solver: Solver) -> None:
         self._solver, self.table, self.steps = solver, solver.table, 0
 
-    def keep(self, direct: FloatArray, timed: FloatArray) -> Any:
-        return self._solver.keep(direct, timed)
+    def keep(self, *matrices: FloatArray) -> Any:
+        return self._solver.keep(*matrices)
 
     def expanded(self, spots: FloatArray) -> FloatArray:
         return self._solver.expanded(spots)
 
-    def projected(self, unknown: FloatArray, free: FloatArray, rows: FloatArray) -> FloatArray:
-        return self._solver.projected(unknown, free, rows)
+    def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
+        return self._solver.standing(left, fit)
+
+    def standing_out(
+        self, signatures: FloatArray, squares: FloatArray, fit: Fit, limits: Limits
+    ) -> tuple[FloatArray, FloatArray]:
+        return self._solver.standing_out(signatures, squares, fit, limits)
+
+    def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
+        return self._solver.judged(problem, fit, uneven)
+
+    def searched(self, question: Question, before: FloatArray) -> Answer | None:
+        """None: the search goes step by step, which comes to the same."""
 
     def settled(self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
         self.steps += 1 + most

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from tomoskin.core import FloatArray
-from tomoskin.touch.fit import EXHAUSTIVE
+from tomoskin.touch.fit import EXHAUSTIVE, LIVE
 from tomoskin.touch.fit.native import NativeSolver
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
+from tomoskin.touch.fit.search import Search
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
 from touch.fit.scene import noise, whitener
 from touch.fit.test_finder import data, model, press
@@ -65,7 +68,8 @@ def test_a_shape_is_the_way_from_a_tail_to_a_bell() -> None:
 def problem(solver: Solver, spots: FloatArray, reach: float) -> Problem:
     seen = WhitenedTable.of(solver, whitener(), model().response.times)
     volts = data(spots) + noise(16, 1, 3)[0]
-    left = 0.05 * whitener()(data(press(0.0, 0.06))[None])
+    whitened, rest = seen.whitened(volts)
+    left = 0.05 * data(press(0.0, 0.06))[None] @ seen.matrix.T
     return Problem(
         response=model().response,
         seen=seen,
@@ -73,49 +77,97 @@ def problem(solver: Solver, spots: FloatArray, reach: float) -> Problem:
         sign="decrease",
         reach=reach,
         grows=0.5,
-        data=whitener()(volts),
+        data=whitened,
+        rest=rest,
         left=left,
+    )
+
+
+def solvers() -> tuple[Solver, Solver]:
+    """Of the same table, natively and by numpy."""
+    native = model().solver
+    if not isinstance(native, NativeSolver):
+        pytest.skip("the native engine is not installed")
+    plain = NumpySolver(native.table, SheetDomain(model().response.spots.mesh), model().prior)
+    return native, plain
+
+
+def close(first: Any, second: Any, to: float = 1e-6) -> None:
+    first, second = np.asarray(first), np.asarray(second)
+    assert first.shape == second.shape
+    np.testing.assert_allclose(
+        first, second, rtol=to, atol=0.1 * to * np.abs(second).max(initial=1)
     )
 
 
 @pytest.mark.parametrize("reach", [0.0, 0.01])
 @pytest.mark.parametrize("spots", [TWO[:0], TWO[:1], TWO], ids=len)
 def test_native_and_numpy_agree(spots: FloatArray, reach: float) -> None:
-    native = model().solver
-    if not isinstance(native, NativeSolver):
-        pytest.skip("the native engine is not installed")
-    plain = NumpySolver(native.table, SheetDomain(model().response.spots.mesh), model().prior)
+    pair = solvers()
     start = spots + np.array([4e-3, -3e-3, 0.1, 2e-5])
-    deficit = Deficit(start, 1e-6 * np.random.default_rng(1).normal(size=len(native.table.basis)))
+    rank = len(pair[0].table.basis)
+    deficit = Deficit(start, 1e-6 * np.random.default_rng(1).normal(size=rank))
+    frames = [problem(solver, TWO, reach) for solver in pair]
     one, other = (
-        solver.settled(problem(solver, TWO, reach), start, deficit, 6) for solver in (native, plain)
+        solver.settled(frame, start, deficit, 6) for solver, frame in zip(pair, frames, strict=True)
     )
     assert one.settled == other.settled
     for name in ("spots", "each", "predicted", "residual", "slopes", "unknown", "normal"):
-        first, second = getattr(one, name), getattr(other, name)
-        assert first.shape == second.shape, name
-        np.testing.assert_allclose(
-            first, second, rtol=1e-6, atol=1e-7 * np.abs(second).max(initial=1)
-        )
-    assert one.misfit == pytest.approx(other.misfit, rel=1e-7)
-    assert one.log_size == pytest.approx(other.log_size, rel=1e-7, abs=1e-9)
-    assert one.cost == pytest.approx(other.cost, rel=1e-7)
-    rows = np.random.default_rng(2).normal(size=(5, len(one.residual)))
-    np.testing.assert_allclose(
-        native.projected(one.unknown, one.slopes, rows),
-        plain.projected(other.unknown, other.slopes, rows),
-        rtol=1e-5,
-        atol=1e-6,
-    )
+        close(getattr(one, name), getattr(other, name))
+    for name in ("misfit", "log_size", "cost", "degrees"):
+        assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-7, abs=1e-9)
+    matched = model().candidates.matched(frames[0].seen)
+    for sign in ("decrease", "both"):
+        ratios = [matched.ratios(solver, one, sign) for solver in pair]
+        assert ratios[0][0].max() > 1.0
+        close(ratios[0], ratios[1], 1e-5)
+    if len(spots):
+        squares = [solver.standing(frames[0].left, one) for solver in pair]
+        assert squares[0].min() > 100.0
+        close(squares[0], squares[1])
+        judged = [
+            solver.judged(frame, one, 0.08) for solver, frame in zip(pair, frames, strict=True)
+        ]
+        for first, second in zip(*judged, strict=True):
+            close(first, second)
+
+
+def test_one_call_finds_what_the_search_step_by_step_does() -> None:
+    native, _ = solvers()
+    kept = {"most": 5, "least": 5.0, "pace": LIVE, "deficit": Deficit.none(len(native.table.basis))}
+    counts = set()
+    three = np.concatenate([TWO, press(0.0, -0.06)])
+    for spots, before in ((TWO[:0], TWO[:0]), (TWO, TWO[:1]), (three, TWO), (TWO[:1], TWO)):
+        frame = problem(native, spots, 0.01)
+        search = Search(frame, model().candidates.matched(frame.seen), **kept)
+        answer = native.searched(search.question, before)
+        assert answer is not None
+        other = search.found(before)
+        close(answer.fit.spots, other.spots)
+        assert answer.fit.cost == pytest.approx(other.cost, rel=1e-9)
+        counts.add(len(other.spots))
+    assert counts == {0, 1, 2, 3}
+
+
+def test_what_changes_do_not_show_along_is_noise() -> None:
+    seen = WhitenedTable.of(model().solver, whitener(), model().response.times)
+    volts = data(TWO)
+    along, rest = seen.whitened(volts)
+    every = whitener()(volts)
+    assert len(along) < len(every) - 20
+    assert np.sqrt(along @ along) == pytest.approx(np.linalg.norm(every), rel=1e-3)
+    assert np.sqrt(rest) < 0.5, "of some eighty deviations"
+    assert np.linalg.norm(every) > 50.0
 
 
 def test_several_spots_are_those_of_the_exact_model() -> None:
     near = np.concatenate([press(-0.015, 0.0, 0.02, -0.8), press(0.025, 0.0, 0.02, -0.8)])
     frame = problem(model().solver, near, 0.0)
     fit = frame.refined(near, Deficit.none(len(frame.solver.table.basis)), 6)
-    exact = frame.corrected(fit, EXHAUSTIVE)
+    exact = frame.corrected(fit, EXHAUSTIVE.rounds, EXHAUSTIVE.near)
     assert exact.misfit < fit.misfit
     assert np.abs((exact.spots - near)[:, :2]).max() < 1.5e-3
-    assert frame.change(exact) == pytest.approx(
+    alone = frame.solver.expanded(exact.spots)[:, 0].sum(axis=0)
+    assert (alone + exact.deficit.change) @ frame.solver.table.basis == pytest.approx(
         model().response.changes([exact.spots])[0], abs=2e-6
     )

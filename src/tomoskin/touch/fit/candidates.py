@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.touch.fit.noise import Whitener
+from tomoskin.mesh import Mesh
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.refine import Fit, Solver
-from tomoskin.touch.fit.spot import CONTENT, Response, spots_of
+from tomoskin.touch.fit.refine import Fit, Limits, Solver, WhitenedTable
+from tomoskin.touch.fit.spot import CONTENT, spots_of
 
 _SPACING = 0.7
 """Between candidates, in median radii."""
@@ -46,26 +47,24 @@ class Candidates:
     signatures: FloatArray
 
     @classmethod
-    def of(cls, response: Response, prior: SpotPrior) -> Self:
-        """On a hexagonal grid, in three sizes."""
-        mesh = response.spots.mesh
+    def of(cls, mesh: Mesh, prior: SpotPrior, changes: Callable[[FloatArray], FloatArray]) -> Self:
+        """On a hexagonal grid, in three sizes; ``changes`` of voltages (n, n_meas) V by spots."""
         positions = _grid(mesh.centroids, _SPACING * prior.radius)
         spots = np.concatenate(
             [spots_of(positions, size * prior.radius, -_FAINT) for size in _SIZES]
         )
-        changes = response.changes([spot[None] for spot in spots])
-        content = spots[:, CONTENT].copy()
+        signatures = changes(spots) / spots[:, CONTENT, None]
         spots[:, CONTENT] = 1.0
-        return cls(spots, changes / content[:, None])
+        return cls(spots, signatures)
 
-    def matched(self, whiten: Whitener) -> Matched:
+    def matched(self, seen: WhitenedTable) -> Matched:
         """The same for one noise."""
-        return Matched.of(self.spots, whiten(self.signatures))
+        return Matched.of(self.spots, self.signatures @ seen.matrix[: seen.narrow].T)
 
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """Candidates, their whitened signatures (n, r), and (n,) the squares of these."""
+    """Candidates, their whitened signatures (n, narrow), and (n,) the squares of these."""
 
     spots: FloatArray
     signatures: FloatArray
@@ -73,7 +72,7 @@ class Matched:
 
     @classmethod
     def of(cls, spots: FloatArray, signatures: FloatArray) -> Self:
-        """Spots (n, 4) of these signatures (n, r)."""
+        """Spots (n, 4) of these signatures (n, narrow)."""
         return cls(spots, signatures, np.einsum("nr,nr->n", signatures, signatures))
 
     def louder(self, times: float) -> Self:
@@ -87,25 +86,20 @@ class Matched:
         stands out (GLRT; Kay 1998, section 7.6.2, for a linear model), after what the spots of
         ``fit`` could take up.
         """
-        found = self.signatures
-        residual = solver.projected(fit.unknown, fit.slopes, fit.residual[None])[0]
-        onto = found @ residual
-        if sign != "both":
-            onto = np.minimum(onto, 0) if sign == "decrease" else np.maximum(onto, 0)
-        likely = np.flatnonzero(onto**2 > _LEAST**2 * self.squares)
-        free = solver.projected(fit.unknown, fit.slopes, found[likely])
-        size = np.einsum("nr,nr->n", free, found[likely])
-        useful = size > _USEFUL * self.squares[likely]
-        ratio, content = np.zeros(len(found)), np.zeros(len(found))
-        content[likely[useful]] = onto[likely[useful]] / size[useful]
-        ratio[likely[useful]] = np.abs(onto[likely[useful]]) / np.sqrt(size[useful])
-        return ratio, content
+        return solver.standing_out(self.signatures, self.squares, fit, limits_of(sign))
 
     def spot(self, number: int, content: FloatArray) -> FloatArray:
         """(4,) candidate ``number`` with its content of ``contents`` (n,)."""
         chosen = self.spots[number].copy()
         chosen[CONTENT] = content[number]
         return np.asarray(chosen)
+
+
+def limits_of(sign: str) -> Limits:
+    """What counts of candidates for touches of this ``sign``."""
+    low = 0.0 if sign == "increase" else -math.inf
+    high = 0.0 if sign == "decrease" else math.inf
+    return Limits(low, high, _LEAST, _USEFUL)
 
 
 def _grid(inside: FloatArray, step: float) -> FloatArray:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.pattern import Pattern, Scan
@@ -89,22 +90,27 @@ class Gauge:
     differs, agrees
         (r, n_meas) 1/V: differences of the pairs, white; and the sums in the same measure.
     directions
-        (n_parts, r) of length 1.
-    means
-        (n_channels, n_parts) averages over the parts that can be seen.
+        (n_seen, r) of length 1, of the parts that can be seen, one channel's after the other.
+        These three in single precision: they are read through in each frame.
+    starts, count
+        (n_channels,) its first part among these, and how many it has.
     variance
         (n_channels,) V² of noise in a part that shows as much as all other noise in its direction.
     limit
         (n_channels,) mean squares beyond which a channel is noisier; infinite where too few of its
         parts can be seen.
+    judged
+        Numbers of the channels that can be judged.
     """
 
-    differs: FloatArray
-    agrees: FloatArray
-    directions: FloatArray
-    means: FloatArray
+    differs: NDArray[np.float32]
+    agrees: NDArray[np.float32]
+    directions: NDArray[np.float32]
+    starts: IntArray
+    count: IntArray
     variance: FloatArray
     limit: FloatArray
+    judged: IntArray
 
     @classmethod
     def of(cls, channels: Channels, covariance: FloatArray, nuisance: FloatArray) -> Self:
@@ -117,16 +123,23 @@ class Gauge:
         shows = squares > 1e-12 * squares.max(initial=0.0)
         squares = np.where(shows, squares, np.inf)
         directions = directions / np.sqrt(squares)[:, None]
-        members = (channels.channel == np.arange(len(channels.names))[:, None]) & shows
-        count = members.sum(axis=1)
-        means = members / np.maximum(count, 1)[:, None]
-        spread = np.array([
-            np.linalg.norm(directions[own] @ directions[own].T) / max(len(own), 1)
-            for own in map(np.flatnonzero, members)
-        ])  # fmt: skip
+        order = np.argsort(channels.channel, kind="stable")
+        order = order[shows[order]]
+        count = np.bincount(channels.channel[order], minlength=len(channels.names))
+        starts = np.cumsum(count) - count
+        own = [directions[order[a : a + n]] for a, n in zip(starts, count, strict=True)]
+        spread = np.array([np.linalg.norm(d @ d.T) / max(len(d), 1) for d in own])
         limit = np.where(count >= _FEWEST, 1 + _LIMIT * np.sqrt(2) * spread, np.inf)
-        seen = whiten.matrix @ apart, whiten.matrix @ both
-        return cls(*seen, directions, means, means @ (1 / squares), limit)
+        return cls(
+            differs=(whiten.matrix @ apart).astype(np.float32),
+            agrees=(whiten.matrix @ both).astype(np.float32),
+            directions=directions[order].astype(np.float32),
+            starts=starts,
+            count=count,
+            variance=_means(1 / squares[order], starts, count),
+            limit=limit,
+            judged=np.flatnonzero(np.isfinite(limit)),
+        )
 
     def squares(self, dv: FloatArray, moved: FloatArray) -> FloatArray:
         """(n_channels,) mean squares of data (n_meas,) V; 1 where the noise is as it should be.
@@ -134,10 +147,22 @@ class Gauge:
         ``moved`` (n_meas,) V since the frame before: of that a part may stand between two rows,
         since one is read after the other; and of all data as much as channels differ in gain.
         """
-        seen = np.column_stack([self.differs @ dv, self.agrees @ moved, self.agrees @ dv])
-        differs, changes, gains = (self.means @ (self.directions @ seen) ** 2).T
+        single, both = dv.astype(np.float32), np.column_stack([moved, dv]).astype(np.float32)
+        seen = np.column_stack([self.differs @ single, self.agrees @ both])
+        along = (self.directions @ seen).astype(np.float64)
+        differs, changes, gains = _means(along * along, self.starts, self.count).T
         allowed = _MOVES**2 * changes + _GAINS**2 * gains
         return np.asarray(differs - (allowed + allowed.mean()) / 2)
+
+
+def _means(values: FloatArray, starts: IntArray, count: IntArray) -> FloatArray:
+    """(n_channels, …) means of ``values`` (n, …) over each channel's; 0 where it has none."""
+    out = np.zeros((len(count), *values.shape[1:]))
+    some = count > 0
+    if some.any():
+        sums = np.add.reduceat(values, starts[some])
+        out[some] = (sums.T / count[some]).T
+    return out
 
 
 def _white(covariance: FloatArray, nuisance: FloatArray) -> Whitener:
@@ -239,5 +264,6 @@ class Excess:
 
 def _common(squares: FloatArray, gauge: Gauge) -> float:
     """The median channel's, of those that can be judged."""
-    known = np.isfinite(gauge.limit)
-    return float(np.median(squares[known])) if known.any() else 1.0
+    ordered = sorted(squares[gauge.judged].tolist())
+    n = len(ordered)
+    return (ordered[(n - 1) // 2] + ordered[n // 2]) / 2 if n else 1.0

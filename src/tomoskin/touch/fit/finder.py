@@ -11,7 +11,7 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.core import Detection, FloatArray, SkinError, finished
+from tomoskin.core import Detection, FloatArray, IntArray, SkinError, finished
 from tomoskin.forward import ForwardModel
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
@@ -97,7 +97,7 @@ class SpotModel:
     @cached_property
     def candidates(self) -> Candidates:
         """Where touches are looked for."""
-        return Candidates.of(self.response, self.prior)
+        return Candidates.of(self.response.spots.mesh, self.prior, self.changes)
 
     @cached_property
     def solver(self) -> Solver:
@@ -108,6 +108,10 @@ class SpotModel:
     def warm_up(self) -> None:
         """Do what takes seconds the first time, and half a second later on, before frames come."""
         _ = self.tabulation.lattices, self.candidates, self.solver
+
+    def changes(self, spots: FloatArray) -> FloatArray:
+        """(k, n_meas) V that each of ``spots`` (k, 4) alone adds to the reference, by the table."""
+        return np.asarray(self.solver.expanded(spots)[:, 0] @ self.solver.table.basis)
 
     def fitted_to(self, reference: FloatArray, deviation: FloatArray | float = 0.0) -> SpotModel:
         """As :meth:`fitting`, at once."""
@@ -169,13 +173,14 @@ class SpotFinder:
         scan_time: float = 0.0,
         pace: Pace = EXHAUSTIVE,
     ) -> None:
-        self._model, self._settings, self._mesh = model, skin.touch, mesh
+        self._model, self._settings = model, skin.touch
+        self._centroids = np.ascontiguousarray(mesh.centroids.T)
         self._pace, self._reach, self._unrest = pace, pace.speed * scan_time, 1.0
         self._fading = math.ceil(pace.fading / scan_time) if scan_time else 0
         self._residual = ResidualResponse.none(len(model.scale))
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
-        self._before = np.zeros((0, N_PARAMETERS))
+        self._before, self._way = np.zeros((0, N_PARAMETERS)), np.zeros((0, 2))
         self._deficit = Deficit.none(len(model.solver.table.basis))
         pattern = model.response.state.model.pattern
         self.watch = FrameWatch(pattern, skin.touch.sign, skin.touch.snr)
@@ -201,10 +206,10 @@ class SpotFinder:
         if times > 1.0:  # it may be no touch in as much noise
             detected, matched = self._searched(data, nuisance, times)
         self.watch.end(solver, detected.fit, matched, times)
-        self._unrest = self._unrest_of(detected.fit.spots)
+        self._unrest, self._way = self._motion(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
         if self._fading:
-            self._residual = self._residual.after(self._before, self._model.response, self._fading)
+            self._residual = self._residual.after(self._before, self._model.changes, self._fading)
         detections = self._detections(joined(detected))
         detections.sort(key=lambda detection: -abs(detection.peak))
         return detections
@@ -216,6 +221,7 @@ class SpotFinder:
         seen, matched, _ = self._whitened(nuisance)
         if times != 1.0:
             seen, matched = seen.louder(times), matched.louder(times)
+        whitened, rest = seen.whitened(data)
         problem = Problem(
             response=self._model.response,
             seen=seen,
@@ -223,20 +229,31 @@ class SpotFinder:
             sign=self._settings.sign,
             reach=self._unrest * self._reach,
             grows=self._unrest * _GROWS,
-            data=seen.whiten(data),
-            left=seen.whiten(self._residual.directions.T),
+            data=whitened,
+            rest=rest,
+            left=self._residual.directions.T @ seen.matrix.T,
         )
         problem = replace(problem, sign=self.watch.sign(problem, matched))
         search = Search(problem, matched, self._settings.snr, self._most, self._pace, self._deficit)
-        return search(self._before), matched
+        return search(self._expected), matched
 
-    def _unrest_of(self, spots: FloatArray) -> float:
-        """How much of what touches may do they have done since the frame before; 1 where there
-        are more of them, or fewer."""
+    @property
+    def _expected(self) -> FloatArray:
+        """(k, 4) the touches of the last frame where they go on as they went."""
+        spots = self._before.copy()
+        spots[:, :2] += self._way
+        return spots
+
+    def _motion(self, spots: FloatArray) -> tuple[float, FloatArray]:
+        """How much of what touches may do they have done since the frame before, and their way
+        (k, 2) m; 1 and none where there are more of them, or fewer, or frames say nothing of each
+        other."""
         if len(spots) != len(self._before) or not len(spots) or not self._reach:
-            return 1.0
-        moved = float(np.linalg.norm((spots - self._before)[:, :2], axis=1).max())
-        return min(1.0, math.hypot(_REST, moved / self._reach))
+            return 1.0, np.zeros((len(spots), 2))
+        way = spots[:, :2] - self._before[:, :2]
+        moved = float(np.linalg.norm(way, axis=1).max())
+        unrest = min(1.0, math.hypot(_REST, moved / self._reach))
+        return unrest, way if moved <= self._reach else np.zeros_like(way)
 
     def _whitened(self, nuisance: FloatArray) -> tuple[WhitenedTable, Matched, Gauge]:
         excess, channels = self.watch.excess, self.watch.channels
@@ -246,7 +263,7 @@ class SpotFinder:
             whiten = Whitener.of(noise).without(nuisance)
             seen = WhitenedTable.of(model.solver, whiten, model.response.times)
             gauge = Gauge.of(channels, noise, nuisance)
-            self._matched[key] = seen, model.candidates.matched(whiten), gauge
+            self._matched[key] = seen, model.candidates.matched(seen), gauge
             if len(self._matched) > _MASKS:
                 self._matched.popitem(last=False)
         self._matched.move_to_end(key)
@@ -255,25 +272,31 @@ class SpotFinder:
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots
         depth = self._unit * np.expm1(depth_of(spots)) if len(spots) else np.zeros(0)
+        cells = self._reached(spots)
         shown = np.flatnonzero(~self.watch.wrong(spots)).tolist()
-        return [self._detection(spots[k], float(depth[k]), detected, k) for k in shown]
+        return [self._detection(detected, k, float(depth[k]), cells[k]) for k in shown]
+
+    def _reached(self, spots: FloatArray) -> list[IntArray]:
+        """Cells of the image whose middles lie in each spot, or the nearest."""
+        x, y = self._centroids[:, None] - spots.T[:2, :, None]
+        square = x * x + y * y
+        limit = np.maximum(np.exp(2 * spots[:, LOG_RADIUS]), square.min(axis=1))
+        return [np.flatnonzero(row) for row in square <= limit[:, None]]
 
     def _detection(
-        self, spot: FloatArray, peak: float, detected: SpotDetections, k: int
+        self, detected: SpotDetections, k: int, peak: float, cells: IntArray
     ) -> Detection:
-        block = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
-        radius = float(np.exp(spot[LOG_RADIUS]))
-        apart = np.linalg.norm(self._mesh.centroids - spot[:2], axis=1)
-        cells = np.flatnonzero(apart <= max(radius, apart.min()))
+        x, y, log_radius, _ = detected.fit.spots[k].tolist()
+        (xx, xy), (_, yy) = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2].tolist()
         return Detection(
-            x=float(spot[0]),
-            y=float(spot[1]),
-            sd_x=float(np.sqrt(block[0, 0])),
-            sd_y=float(np.sqrt(block[1, 1])),
-            area=float(np.pi * radius**2),
+            x=x,
+            y=y,
+            sd_x=math.sqrt(xx),
+            sd_y=math.sqrt(yy),
+            area=math.pi * math.exp(2 * log_radius),
             peak=peak,
             cells=cells,
-            cov_xy=float(block[0, 1]),
+            cov_xy=xy,
             snr=float(detected.ratio[k]),
             close=bool(detected.close[k]),
         )

@@ -49,12 +49,12 @@ class JointStarts:
 
     @classmethod
     def of(cls, matched: Matched, data: FloatArray, prior: SpotPrior, sign: str) -> JointStarts:
-        """For whitened ``data`` (r,), of candidates of median radius."""
+        """For whitened ``data`` (c,), of candidates of median radius."""
         away = np.abs(matched.spots[:, LOG_RADIUS] - np.log(prior.radius))
         chosen = np.flatnonzero(away < away.min() + 1e-9)
         spots, signatures = matched.spots[chosen], matched.signatures[chosen]
         gram = signatures @ signatures.T + np.eye(len(chosen)) / prior.content**2
-        return cls(spots, gram, signatures @ data, prior, sign)
+        return cls(spots, gram, signatures @ data[: signatures.shape[1]], prior, sign)
 
     def sets(self, count: int, most: int) -> list[FloatArray]:
         """At most so many sets (``count``, 4) of spots, the likeliest first, not alike."""

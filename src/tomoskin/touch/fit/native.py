@@ -8,7 +8,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.refine import Deficit, Fit, Problem
+from tomoskin.touch.fit.refine import Answer, Deficit, Fit, Limits, Problem, Question
 from tomoskin.touch.fit.solver import DIRECTED, RESHAPED, RIDGE, SheetDomain
 from tomoskin.touch.fit.spot import FILLING
 from tomoskin.touch.fit.table import ResponseTable
@@ -36,41 +36,94 @@ class NativeSolver:
         """See :class:`Solver`."""
         return np.asarray(self._spots.expanded(spots))
 
-    def keep(self, direct: FloatArray, timed: FloatArray) -> Any:
+    def keep(
+        self, direct: FloatArray, timed: FloatArray, matrix: FloatArray, squares: FloatArray
+    ) -> Any:
         """See :class:`Solver`."""
-        return self._core.SeenTable(direct, timed)
+        return self._core.SeenTable(direct, timed, matrix, self.table.basis, squares)
 
     def settled(self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
         """See :class:`Solver`."""
-        deviations = (DIRECTED, RESHAPED, problem.reach, problem.grows)
-        matrices, vectors, (misfit, log_size, cost, settled) = self._spots.settled(
-            problem.seen.kept,
-            problem.data,
-            problem.left,
-            deficit.change,
-            spots,
-            deviations,
-            self._prior.depths(problem.sign),
-            most,
-        )
-        found, each, slopes, unknown, normal = matrices
-        predicted, residual, gradient = vectors
-        return Fit(
-            spots=found,
-            deficit=deficit,
-            each=each,
-            predicted=predicted,
-            residual=residual,
-            slopes=slopes,
-            unknown=unknown,
-            normal=normal,
-            gradient=gradient,
-            misfit=misfit,
-            log_size=log_size,
-            cost=cost,
-            settled=settled,
-        )
+        kept, frame = problem.seen.kept, self._frame(problem, deficit)
+        return _fit(problem, deficit, *self._spots.settled(kept, frame, spots, most))
 
-    def projected(self, unknown: FloatArray, free: FloatArray, rows: FloatArray) -> FloatArray:
+    def searched(self, question: Question, before: FloatArray) -> Answer | None:
         """See :class:`Solver`."""
-        return np.asarray(self._core.projected(unknown, free, rows, RIDGE))
+        problem, pace = question.problem, question.pace
+        if pace.rounds or pace.joint:
+            return None
+        limits, rules = question.limits, question.rules
+        found, bare, others = self._spots.searched(
+            problem.seen.kept,
+            self._frame(problem, question.deficit),
+            before,
+            question.candidates,
+            (limits.low, limits.high, limits.least, limits.useful, RIDGE),
+            (
+                *(pace.warm, pace.glance, pace.cold, pace.finalists, pace.tries),
+                *(question.most, pace.restart),
+            ),
+            (
+                *(rules.least, rules.held, pace.look, rules.sure, pace.rare),
+                *(rules.misshapen, self._prior.log_volume),
+            ),
+        )
+        rank = len(self.table.basis)
+        deficit = Deficit.none(rank) if bare else question.deficit
+        return Answer(_fit(problem, deficit, *found), others and tuple(others))
+
+    def _frame(self, problem: Problem, deficit: Deficit) -> tuple[Any, ...]:
+        deviations = (DIRECTED, RESHAPED, problem.reach, problem.grows)
+        depths = self._prior.depths(problem.sign)
+        return problem.data, problem.rest, problem.left, deficit.change, deviations, depths
+
+    def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
+        """See :class:`Solver`."""
+        parts = fit.spots, fit.each, fit.slopes, fit.unknown, fit.normal
+        quality = fit.misfit, float(fit.degrees), uneven
+        squares, covariance = self._spots.judged(
+            problem.seen.kept, parts, fit.deficit.change, quality, RIDGE
+        )
+        return squares, covariance
+
+    def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
+        """See :class:`Solver`."""
+        return np.asarray(self._core.standing(left, fit.slopes, fit.each, RIDGE))
+
+    def standing_out(
+        self, signatures: FloatArray, squares: FloatArray, fit: Fit, limits: Limits
+    ) -> tuple[FloatArray, FloatArray]:
+        """See :class:`Solver`."""
+        numbers = (limits.low, limits.high, limits.least, limits.useful, RIDGE)
+        ratio, content = self._core.standing_out(
+            signatures, squares, fit.unknown, fit.slopes, fit.residual, numbers
+        )
+        return ratio, content
+
+
+def _fit(
+    problem: Problem,
+    deficit: Deficit,
+    matrices: tuple[FloatArray, ...],
+    vectors: tuple[FloatArray, ...],
+    numbers: tuple[float, float, float, bool],
+) -> Fit:
+    found, each, slopes, unknown, normal = matrices
+    predicted, residual, gradient = vectors
+    misfit, log_size, cost, settled = numbers
+    return Fit(
+        spots=found,
+        deficit=deficit,
+        each=each,
+        predicted=predicted,
+        residual=residual,
+        slopes=slopes,
+        unknown=unknown,
+        normal=normal,
+        gradient=gradient,
+        misfit=misfit,
+        log_size=log_size,
+        cost=cost,
+        degrees=max(len(problem.seen.full) - len(gradient), 1),
+        settled=settled,
+    )

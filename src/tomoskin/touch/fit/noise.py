@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.pattern import Scan
-from tomoskin.touch.fit.spot import CONTENT, N_PARAMETERS, Response
+from tomoskin.touch.fit.spot import CONTENT, N_PARAMETERS
 
 _LEAST = 1e-10
 """Directions with less than this part of the largest variance hold no data: rows that follow
@@ -167,9 +168,11 @@ class ResidualResponse:
         """(n_meas, k) V, each as long as its deviation."""
         return _LEFT * self.changes.T
 
-    def after(self, spots: FloatArray, response: Response, frames: int) -> Self:
+    def after(
+        self, spots: FloatArray, changes: Callable[[FloatArray], FloatArray], frames: int
+    ) -> Self:
         """With a frame in which touches ``spots`` (k, 4) were; forgotten ``frames`` after the
-        last of them."""
+        last of them. ``changes`` gives (k, n_meas) V of spots (k, 4), each alone."""
         if not len(spots):
             if len(self.spots) and self.quiet >= frames:
                 return self.none(self.changes.shape[1])
@@ -180,10 +183,9 @@ class ResidualResponse:
         if not len(fresh):
             return self if not self.quiet else replace(self, quiet=0)
         kept = ~near[:, ~held.any(axis=0)].any(axis=1)
-        changes = response.changes([spot[None] for spot in fresh])
         return type(self)(
             np.concatenate([self.spots[kept], fresh])[-_MOST:],
-            np.concatenate([self.changes[kept], changes])[-_MOST:],
+            np.concatenate([self.changes[kept], changes(fresh)])[-_MOST:],
         )
 
 

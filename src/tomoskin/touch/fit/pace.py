@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -17,8 +18,9 @@ class Pace:
         Steps from each of the positions where a new touch may begin, and then from the best one.
     finalists
         Of these positions, the best ones that are gone on with.
-    rounds
-        Solves of the exact model, each with a few more steps.
+    rounds, closing
+        Solves of the exact model, each with a few more steps: for each set of touches that is
+        tried, and for what is found in the end.
     near
         Part of radius and content by which a touch may differ before the exact model is solved
         for it again.
@@ -26,6 +28,8 @@ class Pace:
         New touches that are tried in a frame.
     look
         Part of the likelihood ratio at which a touch begins from which a further one is tried.
+    rare
+        Logarithm of the odds against a touch's beginning in a frame: evidence that it needs.
     joint
         Sets of as many new touches as there may be in all that are tried beside, for each number.
     restart
@@ -42,9 +46,11 @@ class Pace:
     cold: int
     finalists: int
     rounds: int
+    closing: int
     near: float
     tries: int
     look: float
+    rare: float
     joint: int
     restart: bool
     speed: float
@@ -57,9 +63,11 @@ EXHAUSTIVE = Pace(
     cold=15,
     finalists=3,
     rounds=4,
+    closing=0,
     near=0.0,
     tries=5,
     look=0.5,
+    rare=0.0,
     joint=6,
     restart=True,
     speed=0.0,
@@ -72,10 +80,12 @@ LIVE = Pace(
     glance=1,
     cold=4,
     finalists=1,
-    rounds=1,
-    near=0.25,
+    rounds=0,
+    closing=1,
+    near=0.5,
     tries=1,
     look=0.8,
+    rare=math.log(200),
     joint=0,
     restart=False,
     speed=0.1,

@@ -74,9 +74,13 @@ class SpotPrior:
     def log_density(self, spots: FloatArray) -> float:
         """Logarithm of the prior density of spots (k, 4), in no order."""
         k = len(spots)
-        scale = math.log(self.area * self.spread * self.content) + math.log(2 * math.pi)
         away = float((self.away(spots) ** 2).sum())
-        return math.lgamma(k + 1) - k * scale - away / 2
+        return math.lgamma(k + 1) - k * self.log_volume - away / 2
+
+    @property
+    def log_volume(self) -> float:
+        """Logarithm of one over the density of one spot at its most likely."""
+        return math.log(self.area * self.spread * self.content) + math.log(2 * math.pi)
 
     def held(self, spots: FloatArray, sign: str) -> FloatArray:
         """``spots`` (k, 4) with radius and content where they may be."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -21,6 +21,9 @@ _CERTAIN = 10.0
 
 _AGAIN = 2
 """Steps after what the table lacks has been renewed."""
+
+_UNSEEN = 0.1
+"""Deviations, in the mean over strong touches, that are left out of what changes show along."""
 
 _EXACT = 0.1
 """Deviations by which the exact model may differ from what a fit was made with."""
@@ -51,12 +54,14 @@ class Deficit:
         ``part`` of radius and content."""
         if len(spots) != len(self.spots):
             return False
-        away = np.linalg.norm((spots - self.spots)[:, :2], axis=1)
-        other = np.abs((spots - self.spots)[:, CONTENT])
-        near = away <= part * np.exp(self.spots[:, LOG_RADIUS])
-        wider = np.abs((spots - self.spots)[:, LOG_RADIUS])
-        alike = (wider <= part) & (other <= part * np.abs(self.spots[:, CONTENT]))
-        return bool((near & alike).all())
+        return all(map(partial(_alike, part), spots.tolist(), self.spots.tolist()))
+
+
+def _alike(part: float, spot: list[float], other: list[float]) -> bool:
+    """Whether a ``spot`` is where the other one was, but for a ``part`` of that."""
+    x, y, log_radius, content = (here - there for here, there in zip(spot, other, strict=True))
+    near = math.hypot(x, y) <= part * math.exp(other[LOG_RADIUS])
+    return near and abs(log_radius) <= part and abs(content) <= part * abs(other[CONTENT])
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +75,13 @@ class Fit:
     deficit
         What the table lacks of these spots.
     each, predicted
-        (k, r) what each spot does to the whitened data, and (r,) what all do together.
+        (k, c) what each spot does to the whitened data, and (c,) what all do together.
     residual
-        (r,) whitened data less what all do.
+        (c,) whitened data less what all do.
     slopes
-        (4k, r) derivatives of the whitened model.
+        (4k, c) derivatives of the whitened model.
     unknown
-        (q, r) directions, each as long as its amplitude's deviation.
+        (q, c) directions, each as long as its amplitude's deviation.
     normal
         (4k, 4k) inverse of the covariance: JC⁻¹Jᵀ and the prior; C = 1 + unknownᵀ unknown.
     gradient
@@ -87,6 +92,8 @@ class Fit:
         Half the logarithm of the determinant of C.
     cost
         Half the misfit and the squares of the prior.
+    degrees
+        Degrees of freedom of the residual.
     settled
         Whether the steps towards it came to an end.
     """
@@ -103,6 +110,7 @@ class Fit:
     misfit: float
     log_size: float
     cost: float
+    degrees: int
     settled: bool = True
 
     @cached_property
@@ -111,11 +119,6 @@ class Fit:
         scale = 1 / np.sqrt(np.diag(self.normal))
         even = np.linalg.inv(self.normal * scale[:, None] * scale)
         return np.asarray(even * scale[:, None] * scale)
-
-    @property
-    def degrees(self) -> int:
-        """Degrees of freedom of the residual."""
-        return max(len(self.residual) - len(self.normal), 1)
 
     def log_evidence(self, prior: SpotPrior) -> float:
         """Logarithm of ∫ likelihood · prior by Laplace's method (MacKay 2003, eq. 28.5).
@@ -131,41 +134,81 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class WhitenedTable:
-    """A table as whitened data see it.
+    """A table as whitened data see it: along the c axes that touches can change at all.
+
+    Changes are smooth, and show above the noise along few axes. Along the others data are
+    noise whatever touches; only their square counts.
 
     Attributes
     ----------
     solver
         What spots do.
-    whiten
-        Of the noise.
+    matrix
+        (c, n_meas) 1/V, from data to whitened data along the axes.
+    full
+        (r, n_meas) 1/V, to all of them.
+    narrow
+        Axes that changes show along, the first ones; the others are those of a change that
+        moves on while the measurements are taken.
     direct, timed
-        (r, rank) from a change in the table's basis to whitened data; of ``timed`` each
+        (c, rank) from a change in the table's basis to whitened data; of ``timed`` each
         measurement counts as often as it is after the middle of the scan.
-    kept
-        What a solver keeps of that.
     """
 
     solver: Solver
-    whiten: Whitener
+    matrix: FloatArray
+    full: FloatArray
+    narrow: int
     direct: FloatArray
     timed: FloatArray
-    kept: Any
 
     @classmethod
     def of(cls, solver: Solver, whiten: Whitener, times: FloatArray) -> WhitenedTable:
         """``times`` (n_meas,) of the measurements about the middle of the scan."""
-        table = solver.table
-        direct = whiten.matrix @ table.basis.T
-        timed = whiten.matrix @ (times[:, None] * table.basis.T)
-        return cls(solver, whiten, direct, timed, solver.keep(direct, timed))
+        full, table = whiten.matrix, solver.table
+        direct, timed = full @ table.basis.T, full @ (times[:, None] * table.basis.T)
+        axes = _axes(direct @ table.typical, least=1)
+        more = _axes(_less(timed @ table.typical, axes), least=0)
+        both, narrow = np.column_stack([axes, more]), axes.shape[1]
+        direct = both.T @ direct
+        direct[narrow:] = 0.0
+        return cls(solver, both.T @ full, full, narrow, direct, both.T @ timed)
 
     def louder(self, times: float) -> WhitenedTable:
         """The same in so many times the noise's variance."""
         part = 1.0 / math.sqrt(times)
-        direct, timed = part * self.direct, part * self.timed
-        whiten = Whitener(part * self.whiten.matrix)
-        return WhitenedTable(self.solver, whiten, direct, timed, self.solver.keep(direct, timed))
+        matrix, full, direct, timed = (
+            part * m for m in (self.matrix, self.full, self.direct, self.timed)
+        )
+        return WhitenedTable(self.solver, matrix, full, self.narrow, direct, timed)
+
+    @cached_property
+    def squares(self) -> FloatArray:
+        """(n_meas,) 1/V²: of what each measurement alone is, whitened."""
+        return np.asarray((self.full**2).sum(axis=0))
+
+    @cached_property
+    def kept(self) -> Any:
+        """What its solver keeps of it."""
+        return self.solver.keep(self.direct[: self.narrow], self.timed, self.matrix, self.squares)
+
+    def whitened(self, data: FloatArray) -> tuple[FloatArray, float]:
+        """(c,) of data (n_meas,) V along the axes, and the square of the rest."""
+        every, along = self.full @ data, self.matrix @ data
+        return along, max(float(every @ every - along @ along), 0.0)
+
+
+def _axes(typical: FloatArray, least: int) -> FloatArray:
+    """(r, c) orthonormal: along them ``typical`` changes (r, n) are but for ``_UNSEEN``; so many at
+    the ``least``, in whatever noise."""
+    square, vectors = np.linalg.eigh(typical.T @ typical)
+    dropped = int(np.searchsorted(np.cumsum(np.maximum(square, 0.0)), _UNSEEN**2))
+    dropped = min(dropped, len(square) - least)
+    return np.asarray(typical @ (vectors[:, dropped:] / np.sqrt(square[dropped:])))
+
+
+def _less(columns: FloatArray, axes: FloatArray) -> FloatArray:
+    return np.asarray(columns - axes @ (axes.T @ columns))
 
 
 class Solver(Protocol):
@@ -176,8 +219,10 @@ class Solver(Protocol):
         """What one spot does."""
         ...
 
-    def keep(self, direct: FloatArray, timed: FloatArray) -> Any:
-        """What it keeps of a :class:`WhitenedTable`."""
+    def keep(
+        self, direct: FloatArray, timed: FloatArray, matrix: FloatArray, squares: FloatArray
+    ) -> Any:
+        """What it keeps of a :class:`WhitenedTable`; ``direct`` (narrow, rank)."""
         ...
 
     def expanded(self, spots: FloatArray) -> FloatArray:
@@ -185,25 +230,119 @@ class Solver(Protocol):
         ...
 
     def settled(self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
-        """The minimum of the cost near ``spots`` (k, 4), after at most so many steps."""
-        ...
+        """The minimum of the cost near ``spots`` (k, 4), after at most so many steps.
 
-    def projected(self, unknown: FloatArray, free: FloatArray, rows: FloatArray) -> FloatArray:
-        """(m, r) of ``rows`` (m, r): each times P.
-
-        P = C⁻¹ less what C⁻¹ keeps of the span of ``free`` (p, r), of which any amount may be
-        there; C = 1 + unknownᵀ unknown, of directions ``unknown`` (q, r).
+        What is unknown of the spots is taken as it is at the first ones, and anew where steps
+        with that end.
         """
         ...
+
+    def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
+        """(k,) square of what each spot of a fit changes that the slopes of the others could not
+        take up, in noise with unknown directions ``left`` (q, c)."""
+        ...
+
+    def standing_out(
+        self, signatures: FloatArray, squares: FloatArray, fit: Fit, limits: Limits
+    ) -> tuple[FloatArray, FloatArray]:
+        """See :meth:`tomoskin.touch.fit.candidates.Matched.ratios`; of ``signatures``
+        (n, narrow) with ``squares`` (n,)."""
+        ...
+
+    def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
+        """As :meth:`standing` in noise alone, and (4k, 4k) the covariance of all parameters.
+
+        The covariance is the curvature's, scaled where the data scatter more than they should, and
+        the part by which each measurement answers otherwise than the model's, ``uneven`` at the
+        least: that is not fitted but considered (Schmidt 1966). How much it is, is what the
+        residual has beyond noise, E[rᵀr] = degrees + u²‖(1 − JΣJᵀ)E‖², E the measurements'
+        answers one by one.
+        """
+        ...
+
+    def searched(self, question: Question, before: FloatArray) -> Answer | None:
+        """What :class:`tomoskin.touch.fit.search.Search` finds in a frame before which there were
+        touches ``before`` (k, 4), in one call; None where this solver has none for that pace."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """A fit, and the likelihood ratios (n,) and contents (n,) of candidates beside it, where these
+    have been looked at."""
+
+    fit: Fit
+    others: tuple[FloatArray, FloatArray] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What counts of candidates.
+
+    Attributes
+    ----------
+    low, high
+        Of the content: no candidate goes beyond 0 on the side that is 0.
+    least
+        Deviations of the noise below which a candidate is none.
+    useful
+        Part of a candidate's square that the spots of a fit must leave of it.
+    """
+
+    low: float
+    high: float
+    least: float
+    useful: float
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """What counts as a touch.
+
+    Attributes
+    ----------
+    least
+        Likelihood ratio, in deviations, at which one begins.
+    held
+        Part of that at which one stays.
+    sure
+        Times that ratio from which no frame is explained better without the touch.
+    misshapen
+        Part of what touches change that a wrong profile may leave: no evidence of another one.
+    """
+
+    least: float
+    held: float
+    sure: float
+    misshapen: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Question:
+    """What is looked for in one frame.
+
+    ``candidates`` are spots (n, 4) of content 1, their whitened signatures (n, narrow) and the
+    squares (n,) of these; ``most`` touches are looked for; ``deficit``: what the table lacked of
+    the last frame's.
+    """
+
+    problem: Problem
+    candidates: tuple[FloatArray, FloatArray, FloatArray]
+    limits: Limits
+    rules: Rules
+    pace: Pace
+    most: int
+    deficit: Deficit
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Whitened data (r,) of one frame, and what they are explained with.
+    """Whitened data (c,) of one frame, and what they are explained with.
 
+    ``rest`` is the square of what the data have along no axis of theirs.
     ``sign`` is "decrease", "increase" or "both". Standard deviations of what a touch does within a
     scan: its way along each axis, ``reach`` m, and what it ``grows`` by, in parts of it.
-    ``left`` (q, r) are directions of residual responses, each as long as its deviation.
+    ``left`` (q, c) are directions of residual responses, each as long as its deviation.
     """
 
     response: Response
@@ -213,7 +352,13 @@ class Problem:
     reach: float
     grows: float
     data: FloatArray
+    rest: float
     left: FloatArray
+
+    @property
+    def square(self) -> float:
+        """Of all whitened data."""
+        return float(self.data @ self.data) + self.rest
 
     @property
     def solver(self) -> Solver:
@@ -229,17 +374,17 @@ class Problem:
         """See :meth:`Solver.settled`."""
         return self.solver.settled(self, spots, deficit, most)
 
-    def corrected(self, fit: Fit, pace: Pace) -> Fit:
-        """The fit with the exact model at its spots, solved as often as the ``pace`` allows.
+    def corrected(self, fit: Fit, rounds: int, near: float) -> Fit:
+        """The fit with the exact model at its spots, solved so often at most, and not where it has
+        been for spots as ``near``.
 
         A single faint spot is left as it is: what its table lacks is below the noise.
         """
-        size = np.linalg.norm(fit.each, axis=1)
-        if not len(size) or (len(size) == 1 and size[0] < _CERTAIN):
+        if not rounds or not len(fit.spots) or fit.deficit.holds_for(fit.spots, near):
             return fit
-        for _ in range(pace.rounds):
-            if fit.deficit.holds_for(fit.spots, pace.near):
-                return fit
+        if len(fit.spots) == 1 and np.linalg.norm(fit.each) < _CERTAIN:
+            return fit
+        for _ in range(rounds):
             exact = self.solver.table.basis @ self.response.changes([fit.spots])[0]
             change = exact - self.solver.expanded(fit.spots)[:, 0].sum(axis=0)
             far = np.linalg.norm(self.seen.direct @ (change - fit.deficit.change))
@@ -247,13 +392,10 @@ class Problem:
             if far < _EXACT:
                 return replace(fit, deficit=deficit)
             fit = self.solver.settled(self, fit.spots, deficit, _AGAIN)
+            if fit.deficit.holds_for(fit.spots, near):
+                break
         return fit
 
     def evidence(self, fit: Fit) -> float:
         """See :meth:`Fit.log_evidence`."""
         return fit.log_evidence(self.prior)
-
-    def change(self, fit: Fit) -> FloatArray:
-        """(n_meas,) V that the spots of a fit add to the reference."""
-        alone = self.solver.expanded(fit.spots)[:, 0].sum(axis=0)
-        return np.asarray((alone + fit.deficit.change) @ self.solver.table.basis)

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
-from tomoskin.touch.fit.candidates import Matched
+from tomoskin.touch.fit.candidates import Matched, limits_of
 from tomoskin.touch.fit.joint_starts import JointStarts
 from tomoskin.touch.fit.pace import Pace
-from tomoskin.touch.fit.refine import Deficit, Fit, Problem
+from tomoskin.touch.fit.refine import Deficit, Fit, Problem, Question, Rules
 from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
 
 HELD = 0.6
@@ -23,6 +23,10 @@ _DOUBTFUL = 0.8
 
 _MISSHAPEN = 0.02
 """A wrong profile leaves up to this part of what a touch changes: no evidence of another one."""
+
+_SURE = 2.0
+"""Times the ratio at which a touch begins: half the square of that is more than what a simpler
+explanation of the frame is worth."""
 
 _UNEVEN = 0.08
 """Part by which each row answers a touch otherwise than the model's, at the least: a sheet is
@@ -80,6 +84,35 @@ class Search:
 
     def __call__(self, before: FloatArray) -> SpotDetections:
         """Touches of the frame; ``before`` (k, 4) are those of the last one."""
+        answer = self.problem.solver.searched(self.question, before)
+        fit = self.found(before) if answer is None else answer.fit
+        if answer and answer.others:
+            self._matches.append((fit, answer.others))
+        return self._judged(self._confirmed(fit, before))
+
+    def _confirmed(self, fit: Fit, before: FloatArray) -> Fit:
+        """A fit by the exact model. Where touches begin beside others: with or without these, since
+        a further one may be what the table lacks of those."""
+        pace, problem = self.pace, self.problem
+        exact = problem.corrected(fit, pace.closing, pace.near)
+        if not pace.closing or len(fit.spots) < 2 or len(fit.spots) <= len(before):
+            return exact
+        other = problem.corrected(self._started(before), pace.closing, pace.near)
+        worth = self._ratios(exact).min() >= self._threshold(other, 1.0)
+        gain = problem.evidence(exact) - problem.evidence(other)
+        return exact if worth and gain > pace.rare else other
+
+    @property
+    def question(self) -> Question:
+        """What a solver is asked that searches in one call."""
+        matched = self.matched
+        candidates = matched.spots, matched.signatures, matched.squares
+        rules = Rules(self.least, HELD, _SURE, _MISSHAPEN)
+        limits = limits_of(self.problem.sign)
+        return Question(self.problem, candidates, limits, rules, self.pace, self.most, self.deficit)
+
+    def found(self, before: FloatArray) -> Fit:
+        """The fit of the touches, before the exact model is asked for the last time."""
         kept = self._pruned(self._started(before))
         tries = self.pace.tries - (len(before) - len(kept.spots) if len(kept.spots) else 0)
         fit, tried = self._more(kept, tries)
@@ -88,7 +121,7 @@ class Search:
         if len(before) and self._is_astray(fit, before, in_vain=tried > 0 and fit is kept):
             fresh, _ = self._more(self.problem.nothing(), self.pace.tries)
             fit = max(fresh, fit, key=self.problem.evidence)
-        return self._judged(fit)
+        return fit
 
     def _is_astray(self, fit: Fit, before: FloatArray, *, in_vain: bool) -> bool:
         """Whether what was there may keep the frame from being understood: another touch stands
@@ -102,7 +135,7 @@ class Search:
             return self.problem.nothing()
         problem, spots = self.problem, before[: self.most]
         fit = problem.refined(spots, self.deficit, self.pace.warm)
-        return problem.corrected(fit, self.pace)
+        return problem.corrected(fit, self.pace.rounds, self.pace.near)
 
     def _pruned(self, fit: Fit) -> Fit:
         """Without the spots that have faded."""
@@ -120,7 +153,7 @@ class Search:
             return fit
         ratio = self._ratios(fit)
         weakest = int(ratio.argmin())
-        if fit.settled and ratio[weakest] >= self.least:
+        if ratio[weakest] >= (1.0 if fit.settled else _SURE) * self.least:
             return fit
         return max(
             fit, self._started(np.delete(fit.spots, weakest, axis=0)), key=self.problem.evidence
@@ -136,7 +169,8 @@ class Search:
             fresh = _starts(fit, self.matched.spot(best, content))
             more = self._best(fresh, fit.deficit, self._joint_starts(len(fit.spots) + 1))
             worth = self._ratios(more).min() >= self._threshold(fit, 1.0)
-            if not worth or self.problem.evidence(more) <= self.problem.evidence(fit):
+            gain = self.problem.evidence(more) - self.problem.evidence(fit)
+            if not worth or gain <= self.pace.rare:
                 return fit, tried + 1
             fit = more
         return fit, tries
@@ -179,21 +213,20 @@ class Search:
             fit if fit.settled else problem.refined(fit.spots, fit.deficit, pace.cold)
             for fit in fits[: pace.finalists]
         ]
-        exact = [problem.corrected(fit, pace) for fit in settled]
+        exact = [problem.corrected(fit, pace.rounds, pace.near) for fit in settled]
         return max(exact, key=self.problem.evidence)
 
     def _ratios(self, fit: Fit) -> FloatArray:
-        """(k,) size of what each spot changes that the others could not take up."""
-        return _standing(self.problem, fit, self.problem.left)
+        """(k,) deviations of the noise and of residual responses by which each stands out."""
+        return np.asarray(np.sqrt(self.problem.solver.standing(self.problem.left, fit)))
 
     def _judged(self, fit: Fit) -> SpotDetections:
         k = len(fit.spots)
         if not k:
             none = np.zeros(0)
             return SpotDetections(fit, none, np.zeros((0, 0)), none.astype(bool))
-        covariance = _covariance(self.problem, fit)
-        ratio = _standing(self.problem, fit, self.problem.left[:0])
-        return SpotDetections(fit, ratio, covariance, self._close(fit))
+        squares, covariance = self.problem.solver.judged(self.problem, fit, _UNEVEN)
+        return SpotDetections(fit, np.sqrt(squares), covariance, self._close(fit))
 
     def _close(self, fit: Fit) -> NDArray[np.bool_]:
         """Where a candidate within a radius of a spot stands out nearly enough."""
@@ -203,17 +236,6 @@ class Search:
             return np.zeros(len(fit.spots), dtype=bool)
         apart = np.linalg.norm(fit.spots[:, None, :2] - doubtful, axis=2).min(axis=1)
         return np.asarray(apart < 2 * np.exp(fit.spots[:, LOG_RADIUS]))
-
-
-def _standing(problem: Problem, fit: Fit, left: FloatArray) -> FloatArray:
-    """(k,) deviations of the noise, with directions ``left`` (q, r), by which each stands out."""
-    k = len(fit.spots)
-    squares = np.empty(k)
-    for number in range(k):
-        others = np.delete(fit.slopes, np.s_[4 * number : 4 * number + 4], axis=0)
-        alone = fit.each[number : number + 1]
-        squares[number] = problem.solver.projected(left, others, alone)[0] @ alone[0]
-    return np.sqrt(np.maximum(squares, 0.0))
 
 
 def _starts(fit: Fit, fresh: FloatArray) -> list[FloatArray]:
@@ -231,37 +253,15 @@ def _starts(fit: Fit, fresh: FloatArray) -> list[FloatArray]:
     return starts
 
 
-def _covariance(problem: Problem, fit: Fit) -> FloatArray:
-    """Curvature, scaled where the data scatter more than they should; and the model's part.
-
-    The part by which each row is off is not fitted but considered (Schmidt 1966).
-    """
-    scatter = max(1.0, fit.misfit / fit.degrees)
-    onto = problem.solver.projected(fit.unknown, fit.slopes[:0], fit.slopes)
-    return np.asarray(scatter * fit.covariance + _uneven(problem, fit, onto))
-
-
-def _uneven(problem: Problem, fit: Fit, onto: FloatArray) -> FloatArray:
-    """What rows that answer more or less than they should add to the covariance.
-
-    How much, is what the residual has beyond noise, where that is more than a sheet
-    is uneven as a rule: E[rᵀr] = degrees + u²‖(1 − JΣJᵀ)E‖², E the rows' answers one by one.
-    ``onto`` is (4k, r) JC⁻¹.
-    """
-    matrix, change = problem.seen.whiten.matrix, problem.change(fit)
-    slopes = onto @ matrix * change
-    moved = fit.covariance @ slopes
-    unexplained = float(np.sum((matrix * change) ** 2) - np.sum(slopes * moved))
-    beyond = max(fit.misfit - fit.degrees, 0.0) / unexplained if unexplained > 0 else 0.0
-    return np.asarray(max(beyond, _UNEVEN**2) * (moved @ moved.T))
-
-
 def joined(detected: SpotDetections) -> SpotDetections:
     """The same with each two touches as one whose positions are not distinct (2 deviations)."""
     spots, k = detected.fit.spots, len(detected.fit.spots)
+    variance = np.diag(detected.covariance).reshape(k, N_PARAMETERS)[:, :2].sum(axis=1)
     for i in range(k):
         for j in range(i + 1, k):
             away = spots[i, :2] - spots[j, :2]
+            if away @ away > 8 * (variance[i] + variance[j]):  # no direction has more than all
+                continue
             pick = [4 * i, 4 * i + 1, 4 * j, 4 * j + 1]
             block = detected.covariance[np.ix_(pick, pick)]
             turn = np.concatenate([away, -away])

@@ -11,14 +11,14 @@ from scipy.spatial import cKDTree
 from tomoskin.core import FloatArray
 from tomoskin.mesh import Mesh
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.refine import Deficit, Fit, Problem
+from tomoskin.touch.fit.refine import Deficit, Fit, Limits, Problem, Question
 from tomoskin.touch.fit.spot import CONTENT, N_PARAMETERS, X, Y
 from tomoskin.touch.fit.table import ResponseTable
 
-_SETTLED = 0.02
-"""Newton decrement, squared, at which a step is too small to matter: 0.14 deviations."""
+_SETTLED = 0.05
+"""Newton decrement, squared, at which a step is too small to matter: 0.22 deviations."""
 
-_LEAST_DAMPING = 1e-6
+_LEAST_DAMPING, _MOST_DAMPING = 1e-6, 1e3
 
 DIRECTED = 0.7
 """Standard deviation of a spot's direction (:class:`Part`) about none."""
@@ -58,7 +58,9 @@ class NumpySolver:
     sheet: SheetDomain
     prior: SpotPrior
 
-    def keep(self, direct: FloatArray, timed: FloatArray) -> None:
+    def keep(
+        self, direct: FloatArray, timed: FloatArray, matrix: FloatArray, squares: FloatArray
+    ) -> None:
         """See :class:`Solver`; nothing."""
 
     def expanded(self, spots: FloatArray) -> FloatArray:
@@ -70,23 +72,40 @@ class NumpySolver:
 
         Levenberg (1944) and Marquardt (1963): damping relative to the diagonal.
         """
-        best = replace(self._at(problem, self._held(spots, problem.sign), deficit), settled=False)
-        damping = _LEAST_DAMPING
-        for _ in range(most):
-            pull = self.prior.away(best.spots) * self.prior.weights
-            gradient = best.gradient - pull.ravel()
-            step = _solved(best.normal, gradient, damping)
-            if gradient @ step < _SETTLED:
-                return replace(best, settled=True)
+        best = self._at(problem, self._held(spots, problem.sign), deficit)
+        while most > 0:
+            descent = self._descended(problem, best, most)
+            best = replace(best, settled=descent.settled)
+            if np.array_equal(descent.spots, best.spots):
+                break
+            most -= descent.steps
+            best = self._at(problem, descent.spots, deficit)
+            best = replace(best, settled=self._gain(best) < _SETTLED)
+        return best
+
+    def _gain(self, fit: Fit) -> float:
+        """Squared Newton decrement of a fit."""
+        gradient = self._pulled(fit.spots, fit.gradient)
+        return float(gradient @ _solved(fit.normal, gradient, _LEAST_DAMPING))
+
+    def _descended(self, problem: Problem, fit: Fit, most: int) -> Descent:
+        """Steps from a fit down to where its metric sees nothing to gain."""
+        metric = Metric.of(fit.unknown)
+        gradient = self._pulled(fit.spots, fit.gradient)
+        best, damping = Slope(fit.spots, fit.normal, gradient, fit.cost), _LEAST_DAMPING
+        for steps in range(most):
+            step = _solved(best.normal, best.gradient, damping)
+            if best.gradient @ step < _SETTLED:
+                return Descent(best.spots, steps, settled=True)
             moved = self._held(best.spots + step.reshape(-1, N_PARAMETERS), problem.sign)
-            tried = self._at(problem, moved, deficit)
+            tried = self._slope(problem, metric, moved, fit.deficit)
             if tried.cost < best.cost:
-                best, damping = replace(tried, settled=False), max(damping / 10, _LEAST_DAMPING)
-            elif damping > 1e3:
-                return replace(best, settled=True)
+                best, damping = tried, max(damping / 10, _LEAST_DAMPING)
+            elif damping > _MOST_DAMPING:
+                return Descent(best.spots, steps, settled=True)
             else:
                 damping = max(damping * 30, 1e-2)
-        return best
+        return Descent(best.spots, most, settled=False)
 
     def _at(self, problem: Problem, spots: FloatArray, deficit: Deficit) -> Fit:
         """The frame with these spots, as they are."""
@@ -103,8 +122,9 @@ class NumpySolver:
         ])  # fmt: skip
         predicted = each.sum(axis=0) + direct @ deficit.change
         residual = problem.data - predicted
-        square, gradient, misfit, log_size = _integrated(unknown, slopes, residual)
-        away, weights = self.prior.away(spots), np.tile(self.prior.weights, len(spots))
+        metric = Metric.of(unknown)
+        square = metric.products(np.vstack([slopes, residual]))
+        misfit = problem.rest + float(square[-1, -1])
         return Fit(
             spots=spots,
             deficit=deficit,
@@ -113,26 +133,88 @@ class NumpySolver:
             residual=residual,
             slopes=slopes,
             unknown=unknown,
-            normal=square + np.diag(weights**2),
-            gradient=gradient,
+            normal=self._normal(square, len(spots)),
+            gradient=square[:-1, -1],
             misfit=misfit,
-            log_size=log_size,
-            cost=(misfit + float((away**2).sum())) / 2,
+            log_size=metric.log_size,
+            cost=(misfit + self._prior_squares(spots)) / 2,
+            degrees=max(len(problem.seen.full) - len(slopes), 1),
+            settled=False,
         )
+
+    def _slope(
+        self, problem: Problem, metric: Metric, spots: FloatArray, deficit: Deficit
+    ) -> Slope:
+        """The cost of spots by the metric of others."""
+        direct = problem.seen.direct
+        seen = self.table.expanded(spots)[:, : 1 + N_PARAMETERS] @ direct.T
+        residual = problem.data - seen[:, 0].sum(axis=0) - direct @ deficit.change
+        slopes = seen[:, 1:].reshape(-1, len(residual))
+        square = metric.products(np.vstack([slopes, residual]))
+        misfit = problem.rest + float(square[-1, -1])
+        gradient = self._pulled(spots, square[:-1, -1])
+        cost = (misfit + self._prior_squares(spots)) / 2
+        return Slope(spots, self._normal(square, len(spots)), gradient, cost)
+
+    def _normal(self, square: FloatArray, k: int) -> FloatArray:
+        return np.asarray(square[:-1, :-1] + np.diag(np.tile(self.prior.weights, k) ** 2))
+
+    def _pulled(self, spots: FloatArray, gradient: FloatArray) -> FloatArray:
+        """A gradient with the prior's part."""
+        return np.asarray(gradient - (self.prior.away(spots) * self.prior.weights).ravel())
+
+    def _prior_squares(self, spots: FloatArray) -> float:
+        return float((self.prior.away(spots) ** 2).sum())
 
     def _held(self, spots: FloatArray, sign: str) -> FloatArray:
         return self.prior.held(self.sheet.held(spots), sign)
 
-    def projected(self, unknown: FloatArray, free: FloatArray, rows: FloatArray) -> FloatArray:
+    def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
         """See :class:`Solver`."""
-        both, q = np.vstack([unknown, free]), len(unknown)
-        square = both @ both.T
-        square[range(q), range(q)] += 1.0
-        scale = 1 / np.sqrt(np.maximum(np.diag(square), 1e-300))
-        even = square * scale[:, None] * scale
-        even[np.diag_indices_from(even)] += RIDGE
-        scaled = scale[:, None] * both
-        return np.asarray(rows - (rows @ scaled.T) @ np.linalg.solve(even, scaled))
+        seen, table = problem.seen, self.table
+        change = (table.expanded(fit.spots)[:, 0].sum(axis=0) + fit.deficit.change) @ table.basis
+        onto = _Beside.of(fit.unknown, fit.slopes[:0]).projected(fit.slopes)
+        answers = onto @ seen.matrix * change
+        moved = fit.covariance @ answers
+        unexplained = float(seen.squares @ change**2 - np.sum(answers * moved))
+        beyond = max(fit.misfit - fit.degrees, 0.0) / unexplained if unexplained > 0 else 0.0
+        scatter = max(1.0, fit.misfit / fit.degrees)
+        covariance = scatter * fit.covariance + max(beyond, uneven**2) * (moved @ moved.T)
+        return self.standing(fit.unknown[:0], fit), covariance
+
+    def searched(self, question: Question, before: FloatArray) -> None:
+        """See :class:`Solver`."""
+
+    def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
+        """See :class:`Solver`."""
+        k = len(fit.spots)
+        own = Metric.of(left).products(np.vstack([fit.slopes, fit.each]))
+        squares = np.empty(k)
+        for spot in range(k):
+            mine = N_PARAMETERS * k + spot
+            others = np.delete(
+                np.arange(N_PARAMETERS * k), np.arange(N_PARAMETERS) + N_PARAMETERS * spot
+            )
+            root, scale = _even_root(own[np.ix_(others, others)])
+            taken = _solved_lower(root, scale * own[others, mine])
+            squares[spot] = own[mine, mine] - taken @ taken
+        return np.maximum(squares, 0.0)
+
+    def standing_out(
+        self, signatures: FloatArray, squares: FloatArray, fit: Fit, limits: Limits
+    ) -> tuple[FloatArray, FloatArray]:
+        """See :class:`Solver`."""
+        beside = _Beside.of(fit.unknown, fit.slopes)
+        clean = beside.projected(fit.residual[None])[0, : signatures.shape[1]]
+        onto = np.clip(signatures @ clean, limits.low, limits.high)
+        likely = np.flatnonzero(onto**2 > limits.least**2 * squares)
+        size = squares[likely] - beside.taken(signatures[likely])
+        useful = size > limits.useful * squares[likely]
+        chosen, size = likely[useful], size[useful]
+        ratio, content = np.zeros(len(squares)), np.zeros(len(squares))
+        content[chosen] = onto[chosen] / size
+        ratio[chosen] = np.abs(onto[chosen]) / np.sqrt(size)
+        return ratio, content
 
 
 def _within_scan(problem: Problem, spots: FloatArray, slopes: FloatArray) -> list[FloatArray]:
@@ -147,25 +229,100 @@ def _within_scan(problem: Problem, spots: FloatArray, slopes: FloatArray) -> lis
     ]
 
 
-def _integrated(
-    unknown: FloatArray, slopes: FloatArray, residual: FloatArray
-) -> tuple[FloatArray, FloatArray, float, float]:
-    """JC⁻¹Jᵀ, JC⁻¹r, rC⁻¹r and half the logarithm of C's determinant, C = 1 + DᵀD.
+@dataclass(frozen=True, eq=False)
+class Metric:
+    """C⁻¹ = 1 − Dᵀ(1 + DDᵀ)⁻¹D (Woodbury 1950) of unknown directions D.
 
-    C⁻¹ = 1 − Dᵀ(1 + DDᵀ)⁻¹D (Woodbury 1950): D are ``unknown`` (q, r), J the ``slopes`` (p, r).
+    ``unknown`` (q, c) are these, ``root`` (q, q) is the lower one of 1 + DDᵀ, and ``log_size`` half
+    the logarithm of C's determinant.
     """
-    columns = np.vstack([unknown, slopes, residual])
-    gram, q = columns @ columns.T, len(unknown)
-    own, log_size = gram[q:, q:], 0.0
-    if q:
-        root = np.asarray(np.linalg.cholesky(np.eye(q) + gram[:q, :q]))
-        across = _solved_lower(root, gram[:q, q:])
-        own = own - across.T @ across
-        log_size = float(np.log(np.diag(root)).sum())
-    return own[:-1, :-1], own[:-1, -1], float(own[-1, -1]), log_size
+
+    unknown: FloatArray
+    root: FloatArray
+    log_size: float
+
+    @classmethod
+    def of(cls, unknown: FloatArray) -> Metric:
+        """Of directions (q, c)."""
+        root = np.asarray(np.linalg.cholesky(np.eye(len(unknown)) + unknown @ unknown.T))
+        return cls(unknown, root, float(np.log(np.diag(root)).sum()))
+
+    def products(self, rows: FloatArray) -> FloatArray:
+        """(n, n) of rows (n, c), with C⁻¹ between them."""
+        own = rows @ rows.T
+        if len(self.unknown):
+            across = _solved_lower(self.root, self.unknown @ rows.T)
+            own -= across.T @ across
+        return np.asarray(own)
+
+
+@dataclass(frozen=True, eq=False)
+class Slope:
+    """The ``cost`` of ``spots`` (k, 4), its ``gradient`` (4k,) downhill, and how it bends,
+    ``normal`` (4k, 4k)."""
+
+    spots: FloatArray
+    normal: FloatArray
+    gradient: FloatArray
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """Where so many ``steps`` have led; ``settled``: there is nothing to gain."""
+
+    spots: FloatArray
+    steps: int
+    settled: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """What is left of rows beside directions: C⁻¹ less what that keeps of the span of free ones, of
+    which any amount may be there. C = 1 + DᵀD of unknown directions D.
+
+    ``both`` (q + p, c) are unknown and free ones, each scaled to length 1 in C; ``root`` is the
+    lower one of their products.
+    """
+
+    both: FloatArray
+    root: FloatArray
+
+    @classmethod
+    def of(cls, unknown: FloatArray, free: FloatArray) -> _Beside:
+        both, q = np.vstack([unknown, free]), len(unknown)
+        square = both @ both.T
+        square[range(q), range(q)] += 1.0
+        root, scale = _even_root(square)
+        return cls(scale[:, None] * both, root)
+
+    def projected(self, rows: FloatArray) -> FloatArray:
+        """(m, c) of rows (m, c)."""
+        if not len(self.both):
+            return rows
+        taken = _solved_lower(self.root, self.both @ rows.T)
+        back = solve_triangular(self.root, taken, lower=True, trans=1, check_finite=False)
+        return np.asarray(rows - back.T @ self.both)
+
+    def taken(self, rows: FloatArray) -> FloatArray:
+        """(m,) of the squares of rows (m, n), of which the first n columns are given."""
+        if not len(self.both) or not len(rows):
+            return np.zeros(len(rows))
+        taken = _solved_lower(self.root, self.both[:, : rows.shape[1]] @ rows.T)
+        return np.asarray(np.einsum("qm,qm->m", taken, taken))
+
+
+def _even_root(square: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n, n) lower root of a matrix scaled to a diagonal of 1 and a ridge, and (n,) the scale."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(square), 1e-300))
+    even = square * scale[:, None] * scale
+    even[np.diag_indices_from(even)] += RIDGE
+    return np.asarray(np.linalg.cholesky(even)), scale
 
 
 def _solved_lower(root: FloatArray, columns: FloatArray) -> FloatArray:
+    if not len(root):
+        return np.zeros_like(columns)
     return np.asarray(solve_triangular(root, columns, lower=True, check_finite=False))
 
 

@@ -8,7 +8,6 @@ other is left to the exact model.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -16,7 +15,7 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.touch.fit.spot import FILLING, LOG_RADIUS, N_PARAMETERS, X, Y, depth_of
+from tomoskin.touch.fit.spot import FILLING, LOG_RADIUS, X, Y, depth_of
 
 PADDING = 2
 """Grid points beyond the sheet on each side: splines need one, the filter another."""
@@ -28,29 +27,22 @@ N_DIRECTIONS = 2
 """Of each spot: of a stretched sheet's direction, and of its shape; see :class:`Part`."""
 
 
-def spline(t: float) -> FloatArray:
-    """(2, 4) cubic B-splines at ``t`` after the second of four points, and their slopes."""
+def spline(t: FloatArray) -> FloatArray:
+    """(2, …, 4) cubic B-splines at ``t`` (…) after the second of four points, and their slopes."""
     u = 1 - t
-    return np.array([
-        [u**3 / 6, (3 * t**3 - 6 * t**2 + 4) / 6, (3 * u**3 - 6 * u**2 + 4) / 6, t**3 / 6],
-        [-(u**2) / 2, (3 * t**2 - 4 * t) / 2, (4 * u - 3 * u**2) / 2, t**2 / 2],
-    ])  # fmt: skip
+    inner = [(3 * v**3 - 6 * v**2 + 4) / 6 for v in (t, u)]
+    weights = [u**3 / 6, *inner, t**3 / 6]
+    slopes = [-(u**2) / 2, (3 * t**2 - 4 * t) / 2, (4 * u - 3 * u**2) / 2, t**2 / 2]
+    return np.stack([np.stack(each, axis=-1) for each in (weights, slopes)])
 
 
-def between(nodes: FloatArray, t: float) -> FloatArray:
-    """(2, n) weights at ``t`` of the polynomial through ``nodes`` (n,), and their slopes."""
-    powers = t ** np.arange(len(nodes))
-    slopes = np.append(0.0, np.arange(1, len(nodes)) * powers[:-1])
+def between(nodes: FloatArray, t: FloatArray) -> FloatArray:
+    """(2, k, n) weights at ``t`` (k,) of a polynomial through ``nodes`` (n,), and their slopes."""
+    order = np.arange(len(nodes))
+    powers = t[:, None] ** order
+    slopes = np.zeros_like(powers)
+    slopes[:, 1:] = order[1:] * powers[:, :-1]
     return np.asarray(np.stack([powers, slopes]) @ np.linalg.inv(np.vander(nodes, increasing=True)))
-
-
-@dataclass(frozen=True, eq=False)
-class Along:
-    """Points (4,) of one axis, their weights (4,), and the slopes of these (4,), 1/m."""
-
-    points: IntArray
-    weight: FloatArray
-    slope: FloatArray
 
 
 @dataclass(frozen=True)
@@ -68,13 +60,6 @@ class PositionGrid:
         count = np.ceil((high - low) / step).astype(int) + 1 + 2 * PADDING
         x, y = (low + high - (count - 1) * step) / 2
         return cls((float(x), float(y)), step, (int(count[0]), int(count[1])))
-
-    def at(self, axis: int, place: float) -> Along:
-        """The four points of an ``axis`` that make a spline at a ``place`` m."""
-        far = (place - self.origin[axis]) / self.step
-        first = int(np.clip(math.floor(far), 1, self.shape[axis] - 3))
-        weight, slope = spline(far - first)
-        return Along(first - 1 + np.arange(4), weight, slope / self.step)
 
     @property
     def points(self) -> FloatArray:
@@ -116,48 +101,67 @@ class ResponseTable:
 
         What it changes, the derivatives of that by the spot's columns, and its directions.
         """
-        shape = len(spots), 1 + N_PARAMETERS + N_DIRECTIONS, len(self.basis)
-        return np.array([self._expanded(spot) for spot in spots]).reshape(shape)
+        points, weights = self._near(spots)
+        near = self.values[points].reshape(*points.shape, self.values[0].size)
+        shape = len(spots), 4, self.values.shape[1], len(self.basis)
+        return self._of_depth(spots, (weights @ near).reshape(shape))
 
-    def _expanded(self, spot: FloatArray) -> FloatArray:
-        first, (weight, slope) = self._between(spot[LOG_RADIUS])
-        rows, parts = [], []
-        for number in range(len(weight)):
-            points, here, across = self._at(first + number, spot)
-            rows.append(points)
-            level = [weight[number] * here, *(weight[number] * across), slope[number] * here]
-            parts.append(np.stack(level))
-        points, weights = np.concatenate(rows), np.concatenate(parts, axis=1)
-        near = self.values[points].reshape(len(points), -1)
-        return self._of_depth(spot, (weights @ near).reshape(4, -1, len(self.basis)))
+    def _near(self, spots: FloatArray) -> tuple[IntArray, FloatArray]:
+        """(k, 64) points round each spot, and (k, 4, 64) weights: of values there, and of their
+        slopes by x, y and log radius."""
+        first, (radius, wider) = self._between(spots[:, LOG_RADIUS])
+        origin, step, shape, starts = (part[first[:, None] + np.arange(NEAR)] for part in self._all)
+        far = (spots[:, None, [X, Y]] - origin) / step[..., None]
+        corner = np.clip(np.floor(far), 1, shape - 3)
+        flat, steep = spline(far - corner)  # (k, NEAR, 2, 4)
+        steep = steep / step[..., None, None]
+        number = corner.astype(np.int64)[..., None] - 1 + np.arange(4)
+        across = number[:, :, 0, :, None] * shape[..., 1, None, None] + number[:, :, 1, None]
+        sides = [(radius, flat, flat), (radius, steep, flat), (radius, flat, steep)]
+        weights = [
+            level[..., None, None] * x[:, :, 0, :, None] * y[:, :, 1, None]
+            for level, x, y in (*sides, (wider, flat, flat))
+        ]
+        k = len(spots)
+        points = (starts[..., None, None] + across).reshape(k, NEAR * 16)
+        return points, np.stack(weights, axis=1).reshape(k, 4, NEAR * 16)
 
-    def _at(self, number: int, spot: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
-        """(16,) points of one grid, their weights (16,), and the slopes of these (2, 16)."""
-        grid = self.grids[number]
-        x, y = (grid.at(axis, spot[axis]) for axis in (X, Y))
-        points = self._starts[number] + x.points[:, None] * grid.shape[1] + y.points
-        across = np.stack([np.outer(x.slope, y.weight), np.outer(x.weight, y.slope)])
-        return points.ravel(), np.outer(x.weight, y.weight).ravel(), across.reshape(2, -1)
-
-    def _of_depth(self, spot: FloatArray, mixed: FloatArray) -> FloatArray:
+    def _of_depth(self, spots: FloatArray, mixed: FloatArray) -> FloatArray:
         """:meth:`expanded` of values, and their slopes by x, y and log radius, at the nodes."""
-        n, depth = len(self.nodes), float(depth_of(spot))
-        s = math.expm1(depth / 4)
+        n, depth = len(self.nodes), depth_of(spots)
+        s = np.expm1(depth / 4)
         weight, slope = between(self.nodes, s)  # of values that are divided by s
-        flat = s * weight @ mixed[:, :n]
-        deeper = (weight + s * slope) * (s + 1) / 4 @ mixed[0, :n]
-        more = deeper / (FILLING * math.exp(2 * spot[LOG_RADIUS]))
-        flat[3] -= 2 * depth * deeper
-        return np.concatenate([flat, more[None], depth * mixed[0, n:]])
+        flat = np.einsum("kn,kmnr->kmr", s[:, None] * weight, mixed[:, :, :n])
+        steep = (weight + s[:, None] * slope) * ((s + 1) / 4)[:, None]
+        deeper = np.einsum("kn,knr->kr", steep, mixed[:, 0, :n])
+        more = deeper / (FILLING * np.exp(2 * spots[:, LOG_RADIUS]))[:, None]
+        flat[:, 3] -= 2 * depth[:, None] * deeper
+        directions = depth[:, None, None] * mixed[:, 0, n:]
+        return np.concatenate([flat, more[:, None], directions], axis=1)
 
-    def _between(self, log_radius: float) -> tuple[int, FloatArray]:
-        """The first of four radii, and (2, 4): their weights, and the slopes of these."""
+    def _between(self, log_radius: FloatArray) -> tuple[IntArray, FloatArray]:
+        """(k,) the first of four radii, and (2, k, 4): their weights, and the slopes of these."""
         step = self.log_radii[1] - self.log_radii[0]
         place = (log_radius - self.log_radii[0]) / step
-        first = int(np.clip(math.floor(place) - 1, 0, len(self.log_radii) - NEAR))
+        first = np.clip(np.floor(place) - 1, 0, len(self.log_radii) - NEAR)
         weights = between(np.arange(float(NEAR)), place - first)
-        return first, weights / np.array([[1.0], [step]])
+        weights[1] /= step
+        return first.astype(np.int64), weights
 
     @cached_property
-    def _starts(self) -> IntArray:
-        return np.cumsum([0, *(nx * ny for nx, ny in (grid.shape for grid in self.grids))])
+    def typical(self) -> FloatArray:
+        """(rank, rank) V whose rows' squares are the mean ones of spots of all depths."""
+        n = len(self.nodes)
+        strong = (self.values[:, :n] * self.nodes[:, None]).reshape(-1, len(self.basis))
+        square, vectors = np.linalg.eigh(strong.T @ strong / len(strong))
+        return np.asarray(vectors * np.sqrt(np.maximum(square, 0.0)))
+
+    @cached_property
+    def _all(self) -> tuple[FloatArray, FloatArray, IntArray, IntArray]:
+        """Of all grids: origins (n, 2) m, steps (n,) m, shapes (n, 2), numbers (n,) of the first
+        points."""
+        grids = self.grids
+        shape = np.array([grid.shape for grid in grids])
+        starts = np.cumsum(shape.prod(axis=1)) - shape.prod(axis=1)
+        origin, step = np.array([g.origin for g in grids]), np.array([g.step for g in grids])
+        return origin, step, shape, starts

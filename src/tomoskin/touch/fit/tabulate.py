@@ -34,7 +34,7 @@ STEP = 0.5
 LOG_STEP = 0.35
 """Between radii, in their logarithm."""
 
-NEGLIGIBLE, SAMPLED = 1e-6, 3000
+NEGLIGIBLE, SAMPLED = 3e-5, 3000
 """Part of the largest change below which a direction of the data counts as none, by so many."""
 
 FAINT = -0.3

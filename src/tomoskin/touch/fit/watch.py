@@ -79,8 +79,8 @@ class FrameWatch:
         """
         if self._sign == "both" or self.wrong(self._before).any():
             return "both"
-        data = problem.data
-        if len(self._before) or data @ data < len(data) + self._least**2:
+        rows = len(problem.seen.full)
+        if len(self._before) or problem.square < rows + self._least**2:
             return self._sign
         ratio, content = matched.ratios(problem.solver, problem.nothing(), "both")
         best = int(ratio.argmax())

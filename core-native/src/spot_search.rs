@@ -1,0 +1,283 @@
+//! How many touches a frame holds: one more as long as the evidence for it grows.
+//!
+//! As `Search` in tomoskin/touch/fit/search.py, of which it does what needs no exact model.
+
+use std::f64::consts::TAU;
+
+use crate::spot_algebra::{Metric, eliminated};
+use crate::spot_fit::{Fit, Frame};
+use crate::spot_match::{Limits, Signatures, standing, standing_out};
+use crate::spot_table::{PARAMETERS, Spot};
+
+/// How much is tried in a frame; see `Pace` in tomoskin/touch/fit/pace.py.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    /// Steps from the touches of the frame before.
+    pub warm: usize,
+    /// Steps from each start.
+    pub glance: usize,
+    /// Further steps from the best ones.
+    pub cold: usize,
+    /// How many are gone on with.
+    pub finalists: usize,
+    /// New touches that are tried.
+    pub tries: usize,
+    /// Touches at most.
+    pub most: usize,
+    /// Whether a frame that changes is looked at from nothing too.
+    pub restart: bool,
+}
+
+/// What counts as a touch.
+#[derive(Clone, Copy, Debug)]
+pub struct Rules {
+    /// Likelihood ratio, in deviations, at which a touch begins.
+    pub least: f64,
+    /// Part of that at which it stays.
+    pub held: f64,
+    /// Part of that from which a further one is tried.
+    pub look: f64,
+    /// Times the ratio at which one begins from which no frame is explained better without it.
+    pub sure: f64,
+    /// Logarithm of the odds against a touch's beginning in a frame.
+    pub rare: f64,
+    /// Part of what touches change that a wrong profile may leave.
+    pub misshapen: f64,
+    /// Logarithm of the volume of a spot's prior.
+    pub volume: f64,
+}
+
+/// A fit, and whether it was made without what the table lacks.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// See there.
+    pub fit: Fit,
+    /// Without the frame's offset.
+    pub bare: bool,
+    /// Likelihood ratios and contents of candidates beside it, where these have been looked at.
+    pub others: Option<[Vec<f64>; 2]>,
+}
+
+/// A search in one frame.
+#[derive(Debug)]
+pub struct Search<'a> {
+    /// The frame, and the same without its offset.
+    pub frames: [Frame<'a>; 2],
+    /// Of the directions that residual responses leave.
+    pub left: &'a Metric,
+    /// Spots of content 1.
+    pub candidates: &'a [Spot],
+    /// What they show.
+    pub signatures: Signatures<'a>,
+    /// What counts of candidates.
+    pub limits: Limits,
+    /// See there.
+    pub pace: Pace,
+    /// See there.
+    pub rules: Rules,
+}
+
+impl Search<'_> {
+    /// Touches of the frame, from those of the last one; `None` where nothing can be compared.
+    pub fn found(&self, before: &[Spot]) -> Option<Found> {
+        let kept = self.pruned(self.started(before)?)?;
+        let lost = match kept.fit.spots.len() {
+            0 => 0,
+            k => before.len() - k,
+        };
+        let tries = self.pace.tries as isize - lost as isize;
+        let (mut found, tried, changed) = self.more(kept, tries)?;
+        if tries > tried && tried == 0 {
+            found = self.fewer(found)?;
+        }
+        let astray = if self.pace.restart {
+            found.fit.spots.len() != before.len() || !found.fit.settled
+        } else {
+            tried > 0 && !changed
+        };
+        if !before.is_empty() && astray {
+            let (fresh, ..) = self.more(self.nothing()?, self.pace.tries as isize)?;
+            if self.evidence(&fresh.fit) >= self.evidence(&found.fit) {
+                found = fresh;
+            }
+        }
+        Some(found)
+    }
+
+    fn nothing(&self) -> Option<Found> {
+        self.refined(&[], true, 0)
+    }
+
+    fn refined(&self, spots: &[Spot], bare: bool, steps: usize) -> Option<Found> {
+        let fit = self.frames[usize::from(bare)].settled(spots, steps)?;
+        Some(Found {
+            fit,
+            bare,
+            others: None,
+        })
+    }
+
+    fn started(&self, before: &[Spot]) -> Option<Found> {
+        if before.is_empty() {
+            return self.nothing();
+        }
+        let spots = &before[..before.len().min(self.pace.most)];
+        self.refined(spots, false, self.pace.warm)
+    }
+
+    /// Without the spots that have faded.
+    fn pruned(&self, mut found: Found) -> Option<Found> {
+        while !found.fit.spots.is_empty() {
+            let (weakest, ratio) = self.weakest(&found.fit)?;
+            if ratio >= self.rules.held * self.rules.least {
+                break;
+            }
+            found = self.started(&without(&found.fit.spots, weakest))?;
+        }
+        Some(found)
+    }
+
+    /// Without the weakest of several spots, where that explains the frame as well.
+    fn fewer(&self, found: Found) -> Option<Found> {
+        if found.fit.spots.len() < 2 {
+            return Some(found);
+        }
+        let (weakest, ratio) = self.weakest(&found.fit)?;
+        let enough = if found.fit.settled {
+            1.0
+        } else {
+            self.rules.sure
+        };
+        if ratio >= enough * self.rules.least {
+            return Some(found);
+        }
+        let fewer = self.started(&without(&found.fit.spots, weakest))?;
+        let better = self.evidence(&fewer.fit) > self.evidence(&found.fit);
+        Some(if better { fewer } else { found })
+    }
+
+    /// With further spots, while they are worth it; how many were tried, and whether one was.
+    fn more(&self, mut found: Found, tries: isize) -> Option<(Found, isize, bool)> {
+        let room = self.pace.most as isize - found.fit.spots.len() as isize;
+        let mut changed = false;
+        for tried in 0..tries.min(room) {
+            let fit = &found.fit;
+            let parts: [&[f64]; 3] = [
+                &fit.metric.unknown.values,
+                &fit.jacobian.values,
+                &fit.residual,
+            ];
+            let [ratios, contents] = standing_out(self.signatures, parts, self.limits)?;
+            let (best, ratio) = largest(&ratios)?;
+            let content = contents[best];
+            let held = self.rules.held;
+            let part = if fit.spots.is_empty() {
+                held
+            } else {
+                self.rules.look
+            };
+            let few = ratio < self.threshold(fit, part);
+            found.others = Some([ratios, contents]);
+            if few {
+                return Some((found, tried, changed));
+            }
+            let fit = &found.fit;
+            let mut fresh = self.candidates[best];
+            fresh[3] = content;
+            let more = self.best(&starts(&fit.spots, fresh), found.bare)?;
+            let worth = self.weakest(&more.fit)?.1 >= self.threshold(fit, 1.0);
+            let gain = self.evidence(&more.fit) - self.evidence(fit);
+            if !worth || gain <= self.rules.rare {
+                return Some((found, tried + 1, changed));
+            }
+            (found, changed) = (more, true);
+        }
+        Some((found, tries, changed))
+    }
+
+    /// The most evident of those that come out best after a glance.
+    fn best(&self, starts: &[Vec<Spot>], bare: bool) -> Option<Found> {
+        let glance = |start: &Vec<Spot>| self.refined(start, bare, self.pace.glance);
+        let mut fits: Vec<Found> = starts.iter().map(glance).collect::<Option<_>>()?;
+        fits.sort_by(|one, other| one.fit.cost.total_cmp(&other.fit.cost));
+        fits.truncate(self.pace.finalists);
+        let mut best: Option<(f64, Found)> = None;
+        for mut found in fits {
+            if !found.fit.settled {
+                found = self.refined(&found.fit.spots, bare, self.pace.cold)?;
+            }
+            let evidence = self.evidence(&found.fit);
+            if best.as_ref().is_none_or(|(most, _)| evidence > *most) {
+                best = Some((evidence, found));
+            }
+        }
+        best.map(|(_, found)| found)
+    }
+
+    /// Number of the spot that stands out least, and by how many deviations.
+    fn weakest(&self, fit: &Fit) -> Option<(usize, f64)> {
+        let parts = [&fit.jacobian.values[..], &fit.each.values];
+        let squares = standing(self.left, parts, self.limits.ridge)?;
+        let least = squares.iter().copied().enumerate();
+        let (spot, square) = least.min_by(|one, other| one.1.total_cmp(&other.1))?;
+        Some((spot, square.sqrt()))
+    }
+
+    /// What a wrong profile may leave adds to the noise.
+    fn threshold(&self, fit: &Fit, part: f64) -> f64 {
+        let square: f64 = fit.predicted.iter().map(|value| value * value).sum();
+        let misshapen = self.rules.misshapen * square.sqrt();
+        part * self.rules.least * 1.0_f64.hypot(misshapen / self.rules.least)
+    }
+
+    /// Logarithm of the evidence, by Laplace's method.
+    fn evidence(&self, fit: &Fit) -> f64 {
+        let (k, n) = (fit.spots.len(), fit.normal.height);
+        let mut normal = fit.normal.clone();
+        let Some(half_log_det) = eliminated(&mut normal, n) else {
+            return f64::NEG_INFINITY;
+        };
+        let orders: f64 = (1..=k).map(|i| (i as f64).ln()).sum();
+        let volume = n as f64 * TAU.ln() / 2.0 - half_log_det;
+        let prior = orders - k as f64 * self.rules.volume;
+        prior + volume - fit.cost - fit.metric.log_size
+    }
+}
+
+/// The first largest value, and where it is.
+fn largest(values: &[f64]) -> Option<(usize, f64)> {
+    let first = |best: Option<(usize, f64)>, (i, &value): (usize, &f64)| match best {
+        Some((_, most)) if most >= value => best,
+        _ => Some((i, value)),
+    };
+    values.iter().enumerate().fold(None, first)
+}
+
+fn without(spots: &[Spot], number: usize) -> Vec<Spot> {
+    let mut rest = spots.to_vec();
+    rest.remove(number);
+    rest
+}
+
+/// The new spot beside the others; or instead of half of the nearest.
+fn starts(spots: &[Spot], fresh: Spot) -> Vec<Vec<Spot>> {
+    debug_assert_eq!(fresh.len(), PARAMETERS);
+    let mut beside = spots.to_vec();
+    beside.push(fresh);
+    let mut starts = vec![beside];
+    let away = |spot: &Spot| [fresh[0] - spot[0], fresh[1] - spot[1]];
+    let far = |spot: &Spot| away(spot)[0].hypot(away(spot)[1]);
+    let near = (0..spots.len()).min_by(|&i, &j| far(&spots[i]).total_cmp(&far(&spots[j])));
+    if let Some(near) = near {
+        let half = spots[near];
+        let reach = 0.7 * half[2].exp() / far(&half).max(1e-9);
+        let [x, y] = away(&half);
+        let mut instead = without(spots, near);
+        for side in [-reach, reach] {
+            let [u, v, log_radius, content] = half;
+            instead.push([u + side * x, v + side * y, log_radius - 0.3, content / 2.0]);
+        }
+        starts.push(instead);
+    }
+    starts
+}
