@@ -17,6 +17,7 @@
 #include <iostream>
 #include <map>
 #include <queue>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -46,6 +47,8 @@ struct Board {
     std::vector<std::vector<uint32_t>> mark;
     std::vector<float> past;
     uint32_t epoch = 0;
+    std::vector<uint32_t> drilled; /* too near a via of the same job, by its number */
+    uint32_t job_number = 0;
 
     int maps() const { return int(classes.size()) * LAYERS + 1; }
     int map_of(int cls, int layer) const { return cls * LAYERS + layer; }
@@ -178,7 +181,7 @@ struct Search {
             if (f > g + guess(at) + 0.01F) continue;
             if (goal[size_t(node)] == epoch) return back(node, plane);
             float drill = price(b.vias(), at);
-            if (drill >= 0) {
+            if (drill >= 0 && b.drilled[size_t(at)] != b.job_number) {
                 if (ends.empty() && from[size_t(node)] >= 0) { auto way = back(node, plane); way.push_back({layer == 0 ? 2 : 0, at}); return way; }
                 for (int l = 0; l < LAYERS; l++)
                     if (l != layer && price(b.map_of(job.cls, l), at) >= 0) push(l * plane + at, g + VIA_COST * drill, node);
@@ -204,9 +207,20 @@ struct Search {
     }
 };
 
+/* Two holes of one net need a distance too. */
+void drill(Board& b, const std::vector<Cell>& way) {
+    const double far = b.via / 2 + 0.3;
+    for (size_t k = 1; k < way.size(); k++) {
+        if (way[k].layer == way[k - 1].layer) continue;
+        int at = way[k].at;
+        near_rectangle(b, (at % b.nx) * b.pitch, (at / b.nx) * b.pitch, 0, 0, far, [&](int c) { if (c != at) b.drilled[size_t(c)] = b.job_number; });
+    }
+}
+
 /* Join all pads and rails of a job; false where one cannot be reached. */
 bool route(Board& b, Search& search, Job& job, double pressure) {
     std::vector<Cell> tree;
+    b.job_number++;
     for (const Rail& l : b.rails)
         if (l.net == job.net)
             for (double x = l.x1; x <= l.x2; x += b.pitch) tree.push_back({l.layer, b.cell(x, l.y1)});
@@ -229,6 +243,7 @@ bool route(Board& b, Search& search, Job& job, double pressure) {
         left.erase(next);
         if (way.empty()) return false;
         job.paths.push_back(way);
+        drill(b, way);
         tree.insert(tree.end(), way.begin(), way.end());
     }
     return true;
@@ -279,9 +294,11 @@ void read(Board& b, std::istream& in) {
 void write(const Board& b) {
     auto x = [&](int at) { return (at % b.nx) * b.pitch; };
     auto y = [&](int at) { return (at / b.nx) * b.pitch; };
+    std::set<std::pair<int, int>> holes;
     for (const Job& job : b.jobs)
         for (const auto& path : job.paths)
             for (size_t k = 0; k + 1 < path.size();) {
+                if (path[k].layer != path[k + 1].layer && !holes.insert({job.net, path[k].at}).second) { k++; continue; }
                 if (path[k].layer != path[k + 1].layer) { std::printf("via %d %.3f %.3f\n", job.net, x(path[k].at), y(path[k].at)); k++; continue; }
                 size_t end = k + 1;
                 int step = path[end].at - path[k].at;
@@ -301,6 +318,7 @@ int main() {
     b.used.assign(size_t(b.maps()), std::vector<uint8_t>(cells, 0));
     b.mark.assign(size_t(b.maps()), std::vector<uint32_t>(cells, 0));
     b.past.assign(cells, 0);
+    b.drilled.assign(cells, 0);
     Search search(b);
     size_t clashing = 0, lost = 0;
     for (int round = 0; round < ROUNDS; round++) {

@@ -48,15 +48,41 @@ def parse(text: str) -> tuple[dict[str, Part], Nets]:
     for comp in _all(_one(tree, "components"), "comp"):
         sheet = _text(_one(comp, "sheetpath"), "tstamps")
         properties = {_text(p, "name") for p in _all(comp, "property")}
-        fields = {f[1][1]: f[2] if len(f) > 2 else "" for f in _all(_one(comp, "fields"), "field")}
+        fields = {f[1][1]: f[2] for f in _all(_one(comp, "fields"), "field") if len(f) > 2}
         named = {k: v for k, v in fields.items() if k in ("Manufacturer", "MPN", "Mouser")}
-        part = Part(_text(comp, "ref"), _text(comp, "value"), _text(comp, "footprint"), sheet + _text(comp, "tstamps"), named, "exclude_from_bom" not in properties)
+        part = Part(
+            _text(comp, "ref"),
+            _text(comp, "value"),
+            _text(comp, "footprint"),
+            sheet + _text(comp, "tstamps"),
+            named,
+            "exclude_from_bom" not in properties,
+        )
         parts[part.reference] = part
     nets = {
         _text(net, "name"): [(_text(node, "ref"), _text(node, "pin")) for node in _all(net, "node")]
         for net in _all(_one(tree, "nets"), "net")
     }
     return parts, nets
+
+
+def written(parts: dict[str, Part], nets: Nets) -> str:
+    """The same as text: without the date and the paths that KiCad writes into its own."""
+    lines = ['(export (version "E")', "  (components"]
+    for part in parts.values():
+        fields = "".join(f'(field (name "{k}") "{v}")' for k, v in part.fields.items())
+        sheet, _, symbol = part.path.rpartition("/")
+        lines += [
+            f'    (comp (ref "{part.reference}") (value "{part.value}")',
+            f'      (footprint "{part.footprint}") (fields {fields})',
+            *([] if part.in_bom else ['      (property (name "exclude_from_bom"))']),
+            f'      (sheetpath (tstamps "{sheet}/")) (tstamps "{symbol}"))',
+        ]
+    lines += ["  )", "  (nets"]
+    for code, (net, nodes) in enumerate(sorted(nets.items()), start=1):
+        pins = " ".join(f'(node (ref "{reference}") (pin "{pin}"))' for reference, pin in nodes)
+        lines.append(f'    (net (code "{code}") (name "{net}") {pins})')
+    return "\n".join([*lines, "  )", ")"]) + "\n"
 
 
 def _tree(text: str) -> list[Any]:
@@ -69,7 +95,8 @@ def _tree(text: str) -> list[Any]:
             stack[-1].append(done)
         else:
             stack[-1].append(word or quoted)
-    return stack[0][0]
+    tree: list[Any] = stack[0][0]
+    return tree
 
 
 def _all(node: list[Any], name: str) -> list[list[Any]]:

@@ -1,6 +1,6 @@
 """Writes kicad/board-8.kicad_pcb and board-16.kicad_pcb: places, routes, fills. For KiCad's Python.
 
-``python3 hardware/layout/make.py [8|16]``; needs KiCad 9 and a C++ compiler (for router.cpp).
+``python3 hardware/layout.py [8|16]``; needs KiCad 9 and a C++ compiler (for router.cpp).
 """
 
 from __future__ import annotations
@@ -11,16 +11,33 @@ import tempfile
 from pathlib import Path
 
 import pcbnew
+
 from netlist import Part, read
-from placement import HEADERS, HEIGHT, LABELS, MARGIN, RAILS, TILE, outline, places, width
+from placement import (
+    HEADERS,
+    HEIGHT,
+    LABELS,
+    LINK,
+    MARGIN,
+    RAILS,
+    STEP,
+    TEST_POINTS,
+    TILE,
+    outline,
+    places,
+    width,
+)
 
 HERE = Path(__file__).resolve().parent
-KICAD = HERE.parent / "kicad"
+KICAD = HERE / "kicad"
 FOOTPRINTS = Path("/usr/share/kicad/footprints")
 ORIGIN = 50.0
 CLASSES = (0.2, 0.4, 0.6)
 """Widths of tracks, mm: signals; supplies; the current's path."""
-CURRENT, SUPPLY = ("BUS", "/EL", "SENSE", "Net-(Q22-D)", "Net-(Q21-D)"), ("+12V", "+5V", "-5V", "RAW", "CAP")
+CURRENT, SUPPLY = (
+    ("BUS", "/EL", "SENSE", "Net-(Q22-D)", "Net-(Q21-D)"),
+    ("+12V", "+5V", "-5V", "RAW", "CAP"),
+)
 LAYERS = (pcbnew.F_Cu, pcbnew.In2_Cu, pcbnew.B_Cu)
 SILK_SIZE = 0.8
 
@@ -61,6 +78,8 @@ class Layout:
         settings = self.board.GetDesignSettings()
         settings.SetAuxOrigin(at(0, HEIGHT))
         settings.m_MinResolvedSpokes = 1
+        settings.m_HoleClearance = settings.m_HoleToHoleMin = mm(0.25)
+        settings.m_CopperEdgeClearance = mm(0.5)
 
     def net(self, short: str) -> str:
         """Full name of a rail: BUS is /BUS."""
@@ -87,7 +106,7 @@ class Layout:
             _letter(footprint, reference)
 
     def draw(self) -> None:
-        """Outline, rails, labels."""
+        """Outline and labels."""
         corners = outline(self.channels)
         for start, end in zip(corners, corners[1:] + corners[:1], strict=True):
             line = pcbnew.PCB_SHAPE(self.board, pcbnew.SHAPE_T_SEGMENT)
@@ -96,14 +115,15 @@ class Layout:
             line.SetLayer(pcbnew.Edge_Cuts)
             line.SetWidth(mm(0.1))
             self.board.Add(line)
-        for rail in RAILS:
-            self.track(self.net(rail.net), 1, rail.width, self.left, rail.y, self.right, rail.y)
         for text, x, y, size in LABELS:
             self.text(text, x, y, size)
         for number in range(self.channels):
             x = MARGIN + TILE * number
-            self.text(f"E{number + 1}", x + 3.1, 11.4, 1.3)
-            self.text("GND", x + 8.1, 11.4, 0.9)
+            self.text(f"E{number + 1}", x + 8.1, 11.85, 0.8)
+            self.text("GND", x + 3.1, 11.85, 0.8)
+        for reference, name in TEST_POINTS.items():
+            x, y, _ = places(self.channels)[reference]
+            self.text(name, x, y - 2.1, 0.8)
 
     @property
     def left(self) -> float:
@@ -117,8 +137,6 @@ class Layout:
 
     def text(self, words: str, x: float, y: float, size: float) -> None:
         """A label on the front."""
-        if size < 0.1:
-            return
         text = pcbnew.PCB_TEXT(self.board)
         text.SetText(words)
         text.SetLayer(pcbnew.F_SilkS)
@@ -150,7 +168,13 @@ class Layout:
         """Tracks and vias by the router; RuntimeError where it leaves a net."""
         codes = {name: number for number, name in enumerate(sorted(self.nets), start=1)}
         names = {number: name for name, number in codes.items()}
-        done = subprocess.run([router], input="\n".join(self.problem(codes)), capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [router],
+            input="\n".join(self.problem(codes)),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         print(done.stderr[-400:], file=sys.stderr)
         for line in done.stdout.splitlines():
             kind, net, *rest = line.split()
@@ -158,14 +182,35 @@ class Layout:
                 self.via(names[int(net)], *map(float, rest))
             else:
                 self.track(names[int(net)], int(rest[0]), *map(float, rest[1:]))
+        self.rails()
         if done.returncode:
             print(f"board-{self.channels}: nets are left unrouted:\n{done.stderr}", file=sys.stderr)
 
+    def rails(self) -> None:
+        """The rails, from the first to the last place where something joins them."""
+        for rail in RAILS:
+            name = self.net(rail.net)
+            ends = [
+                point
+                for one in self.board.GetTracks()
+                if one.GetNetname() == name
+                and (one.Type() == pcbnew.PCB_VIA_T or one.GetLayer() == LAYERS[1])
+                for point in (one.GetStart(), one.GetEnd())
+            ]
+            joined = [p.x for p in ends if abs(pcbnew.ToMM(p.y) - ORIGIN - rail.y) < 0.01]
+            left, right = (pcbnew.ToMM(x) - ORIGIN for x in (min(joined), max(joined)))
+            left = self.left if rail.net == LINK[0] else left
+            self.track(name, 1, rail.width, left, rail.y, right, rail.y)
+        self.track(LINK[0], 1, 0.8, self.left, LINK[1], self.left, LINK[2])
+
     def problem(self, codes: dict[str, int]) -> list[str]:
         """What the router reads."""
-        lines = [f"board {width(self.channels)} {HEIGHT} 0.1 0.2 0.6 0.5", *(f"class {w}" for w in CLASSES)]
+        lines = [
+            f"board {width(self.channels)} {HEIGHT} 0.1 0.2 0.6 0.5",
+            *(f"class {w}" for w in CLASSES),
+        ]
         if self.channels > 8:
-            lines.append(f"block 7 {width(8) - 0.5} {STEP_BLOCK} {width(self.channels)} {HEIGHT}")
+            lines.append(f"block 7 {width(8) - 0.5} {STEP - 0.5} {width(self.channels)} {HEIGHT}")
         counts: dict[str, int] = {}
         for footprint in self.board.GetFootprints():
             for pad in footprint.Pads():
@@ -173,19 +218,21 @@ class Layout:
                 counts[pad.GetNetname()] = counts.get(pad.GetNetname(), 0) + 1
         for rail in RAILS:
             name = self.net(rail.net)
-            lines.append(f"rail {codes[name]} 1 {rail.width} {self.left} {rail.y} {self.right} {rail.y}")
+            lines.append(
+                f"rail {codes[name]} 1 {rail.width} {self.left} {rail.y} {self.right} {rail.y}"
+            )
+        lines.append(f"rail {codes[LINK[0]]} 1 0.8 {self.left} {LINK[1]} {self.left} {LINK[2]}")
         for name, count in counts.items():
             if name and name != "GND" and count > 1:
                 lines.append(f"net {codes[name]} {class_of(name)}")
         return [*lines, f"ground {codes['GND']} 1"]
 
     def pour(self) -> None:
-        """Ground on all layers; copper under the tab of the source's transistor."""
+        """Pours, not filled yet: ground on all layers; copper under the source's transistor."""
         whole = [(x, y) for x, y in outline(self.channels)]
         for layer in (pcbnew.F_Cu, pcbnew.In1_Cu, pcbnew.In2_Cu, pcbnew.B_Cu):
             self.zone("GND", layer, whole, 0)
         self.zone(self.net("BUS"), pcbnew.F_Cu, [(1, 57), (12.2, 57), (12.2, 67), (1, 67)], 1)
-        pcbnew.ZONE_FILLER(self.board).Fill(self.board.Zones())
 
     def zone(self, net: str, layer: int, corners: list[tuple[float, float]], priority: int) -> None:
         """A pour of copper."""
@@ -204,9 +251,6 @@ class Layout:
         self.board.Add(zone)
 
 
-STEP_BLOCK = 61.5
-
-
 def _load(part: Part) -> pcbnew.FOOTPRINT:
     """The footprint of a part, with what the schematic says of it."""
     library, name = part.footprint.split(":")
@@ -223,7 +267,11 @@ def _load(part: Part) -> pcbnew.FOOTPRINT:
         else:
             footprint.SetField(field, text)
     if not part.in_bom:
-        footprint.SetAttributes(footprint.GetAttributes() | pcbnew.FP_EXCLUDE_FROM_BOM | pcbnew.FP_EXCLUDE_FROM_POS_FILES)
+        footprint.SetAttributes(
+            footprint.GetAttributes()
+            | pcbnew.FP_EXCLUDE_FROM_BOM
+            | pcbnew.FP_EXCLUDE_FROM_POS_FILES
+        )
     return footprint
 
 
@@ -233,8 +281,13 @@ def _turn_header(footprint: pcbnew.FOOTPRINT, pins: int) -> None:
     way = (0, -1) if pins == 36 else (1, 0)
     for turn in (0, 90, 180, 270):
         footprint.SetOrientationDegrees(turn)
-        first, third = (footprint.FindPadByNumber(str(n)).GetPosition() for n in (1, 3 if pins == 36 else 2))
-        if (round(pcbnew.ToMM(third.x - first.x) / 2.54), round(pcbnew.ToMM(third.y - first.y) / 2.54)) == way:
+        first, third = (
+            footprint.FindPadByNumber(str(n)).GetPosition() for n in (1, 3 if pins == 36 else 2)
+        )
+        if (
+            round(pcbnew.ToMM(third.x - first.x) / 2.54),
+            round(pcbnew.ToMM(third.y - first.y) / 2.54),
+        ) == way:
             break
     if pins == 36:
         second = footprint.FindPadByNumber("2").GetPosition()
@@ -243,7 +296,7 @@ def _turn_header(footprint: pcbnew.FOOTPRINT, pins: int) -> None:
 
 
 def _letter(footprint: pcbnew.FOOTPRINT, reference: str) -> None:
-    """References of what a person looks for on the silk screen, the others' on the assembly drawing."""
+    """References of the larger chips on the silk screen, the others' on the assembly drawing."""
     text = footprint.Reference()
     text.SetTextSize(pcbnew.VECTOR2I(mm(SILK_SIZE), mm(SILK_SIZE)))
     text.SetTextThickness(mm(0.12))
@@ -251,8 +304,12 @@ def _letter(footprint: pcbnew.FOOTPRINT, reference: str) -> None:
     if reference.startswith("TP"):
         text.SetVisible(False)
         return
-    text.SetLayer(pcbnew.B_Fab if footprint.IsFlipped() else pcbnew.F_Fab)
+    inside = footprint.GetFPIDAsString().startswith("Package_SO:")
     text.SetPosition(footprint.GetPosition())
+    if inside:
+        text.SetTextAngleDegrees(0 if footprint.GetOrientationDegrees() else 90)
+        return
+    text.SetLayer(pcbnew.B_Fab if footprint.IsFlipped() else pcbnew.F_Fab)
     for item in footprint.GraphicalItems():
         if isinstance(item, pcbnew.PCB_TEXT) and "REFERENCE" in item.GetText():
             item.SetVisible(False)
@@ -266,16 +323,28 @@ def _pad_line(pad: pcbnew.PAD, codes: dict[str, int]) -> str:
     x, y = (pcbnew.ToMM(v) - ORIGIN for v in (box.GetCenter().x, box.GetCenter().y))
     w, h = pcbnew.ToMM(box.GetWidth()), pcbnew.ToMM(box.GetHeight())
     if not pad.GetNumber() or pad.GetAttribute() == pcbnew.PAD_ATTRIB_NPTH:
-        w, h = max(w, pcbnew.ToMM(pad.GetDrillSizeX()) + 0.2), max(h, pcbnew.ToMM(pad.GetDrillSizeY()) + 0.2)
+        w, h = (
+            max(w, pcbnew.ToMM(pad.GetDrillSizeX()) + 0.2),
+            max(h, pcbnew.ToMM(pad.GetDrillSizeY()) + 0.2),
+        )
     code = codes.get(pad.GetNetname(), -1)
     return f"pad {code} {7 if hole else layers} {x:.4f} {y:.4f} {w:.4f} {h:.4f} {int(hole)}"
+
+
+def fill(file: Path) -> None:
+    """Fill the pours of a saved board: only one that was read keeps them off bare holes."""
+    board = pcbnew.LoadBoard(str(file))
+    pcbnew.ZONE_FILLER(board).Fill(board.Zones())
+    pcbnew.SaveBoard(str(file), board)
 
 
 def main() -> None:
     """Make the boards that are named, or both."""
     with tempfile.TemporaryDirectory() as folder:
         router = f"{folder}/router"
-        subprocess.run(["c++", "-O2", "-std=c++17", str(HERE / "router.cpp"), "-o", router], check=True)
+        subprocess.run(
+            ["c++", "-O2", "-std=c++17", str(HERE / "router.cpp"), "-o", router], check=True
+        )
         for channels in map(int, sys.argv[1:] or ("8", "16")):
             layout = Layout(channels)
             layout.place()
@@ -284,6 +353,7 @@ def main() -> None:
                 layout.route(router)
             layout.pour()
             pcbnew.SaveBoard(str(layout.file), layout.board)
+            fill(layout.file)
 
 
 if __name__ == "__main__":
