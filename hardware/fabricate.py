@@ -85,27 +85,7 @@ def make(channels: int) -> list[Path]:
     (ROOT / f"{name}.net").write_text(written(parts, nets), encoding="utf-8")
     (ROOT / f"{name}.csv").write_text(bill(parts), encoding="utf-8")
     kicad("sch", "export", "pdf", "--pages", PAGES, "--output", ROOT / f"{name}.pdf", schematic)
-    pictures = []
-    for side in ("top", "bottom"):
-        pictures.append(PICTURES / f"{name}-{side}.png")
-        size = (
-            "--width",
-            1000 if channels == 8 else 1500,
-            "--height",
-            1000 if channels == 8 else 900,
-        )
-        kicad(
-            "pcb",
-            "render",
-            "--side",
-            side,
-            *size,
-            "--background",
-            "opaque",
-            "--output",
-            pictures[-1],
-            board,
-        )
+    pictures = [_picture(board, side, channels) for side in ("top", "bottom")]
     STEP.mkdir(parents=True, exist_ok=True)
     kicad(
         "pcb",
@@ -120,6 +100,14 @@ def make(channels: int) -> list[Path]:
     packed = ROOT / f"{name}.zip"
     _pack(packed, board, ROOT / f"{name}.csv")
     return [ROOT / f"{name}{end}" for end in (".net", ".csv", ".pdf", ".zip")] + pictures
+
+
+def _picture(board: Path, side: str, channels: int) -> Path:
+    file = PICTURES / f"{board.stem}-{side}.png"
+    width, height, zoom = (1000, 1000, 1) if channels == 8 else (1500, 900, 1.65)
+    size = ("--width", width, "--height", height, "--zoom", zoom)
+    kicad("pcb", "render", "--side", side, *size, "--background", "opaque", "--output", file, board)
+    return file
 
 
 def _pack(packed: Path, board: Path, bill_file: Path) -> None:
