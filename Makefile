@@ -1,7 +1,7 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: set-up together checks programs style types page-check page-test engine-check help soak live test test-all firmware-test fuzz bench bench-docs docs gallery lint lock native wheel release clean page dev
+.PHONY: set-up together checks programs style types page-check page-test engine-check help soak live test test-all firmware-test fuzz bench bench-docs docs board gallery lint lock native wheel release clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -54,6 +54,9 @@ bench-docs: native page  ## measure the table of all and the forward engine anew
 
 docs: dev $(VENV)/.docs  ## the documentation, in build/docs; a warning is an error
 	@$(PY) -m sphinx --quiet --fail-on-warning --keep-going docs build/docs
+
+board: dev  ## the circuit boards: rules, then netlists, bills, Gerbers, pictures, zip; needs KiCad 9
+	@$(PY) hardware/fabricate.py $(ARGS)
 
 gallery: native  ## run the examples anew into docs/gallery.md; two minutes
 	@$(PY) docs/make_gallery.py

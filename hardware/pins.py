@@ -1,4 +1,4 @@
-"""The table of pins: the firmware's header is made from it, and the board's connector.
+"""The table of pins: the firmware's header is made from it, the schematics are held to it.
 
 ``python hardware/pins.py`` writes ``firmware/avr/pins.h``, ``… --check`` fails when it is stale.
 """
@@ -67,8 +67,8 @@ def header(pins: Pins) -> str:
         for number, pin in enumerate(pins[key])
     ]
     return f"""\
-/* Pins of the ATmega2560 board. Made by hardware/pins.py from hardware/pins.toml, as is the
-   connector of the netlist: change that table, not this file.
+/* Pins of the ATmega2560 board. Made by hardware/pins.py from hardware/pins.toml, to which
+   a test holds the board's schematics: change that table, not this file.
 
    Per channel a p-MOSFET to the current and an n-MOSFET to ground, chosen by CD74HC237 3-to-8
    demultiplexers, one for the sources and one for the sinks of each eight channels. A channel's

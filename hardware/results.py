@@ -87,6 +87,12 @@ def noise(signal: float) -> Figures:
     return {name: value[0] for name, value in said.items()}
 
 
+def shared(step: float = 1 / GAIN) -> Figures:
+    """One amplifier for all channels: settling after its multiplexer, s, and what is read, V."""
+    said = run("shared", step=step, gain=GAIN, bandwidth="200k")
+    return {"settling": said["settled"][0] - 20e-6, "last": said["last"][0]}
+
+
 def measured() -> dict[str, Figures]:
     """The figures of the file, rounded to what means something."""
     rest, step = compliance("mended"), switching("mended")

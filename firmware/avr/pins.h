@@ -1,5 +1,5 @@
-/* Pins of the ATmega2560 board. Made by hardware/pins.py from hardware/pins.toml, as is the
-   connector of the netlist: change that table, not this file.
+/* Pins of the ATmega2560 board. Made by hardware/pins.py from hardware/pins.toml, to which
+   a test holds the board's schematics: change that table, not this file.
 
    Per channel a p-MOSFET to the current and an n-MOSFET to ground, chosen by CD74HC237 3-to-8
    demultiplexers, one for the sources and one for the sinks of each eight channels. A channel's

@@ -111,6 +111,13 @@ def test_one_fault_in_it_too(volts):
     assert said["direct"][0] < 50e-6
 
 
+def test_one_amplifier_for_all_would_settle_anew_for_each_electrode():
+    """The cheaper board that docs/hardware.md rejects."""
+    said = results.shared()
+    assert 50e-6 < said["settling"] < 100e-6
+    assert said["last"] == pytest.approx(2.5 + 1, rel=1e-3)
+
+
 def test_the_twins_figures_are_those_of_the_decks():
     assert results.FILE.read_text(encoding="utf-8") == results.written(results.measured())
 

@@ -1,91 +1,118 @@
-"""The schematic: rule check, connector, netlist and bill of materials that are not stale."""
+"""The schematics of the KiCad projects: pins, rest states, reference, parts to order."""
 
-import csv
+import tomllib
+from collections import Counter
 
 import pytest
 
-import generate
+import bill
+import netlist
 import pins
-from schematic import parts
-from schematic.board import assembly, channel, supplies
-from schematic.circuit import Circuit
+from circuit import ROOT, Circuit
+
+HEADERS = {
+    "J61": {5: "5V", 6: "GND", 7: "GND"},
+    "J62": {n + 1: f"A{n}" for n in range(8)},
+    "J63": {n + 1: f"A{n + 8}" for n in range(8)},
+    "J64": {1: "GND", 2: "GND", 35: "5V", 36: "5V"},
+}
+"""The Arduino Mega 2560's names of the headers' pins."""
+# The double row: D52 and D53 beside pins 3 and 4, down to D22 and D23 beside 33 and 34.
+for _row in range(16):
+    HEADERS["J64"] |= {3 + 2 * _row: f"D{52 - 2 * _row}", 4 + 2 * _row: f"D{53 - 2 * _row}"}
 
 
-@pytest.mark.parametrize("channels", [8, 16])
-def test_the_rule_check_finds_nothing(channels):
-    assert assembly(channels).problems() == []
+@pytest.fixture(scope="module", params=[8, 16])
+def circuit(request):
+    return Circuit.read(request.param)
 
 
-def test_what_is_committed_is_not_stale():
-    assert generate.stale() == []
+def test_the_headers_are_those_of_the_pin_table(circuit):
+    table = pins.signals(pins.read(pins.TABLE.read_text(encoding="utf-8")))
+    on = {
+        HEADERS[reference][int(pin)]: net
+        for (reference, pin), net in circuit.net_of.items()
+        if reference in HEADERS and int(pin) in HEADERS[reference]
+    }
+    for signal, pin in table.items():
+        wanted = "LATCH" if signal == "LATCH_0" else signal
+        assert on[pins.arduino(pin)].rsplit("/", 1)[-1] == wanted
+    assert on["GND"] == "GND"
+    assert on["5V"] == "+5V"
 
 
-def test_the_rule_check_finds_what_is_wrong():
-    circuit = Circuit()
-    supplies(circuit)
-    circuit.add(parts.NFET, "FLOATS GND FLOATS")  # a gate that nothing holds
-    circuit.add(parts.FOLLOWER, "2V5 GND FLOATS NOWHERE +3V")  # a second output, no supply
-    odd = circuit.add(parts.PRECISE, "2V5 GND", "12.25")
-    said = "\n".join(circuit.problems())
-    for problem in (
-        "2V5: two outputs",
-        "FLOATS: a gate that no resistor holds",
-        "NOWHERE: only",
-        "+3V: supplied by nothing",
-        f"{odd}: 12.25 is no stock value",
-    ):
-        assert problem in said
+def test_each_gate_rests_at_a_rail(circuit):
+    held = {frozenset(nets) for nets in circuit.between("R")}
+    for number in range(1, circuit.channels + 1):
+        high, low = (circuit.net_of[f"Q{number}0{n}", "1"] for n in (2, 3))
+        shift = circuit.net_of[f"Q{number}01", "1"]
+        assert {high, "+12V"} in held
+        assert {low, "GND"} in held
+        assert {shift, "GND"} in held
 
 
-@pytest.mark.parametrize("net", ["SHIFT_0", "LOW_0", "HIGH_0"])
-def test_each_gate_of_a_channel_rests_off(net):
-    circuit = Circuit()
-    channel(circuit, 0)
-    held = [
-        r
-        for r, p in circuit.placed.items()
-        if set(p.nets.values()) in ({net, "GND"}, {net, "+12V"})
-    ]
-    assert len(held) == 1
-    del circuit.placed[held[0]]
-    assert f"{net}: a gate that no resistor holds" in circuit.problems()
+def test_every_control_line_has_a_pull_down(circuit):
+    held = {frozenset(nets) for nets in circuit.between("R")}
+    for (reference, pin), net in circuit.net_of.items():
+        name = HEADERS.get(reference, {}).get(int(pin) if pin.isdigit() else 0, "")
+        if name.startswith("D") and not net.startswith("unconnected"):
+            assert {net, "GND"} in held, net
 
 
-def test_every_enable_has_a_pull_down():
-    circuit = assembly(16)
-    for signal in ("SOURCE_ENABLE_0", "SOURCE_ENABLE_1", "SINK_ENABLE_0", "SINK_ENABLE_1"):
-        assert any(
-            placed.part is parts.R and set(placed.nets.values()) == {signal, "GND"}
-            for placed in circuit.placed.values()
+def test_an_amplifier_reads_against_the_electrode_before_the_sink(circuit):
+    inputs = [9, 8, 7, 6, 5, 4, 3, 2, 23, 22, 21, 20, 19, 18, 17, 16]
+    for sink in range(16):
+        wanted = f"/TAP_{(sink - 1) % circuit.channels}" if sink < circuit.channels else "GND"
+        assert circuit.net_of["U41", str(inputs[sink])] == wanted
+
+
+def test_the_dump_closes_at_once_and_opens_late(circuit):
+    """The diode lets the gate of the dump's transistor rise at once: its cathode is at the gate."""
+    assert circuit.net_of["D21", "1"] == circuit.net_of["Q22", "1"]
+    assert circuit.net_of["D21", "2"] == circuit.net_of["U23", "4"]
+
+
+def test_every_channel_is_the_same(circuit):
+    """Parts of channel n are those of channel 1, with the same values and numbers to order."""
+
+    def of(number):
+        named = circuit.parts.values()
+        mine = [p for p in named if p.reference.lstrip("CDJQRU").startswith(str(number))]
+        return Counter(
+            (p.value, p.footprint, p.fields.get("MPN"))
+            for p in mine
+            if len(p.reference.lstrip("CDJQRU")) == len(str(number)) + 2
         )
 
-
-def test_the_connector_is_that_of_the_pin_table():
-    table = pins.signals(pins.read(pins.TABLE.read_text(encoding="utf-8")))
-    mega = next(p for p in assembly(16).placed.values() if p.part.name == "Arduino Mega 2560")
-    for signal, pin in table.items():
-        assert mega.nets[signal] == signal
-        assert mega.part.numbers[signal] == pins.arduino(pin)
+    assert all(of(number) == of(1) for number in range(2, circuit.channels + 1))
+    assert sum(of(1).values()) == 26
 
 
-@pytest.mark.parametrize("channels", [8, 16])
-def test_an_amplifier_reads_against_the_electrode_before_the_sink(channels):
-    mux = next(p for p in assembly(channels).placed.values() if p.part is parts.MUX)
-    for sink in range(channels):
-        assert mux.nets[f"I{sink}"] == f"TAP_{(sink - 1) % channels}"
+def test_what_is_ordered_has_numbers_and_a_price(circuit):
+    groups = bill.grouped(circuit.parts)
+    assert sum(map(len, groups.values())) == sum(part.in_bom for part in circuit.parts.values())
+    table = tomllib.loads(bill.PRICES.read_text(encoding="utf-8"))
+    assert set(groups) <= set(table["part"])
+    one, ten, hundred = (bill.total(circuit.parts, boards) for boards in bill.BOARDS)
+    assert one > ten > hundred > 50
 
 
-@pytest.mark.parametrize(("channels", "least", "most"), [(8, 80, 200), (16, 150, 350)])
-def test_the_bill_adds_up(channels, least, most):
-    text = (generate.ROOT / f"board-{channels}.csv").read_text(encoding="utf-8")
-    *rows, total = csv.DictReader(text.splitlines())
-    assert sum(int(row["number"]) for row in rows) == int(total["number"])
-    assert least < float(total["euros"]) < most
-    assert float(total["euros"]) == pytest.approx(sum(float(r["euros"]) for r in rows), abs=1)
+def test_the_committed_bill_is_that_of_the_netlist(circuit):
+    committed = (ROOT / f"board-{circuit.channels}.csv").read_text(encoding="utf-8")
+    assert committed == bill.bill(circuit.parts)
 
 
-def test_the_netlist_has_each_part_once():
-    circuit = assembly(8)
-    text = circuit.netlist()
-    assert text.count("(comp ") == len(circuit.placed)
-    assert text.count("(") == text.count(")")
+def test_a_part_without_a_number_is_refused(circuit):
+    part = circuit.parts["U101"]
+    broken = circuit.parts | {
+        "U101": netlist.Part(part.reference, part.value, part.footprint, part.path, {}, True)
+    }
+    with pytest.raises(bill.BillError, match=r"U101 \(INA118\): expected a field Manufacturer"):
+        bill.bill(broken)
+
+
+def test_a_netlist_reads_back(circuit):
+    assert netlist.parse(netlist.written(circuit.parts, circuit.nets)) == (
+        circuit.parts,
+        circuit.nets,
+    )

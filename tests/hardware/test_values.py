@@ -5,11 +5,12 @@ import re
 import pytest
 
 import results
-from schematic.board import assembly
+from circuit import Circuit
 from spice import DECKS
 
 TEXT = (DECKS / "circuits.lib").read_text(encoding="utf-8")
-BOARD = assembly(8)
+BOARD = Circuit.read(8)
+GND, TWELVE = ("GND", ""), ("+12V", "")
 
 
 def in_deck(block, element):
@@ -18,42 +19,40 @@ def in_deck(block, element):
     return re.search(rf"(?m)^{element} \S+ \S+ (\S+)$", body)[1]
 
 
-def on_board(*nets):
-    """The value of the resistor or capacitor between these nets."""
-    passive = [part for part in BOARD.placed.values() if part.part.letter in "RC"]
-    found = {part.value for part in passive if sorted(part.nets.values()) == sorted(nets)}
-    assert len(found) == 1, (nets, found)
-    return found.pop()
-
-
 @pytest.mark.parametrize(
-    ("block", "element", "nets"),
+    ("block", "element", "one", "other"),
     [
-        ("CURRENT_mended", "R2", ("SENSE", "BACK")),
-        ("CURRENT_mended", "C2", ("DRIVE", "BACK")),
-        ("CURRENT_mended", "R3", ("DRIVE", "GATE")),
-        ("DUMP_mended", "R2", ("IDLE", "DUMP_GATE")),
-        ("HIGH_mended", "R1", ("+12V", "HIGH_3")),
-        ("HIGH_mended", "R2", ("SOURCE_3", "SHIFT_3")),
-        ("HIGH_mended", "R3", ("SHIFT_3", "GND")),
-        ("LOW", "R2", ("SINK_3", "LOW_3")),
-        ("LOW", "R3", ("LOW_3", "GND")),
-        ("CHAIN", "R1", ("EL_3", "TAP_3")),
-        ("CHAIN", "R2", ("MINUS", "NEG_3")),
-        ("CHAIN", "C1", ("TAP_3", "GND")),
-        ("CHAIN", "R3", ("AMP_3", "FILTER_3")),
-        ("CHAIN", "C3", ("FILTER_3", "GND")),
-        ("CHAIN", "R4", ("FILTER_3", "CLAMP_3")),
-        ("CHAIN", "R5", ("BUFFER_3", "POTENTIAL_3")),
-        ("CHAIN", "C5", ("POTENTIAL_3", "GND")),
+        ("CURRENT_mended", "R2", ("Q21", "3"), ("U22", "4")),
+        ("CURRENT_mended", "C2", ("U22", "1"), ("U22", "4")),
+        ("CURRENT_mended", "R3", ("U22", "1"), ("Q21", "1")),
+        ("DUMP_mended", "R2", ("U23", "4"), ("Q22", "1")),
+        ("HIGH_mended", "R1", TWELVE, ("Q302", "1")),
+        ("HIGH_mended", "R2", ("U81", "13"), ("Q301", "1")),
+        ("HIGH_mended", "R3", ("Q301", "1"), GND),
+        ("LOW", "R2", ("U82", "13"), ("Q303", "1")),
+        ("LOW", "R3", ("Q303", "1"), GND),
+        ("CHAIN", "R1", ("J301", "1"), ("U301", "3")),
+        ("CHAIN", "R2", ("J41", "2"), ("U301", "2")),
+        ("CHAIN", "C1", ("U301", "3"), GND),
+        ("CHAIN", "C2", ("U301", "2"), GND),
+        ("CHAIN", "R3", ("U301", "6"), ("C303", "1")),
+        ("CHAIN", "C3", ("C303", "1"), GND),
+        ("CHAIN", "R4", ("C303", "1"), ("U302", "3")),
+        ("CHAIN", "R5", ("U302", "1"), ("J62", "3")),
+        ("CHAIN", "C5", ("J62", "3"), GND),
     ],
 )
-def test_a_value_is_the_same_in_both(block, element, nets):
-    assert on_board(*nets).split()[0] == in_deck(block, element)
+def test_a_value_is_the_same_in_both(block, element, one, other):
+    assert BOARD.value(one, other).split()[0] == in_deck(block, element)
 
 
 def test_what_sets_the_current():
-    pair = [p.value for p in BOARD.placed.values() if set(p.nets.values()) == {"+12V", "SENSE"}]
+    sense = {"+12V", BOARD.net_of["Q21", "3"]}
+    pair = [
+        p.value
+        for r, p in BOARD.parts.items()
+        if r[0] == "R" and {BOARD.net_of[r, n] for n in "12"} == sense
+    ]
     of_deck = [float(in_deck("CURRENT_mended", name)[1:].split("/")[0]) for name in ("R1", "R4")]
     ohms = [float(value.rstrip("k")) * (1e3 if "k" in value else 1) for value in pair]
     assert ohms == pytest.approx([value / results.AMPERES for value in of_deck])
@@ -63,13 +62,13 @@ def test_what_sets_the_current():
 
 
 def test_what_sets_the_gain():
-    ohms = float(on_board("RA_3", "RB_3").rstrip("k")) * 1e3
+    ohms = float(BOARD.value(("U301", "1"), ("U301", "8")).rstrip("k")) * 1e3
     assert 1 + 50e3 / ohms == pytest.approx(results.GAIN, rel=0.002)
-    assert on_board("BUS", "DUMP") == "22"
+    assert BOARD.value(("Q21", "2"), ("Q22", "3")) == "22"
     decks = [file.read_text(encoding="utf-8") for file in DECKS.glob("*.cir")]
     assert {m for text in decks for m in re.findall(r"rdump=(\d+)", text)} == {"22"}
 
 
-@pytest.mark.parametrize("signal", ["SOURCE_ENABLE_0", "SINK_ENABLE_0", "LATCH_0"])
-def test_a_pull_down_is_that_of_the_deck(signal):
-    assert on_board(signal, "GND") == "10k"
+@pytest.mark.parametrize("pin", ["20", "22", "24"])
+def test_a_pull_down_is_that_of_the_deck(pin):
+    assert BOARD.value(("J64", pin), GND) == "10k"

@@ -1,8 +1,14 @@
-"""The picture of a wired skin: sheet, clips, cable, board, seen from the front."""
+"""The picture of a wired skin: sheet, clips, cable, board, seen from the front.
+
+``python hardware/wiring.py`` writes it.
+"""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
+
+FILE = Path(__file__).resolve().parent.parent / "docs" / "hardware" / "skin.svg"
 
 CX, CY, RIM = 330, 350, 210
 """Of the sheet, in pixels; 200 mm across."""
@@ -149,3 +155,7 @@ def _words() -> list[str]:
 
 def _text(x: float, y: float, words: str, anchor: str = "start", fill: str = "#1d222b") -> str:
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{fill}">{words}</text>'
+
+
+if __name__ == "__main__":
+    FILE.write_text(wiring(), encoding="utf-8")

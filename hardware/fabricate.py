@@ -1,0 +1,217 @@
+"""From the KiCad projects to what one uploads: ``python hardware/fabricate.py``, or ``make board``.
+
+It runs the rule checks, then writes netlists, bills of materials, and for each board a zip
+(Gerbers, drill files, bill, positions), the schematic as PDF, pictures of both sides, and STEP
+(into build/). ``outputs.toml`` holds the hashes of sources and outputs, so that without KiCad a
+test can say whether they belong together. ``--check`` only checks.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+import zipfile
+from pathlib import Path
+
+from bill import bill
+from netlist import Nets, Part, read, written
+
+ROOT = Path(__file__).resolve().parent
+KICAD, MANIFEST = ROOT / "kicad", ROOT / "outputs.toml"
+PICTURES, STEP = ROOT.parent / "docs" / "hardware", ROOT.parent / "build" / "board"
+BOARDS = (8, 16)
+COPPER = "F.Cu,In1.Cu,In2.Cu,B.Cu"
+LAYERS = f"{COPPER},F.Paste,F.Mask,B.Mask,F.Silkscreen,B.Silkscreen,Edge.Cuts"
+PAGES = "1,2,3,4,5,6,7"
+"""Of the schematic, up to the first channel: the others are the same sheet."""
+POSITIONS = ["Designator", "Val", "Package", "Mid X", "Mid Y", "Rotation", "Layer"]
+_EPOCH = (2026, 1, 1, 0, 0, 0)
+
+
+class BoardError(Exception):
+    """KiCad found something wrong, or is not there."""
+
+
+def kicad(*words: object) -> None:
+    """Run kicad-cli; BoardError with what it said when it fails."""
+    program = shutil.which("kicad-cli")
+    if program is None:
+        raise BoardError(
+            "expected kicad-cli of KiCad 9 (Debian 12: suite bookworm-backports), found none"
+        )
+    done = subprocess.run([program, *map(str, words)], capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise BoardError(f"kicad-cli {' '.join(map(str, words[:3]))}: {done.stdout}{done.stderr}")
+
+
+def check(channels: int) -> None:
+    """Electrical and design rules, and whether layout and schematic are one; BoardError else."""
+    with tempfile.TemporaryDirectory() as folder:
+        for kind, file in (("sch erc", "kicad_sch"), ("pcb drc", "kicad_pcb")):
+            report = Path(folder) / "report.txt"
+            options = ["--schematic-parity"] if file == "kicad_pcb" else []
+            board = KICAD / f"board-{channels}.{file}"
+            try:
+                kicad(
+                    *kind.split(),
+                    "--severity-all",
+                    "--exit-code-violations",
+                    *options,
+                    "--output",
+                    report,
+                    board,
+                )
+            except BoardError as error:
+                said = report.read_text(encoding="utf-8") if report.exists() else str(error)
+                raise BoardError(f"{board.name}: {said[:3000]}") from error
+
+
+def listed(channels: int) -> tuple[dict[str, Part], Nets]:
+    """Parts and nets of a schematic."""
+    return read(KICAD / f"board-{channels}.kicad_sch")
+
+
+def make(channels: int) -> list[Path]:
+    """Write all files of a board; their paths, without those in build/."""
+    name = f"board-{channels}"
+    board, schematic = KICAD / f"{name}.kicad_pcb", KICAD / f"{name}.kicad_sch"
+    parts, nets = listed(channels)
+    (ROOT / f"{name}.net").write_text(written(parts, nets), encoding="utf-8")
+    (ROOT / f"{name}.csv").write_text(bill(parts), encoding="utf-8")
+    kicad("sch", "export", "pdf", "--pages", PAGES, "--output", ROOT / f"{name}.pdf", schematic)
+    pictures = [_picture(board, side, channels) for side in ("top", "bottom")]
+    STEP.mkdir(parents=True, exist_ok=True)
+    kicad(
+        "pcb",
+        "export",
+        "step",
+        "--force",
+        "--subst-models",
+        "--output",
+        STEP / f"{name}.step",
+        board,
+    )
+    packed = ROOT / f"{name}.zip"
+    _pack(packed, board, ROOT / f"{name}.csv")
+    return [ROOT / f"{name}{end}" for end in (".net", ".csv", ".pdf", ".zip")] + pictures
+
+
+def _picture(board: Path, side: str, channels: int) -> Path:
+    file = PICTURES / f"{board.stem}-{side}.png"
+    width, height, zoom = (1000, 1000, 1) if channels == 8 else (1500, 900, 1.65)
+    size = ("--width", width, "--height", height, "--zoom", zoom)
+    kicad("pcb", "render", "--side", side, *size, "--background", "opaque", "--output", file, board)
+    return file
+
+
+def _pack(packed: Path, board: Path, bill_file: Path) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        to = Path(folder)
+        kicad("pcb", "export", "gerbers", "--layers", LAYERS, "--output", to, board)
+        kicad(
+            "pcb",
+            "export",
+            "drill",
+            "--excellon-separate-th",
+            "--drill-origin",
+            "absolute",
+            "--output",
+            f"{to}/",
+            board,
+        )
+        raw = to / "raw.csv"
+        kicad(
+            "pcb",
+            "export",
+            "pos",
+            "--format",
+            "csv",
+            "--units",
+            "mm",
+            "--smd-only",
+            "--output",
+            raw,
+            board,
+        )
+        (to / f"{board.stem}-positions.csv").write_text(
+            positions(raw.read_text(encoding="utf-8")), encoding="utf-8"
+        )
+        raw.unlink()
+        shutil.copy(bill_file, to / f"{board.stem}-bom.csv")
+        with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+            for file in sorted(to.iterdir()):
+                archive.writestr(
+                    zipfile.ZipInfo(file.name, _EPOCH), file.read_bytes(), zipfile.ZIP_DEFLATED
+                )
+
+
+def positions(text: str) -> str:
+    """KiCad's table of positions, its columns named as assembly houses name them."""
+    out = io.StringIO()
+    rows = csv.writer(out, lineterminator="\n")
+    rows.writerow(POSITIONS)
+    names = ("Ref", "Val", "Package", "PosX", "PosY", "Rot", "Side")
+    for row in csv.DictReader(text.splitlines()):
+        rows.writerow([row[name] for name in names])
+    return out.getvalue()
+
+
+def sources() -> list[Path]:
+    """What outputs are made of."""
+    ends = (".kicad_sch", ".kicad_pcb")
+    return [*sorted(f for f in KICAD.iterdir() if f.suffix in ends), ROOT / "prices.toml"]
+
+
+def manifest(outputs: list[Path]) -> str:
+    """Hashes of sources and outputs, as TOML."""
+    lines = ["# Made by hardware/fabricate.py: SHA-256 of what outputs are made of, and theirs."]
+    for title, files in (("sources", sources()), ("outputs", outputs)):
+        lines += ["", f"[{title}]"]
+        lines += [
+            f'"{file.relative_to(ROOT.parent).as_posix()}" = "{_hash(file)}"' for file in files
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def stale() -> list[str]:
+    """Files that are not those of the manifest: changed, gone, or new."""
+    table = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))
+    held = table["sources"] | table["outputs"]
+    wrong = {
+        name
+        for name, digest in held.items()
+        if not (ROOT.parent / name).is_file() or _hash(ROOT.parent / name) != digest
+    }
+    return sorted(wrong | ({f.relative_to(ROOT.parent).as_posix() for f in sources()} - set(held)))
+
+
+def _hash(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def main() -> int:
+    """Check, and make all."""
+    outputs: list[Path] = []
+    try:
+        for channels in BOARDS:
+            check(channels)
+            print(f"board-{channels}: electrical and design rules, parity: nothing found")
+            if sys.argv[1:] != ["--check"]:
+                outputs += make(channels)
+    except BoardError as error:
+        print(error, file=sys.stderr)
+        return 1
+    if outputs:
+        MANIFEST.write_text(manifest(outputs), encoding="utf-8")
+        print(*(file.relative_to(ROOT.parent) for file in outputs), sep="\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
