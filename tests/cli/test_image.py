@@ -80,14 +80,14 @@ def test_idle_frames_with_known_noise_give_no_touch(save, image, tmp_path) -> No
 
 
 def test_reference_from_a_file_or_in_the_file(save, image, tmp_path, frames) -> None:
-    """With alpha by hand: the noise, which only the first tells, would choose another one."""
+    """Nearly the same: only the first tells the noise, by which measurements are weighed."""
     image = partial(image, "--alpha", "0.05")
     idle = save("idle.npz", voltages=frames[:3])
     one, two = tmp_path / "one.csv", tmp_path / "two.csv"
     assert image(save("a.npz", voltages=frames[3:]), "--reference", idle, "--touches", one)[0] == 0
     inside = save("b.npz", voltages=frames[3:], reference=frames[:3].mean(axis=0))
     assert image(inside, "--touches", two)[0] == 0
-    np.testing.assert_allclose(places(one)[0], places(two)[0], atol=1e-9)
+    np.testing.assert_allclose(places(one)[0], places(two)[0], atol=1e-3)
 
 
 def test_differences_need_no_reference(save, image, tmp_path, frames) -> None:

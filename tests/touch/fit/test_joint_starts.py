@@ -7,6 +7,7 @@ import pytest
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.joint_starts import JointStarts
+from tomoskin.touch.fit.refine import WhitenedTable
 from touch.fit.scene import noise, whitener
 from touch.fit.test_finder import data, finder, model, press
 
@@ -17,10 +18,9 @@ NOTHING = np.zeros((208, 0))
 
 
 def starts(spots: FloatArray, sign: str = "decrease") -> JointStarts:
-    whiten = whitener()
-    matched = model().candidates.matched(whiten)
-    whitened = whiten(data(spots) + noise(16, 1, 1)[0])
-    return JointStarts.of(matched, whitened, model().prior, sign)
+    seen = WhitenedTable.of(model().solver, whitener(), model().response.times)
+    whitened = seen.matrix[: seen.narrow] @ (data(spots) + noise(16, 1, 1)[0])
+    return JointStarts.of(model().candidates.matched(seen), whitened, model().prior, sign)
 
 
 def missed(found: FloatArray, spots: FloatArray) -> float:
