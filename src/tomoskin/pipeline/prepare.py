@@ -49,8 +49,7 @@ class Prepared:
     light_touch
         Chooses alpha again when the noise has been measured; None where it was set by hand.
     spots
-        What touches are fitted with; None where they are found in the image, and no bends are read
-        beside them.
+        What touches are fitted with; None where nothing is fitted.
     calibrations
         What was learnt from examples, by the name of its kind.
     """
@@ -100,25 +99,19 @@ class Prepared:
         return self._with({k: c for k, c in self.calibrations.items() if k != kind.name})
 
     def _with(self, calibrations: Mapping[str, Calibration[Any]]) -> Prepared:
-        spots = self.spots
-        if spots is None and _fits(self.skin, calibrations):
-            spots = SpotModel.of(self.skin, self.model)
+        spots = None
+        if _fits(self.skin, calibrations):
+            spots = self.spots or SpotModel.of(self.skin, self.model)
         return replace(self, calibrations=calibrations, spots=spots)
 
     @property
     def fits_touches(self) -> bool:
         """Whether touches are fitted to the data, rather than found in the image or located."""
-        located = any(c.kind.locates for c in self.calibrations.values())
-        return self.skin.touch.method == "fit" and not located
-
-    @property
-    def needs_sheet(self) -> bool:
-        """Whether anything is fitted on the sheet that a reference shows."""
-        return self.fits_touches or any(c.kind.fits for c in self.calibrations.values())
+        return _fits_touches(self.skin, self.calibrations)
 
     def warm_up(self) -> None:
         """Do what would hold up the first frames: it takes seconds the first time for a skin."""
-        if self.spots is not None and self.needs_sheet:
+        if self.spots is not None:
             reach("touches")
             self.spots.warm_up()
 
@@ -189,12 +182,6 @@ class Prepared:
     def predicted_noise(self) -> FloatArray:
         """(n_meas,) standard deviation of difference data that the read-out predicts."""
         return _predicted(self.problem, self.readout)
-
-    def positions(self, image: FloatArray) -> FloatArray:
-        """(k, 2) m, where the touches of an image (n_cells,) are."""
-        shown = Image(image, self.operator.unit, self.mesh.identity)
-        centres = [(reading.x, reading.y) for reading in self.segmenter(shown)]
-        return np.array(centres).reshape(-1, 2)
 
 
 def prepare(skin: Skin, previous: Prepared | None = None) -> Prepared:
@@ -298,8 +285,12 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
 
 
 def _fits(skin: Skin, calibrations: Mapping[str, Calibration[Any]]) -> bool:
-    """Whether touches are fitted to the data: by the skin's method, or for a calibration."""
-    return skin.touch.method == "fit" or any(c.kind.fits for c in calibrations.values())
+    """Whether anything is fitted to the data: touches, or what a calibration needs."""
+    return _fits_touches(skin, calibrations) or any(c.kind.fits for c in calibrations.values())
+
+
+def _fits_touches(skin: Skin, calibrations: Mapping[str, Calibration[Any]]) -> bool:
+    return skin.touch.method == "fit" and not any(c.kind.locates for c in calibrations.values())
 
 
 def _same_difference(one: Skin, other: Skin) -> bool:

@@ -82,9 +82,9 @@ def _tune_image(prepared: Prepared, reference: Reference) -> Steps:
 
 
 def _tune_sheet(prepared: Prepared, reference: Reference, excluded: Mask | None) -> Steps:
-    """The sheet stays where it is not asked for, or has been fitted to a reference before."""
+    """The sheet stays where nothing is fitted on it, or it has been fitted before."""
     spots = prepared.spots
-    if spots is None or spots.even is not None or not prepared.needs_sheet:
+    if spots is None or spots.even is not None:
         return
     deviation = np.nan_to_num(reference.noise) / np.sqrt(reference.n_frames)
     mean = reference.mean if excluded is None else np.where(excluded, np.nan, reference.mean)

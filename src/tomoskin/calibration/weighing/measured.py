@@ -32,7 +32,7 @@ _CHANCE = 1.15
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class FeatureBlock:
     """Principal components of what presses read, and how far apart two presses are in them.
 
     ``middle`` (n_meas,) is taken off where a block is no change by itself; ``mean`` (k,) and
@@ -92,7 +92,7 @@ class ForceProcess:
         (n,) N: force of each press as the others tell it.
     """
 
-    blocks: Mapping[str, Block]
+    blocks: Mapping[str, FeatureBlock]
     process: Process
     factor: tuple[FloatArray, bool]
     centre: float
@@ -128,7 +128,7 @@ class ForceProcess:
         if not np.isfinite(newtons).all() or np.ptp(newtons) == 0:
             raise DataError("expected forces that are finite and not all alike", where=_WHERE)
         blocks = {
-            name: Block.of(data, _COMPONENTS[name], is_change=name == "change")
+            name: FeatureBlock.of(data, _COMPONENTS[name], is_change=name == "change")
             for name, data in _named(rest, pressed).items()
         }
         squares = {name: block.squares(block.inputs) for name, block in blocks.items()}

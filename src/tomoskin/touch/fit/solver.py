@@ -88,24 +88,24 @@ class NumpySolver:
         gradient = self._pulled(fit.spots, fit.gradient)
         return float(gradient @ _solved(fit.normal, gradient, _LEAST_DAMPING))
 
-    def _descended(self, problem: Problem, fit: Fit, most: int) -> Descent:
+    def _descended(self, problem: Problem, fit: Fit, most: int) -> FitDescent:
         """Steps from a fit down to where its metric sees nothing to gain."""
-        metric = Metric.of(fit.unknown)
+        metric = NuisanceMetric.of(fit.unknown)
         gradient = self._pulled(fit.spots, fit.gradient)
         best, damping = Slope(fit.spots, fit.normal, gradient, fit.cost), _LEAST_DAMPING
         for steps in range(most):
             step = _solved(best.normal, best.gradient, damping)
             if best.gradient @ step < _SETTLED:
-                return Descent(best.spots, steps, settled=True)
+                return FitDescent(best.spots, steps, settled=True)
             moved = self._held(best.spots + step.reshape(-1, N_PARAMETERS), problem.sign)
             tried = self._slope(problem, metric, moved, fit.deficit)
             if tried.cost < best.cost:
                 best, damping = tried, max(damping / 10, _LEAST_DAMPING)
             elif damping > _MOST_DAMPING:
-                return Descent(best.spots, steps, settled=True)
+                return FitDescent(best.spots, steps, settled=True)
             else:
                 damping = max(damping * 30, 1e-2)
-        return Descent(best.spots, most, settled=False)
+        return FitDescent(best.spots, most, settled=False)
 
     def _at(self, problem: Problem, spots: FloatArray, deficit: Deficit) -> Fit:
         """The frame with these spots, as they are."""
@@ -122,7 +122,7 @@ class NumpySolver:
         ])  # fmt: skip
         predicted = each.sum(axis=0) + direct @ deficit.change
         residual = problem.data - predicted
-        metric = Metric.of(unknown)
+        metric = NuisanceMetric.of(unknown)
         square = metric.products(np.vstack([slopes, residual]))
         misfit = problem.rest + float(square[-1, -1])
         return Fit(
@@ -143,7 +143,7 @@ class NumpySolver:
         )
 
     def _slope(
-        self, problem: Problem, metric: Metric, spots: FloatArray, deficit: Deficit
+        self, problem: Problem, metric: NuisanceMetric, spots: FloatArray, deficit: Deficit
     ) -> Slope:
         """The cost of spots by the metric of others."""
         direct = problem.seen.direct
@@ -188,7 +188,7 @@ class NumpySolver:
     def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
         """See :class:`Solver`."""
         k = len(fit.spots)
-        own = Metric.of(left).products(np.vstack([fit.slopes, fit.each]))
+        own = NuisanceMetric.of(left).products(np.vstack([fit.slopes, fit.each]))
         squares = np.empty(k)
         for spot in range(k):
             mine = N_PARAMETERS * k + spot
@@ -230,7 +230,7 @@ def _within_scan(problem: Problem, spots: FloatArray, slopes: FloatArray) -> lis
 
 
 @dataclass(frozen=True, eq=False)
-class Metric:
+class NuisanceMetric:
     """C⁻¹ = 1 − Dᵀ(1 + DDᵀ)⁻¹D (Woodbury 1950) of unknown directions D.
 
     ``unknown`` (q, c) are these, ``root`` (q, q) is the lower one of 1 + DDᵀ, and ``log_size`` half
@@ -242,7 +242,7 @@ class Metric:
     log_size: float
 
     @classmethod
-    def of(cls, unknown: FloatArray) -> Metric:
+    def of(cls, unknown: FloatArray) -> NuisanceMetric:
         """Of directions (q, c)."""
         root = np.asarray(np.linalg.cholesky(np.eye(len(unknown)) + unknown @ unknown.T))
         return cls(unknown, root, float(np.log(np.diag(root)).sum()))
@@ -268,7 +268,7 @@ class Slope:
 
 
 @dataclass(frozen=True, eq=False)
-class Descent:
+class FitDescent:
     """Where so many ``steps`` have led; ``settled``: there is nothing to gain."""
 
     spots: FloatArray
