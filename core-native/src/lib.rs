@@ -29,11 +29,11 @@ pub mod solve;
 pub mod spot_algebra;
 pub mod spot_fit;
 pub mod spot_match;
+#[cfg(feature = "python")]
 mod spot_match_python;
 #[cfg(feature = "python")]
 mod spot_python;
 pub mod spot_search;
-
 pub mod spot_table;
 pub mod symbolic;
 pub mod threads;
