@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.core import DataError, FloatArray, Image, IntArray
 from tomoskin.inverse import MOST_EXCLUDED, Evidence
 from tomoskin.pattern import Pattern
 from tomoskin.pipeline.model_agreement import NO_AGREEMENT, REFUSED, ModelAgreement
@@ -83,8 +83,15 @@ class RecordedFrames:
             noise=noise,
             frames=self.differences[complete],
             places=None if self.positions is None else self.positions[complete],
-            locate=self.prepared.positions,
+            locate=self._located,
         )
+
+    def _located(self, image: FloatArray) -> FloatArray:
+        """(k, 2) m, where regions of an image (n_cells,) are."""
+        prepared = self.prepared
+        shown = Image(image, prepared.operator.unit, prepared.mesh.identity)
+        centres = [(detection.x, detection.y) for detection in prepared.segmenter(shown)]
+        return np.array(centres).reshape(-1, 2)
 
 
 def recorded_frames(prepared: Prepared, recording: Recording, idle: Idle) -> RecordedFrames:
