@@ -28,7 +28,7 @@ def files(tmp_path_factory):
             0.05 * np.sqrt((number + 0.5) / len(WEIGHTS)) * np.array([np.cos(turn), np.sin(turn)])
         )
         near = np.flatnonzero(np.linalg.norm(model.mesh.centroids - place, axis=1) < 0.02)
-        depth = 0.5 * weight / (weight + 500.0)
+        depth = 0.8 * weight / (weight + 500.0)
         change = np.full(len(near), np.exp(-depth) * SKIN.conductivity)
         (pressed,) = state.local.voltages_of([(near, change)])
         values += [pressed] * STAGES + [state.voltages] * 2

@@ -27,12 +27,14 @@ SHOWN = """centroids => ({
 
 @pytest.fixture(scope="module")
 def still():
-    return prepare(Skin.load("textile-disc-8").altered({"signal": AS_TAKEN}))
+    return prepare(
+        Skin.load("textile-disc-8").altered({"signal": AS_TAKEN, "touch": {"method": "image"}})
+    )
 
 
 @pytest.fixture(scope="module")
 def site(still):
-    """A skin that conducts less at FALL and more at RISE, and stays so."""
+    """A skin that conducts less at FALL and more at RISE, and stays so; touches are regions."""
     board = Board(free=samples_of(still), period=0.02)
     runner = Runner(still, lambda: board)
     runner.start()

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from tomoskin.core import SourceError
+from tomoskin.core import SourceError, written
 from tomoskin.emulator.program import BUILD, FOLDER, IMAGES, make_firmware
 from tomoskin.emulator.uf2 import check_boot, pack_uf2, unpack_uf2
 
@@ -62,7 +62,8 @@ def build_uf2(channels: int = 16) -> Path:
     data = pico_image(channels)
     uf2 = BUILD / f"tomoskin-pico-{channels}.uf2"
     if not uf2.is_file() or uf2.read_bytes() != data:
-        uf2.write_bytes(data)
+        with written(uf2, overwrite=True) as part:
+            part.write_bytes(data)
     return uf2
 
 
@@ -103,7 +104,8 @@ def write_uf2(uf2: bytes, drive: Path) -> None:
             hint=_HINT,
         )
     try:
-        with (drive / _WRITTEN).open("wb") as file:
+        part = drive / _WRITTEN  # the board takes it as it comes, and nothing is there before
+        with part.open("wb") as file:
             file.write(uf2)
             file.flush()
             os.fsync(file.fileno())

@@ -16,7 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import DataError, FloatArray, Output, Touch, check_outputs, encode_json
+from tomoskin.core import (
+    DataError,
+    FloatArray,
+    Output,
+    Touch,
+    check_outputs,
+    encode_json,
+    write_text,
+)
 from tomoskin.mesh import Surface
 from tomoskin.recording import Advance, SessionReader, as_recorded, indexed_frames, replayed
 
@@ -68,8 +76,8 @@ def write_lerobot(path: Path, session: SessionReader, every: float, advance: Adv
         episode = pa.Table.from_pylist([_episode(len(rows["index"]), statistics)])
         pq.write_table(episode, part / "meta/episodes" / _FILE)
         info = _info(rate, len(rows["index"]), features)
-        (part / "meta/info.json").write_bytes(encode_json(info))
-        (part / "meta/stats.json").write_bytes(encode_json(statistics))
+        for name, content in (("info", info), ("stats", statistics)):
+            write_text(part / f"meta/{name}.json", encode_json(content).decode())
 
 
 def _rate(every: float, path: Path) -> int:

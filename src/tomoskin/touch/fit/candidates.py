@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.mesh import Mesh
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Fit, Limits, Solver, WhitenedTable
-from tomoskin.touch.fit.spot import CONTENT, spots_of
+from tomoskin.touch.fit.spot import CONTENT, Response, spots_of
 
 _SPACING = 0.7
 """Between candidates, in median radii."""
@@ -47,15 +45,17 @@ class Candidates:
     signatures: FloatArray
 
     @classmethod
-    def of(cls, mesh: Mesh, prior: SpotPrior, changes: Callable[[FloatArray], FloatArray]) -> Self:
-        """On a hexagonal grid, in three sizes; ``changes`` of voltages (n, n_meas) V by spots."""
+    def of(cls, response: Response, prior: SpotPrior) -> Self:
+        """On a hexagonal grid, in three sizes."""
+        mesh = response.spots.mesh
         positions = _grid(mesh.centroids, _SPACING * prior.radius)
         spots = np.concatenate(
             [spots_of(positions, size * prior.radius, -_FAINT) for size in _SIZES]
         )
-        signatures = changes(spots) / spots[:, CONTENT, None]
+        changes = response.changes([spot[None] for spot in spots])
+        content = spots[:, CONTENT].copy()
         spots[:, CONTENT] = 1.0
-        return cls(spots, signatures)
+        return cls(spots, changes / content[:, None])
 
     def matched(self, seen: WhitenedTable) -> Matched:
         """The same for one noise."""

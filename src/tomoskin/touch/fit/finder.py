@@ -97,7 +97,7 @@ class SpotModel:
     @cached_property
     def candidates(self) -> Candidates:
         """Where touches are looked for."""
-        return Candidates.of(self.response.spots.mesh, self.prior, self.changes)
+        return Candidates.of(self.response, self.prior)
 
     @cached_property
     def solver(self) -> Solver:
