@@ -12,7 +12,6 @@ from tomoskin.calibration.bending.model import BendModel
 from tomoskin.calibration.bending.reader import BendReader, BendReading
 from tomoskin.calibration.kind import (
     Applied,
-    Calibration,
     Conditions,
     FrameView,
     Kind,
@@ -22,7 +21,6 @@ from tomoskin.calibration.kind import (
 )
 from tomoskin.core import Arrays, DataError, Detection, real_numbers
 from tomoskin.pattern import Pattern
-from tomoskin.skin import Skin
 
 _LABELS = ("angle_rad", "axis_rad", "time_s")
 
@@ -67,11 +65,6 @@ def _unpack(arrays: Arrays, pattern: Pattern, where: str, _progress: Progress) -
         return BendModel.learn(BendExamples.of(dv, *labels), covariance)
 
 
-def _check(calibration: Calibration[BendModel], skin: Skin) -> None:
-    if skin.pattern().identity != calibration.pattern.identity:
-        raise calibration.mismatch("scan", skin)
-
-
 def _apply(model: BendModel, conditions: Conditions) -> Applied:
     fit = conditions.touch_fit()
     return Applied() if fit is None else BendApplied(model, fit)
@@ -87,7 +80,6 @@ BENDS = Kind(
     keys=frozenset({"dv", *_LABELS, "covariance"}),
     pack=_pack,
     unpack=_unpack,
-    check=_check,
     exclude=BendModel.without,
     apply=_apply,
     skin_id=lambda _model: "",

@@ -17,7 +17,6 @@ from tomoskin.calibration.classifier.classifier import Classifier
 from tomoskin.calibration.classifier.examples import Codes, Examples
 from tomoskin.calibration.kind import (
     Applied,
-    Calibration,
     Conditions,
     FrameView,
     Kind,
@@ -34,7 +33,6 @@ from tomoskin.core import (
     whole_number,
 )
 from tomoskin.pattern import Pattern
-from tomoskin.skin import Skin
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,12 +142,6 @@ def _examples(arrays: Arrays, where: str) -> Examples:
     return replace(examples, session=session.astype(np.int64))
 
 
-def _check(calibration: Calibration[FrameClassifier], skin: Skin) -> None:
-    """The skin may have any settings of its images."""
-    if skin.pattern().identity != calibration.pattern.identity:
-        raise calibration.mismatch("scan", skin)
-
-
 def _apply(frames: FrameClassifier, _conditions: Conditions) -> Applied:
     return ClassesApplied(frames)
 
@@ -164,7 +156,6 @@ CLASSES = Kind(
     keys=frozenset({"dv", "flags", "session", "names", "exclusive"}),
     pack=_pack,
     unpack=_unpack,
-    check=_check,
     exclude=FrameClassifier.without,
     apply=_apply,
     skin_id=lambda frames: frames.classifier.skin_id,

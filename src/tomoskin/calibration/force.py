@@ -93,8 +93,6 @@ def _detection(x: float, y: float, area: float, peak: float, snr: float) -> Dete
 def _check(calibration: Calibration[ForceModel], skin: Skin) -> None:
     """Forces rest on the sheet and on how touches are found on it, not on its images."""
     model = calibration.model
-    if skin.pattern().identity != calibration.pattern.identity:
-        raise calibration.mismatch("scan", skin)
     if skin.touch.method != model.method:
         raise DataError(
             f'the calibration of forces is of touches found by "{model.method}", those of this '

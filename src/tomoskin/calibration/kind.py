@@ -163,14 +163,15 @@ class Kind(Generic[M]):
     unpack
         Arrays of a file, the pattern, the file's name and a progress → model, learnt again.
         Raises DataError.
-    check
-        Raises DataError where a calibration cannot serve a skin.
     exclude
         Model without some measurements; None where it cannot do without.
     apply
         Model and conditions → what it does with each frame.
     skin_id
         Model → identity of the skin that it was learnt on; "" where none is known.
+    check
+        Raises DataError where a calibration cannot serve a skin of its own scan; None where it
+        always can.
     directions
         Model → (n_meas, k) V along which what it reads moves the data: images do without them.
         None where it reads nothing of that sort.
@@ -189,10 +190,10 @@ class Kind(Generic[M]):
     keys: frozenset[str]
     pack: Callable[[M], Arrays]
     unpack: Callable[[Arrays, Pattern, str, Progress], M]
-    check: Callable[[Calibration[M], Skin], None]
     exclude: Callable[[M, IntArray], M | None]
     apply: Callable[[M, Conditions], Applied]
     skin_id: Callable[[M], str]
+    check: Callable[[Calibration[M], Skin], None] | None = None
     directions: Callable[[M], FloatArray] | None = None
     locates: bool = False
     fits: bool = False
@@ -259,8 +260,11 @@ class Calibration(Generic[M]):
         return pack_arrays(self._arrays())
 
     def check(self, skin: Skin) -> None:
-        """Raise DataError where it cannot serve ``skin``."""
-        self.kind.check(self, skin)
+        """Raise DataError where it cannot serve ``skin``: of another scan, or as its kind says."""
+        if skin.pattern().identity != self.pattern.identity:
+            raise self.mismatch("scan", skin)
+        if self.kind.check is not None:
+            self.kind.check(self, skin)
 
     def check_skin(self, skin: Skin) -> None:
         """Raise DataError where it was learnt on another skin, or on other settings of it."""

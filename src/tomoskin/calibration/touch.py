@@ -98,8 +98,6 @@ def _unpack(arrays: Arrays, pattern: Pattern, where: str, progress: Progress) ->
 def _check(calibration: Calibration[Locator], skin: Skin) -> None:
     """It rests on measurements and positions alone: other settings of the image do not matter."""
     locator = calibration.model
-    if skin.pattern().identity != calibration.pattern.identity:
-        raise calibration.mismatch("scan", skin)
     outline, known = Region.of(skin).outline, locator.region.outline
     same = outline.shape == known.shape and np.allclose(outline, known, atol=_SAME_SHAPE)
     if locator.skin_id and not same:

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.forward.engine import BaseState, Compressed, Factor, Factorise, Patches, singular
-from tomoskin.forward.small_patches import stack_change, stacks
+from tomoskin.forward.small_patches import stack_change, stacks, summed
 from tomoskin.forward.touches import Touches
 from tomoskin.pattern import Pattern
 
@@ -190,12 +190,8 @@ def _block(
     local: FloatArray, position: IntArray, conductivity: NDArray[Any], n: int
 ) -> NDArray[Any]:
     """(n, n): the sum of the cells' matrices."""
-    entries = (local * conductivity[:, None, None]).ravel()
-    keys = (position[:, :, None] * n + position[:, None, :]).ravel()
-    block = np.bincount(keys, entries.real, n * n).astype(entries.dtype)
-    if np.iscomplexobj(entries):
-        block += 1j * np.bincount(keys, entries.imag, n * n)
-    return block.reshape(n, n)
+    keys = position[:, :, None] * n + position[:, None, :]
+    return summed(local * conductivity[:, None, None], keys, (n, n))
 
 
 def _condensed(block: NDArray[Any], inside: NDArray[np.bool_]) -> NDArray[Any]:

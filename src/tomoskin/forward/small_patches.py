@@ -91,7 +91,7 @@ def stack_change(
     """
     nodes, index = stack.nodes, touches.cells[stack.entries]
     moved = touches.conductivity[stack.entries] - base.conductivity[index]
-    change = _summed(base.local[index] * moved[:, None, None], stack.keys, between.shape)
+    change = summed(base.local[index] * moved[:, None, None], stack.keys, between.shape)
     between = between[:, 1:] - between[:, :1]
     between = between[:, :, 1:] - between[:, :, :1]
     fields = base.fields[nodes[:, 1:]] - base.fields[nodes[:, :1]]
@@ -105,8 +105,8 @@ def stack_change(
     return fields.swapaxes(1, 2) @ current, changed.swapaxes(1, 2) @ residual
 
 
-def _summed(entries: NDArray[Any], keys: IntArray, shape: tuple[int, ...]) -> NDArray[Any]:
-    """(b, n, n): the sum of the cells' matrices (c, k, k)."""
+def summed(entries: NDArray[Any], keys: IntArray, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Of that ``shape``: the sum of the cells' matrices (c, k, k), by the ``keys`` (c, k, k)."""
     size, keys = int(np.prod(shape)), keys.ravel()
     total = np.bincount(keys, entries.real.ravel(), size).astype(entries.dtype)
     if np.iscomplexobj(entries):
