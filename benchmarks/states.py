@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from report import Report
 from tomoskin import Skin
-from tomoskin.calibration import Classifier, Wiring, against_rest, ring_of, solve_wiring
+from tomoskin.calibration import (
+    ChannelMapping,
+    Classifier,
+    against_rest,
+    ring_of,
+    solve_channel_mapping,
+)
 from tomoskin.core import DataError
 from tomoskin.pattern import match_rows
 from tomoskin.twin import COMMON_PRESSES, SetPlan, make_shard
@@ -220,9 +226,9 @@ def _tally(found: list[Solved]) -> tuple[object, ...]:
     return (f"{right.mean():.0%}", f"{sure.mean():.0%}", wrong, round(float(seconds.mean()), 1))
 
 
-def _scrambled(skin: Skin, seed: int) -> tuple[Wiring, Floats, Floats, Floats]:
+def _scrambled(skin: Skin, seed: int) -> tuple[ChannelMapping, Floats, Floats, Floats]:
     random, n = np.random.default_rng(seed), skin.n_electrodes
-    wiring = Wiring.as_drawn(n).turned(
+    wiring = ChannelMapping.as_drawn(n).turned(
         ring_of(skin), int(random.integers(n)), mirrored=bool(random.integers(2))
     )
     for _ in range(random.integers(3)):
@@ -239,12 +245,14 @@ def _scrambled(skin: Skin, seed: int) -> tuple[Wiring, Floats, Floats, Floats]:
 
 
 def _solved(
-    skin: Skin, scene: tuple[Wiring, Floats, Floats, Floats], count: int, *, rest: bool
+    skin: Skin, scene: tuple[ChannelMapping, Floats, Floats, Floats], count: int, *, rest: bool
 ) -> Solved:
     wiring, dv, xy, reference = scene
     start = time.process_time()
-    found = solve_wiring(dv[:count], xy[:count], skin, reference=reference if rest else None)
-    return found.wiring == wiring, found.sure, time.process_time() - start
+    found = solve_channel_mapping(
+        dv[:count], xy[:count], skin, reference=reference if rest else None
+    )
+    return found.mapping == wiring, found.sure, time.process_time() - start
 
 
 def _real(data: Path) -> Report:
@@ -252,16 +260,17 @@ def _real(data: Path) -> Report:
     for name, skin, dv, xy in _skins(data):
         ring = ring_of(skin)
         near = {
-            Wiring.as_drawn(len(ring)).turned(ring, k, mirrored=False).places for k in (-1, 0, 1)
+            ChannelMapping.as_drawn(len(ring)).turned(ring, k, mirrored=False).places
+            for k in (-1, 0, 1)
         }
         for count in REAL_COUNTS:
             found = []
             for seed in range(REAL_TRIALS):
                 chosen = np.random.default_rng(seed).permutation(len(dv))[:count]
                 start = time.process_time()
-                told = solve_wiring(dv[chosen], xy[chosen], skin)
+                told = solve_channel_mapping(dv[chosen], xy[chosen], skin)
                 taken = time.process_time() - start
-                found.append((told.wiring.places in near, told.sure, taken))
+                found.append((told.mapping.electrodes in near, told.sure, taken))
             rows.append((name, count, *_tally(found)))
     return Report(
         "orientation of public skins",

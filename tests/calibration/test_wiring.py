@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tomoskin.calibration import Wiring, ring_of, solve_wiring
+from tomoskin.calibration import ChannelMapping, ring_of, solve_channel_mapping
 from tomoskin.core import DataError, FloatArray
 from tomoskin.pattern import match_rows
 from tomoskin.skin import Skin
@@ -22,7 +22,8 @@ N = SKIN.n_electrodes
 
 wirings = st.builds(
     lambda steps, mirrored, swap, polarity: replace(
-        Wiring.as_drawn(N).turned(RING, steps, mirrored=mirrored).swapped(*swap), reversed=polarity
+        ChannelMapping.as_drawn(N).turned(RING, steps, mirrored=mirrored).swapped(*swap),
+        reversed=polarity,
     ),
     st.integers(0, N - 1),
     st.booleans(),
@@ -31,7 +32,9 @@ wirings = st.builds(
 )
 
 
-def pressed(wiring: Wiring, seed: int, n: int = 12) -> tuple[FloatArray, FloatArray, FloatArray]:
+def pressed(
+    wiring: ChannelMapping, seed: int, n: int = 12
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Changes, labels and reference of a twin that is wired so."""
     true = replace(wiring, reversed=False).applied(SKIN)
     arrays = make_shard(SetPlan(true.to_toml(), COMMON_PRESSES, "textile", seed, n), 0)
@@ -47,50 +50,50 @@ def pressed(wiring: Wiring, seed: int, n: int = 12) -> tuple[FloatArray, FloatAr
 
 @settings(max_examples=5)
 @given(wirings, st.integers(0, 99))
-def test_five_presses_tell_any_scramble(wiring: Wiring, seed: int) -> None:
+def test_five_presses_tell_any_scramble(wiring: ChannelMapping, seed: int) -> None:
     dv, xy, reference = pressed(wiring, seed)
-    found = solve_wiring(dv[:5], xy[:5], SKIN, reference=reference)
+    found = solve_channel_mapping(dv[:5], xy[:5], SKIN, reference=reference)
     assert found.sure
-    assert found.wiring == wiring
+    assert found.mapping == wiring
     assert found.odds > 19
     assert not found.contradicted
 
 
 def test_one_press_in_the_middle_tells_nothing() -> None:
     """All rotations look alike; a press out at the rim would tell."""
-    dv, xy, reference = pressed(Wiring.as_drawn(N), 3)
+    dv, xy, reference = pressed(ChannelMapping.as_drawn(N), 3)
     near = int(np.argmin(np.linalg.norm(xy, axis=1)))
     middle = np.zeros((1, 2))
-    found = solve_wiring(dv[near : near + 1], middle, SKIN, reference=reference)
+    found = solve_channel_mapping(dv[near : near + 1], middle, SKIN, reference=reference)
     assert not found.sure
     assert found.odds < 19
     assert np.linalg.norm(found.next_place) > 0.02
 
 
 def test_polarity_needs_a_sign() -> None:
-    wiring = replace(Wiring.as_drawn(N), reversed=True)
+    wiring = replace(ChannelMapping.as_drawn(N), reversed=True)
     dv, xy, reference = pressed(wiring, 5)
     either = SKIN.altered({"touch": {"sign": "both"}})
-    found = solve_wiring(dv[:8], xy[:8], either)
+    found = solve_channel_mapping(dv[:8], xy[:8], either)
     assert not found.polarity_known
-    assert found.wiring.places == wiring.places
-    assert solve_wiring(dv[:8], xy[:8], either, reference=reference).wiring == wiring
-    assert solve_wiring(dv[:8], xy[:8], SKIN).wiring == wiring
+    assert found.mapping.electrodes == wiring.electrodes
+    assert solve_channel_mapping(dv[:8], xy[:8], either, reference=reference).mapping == wiring
+    assert solve_channel_mapping(dv[:8], xy[:8], SKIN).mapping == wiring
 
 
 def test_noise_is_no_wiring() -> None:
-    dv, xy, _ = pressed(Wiring.as_drawn(N), 5)
+    dv, xy, _ = pressed(ChannelMapping.as_drawn(N), 5)
     nothing = np.random.default_rng(0).normal(size=dv.shape) * np.std(dv)
-    assert not solve_wiring(nothing, xy, SKIN).sure
+    assert not solve_channel_mapping(nothing, xy, SKIN).sure
 
 
 def test_a_wrong_label_is_named() -> None:
-    dv, xy, reference = pressed(Wiring.as_drawn(N), 7)
+    dv, xy, reference = pressed(ChannelMapping.as_drawn(N), 7)
     outer = int(np.argmax(np.linalg.norm(xy, axis=1)))
     wrong = xy.copy()
     wrong[outer] = -wrong[outer]
-    found = solve_wiring(dv, wrong, SKIN, reference=reference)
-    assert found.wiring == Wiring.as_drawn(N)
+    found = solve_channel_mapping(dv, wrong, SKIN, reference=reference)
+    assert found.mapping == ChannelMapping.as_drawn(N)
     (remark,) = found.contradicted
     assert remark[0] == outer
     assert np.linalg.norm(np.array(remark[1:]) - xy[outer]) < 0.04
@@ -98,43 +101,45 @@ def test_a_wrong_label_is_named() -> None:
 
 def test_a_wired_skin_answers_as_the_wires_do() -> None:
     """What is read through scrambled wires is what the wired skin's own model says."""
-    wiring = replace(Wiring.as_drawn(N).turned(RING, 3, mirrored=True).swapped(0, 5), reversed=True)
+    wiring = replace(
+        ChannelMapping.as_drawn(N).turned(RING, 3, mirrored=True).swapped(0, 5), reversed=True
+    )
     wired = wiring.applied(SKIN)
     assert wired.polarity == -1
     assert wired.n_electrodes == N
     np.testing.assert_allclose(
-        wired.electrode_centres, SKIN.electrode_centres[list(wiring.places)], atol=2e-5
+        wired.electrode_centres, SKIN.electrode_centres[list(wiring.electrodes)], atol=2e-5
     )
     assert wired.identity != SKIN.identity
-    again = replace(Wiring.as_drawn(N), reversed=True).applied(wired)
+    again = replace(ChannelMapping.as_drawn(N), reversed=True).applied(wired)
     assert again.polarity == 1
     mixed = SKIN.altered({"electrodes": {"contact_impedance": [f"{k} ohm*m" for k in range(1, 9)]}})
     np.testing.assert_allclose(
-        wiring.applied(mixed).contact_impedance, 1.0 + np.array(wiring.places)
+        wiring.applied(mixed).contact_impedance, 1.0 + np.array(wiring.electrodes)
     )
 
 
 @pytest.mark.parametrize(
     ("wiring", "words"),
     [
-        (Wiring.as_drawn(8), "as the skin file says"),
-        (Wiring.as_drawn(8).turned(RING, 1, mirrored=False), "turned by 1 electrode"),
+        (ChannelMapping.as_drawn(8), "as the skin file says"),
+        (ChannelMapping.as_drawn(8).turned(RING, 1, mirrored=False), "turned by 1 electrode"),
         (
-            replace(Wiring.as_drawn(8).turned(RING, 2, mirrored=True), reversed=True),
+            replace(ChannelMapping.as_drawn(8).turned(RING, 2, mirrored=True), reversed=True),
             "mirrored, turned by 2 electrodes, polarity reversed",
         ),
         (
-            Wiring.as_drawn(8).swapped(2, 3),
+            ChannelMapping.as_drawn(8).swapped(2, 3),
             "E3 at the place of E4, E4 at the place of E3",
         ),
     ],
 )
-def test_a_wiring_in_words(wiring: Wiring, words: str) -> None:
+def test_a_wiring_in_words(wiring: ChannelMapping, words: str) -> None:
     assert wiring.text(RING) == words
 
 
 def test_electrodes_are_followed_along_the_rim() -> None:
-    shuffled = Wiring((0, 3, 1, 2, 7, 5, 6, 4)).applied(SKIN)
+    shuffled = ChannelMapping((0, 3, 1, 2, 7, 5, 6, 4)).applied(SKIN)
     ring = ring_of(shuffled)
     centres = shuffled.electrode_centres[list(ring)]
     steps = np.linalg.norm(centres - np.roll(centres, 1, axis=0), axis=1)
@@ -145,13 +150,13 @@ def test_electrodes_are_followed_along_the_rim() -> None:
 def test_what_cannot_be_is_refused() -> None:
     dv, xy = np.ones((3, 40)), np.full((3, 2), 0.02)
     with pytest.raises(DataError, match="outside the skin"):
-        solve_wiring(dv, 1e3 * xy, SKIN)
+        solve_channel_mapping(dv, 1e3 * xy, SKIN)
     with pytest.raises(DataError, match="40 rows"):
-        solve_wiring(dv[:, :8], xy, SKIN)
+        solve_channel_mapping(dv[:, :8], xy, SKIN)
     with pytest.raises(DataError, match="change something"):
-        solve_wiring(np.zeros((3, 40)), xy, SKIN)
+        solve_channel_mapping(np.zeros((3, 40)), xy, SKIN)
     with pytest.raises(DataError, match="xy of shape"):
-        solve_wiring(dv, xy[:2], SKIN)
+        solve_channel_mapping(dv, xy[:2], SKIN)
 
 
 @pytest.mark.data
@@ -174,10 +179,10 @@ def test_a_public_skin_is_oriented(data_dir: Path, steps: int) -> None:
         dv = match.apply((kept["v_down"].astype(float) - kept["v_up"])[:, :half])
         xy = 1e-3 * kept["xy_mm"].astype(float)
     chosen = np.random.default_rng(0).permutation(len(dv))[:15]
-    turned = Wiring.as_drawn(16).turned(ring_of(skin), steps, mirrored=True).applied(skin)
-    found = solve_wiring(dv[chosen], xy[chosen], turned)
+    turned = ChannelMapping.as_drawn(16).turned(ring_of(skin), steps, mirrored=True).applied(skin)
+    found = solve_channel_mapping(dv[chosen], xy[chosen], turned)
     assert found.sure
-    centres = found.wiring.applied(turned).electrode_centres
+    centres = found.mapping.applied(turned).electrode_centres
     apart = np.linalg.norm(centres - skin.electrode_centres, axis=1)
     assert (
         apart < 1.1 * np.linalg.norm(skin.electrode_centres[0] - skin.electrode_centres[1])
@@ -186,7 +191,7 @@ def test_a_public_skin_is_oriented(data_dir: Path, steps: int) -> None:
 
 def test_labels_of_other_presses_make_no_sure_answer() -> None:
     """Each label stands beside the data of another press: no wiring can be right."""
-    dv, xy, reference = pressed(Wiring.as_drawn(N), 7)
-    found = solve_wiring(dv, np.roll(xy, 3, axis=0), SKIN, reference=reference)
+    dv, xy, reference = pressed(ChannelMapping.as_drawn(N), 7)
+    found = solve_channel_mapping(dv, np.roll(xy, 3, axis=0), SKIN, reference=reference)
     assert not found.sure
     assert found.doubtful

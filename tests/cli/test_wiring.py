@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tomoskin.calibration import Wiring, ring_of
+from tomoskin.calibration import ChannelMapping, ring_of
 from tomoskin.skin import Skin
 from tomoskin.twin import COMMON_PRESSES, SetPlan, make_shard
 
 NAME = "textile-disc-8"
 SKIN = Skin.load(NAME)
 WIRING = replace(
-    Wiring.as_drawn(8).turned(ring_of(SKIN), 3, mirrored=True).swapped(1, 2), reversed=True
+    ChannelMapping.as_drawn(8).turned(ring_of(SKIN), 3, mirrored=True).swapped(1, 2), reversed=True
 )
 KEYS = ("voltages", "reference", "drive", "measure", "xy_m")
 Run = Callable[..., tuple[int, str, str]]
@@ -42,7 +42,7 @@ def test_the_skin_file_is_as_it_is_wired(tomoskin: Run, tmp_path: Path, presses:
     wired = Skin.load(out)
     assert wired.polarity == -1
     np.testing.assert_allclose(
-        wired.electrode_centres, SKIN.electrode_centres[list(WIRING.places)], atol=1e-4
+        wired.electrode_centres, SKIN.electrode_centres[list(WIRING.electrodes)], atol=1e-4
     )
     code, said, err = tomoskin("image", presses, "--skin", out, "--json")
     assert (code, err) == (0, "")

@@ -11,7 +11,7 @@ import pytest
 
 from run.test_runner import Watch
 from server.flowing import flowing
-from tomoskin.calibration import TOUCH, Wiring
+from tomoskin.calibration import TOUCH, ChannelMapping
 from tomoskin.core import DataError
 from tomoskin.recording import SessionReader, as_recorded, replayed
 from tomoskin.run import commands
@@ -357,7 +357,7 @@ def test_a_press_is_taken_back_and_the_flow_left(flows):
 
 def test_scrambled_wires_are_found_kept_and_applied(prepared, tmp_path):
     ring = tuple(range(8))
-    wiring = Wiring.as_drawn(8).turned(ring, 3, mirrored=True)
+    wiring = ChannelMapping.as_drawn(8).turned(ring, 3, mirrored=True)
     scrambled = wiring.applied(prepared.skin)
     with flowing(prepared, tmp_path, opening=quick(scrambled)) as (
         site,

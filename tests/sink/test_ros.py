@@ -260,7 +260,7 @@ def test_what_is_sent_when(stream):
         [m.topic for m in view.of(moment)]
         for moment in (
             moment_at(0.0, TOUCH), moment_at(0.1), moment_at(0.2),
-            replace(moment_at(0.3), told=(Event(0.3, "touch-release", "touch 4 ends"),)),
+            replace(moment_at(0.3), messages=(Event(0.3, "touch-release", "touch 4 ends"),)),
             replace(moment_at(0.4), valid=False), moment_at(1.5),
         )
     ]  # fmt: skip

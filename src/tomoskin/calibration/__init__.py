@@ -8,8 +8,8 @@ from tomoskin.calibration.bending.joint import JointReference
 from tomoskin.calibration.bending.model import BendModel
 from tomoskin.calibration.bending.reader import BendReader, BendReading
 from tomoskin.calibration.bends import BENDS
-from tomoskin.calibration.channel_mapping.solve import WiringAnswer, solve_wiring
-from tomoskin.calibration.channel_mapping.wiring import Wiring, ring_of
+from tomoskin.calibration.channel_mapping.mapping import ChannelMapping, ring_of
+from tomoskin.calibration.channel_mapping.solve import MappingAnswer, solve_channel_mapping
 from tomoskin.calibration.classes import CLASSES, ClassReading, FrameClassifier
 from tomoskin.calibration.classifier.alignment import Alignment
 from tomoskin.calibration.classifier.classifier import Answers, Classifier
@@ -52,6 +52,7 @@ __all__ = [
     "BendReader",
     "BendReading",
     "Calibration",
+    "ChannelMapping",
     "ClassReading",
     "Classifier",
     "Codes",
@@ -66,6 +67,7 @@ __all__ = [
     "Kind",
     "LabelRemark",
     "Locator",
+    "MappingAnswer",
     "MaterialFit",
     "PressedSpot",
     "Presses",
@@ -74,12 +76,10 @@ __all__ = [
     "TouchFit",
     "Watch",
     "WeighedPresses",
-    "Wiring",
-    "WiringAnswer",
     "against_rest",
     "identify",
     "ring_of",
-    "solve_wiring",
+    "solve_channel_mapping",
 ]
 
 

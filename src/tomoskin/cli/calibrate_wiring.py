@@ -15,7 +15,7 @@ from tomoskin.cli.recording import changes, idle_frames, labelled_frames, labels
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import WiringAnswer
+    from tomoskin.calibration import MappingAnswer
     from tomoskin.core import FloatArray
     from tomoskin.pattern import Pattern
     from tomoskin.signal import Recording
@@ -39,7 +39,7 @@ def calibrate_wiring(
     The result is a skin file whose electrodes are where the wires end: give it as --skin to any
     other command.
     """
-    from tomoskin.calibration import solve_wiring
+    from tomoskin.calibration import solve_channel_mapping
     from tomoskin.core import write_text
     from tomoskin.formats import read_recording
 
@@ -52,12 +52,12 @@ def calibrate_wiring(
     frames = labelled_frames(xy)
     rest, noise = _at_rest(data, reference, pattern)
     with Bar("weighing wirings") as bar:
-        answer = solve_wiring(
+        answer = solve_channel_mapping(
             dv[frames], xy[frames], drawn, reference=rest, noise=noise, progress=bar
         )
     facts = _findings(answer, drawn, frames.tolist())
     if answer.sure:
-        write_text(out, answer.wiring.applied(drawn).to_toml(), overwrite=force)
+        write_text(out, answer.mapping.applied(drawn).to_toml(), overwrite=force)
     if json:
         emit(facts)
     else:
@@ -80,15 +80,15 @@ def _at_rest(
     return idle_level.mean, idle_level.noise if usable else None
 
 
-def _findings(answer: WiringAnswer, skin: Skin, frames: list[int]) -> dict[str, Any]:
+def _findings(answer: MappingAnswer, skin: Skin, frames: list[int]) -> dict[str, Any]:
     from tomoskin.calibration import ring_of
 
     ring = ring_of(skin)
     return {
         "presses": len(frames),
         "sure": answer.sure,
-        "wiring": answer.wiring.text(ring),
-        "places": list(answer.wiring.places),
+        "wiring": answer.mapping.text(ring),
+        "places": list(answer.mapping.electrodes),
         "polarity": _polarity(answer),
         "probability": answer.probability,
         "runner_up": answer.runner_up.text(ring),
@@ -102,10 +102,10 @@ def _findings(answer: WiringAnswer, skin: Skin, frames: list[int]) -> dict[str, 
     }
 
 
-def _polarity(answer: WiringAnswer) -> str:
+def _polarity(answer: MappingAnswer) -> str:
     if not answer.polarity_known:
         return "not known"
-    return "reversed" if answer.wiring.reversed else "normal"
+    return "reversed" if answer.mapping.reversed else "normal"
 
 
 def _say(facts: dict[str, Any]) -> None:
@@ -126,7 +126,7 @@ def _say(facts: dict[str, Any]) -> None:
         )
 
 
-def _why(answer: WiringAnswer) -> str:
+def _why(answer: MappingAnswer) -> str:
     if answer.doubtful:
         return "too many of these presses look as if they were elsewhere: are the labels right?"
     if answer.unexplained > 1 - answer.probability - answer.unexplained:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tomoskin.calibration import Locator, WiringAnswer, ring_of, solve_wiring
+from tomoskin.calibration import Locator, MappingAnswer, ring_of, solve_channel_mapping
 from tomoskin.core import FloatArray
 from tomoskin.pipeline import Prepared
 from tomoskin.touch import Region
@@ -159,7 +159,7 @@ class Estimate:
     place: FloatArray | None = None
     ready: bool = False
     figures: dict[str, Any] = field(default_factory=dict)
-    answer: Locator | WiringAnswer | None = None
+    answer: Locator | MappingAnswer | None = None
 
 
 def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estimate:
@@ -210,10 +210,10 @@ def estimate_wiring(
         return Estimate(f"{_counted(left)} to go for a first answer")
     dv, xy = _arrays(presses)
     rest, noise = untouched or (None, None)
-    solution = solve_wiring(dv, xy, prepared.skin, reference=rest, noise=noise)
+    solution = solve_channel_mapping(dv, xy, prepared.skin, reference=rest, noise=noise)
     ring = ring_of(prepared.skin)
     figures = {
-        "wiring": solution.wiring.text(ring),
+        "wiring": solution.mapping.text(ring),
         "probability": solution.probability,
         "odds": min(solution.odds, 1e9),
         "runner_up": solution.runner_up.text(ring),
@@ -225,7 +225,7 @@ def estimate_wiring(
     )
 
 
-def _in_words(solution: WiringAnswer, figures: dict[str, Any]) -> str:
+def _in_words(solution: MappingAnswer, figures: dict[str, Any]) -> str:
     if solution.sure:
         return f"Sure: {figures['wiring']}"
     if solution.doubtful:

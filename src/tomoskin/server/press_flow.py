@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from tomoskin.calibration import TOUCH, Locator, WiringAnswer
+from tomoskin.calibration import TOUCH, Locator, MappingAnswer
 from tomoskin.core import FloatArray, WireError, write_text
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.run import Runner, commands
@@ -74,7 +74,7 @@ class PressFlow:
             return estimate_touch(self.prepared, presses)
         return estimate_wiring(self.prepared, presses, self.taker.untouched)
 
-    def answer(self) -> Locator | WiringAnswer:
+    def answer(self) -> Locator | MappingAnswer:
         """What can be kept. Raises WireError where the presses do not tell enough."""
         estimate = self.estimate
         if self.estimating or estimate is None or not estimate.ready or estimate.answer is None:
@@ -98,7 +98,7 @@ class PressFlow:
 
 
 def keep(
-    flow: PressFlow, answer: Locator | WiringAnswer, folder: Folder, name: str, runner: Runner
+    flow: PressFlow, answer: Locator | MappingAnswer, folder: Folder, name: str, runner: Runner
 ) -> str:
     """Save ``answer`` and have the run go on with it; in a thread. The file's name."""
     skin = flow.prepared.skin
@@ -109,7 +109,7 @@ def keep(
         runner.ask(commands.Adopt(runner.prepared.calibrated(calibration)))
     else:
         path = folder.free(name, ".toml")
-        wired = answer.wiring.applied(skin)
+        wired = answer.mapping.applied(skin)
         write_text(path, wired.to_toml())
         runner.ask(commands.Change(prepare(wired)))
     return path.name

@@ -54,7 +54,7 @@ class FoxgloveSink:
     def publish(self, item: Item) -> None:
         """Send the messages of ``item``."""
         now = self._stream.log_time(item.host_time)
-        for event in (item,) if isinstance(item, Event) else item.told:
+        for event in (item,) if isinstance(item, Event) else item.messages:
             self._send("/events", log_message(event, now), now)
         if isinstance(item, Event):
             return

@@ -48,7 +48,7 @@ class LslSink:
 
     def publish(self, item: Item) -> None:
         """Push the samples of ``item``."""
-        for event in (item,) if isinstance(item, Event) else item.told:
+        for event in (item,) if isinstance(item, Event) else item.messages:
             text = encode_json({"kind": event.kind, "text": event.text}).decode()
             self._push("events", [text], item)
         if isinstance(item, Event):

@@ -47,7 +47,7 @@ class RerunView:
         utc = self._stream.utc(item.host_time)
         when = {"duration": item.host_time} if utc is None else {"timestamp": utc}
         self._recording.set_time("time", **when)
-        for event in (item,) if isinstance(item, Event) else item.told:
+        for event in (item,) if isinstance(item, Event) else item.messages:
             text = self._rerun.TextLog(f"{event.kind}: {event.text}")
             self._recording.log(self._path("events"), text)
         if isinstance(item, Event):

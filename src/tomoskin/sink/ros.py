@@ -59,7 +59,7 @@ class RosView:
         """Messages of one frame, or of an event."""
         stamp = self._stream.log_time(item.host_time)
         of_frame = not isinstance(item, Event)
-        for event in (item,) if isinstance(item, Event) else item.told:
+        for event in (item,) if isinstance(item, Event) else item.messages:
             content = event_content(self._stream, self._naming, event, of_frame=of_frame)
             yield RosMessage("events", _json(content), stamp)
         if isinstance(item, Event):

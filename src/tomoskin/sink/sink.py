@@ -109,7 +109,7 @@ class Moment:
         Tracked touches.
     happened
         What happened to touches in this frame: onset, move, release, merge, split.
-    told
+    messages
         The same in words.
     valid
         Whether a reference stands and enough electrodes work, so that no touch means none.
@@ -127,7 +127,7 @@ class Moment:
     touches: tuple[Touch, ...]
     image: Image | None
     happened: tuple[TouchEvent, ...] = ()
-    told: tuple[Event, ...] = ()
+    messages: tuple[Event, ...] = ()
     valid: bool = True
     problem: str | None = None
 
@@ -143,7 +143,7 @@ class Moment:
             touches=result.touches,
             image=result.image if with_image else None,
             happened=result.events,
-            told=tuple(map(event_of, result.events)),
+            messages=tuple(map(event_of, result.events)),
             valid=result.ready and result.has_image,
             problem=result.problem if result.ready else NO_REFERENCE,
         )

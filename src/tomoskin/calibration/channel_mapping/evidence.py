@@ -1,4 +1,4 @@
-"""How well a wiring explains labelled presses: the forward model's answers against the data."""
+"""How well a mapping explains labelled presses: the forward model's answers against the data."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.calibration.channel_mapping.wiring import Wiring
+from tomoskin.calibration.channel_mapping.mapping import ChannelMapping
 from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel
 from tomoskin.skin import Skin
@@ -60,16 +60,16 @@ class IndentationResponses:
             sizes.append(changed - state.transfer_resistance)
         return cls(model, positions, np.stack(sizes), np.asarray(state.transfer_resistance))
 
-    def rows(self, wirings: Sequence[Wiring], resistance: FloatArray) -> FloatArray:
-        """(h, …, n_meas) V of resistances (…, n, n) Ω as each wiring reads them, sign apart."""
-        order = np.array([w.places for w in wirings])
+    def rows(self, mappings: Sequence[ChannelMapping], resistance: FloatArray) -> FloatArray:
+        """(h, …, n_meas) V of resistances (…, n, n) Ω as each mapping reads them, sign apart."""
+        order = np.array([w.electrodes for w in mappings])
         response = [resistance[..., p[:, None], p] for p in order]
         return np.asarray(self.model.voltages(np.stack(response)))
 
 
 @dataclass(frozen=True, eq=False)
 class MappingLikelihood:
-    """Labelled presses, and what they say of a wiring.
+    """Labelled presses, and what they say of a mapping.
 
     Rows are compared in units of the noise, and by the root of their size: so rows that shout do
     not drown the others, and how strong a press was drops out. Signs and sizes of a press's rows
@@ -99,39 +99,39 @@ class MappingLikelihood:
     signs: tuple[float, ...]
     worth: float
 
-    def presses(self, wirings: Sequence[Wiring]) -> FloatArray:
-        """(h, sign, size, p) log-likelihood of each press under each wiring; 0: says nothing."""
+    def presses(self, mappings: Sequence[ChannelMapping]) -> FloatArray:
+        """(h, sign, size, p) log-likelihood of each press under each mapping; 0: says nothing."""
         parts = [
-            self._presses(wirings[start : start + _BLOCK])
-            for start in range(0, len(wirings), _BLOCK)
+            self._presses(mappings[start : start + _BLOCK])
+            for start in range(0, len(mappings), _BLOCK)
         ]
         return np.concatenate(parts)
 
-    def _presses(self, wirings: Sequence[Wiring]) -> FloatArray:
-        predicted = self.sheet.rows(wirings, self.sheet.changes)
+    def _presses(self, mappings: Sequence[ChannelMapping]) -> FloatArray:
+        predicted = self.sheet.rows(mappings, self.sheet.changes)
         correlation = agreement(self.dv, predicted, self.noise)
-        way = np.array([-1.0 if w.reversed else 1.0 for w in wirings])
+        way = np.array([-1.0 if w.reversed else 1.0 for w in mappings])
         signed = (
             correlation[:, None] * np.array(self.signs)[:, None, None] * way[:, None, None, None]
         )
         loud = likelihood(loudness(self.dv, predicted, self.noise), self.worth)
         return np.asarray(likelihood(signed, self.worth) + loud[:, None])
 
-    def at_rest(self, wirings: Sequence[Wiring]) -> FloatArray:
+    def at_rest(self, mappings: Sequence[ChannelMapping]) -> FloatArray:
         """(h,) log-likelihood of the untouched skin's voltages; 0 where they are not known."""
         if self.reference is None:
-            return np.zeros(len(wirings))
+            return np.zeros(len(mappings))
         noise = np.full(len(self.reference), _QUIET * np.median(np.abs(self.reference)))
-        predicted = self.sheet.rows(wirings, self.sheet.rest)
+        predicted = self.sheet.rows(mappings, self.sheet.rest)
         correlation = agreement(self.reference, predicted, noise)
-        return likelihood(correlation * [-1.0 if w.reversed else 1.0 for w in wirings], self.worth)
+        return likelihood(correlation * [-1.0 if w.reversed else 1.0 for w in mappings], self.worth)
 
-    def __call__(self, wirings: Sequence[Wiring]) -> FloatArray:
+    def __call__(self, mappings: Sequence[ChannelMapping]) -> FloatArray:
         """(h,) log-likelihood of all; the unknown size and sign are averaged over."""
-        each = self.presses(wirings).sum(axis=-1)
+        each = self.presses(mappings).sum(axis=-1)
         most = each.max(axis=(1, 2))
         mean = np.exp(each - most[:, None, None]).mean(axis=(1, 2))
-        return np.asarray(most + np.log(mean) + self.at_rest(wirings))
+        return np.asarray(most + np.log(mean) + self.at_rest(mappings))
 
 
 def agreement(measured: FloatArray, predicted: FloatArray, noise: FloatArray) -> FloatArray:

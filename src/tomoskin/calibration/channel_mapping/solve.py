@@ -1,4 +1,4 @@
-"""The wiring that labelled presses tell: the likeliest plausible one, and how sure that is."""
+"""The mapping that labelled presses tell: the likeliest plausible one, and how sure that is."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tomoskin.calibration.channel_mapping.evidence import (
     likelihood,
     quiet_noise,
 )
-from tomoskin.calibration.channel_mapping.wiring import Wiring, ring_of, swaps, turns
+from tomoskin.calibration.channel_mapping.mapping import ChannelMapping, ring_of, swaps, turns
 from tomoskin.calibration.locator import Presses
 from tomoskin.core import DataError, FloatArray
 from tomoskin.skin import Skin
@@ -31,41 +31,41 @@ _WORTH = 10.0
 """Independent readings of a press: few, as what the model misses is alike in many rows."""
 
 _TRIED = 1000
-"""Exchanges that are tried at a time: all of those of so many of the best wirings, at least 6."""
+"""Exchanges that are tried at a time: all of those of so many of the best mappings, at least 6."""
 
 _MOST_SWAPS = 3
 _SWAPPED = 0.1
 """Probability beforehand that two wires are exchanged, given all the others."""
 
 _NOTHING = 0.1
-"""Probability beforehand that the presses do not tell of any wiring."""
+"""Probability beforehand that the presses do not tell of any mapping."""
 
 _ASKED = 160
 """Places at which a further press is thought of."""
 
 _ALIKE = 0.999
-"""Two wirings whose answers agree so well at all places are one."""
+"""Two mappings whose answers agree so well at all places are one."""
 
 _ELSEWHERE = 8.0
 """Log-likelihood by which a press must fit better at another place to be remarked on."""
 
 _DOUBTFUL = 0.25
 """Part of the presses that may be remarked on, where the answer is still sure: beyond that it is
-the wiring that is wrong."""
+the mapping that is wrong."""
 
 _FAR = 0.2
 """How far that place must be from the label, in parts of the sheet's extent."""
 
 
 @dataclass(frozen=True, eq=False)
-class WiringAnswer:
-    """What labelled presses say of the wiring.
+class MappingAnswer:
+    """What labelled presses say of the mapping.
 
     Attributes
     ----------
     presses
         How many there were.
-    wiring, probability
+    mapping, probability
         The likeliest, with all that no press could tell from it.
     runner_up, odds
         The likeliest that is not equivalent, and how many times as likely the first is.
@@ -81,9 +81,9 @@ class WiringAnswer:
     """
 
     presses: int
-    wiring: Wiring
+    mapping: ChannelMapping
     probability: float
-    runner_up: Wiring
+    runner_up: ChannelMapping
     odds: float
     unexplained: float
     polarity_known: bool
@@ -101,7 +101,7 @@ class WiringAnswer:
         return len(self.contradicted) > _DOUBTFUL * self.presses
 
 
-def solve_wiring(
+def solve_channel_mapping(
     dv: ArrayLike,
     xy: ArrayLike,
     skin: Skin,
@@ -109,8 +109,8 @@ def solve_wiring(
     reference: FloatArray | None = None,
     noise: FloatArray | None = None,
     progress: Advance = lambda _done, _total: None,
-) -> WiringAnswer:
-    """Which wiring explains labelled presses.
+) -> MappingAnswer:
+    """Which mapping explains labelled presses.
 
     Every rotation, mirroring and polarity is weighed, and from the best of them up to three
     exchanges of two wires. A drive and a measuring cable that are swapped measure the same
@@ -149,7 +149,7 @@ def solve_wiring(
     scores = _searched(evidence, ring_of(skin), signed)
     progress(2, 3)
     answer = _weighed(scores, there, sd, signed, n)
-    contradicted = _contradicted(evidence, there, answer.wiring)
+    contradicted = _contradicted(evidence, there, answer.mapping)
     progress(3, 3)
     return replace(answer, contradicted=contradicted)
 
@@ -165,11 +165,11 @@ def _checked(presses: Presses, skin: Skin) -> Presses:
 
 def _searched(
     evidence: MappingLikelihood, ring: tuple[int, ...], signed: bool
-) -> dict[Wiring, float]:
-    """Log-probability of the wirings that were looked at, prior included, not normalised."""
+) -> dict[ChannelMapping, float]:
+    """Log-probability of the mappings that were looked at, prior included, not normalised."""
     polarities = (False, True) if signed else (False,)
     frontier = [replace(w, reversed=r) for w in turns(ring) for r in polarities]
-    searched: dict[Wiring, float] = {}
+    searched: dict[ChannelMapping, float] = {}
     each = np.log((1 - _SWAPPED) / len(frontier))
     pairs = len(ring) * (len(ring) - 1) / 2
     for _ in range(1 + _MOST_SWAPS):
@@ -183,12 +183,12 @@ def _searched(
 
 
 def _weighed(
-    scores: dict[Wiring, float],
+    scores: dict[ChannelMapping, float],
     there: IndentationResponses,
     noise: FloatArray,
     signed: bool,
     presses: int,
-) -> WiringAnswer:
+) -> MappingAnswer:
     """The likeliest, with those that no press at all could tell from it."""
     ranked = sorted(scores, key=lambda w: -scores[w])
     weights = np.exp(np.array([scores[w] for w in ranked]) - scores[ranked[0]])
@@ -198,28 +198,28 @@ def _weighed(
     answers = there.rows([best], there.changes[0])[0]
     faint = 0.02 * float(np.median(np.abs(answers))) * noise / np.median(noise)
     second, place, odds = ranked[1], there.positions[0], float("inf")
-    for wiring, weight in zip(ranked[1:], weights[1:].tolist(), strict=True):
-        others = there.rows([wiring], there.changes[0])[0]
+    for mapping, weight in zip(ranked[1:], weights[1:].tolist(), strict=True):
+        others = there.rows([mapping], there.changes[0])[0]
         same = agreement(answers, others, faint)
-        same = same * (1 if wiring.reversed == best.reversed else -1)
+        same = same * (1 if mapping.reversed == best.reversed else -1)
         if same.min() > _ALIKE:
             mine += weight
             continue
-        second, odds = wiring, mine / max(weight, 1e-300)
+        second, odds = mapping, mine / max(weight, 1e-300)
         place = there.positions[int(np.argmin(same))]
         break
     unexplained, sure = float(nothing / total), float(mine / total)
-    return WiringAnswer(presses, best, sure, second, odds, unexplained, signed, place, ())
+    return MappingAnswer(presses, best, sure, second, odds, unexplained, signed, place, ())
 
 
 def _contradicted(
-    evidence: MappingLikelihood, there: IndentationResponses, wiring: Wiring
+    evidence: MappingLikelihood, there: IndentationResponses, mapping: ChannelMapping
 ) -> tuple[tuple[int, float, float], ...]:
     """Presses that fit far better at another place than at their label."""
     extent = float(np.ptp(there.positions, axis=0).max())
-    labelled = evidence.sheet.rows([wiring], evidence.sheet.changes)[0]
-    elsewhere = there.rows([wiring], there.changes)[0]
-    fits = np.array(evidence.signs)[:, None] * (-1.0 if wiring.reversed else 1.0)
+    labelled = evidence.sheet.rows([mapping], evidence.sheet.changes)[0]
+    elsewhere = there.rows([mapping], there.changes)[0]
+    fits = np.array(evidence.signs)[:, None] * (-1.0 if mapping.reversed else 1.0)
     remarks = []
     for row, dv in enumerate(evidence.dv):
         mine = (fits * agreement(dv, labelled[:, row], evidence.noise)).max()

@@ -1,4 +1,4 @@
-"""A wiring: at which electrode each wire ends, and which way round voltages are read."""
+"""A mapping: at which electrode each wire ends, and which way round voltages are read."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ _MICRON = 1e6
 
 
 @dataclass(frozen=True)
-class Wiring:
+class ChannelMapping:
     """How the wires of a board or recording meet the electrodes that a skin file describes.
 
     Attributes
     ----------
-    places
+    electrodes
         For each wire, the electrode of the skin file that it is really at; 0, 1, 2, … when all is
         as the file says.
     reversed
         Whether voltages come with the opposite sign.
     """
 
-    places: tuple[int, ...]
+    electrodes: tuple[int, ...]
     reversed: bool = False
 
     @classmethod
@@ -40,21 +40,21 @@ class Wiring:
         """Turned by a number of electrodes along ``ring``, their order along the rim."""
         n, rank = len(ring), {electrode: k for k, electrode in enumerate(ring)}
         way = -1 if mirrored else 1
-        places = tuple(ring[(steps + way * rank[p]) % n] for p in self.places)
-        return replace(self, places=places)
+        electrodes = tuple(ring[(steps + way * rank[p]) % n] for p in self.electrodes)
+        return replace(self, electrodes=electrodes)
 
     def swapped(self, a: int, b: int) -> Self:
         """With the wires ``a`` and ``b`` exchanged."""
-        places = list(self.places)
-        places[a], places[b] = places[b], places[a]
-        return replace(self, places=tuple(places))
+        electrodes = list(self.electrodes)
+        electrodes[a], electrodes[b] = electrodes[b], electrodes[a]
+        return replace(self, electrodes=tuple(electrodes))
 
     def applied(self, skin: Skin) -> Skin:
         """Skin whose electrodes are named by the wires that end at them."""
-        where = skin.electrode_centres[list(self.places)]
+        where = skin.electrode_centres[list(self.electrodes)]
         impedance = skin.document["electrodes"]["contact_impedance"]
         if isinstance(impedance, list):
-            impedance = [impedance[place] for place in self.places]
+            impedance = [impedance[place] for place in self.electrodes]
         evenly: dict[str, object] = dict.fromkeys(("count", "first", "order"))
         electrodes = evenly | {"positions": _written(where), "contact_impedance": impedance}
         was = skin.polarity < 0
@@ -63,9 +63,9 @@ class Wiring:
 
     def text(self, ring: tuple[int, ...]) -> str:
         """In words: what differs from the skin file."""
-        plain = Wiring.as_drawn(len(ring))
+        plain = ChannelMapping.as_drawn(len(ring))
         turns = [
-            (sum(a != b for a, b in zip(self.places, base.places, strict=True)), m, k, base)
+            (sum(a != b for a, b in zip(self.electrodes, base.electrodes, strict=True)), m, k, base)
             for m in (False, True)
             for k in range(len(ring))
             for base in [plain.turned(ring, k, mirrored=m)]
@@ -76,8 +76,8 @@ class Wiring:
             said.append("mirrored")
         if steps:
             said.append(f"turned by {steps} electrode{'s' if steps > 1 else ''}")
-        odd = [k for k, place in enumerate(self.places) if place != base.places[k]]
-        said += [f"E{k + 1} at the place of E{self.places[k] + 1}" for k in odd]
+        odd = [k for k, place in enumerate(self.electrodes) if place != base.electrodes[k]]
+        said += [f"E{k + 1} at the place of E{self.electrodes[k] + 1}" for k in odd]
         if self.reversed:
             said.append("polarity reversed")
         return ", ".join(said) or "as the skin file says"
@@ -92,18 +92,18 @@ def ring_of(skin: Skin) -> tuple[int, ...]:
     return tuple(order.tolist())
 
 
-def turns(ring: tuple[int, ...]) -> Iterator[Wiring]:
+def turns(ring: tuple[int, ...]) -> Iterator[ChannelMapping]:
     """Every rotation and mirroring."""
-    plain = Wiring.as_drawn(len(ring))
+    plain = ChannelMapping.as_drawn(len(ring))
     for mirrored in (False, True):
         for steps in range(len(ring)):
             yield plain.turned(ring, steps, mirrored=mirrored)
 
 
-def swaps(wiring: Wiring) -> Iterator[Wiring]:
-    """Every wiring in which two wires are exchanged."""
-    for a, b in combinations(range(len(wiring.places)), 2):
-        yield wiring.swapped(a, b)
+def swaps(mapping: ChannelMapping) -> Iterator[ChannelMapping]:
+    """Every mapping in which two wires are exchanged."""
+    for a, b in combinations(range(len(mapping.electrodes)), 2):
+        yield mapping.swapped(a, b)
 
 
 def _written(where: FloatArray) -> list[list[str]]:
