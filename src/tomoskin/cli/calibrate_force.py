@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+from tomoskin.cli.frame_ranges import labels_of_frames
 from tomoskin.cli.named_files import ForceFlag, Reads
 from tomoskin.cli.options import CalibrationOut, ReferenceOption, SkinOption
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
@@ -88,7 +89,12 @@ def _labels(path: Path, n: int, given: Sequence[str]) -> FloatArray:
     from tomoskin.formats import is_session
 
     if given:
-        return _ranges(given, n)
+        return np.array(
+            [
+                _number(text) if text else np.nan
+                for text in labels_of_frames(given, n, "--weight", "FORCE")
+            ]
+        )
     arrays = {} if is_session(path) or path.suffix.lower() != ".npz" else load_arrays(path)
     if "force_n" not in arrays:
         raise DataError(
@@ -102,28 +108,14 @@ def _labels(path: Path, n: int, given: Sequence[str]) -> FloatArray:
     return labels
 
 
-def _ranges(given: Sequence[str], n: int) -> FloatArray:
-    labels = np.full(n, np.nan)
-    for text in given:
-        value, _, span = text.partition("=")
-        first, colon, last = span.partition(":")
-        try:
-            number = float(value)
-        except ValueError:
-            number = np.nan
-        if not (np.isfinite(number) and colon and first.isdigit() and last.isdigit()):
-            raise typer.BadParameter(f'expected FORCE=A:B, got "{text}"', param_hint="--weight")
-        start, stop = int(first), int(last)
-        if not 0 <= start < stop <= n:
-            raise DataError(f"expected frames within 0:{n}, got {span}", where=f"--weight {text}")
-        if np.isfinite(labels[start:stop]).any():
-            raise DataError(
-                f"frames of {span} have two forces",
-                where=f"--weight {text}",
-                hint="each frame shows one weight",
-            )
-        labels[start:stop] = number
-    return labels
+def _number(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = np.nan
+    if not np.isfinite(number):
+        raise typer.BadParameter(f'expected a number as FORCE, got "{text}"', param_hint="--weight")
+    return number
 
 
 def _weighed(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
+from tomoskin.cli.frame_ranges import labels_of_frames
 from tomoskin.cli.named_files import ForceFlag, Reads
 from tomoskin.cli.options import CalibrationOut, KnownSkinOption, ReferenceOption
 from tomoskin.cli.output import Bar, JsonFlag, emit
@@ -39,7 +40,11 @@ def marked(path: Path, dv: FloatArray, given: list[str], codes: Codes | None) ->
         own = Codes(tuple(map(str, names)), exclusive=False)
         return Examples.of(codes or own, dv, flags)
     if given or "state" in arrays:
-        labels = _ranges(given, len(dv)) if given else [str(s) for s in arrays["state"].tolist()]
+        labels = (
+            labels_of_frames(given, len(dv), "--state", "NAME")
+            if given
+            else [str(s) for s in arrays["state"].tolist()]
+        )
         codes = codes or Codes.of_labels(labels)
         return Examples.of(codes, dv, codes.flags_of(labels))
     if codes is None:
@@ -61,28 +66,6 @@ def _arrays(path: Path) -> Arrays:
     if "flags" in arrays and arrays["flags"].dtype.kind not in "biuf":
         raise DataError(f"expected numbers in flags, got {arrays['flags'].dtype}", where=str(path))
     return arrays
-
-
-def _ranges(given: list[str], n: int) -> list[str]:
-    """(n,) state of each frame, "" without one."""
-    labels = [""] * n
-    for text in given:
-        name, equals, span = text.partition("=")
-        first, colon, last = span.partition(":")
-        if not (name and equals and colon and first.isdigit() and last.isdigit()):
-            raise typer.BadParameter(f'expected NAME=A:B, got "{text}"', param_hint="--state")
-        start, stop = int(first), int(last)
-        if not 0 <= start < stop <= n:
-            raise DataError(f"expected frames within 0:{n}, got {span}", where=f"--state {name}")
-        taken = sorted({labels[k] for k in range(start, stop)} - {"", name})
-        if taken:
-            raise DataError(
-                f"frames of {span} are already {taken[0]}",
-                where=f"--state {name}",
-                hint="each frame shows one state",
-            )
-        labels[start:stop] = [name] * (stop - start)
-    return labels
 
 
 _HARDLY = 0.5
