@@ -229,6 +229,7 @@ def test_a_host_that_does_not_read_costs_whole_frames(pico: PicoPrograms, tmp_pa
     with powered(pico, tmp_path, "-f") as board, board.link(SCAN, settings) as link:
         frames_of(link, 3)
         board.order("stall")
+        board.until(lambda seen: bool(seen["stalled"]))
         drives = board.watch()["drives"]
         board.until(lambda seen: seen["drives"] > drives + 200)
         board.order("flow")

@@ -90,13 +90,12 @@ function attempt(work) {
 }
 
 const read = Buffer.alloc(256);
-let stalled = false;
 
 function serve() {
   if (out.length > 0) {
     out = out.subarray(attempt(() => writeSync(line, out)));
   }
-  host.stalled = stalled || out.length > MOST_WAITING;
+  host.stalled = watch.seen.stalled || out.length > MOST_WAITING;
   if (host.waiting === 0) {
     host.send(read.subarray(0, attempt(() => readSync(line, read, 0, read.length, null))));
   }
@@ -141,8 +140,8 @@ function slice() {
 const orders = {
   unplug: () => host.unplug(),
   plug: () => host.plug(),
-  stall: () => (stalled = true),
-  flow: () => (stalled = false),
+  stall: () => (watch.seen.stalled = true),
+  flow: () => (watch.seen.stalled = false),
 };
 if (options.dependent) {
   process.stdin.setEncoding('utf8');

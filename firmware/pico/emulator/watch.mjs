@@ -5,7 +5,7 @@ export class Watch {
   /** Written to `path`; undefined: nothing is kept. */
   constructor(path) {
     this.path = path;
-    this.seen = { longestOn: 0, shortestOff: null, resets: 0, drives: 0, serial: '' };
+    this.seen = { longestOn: 0, shortestOff: null, resets: 0, drives: 0, serial: '', stalled: false };
     this.instants = new Map();
   }
 
