@@ -21,7 +21,7 @@ READING = Detection(
 TOUCHES = (
     Touch(1, "decrease", 0.5, replace(READING, close=False), (1, 3)),
     Touch(2, "decrease", 0.5, READING),
-    Touch(4, "increase", 0.5, replace(READING, close=False)),
+    Touch(4, "increase", 0.5, replace(READING, close=False, force=Force(4.0, 3.5, 4.75))),
 )
 
 
@@ -47,6 +47,7 @@ def test_touches_come_back_as_they_were(session: Path) -> None:
             put.detection.cov_xy,
             put.detection.close,
         )
+        assert got.detection.force == put.detection.force
 
 
 def test_a_touch_that_was_only_seen_merged_counts(session: Path) -> None:

@@ -2,12 +2,21 @@
 
 const MAGIC = 0x314b5354; // "TSK1"
 const HEADER = 40;
-const TOUCH = 40;
+const TOUCH = 52;
 const TRUTH = 16;
 const BEND = 16;
 const READY = 1;
 const NO_PICTURE = 2;
 const BENT = 8;
+
+/** Median, and an interval that nine in ten lie in, N. */
+export interface Force {
+  readonly newtons: number;
+  readonly low: number;
+  readonly high: number;
+  /** False: it rests on the skin file's material alone. */
+  readonly calibrated: boolean;
+}
 
 export interface Touch {
   readonly id: number;
@@ -21,6 +30,8 @@ export interface Touch {
   readonly covXy: number;
   /** m². */
   readonly area: number;
+  /** N; null where no calibration tells it. */
+  readonly force: Force | null;
   /** Signed change of conductivity at the peak, in the scene's unit. */
   readonly peak: number;
   /** Seconds since the touch began. */
@@ -80,6 +91,18 @@ function touchAt(data: DataView, at: number): Touch {
     peak: data.getFloat32(at + 28, true),
     since: data.getFloat32(at + 32, true),
     several: data.getUint8(at + 5),
+    force: forceAt(data, at),
+  };
+}
+
+function forceAt(data: DataView, at: number): Force | null {
+  const state = data.getUint8(at + 6);
+  if (state === 0) return null;
+  return {
+    newtons: data.getFloat32(at + 40, true),
+    low: data.getFloat32(at + 44, true),
+    high: data.getFloat32(at + 48, true),
+    calibrated: state === 1,
   };
 }
 

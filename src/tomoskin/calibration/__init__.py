@@ -1,5 +1,6 @@
 """What is learnt from examples: touch positions, forces, classes, bends, channel mapping."""
 
+from pathlib import Path
 from typing import Any
 
 from tomoskin._moved import moved
@@ -22,7 +23,9 @@ from tomoskin.calibration.kind import (
     Differences,
     FrameView,
     Kind,
+    Progress,
     TouchFit,
+    silent,
 )
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
@@ -34,9 +37,22 @@ from tomoskin.calibration.weighing.identify import MaterialFit, identify
 from tomoskin.calibration.weighing.measured import ForceProcess
 from tomoskin.calibration.weighing.model import ForceModel, LabelRemark, PressedSpot
 from tomoskin.calibration.weighing.presses import WeighedPresses
+from tomoskin.core import DataError, load_arrays
 
 KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, BENDS, CLASSES)
 """Every kind whose calibrations are applied to frames, in the order in which they are applied."""
+
+
+def load_calibration(path: Path, progress: Progress = silent) -> Calibration[Any]:
+    """Read a file of any of the :data:`KINDS`. Raises DataError where it is of none."""
+    title = str(load_arrays(path).get("kind", ""))
+    kind = next((kind for kind in KINDS if kind.title == title), None)
+    if kind is None:
+        raise DataError(
+            "is not a calibration", where=str(path), hint="make one: tomoskin calibrate --help"
+        )
+    return kind.read(path, progress)
+
 
 __all__ = [
     "BENDS",
@@ -78,6 +94,7 @@ __all__ = [
     "WeighedPresses",
     "against_rest",
     "identify",
+    "load_calibration",
     "ring_of",
     "solve_channel_mapping",
 ]

@@ -159,5 +159,6 @@ CLASSES = Kind(
     exclude=FrameClassifier.without,
     apply=_apply,
     skin_id=lambda frames: frames.classifier.skin_id,
+    own_settings=True,
 )
 """Classes of frames; its model is a :class:`FrameClassifier`."""

@@ -179,6 +179,8 @@ class Kind(Generic[M]):
         Whether its positions stand in for those of the image.
     fits
         Whether it needs touches fitted to the data of each frame.
+    own_settings
+        Whether it serves only the skin that it was learnt on, with the settings that it had.
     """
 
     name: str
@@ -197,6 +199,7 @@ class Kind(Generic[M]):
     directions: Callable[[M], FloatArray] | None = None
     locates: bool = False
     fits: bool = False
+    own_settings: bool = False
 
     def of(self, model: M, pattern: Pattern, skin: Skin | None = None) -> Calibration[M]:
         """A calibration of this kind, of the measurements of ``pattern``."""

@@ -9,6 +9,7 @@ import typer
 
 from tomoskin.cli.options import DEFAULT_SKIN
 from tomoskin.cli.output import remark
+from tomoskin.core import DataError
 
 if TYPE_CHECKING:
     from tomoskin.formats import Display
@@ -127,30 +128,26 @@ def chosen_sinks(specs: list[str] | None) -> tuple[Sink, ...]:
     return tuple(make_sink(spec) for spec in specs or ())
 
 
-def with_bends(prepared: Prepared, path: Path | None) -> Prepared:
-    """The skin with its bends, where a calibration is named. Raises DataError for others."""
-    from tomoskin.calibration import BENDS
+def with_calibrations(prepared: Prepared, paths: list[Path] | None, skin: Skin) -> Prepared:
+    """The skin with the calibrations named, of any kind.
 
-    return prepared if path is None else prepared.calibrated(BENDS.read(path))
-
-
-def with_forces(prepared: Prepared, path: Path | None) -> Prepared:
-    """The skin with forces, where a calibration is named. Raises DataError for those of another."""
-    from tomoskin.calibration import FORCE
-
-    return prepared if path is None else prepared.calibrated(FORCE.read(path))
-
-
-def with_states(prepared: Prepared, path: Path | None, skin: Skin) -> Prepared:
-    """The skin with its states, where a calibration is named.
-
-    ``skin`` as its file says, whatever images are made of it. Raises DataError for states of
-    another.
+    ``skin`` as its file says, whatever images are made of it. Raises DataError for calibrations of
+    another skin, and for two of one kind.
     """
-    from tomoskin.calibration import CLASSES
+    from tomoskin.calibration import load_calibration
 
-    if path is None:
-        return prepared
-    calibration = CLASSES.read(path)
-    calibration.check_skin(skin)
-    return prepared.calibrated(calibration)
+    named: dict[str, Path] = {}
+    for path in paths or ():
+        calibration = load_calibration(path)
+        kind = calibration.kind
+        if kind.name in named:
+            raise DataError(
+                f"is a calibration of {kind.subject}, and so is {named[kind.name]}",
+                where=str(path),
+                hint="name one of them",
+            )
+        named[kind.name] = path
+        if kind.own_settings:
+            calibration.check_skin(skin)
+        prepared = prepared.calibrated(calibration)
+    return prepared

@@ -15,24 +15,20 @@ from tomoskin.cli.choices import (
     display_of,
     skin_for_file,
     with_alpha,
-    with_bends,
-    with_forces,
-    with_states,
+    with_calibrations,
     with_time_constant,
 )
 from tomoskin.cli.named_files import ForceFlag, Writes
 from tomoskin.cli.options import (
     AlphaOption,
-    BendOption,
+    CalibrationsOption,
     FramesOption,
     LimitOption,
-    NewtonsOption,
     PercentFlag,
     RecordingArgument,
     ReferenceOption,
     SkinOption,
     SmoothOption,
-    StatesOption,
     TimeConstantOption,
     TouchesOut,
 )
@@ -67,9 +63,7 @@ def image(
     frames: FramesOption = None,
     alpha: AlphaOption = None,
     time_constant: TimeConstantOption = None,
-    bend: BendOption = None,
-    states: StatesOption = None,
-    newtons: NewtonsOption = None,
+    calibration: CalibrationsOption = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go."),
@@ -83,6 +77,7 @@ def image(
     json: JsonFlag = False,
 ) -> None:
     """Write the images of a recording and the touches in them, or say what they are."""
+    from tomoskin.calibration import FORCE
     from tomoskin.formats import read_recording, write_touches
     from tomoskin.pipeline import prepare, reconstruct
     from tomoskin.touch import touch_spans
@@ -93,8 +88,7 @@ def image(
     display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
     data = read_recording(recording)  # what cannot be read is said before the work
     with Bar("preparing"):
-        prepared = with_states(with_bends(prepare(chosen), bend), states, own)
-        prepared = with_forces(prepared, newtons)
+        prepared = with_calibrations(prepare(chosen), calibration, own)
     recorded = data.in_order_of(prepared.pattern)
     say_notes(recorded)
     idle = idle_frames(recorded, reference, prepared.pattern)
@@ -105,7 +99,7 @@ def image(
     times = recorded.time[result.frames].tolist()
     if touches is not None:
         rows = zip(result.frames.tolist(), times, result.touches, strict=True)
-        surface, forces = prepared.skin.surface, newtons is not None
+        surface, forces = prepared.skin.surface, FORCE.name in prepared.calibrations
         write_touches(touches, rows, surface, forces=forces, overwrite=force)
     if out is not None:
         WRITERS[out.suffix.lower()](out, prepared, result, display, overwrite=force)

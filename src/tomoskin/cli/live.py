@@ -14,11 +14,10 @@ from tomoskin.cli.choices import (
     chosen_sinks,
     say_headroom,
     skin_for_source,
-    with_bends,
-    with_states,
+    with_calibrations,
 )
-from tomoskin.cli.named_files import RECORDING, Otherwise, Reads, Writes
-from tomoskin.cli.options import BendOption, SinkOption, SkinOption, SourceOption, StatesOption
+from tomoskin.cli.named_files import RECORDING, Otherwise, Writes
+from tomoskin.cli.options import CalibrationsOption, SinkOption, SkinOption, SourceOption
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.record import ended_by_signals, recording_to
 
@@ -37,11 +36,7 @@ def live(
         typer.Option(metavar="FILE", help="Record the session to a new file, such as run.mcap."),
         Writes(RECORDING),
     ] = None,
-    calibration: Annotated[
-        Path | None,
-        typer.Option(metavar="C.npz", help="Positions of touches by a calibration of touch."),
-        Reads(),
-    ] = None,
+    calibration: CalibrationsOption = None,
     folder: Annotated[
         Path,
         typer.Option(
@@ -57,8 +52,6 @@ def live(
         ),
         Otherwise("made where there is none, else only read"),
     ] = None,
-    bend: BendOption = None,
-    states: StatesOption = None,
     sink: SinkOption = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = 8765,
     host: Annotated[
@@ -88,8 +81,8 @@ def live(
         check_page()
         sinks = chosen_sinks(sink)
         with Bar("preparing"):
-            prepared = with_bends(_prepared(skin, source, calibration), bend)
-            prepared = with_states(prepared, states, prepared.skin)
+            prepared = _prepared(skin, source)
+            prepared = with_calibrations(prepared, calibration, prepared.skin)
         say_headroom(prepared.headroom)
         chosen = prepared.skin
         with listen(host, port) as listener:
@@ -111,21 +104,16 @@ def live(
         _farewell(runner, json=json)
 
 
-def _prepared(skin: str | None, source: str, calibration: Path | None) -> Prepared:
-    """The skin with the calibration named; of a recording with the others that it holds."""
-    from tomoskin.calibration import TOUCH
+def _prepared(skin: str | None, source: str) -> Prepared:
+    """The skin, of a recording with the calibrations that it holds."""
     from tomoskin.pipeline import prepare
     from tomoskin.recording import SessionReader, as_recorded, parse_replay
 
     name, _, argument = source.partition(":")
     if skin is None and name == "replay":
         with SessionReader(parse_replay(argument)[0]) as session:
-            prepared = as_recorded(session)
-    else:
-        prepared = prepare(skin_for_source(skin, source))
-    if calibration is None:
-        return prepared
-    return prepared.calibrated(TOUCH.read(calibration))
+            return as_recorded(session)
+    return prepare(skin_for_source(skin, source))
 
 
 def _token(token_file: Path | None) -> dict[str, str]:

@@ -122,3 +122,5 @@ def _files(value: Any) -> Iterator[Path]:
         yield value
     elif isinstance(value, str) and value:
         yield Path(value)
+    elif isinstance(value, list):
+        yield from (path for path in value if isinstance(path, Path))

@@ -49,24 +49,16 @@ ReferenceOption = Annotated[
 FramesOption = Annotated[
     str | None, typer.Option(metavar="A:B", help="Only frames A to B-1 (from 0).")
 ]
-BendOption = Annotated[
-    Path | None,
+CalibrationsOption = Annotated[
+    list[Path] | None,
     typer.Option(
-        metavar="C.npz", help="From tomoskin calibrate bend: bends are taken out, and read."
-    ),
-    Reads(),
-]
-StatesOption = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="C.npz", help="From tomoskin calibrate states: the state of each frame is told."
-    ),
-    Reads(),
-]
-NewtonsOption = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="C.npz", help="From tomoskin calibrate force: the force of each touch is told."
+        "--calibration",
+        "--bend",
+        "--states",
+        "--newtons",
+        metavar="C.npz",
+        help="From tomoskin calibrate, of any kind: positions and forces of touches, bends or "
+        "states are read in each frame; once for each kind.",
     ),
     Reads(),
 ]

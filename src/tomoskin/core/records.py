@@ -154,6 +154,11 @@ class Force:
     calibrated: bool = True
 
     @property
+    def state(self) -> str:
+        """``calibrated`` or ``uncalibrated``."""
+        return "calibrated" if self.calibrated else "uncalibrated"
+
+    @property
     def text(self) -> str:
         """For people."""
         state = "" if self.calibrated else ", uncalibrated"

@@ -104,8 +104,10 @@ class Export:
 
     def touches(self, path: Path) -> None:
         """Write a table of the recorded touches."""
-        rows = scanned_touches(self.session)
-        write_touches(path, rows, self.session.skin.surface, overwrite=self.overwrite)
+        rows = list(scanned_touches(self.session))
+        forces = any(t.detection.force is not None for _, _, touches in rows for t in touches)
+        surface = self.session.skin.surface
+        write_touches(path, rows, surface, forces=forces, overwrite=self.overwrite)
 
     def _panels(self, prepared: Prepared) -> Iterator[Panel]:
         first: float | None = None

@@ -70,8 +70,7 @@ def _force(touch: Touch) -> tuple[str, ...]:
     force = touch.detection.force
     if force is None:
         return ("",) * len(FORCE)
-    state = "calibrated" if force.calibrated else "uncalibrated"
-    return (*map(_number, (force.newtons, force.low, force.high)), state)
+    return (*map(_number, (force.newtons, force.low, force.high)), force.state)
 
 
 def _in_space(touch: Touch, surface: Surface | None) -> tuple[str, ...]:

@@ -60,6 +60,10 @@ _TOUCH = _object(
     cov_xy=_MAYBE,
     close={"type": "boolean"},
     merged=_list(_INTEGER),
+    force=_MAYBE,
+    force_low=_MAYBE,
+    force_high=_MAYBE,
+    force_calibrated={"type": "boolean"},
 )
 _PRESS = _object(x=_NUMBER, y=_NUMBER, force=_NUMBER, radius=_NUMBER)
 _LOG = _object(

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from enum import IntFlag
 from typing import Any
 
 import msgspec
 import numpy as np
 
-from tomoskin.core import DataError, Detection, Event, Frame, Touch
+from tomoskin.core import DataError, Detection, Event, Force, Frame, Touch
 
 _CDR = b"\x00\x01\x00\x00"
 _FRAME = struct.Struct("<4sdQIHHBBxxI")
@@ -105,6 +105,7 @@ def _wrong(what: str, data: bytes | memoryview, where: str) -> DataError:
     return DataError(f"expected {what}, got {len(data)} bytes that are not", where=where)
 
 
+_FORCE = ("force", "force_low", "force_high", "force_calibrated")
 _NO_CELLS = np.empty(0, dtype=np.int64)
 
 
@@ -133,9 +134,10 @@ def touches_message(host_time: float, sequence: int, touches: Sequence[Touch]) -
 
 
 def touch_row(touch: Touch) -> dict[str, Any]:
-    """One touch as plain values by name."""
-    r = touch.detection
-    return {
+    """One touch as plain values by name; its force, N, only where a calibration tells it."""
+    r, force = touch.detection, touch.detection.force
+    newtons = {} if force is None else dict(zip(_FORCE, astuple(force), strict=True))
+    return newtons | {
         "id": touch.id, "kind": touch.kind, "since": touch.since,
         "x": r.x, "y": r.y, "sd_x": r.sd_x, "sd_y": r.sd_y, "area": r.area, "peak": r.peak,
         "cov_xy": r.cov_xy, "close": r.close, "merged": touch.merged,
@@ -163,5 +165,6 @@ def _touch_of(item: dict[str, Any]) -> Touch:
     sd_x, sd_y = (float("nan") if item[k] is None else item[k] for k in ("sd_x", "sd_y"))
     place = item["x"], item["y"], sd_x, sd_y, item["area"], item["peak"], _NO_CELLS
     cov_xy, close, merged = (item.get(k) for k in ("cov_xy", "close", "merged"))  # format 1.0: none
-    reading = Detection(*place, cov_xy=cov_xy or 0.0, close=bool(close))
+    force = Force(*(item[k] for k in _FORCE)) if item.get("force") is not None else None
+    reading = Detection(*place, cov_xy=cov_xy or 0.0, close=bool(close), force=force)
     return Touch(item["id"], item["kind"], item["since"], reading, tuple(merged or ()))

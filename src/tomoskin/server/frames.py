@@ -5,9 +5,10 @@ header, 40 bytes      ``TSK1``, sequence u32, host_time f64, n_cells u32, n_meas
                       n_touches u16, n_truth u16, flags u32, latency_us u32, reserved u32
 image                 f32 [n_cells], change of conductivity in the scene's unit
 voltages, reference   f32 [n_meas] each, V
-touches, 40 bytes     id u32, kind u8 (0 decrease, 1 increase), apart u8 (0 yes, 1 may be
-each                  several, n > 1: n that have merged), 2 pad, x, y, sd_x, sd_y (NaN unknown),
-                      area, peak, since (s ago), cov_xy (m²) f32
+touches, 52 bytes     id u32, kind u8 (0 decrease, 1 increase), apart u8 (0 yes, 1 may be
+each                  several, n > 1: n that have merged), force u8 (0 none, 1 calibrated,
+                      2 uncalibrated), 1 pad, x, y, sd_x, sd_y (NaN unknown), area, peak,
+                      since (s ago), cov_xy (m²), force and its interval (N, NaN none) f32
 truth, 16 bytes each  x, y (m), force (N), radius (m) f32: the presses on the twin
 bend, 16 bytes        with flag bit 3 only: angle, its deviation, axis (rad) f32, state u32 (a
                       place in :data:`BEND_STATES`)
@@ -26,7 +27,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tomoskin.calibration import BendReading
-from tomoskin.core import Touch
+from tomoskin.core import Force, Touch
 from tomoskin.pipeline import FrameResult
 from tomoskin.run import Runner, Snapshot
 from tomoskin.twin import Contact
@@ -52,13 +53,14 @@ _HEADER = np.dtype(
     ]
 )
 _BEND = np.dtype([("angle", "<f4"), ("sd", "<f4"), ("axis", "<f4"), ("state", "<u4")])
-_MEASURES = ("x", "y", "sd_x", "sd_y", "area", "peak", "since", "cov_xy")
+_MEASURES = ("x", "y", "sd_x", "sd_y", "area", "peak", "since", "cov_xy", "force", "low", "high")
 _TOUCH = np.dtype(
     [
         ("id", "<u4"),
         ("kind", "u1"),
         ("apart", "u1"),
-        ("pad", "u1", 2),
+        ("force_state", "u1"),
+        ("pad", "u1"),
         *((name, "<f4") for name in _MEASURES),
     ]
 )
@@ -140,7 +142,8 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
             t.id % 2**32,
             t.kind == "increase",
             min(len(t.merged), _MOST) or t.detection.close,
-            (0, 0),
+            _force_state(t.detection.force),
+            0,
             t.detection.x,
             t.detection.y,
             t.detection.sd_x,
@@ -149,10 +152,19 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
             t.detection.peak,
             now - t.since,
             t.detection.cov_xy,
+            *_newtons(t.detection.force),
         )
         for t in touches
     ]
     return np.array(rows, _TOUCH).tobytes()
+
+
+def _force_state(force: Force | None) -> int:
+    return 0 if force is None else 1 if force.calibrated else 2
+
+
+def _newtons(force: Force | None) -> tuple[float, float, float]:
+    return (np.nan,) * 3 if force is None else (force.newtons, force.low, force.high)
 
 
 def _bend(bend: BendReading | None) -> bytes:

@@ -6,8 +6,9 @@ import asyncio
 import contextlib
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
-from tomoskin.calibration import TOUCH
+from tomoskin.calibration import TOUCH, Kind, load_calibration
 from tomoskin.core import FloatArray, TomoskinError, WireError
 from tomoskin.pipeline import FrameResult
 from tomoskin.run import commands
@@ -139,17 +140,18 @@ class GuideHandlers:
         self._hub.tasks.run(page, work, done)
 
     def _use(self, page: Listener, request: UseCalibration) -> None:
-        def work() -> None:
+        def work() -> Kind[Any]:
             runner = self._hub.runner
             if request.name is None:
-                prepared = runner.prepared.uncalibrated(TOUCH)
-            else:
-                calibration = TOUCH.read(self._folder.existing(request.name, ".npz"))
-                prepared = runner.prepared.calibrated(calibration)
-            runner.ask(commands.Adopt(prepared))
+                runner.ask(commands.Adopt(runner.prepared.uncalibrated(TOUCH)))
+                return TOUCH
+            calibration = load_calibration(self._folder.existing(request.name, ".npz"))
+            runner.ask(commands.Adopt(runner.prepared.calibrated(calibration)))
+            return calibration.kind
 
-        def done(_: None) -> None:
-            self._using = request.name
+        def done(kind: Kind[Any]) -> None:
+            if kind is TOUCH:
+                self._using = request.name
             self._tell()
 
         self._hub.tasks.run(page, work, done)

@@ -22,13 +22,16 @@ class Contact:
         Its identity, and where it is on the sheet.
     pose
         Where it is in the frame of its :class:`Contacts`.
-    force
-        N, against the normal; None where no calibration measures it.
     """
 
     touch: Touch
     pose: SpacePose = field(repr=False)
-    force: float | None = None
+
+    @property
+    def force(self) -> float | None:
+        """N, against the normal; None where no calibration tells it."""
+        force = self.touch.detection.force
+        return None if force is None else force.newtons
 
     @property
     def position(self) -> Vector:

@@ -40,6 +40,7 @@ class LslSink:
             for number in range(1, MOST_TOUCHES + 1)
             for name, unit in _FIELDS
         ]
+        touches += [(f"force {number}", "N") for number in range(1, MOST_TOUCHES + 1)]
         double, string = self._lsl.cf_double64, self._lsl.cf_string
         self._announce(stream, "voltages", "EIT", rows, double)
         self._announce(stream, "dv", "EIT", rows, double)
@@ -105,7 +106,9 @@ def _row_labels(pattern: Pattern) -> list[str]:
 def _touch_row(moment: Moment) -> FloatArray:
     strongest = sorted(moment.touches, key=lambda t: -abs(t.detection.peak))[:MOST_TOUCHES]
     row = np.full((MOST_TOUCHES, len(_FIELDS)), np.nan)
+    forces = np.full(MOST_TOUCHES, np.nan)
     for number, touch in enumerate(strongest):
         detection = touch.detection
         row[number] = touch.id, detection.x, detection.y, detection.peak
-    return row.ravel()
+        forces[number] = np.nan if detection.force is None else detection.force.newtons
+    return np.concatenate((row.ravel(), forces))

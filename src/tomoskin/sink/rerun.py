@@ -77,9 +77,13 @@ class RerunView:
             self._series("latency", contacts.latency)
         for touch in found:
             self._series(f"peak/{touch.id}", touch.detection.peak)
+            if touch.detection.force is not None:
+                self._series(f"force/{touch.id}", touch.detection.force.newtons)
         ids = {touch.id for touch in found}
         for gone in self._ids - ids:  # or its line would go on for ever
-            self._recording.log(self._path(f"peak/{gone}"), self._rerun.Clear(recursive=False))
+            for name in ("peak", "force"):
+                gap = self._rerun.Clear(recursive=False)
+                self._recording.log(self._path(f"{name}/{gone}"), gap)
         self._ids = ids
 
     def _sheet(self, image: Image) -> None:

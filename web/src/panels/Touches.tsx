@@ -1,8 +1,8 @@
 /** The touches as a short list in large figures, and, quietly, as words for a screen reader. */
 
-import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
-import type { Touch } from "../decode";
-import { inScale, millimetres, scaleFor, type Scale } from "../format";
+import { signal, useComputed, useSignal, useSignalEffect } from "@preact/signals";
+import type { Force, Touch } from "../decode";
+import { fixed, inScale, millimetres, scaleFor, type Scale } from "../format";
 import { limit, link, scene, shown, status } from "../state";
 import { stateInWords } from "../words";
 
@@ -20,6 +20,51 @@ function tooClose(touch: Touch): string | undefined {
   return touch.several ? "may be several touches, too close to separate" : undefined;
 }
 
+/** Whether the change of conductivity is shown where forces are known too. */
+const asChange = signal(false);
+
+/** A force with its interval, in words. */
+function forceInWords({ newtons, low, high, calibrated }: Force): string {
+  const state = calibrated ? "" : ", uncalibrated";
+  return `${fixed(newtons, 1)} newtons, ${fixed(low, 1)} to ${fixed(high, 1)}${state}`;
+}
+
+function Strength({ touch, scale }: { touch: Touch; scale: Scale }) {
+  const { force } = touch;
+  if (force && !asChange.value) {
+    return (
+      <td class="large" title={`${forceInWords(force)} (nine in ten)`} data-testid="force">
+        {!force.calibrated && "≈ "}
+        {fixed(force.newtons, 1)}
+      </td>
+    );
+  }
+  return (
+    <td class="large">
+      <span class="arrow" title={touch.kind}>
+        {touch.kind === "decrease" ? "↓" : "↑"}
+      </span>
+      {inScale(Math.abs(touch.peak), scale)}
+    </td>
+  );
+}
+
+function StrengthTitle({ forces, scale }: { forces: boolean; scale: Scale }) {
+  const change = `change, ${scale.unit}`;
+  if (!forces) return <>{change}</>;
+  return (
+    <button
+      type="button"
+      class="quiet"
+      aria-pressed={asChange.value}
+      title={asChange.value ? "Show newtons" : "Show the change of conductivity"}
+      onClick={() => (asChange.value = !asChange.value)}
+    >
+      {asChange.value ? change : "force, N"}
+    </button>
+  );
+}
+
 function Row({ touch, scale }: { touch: Touch; scale: Scale }) {
   return (
     <tr data-testid="touch-row" data-id={touch.id}>
@@ -32,12 +77,7 @@ function Row({ touch, scale }: { touch: Touch; scale: Scale }) {
       <td class="large">{millimetres(touch.x)}</td>
       <td class="large">{millimetres(touch.y)}</td>
       <td class="small">{uncertainty(touch)}</td>
-      <td class="large">
-        <span class="arrow" title={touch.kind}>
-          {touch.kind === "decrease" ? "↓" : "↑"}
-        </span>
-        {inScale(Math.abs(touch.peak), scale)}
-      </td>
+      <Strength touch={touch} scale={scale} />
     </tr>
   );
 }
@@ -76,7 +116,9 @@ function Announcer() {
       const places = touches.map(
         (touch) =>
           `touch ${touch.id} at ${millimetres(touch.x, 0)}, ${millimetres(touch.y, 0)} ` +
-          ["millimetres", tooClose(touch)].filter(Boolean).join(", "),
+          ["millimetres", touch.force && forceInWords(touch.force), tooClose(touch)]
+            .filter(Boolean)
+            .join(", "),
       );
       words.value = places.length ? places.join("; ") : "No touch";
     }, 700);
@@ -128,7 +170,9 @@ export function Touches() {
                 <th scope="col" title="One standard deviation, the larger of x and y">
                   ± mm
                 </th>
-                <th scope="col">change, {scale.unit}</th>
+                <th scope="col">
+                  <StrengthTitle forces={touches.some(({ force }) => force)} scale={scale} />
+                </th>
               </tr>
             </thead>
             <tbody>

@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from tomoskin.core import DataError, written
+from tomoskin.core import DataError, Force, written
 from tomoskin.recording import (
     Advance,
     Block,
@@ -22,6 +22,7 @@ _FRAMES = ("number", "time", "host_time", "sequence", "ticks", "mark", "samples"
 _TOUCH = np.dtype(
     [("frame", "i8"), ("time", "f8"), ("id", "i8"), ("kind", "S32"), ("since", "f8")]
     + [(name, "f8") for name in ("x", "y", "sd_x", "sd_y", "area", "peak")]
+    + [("force", "f8"), ("force_low", "f8"), ("force_high", "f8"), ("force_state", "S12")]
 )
 
 
@@ -77,12 +78,19 @@ def _touches(session: SessionReader) -> Any:
     """By frame, as in every table; -1 where a touch's frame is not in the file."""
     table = [
         (-1 if frame is None else frame, time, t.id, t.said.encode(), t.since,
-         r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak)
+         r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak, *_newtons(r.force))
         for frame, time, touches in scanned_touches(session)
         for t in touches
         for r in [t.detection]
     ]  # fmt: skip
     return np.array(table, dtype=_TOUCH)
+
+
+def _newtons(force: Force | None) -> tuple[float, float, float, bytes]:
+    """N and state; NaN and nothing where no calibration tells it."""
+    if force is None:
+        return (np.nan, np.nan, np.nan, b"")
+    return force.newtons, force.low, force.high, force.state.encode()
 
 
 def _json(item: Any) -> str:
