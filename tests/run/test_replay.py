@@ -327,8 +327,7 @@ def test_a_recording_begun_later_has_the_reference(prepared, tmp_path):
         live.runner.ask(commands.Record(path))
         live.touch(0, 8)
     with SessionReader(path) as session:
-        frames = list(session.frames())
-        early = [item for item in frames if item.mark & Mark.EARLIER]
+        early = [item for item in session.frames() if item.mark & Mark.EARLIER]
         results = list(replayed(prepared, session))
     assert len(early) == REFERENCE_FRAMES + 5
     assert [r.sequence for r in results] == list(range(REFERENCE_FRAMES + 5, live.sent))
@@ -374,7 +373,8 @@ def test_a_recording_begun_late_is_replayed_to_the_bit(tmp_path, method):
         late(live, path)
     recorded = recorded_touches(path)
     with SessionReader(path) as session:
-        early = [item for item in session.frames() if item.mark & Mark.EARLIER]
+        frames = list(session.frames())
+        early = [item for item in frames if item.mark & Mark.EARLIER]
         results = list(replayed(prepared, session))
     assert len(early) == 3 * REFERENCE_FRAMES
     with SessionReader(tmp_path / "whole.mcap") as session:
