@@ -7,6 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +36,8 @@ _PAD = re.compile(
     re.DOTALL,
 )
 _POUR = re.compile(
-    r'\(zone\s+\(net \d+\)\s+\(net_name "([^"]+)"\)\s+\(layer "([^"]+)"\).*?\(polygon\s+\(pts(.*?)\)\s+\)\s',
+    r'\(zone\s+\(net \d+\)\s+\(net_name "([^"]+)"\)\s+\(layer "([^"]+)"\)'
+    r".*?\(polygon\s+\(pts(.*?)\)\s+\)\s",
     re.DOTALL,
 )
 Point = tuple[float, float]
@@ -80,7 +82,7 @@ class Pad:
 
 @dataclass(frozen=True)
 class Copper:
-    """Tracks, vias (net and place), pads, and pours of a net other than ground (net, layer, box)."""
+    """Tracks, vias (net, place), pads, and pours but ground's (net, layer, box)."""
 
     tracks: list[Track]
     vias: list[tuple[str, Point]]
@@ -138,7 +140,7 @@ class Copper:
 
         mine = [track for track in self.tracks if track.net == net]
         vias = [place for name, place in self.vias if name == net]
-        points = defaultdict(set)
+        points: dict[str, set[Point]] = defaultdict(set)
         for track in mine:
             points[track.layer] |= {track.start, track.end}
         for place in vias:
@@ -148,12 +150,12 @@ class Copper:
         for track in mine:
             chain = sorted(_along(track, points[track.layer]))
             ohms = _RESISTIVITY / (LAYERS[track.layer].thickness * track.width)
-            for (at, one), (then, other) in zip(chain, chain[1:], strict=False):
+            for (at, one), (then, other) in pairwise(chain):
                 siemens = 1 / max(ohms * (then - at), 1e-7)
                 edges.append((node((one, track.layer)), node((other, track.layer)), siemens))
         for place in vias:
             here = [node((place, layer)) for layer in LAYERS]
-            edges += [(a, b, 3 / VIA_OHMS) for a, b in zip(here, here[1:], strict=False)]
+            edges += [(a, b, 3 / VIA_OHMS) for a, b in pairwise(here)]
         joined = [(pad, pad.holds) for pad in self.pads.values() if pad.net == net]
         for key, holds in joined:
             middle = node((key.name, ""))
@@ -227,4 +229,5 @@ def _along(track: Track, points: Iterable[Point]) -> Iterator[tuple[float, Point
 def heating(amperes: float, width: float, layer: Layer) -> float:
     """Kelvins above the board, by IPC-2221: I = k ΔT^0.44 A^0.725, A in square mils."""
     mils = width * layer.thickness / 0.0254**2
-    return (amperes / (layer.ipc * mils**0.725)) ** (1 / 0.44)
+    ratio: float = amperes / (layer.ipc * mils**0.725)
+    return math.pow(ratio, 1 / 0.44)

@@ -96,7 +96,7 @@ def written() -> str:
         "cminus": "of the line that the amplifiers read against",
     }
     lines = [
-        "* What the layouts add: hardware/parasitics.py makes this file of the tracks, vias, pads and",
+        "* What the layouts add: hardware/parasitics.py makes this file of tracks, vias, pads and",
         "* stack-up of both boards; the largest of each. The ground plane itself is left out.",
     ]
     for name, value in measured().items():

@@ -64,7 +64,10 @@ def kicad() -> str:
         )
 
     def mask(side: str, name: str) -> str:
-        return f'\t\t\t(layer "{side}.Mask" (type "{name} Solder Mask") (thickness {_MASK}))'
+        return (
+            f'\t\t\t(layer "{side}.Mask" (type "{name} Solder Mask") (color "Green") '
+            f"(thickness {_MASK}))"
+        )
 
     lines = [
         mask("F", "Top"),
@@ -77,5 +80,5 @@ def kicad() -> str:
         copper("B.Cu"),
         mask("B", "Bottom"),
     ]
-    tail = ['\t\t\t(copper_finish "None")', "\t\t\t(dielectric_constraints no)"]
+    tail = ['\t\t\t(copper_finish "HAL lead-free")', "\t\t\t(dielectric_constraints no)"]
     return "\n".join(["\t\t(stackup", *lines, *tail, "\t\t)"]) + "\n"

@@ -6,11 +6,11 @@ import math
 import pytest
 
 import parasitics
-from copper import Copper, Pad, Track, heating
+from copper import ROOT, Copper, Pad, Track, heating
 from stackup import LAYERS, kicad
 
 WIDE = LAYERS["F.Cu"]
-KICAD = parasitics.ROOT / "kicad"
+KICAD = ROOT / "kicad"
 
 
 def pad(name, x, y):
@@ -70,7 +70,7 @@ def test_no_track_becomes_warm(channels):
 def test_conductors_are_further_apart_than_their_voltage_asks():
     """The rule checks hold the clearance; on a flat board without slots creepage is the same."""
     clamped = 24.4  # V, SMAJ15A at its peak current
-    most = max(clamped, max(parasitics.VOLTS.values())) - min(parasitics.VOLTS.values())
+    most = max(clamped, *parasitics.VOLTS.values()) - min(parasitics.VOLTS.values())
     for channels in parasitics.BOARDS:
         project = json.loads((KICAD / f"board-{channels}.kicad_pro").read_text(encoding="utf-8"))
         (rules,) = project["net_settings"]["classes"]
