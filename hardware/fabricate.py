@@ -13,6 +13,7 @@ import csv
 import hashlib
 import io
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -92,6 +93,8 @@ def make(channels: int) -> list[Path]:
     (ROOT / f"{name}.csv").write_text(bill(parts), encoding="utf-8")
     kicad("sch", "export", "pdf", "--pages", PAGES, "--output", ROOT / f"{name}.pdf", schematic)
     pictures = [_picture(board, side, channels) for side in ("top", "bottom")]
+    if channels == BOARDS[0]:
+        pictures.append(_first_page(schematic))
     STEP.mkdir(parents=True, exist_ok=True)
     kicad(
         "pcb",
@@ -134,6 +137,17 @@ def _picture(board: Path, side: str, channels: int) -> Path:
     width, height, zoom = (1000, 1000, 1) if channels == 8 else (1500, 900, 1.65)
     size = ("--width", width, "--height", height, "--zoom", zoom)
     kicad("pcb", "render", "--side", side, *size, "--background", "opaque", "--output", file, board)
+    return file
+
+
+def _first_page(schematic: Path) -> Path:
+    """The schematic's first page as a drawing, without the day on which it was drawn."""
+    file = PICTURES / f"{schematic.stem}-schematic.svg"
+    with tempfile.TemporaryDirectory() as folder:
+        options = ("--pages", "1", "--exclude-drawing-sheet", "--output", folder)
+        kicad("sch", "export", "svg", *options, schematic)
+        text = (Path(folder) / f"{schematic.stem}.svg").read_text(encoding="utf-8")
+    file.write_text(re.sub(r"<title>.*?</title>", "", text), encoding="utf-8")
     return file
 
 
