@@ -45,7 +45,7 @@ def test_a_sound_board_of_resistors_of_one_per_cent_passes(channels: int) -> Non
     ring = LoadRing.for_current(channels, CURRENT)
     drives = np.vstack([scan.drives for scan in ring.scans()])
     rng = np.random.default_rng(7)
-    for _ in range(20):
+    for _ in range(5):
         real = LoadRing(ring.ohms * (1 + rng.uniform(-0.01, 0.01, channels)))
         found = diagnose(counts_of(potentials(real, drives, CURRENT)), ring, drives, CURRENT, SCALE)
         assert found.faults == ()
@@ -53,14 +53,24 @@ def test_a_sound_board_of_resistors_of_one_per_cent_passes(channels: int) -> Non
         assert 0.02 < found.sink_ohms < 0.06
 
 
-@pytest.mark.parametrize("number", range(0, len(FAULTS), 11))
-def test_a_fault_is_named(number: int) -> None:
+def _is_named(number: int) -> None:
     fault = FAULTS[number]
     counts = counts_of(fault.volts, 1.01)
     counts[fault.unknown] = 500.0
     found = diagnose(counts, RING, DRIVES, CURRENT, SCALE)
     assert fault.text in found.faults
     assert len(found.faults) <= 2
+
+
+@pytest.mark.parametrize("number", range(0, len(FAULTS), 29))
+def test_a_fault_is_named(number: int) -> None:
+    _is_named(number)
+
+
+@pytest.mark.slow
+def test_every_fault_is_named() -> None:
+    for number in range(len(FAULTS)):
+        _is_named(number)
 
 
 def test_a_wrong_sense_resistor_is_named() -> None:
