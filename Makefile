@@ -56,6 +56,7 @@ docs: dev $(VENV)/.docs  ## the documentation, in build/docs; a warning is an er
 	@$(PY) -m sphinx --quiet --fail-on-warning --keep-going docs build/docs
 
 board: dev  ## the circuit boards: rules, then netlists, bills, Gerbers, pictures, zip; needs KiCad 9
+	@$(PIP) install --no-deps --require-hashes --upgrade --target build/board/tools --requirement requirements/board.txt
 	@$(PY) hardware/fabricate.py $(ARGS)
 
 gallery: native  ## run the examples anew into docs/gallery.md; two minutes

@@ -1,4 +1,4 @@
-"""The bill of materials: of the schematic's parts, what they cost one by one and in numbers."""
+"""The bill of materials: of the schematic's parts, where they are sold and what they cost."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import io
 import tomllib
 from collections import defaultdict
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from netlist import Part
 
-PRICES = Path(__file__).resolve().parent / "prices.toml"
+PARTS = Path(__file__).resolve().parent / "parts.toml"
 BOARDS = (1, 10, 100)
 COLUMNS = [
     "Comment",
@@ -20,19 +21,35 @@ COLUMNS = [
     "Manufacturer",
     "MPN",
     "Mouser",
+    "Second source",
+    "State",
     "Quantity",
     "EUR each",
+    "EUR each of 10 boards",
+    "EUR each of 100 boards",
 ]
 
 
 class BillError(Exception):
-    """A part that cannot be ordered, or has no price."""
+    """A part that cannot be ordered, or of which nothing is known."""
 
 
-def prices() -> dict[str, list[float]]:
-    """Euros for one of each part, by its number, when parts for 1, 10 and 100 boards are bought."""
-    table: dict[str, list[float]] = tomllib.loads(PRICES.read_text(encoding="utf-8"))["part"]
-    return table
+@dataclass(frozen=True)
+class Bought:
+    """What is known of a part: a second distributor's number (or nothing), its life cycle's state,
+    and euros for one when parts for 1, 10 and 100 boards are bought."""
+
+    second: str
+    state: str
+    each: tuple[float, float, float]
+
+
+def known() -> dict[str, Bought]:
+    """What is known of each part, by its number."""
+    table = tomllib.loads(PARTS.read_text(encoding="utf-8"))["part"]
+    return {
+        name: Bought(row["second"], row["state"], tuple(row["each"])) for name, row in table.items()
+    }
 
 
 def grouped(parts: Mapping[str, Part]) -> dict[str, list[Part]]:
@@ -47,15 +64,17 @@ def grouped(parts: Mapping[str, Part]) -> dict[str, list[Part]]:
                     f"{part.reference} ({part.value}): expected a field {field} in the schematic"
                 )
         groups[part.fields["MPN"]].append(part)
-    if unknown := sorted(set(groups) - set(prices())):
-        raise BillError(f"{PRICES.name}: expected a price for each part, none for {unknown}")
+    if unknown := sorted(set(groups) - set(known())):
+        raise BillError(f"{PARTS.name}: expected each part with its price, none for {unknown}")
     return dict(groups)
 
 
 def total(parts: Mapping[str, Part], boards: int) -> float:
     """Euros for the parts of one board, when as many are bought."""
-    column, each = BOARDS.index(boards), prices()
-    return sum(len(group) * each[number][column] for number, group in grouped(parts).items())
+    column, parts_known = BOARDS.index(boards), known()
+    return sum(
+        len(group) * parts_known[number].each[column] for number, group in grouped(parts).items()
+    )
 
 
 def bill(parts: Mapping[str, Part]) -> str:
@@ -63,9 +82,11 @@ def bill(parts: Mapping[str, Part]) -> str:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(COLUMNS)
-    each = prices()
+    about = known()
     for number, group in grouped(parts).items():
         first, names = group[0], ",".join(part.reference for part in group)
         fields = [first.fields[field] for field in ("Manufacturer", "MPN", "Mouser")]
-        rows.writerow([first.value, names, first.footprint, *fields, len(group), each[number][0]])
+        one = about[number]
+        tail = (one.second, one.state, len(group), *one.each)
+        rows.writerow([first.value, names, first.footprint, *fields, *tail])
     return text.getvalue()

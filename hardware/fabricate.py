@@ -1,9 +1,10 @@
 """From the KiCad projects to what one uploads: ``python hardware/fabricate.py``, or ``make board``.
 
 It runs the rule checks, then writes netlists, bills of materials, and for each board a zip
-(Gerbers, drill files, bill, positions), the schematic as PDF, pictures of both sides, and STEP
-(into build/). ``outputs.toml`` holds the hashes of sources and outputs, so that without KiCad a
-test can say whether they belong together. ``--check`` only checks.
+(Gerbers, drill files, bill, positions), the schematic as PDF, pictures of both sides, and into
+build/board STEP and an interactive bill (a page that shows each part on the board).
+``outputs.toml`` holds the hashes of sources and outputs, so that without KiCad a test can say
+whether they belong together. ``--check`` only checks.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
+import os
+import re
 import shutil
 import subprocess
 import sys
@@ -25,6 +28,10 @@ from netlist import Nets, Part, read, written
 ROOT = Path(__file__).resolve().parent
 KICAD, MANIFEST = ROOT / "kicad", ROOT / "outputs.toml"
 PICTURES, STEP = ROOT.parent / "docs" / "hardware", ROOT.parent / "build" / "board"
+TOOLS = STEP / "tools"
+PYTHON = "/usr/bin/python3"
+"""KiCad's own, with pcbnew."""
+
 BOARDS = (8, 16)
 COPPER = "F.Cu,In1.Cu,In2.Cu,B.Cu"
 LAYERS = f"{COPPER},F.Paste,F.Mask,B.Mask,F.Silkscreen,B.Silkscreen,Edge.Cuts"
@@ -86,6 +93,8 @@ def make(channels: int) -> list[Path]:
     (ROOT / f"{name}.csv").write_text(bill(parts), encoding="utf-8")
     kicad("sch", "export", "pdf", "--pages", PAGES, "--output", ROOT / f"{name}.pdf", schematic)
     pictures = [_picture(board, side, channels) for side in ("top", "bottom")]
+    if channels == BOARDS[0]:
+        pictures.append(_first_page(schematic))
     STEP.mkdir(parents=True, exist_ok=True)
     kicad(
         "pcb",
@@ -97,9 +106,30 @@ def make(channels: int) -> list[Path]:
         STEP / f"{name}.step",
         board,
     )
+    _interactive(board)
     packed = ROOT / f"{name}.zip"
     _pack(packed, board, ROOT / f"{name}.csv")
     return [ROOT / f"{name}{end}" for end in (".net", ".csv", ".pdf", ".zip")] + pictures
+
+
+def _interactive(board: Path) -> None:
+    """A page with both sides and the list of parts, by InteractiveHtmlBom under KiCad's Python."""
+    if not TOOLS.is_dir():
+        print(f"{board.stem}: no interactive bill, since it is made by make board", file=sys.stderr)
+        return
+    words = ["--no-browser", "--dest-dir", STEP, "--name-format", "%f-bill", "--include-nets"]
+    words += ["--extra-fields", "Manufacturer,MPN,Mouser", board]
+    start = "from InteractiveHtmlBom.generate_interactive_bom import main; main()"
+    environment = os.environ | {"PYTHONPATH": str(TOOLS), "INTERACTIVE_HTML_BOM_NO_DISPLAY": "1"}
+    done = subprocess.run(
+        [PYTHON, "-c", start, *map(str, words)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode or not (STEP / f"{board.stem}-bill.html").is_file():
+        raise BoardError(f"{board.name}: no interactive bill: {done.stderr[-1000:]}")
 
 
 def _picture(board: Path, side: str, channels: int) -> Path:
@@ -107,6 +137,17 @@ def _picture(board: Path, side: str, channels: int) -> Path:
     width, height, zoom = (1000, 1000, 1) if channels == 8 else (1500, 900, 1.65)
     size = ("--width", width, "--height", height, "--zoom", zoom)
     kicad("pcb", "render", "--side", side, *size, "--background", "opaque", "--output", file, board)
+    return file
+
+
+def _first_page(schematic: Path) -> Path:
+    """The schematic's first page as a drawing, without the day on which it was drawn."""
+    file = PICTURES / f"{schematic.stem}-schematic.svg"
+    with tempfile.TemporaryDirectory() as folder:
+        options = ("--pages", "1", "--exclude-drawing-sheet", "--output", folder)
+        kicad("sch", "export", "svg", *options, schematic)
+        text = (Path(folder) / f"{schematic.stem}.svg").read_text(encoding="utf-8")
+    file.write_text(re.sub(r"<title>.*?</title>", "", text), encoding="utf-8")
     return file
 
 
@@ -165,7 +206,7 @@ def positions(text: str) -> str:
 def sources() -> list[Path]:
     """What outputs are made of."""
     ends = (".kicad_sch", ".kicad_pcb")
-    return [*sorted(f for f in KICAD.iterdir() if f.suffix in ends), ROOT / "prices.toml"]
+    return [*sorted(f for f in KICAD.iterdir() if f.suffix in ends), ROOT / "parts.toml"]
 
 
 def manifest(outputs: list[Path]) -> str:

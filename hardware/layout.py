@@ -27,6 +27,7 @@ from placement import (
     places,
     width,
 )
+from stackup import kicad
 
 HERE = Path(__file__).resolve().parent
 KICAD = HERE / "kicad"
@@ -336,6 +337,8 @@ def fill(file: Path) -> None:
     board = pcbnew.LoadBoard(str(file))
     pcbnew.ZONE_FILLER(board).Fill(board.Zones())
     pcbnew.SaveBoard(str(file), board)
+    text = file.read_text(encoding="utf-8")  # pcbnew cannot set a stack-up
+    file.write_text(text.replace("\t(setup\n", "\t(setup\n" + kicad(), 1), encoding="utf-8")
 
 
 def main() -> None:

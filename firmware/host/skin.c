@@ -38,20 +38,70 @@ const struct skin_memory *skin_star(void) {
     return &star;
 }
 
+static const double *row(const struct skin_memory *skin, unsigned electrode) {
+    return skin->resistance + (size_t)electrode * skin->n;
+}
+
+/* The current that a stuck transistor of `also` takes over from `main`, on the side that is
+   connected to one line: both then have one potential. `far`: the other side's electrode. */
+static double share(const struct skin_memory *skin, unsigned main, unsigned also, unsigned far) {
+    const double *m = row(skin, main);
+    const double *a = row(skin, also);
+    double loop = m[main] - 2.0 * m[also] + a[also];
+    return also == main || loop <= 0.0 ? 0.0 : (m[main] - m[far] - a[main] + a[far]) / loop;
+}
+
+/* The electrodes that are connected on one side: that of `channel`, and a stuck one; `SKIN_MOST`
+   where there is none. */
+struct side {
+    unsigned main;
+    unsigned also;
+};
+
+static struct side side_of(unsigned channel, const uint8_t *map, uint32_t open, uint32_t stuck) {
+    unsigned electrode = map[channel] != 0u ? map[channel] - 1u : channel;
+    unsigned also = stuck != 0u ? (unsigned)__builtin_ctz(stuck) : SKIN_MOST;
+    if ((open >> electrode & 1u) != 0u) {
+        electrode = also;
+    }
+    return (struct side){electrode, also < SKIN_MOST ? also : electrode};
+}
+
 static double volts_now(const struct skin_memory *skin, unsigned source, unsigned sink,
                         unsigned channel) {
     unsigned n = skin->n;
     if (n > SKIN_MOST || source >= n || sink >= n || channel >= n) {
         return 0.0;
     }
-    const double *r = skin->resistance;
-    double at_sink = r[source * n + sink] - r[sink * n + sink];
-    double load = r[source * n + source] - r[sink * n + source] - at_sink;
+    const struct skin_faults *faults = &skin->faults;
+    struct side high = side_of(source, faults->source, faults->high_open, faults->high_stuck);
+    struct side low = side_of(sink, faults->sink, faults->low_open, faults->low_stuck);
+    unsigned at = faults->reading[channel] != 0u ? faults->reading[channel] - 1u : channel;
+    if (high.main >= n || high.main == low.main || at >= n) {
+        return 0.0;
+    }
+    if (low.main >= n) {
+        return skin->compliance;
+    }
+    double into = share(skin, high.main, high.also, low.main);
+    double out = share(skin, low.main, low.also, high.main);
+    const double *from[4] = {row(skin, high.main), row(skin, high.also), row(skin, low.main),
+                             row(skin, low.also)};
+    double part[4] = {1.0 - into, into, out - 1.0, -out};
+    double ohms_here = 0.0;
+    double ohms_high = 0.0;
+    double ohms_low = 0.0;
+    for (unsigned k = 0; k < 4; k++) {
+        ohms_here += part[k] * from[k][at];
+        ohms_high += part[k] * from[k][high.main];
+        ohms_low += part[k] * from[k][low.main];
+    }
     double amperes = skin->current;
+    double load = ohms_high - ohms_low;
     if (amperes * load > skin->compliance) {
         amperes = skin->compliance / load;
     }
-    return amperes * (r[source * n + channel] - r[sink * n + channel] - at_sink);
+    return amperes * (ohms_here - ohms_low);
 }
 
 double skin_volts(const struct skin_memory *skin, unsigned source, unsigned sink,

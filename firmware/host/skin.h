@@ -7,6 +7,18 @@
 #define SKIN_MOST 32u
 #define SKIN_MAGIC UINT64_C(0x31306E696B736F74) /* "toskin01" */
 
+/* What is wrong with the board, so that its check can be tested; all 0: nothing. Masks have a bit for
+   each channel; of stuck transistors the lowest counts, on one side at a time. */
+struct skin_faults {
+    uint32_t high_open; /* never connects its channel to the current */
+    uint32_t low_open;  /* nor to ground */
+    uint32_t high_stuck; /* always does */
+    uint32_t low_stuck;
+    uint8_t source[SKIN_MOST]; /* 1 + the channel that is connected, or read, instead; 0: its own */
+    uint8_t sink[SKIN_MOST];
+    uint8_t reading[SKIN_MOST];
+};
+
 /* A seqlock: `sequence` is odd while the rest is written. Python: tomoskin.emulator.memory. */
 struct skin_memory {
     uint64_t magic;
@@ -20,6 +32,7 @@ struct skin_memory {
     double levels;       /* 2^bits */
     double noise;        /* LSB, standard deviation of one conversion */
     double resistance[SKIN_MOST * SKIN_MOST]; /* ohm, transfer, row by row, n by n */
+    struct skin_faults faults;
 };
 
 /* Map `path`, or exit with a sentence. */

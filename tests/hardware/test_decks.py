@@ -2,9 +2,11 @@
 
 import pytest
 
+import parasitics
 import results
 from spice import DeckError, run
 from tomoskin.skin import Skin
+from tomoskin.source import ScanSettings
 
 pytestmark = pytest.mark.usefixtures("decks")
 OFF, ON, SOUND, BROKEN = 0, 5, "1g", "50m"
@@ -54,10 +56,12 @@ def test_a_demultiplexer_of_5_v_does_not_switch_a_high_side_off():
     assert right["idle_peak"] < 0.15
 
 
-def test_after_a_cut_electrode_ten_microseconds_are_needed():
-    assert results.switching("mended", cut="1g", dead="10u")["peak"] < 1.3
+def test_after_a_cut_electrode_the_hosts_dead_time_is_enough():
+    assert results.switching("mended", cut="1g")["peak"] < 1.3
     assert 1.3 < results.switching("mended", cut="1g", dead="2u")["peak"] < 2
     assert results.switching("source", cut="1g", dead="10u")["peak"] > 8
+    default = ScanSettings(1, 1e-3, 0.1, 10).dead_time
+    assert f"{default * 1e6:g}u" == results.DEAD_TIME
 
 
 @pytest.mark.parametrize(("contact", "amperes"), [(1, 0.1), (20, 0.1), (20, 0.01), (100, 0.01)])
@@ -127,3 +131,7 @@ def test_a_deck_without_its_values_is_refused():
         run("compliance", variant="mended")
     with pytest.raises(DeckError, match="compliance"):
         run("compliance", variant="nobody", loads="1", amps=0.1)
+
+
+def test_the_decks_have_the_layouts_resistance_and_capacitance():
+    assert parasitics.FILE.read_text(encoding="utf-8") == parasitics.written()

@@ -91,10 +91,18 @@ def test_every_channel_is_the_same(circuit):
 def test_what_is_ordered_has_numbers_and_a_price(circuit):
     groups = bill.grouped(circuit.parts)
     assert sum(map(len, groups.values())) == sum(part.in_bom for part in circuit.parts.values())
-    table = tomllib.loads(bill.PRICES.read_text(encoding="utf-8"))
-    assert set(groups) <= set(table["part"])
+    assert set(groups) <= set(bill.known())
     one, ten, hundred = (bill.total(circuit.parts, boards) for boards in bill.BOARDS)
     assert one > ten > hundred > 50
+
+
+def test_what_is_known_of_parts_is_dated_and_in_production():
+    table = tomllib.loads(bill.PARTS.read_text(encoding="utf-8"))
+    assert str(table["checked"]["date"]) > "2026"
+    known = bill.known().values()
+    assert {part.state for part in known} == {"active", "old"}
+    assert all(part.each[0] >= part.each[1] >= part.each[2] > 0 for part in known)
+    assert sum(bool(part.second) for part in known) >= 25
 
 
 def test_the_committed_bill_is_that_of_the_netlist(circuit):

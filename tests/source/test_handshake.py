@@ -50,7 +50,7 @@ def test_the_order_of_the_handshake(clock):
     start = board.commands[-1]
     assert chosen.format is Format.SIXTEEN
     assert scan.configuration == pattern.configuration == start.configuration == link.configuration
-    assert (scan.n_drives, scan.settling, scan.dead_time) == (8, 200, 2)
+    assert (scan.n_drives, scan.settling, scan.dead_time) == (8, 200, 5)
     assert (scan.oversampling, scan.prescaler, scan.current_limit) == (4, 64, 100_000)
     assert [(d.source, d.sink) for d in pattern.drives] == [((k + 1) % 8, k) for k in range(8)]
     assert [d.mask for d in pattern.drives] == SCAN.masks.tolist()

@@ -54,7 +54,7 @@ def test_frames_of_the_twin_arrive_whole_in_order_and_at_the_scans_rate(clock):
         assert [frame.sequence for frame in got] == list(range(50))
         for number, frame in enumerate(got):
             assert np.array_equal(frame.samples, np.arange(48) + number)
-        period = 8 * (200e-6 + 2e-6) + 48 * 4 * 13 * 64 / 16e6
+        period = 8 * (200e-6 + 5e-6) + 48 * 4 * 13 * 64 / 16e6
         ticks = np.diff([frame.ticks for frame in got])
         assert ticks.mean() == pytest.approx(period * 250e3, rel=1e-3)
         times = np.diff([frame.host_time for frame in got])

@@ -77,7 +77,7 @@ def test_the_same_seed_gives_the_same_bytes(skin):
 def test_pace_is_the_boards(skin):
     clock = ManualClock()
     frames, link = frames_of(make_twin(skin, TwinSettings(), clock), skin, 20, clock)
-    period = 8 * 2.002e-3 + 48 * 16 * 52e-6
+    period = 8 * 2.005e-3 + 48 * 16 * 52e-6
     assert np.diff([f.host_time for f in frames]) == pytest.approx(np.full(19, period), rel=1e-6)
     link.close()
 

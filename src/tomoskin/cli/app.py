@@ -38,6 +38,7 @@ COMMANDS = {
     "session": "Inspect, mend and convert recorded sessions.",
     "skin": "List, show, check and lay skins.",
     "firmware": "Build, flash and emulate the board's firmware.",
+    "board": "Check a board that has just been built, before a skin is connected.",
     "doctor": "Look at this installation: versions, page, sources, sinks, skins, ports.",
 }
 """What each command does: a function NAME of the module ``tomoskin.cli.NAME``, or its ``app``."""

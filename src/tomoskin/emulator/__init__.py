@@ -17,14 +17,21 @@ from tomoskin.emulator.pico import (
     pico_image,
     write_uf2,
 )
-from tomoskin.emulator.process import BoardProcess, BoardPrograms, Front, SkinMemory
+from tomoskin.emulator.process import (
+    BoardFaults,
+    BoardProcess,
+    BoardPrograms,
+    Front,
+    SkinMemory,
+)
 from tomoskin.emulator.program import Programs, build_elf, build_programs, firmware_image
-from tomoskin.emulator.source import BOARDS, DEFAULT, BoardKind, emulate_board
+from tomoskin.emulator.source import BOARDS, DEFAULT, BoardKind, emulate_board, emulate_load
 from tomoskin.emulator.transport import EmulatorTransport
 
 __all__ = [
     "BOARDS",
     "DEFAULT",
+    "BoardFaults",
     "BoardIdentity",
     "BoardKind",
     "BoardProcess",
@@ -40,6 +47,7 @@ __all__ = [
     "build_uf2",
     "check_current",
     "emulate_board",
+    "emulate_load",
     "find_boot_drive",
     "firmware_image",
     "pico_image",

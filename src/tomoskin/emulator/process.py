@@ -6,8 +6,8 @@ import mmap
 import struct
 import subprocess
 import tempfile
-from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import IO, Protocol
 
@@ -19,7 +19,9 @@ _MAGIC = 0x31306E696B736F74
 _HEAD = struct.Struct("<QII7d")
 _SEQUENCE = struct.Struct("<I")
 _SEQUENCE_AT = 8
-_SIZE = _HEAD.size + 8 * MOST_ELECTRODES**2
+_FAULTS_AT = _HEAD.size + 8 * MOST_ELECTRODES**2
+_FAULTS = struct.Struct(f"<4I{MOST_ELECTRODES}s{MOST_ELECTRODES}s{MOST_ELECTRODES}s")
+_SIZE = _FAULTS_AT + _FAULTS.size
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +41,44 @@ class Front:
     noise: float
 
 
+@dataclass(frozen=True, slots=True)
+class BoardFaults:
+    """What is wrong with an emulated Mega's board; the Pico's emulator does not know it.
+
+    ``high_open``, ``low_open``: channels whose switch never connects them to the current, or to
+    ground; ``high_stuck``, ``low_stuck``: always; of the stuck ones the lowest counts, on one side.
+    ``source``, ``sink``, ``reading``: the channel that is connected, or read, instead of another.
+    """
+
+    high_open: Collection[int] = ()
+    low_open: Collection[int] = ()
+    high_stuck: Collection[int] = ()
+    low_stuck: Collection[int] = ()
+    source: Mapping[int, int] = field(default_factory=dict)
+    sink: Mapping[int, int] = field(default_factory=dict)
+    reading: Mapping[int, int] = field(default_factory=dict)
+
+    def pack(self) -> bytes:
+        """As ``firmware/host/skin.h`` has it."""
+        masks = (self.high_open, self.low_open, self.high_stuck, self.low_stuck)
+        maps = (self.source, self.sink, self.reading)
+        return _FAULTS.pack(
+            *(sum(1 << channel for channel in mask) for mask in masks),
+            *(bytes(1 + one[e] if e in one else 0 for e in range(MOST_ELECTRODES)) for one in maps),
+        )
+
+
 class SkinMemory:
     """A file, mapped by this process and by the emulator's; a seqlock, so nobody waits."""
 
-    def __init__(self, path: Path, front: Front, resistance: FloatArray) -> None:
-        """Make the file; ``resistance`` as in :meth:`write`."""
+    def __init__(
+        self,
+        path: Path,
+        front: Front,
+        resistance: FloatArray,
+        faults: BoardFaults | None = None,
+    ) -> None:
+        """Make the file; ``resistance`` as in :meth:`write`; without ``faults``, none."""
         self.path = path
         self._n = len(resistance)
         if self._n > MOST_ELECTRODES:
@@ -55,6 +90,7 @@ class SkinMemory:
             self._map = mmap.mmap(file.fileno(), _SIZE)
         self._sequence = 0
         _HEAD.pack_into(self._map, 0, _MAGIC, 0, self._n, *astuple(front))
+        self._map[_FAULTS_AT:_SIZE] = (faults or BoardFaults()).pack()
         self.write(resistance)
 
     def write(self, resistance: FloatArray) -> None:

@@ -10,11 +10,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tomoskin.core import FloatArray
 from tomoskin.emulator.pico import build_pico_programs
-from tomoskin.emulator.process import BoardProcess, BoardPrograms, Front, SkinMemory
+from tomoskin.emulator.process import (
+    BoardFaults,
+    BoardProcess,
+    BoardPrograms,
+    Front,
+    SkinMemory,
+)
 from tomoskin.emulator.program import build_programs
 from tomoskin.emulator.transport import EmulatorTransport
-from tomoskin.source import read_options
+from tomoskin.signal import FIGURES
+from tomoskin.source import SerialTransport, Transport, read_options
 from tomoskin.twin import TwinSettings, TwinSkin, read_settings
 
 if TYPE_CHECKING:
@@ -68,6 +76,33 @@ def emulate_board(skin: Skin, board: str = DEFAULT) -> Iterator[BoardProcess]:
         process = BoardProcess(programs_of(board), memory.path, skin.current)
         try:
             yield process
+        finally:
+            process.close()
+            memory.close()
+
+
+@contextmanager
+def emulate_load(
+    resistance: FloatArray,
+    current: float,
+    board: str = DEFAULT,
+    faults: BoardFaults | None = None,
+) -> Iterator[Transport]:
+    """A board on a network of resistors, of (n, n) Ω transfer resistance; SourceError.
+
+    ``current`` A; ``faults`` of a Mega's board: without it, none. The converter is as noisy as the
+    decks say, and has the Mega's scale.
+    """
+    levels = float(1 << BOARDS[board].adc_bits)
+    noise = FIGURES.noise * levels / 1024
+    front = Front(current, FIGURES.compliance, 35.0, 0.0, 5.0, levels, noise)
+    with tempfile.TemporaryDirectory(prefix="tomoskin-") as folder:
+        memory = SkinMemory(Path(folder) / "skin", front, resistance, faults)
+        process = BoardProcess(programs_of(board), memory.path, current)
+        try:
+            transport = SerialTransport(process.port)
+            yield transport
+            transport.close()
         finally:
             process.close()
             memory.close()

@@ -1,6 +1,7 @@
 """The running loop: a thread that owns the source, commands to it and messages from it."""
 
 from tomoskin.run import commands
+from tomoskin.run.board_check import CheckFinding, check_board
 from tomoskin.run.flow import Snapshot
 from tomoskin.run.labelled_frames import (
     SetMade,
@@ -20,6 +21,7 @@ from tomoskin.run.twin_requests import MAX_FORCE, SetPose, SetPresses, SetTwin, 
 
 __all__ = [
     "MAX_FORCE",
+    "CheckFinding",
     "ReplaySource",
     "Runner",
     "SetMade",
@@ -31,6 +33,7 @@ __all__ = [
     "Status",
     "StrictRequest",
     "Workers",
+    "check_board",
     "commands",
     "in_processes",
     "in_this_process",

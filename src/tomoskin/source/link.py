@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 from types import TracebackType
@@ -120,13 +121,16 @@ class Link:
         """Stop the board, as far as it can still be reached, and give the transport back."""
         if self._closed:
             return
-        self._closed = True
         try:
-            self._stop_board()
-        except SourceError:
-            pass  # gone already: its heartbeat stops it
+            self.stop()
         finally:
+            self._closed = True
             self.transport.close()
+
+    def stop(self) -> None:
+        """Stop the board, as far as it can still be reached; the transport stays open."""
+        with contextlib.suppress(SourceError):  # gone already: its heartbeat stops it
+            self._stop_board()
 
     def __enter__(self) -> Self:
         """The link itself."""

@@ -48,8 +48,8 @@ class ScanSettings:
     adc_bits
         Converter resolution that the voltages are worked out with.
     dead_time
-        All channels high-impedance between two drives, s. Short: an unloaded LM317 charges the
-        bus meanwhile and spikes into the skin.
+        All channels high-impedance between two drives, s. After a cut electrode the board's source
+        needs 5 µs to come back from its end stop.
     prescaler
         Converter clock divider; 64 is 250 kHz at 16 MHz.
     """
@@ -58,7 +58,7 @@ class ScanSettings:
     settling: float
     current_limit: float
     adc_bits: int
-    dead_time: float = 2e-6
+    dead_time: float = 5e-6
     prescaler: int = 64
 
     def __post_init__(self) -> None:

@@ -1,0 +1,124 @@
+"""``tomoskin board``: the first power-up of a board, step by step."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tomoskin.cli.app import group
+from tomoskin.cli.choices import quantity
+from tomoskin.cli.output import JsonFlag, emit
+
+if TYPE_CHECKING:
+    from tomoskin.run import CheckFinding
+    from tomoskin.source import Transport
+
+app = group("board")
+_EMULATORS = {"emulator": "mega", "emulator:pico": "pico"}
+
+
+@app.callback()
+def _board() -> None:
+    """Keep ``check`` a word of its own."""
+
+
+@app.command()
+def check(
+    source: Annotated[
+        str, typer.Option(help="serial:PORT, serial:auto, or emulator to try the procedure.")
+    ] = "serial:auto",
+    channels: Annotated[int, typer.Option(min=4, max=16, help="8 or 16, as the board has.")] = 8,
+    current: Annotated[
+        str, typer.Option(metavar="CURRENT", help="What the sense resistor is for.")
+    ] = "100 mA",
+    meter: Annotated[
+        bool, typer.Option(help="Ask for the multimeter's readings first; Enter leaves one out.")
+    ] = True,
+    json: JsonFlag = False,
+) -> None:
+    """Walk through the first power-up: readings of a multimeter, then all that the board can tell.
+
+    For the second part the terminals hold a ring of equal resistors, 1 Ω at 100 mA (0.1 V over the
+    current), one between neighbours, but two in parallel from E1 to E2 and three from E2 to E3.
+    """
+    amperes = quantity(current, "current", "--current")
+    if not 1e-6 <= amperes <= 0.1:
+        raise typer.BadParameter(f"expected 1 µA to 100 mA, got {current}", param_hint="--current")
+    findings = []
+    for finding in _findings(source, channels, amperes, meter=meter):
+        findings.append(finding)
+        if not json:
+            mark = "ok  " if finding.ok else "FAIL"
+            typer.echo(f"{mark}  {finding.name:<10} {finding.text}")
+    sound = all(finding.ok for finding in findings)
+    if json:
+        emit({"ok": sound, "findings": [asdict(finding) for finding in findings]})
+    raise typer.Exit(0 if sound else 1)
+
+
+def _findings(source: str, channels: int, current: float, *, meter: bool) -> Iterator[CheckFinding]:
+    from tomoskin.run import check_board
+    from tomoskin.signal import LoadRing
+
+    if meter:
+        yield from _readings(current)
+    ring = LoadRing.for_current(channels, current)
+    with _opened(source, ring, current) as transport:
+        yield from check_board(transport, ring, current)
+
+
+def _readings(current: float) -> Iterator[CheckFinding]:
+    """Ask for what only a multimeter can tell."""
+    from tomoskin.run import CheckFinding
+    from tomoskin.signal import STAGES, meter_steps
+
+    stage = ""
+    for step in meter_steps(current):
+        if step.stage != stage:
+            stage = step.stage
+            typer.echo(f"\n{STAGES[stage]}; black lead on GND.", err=True)
+        volts = _asked(f"{step.point}, expected {step.expected}")
+        if volts is None:
+            continue
+        ok = step.accepts(volts)
+        text = f"{step.point}: {volts:g} V"
+        yield CheckFinding(
+            stage, ok, text if ok else f"{text}, expected {step.expected}: {step.otherwise}"
+        )
+        if not ok:
+            typer.echo("Switch off, find the cause, then begin again.", err=True)
+            raise typer.Exit(1)
+
+
+def _asked(question: str) -> float | None:
+    """Volts that a person enters; None for Enter alone."""
+    while True:
+        text = typer.prompt(question, default="", show_default=False, err=True).strip()
+        if not text:
+            return None
+        with contextlib.suppress(ValueError):
+            return float(text.removesuffix("V").strip().replace(",", "."))
+        typer.echo(f'expected volts, such as 2.20, got "{text}"', err=True)
+
+
+@contextlib.contextmanager
+def _opened(source: str, ring: object, current: float) -> Iterator[Transport]:
+    from tomoskin.emulator import emulate_load
+    from tomoskin.signal import LoadRing
+    from tomoskin.skin import Skin
+    from tomoskin.source import open_source
+
+    assert isinstance(ring, LoadRing)
+    if source in _EMULATORS:
+        with emulate_load(ring.resistance, current, _EMULATORS[source]) as transport:
+            yield transport
+        return
+    transport = open_source(source, Skin.load("textile-disc-8"))
+    try:
+        yield transport
+    finally:
+        transport.close()

@@ -1,0 +1,160 @@
+"""What the protocol can measure of a board with a ring of known resistors in place of the skin."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tomoskin.core import FloatArray, Frame, SourceError
+from tomoskin.pattern import Scan
+from tomoskin.run.safe_off import check_safe_off
+from tomoskin.signal import CountScale, LoadRing, diagnose
+from tomoskin.source import Link, ScanSettings, Timing, Transport
+from tomoskin.wire import Info
+
+GAIN, REFERENCE, BITS = 35.0, 5.0, 10
+"""Of the board's amplifiers, and of the Mega's converter, V and bits; a Pico's samples are scaled
+to it."""
+
+_NOISE = 2.0
+"""Counts a conversion; the decks give 0.7, and rounding adds 0.3."""
+
+_EARLY, _LATE = 120e-6, 2e-3
+"""Settling times that must give the same readings, s; the decks need up to 84 µs."""
+
+_UNSETTLED = 2.0
+"""Counts between the two."""
+
+_SINK_OHMS = 0.3
+"""Ω from an electrode to ground: a transistor of 0.03 Ω, tracks, joints."""
+
+_AT_ONCE = Timing(hello=0.05)
+"""Of a board that has spoken before."""
+
+
+@dataclass(frozen=True, slots=True)
+class CheckFinding:
+    """One thing that was looked at: whether it is as expected, and a sentence."""
+
+    name: str
+    ok: bool
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Readings:
+    """(n_drives, n) mean and standard deviation of one conversion, counts."""
+
+    mean: FloatArray
+    sd: FloatArray
+    info: Info
+
+
+def check_board(
+    transport: Transport, ring: LoadRing, current: float, *, frames: int = 24
+) -> Iterator[CheckFinding]:
+    """Look at a board whose terminals hold ``ring``, set to ``current`` A.
+
+    ``frames`` are averaged for each pass. Findings come as they are made.
+
+    Raises
+    ------
+    SourceError
+        When no board answers, it refuses the scan, or goes away.
+    """
+    n = len(ring.ohms)
+    onward, back = ring.scans()
+    settings = ScanSettings(4, _LATE, current, BITS)
+    first = _measure(transport, onward, settings, frames, Timing())
+    yield _identity(first.info, n, current)
+    second = _measure(transport, back, settings, frames, _AT_ONCE)
+    scale = CountScale.of(GAIN, REFERENCE, BITS)
+    found = diagnose(
+        np.vstack([first.mean, second.mean]),
+        ring,
+        np.vstack([onward.drives, back.drives]),
+        current,
+        scale,
+    )
+    for text in found.faults:
+        yield CheckFinding("channels", False, text)
+    if not found.faults:
+        text = (
+            f"{n} channels as source, sink and reading: deviations of {found.deviation:.1f} counts "
+            f"(RMS), at most {found.largest:.1f}"
+        )
+        yield CheckFinding("channels", True, text)
+        text = f"{found.scale * current * 1e3:.4g} mA through resistors of their nominal values"
+        yield CheckFinding("current", True, text)
+        ok = found.sink_ohms < _SINK_OHMS
+        text = f"{found.sink_ohms * 1e3:.0f} mΩ from a sink to ground"
+        yield CheckFinding("sinks", ok, text if ok else f"{text}: solder joints, Q103, Q203, …")
+    yield _noise(np.vstack([first.sd, second.sd]))
+    early = _measure(transport, onward, replace(settings, settling=_EARLY), frames, _AT_ONCE)
+    yield _settling(early, first)
+    for name, problem, text in check_safe_off(transport, onward, settings):
+        yield CheckFinding(name, not problem, problem or text)
+
+
+def _measure(
+    transport: Transport, scan: Scan, settings: ScanSettings, frames: int, timing: Timing
+) -> _Readings:
+    """Mean and noise over ``frames``; the board is stopped, the transport stays open."""
+    link = Link(transport, scan, settings, timing=timing)
+    got: list[np.ndarray] = []
+    info = link.connect()
+    end = time.monotonic() + _PATIENCE
+    try:
+        while len(got) <= frames:
+            if time.monotonic() > end:
+                raise SourceError(
+                    f"expected {frames} frames within {_PATIENCE:.0f} s, got {len(got)}",
+                    where=transport.name,
+                    hint="is the line damaged? tomoskin record says how many frames are lost",
+                )
+            items = link.poll(0.1)
+            got += [item.samples for item in items if isinstance(item, Frame)]
+    finally:
+        link.stop()
+    samples = np.array(got[1:], dtype=float)
+    shape = scan.drives.shape[0], -1
+    mean = samples.mean(axis=0).reshape(shape) / settings.oversampling
+    sd = samples.std(axis=0, ddof=1).reshape(shape) / np.sqrt(settings.oversampling)
+    return _Readings(mean, sd, info)
+
+
+_PATIENCE = 60.0
+
+
+def _identity(info: Info, n: int, current: float) -> CheckFinding:
+    """Whether the firmware is of a board like this."""
+    firmware = ".".join(map(str, info.firmware))
+    said = f"firmware {firmware}, {info.channels} channels, {info.current / 1e3:g} mA"
+    if info.channels < n:
+        return CheckFinding("handshake", False, f"{said}: flash it for {n} channels")
+    if info.current != round(current * 1e6):
+        hint = f'expected {current * 1e3:g} mA: tomoskin firmware configure PORT --current "…"'
+        return CheckFinding("handshake", False, f"{said}, {hint}")
+    return CheckFinding("handshake", True, said)
+
+
+def _noise(sd: FloatArray) -> CheckFinding:
+    by_channel = np.sqrt(np.mean(sd**2, axis=0))
+    worst = int(by_channel.argmax())
+    text = f"{np.median(by_channel):.2f} counts a conversion, most on E{worst + 1} ({{:.2f}})"
+    text = text.format(by_channel[worst])
+    ok = bool(by_channel[worst] < _NOISE)
+    look = f"; expected less than {_NOISE:g}: C{100 * (worst + 1) + 3}, its supply, a long cable"
+    return CheckFinding("noise", ok, text if ok else text + look)
+
+
+def _settling(early: _Readings, late: _Readings) -> CheckFinding:
+    off = np.abs(early.mean - late.mean).max(axis=0)
+    worst = int(off.argmax())
+    text = f"after {_EARLY * 1e6:.0f} µs within {off[worst]:.1f} counts of what it is after 2 ms"
+    ok = bool(off[worst] < _UNSETTLED)
+    look = f"; on E{worst + 1}: C{100 * (worst + 1) + 1}, C{100 * (worst + 1) + 3}"
+    return CheckFinding("settling", ok, text if ok else text + look)

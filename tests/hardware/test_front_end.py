@@ -1,0 +1,31 @@
+"""The Pico's front end under ngspice: quiet, fast and cheap enough, as docs/hardware.md says."""
+
+import pytest
+
+import front_end
+import results
+
+pytestmark = pytest.mark.usefixtures("decks")
+
+
+def test_it_is_four_times_as_quiet_as_the_mega():
+    ours, mega = front_end.noise(), front_end.mega_noise()
+    assert mega["total"] / ours["total"] > 4
+    assert mega["ohms"] / ours["ohms"] > 4
+    own = front_end.noise(converter=front_end.OWN_NOISE)
+    assert mega["total"] / own["total"] < 4  # why it has a converter of its own
+
+
+def test_it_settles_within_two_conversions_after_the_multiplexer():
+    assert max(front_end.settling(step) for step in (0.025, 0.06)) < 4e-6
+    assert results.shared()["settling"] > 50e-6  # of the Mega's amplifier, which is slower
+
+
+def test_its_current_holds():
+    found = front_end.drive()
+    assert found["current_error"] < 0.005
+    assert found["load"] >= 50
+
+
+def test_its_parts_are_within_what_was_asked():
+    assert front_end.cost() <= 45
