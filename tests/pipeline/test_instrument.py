@@ -107,7 +107,11 @@ def test_a_pattern_is_edited_by_keys_and_errors_stand_at_their_row(opened):
 def test_a_cut_electrode_is_said_in_words_and_by_shape(opened):
     opened.page.keyboard.press("w")
     opened.test_id("cut-3").click()
-    opened.test_id("state").filter(has_text="E3 is open").wait_for()
+    warning = opened.test_id("warning").filter(has_text="E3 is open")
+    warning.click()
+    opened.test_id("warnings").filter(has_text="E3 is open").wait_for()
+    warning.click()
+    opened.test_id("warnings").wait_for(state="detached")
     electrode = opened.test_id("electrode-3")
     assert electrode.locator("rect").count() == 1
     assert "no current" in electrode.get_attribute("aria-label")
@@ -116,10 +120,28 @@ def test_a_cut_electrode_is_said_in_words_and_by_shape(opened):
     electrode.locator("circle").wait_for()
 
 
+def points_at(opened, electrode):
+    """Whether the current's arrow has its head nearer to that electrode than its tail."""
+    ends = opened.page.evaluate(
+        """id => {
+            const path = document.querySelector("[data-testid=current] path");
+            const tail = path.getPointAtLength(0);
+            const [x, y] = path.getAttribute("d").match(/L([\\d.]+) ([\\d.]+)/).slice(1).map(Number);
+            const arc = document.querySelector(`[data-testid=${id}] .arc`).getBBox();
+            const far = (px, py) => Math.hypot(px - arc.x - arc.width / 2, py - arc.y - arc.height / 2);
+            return [far(x, y), far(tail.x, tail.y)];
+        }""",
+        electrode,
+    )
+    return ends[0] < 0.5 * ends[1]
+
+
 def test_signals(opened):
     opened.page.keyboard.press("g")
-    assert "E1 to E2" in opened.test_id("drive").inner_text()
-    assert "E2 +" in opened.test_id("electrode-2").text_content()
+    assert "E2 to E1" in opened.test_id("drive").inner_text(), "from the source to the sink"
+    assert "E2: good, source" in opened.test_id("electrode-2").text_content()
+    assert "E1: good, sink" in opened.test_id("electrode-1").text_content()
+    assert points_at(opened, "electrode-1")
     opened.test_id("signals-noise").click()
     opened.test_id("signals-sum").filter(has_text="µV").wait_for()
     opened.test_id("signals-reciprocity").click()

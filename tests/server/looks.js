@@ -148,6 +148,7 @@ window.looks = (() => {
     const { left, top, right, bottom } = thing.box;
     return box(Math.max(left, room.left), Math.max(top, room.top), Math.min(right, room.right), Math.min(bottom, room.bottom));
   }
+  const shownPart = (element) => inView({ element, box: element.getBoundingClientRect() });
   const isSeen = (thing) => common(thing.box, inView(thing)) > 1;
   const place = ({ left, top, right, bottom }) => `[${[left, top, right, bottom].map(Math.round)}]`;
   const said = (thing) => `“${thing.words.slice(0, 40)}” at ${place(thing.box)}`;
@@ -192,7 +193,7 @@ window.looks = (() => {
     grounds.forEach((a, k) => {
       for (const b of grounds.slice(k + 1)) {
         if (a.contains(b)) continue;
-        if (common(a.getBoundingClientRect(), b.getBoundingClientRect()) > 1) found.push(`${a.className} and ${b.className}`);
+        if (common(shownPart(a), shownPart(b)) > 1) found.push(`${a.className} and ${b.className}`);
       }
     });
     return found;

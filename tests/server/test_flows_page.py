@@ -64,7 +64,7 @@ def test_a_recording_is_marked_listed_exported_played_and_left(opened, folder):
     page = opened.page
     assert opened.test_id("timeline").count() == 0
     opened.test_id("do-record").click()
-    opened.test_id("state").filter(has_text="Live, recording").wait_for()
+    opened.test_id("state").filter(has_text="Recording").wait_for()
     assert opened.test_id("do-record").get_attribute("aria-pressed") == "true"
     opened.test_id("timeline").wait_for()
     opened.press(0.03, 0.02)
@@ -96,7 +96,7 @@ def test_a_recording_is_marked_listed_exported_played_and_left(opened, folder):
 def _played_and_left(opened, row, path):
     page = opened.page
     row.get_by_role("button", name="Play").click()
-    opened.test_id("play").wait_for()
+    opened.test_id("state").filter(has_text="Playing").wait_for()
     opened.until(f"scene.source.endsWith('{path.name}')")
     opened.test_id("span").first.wait_for()
     assert page.locator(".track-of-time .note").get_attribute("title").endswith("a finger")
@@ -105,8 +105,9 @@ def _played_and_left(opened, row, path):
     page.locator("[data-testid=loop][aria-pressed=true]").wait_for()
     opened.test_id("loop").click()
     page.locator("[data-testid=loop][aria-pressed=false]").wait_for()
-    opened.test_id("play").filter(has_text="Hold").click()
-    opened.test_id("play").filter(has_text="Play").wait_for()
+    opened.test_id("do-pause").click()
+    opened.test_id("state").filter(has_text="Paused").wait_for()
+    assert page.get_by_role("button", name="Go on").count() == 1, "there is one pause"
     span = opened.test_id("span").first.bounding_box()
     track = opened.test_id("track").bounding_box()
     page.mouse.click(span["x"] + span["width"] / 2, track["y"] + 6)
@@ -119,7 +120,7 @@ def _played_and_left(opened, row, path):
     page.keyboard.press("Home")
     opened.test_id("when").filter(has_text="0:00").wait_for()
     opened.test_id("go-live").click()
-    opened.test_id("play").wait_for(state="detached")
+    opened.test_id("step").wait_for(state="detached")
     opened.until("scene.source.startsWith('twin')")
 
 
@@ -166,7 +167,8 @@ def test_a_page_finds_a_server_that_was_started_again_with_its_token(
     watched = Watched(browser, first, prepared.mesh)
     watched.open()
     first.stop()
-    watched.test_id("state").filter(has_text="Connection lost").wait_for()
+    watched.test_id("state").filter(has_text="Disconnected").wait_for()
+    watched.test_id("warning").filter(has_text="Connection lost").wait_for()
     second = Site(site.runner, token=load_token(tmp_path / "token"), port=first.port)
     try:
         watched.test_id("state").filter(has_text="Live").wait_for()
@@ -174,7 +176,8 @@ def test_a_page_finds_a_server_that_was_started_again_with_its_token(
         second.stop()
     third = Site(site.runner, port=first.port)
     try:
-        watched.test_id("state").filter(has_text="started again and does not know").wait_for()
+        watched.test_id("warning").filter(has_text="started again and does not know").click()
+        watched.test_id("warnings").filter(has_text="open the address").wait_for()
         looks_right(watched, "refused")
     finally:
         third.stop()

@@ -39,8 +39,11 @@ export const pause: Command = {
   label: "Pause",
   key: "Space",
   code: " ",
-  title: "Hold the picture; again to go on",
-  run: () => state.send({ type: "pause", on: !(state.status.value?.paused ?? false) }),
+  title: "Hold the image; again to go on",
+  run: () => {
+    const { replay, paused = false } = state.status.value ?? {};
+    state.send(replay?.ended ? { type: "seek", at_s: 0 } : { type: "pause", on: !paused });
+  },
 };
 
 export const record: Command = {

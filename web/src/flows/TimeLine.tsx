@@ -152,19 +152,8 @@ function MarkForm() {
 function PlayButtons() {
   const replay = status.value?.replay;
   if (!replay) return null;
-  const paused = status.value?.paused ?? false;
   return (
     <div role="group" aria-label="Replay">
-      <button
-        type="button"
-        data-testid="play"
-        title="Play or hold (Space)"
-        onClick={() =>
-          replay.ended ? seek(0) : send({ type: "pause", on: !paused })
-        }
-      >
-        {replay.ended ? "Again" : paused ? "Play" : "Hold"}
-      </button>
       <button type="button" data-testid="step" title="One read further" onClick={() => send({ type: "step" })}>
         Step
       </button>

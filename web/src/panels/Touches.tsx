@@ -109,6 +109,7 @@ export function Touches() {
     <section class={`panel touches${stale ? " stale" : ""}`} aria-labelledby="touches-title">
       <h2>
         <span id="touches-title">Touches</span>
+        {touches.length > ROWS && <span class="small">{touches.length - ROWS} more on the sheet</span>}
         <State />
       </h2>
       <div class="list" data-testid="touch-list">
@@ -138,7 +139,6 @@ export function Touches() {
             </tbody>
           </table>
         )}
-        {touches.length > ROWS && <p class="hint">and {touches.length - ROWS} more on the sheet</p>}
       </div>
       <Announcer />
     </section>

@@ -18,17 +18,21 @@ import {
 } from "../state";
 import { theme } from "../theme";
 import { Target } from "../flows/Target";
-import { Furniture } from "./Furniture";
+import { narrow } from "../screen";
+import { Furniture, LABELS } from "./Furniture";
 import { Painter } from "./painter";
 import { cursor, listen } from "./pointer";
 import { hovered, locator, seen, shownDrive, shownPair } from "./space";
 import { around, boxOf, fit, type Margin, type View } from "./view";
 
-/** Room for the electrodes' labels all round and for the legend at the left; on a telephone less. */
-const margin = (width: number): Margin =>
-  width > 600
-    ? { left: 186, right: 64, top: 52, bottom: 80 }
-    : { left: 134, right: 50, top: 46, bottom: 46 };
+/** Room for the electrodes' labels all round and for the legend at the left; on a telephone for
+ * the labels alone, px. */
+function margin(): Margin {
+  if (!narrow.value) return { left: 186, right: 64, top: 52, bottom: 80 };
+  const longest = Math.max(2, ...(scene.value?.electrodes.map(({ label }) => label.length) ?? []));
+  const side = LABELS.narrow.beside + 10 * longest;
+  return { left: side, right: side, top: 32, bottom: 32 };
+}
 const NOWHERE: View = { scale: 1, originX: 0, originY: 0, width: 0, height: 0 };
 
 export const view = signal<View>(NOWHERE);
@@ -71,8 +75,8 @@ export function Sheet() {
         const [width, height] = size.value;
         if (scene.value && width > 0) {
           view.value = seen.value
-            ? around(seen.value, width, height, margin(width))
-            : fit(boxOf(scene.value.outline), width, height, margin(width));
+            ? around(seen.value, width, height, margin())
+            : fit(boxOf(scene.value.outline), width, height, margin());
         }
         painter.resize(width, height);
       }),
