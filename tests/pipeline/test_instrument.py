@@ -39,7 +39,8 @@ def site(prepared, tmp_path_factory):
 
 def test_a_setting_shows_in_the_picture_and_is_taken_back(opened):
     opened.page.keyboard.press("e")
-    opened.test_id("set-touch-gamma1").wait_for(state="attached")
+    opened.test_id("set-touch-method").wait_for(state="attached")
+    assert opened.test_id("set-touch-gamma1").count() == 0, "a fit has no thresholds"
     alpha = opened.test_id("alpha")
     opened.test_id("set-alpha").focus()
     opened.page.keyboard.press("ArrowRight")
@@ -50,6 +51,26 @@ def test_a_setting_shows_in_the_picture_and_is_taken_back(opened):
     opened.page.keyboard.press("Enter")
     opened.test_id("refused").filter(has_text="expected a number from 0 to 2, got 7").wait_for()
     assert opened.page.evaluate("window.tomoskin.last.referenceReady")
+
+
+def test_every_setting_has_its_meaning_and_says_itself_what_is_wrong_with_it(opened):
+    """With its unit, and with electrodes as on the bench; also where the sheet cannot be made."""
+    opened.page.keyboard.press("e")
+    opened.test_id("section-electrodes").locator("summary").click()
+    field = opened.page.locator(".field", has=opened.test_id("set-electrodes-width"))
+    assert field.locator(".unit").inner_text() == "mm"
+    opened.test_id("set-electrodes-width").fill("90")
+    opened.page.keyboard.press("Enter")
+    refused = field.get_by_test_id("refused")
+    refused.filter(has_text="E2: overlaps E1 by").wait_for()
+    assert opened.test_id("refused").count() == 1
+    assert opened.test_id("set-electrodes-width").get_attribute("aria-invalid") == "true"
+    refused.get_by_role("button").click()
+    refused.wait_for(state="detached")
+    meanings = opened.page.locator(".settings .field").evaluate_all(
+        "all => all.filter(each => !each.querySelector('.help')?.textContent.trim()).length"
+    )
+    assert meanings == 0
 
 
 def edit_pattern(opened):

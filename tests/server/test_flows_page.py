@@ -90,6 +90,11 @@ def test_a_recording_is_marked_listed_exported_played_and_left(opened, folder):
     assert download.value.suggested_filename == f"{path.stem}-touches.csv"
     assert Path(download.value.path()).read_text().startswith("frame,time_s,id,")
     looks_right(opened, "sessions")
+    row.get_by_role("button", name="Name and notes").click()
+    opened.test_id("session-notes").fill("the left hand, softly")
+    looks_right(opened, "session")
+    opened.page.get_by_role("button", name="Save notes").click()
+    row.filter(has_text="the left hand").wait_for()
     _played_and_left(opened, row, path)
 
 

@@ -30,6 +30,7 @@ from tomoskin.recording import (
     recording_of,
     replayed,
     scanned_touches,
+    start_time,
 )
 from tomoskin.skin import Skin
 
@@ -104,8 +105,9 @@ class Export:
 
     def touches(self, path: Path) -> None:
         """Write a table of the recorded touches."""
-        rows = scanned_touches(self.session)
-        write_touches(path, rows, self.session.skin.surface, overwrite=self.overwrite)
+        rows, surface = scanned_touches(self.session), self.session.skin.surface
+        begun = start_time(self.session)
+        write_touches(path, rows, surface, begun=begun, overwrite=self.overwrite)
 
     def _panels(self, prepared: Prepared) -> Iterator[Panel]:
         first: float | None = None

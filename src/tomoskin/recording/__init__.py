@@ -45,6 +45,7 @@ from tomoskin.recording.session_reader import (
     end_time,
     indexed_frames,
     message_counts,
+    start_time,
     tick_rate,
     touches_before,
 )
@@ -93,6 +94,7 @@ __all__ = [
     "repair",
     "replayed",
     "scanned_touches",
+    "start_time",
     "scene_message",
     "schema_of",
     "session_info",

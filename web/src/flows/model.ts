@@ -11,6 +11,8 @@ export interface FoundFile {
   readonly size: number;
   /** Seconds since 1970. */
   readonly written: number;
+  /** What a person wrote about it; "" for nothing. */
+  readonly notes: string;
 }
 
 interface Files {
