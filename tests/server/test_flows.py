@@ -231,7 +231,7 @@ def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
     assert page.told("sources")["board"]["channels"] == channels, "those that were recorded"
     assert {f["name"] for f in told["files"]} >= {"run.mcap", "run.npz", "run-touches.csv"}
     page.ask("flow_begin", kind="touch")
-    assert "nobody can press a recording" in page.told("error")["message"]
+    assert "a recording cannot be pressed" in page.told("error")["message"]
     page.ask("live")
     assert page.told("scene")["source"] == "twin of textile-disc-8"
     assert page.told("state")["replay"] is None
@@ -395,7 +395,7 @@ def test_a_press_is_taken_back_and_the_flow_left(flows):
     page.ask("flow_begin", kind="touch")
     first = press_dots(site, page, 1)["presses"][0]
     page.ask("flow_keep", name="early")
-    assert "do not tell enough" in page.told("error")["message"]
+    assert "more presses are needed" in page.told("error")["message"]
     page.ask("flow_undo")
     told = page.told("flow", lambda m: m["presses"] == [])
     assert told["dot"] == first

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -129,22 +130,81 @@ def _played_and_left(opened, row, path):
     opened.until("scene.source.startsWith('twin')")
 
 
+def focus_on(page, name, most=60):
+    """Tab on until the focus is on what a screen reader calls so."""
+    called = "e => e.getAttribute('aria-label') ?? e.labels?.[0]?.textContent ?? e.textContent"
+    for _ in range(most):
+        page.keyboard.press("Tab")
+        if name in page.evaluate(f"() => ({called})(document.activeElement)"):
+            return
+    raise AssertionError(f"no way by Tab to {name}")
+
+
+def test_pressing_recording_and_setting_up_without_pointer_and_without_eyes(opened, folder):
+    page, before = opened.page, set(folder.glob("*.mcap"))
+    focus_on(page, "The sheet")
+    opened.test_id("probe").filter(has_text="Probe at 0, 0 millimetres").wait_for(state="attached")
+    for _ in range(6):
+        page.keyboard.press("ArrowRight")
+    page.keyboard.press("c")
+    opened.test_id("state").filter(has_text="Recording").wait_for()
+    page.keyboard.press("Enter")
+    opened.test_id("probe").filter(has_text="Pressed at 30, 0 with").wait_for(state="attached")
+    log = page.get_by_role("log")
+    log.filter(has_text="millimetres").wait_for(state="attached")
+    assert re.match(r"touch \d+ at (2|3)\d, −?\d+ millimetres", log.text_content())
+    page.keyboard.press("Enter")
+    log.filter(has_text="No touch").wait_for(state="attached")
+    page.keyboard.press("c")
+    opened.test_id("state").filter(has_text="Live").wait_for()
+    [path] = set(folder.glob("*.mcap")) - before
+    page.keyboard.press("s")
+    opened.test_id("session").filter(has_text=path.name).wait_for()
+    focus_on(page, f"Name and notes of {path.name}")
+    page.keyboard.press("Enter")
+    focus_on(page, "Name")
+    page.keyboard.press("Control+a")
+    page.keyboard.type("by-keys")
+    page.keyboard.press("Enter")
+    row = opened.test_id("session").filter(has_text="by-keys.mcap")
+    row.wait_for()
+    focus_on(page, "Name and notes of by-keys.mcap")
+    page.keyboard.press("Enter")
+    focus_on(page, "Delete")
+    page.keyboard.press("Enter")
+    assert path.with_name("by-keys.mcap").exists(), "it is asked twice"
+    page.keyboard.press("Enter")
+    row.wait_for(state="detached")
+    page.keyboard.press("Escape")
+    page.keyboard.press("u")
+    focus_on(page, "3 Touch")
+    page.keyboard.press("Enter")
+    focus_on(page, "Begin")
+    page.keyboard.press("Enter")
+    opened.test_id("phase").wait_for()
+    focus_on(page, "Leave")
+    page.keyboard.press("Enter")
+    opened.test_id("flow-begin").wait_for()
+    page.keyboard.press("Escape")
+    opened.test_id("drawer-setup").wait_for(state="detached")
+
+
 def test_the_board_says_what_it_is_and_is_connected_anew(opened):
     opened.test_id("open-setup").click()
     opened.test_id("board").filter(has_text="Firmware").wait_for()
-    opened.test_id("reference-words").filter(has_text="Stands for").wait_for()
-    opened.page.get_by_role("button", name="open it anew").click()
+    opened.test_id("reference-words").filter(has_text="ago").wait_for()
+    opened.page.get_by_role("button", name="reconnect").click()
     opened.test_id("reference-words").filter(has_text="keep hands off").wait_for()
-    opened.test_id("reference-words").filter(has_text="Stands for").wait_for()
+    opened.test_id("reference-words").filter(has_text="ago").wait_for()
     opened.test_id("take-reference").click()
     opened.test_id("reference-words").filter(has_text="keep hands off").wait_for()
-    opened.test_id("reference-words").filter(has_text="Stands for").wait_for()
+    opened.test_id("reference-words").filter(has_text="ago").wait_for()
     looks_right(opened, "board")
 
 
 def test_touch_is_taught_by_pressing_dots(opened, folder):
     guided(opened, "touch", 6)
-    opened.test_id("told").filter(has_text="Missed by").wait_for()
+    opened.test_id("flow-text").filter(has_text="Median error").wait_for()
     looks_right(opened, "touch")
     opened.test_id("flow-keep").click()
     opened.test_id("calibration").filter(has_text="touch.npz").wait_for()
@@ -157,7 +217,7 @@ def test_touch_is_taught_by_pressing_dots(opened, folder):
 
 def test_the_wires_are_found_by_pressing_dots(opened, folder):
     guided(opened, "wiring", 3)
-    opened.test_id("told").filter(has_text="as the skin file says").wait_for()
+    opened.test_id("flow-text").filter(has_text="as the skin file says").wait_for()
     looks_right(opened, "wiring")
     opened.test_id("flow-keep").click()
     opened.test_id("flow-begin").wait_for()

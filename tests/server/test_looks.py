@@ -10,7 +10,7 @@ import pytest
 
 from server.looks import look, look_in_both
 from server.still import PANELS, show, still_site
-from server.watching import Watched
+from server.watching import Watched, axe_finds
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 
@@ -21,6 +21,9 @@ SIZES = {
     (390, 844): True,
 }
 """Whether it is pressed with fingers."""
+
+AXE_LOOKS = ((1280, 720), (390, 844))
+"""Where axe-core looks too."""
 
 PLANTED = {
     "cutOff": [".choice", "width: 90px; overflow: hidden"],
@@ -57,6 +60,8 @@ def test_every_panel_looks_right(browser, site, prepared, size):
             f"{name}: {fact}": what for fact, what in look_in_both(watched.page, name).items()
         }
         sheets.append(watched.test_id("sheet").bounding_box())
+        if size in AXE_LOOKS:
+            wrong |= {f"{name}: {rule}": where for rule, where in axe_finds(watched.page)}
     watched.context.close()
     assert not wrong
     assert watched.wrong == []

@@ -4,13 +4,32 @@ import pytest
 
 from run.test_runner import Watch
 from server.serving import Site
-from server.watching import distance
+from server.watching import TO_CLIENT, Watched, distance
 from tomoskin.run import Runner
 from tomoskin.source import open_source
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 
 NEAR = 0.015
+RING = """() => {
+    const canvas = [...document.querySelectorAll(".sheet canvas")].at(-1);
+    const style = getComputedStyle(document.documentElement).getPropertyValue("--truth").trim();
+    const [r, g, b] = [1, 3, 5].map(at => parseInt(style.slice(at, at + 2), 16));
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    let count = 0;
+    for (let k = 0; k < data.length; k += 4) {
+        const off = Math.abs(data[k] - r) + Math.abs(data[k + 1] - g) + Math.abs(data[k + 2] - b);
+        count += data[k + 3] > 250 && off < 6;
+    }
+    return count;
+}"""
+"""Pixels in the colour of the truth."""
+
+
+def ring_colours(opened):
+    return opened.page.evaluate(RING)
+
+
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +98,40 @@ def test_several_presses_stay_with_shift_and_escape_lifts_them(opened):
     for place in places:
         assert min(distance(row, place) for row in rows) < NEAR
     opened.page.keyboard.press("Escape")
+    opened.lifted()
+
+
+def test_two_taps_of_a_finger_keep_a_press_and_two_more_lift_it(browser, site, prepared):
+    """On a telephone, whose screen the skin fills from side to side."""
+    phone = Watched(browser, site, prepared.mesh, (390, 844), touch=True)
+    try:
+        phone.open()
+        left, right = (phone.page.evaluate(TO_CLIENT, [x, 0])["x"] for x in (-0.1, 0.1))
+        assert right - left > 0.8 * 390
+        place = phone.page.evaluate(TO_CLIENT, [0.03, 0.02])
+        for _ in range(2):
+            phone.page.touchscreen.tap(place["x"], place["y"])
+        phone.test_id("touch-row").wait_for()
+        assert phone.read()["truths"][0]["x"] == pytest.approx(0.03, abs=2e-3)
+        for _ in range(2):
+            phone.page.touchscreen.tap(place["x"], place["y"])
+        phone.lifted()
+        assert phone.wrong == []
+    finally:
+        phone.context.close()
+
+
+def test_the_truth_shows_around_the_pointers_own_press(opened):
+    """Its ring is drawn over what the press itself draws, outside of its rim."""
+    opened.press(0.03, 0.02)
+    opened.until("last.truths[0].force >= 5")
+    opened.page.keyboard.press(" ")
+    opened.test_id("state").filter(has_text="Paused").wait_for()
+    assert ring_colours(opened) == 0
+    opened.page.keyboard.press("t")
+    opened.page.wait_for_function(f"() => ({RING})() > 100")
+    opened.page.keyboard.press(" ")
+    opened.page.mouse.up()
     opened.lifted()
 
 

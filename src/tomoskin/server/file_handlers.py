@@ -97,8 +97,7 @@ class FileHandlers:
 
     def _check_idle(self, name: str) -> None:
         """Raise DataError where the session is in use."""
-        if name == self._recording():
-            raise DataError("is still being recorded: end the recording first", where=name)
+        self._check_ended(name)
         if name == self._playing():
             raise DataError("is being played: go back to live first", where=name)
         if name == self._exporting:
@@ -142,9 +141,12 @@ class FileHandlers:
     def _advance(self, done: float, total: float) -> None:
         self._share = done / total if total else 0.0
 
-    def _complete(self, name: str) -> Path:
+    def _check_ended(self, name: str) -> None:
         if name == self._recording():
             raise DataError("is still being recorded: end the recording first", where=name)
+
+    def _complete(self, name: str) -> Path:
+        self._check_ended(name)
         return self._folder.existing(name, SESSION)
 
     def _playing(self) -> str | None:

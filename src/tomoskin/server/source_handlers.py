@@ -21,7 +21,7 @@ from tomoskin.source import Transport, list_ports, open_source
 from tomoskin.wire import SCHEMA
 
 EMULATED = {
-    "emulator" if name == DEFAULT else f"emulator:{name}": f"Real firmware, simulated {board.text}"
+    "emulator" if name == DEFAULT else f"emulator:{name}": f"Real firmware on a simulated {board.text}"
     for name, board in BOARDS.items()
 }
 

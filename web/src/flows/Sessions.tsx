@@ -36,6 +36,8 @@ const doomed = signal(false);
 function change(name: string | null): void {
   changing.value = name;
   doomed.value = false;
+  // The form goes, and with it what had the focus.
+  if (name === null) document.getElementById("drawer")?.focus();
 }
 
 /** Another name, notes, deletion; what is in use keeps its name. */
@@ -204,7 +206,7 @@ function View() {
         </p>
       )}
       {sessions.length === 0 && (
-        <p class="hint">Nothing has been recorded here yet: press Record below, then touch the skin.</p>
+        <p class="hint">Nothing has been recorded yet. Press Record, then touch the skin.</p>
       )}
       <ul class="filed">
         {sessions.map((file) => (

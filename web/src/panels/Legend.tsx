@@ -57,7 +57,7 @@ export function Legend() {
           Reset
         </button>
       )}
-      <p class="ring" title="The ellipse around a touch: where it is with 90 % of certainty, by the noise">
+      <p class="ring" title="The ellipse around a touch holds its position with 90 % probability">
         <svg viewBox="0 0 14 14" aria-hidden="true">
           <circle cx="7" cy="7" r="5.5" />
         </svg>{" "}

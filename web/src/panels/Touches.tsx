@@ -3,6 +3,7 @@
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import type { Touch } from "../decode";
 import { inScale, millimetres, scaleFor, type Scale } from "../format";
+import { fingers } from "../screen";
 import { limit, link, scene, shown, status } from "../state";
 import { stateInWords } from "../words";
 
@@ -14,7 +15,7 @@ function uncertainty(touch: Touch): string {
   return Number.isFinite(sd) ? millimetres(sd) : "";
 }
 
-/** What cannot be told apart, in words; nothing where there is one touch. */
+/** What cannot be separated, in words; nothing where there is one touch. */
 function tooClose(touch: Touch): string | undefined {
   if (touch.several > 1) return `${touch.several} touches, too close to separate`;
   return touch.several ? "may be several touches, too close to separate" : undefined;
@@ -59,7 +60,9 @@ function Teaching() {
     <>
       <p class="lead">Press the sheet</p>
       <p class="hint">
-        Hold for more force, or set it with the wheel. Drag to slide. With Shift a press stays.
+        {fingers.value
+          ? "Hold for more force, drag to slide. Tap twice and a press stays; twice more, and it lifts."
+          : "Hold for more force, or set it with the wheel. Drag to slide. With Shift a press stays."}
       </p>
     </>
   );
@@ -73,12 +76,12 @@ function Announcer() {
     void ids.value;
     const timer = window.setTimeout(() => {
       const touches = shown.peek()?.touches ?? [];
-      const places = touches.map(
+      const positions = touches.map(
         (touch) =>
           `touch ${touch.id} at ${millimetres(touch.x, 0)}, ${millimetres(touch.y, 0)} ` +
           ["millimetres", tooClose(touch)].filter(Boolean).join(", "),
       );
-      words.value = places.length ? places.join("; ") : "No touch";
+      words.value = positions.length ? positions.join("; ") : "No touch";
     }, 700);
     return () => window.clearTimeout(timer);
   });
@@ -95,7 +98,7 @@ function State() {
   if (!state) return null;
   const words = stateInWords(state);
   return (
-    <span class="told" title={words} data-testid="told">
+    <span class="reading-of-state" title={words} data-testid="sheet-state">
       {words}
     </span>
   );

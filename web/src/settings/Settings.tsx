@@ -85,7 +85,7 @@ function Files() {
   const save = () => {
     const wanted = name.value.trim();
     if (!/^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$/.test(wanted)) {
-      say("A name has letters, digits, - and _ only");
+      say("A name has letters, digits, dashes and underscores only");
       return;
     }
     send({ type: "save_skin", name: wanted, replace: again.value === wanted });

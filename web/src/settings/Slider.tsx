@@ -45,7 +45,7 @@ export function Alpha({ value }: { readonly value: Value | null | undefined }) {
         Automatic
       </button>
       <p class="help">
-        Sharper to the left, calmer to the right. Automatic
+        To the left images are sharper, to the right calmer. Automatic
         {automatic === null ? "" : ` (${Number(automatic.toPrecision(2))}, marked)`} follows the noise.
       </p>
     </div>

@@ -106,7 +106,7 @@ onMessage<Refused>("settings_error", (message) => {
 
 const DOING = {
   mesh: "meshing",
-  model: "solving the sheet",
+  model: "computing the model",
   image: "preparing images",
   touches: "preparing touches",
   source: "starting the source",

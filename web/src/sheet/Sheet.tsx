@@ -2,7 +2,7 @@
 
 import { effect, signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { inScale, millimetres, scaleFor } from "../format";
+import { fixed, inScale, millimetres, scaleFor } from "../format";
 import {
   hand,
   limit,
@@ -54,6 +54,19 @@ function Reading() {
     <p class="reading" data-testid="reading">
       {millimetres(place[0], 0)}, {millimetres(place[1], 0)} mm{" "}
       <strong>{inScale(frame.image[found.cell], scale)}</strong> {scale.unit}
+    </p>
+  );
+}
+
+/** Where the keyboard's probe is and what it holds, for who cannot see it. */
+function Probe() {
+  const place = cursor.value;
+  if (!place) return null;
+  const held = hand.value.held.map(({ x, y, force }) => `${millimetres(x, 0)}, ${millimetres(y, 0)} with ${fixed(force, 1)} newtons`);
+  return (
+    <p class="unseen" role="status" data-testid="probe">
+      Probe at {millimetres(place[0], 0)}, {millimetres(place[1], 0)} millimetres.{" "}
+      {held.length > 0 && `Pressed at ${held.join("; ")}.`}
     </p>
   );
 }
@@ -125,8 +138,9 @@ export function Sheet() {
       )}
       {view.value.width > 0 && <Target view={view.value} />}
       <Reading />
+      <Probe />
       {!accelerated.value && (
-        <p class="remark">WebGL 2 is missing in this browser: the sheet is drawn flat and more slowly.</p>
+        <p class="remark">This browser lacks WebGL 2: the sheet is drawn flat, and more slowly.</p>
       )}
     </div>
   );

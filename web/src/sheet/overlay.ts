@@ -105,6 +105,21 @@ function drawTrail(pen: Pen, theme: Theme, view: View, trail: readonly Place[]):
   pen.globalAlpha = 1;
 }
 
+/** A closed line through places in pixels. */
+function closed(places: readonly Place[]): Path2D {
+  const path = new Path2D();
+  places.forEach(([x, y], k) => (k ? path.lineTo(x, y) : path.moveTo(x, y)));
+  path.closePath();
+  return path;
+}
+
+/** Places on a circle of the sheet, m. */
+const circle = (x: number, y: number, radius: number): Place[] =>
+  Array.from({ length: CORNERS }, (_, k) => {
+    const phase = (2 * Math.PI * k) / CORNERS;
+    return [x + radius * Math.cos(phase), y + radius * Math.sin(phase)] as const;
+  });
+
 /** From the edge of what presses to its ring, px. */
 const TRUTH_GAP = 6;
 
@@ -156,17 +171,16 @@ function drawNumber(pen: Pen, theme: Theme, view: View, touch: Touch): void {
 function drawTruth(pen: Pen, theme: Theme, view: View, truth: Truth): void {
   const [x, y] = toPixels(view, truth.x, truth.y);
   // Never under the rim of the press that made it.
-  const radius = truth.radius * view.scale + TRUTH_GAP;
-  pen.beginPath();
-  pen.ellipse(x, y, radius, radius, 0, 0, 2 * Math.PI);
+  const ring = circle(truth.x, truth.y, truth.radius + TRUTH_GAP / view.scale);
+  const path = closed(ring.map((place) => toPixels(view, ...place)));
   pen.setLineDash([]);
   pen.strokeStyle = theme.halo;
   pen.lineWidth = 4;
-  pen.stroke();
+  pen.stroke(path);
   pen.setLineDash([6, 4]);
   pen.strokeStyle = theme.truth;
   pen.lineWidth = 2;
-  pen.stroke();
+  pen.stroke(path);
   pen.setLineDash([]);
   pen.beginPath();
   pen.ellipse(x, y, 3, 3, 0, 0, 2 * Math.PI);
