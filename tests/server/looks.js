@@ -199,6 +199,17 @@ window.looks = (() => {
     return found;
   };
 
+  /** What is drawn outside the part of the page that it belongs to. */
+  const spilling = () =>
+    [...document.querySelectorAll(LANDMARKS)].flatMap((part) => {
+      const edge = part.getBoundingClientRect();
+      return [...part.querySelectorAll("*")].filter(visible).flatMap((each) => {
+        const shown = shownPart(each);
+        if (shown.width <= 0 || shown.height <= 0 || within(shown, edge, 2)) return [];
+        return [`${each.tagName} .${each.getAttribute("class")} at ${place(shown)} leaves ${place(edge)}`];
+      });
+    });
+
   /** Whether somebody who reads on from `a` finds `b`: not above it, not left of it on its line. */
   function follows(a, b) {
     const level = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
@@ -332,7 +343,7 @@ window.looks = (() => {
       return canvas && Math.abs(canvas.getBoundingClientRect().height - plot.clientHeight) > 1;
     }).map((plot) => plot.getAttribute("aria-label"));
 
-  const FACTS = { unfinished, cutOff, overlapping, outOfOrder, tooSmallToHit, tooSmallToRead, tooFaint, scrolling };
+  const FACTS = { unfinished, cutOff, overlapping, spilling, outOfOrder, tooSmallToHit, tooSmallToRead, tooFaint, scrolling };
 
   return {
     /** Fact → what breaks it, in words; nothing where all is well. */

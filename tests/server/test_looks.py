@@ -28,6 +28,7 @@ AXE_LOOKS = ((1280, 720), (390, 844))
 PLANTED = {
     "cutOff": [".choice", "width: 90px; overflow: hidden"],
     "overlapping": ["[data-testid=do-pause]", "margin-left: -60px"],
+    "spilling": [".lamp", "position: relative; top: 60px"],
     "outOfOrder": [".controls", "flex-direction: row-reverse"],
     "tooSmallToHit": [".choice button", "min-height: 0; height: 18px; padding: 0; line-height: 1"],
     "tooSmallToRead": [".facts dt", "font-size: 11px"],

@@ -67,7 +67,7 @@ export function Side() {
   const drawer = opened.value;
   return (
     <div class="side">
-      <div class="head">
+      <div class="upper">
         <Touches />
         <Strength />
       </div>

@@ -12,7 +12,7 @@ import { axis, Plot, type Plan } from "./Plot";
 const NARROW = 320;
 
 /** A touch is stronger than the image of it, by about so much at first. */
-const HEADROOM = 3;
+const HEADROOM = 5;
 
 /** The end of the ordinate: it follows the colour scale, and moves for nothing else. */
 const top = computed(() => niceAbove(HEADROOM * limit.value));
