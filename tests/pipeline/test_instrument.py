@@ -146,9 +146,11 @@ def points_at(opened, electrode):
         """id => {
             const path = document.querySelector("[data-testid=current] path");
             const tail = path.getPointAtLength(0);
-            const [x, y] = path.getAttribute("d").match(/L([\\d.]+) ([\\d.]+)/).slice(1).map(Number);
+            const head = path.getAttribute("d").match(/L([\\d.]+) ([\\d.]+)/);
+            const [x, y] = head.slice(1).map(Number);
             const arc = document.querySelector(`[data-testid=${id}] .arc`).getBBox();
-            const far = (px, py) => Math.hypot(px - arc.x - arc.width / 2, py - arc.y - arc.height / 2);
+            const middle = [arc.x + arc.width / 2, arc.y + arc.height / 2];
+            const far = (px, py) => Math.hypot(px - middle[0], py - middle[1]);
             return [far(x, y), far(tail.x, tail.y)];
         }""",
         electrode,

@@ -239,7 +239,7 @@ def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
 
 def test_a_session_is_renamed_annotated_and_deleted(flows, tmp_path):
     """Never over another file, and its notes go with it."""
-    site, page = flows
+    _, page = flows
     folder = tmp_path / "sessions"
     for name in ("run.mcap", "taken.mcap", "run.csv"):
         (folder / name).write_bytes(name.encode())

@@ -130,12 +130,19 @@ def _played_and_left(opened, row, path):
     opened.until("scene.source.startsWith('twin')")
 
 
+FOCUSED = """() => {
+    const one = document.activeElement;
+    if (!one.matches("a, button, input, select, textarea, [role=application]")) return "";
+    return one.getAttribute("aria-label") ?? one.labels?.[0]?.textContent ?? one.textContent;
+}"""
+"""What a screen reader calls what has the focus."""
+
+
 def focus_on(page, name, most=60):
-    """Tab on until the focus is on what a screen reader calls so."""
-    called = "e => e.getAttribute('aria-label') ?? e.labels?.[0]?.textContent ?? e.textContent"
+    """Tab on until the focus is on what is called so."""
     for _ in range(most):
         page.keyboard.press("Tab")
-        if name in page.evaluate(f"() => ({called})(document.activeElement)"):
+        if name in page.evaluate(FOCUSED):
             return
     raise AssertionError(f"no way by Tab to {name}")
 

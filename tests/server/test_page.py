@@ -30,8 +30,6 @@ def ring_colours(opened):
     return opened.page.evaluate(RING)
 
 
-
-
 @pytest.fixture(scope="module")
 def site(prepared):
     runner = Runner(prepared, lambda: open_source("twin", prepared.skin))

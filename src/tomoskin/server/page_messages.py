@@ -154,7 +154,9 @@ def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
 
 def event(happened: Event) -> str:
     """Something that a person should know."""
-    return text_of(type="event", time_s=happened.host_time, kind=happened.kind, text=as_on_bench(happened.text))
+    return text_of(
+        type="event", time_s=happened.host_time, kind=happened.kind, text=as_on_bench(happened.text)
+    )
 
 
 def timeline(line: Timeline) -> str:

@@ -21,7 +21,9 @@ from tomoskin.source import Transport, list_ports, open_source
 from tomoskin.wire import SCHEMA
 
 EMULATED = {
-    "emulator" if name == DEFAULT else f"emulator:{name}": f"Real firmware on a simulated {board.text}"
+    "emulator"
+    if name == DEFAULT
+    else f"emulator:{name}": f"Real firmware on a simulated {board.text}"
     for name, board in BOARDS.items()
 }
 

@@ -90,9 +90,9 @@ def key(
 ) -> T:
     """A field of a :class:`Section`; without ``default`` (None: none at all) the key is required.
 
-    ``when`` names another key and its values for which this one may stand: ``shape="disc"``; ``effective``
-    the same for which it does anything. In the
-    record a key that is absent has its default in SI units, or None.
+    ``when`` names another key and its values for which this one may stand: ``shape="disc"``;
+    ``effective`` those for which it does anything. In the record a key that is absent has its
+    default in SI units, or None.
     """
     condition = None
     for other, words in when.items():
