@@ -91,6 +91,9 @@ def _default(key: Key) -> str:
         text = "required" if key.required else "none"
     if key.when:
         text += f" for {' and '.join(key.when[1])}"
+    if key.effective:
+        other, words = key.effective
+        text += f", has an effect with `{other}` {' or '.join(words)}"
     if key.unless:
         text += f", unless `{key.unless}` is there"
     return text

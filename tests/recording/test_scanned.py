@@ -59,8 +59,7 @@ def test_recorded_touches_stand_at_the_same_frames_and_times(session: Path) -> N
     write_touches(own, [(frame, float(time[frame]), (TOUCH,)) for frame in (3, 11)])
     with own.open(encoding="utf-8") as file:
         first, last = csv.DictReader(file)
-    assert exported(session, "touches") == [
-        first,
-        first | {"frame": "", "time_s": "5.500000"},
-        last,
-    ]
+    rows = exported(session, "touches")
+    elapsed = [float(row.pop("elapsed_s")) for row in rows]
+    assert rows == [first, first | {"frame": "", "time_s": "5.500000"}, last]
+    assert elapsed == pytest.approx([0.03, 0.5, 1.01], abs=1e-6), "since the first frame"

@@ -148,6 +148,7 @@ window.looks = (() => {
     const { left, top, right, bottom } = thing.box;
     return box(Math.max(left, room.left), Math.max(top, room.top), Math.min(right, room.right), Math.min(bottom, room.bottom));
   }
+  const shownPart = (element) => inView({ element, box: element.getBoundingClientRect() });
   const isSeen = (thing) => common(thing.box, inView(thing)) > 1;
   const place = ({ left, top, right, bottom }) => `[${[left, top, right, bottom].map(Math.round)}]`;
   const said = (thing) => `“${thing.words.slice(0, 40)}” at ${place(thing.box)}`;
@@ -192,11 +193,22 @@ window.looks = (() => {
     grounds.forEach((a, k) => {
       for (const b of grounds.slice(k + 1)) {
         if (a.contains(b)) continue;
-        if (common(a.getBoundingClientRect(), b.getBoundingClientRect()) > 1) found.push(`${a.className} and ${b.className}`);
+        if (common(shownPart(a), shownPart(b)) > 1) found.push(`${a.className} and ${b.className}`);
       }
     });
     return found;
   };
+
+  /** What is drawn outside the part of the page that it belongs to. */
+  const spilling = () =>
+    [...document.querySelectorAll(LANDMARKS)].flatMap((part) => {
+      const edge = part.getBoundingClientRect();
+      return [...part.querySelectorAll("*")].filter(visible).flatMap((each) => {
+        const shown = shownPart(each);
+        if (shown.width <= 0 || shown.height <= 0 || within(shown, edge, 2)) return [];
+        return [`${each.tagName} .${each.getAttribute("class")} at ${place(shown)} leaves ${place(edge)}`];
+      });
+    });
 
   /** Whether somebody who reads on from `a` finds `b`: not above it, not left of it on its line. */
   function follows(a, b) {
@@ -331,7 +343,7 @@ window.looks = (() => {
       return canvas && Math.abs(canvas.getBoundingClientRect().height - plot.clientHeight) > 1;
     }).map((plot) => plot.getAttribute("aria-label"));
 
-  const FACTS = { unfinished, cutOff, overlapping, outOfOrder, tooSmallToHit, tooSmallToRead, tooFaint, scrolling };
+  const FACTS = { unfinished, cutOff, overlapping, spilling, outOfOrder, tooSmallToHit, tooSmallToRead, tooFaint, scrolling };
 
   return {
     /** Fact → what breaks it, in words; nothing where all is well. */

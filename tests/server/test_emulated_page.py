@@ -30,8 +30,8 @@ def site(programs, prepared, monkeypatch):
 
 
 def test_a_press_on_the_page_is_a_press_on_the_emulated_board(opened):
-    state = opened.test_id("state").filter(has_text="Live")
-    state.filter(has_text="emulator of textile-disc-8").wait_for()
+    opened.test_id("state").filter(has_text="Live").wait_for()
+    opened.until("scene.source.includes('emulator of textile-disc-8')")
     assert opened.read()["touches"] == []
     opened.page.keyboard.press("w")
     opened.test_id("stretch-along").wait_for()

@@ -13,7 +13,7 @@ from run.test_runner import Watch
 from server.flowing import flowing
 from tomoskin.calibration import TOUCH, ChannelMapping
 from tomoskin.core import DataError
-from tomoskin.recording import SessionReader, as_recorded, replayed
+from tomoskin.recording import SessionReader, as_recorded, end_time, replayed, start_time
 from tomoskin.run import commands
 from tomoskin.server.folder import Folder
 from tomoskin.server.source_handlers import SourceSwitch
@@ -129,7 +129,9 @@ def test_a_folder_that_is_gone_is_said(tmp_path):
 @pytest.mark.parametrize("name", NAMES)
 def test_no_request_takes_such_a_name(flows, name):
     _, page = flows
-    for kind, fields in (("open", {}), ("export", {"format": "npz"}), ("calibration", {})):
+    others = (("rename", {"to": "x"}), ("delete", {}), ("annotate", {"text": "x"}))
+    named = (("open", {}), ("export", {"format": "npz"}), ("calibration", {}), *others)
+    for kind, fields in named:
         page.ask(kind, name=name, **fields)
         assert "not understood" in page.told("error")["message"] or name == "run.txt"
     page.ask("flow_keep", name=name)
@@ -208,19 +210,65 @@ def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
         page.ask("export", name="run.mcap", format=form)
         assert page.told("exported")["name"] == name
     with (tmp_path / "sessions" / "run-touches.csv").open() as file:
-        assert {row["id"] for row in csv.DictReader(file)} == {"1"}
+        rows = list(csv.DictReader(file))
+    assert {row["id"] for row in rows} == {"1"}
+    with SessionReader(path) as session:
+        start, length = start_time(session), end_time(session) - start_time(session)
+        channels = session.device()["channels"]
+    assert 0 <= float(rows[0]["elapsed_s"]) < length
+    assert float(rows[0]["time_s"]) - float(rows[0]["elapsed_s"]) == pytest.approx(start, abs=1e-5)
     page.ask("open", name="run.mcap")
     assert page.told("scene")["source"] == "textile-disc-8 on replay:run.mcap"
     assert page.told("timeline")["touches"]
     page.ask("files")
     told = page.told("files")
     assert told["playing"] == "run.mcap"
+    page.ask("rename", name="run.mcap", to="other")
+    assert "is being played" in page.told("error")["message"]
+    page.ask("delete", name="run.mcap")
+    assert "is being played" in page.told("error")["message"]
+    page.ask("sources")
+    assert page.told("sources")["board"]["channels"] == channels, "those that were recorded"
     assert {f["name"] for f in told["files"]} >= {"run.mcap", "run.npz", "run-touches.csv"}
     page.ask("flow_begin", kind="touch")
-    assert "nobody can press a recording" in page.told("error")["message"]
+    assert "a recording cannot be pressed" in page.told("error")["message"]
     page.ask("live")
     assert page.told("scene")["source"] == "twin of textile-disc-8"
     assert page.told("state")["replay"] is None
+
+
+def test_a_session_is_renamed_annotated_and_deleted(flows, tmp_path):
+    """Never over another file, and its notes go with it."""
+    _, page = flows
+    folder = tmp_path / "sessions"
+    for name in ("run.mcap", "taken.mcap", "run.csv"):
+        (folder / name).write_bytes(name.encode())
+    page.ask("annotate", name="run.mcap", text=" the left hand\nsoftly ")
+    page.told("files", lambda m: "the left hand\nsoftly\n" in [f["notes"] for f in m["files"]])
+    page.ask("rename", name="run.mcap", to="taken")
+    assert "taken.mcap: is there already" in page.told("error")["message"]
+    page.ask("rename", name="run.mcap", to="left")
+    named = page.told("files", lambda m: "left.mcap" in [f["name"] for f in m["files"]])
+    assert {f["name"]: f["notes"] for f in named["files"]}["left.mcap"].startswith("the left hand")
+    assert (folder / "left.mcap").read_bytes() == b"run.mcap"
+    assert (folder / "taken.mcap").read_bytes() == b"taken.mcap"
+    page.ask("delete", name="run.csv")
+    assert "ends in .mcap" in page.told("error")["message"]
+    page.ask("delete", name="left.mcap")
+    page.told("files", lambda m: "left.mcap" not in [f["name"] for f in m["files"]])
+    assert sorted(path.name for path in folder.iterdir()) == ["run.csv", "taken.mcap"]
+
+
+def test_notes_lead_nowhere_else(tmp_path):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "secret.txt").write_text("secret")
+    (tmp_path / "in" / "run.mcap").write_bytes(b"")
+    (tmp_path / "in" / "run.notes.txt").symlink_to(tmp_path / "secret.txt")
+    folder = Folder(tmp_path / "in")
+    assert [file.notes for file in folder.list_files().files] == [""]
+    with pytest.raises(DataError, match="is a link"):
+        folder.annotate("run.mcap", "mine")
+    assert (tmp_path / "secret.txt").read_text() == "secret"
 
 
 def test_a_recording_that_was_named_by_its_path_is_named_by_its_file():
@@ -347,7 +395,7 @@ def test_a_press_is_taken_back_and_the_flow_left(flows):
     page.ask("flow_begin", kind="touch")
     first = press_dots(site, page, 1)["presses"][0]
     page.ask("flow_keep", name="early")
-    assert "do not tell enough" in page.told("error")["message"]
+    assert "more presses are needed" in page.told("error")["message"]
     page.ask("flow_undo")
     told = page.told("flow", lambda m: m["presses"] == [])
     assert told["dot"] == first

@@ -10,7 +10,7 @@ import pytest
 
 from server.looks import look, look_in_both
 from server.still import PANELS, show, still_site
-from server.watching import Watched
+from server.watching import Watched, axe_finds
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 
@@ -22,9 +22,13 @@ SIZES = {
 }
 """Whether it is pressed with fingers."""
 
+AXE_LOOKS = ((1280, 720), (390, 844))
+"""Where axe-core looks too."""
+
 PLANTED = {
     "cutOff": [".choice", "width: 90px; overflow: hidden"],
     "overlapping": ["[data-testid=do-pause]", "margin-left: -60px"],
+    "spilling": [".lamp", "position: relative; top: 60px"],
     "outOfOrder": [".controls", "flex-direction: row-reverse"],
     "tooSmallToHit": [".choice button", "min-height: 0; height: 18px; padding: 0; line-height: 1"],
     "tooSmallToRead": [".facts dt", "font-size: 11px"],
@@ -57,6 +61,8 @@ def test_every_panel_looks_right(browser, site, prepared, size):
             f"{name}: {fact}": what for fact, what in look_in_both(watched.page, name).items()
         }
         sheets.append(watched.test_id("sheet").bounding_box())
+        if size in AXE_LOOKS:
+            wrong |= {f"{name}: {rule}": where for rule, where in axe_finds(watched.page)}
     watched.context.close()
     assert not wrong
     assert watched.wrong == []

@@ -1,16 +1,35 @@
 """The built page in real Chromium, on the real server and the twin."""
 
+import time
+
 import pytest
 
 from run.test_runner import Watch
 from server.serving import Site
-from server.watching import distance
+from server.watching import TO_CLIENT, Watched, distance
 from tomoskin.run import Runner
 from tomoskin.source import open_source
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 
 NEAR = 0.015
+RING = """() => {
+    const canvas = [...document.querySelectorAll(".sheet canvas")].at(-1);
+    const style = getComputedStyle(document.documentElement).getPropertyValue("--truth").trim();
+    const [r, g, b] = [1, 3, 5].map(at => parseInt(style.slice(at, at + 2), 16));
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    let count = 0;
+    for (let k = 0; k < data.length; k += 4) {
+        const off = Math.abs(data[k] - r) + Math.abs(data[k + 1] - g) + Math.abs(data[k + 2] - b);
+        count += data[k + 3] > 250 && off < 6;
+    }
+    return count;
+}"""
+"""Pixels in the colour of the truth."""
+
+
+def ring_colours(opened):
+    return opened.page.evaluate(RING)
 
 
 @pytest.fixture(scope="module")
@@ -24,10 +43,8 @@ def site(prepared):
 
 
 def test_it_loads_and_says_that_it_is_live(opened, prepared):
-    assert "(light-touch)" in opened.test_id("alpha").inner_text()
-    state = opened.test_id("state")
-    state.filter(has_text="Live").wait_for()
-    assert "twin of textile-disc-8" in state.inner_text()
+    opened.test_id("state").filter(has_text="Live").wait_for()
+    assert "textile-disc-8" in opened.page.locator(".top .skin").inner_text()
     opened.test_id("touch-list").filter(has_text="Press the sheet").wait_for()
     assert opened.page.evaluate("window.tomoskin.scene.points.length") == prepared.mesh.points.size
     assert "token" not in opened.page.url
@@ -81,6 +98,47 @@ def test_several_presses_stay_with_shift_and_escape_lifts_them(opened):
     for place in places:
         assert min(distance(row, place) for row in rows) < NEAR
     opened.page.keyboard.press("Escape")
+    opened.lifted()
+
+
+def tap_twice(phone, place):
+    """A tenth of a second apart by the events' own times, however busy the machine is."""
+    session, begin = phone.context.new_cdp_session(phone.page), time.time()
+    for step, kind in enumerate(("touchStart", "touchEnd") * 2):
+        points = [place] if kind == "touchStart" else []
+        event = {"type": kind, "touchPoints": points, "timestamp": begin + 0.05 * step}
+        session.send("Input.dispatchTouchEvent", event)
+
+
+def test_two_taps_of_a_finger_keep_a_press_and_two_more_lift_it(browser, site, prepared):
+    """On a telephone, whose screen the skin fills from side to side."""
+    phone = Watched(browser, site, prepared.mesh, (390, 844), touch=True)
+    try:
+        phone.open()
+        left, right = (phone.page.evaluate(TO_CLIENT, [x, 0])["x"] for x in (-0.1, 0.1))
+        assert right - left > 0.8 * 390
+        place = phone.page.evaluate(TO_CLIENT, [0.03, 0.02])
+        tap_twice(phone, place)
+        phone.test_id("touch-row").wait_for()
+        assert phone.read()["truths"][0]["x"] == pytest.approx(0.03, abs=2e-3)
+        tap_twice(phone, place)
+        phone.lifted()
+        assert phone.wrong == []
+    finally:
+        phone.context.close()
+
+
+def test_the_truth_shows_around_the_pointers_own_press(opened):
+    """Its ring is drawn over what the press itself draws, outside of its rim."""
+    opened.press(0.03, 0.02)
+    opened.until("last.truths[0].force >= 5")
+    opened.page.keyboard.press(" ")
+    opened.test_id("state").filter(has_text="Paused").wait_for()
+    assert ring_colours(opened) == 0
+    opened.page.keyboard.press("t")
+    opened.page.wait_for_function(f"() => ({RING})() > 100")
+    opened.page.keyboard.press(" ")
+    opened.page.mouse.up()
     opened.lifted()
 
 

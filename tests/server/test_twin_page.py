@@ -109,15 +109,15 @@ def place(element):
 
 
 def test_the_state_is_said_on_one_line_that_does_not_move(opened):
-    told, runner = opened.test_id("told"), opened.site.runner
-    told.filter(has_text="straight").wait_for()
-    straight = place(told)
+    said, runner = opened.test_id("sheet-state"), opened.site.runner
+    said.filter(has_text="straight").wait_for()
+    straight = place(said)
     runner.ask(SetPose(BendRequest(TRUE, length=WIDTH)))
-    told.filter(has_text="bent").wait_for()
-    assert place(told) == straight
-    assert told.get_attribute("title").startswith("State")
+    said.filter(has_text="bent").wait_for()
+    assert place(said) == straight
+    assert said.get_attribute("title").startswith("State")
     runner.ask(SetPose())
-    told.filter(has_text="straight").wait_for()
+    said.filter(has_text="straight").wait_for()
 
 
 def stretched(opened):

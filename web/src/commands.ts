@@ -1,7 +1,7 @@
 /** What a person can ask for, each with its key and its words: buttons and keyboard share them. */
 
 import { computed, signal } from "@preact/signals";
-import { drawers, toggleDrawer } from "./drawers";
+import { closeDrawer, drawers, toggleDrawer } from "./drawers";
 import { niceAbove } from "./format";
 import { adjustForce, liftAll } from "./presses";
 import * as state from "./state";
@@ -16,7 +16,7 @@ export interface Command {
   run(): void;
 }
 
-/** The limit that shows all of the present picture: a round number above its largest change. */
+/** The limit that shows all of the present image: a round number above its largest change. */
 function autoLimit(): number | null {
   const image = state.newest.frame?.image;
   if (!image) return null;
@@ -30,7 +30,7 @@ export const takeReference: Command = {
   label: "Reference",
   key: "R",
   code: "r",
-  title: "Take the sheet as it is now for untouched",
+  title: "Take the skin as it is now as untouched",
   run: () => state.send({ type: "reference" }),
 };
 
@@ -39,8 +39,11 @@ export const pause: Command = {
   label: "Pause",
   key: "Space",
   code: " ",
-  title: "Hold the picture; again to go on",
-  run: () => state.send({ type: "pause", on: !(state.status.value?.paused ?? false) }),
+  title: "Hold the image; again to go on",
+  run: () => {
+    const { replay, paused = false } = state.status.value ?? {};
+    state.send(replay?.ended ? { type: "seek", at_s: 0 } : { type: "pause", on: !paused });
+  },
 };
 
 export const record: Command = {
@@ -48,7 +51,7 @@ export const record: Command = {
   label: "Record",
   key: "C",
   code: "c",
-  title: "Record this session to a file where tomoskin runs; again to end it",
+  title: "Record to a file where tomoskin runs; again to stop",
   run: () => state.send({ type: "record", on: !state.status.value?.recording }),
 };
 
@@ -57,8 +60,11 @@ export const lift: Command = {
   label: "Lift all",
   key: "Esc",
   code: "Escape",
-  title: "Lift every press",
-  run: () => (state.hand.value = liftAll(state.hand.value)),
+  title: "Lift every press; where there is none, close the drawer",
+  run: () => {
+    if (state.hand.peek().held.length === 0) closeDrawer();
+    state.hand.value = liftAll(state.hand.peek());
+  },
 };
 
 export const keep: Command = {
@@ -66,7 +72,7 @@ export const keep: Command = {
   label: "Keep presses",
   key: "Shift",
   code: "k",
-  title: "Presses stay when let go (or hold Shift, or key K)",
+  title: "Presses stay when released (or hold Shift, or key K)",
   run: () => (state.keepPresses.value = !state.keepPresses.value),
 };
 
@@ -93,7 +99,7 @@ export const flat: Command = {
   label: "Cells",
   key: "F",
   code: "f",
-  title: "Show the triangles as they are, unsmoothed",
+  title: "Show the triangles of the mesh without smoothing",
   run: () => (state.smoothed.value = !state.smoothed.value),
 };
 
@@ -102,7 +108,7 @@ export const truth: Command = {
   label: "Truth",
   key: "T",
   code: "t",
-  title: "Show where the twin is really pressed, as dashed rings",
+  title: "Show where the simulated skin is really pressed, as dashed rings",
   run: () => (state.showTruth.value = !state.showTruth.value),
 };
 
@@ -111,7 +117,7 @@ export const autoOnce: Command = {
   label: "Auto once",
   key: "A",
   code: "a",
-  title: "Fit the colour limits to the picture as it is now, once",
+  title: "Fit the colour limits to the present image, once",
   run: () => (state.ownLimit.value = autoLimit() ?? state.ownLimit.value),
 };
 

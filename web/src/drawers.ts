@@ -1,4 +1,4 @@
-/** What slides in over the panels, never over the sheet: one at a time, each registered once. */
+/** What opens below the touches, never over the sheet: one at a time, each registered once. */
 
 import { computed, effect, signal } from "@preact/signals";
 import type { ComponentType } from "preact";

@@ -68,7 +68,7 @@ export function rim(face: Face, radius: number, angle: number): readonly Corner[
 }
 
 /** What the server is told of a face beside place, force and half size; nothing for a circle. */
-export function told(face: Face, radius: number, angle: number): object {
+export function faceMessage(face: Face, radius: number, angle: number): object {
   if (face.shape === "circle") return {};
   const { shape, corners } = face;
   const vertices = corners?.map(([x, y]) => [x * radius, y * radius]);

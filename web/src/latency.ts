@@ -7,7 +7,7 @@ const PERIOD_MS = 1000;
 
 const took = new Float64Array(KEPT);
 let count = 0;
-let told = 0;
+let reported = 0;
 let drawn = -1;
 
 /** Page time of the first picture that was drawn, ms from the navigation; null before. */
@@ -27,8 +27,8 @@ export function quantile(sorted: Float64Array, part: number): number {
 }
 
 function tell(): void {
-  if (count === told) return;
-  told = count;
+  if (count === reported) return;
+  reported = count;
   const sorted = took.slice(0, Math.min(count, KEPT)).sort();
   send({ type: "painted", p50_s: quantile(sorted, 0.5), p99_s: quantile(sorted, 0.99) });
 }

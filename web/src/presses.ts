@@ -1,6 +1,6 @@
 /** The presses that this page holds on the twin, as a pure state machine in metres and newtons. */
 
-import { CIRCLE, type Face, told } from "./faces";
+import { CIRCLE, type Face, faceMessage } from "./faces";
 import type { Press } from "./protocol";
 
 export const MAX_PRESSES = 8;
@@ -135,6 +135,6 @@ export function reforced(hand: Hand, which: Held, steps: number): Hand {
 export function toMessage(hand: Hand): Press[] {
   return hand.held.map(({ x, y, force, radius, face, angle }) => ({
     ...{ x, y, force, radius },
-    ...told(face, radius, angle),
+    ...faceMessage(face, radius, angle),
   }));
 }

@@ -3,7 +3,7 @@
 import { signal } from "@preact/signals";
 import { CHANGE, mapTable } from "./colours";
 
-const NAMES = ["ground", "ink", "muted", "line", "accent", "halo", "mesh"] as const;
+const NAMES = ["ground", "ink", "muted", "line", "accent", "truth", "halo", "mesh"] as const;
 
 export type Theme = Readonly<Record<(typeof NAMES)[number], string>> & {
   readonly dark: boolean;

@@ -1,55 +1,84 @@
-/** The state in one sentence, and whether someone must act. */
+/** The state as a word, what someone must act on, and the figures of the top line. */
 
 import { duration, fixed } from "./format";
 import type { Scene, StateReading, Status } from "./protocol";
 import type { LinkState } from "./socket";
 
-export interface Sentence {
+export interface Warning {
   readonly text: string;
   /** The same without what counts up or down, for a screen reader. */
   readonly brief: string;
-  /** Amber: someone must act. */
-  readonly act: boolean;
 }
 
-/** A picture older than this, while it should be moving, is said to be old. */
+export interface Headline {
+  /** The state in one or two words. */
+  readonly word: string;
+  /** What goes on, where nobody has to act on it; "" for nothing. */
+  readonly remark: string;
+  /** What someone must act on, the most urgent first. */
+  readonly warnings: readonly Warning[];
+}
+
+/** An image older than this, s, while it should be moving, is reported as old. */
 const OLD = 1.5;
 
-const calm = (text: string, brief = text): Sentence => ({ text, brief, act: false });
-const act = (text: string, brief = text): Sentence => ({ text, brief, act: true });
+const warning = (text: string, brief = text): Warning => ({ text, brief });
+const calm = (word: string, remark = ""): Headline => ({ word, remark, warnings: [] });
 
-function lostSentence(link: LinkState & { phase: "lost" }, now: number, age: number | null): Sentence {
+function disconnected(link: LinkState & { phase: "lost" }, now: number, age: number | null): Headline {
   if (link.refused) {
-    return act("tomoskin was started again and does not know this page: open the address that it printed");
+    const text = "tomoskin was started again and does not know this page: open the address that it printed";
+    return { word: "Disconnected", remark: "", warnings: [warning(text)] };
   }
   const wait = Math.max(0, link.retryAt / 1e3 - now);
   const retry = wait < 0.5 ? "trying again" : `trying again in ${duration(Math.ceil(wait))}`;
-  const picture = age === null ? "" : `, the picture is ${duration(age)} old`;
-  return act(`Connection lost${picture}: ${retry}`, "Connection lost");
+  const image = age === null ? "" : `, the image is ${duration(age)} old`;
+  const text = `Connection lost${image}: ${retry}`;
+  return { word: "Disconnected", remark: "", warnings: [warning(text, "Connection lost")] };
+}
+
+/** The state of a source that is connected. */
+function stateOf(status: Status, old: boolean): readonly [word: string, remark: string] {
+  const { paused, reference, replay, running, recording } = status;
+  if (replay?.ended) return ["At the end", ""];
+  if (paused) return ["Paused", ""];
+  if (!running) return ["Stopped", ""];
+  if (!reference.ready) {
+    return ["Taking reference", `${reference.frames} of ${reference.needed} frames: keep hands off`];
+  }
+  if (old) return ["No frames", ""];
+  if (replay) return ["Playing", ""];
+  return [recording ? "Recording" : "Live", ""];
+}
+
+/** What someone must act on; the server's own sentence first. */
+function warningsOf(status: Status, age: number | null): Warning[] {
+  const { baseline, paused, problem, replay, running, sick } = status;
+  const found = problem ? [warning(problem)] : [];
+  if (!running && !replay?.ended && !problem) found.push(warning("No frames come from the source"));
+  if (running && !paused && !replay?.ended && age !== null && age > OLD) {
+    found.push(warning(`No new image for ${duration(age)}`, "No new image"));
+  }
+  for (const { electrode, state, reason } of sick) {
+    const name = `E${electrode + 1} is ${state}`;
+    if (!problem?.includes(name)) found.push(warning(`${name}: ${reason}`));
+  }
+  if (baseline?.stale) found.push(warning(`The reference is stale: ${baseline.stale}`));
+  return found;
 }
 
 /** What the top line says. `age`: seconds since the last frame, null before the first. */
-export function sentence(
+export function headline(
   link: LinkState,
   scene: Scene | null,
   status: Status | null,
   now: number,
   age: number | null,
-): Sentence {
-  if (link.phase === "lost") return lostSentence(link, now, age);
-  if (link.phase === "connecting" || !scene) return calm("Connecting");
-  if (status?.problem) return act(status.problem);
-  if (status?.paused) return calm("Paused");
-  if (status && !status.reference.ready) {
-    const { frames, needed } = status.reference;
-    return calm(
-      `Taking the reference, ${frames} of ${needed}: keep hands off`,
-      "Taking the reference: keep hands off",
-    );
-  }
-  if (status && !status.running) return act("Stopped: no frames come from the source");
-  if (age !== null && age > OLD) return act(`No new picture for ${duration(age)}`, "No new picture");
-  return calm(status?.recording ? "Live, recording" : "Live");
+): Headline {
+  if (link.phase === "lost") return disconnected(link, now, age);
+  if (link.phase === "connecting" || !scene || !status) return calm("Connecting");
+  const [word, remark] = stateOf(status, age !== null && age > OLD);
+  return { word, remark, warnings: warningsOf(status, age) };
 }
 
 export interface Fact {
@@ -65,40 +94,40 @@ export function facts(status: Status | null): Fact[] {
   if (!status) return [];
   const lost = status.dropped + status.corrupt + status.gaps;
   const { age_s: age } = status.reference;
-  const leftOut = {
-    id: "left-out",
-    name: "rows left out",
+  const excluded = {
+    id: "excluded",
+    name: "excluded",
     value: String(status.left_out),
-    title: "Measurements that the picture does without",
+    title: "Measurements that the image does without",
   };
   return [
-    ...(status.left_out > 0 ? [leftOut] : []),
+    ...(status.left_out > 0 ? [excluded] : []),
     { id: "fps", name: "frames/s", value: fixed(status.fps, 0), title: "Frames decoded per second" },
     {
       id: "dropped",
       name: "lost",
       value: String(lost),
-      title: `${status.dropped} dropped, ${status.corrupt} corrupt, ${status.gaps} gaps`,
+      title: `Frames lost: ${status.dropped} dropped, ${status.corrupt} corrupt, ${status.gaps} gaps`,
     },
     {
       id: "latency",
-      name: "ms p99",
-      value: fixed(status.p99_ms, 2),
-      title: `Bytes in to touches out: median ${fixed(status.p50_ms, 2)} ms`,
+      name: "ms delay",
+      value: fixed(status.p99_ms, 1),
+      title: `From bytes to touches: 99 of 100 frames take less; median ${fixed(status.p50_ms, 2)} ms`,
     },
     {
       id: "reference",
       name: "reference",
       value: age === null ? "–" : duration(age),
-      title: "Age of the reference",
+      title: "Time since the reference was taken",
     },
   ];
 }
 
-/** Alpha of the pictures and what chose it. */
+/** Alpha of the images and what chose it. */
 export function alpha(status: Status): string {
   const by = status.rule === "hand" ? "by hand" : status.rule;
-  return `alpha ${Number(status.alpha.toPrecision(2))} (${by})`;
+  return `${Number(status.alpha.toPrecision(2))} (${by})`;
 }
 
 /** The same in full, for a tooltip. */

@@ -15,8 +15,8 @@ describe("rows by drive", () => {
   it("leaves a gap between drives and names them as people count", () => {
     expect(grouping.rows).toEqual([0, 1, -1, 2, 3]);
     expect(grouping.drives).toEqual([
-      { label: "1–2", from: 0, to: 1 },
-      { label: "2–3", from: 3, to: 4 },
+      { label: "2–1", from: 0, to: 1 },
+      { label: "3–2", from: 3, to: 4 },
     ]);
   });
 

@@ -2,7 +2,7 @@ import { describe, expect, it, vi } from "vitest";
 
 vi.stubGlobal("window", { location: { href: "http://127.0.0.1/" }, setTimeout, clearTimeout });
 
-const { doing, stands, typed } = await import("../src/settings/model");
+const { applies, doing, parted, typed } = await import("../src/settings/model");
 
 describe("what a person types", () => {
   it("gets the unit that was there, else the schema's", () => {
@@ -18,13 +18,25 @@ describe("what a person types", () => {
   });
 });
 
-it("a key stands only beside the choice that it goes with", () => {
-  const key = { when: { key: "shape", words: ["disc"] }, unless: null } as never;
-  expect(stands(key, { shape: "disc" })).toBe(true);
-  expect(stands(key, { shape: "rectangle" })).toBe(false);
-  const count = { when: null, unless: "positions" } as never;
-  expect(stands(count, { positions: null })).toBe(true);
-  expect(stands(count, { positions: [[0, 1]] })).toBe(false);
+it("a value and its unit stand apart", () => {
+  const kind = { form: "quantity", unit: "mm" } as const;
+  expect(parted("3 cm", kind)).toEqual(["3", "cm"]);
+  expect(parted("-1.5e3 ohm/sq", kind)).toEqual(["-1.5e3", "ohm/sq"]);
+  expect(parted(null, kind)).toEqual(["", "mm"]);
+  expect(parted("3 cm", { form: "text" })).toEqual(["3 cm", ""]);
+});
+
+it("a key applies beside the choice that it goes with or does anything with", () => {
+  const disc = { key: "shape", words: ["disc"] };
+  const goesWith = { when: disc, effective: null, unless: null } as never;
+  const worksWith = { when: null, effective: disc, unless: null } as never;
+  for (const key of [goesWith, worksWith]) {
+    expect(applies(key, { shape: "disc" })).toBe(true);
+    expect(applies(key, { shape: "rectangle" })).toBe(false);
+  }
+  const count = { when: null, effective: null, unless: "positions" } as never;
+  expect(applies(count, { positions: null })).toBe(true);
+  expect(applies(count, { positions: [[0, 1]] })).toBe(false);
 });
 
 it("a change says what it is doing, and how far it is", () => {

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { CIRCLE, FACES, rim, told } from "../src/faces";
+import { CIRCLE, FACES, rim, faceMessage } from "../src/faces";
 import { emptyHand, lifted, press, reforced, release, toMessage } from "../src/presses";
 import { profile } from "../src/twin/BendFigure";
 
@@ -7,10 +7,10 @@ const face = (id: string) => FACES.find((one) => one.id === id) ?? CIRCLE;
 const hand = emptyHand({ radius: 0.01, force: 2, maxForce: 10 });
 
 describe("a probe's face", () => {
-  it("is told by its shape, turn and corners, a circle by nothing", () => {
-    expect(told(CIRCLE, 0.01, 1)).toEqual({});
-    expect(told(face("square"), 0.01, 1)).toEqual({ shape: "square", angle: 1 });
-    const bar = told(face("bar"), 0.02, 0);
+  it("is faceMessage by its shape, turn and corners, a circle by nothing", () => {
+    expect(faceMessage(CIRCLE, 0.01, 1)).toEqual({});
+    expect(faceMessage(face("square"), 0.01, 1)).toEqual({ shape: "square", angle: 1 });
+    const bar = faceMessage(face("bar"), 0.02, 0);
     expect(bar).toMatchObject({ shape: "polygon", vertices: [[0.02, 0.005], [-0.02, 0.005], [-0.02, -0.005], [0.02, -0.005]] });
   });
 

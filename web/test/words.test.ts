@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { Scene, Status } from "../src/protocol";
 import { backOff, socketAddress } from "../src/socket";
-import { alpha, alphaInFull, facts, sentence, stateInWords } from "../src/words";
+import { alpha, alphaInFull, facts, headline, stateInWords } from "../src/words";
 
 const scene = { source: "twin of textile-disc-8" } as Scene;
 const status: Status = {
@@ -30,45 +30,65 @@ const status: Status = {
 };
 const open = { phase: "open" } as const;
 
-describe("the sentence", () => {
-  it("is calm while all is well", () => {
-    expect(sentence(open, scene, status, 10, 0.1)).toMatchObject({ text: "Live", act: false });
-    expect(sentence(open, scene, { ...status, paused: true }, 10, 60).act).toBe(false);
-    const recording = { ...status, recording: "run.mcap" };
-    expect(sentence(open, scene, recording, 10, 0.1).text).toBe("Live, recording");
-    expect(sentence({ phase: "connecting" }, null, null, 0, null).text).toBe("Connecting");
+const words = (...[next, age]: readonly [Partial<Status>, (number | null)?]) =>
+  headline(open, scene, { ...status, ...next }, 10, age ?? 0.1);
+const texts = (next: Partial<Status>, age?: number) => words(next, age).warnings.map(({ text }) => text);
+
+describe("the headline", () => {
+  it("is one calm word while all is well", () => {
+    expect(words({})).toEqual({ word: "Live", remark: "", warnings: [] });
+    expect(words({ paused: true }, 60)).toMatchObject({ word: "Paused", warnings: [] });
+    expect(words({ recording: "run.mcap" }).word).toBe("Recording");
+    expect(headline({ phase: "connecting" }, null, null, 0, null).word).toBe("Connecting");
   });
 
   it("counts the reference", () => {
     const reference = { ...status.reference, frames: 7, ready: false };
-    expect(sentence(open, scene, { ...status, reference }, 0, 0).text).toContain("7 of 20: keep hands off");
+    expect(words({ reference })).toMatchObject({ remark: "7 of 20 frames: keep hands off", warnings: [] });
   });
 
-  it("asks for action on problems, old pictures and a lost connection", () => {
-    const problem = { ...status, problem: "electrode 5 is open" };
-    expect(sentence(open, scene, problem, 0, 0)).toMatchObject({ text: "electrode 5 is open", act: true });
-    expect(sentence(open, scene, status, 9, 4).text).toBe("No new picture for 4 s");
+  it("says of a replay whether it plays or has ended", () => {
+    const replay = { now_s: 4, end_s: 4, speed: 1, loop: false, ended: true };
+    expect(words({ replay: { ...replay, ended: false } }).word).toBe("Playing");
+    expect(words({ replay, running: false }, 60)).toEqual({ word: "At the end", remark: "", warnings: [] });
+  });
+
+  it("warns of each thing once, the server's own sentence first", () => {
+    const sick = [
+      { electrode: 4, state: "open", reason: "no current flows", since_s: 1 },
+      { electrode: 6, state: "noisy", reason: "ten times its noise", since_s: 1 },
+    ];
+    expect(texts({ problem: "E5 is open: no current flows", sick })).toEqual([
+      "E5 is open: no current flows",
+      "E7 is noisy: ten times its noise",
+    ]);
+    const baseline = { drift: 0.1, held_s: 0, noise_v: null, stale: "drift of 10 %" };
+    expect(texts({ baseline })).toEqual(["The reference is stale: drift of 10 %"]);
+    expect(texts({ running: false })).toEqual(["No frames come from the source"]);
+    expect(texts({}, 4)).toEqual(["No new image for 4 s"]);
+  });
+
+  it("says how long a lost connection takes, and to a screen reader that it is lost", () => {
     const lost = { phase: "lost", since: 0, retryAt: 12_000, refused: false } as const;
-    expect(sentence(lost, scene, status, 9, 4)).toEqual({
-      text: "Connection lost, the picture is 4 s old: trying again in 3 s",
-      brief: "Connection lost",
-      act: true,
-    });
-    expect(sentence({ ...lost, refused: true }, scene, status, 9, 4).text).toContain("open the address");
+    expect(headline(lost, scene, status, 9, 4).warnings).toEqual([
+      { text: "Connection lost, the image is 4 s old: trying again in 3 s", brief: "Connection lost" },
+    ]);
+    const refused = headline({ ...lost, refused: true }, scene, status, 9, 4);
+    expect(refused.warnings[0].text).toContain("open the address");
   });
 });
 
 it("adds up what was lost and says what it was", () => {
   const lost = facts(status).find(({ id }) => id === "dropped");
-  expect(lost).toMatchObject({ value: "6", title: "1 dropped, 2 corrupt, 3 gaps" });
+  expect(lost).toMatchObject({ value: "6", title: "Frames lost: 1 dropped, 2 corrupt, 3 gaps" });
   expect(facts(null)).toEqual([]);
 });
 
 it("says alpha and what chose it", () => {
-  expect(alpha(status)).toBe("alpha 0.051 (light-touch)");
+  expect(alpha(status)).toBe("0.051 (light-touch)");
   expect(alphaInFull(status)).toBe("Weight of the prior, 0.05090, chosen by the rule light-touch");
   const byHand = { ...status, alpha: 0.1, rule: "hand" };
-  expect(alpha(byHand)).toBe("alpha 0.1 (by hand)");
+  expect(alpha(byHand)).toBe("0.1 (by hand)");
   expect(alphaInFull(byHand)).toContain("set by hand");
 });
 

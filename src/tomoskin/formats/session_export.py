@@ -30,6 +30,7 @@ from tomoskin.recording import (
     recording_of,
     replayed,
     scanned_touches,
+    start_time,
 )
 from tomoskin.skin import Skin
 
@@ -104,10 +105,10 @@ class Export:
 
     def touches(self, path: Path) -> None:
         """Write a table of the recorded touches."""
-        rows = list(scanned_touches(self.session))
+        rows, surface = list(scanned_touches(self.session)), self.session.skin.surface
         forces = any(t.detection.force is not None for _, _, touches in rows for t in touches)
-        surface = self.session.skin.surface
-        write_touches(path, rows, surface, forces=forces, overwrite=self.overwrite)
+        begun = start_time(self.session)
+        write_touches(path, rows, surface, forces=forces, begun=begun, overwrite=self.overwrite)
 
     def _panels(self, prepared: Prepared) -> Iterator[Panel]:
         first: float | None = None

@@ -19,6 +19,9 @@ FORCE = ("force_n", "force_low_n", "force_high_n", "force_state")
 """Further columns where a calibration tells forces: median, interval that nine in ten lie in, and
 "calibrated" or "uncalibrated"."""
 
+ELAPSED = "elapsed_s"
+"""The last column where it is known when a recording began: s since its first frame."""
+
 IN_SPACE = ("space_x_m", "space_y_m", "space_z_m")
 """Further columns where the sheet lies on a surface; x_m and y_m are the sheet's own (u, v)."""
 
@@ -29,6 +32,7 @@ def write_touches(
     surface: Surface | None = None,
     *,
     forces: bool = False,
+    begun: float | None = None,
     overwrite: bool = False,
 ) -> int:
     """Write touches of (frame, time, touches); return the number of rows.
@@ -36,7 +40,8 @@ def write_touches(
     A frame is its index in the recording, from 0, and empty where that does not hold it; its time
     is the recording's own.
 
-    ``forces`` adds those of the touches, which are empty where a touch has none.
+    ``forces`` adds those of the touches, which are empty where a touch has none; ``begun``, the
+    time of the recording's own first frame, adds the time since then.
 
     A standard deviation that is not known is an empty field; the kind is :attr:`Touch.said`. On
     a ``surface`` that is not flat each row ends with the touch's place on it.
@@ -50,11 +55,13 @@ def write_touches(
         part.open("w", newline="", encoding="utf-8") as file,
     ):
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(HEADER + (FORCE if forces else ()) + (IN_SPACE if on else ()))
+        since = () if begun is None else (ELAPSED,)
+        table.writerow(HEADER + (FORCE if forces else ()) + (IN_SPACE if on else ()) + since)
         for frame, time, touches in frames:
             for touch in touches:
                 more = _force(touch) if forces else ()
-                table.writerow(_row(frame, time, touch) + more + _in_space(touch, on))
+                last = () if begun is None else (f"{time - begun:.6f}",)
+                table.writerow(_row(frame, time, touch) + more + _in_space(touch, on) + last)
                 count += 1
     return count
 

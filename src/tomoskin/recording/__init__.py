@@ -45,6 +45,7 @@ from tomoskin.recording.session_reader import (
     end_time,
     indexed_frames,
     message_counts,
+    start_time,
     tick_rate,
     touches_before,
 )
@@ -96,6 +97,7 @@ __all__ = [
     "scene_message",
     "schema_of",
     "session_info",
+    "start_time",
     "tick_rate",
     "touch_colour",
     "touch_row",

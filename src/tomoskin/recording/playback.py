@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tomoskin.core import Event, Frame
 from tomoskin.recording.layout import Mark, MarkedFrame
-from tomoskin.recording.session_reader import SessionReader, end_time
+from tomoskin.recording.session_reader import SessionReader, end_time, start_time
 from tomoskin.touch import Span, touch_spans
 from tomoskin.wire import SCHEMA, Deframer, decode_payload, encode
 
@@ -36,8 +36,7 @@ def read_timeline(path: Path) -> Timeline:
         When the file cannot be read, is no session, is damaged, or holds no frame.
     """
     with SessionReader(path) as session:
-        own = (i.frame.host_time for i in session.frames() if not i.mark & Mark.EARLIER)
-        start = next(own, 0.0)
+        start = start_time(session)
 
         def timed(events: Iterator[Event]) -> tuple[tuple[float, Event], ...]:
             return tuple((event.host_time - start, event) for event in events)

@@ -62,6 +62,12 @@ class ReplayBoard:
         self._out.clear()
         return data
 
+    @property
+    def _channels(self) -> int:
+        """Of the board that was recorded; never fewer than the skin has electrodes."""
+        recorded = self._device.get("channels")
+        return max(recorded if isinstance(recorded, int) else 0, self._skin.n_electrodes)
+
     def _info(self, request: int) -> Info:
         skin = self._skin
         return Info(
@@ -71,7 +77,7 @@ class ReplayBoard:
             schema_hash=_HASH,
             firmware=_version(self._device.get("firmware")),
             reset=Reset.UNKNOWN,
-            channels=32,
+            channels=self._channels,
             adc_bits=skin.readout.adc_bits,
             max_oversampling=64,
             max_drives=2**16 - 1,

@@ -15,6 +15,7 @@ from tomoskin.core import DataError, Event, SkinError
 from tomoskin.recording import channels
 from tomoskin.recording.container_reader import MEND, ContainerReader
 from tomoskin.recording.layout import (
+    Mark,
     MarkedFrame,
     RecordedTouches,
     Truth,
@@ -153,6 +154,12 @@ def indexed_frames(session: SessionReader) -> int:
     """Number of frames by the index; 0 where there is none."""
     summary = session.container.summary
     return summary.totals.channel_message_counts.get(channels.FRAMES, 0) if summary else 0
+
+
+def start_time(session: SessionReader) -> float:
+    """Host time of the recording's own first frame; 0 where there is none."""
+    own = (item.frame.host_time for item in session.frames() if not item.mark & Mark.EARLIER)
+    return next(own, 0.0)
 
 
 def end_time(session: SessionReader) -> float | None:

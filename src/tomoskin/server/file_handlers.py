@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
+from typing import TypeVar
 
 from tomoskin.core import DataError, WireError
 from tomoskin.formats import WRITERS, Export
 from tomoskin.recording import SessionReader
-from tomoskin.server.folder import Folder, Listing
+from tomoskin.server.folder import SESSION, Folder, Listing
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_messages import text_of
-from tomoskin.server.requests import ExportSession, GoLive, ListFiles, OpenSession
+from tomoskin.server.requests import (
+    Annotate,
+    DeleteSession,
+    ExportSession,
+    GoLive,
+    ListFiles,
+    OpenSession,
+    RenameSession,
+)
 from tomoskin.server.source_handlers import SourceSwitch
 from tomoskin.server.task import Listener
 
+_T = TypeVar("_T")
+
 _EVERY = 0.1
 """Seconds between two images of a picture or film."""
-
-_SESSION = ".mcap"
 
 
 class FileHandlers:
@@ -35,6 +45,9 @@ class FileHandlers:
                 OpenSession: self._open,
                 GoLive: lambda page, _: self._live(page),
                 ExportSession: self._export,
+                RenameSession: self._rename,
+                DeleteSession: self._delete,
+                Annotate: self._annotate,
             }
         )
 
@@ -52,6 +65,43 @@ class FileHandlers:
             )
 
         self._hub.tasks.run(page, self._folder.list_files, answer)
+
+    def _rename(self, page: Listener, request: RenameSession) -> None:
+        def work() -> str:
+            self._check_idle(request.name)
+            return self._folder.rename(request.name, request.to)
+
+        self._change(page, work, lambda new: f"{request.name} is now {new}")
+
+    def _delete(self, page: Listener, request: DeleteSession) -> None:
+        def work() -> None:
+            self._check_idle(request.name)
+            self._folder.delete(request.name)
+
+        self._change(page, work, lambda _: f"{request.name} is deleted")
+
+    def _annotate(self, page: Listener, request: Annotate) -> None:
+        def work() -> None:
+            self._folder.annotate(request.name, request.text)
+
+        self._change(page, work, lambda _: f"Notes on {request.name} are saved")
+
+    def _change(self, page: Listener, work: Callable[[], _T], said: Callable[[_T], str]) -> None:
+        """Change the folder, and say to every page what has been done."""
+
+        def done(outcome: _T) -> None:
+            self._hub.runner.say("folder", said(outcome))
+            self._list(page)
+
+        self._hub.tasks.run(page, work, done)
+
+    def _check_idle(self, name: str) -> None:
+        """Raise DataError where the session is in use."""
+        self._check_ended(name)
+        if name == self._playing():
+            raise DataError("is being played: go back to live first", where=name)
+        if name == self._exporting:
+            raise DataError("is being exported: wait for it", where=name)
 
     def _open(self, page: Listener, request: OpenSession) -> None:
         def work() -> None:
@@ -91,10 +141,13 @@ class FileHandlers:
     def _advance(self, done: float, total: float) -> None:
         self._share = done / total if total else 0.0
 
-    def _complete(self, name: str) -> Path:
+    def _check_ended(self, name: str) -> None:
         if name == self._recording():
             raise DataError("is still being recorded: end the recording first", where=name)
-        return self._folder.existing(name, _SESSION)
+
+    def _complete(self, name: str) -> Path:
+        self._check_ended(name)
+        return self._folder.existing(name, SESSION)
 
     def _playing(self) -> str | None:
         replay = self._hub.runner.replay

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 
-from tomoskin.core import DataError
+from tomoskin.core import DataError, write_text
 
 KINDS = {
     ".mcap": "session",
@@ -22,6 +22,8 @@ KINDS = {
 }
 """What is listed and handed out, by the ending of its name."""
 
+SESSION = ".mcap"
+
 MOST_FILES = 200
 
 NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,119}"
@@ -31,14 +33,22 @@ STEM = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
 """The same without its ending."""
 
 
+NOTES = ".notes.txt"
+"""What a person wrote about a session stands beside it, under its stem and this ending."""
+
+MOST_NOTES = 4000
+"""Letters of it."""
+
+
 @dataclass(frozen=True, slots=True)
 class FileEntry:
-    """A file: name, kind, size in bytes, when it was last written (s since 1970)."""
+    """A file: name, kind, size in bytes, when it was last written (s since 1970), notes on it."""
 
     name: str
     kind: str
     size: int
     written: float
+    notes: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +84,59 @@ class Folder:
         except OSError as error:
             raise DataError(f"cannot be read: {error.strerror}", where="the folder") from error
         newest = sorted(entries, key=lambda file: -file.written)
-        return Listing(tuple(newest[:MOST_FILES]), others + len(newest[MOST_FILES:]))
+        listed = tuple(replace(file, notes=self._notes(file)) for file in newest[:MOST_FILES])
+        return Listing(listed, others + len(newest[MOST_FILES:]))
+
+    def _notes(self, file: FileEntry) -> str:
+        path = self._notes_path(file.name)
+        if file.kind != "session" or path.is_symlink() or not path.is_file():
+            return ""
+        return path.read_bytes()[: 4 * MOST_NOTES].decode(errors="replace")[:MOST_NOTES]
+
+    def _notes_path(self, name: str) -> Path:
+        return self.path / f"{Path(name).stem}{NOTES}"
+
+    def annotate(self, name: str, text: str) -> None:
+        """Write notes on a session beside it, in place of older ones; none for "".
+
+        Raises DataError where there is no such session, and OutputError where notes cannot be
+        written.
+        """
+        self.existing(name, SESSION)
+        path = self._notes_path(name)
+        if path.is_symlink():
+            raise DataError("is a link, and what it leads to is left alone", where=path.name)
+        if text.strip():
+            write_text(path, text.strip() + "\n", overwrite=True)
+        else:
+            path.unlink(missing_ok=True)
+
+    def rename(self, name: str, stem: str) -> str:
+        """Give a session and its notes another name; the new one. Never over another file.
+
+        Raises DataError where there is no such session or the new name is taken.
+        """
+        path, old = self.existing(name, SESSION), self._notes_path(name)
+        new = self.path / self._check(f"{stem}{SESSION}")
+        moves = [(path, new)] + ([(old, self._notes_path(new.name))] if old.is_file() else [])
+        for _, target in moves:
+            if target.exists() or target.is_symlink():
+                raise DataError("is there already: choose another name", where=target.name)
+        try:
+            for source, target in moves:
+                source.rename(target)
+        except OSError as error:
+            raise DataError(f"cannot be renamed: {error.strerror}", where=name) from error
+        return new.name
+
+    def delete(self, name: str) -> None:
+        """Delete a session and its notes. Raises DataError where there is no such session."""
+        path = self.existing(name, SESSION)
+        try:
+            path.unlink()
+            self._notes_path(name).unlink(missing_ok=True)
+        except OSError as error:
+            raise DataError(f"cannot be deleted: {error.strerror}", where=name) from error
 
     def skins(self) -> list[str]:
         """Stems of the skin files that a page may ask for, in the order of the alphabet."""

@@ -62,7 +62,7 @@ class GuideHandlers:
 
     def _begin(self, kind: FlowKind) -> None:
         if self._hub.runner.replay is not None:
-            raise WireError("nobody can press a recording: go back to live first")
+            raise WireError("a recording cannot be pressed: go back to live first")
         self._leave()
         flow = self._flow = PressFlow(kind, self._hub.runner.prepared)
         loop = asyncio.get_running_loop()
@@ -97,7 +97,7 @@ class GuideHandlers:
     def _undo(self) -> None:
         flow = self._flow
         if flow is None:
-            raise WireError("there is no press to take back")
+            raise WireError("there is no press to undo")
         flow.undo()
         self._estimate(flow)
         self._tell()
@@ -125,7 +125,7 @@ class GuideHandlers:
     def _keep(self, page: Listener, request: KeepFlow) -> None:
         flow = self._flow
         if flow is None:
-            raise WireError("nothing has been pressed")
+            raise WireError("no press has been recorded")
         work = partial(keep, flow, flow.answer(), self._folder, request.name, self._hub.runner)
 
         def done(name: str) -> None:

@@ -166,18 +166,18 @@ def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estima
     """A locator of the presses, and by how much it misses them. Raises DataError."""
     if len(presses) < _FEWEST_TOUCH:
         left = _FEWEST_TOUCH - len(presses)
-        return Estimate(f"{_counted(left)} to go for a first estimate")
+        return Estimate(f"{_counted(left)} more for a first estimate")
     dv, xy = _arrays(presses)
     locator = Locator.fit(dv, xy, pattern=prepared.pattern, skin=prepared.skin)
     errors = 1e3 * locator.errors
     doubted = sorted({remark.row for remark in locator.remarks})
-    text = f"Missed by {_by_effort(presses, errors)} (median; each press left out in turn)"
+    text = f"Median error {_by_effort(presses, errors)} (each press left out in turn)"
     if locator.one_force:
-        text += ", but all were about equally hard: others are missed farther"
+        text += ", but all presses were about equally hard: expect larger errors for others"
     if locator.is_guess:
-        text += "; the middle of all presses is as good an answer: press harder"
+        text += "; the mean of all presses is as good: press harder"
     elif len(presses) < _FIRST:
-        text += ": ten presses are a start, fifty are good"
+        text += ". Ten presses are a start, fifty are good"
     figures = {
         "errors_mm": errors.tolist(),
         "median_mm": float(np.median(errors)),
@@ -207,7 +207,7 @@ def estimate_wiring(
     """The likeliest wiring and how sure that is; ``untouched`` mean and noise V. DataError."""
     if len(presses) < _FEWEST_WIRING:
         left = _FEWEST_WIRING - len(presses)
-        return Estimate(f"{_counted(left)} to go for a first answer")
+        return Estimate(f"{_counted(left)} more for a first answer")
     dv, xy = _arrays(presses)
     rest, noise = untouched or (None, None)
     solution = solve_channel_mapping(dv, xy, prepared.skin, reference=rest, noise=noise)
@@ -229,10 +229,10 @@ def _in_words(solution: MappingAnswer, figures: dict[str, Any]) -> str:
     if solution.sure:
         return f"Sure: {figures['wiring']}"
     if solution.doubtful:
-        return "Too many presses look as if they were elsewhere: was each made on its dot?"
+        return "Many presses seem to be elsewhere. Was each made on its dot?"
     if solution.unexplained > 1 - solution.probability - solution.unexplained:
-        return "No wiring explains these presses well: press on the dot, and harder"
-    return f"Not sure yet: {figures['wiring']}, or {figures['runner_up']}. The dot tells them apart"
+        return "No wiring explains these presses well. Press on the dot, and harder"
+    return f"Not sure yet: {figures['wiring']}, or {figures['runner_up']}. The next dot decides"
 
 
 class Dots:

@@ -4,6 +4,7 @@ frames: ``server/frames.py``."""
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import asdict
 from typing import Any
 
@@ -22,6 +23,8 @@ PROBE_RADIUS = 0.015
 
 PROBE_FORCE = 3.0
 """Its force, N."""
+
+_ELECTRODE = re.compile(r"\belectrode (\d+)\b(?: \(E\d+\))?")
 
 _OUTLINE_POINTS = 240
 
@@ -94,7 +97,7 @@ def state(status: Status) -> str:
         sinks=status.sinks,
         replay=status.replay,
         **readings(status),
-        problem=status.problem,
+        problem=status.problem and as_on_bench(status.problem),
         text=status.text,
     )
 
@@ -151,7 +154,9 @@ def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
 
 def event(happened: Event) -> str:
     """Something that a person should know."""
-    return text_of(type="event", time_s=happened.host_time, kind=happened.kind, text=happened.text)
+    return text_of(
+        type="event", time_s=happened.host_time, kind=happened.kind, text=as_on_bench(happened.text)
+    )
 
 
 def timeline(line: Timeline) -> str:
@@ -172,7 +177,12 @@ def timeline(line: Timeline) -> str:
 
 def error(message: str) -> str:
     """Answer to a request that was not understood."""
-    return text_of(type="error", message=message)
+    return text_of(type="error", message=as_on_bench(message))
+
+
+def as_on_bench(message: str) -> str:
+    """``message`` with electrodes as people call them: "electrode 3", counted from 0, is E4."""
+    return _ELECTRODE.sub(lambda found: f"E{int(found[1]) + 1}", message)
 
 
 def _electrodes(prepared: Prepared) -> list[dict[str, Any]]:

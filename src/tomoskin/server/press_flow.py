@@ -64,7 +64,7 @@ class PressFlow:
     def undo(self) -> None:
         """Take the last press back."""
         if not self.presses:
-            raise WireError("there is no press to take back")
+            raise WireError("there is no press to undo")
         self._dot = self.presses.pop().place
         self.estimate = None
 
@@ -78,7 +78,7 @@ class PressFlow:
         """What can be kept. Raises WireError where the presses do not tell enough."""
         estimate = self.estimate
         if self.estimating or estimate is None or not estimate.ready or estimate.answer is None:
-            raise WireError("the presses do not tell enough yet")
+            raise WireError("more presses are needed")
         return estimate.answer
 
     def fields(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from msgspec import Meta
 
 from tomoskin.core import WireError
 from tomoskin.run import SetPose, SetPresses, SetTwin, StrictRequest, commands
-from tomoskin.server.folder import NAME, STEM
+from tomoskin.server.folder import MOST_NOTES, NAME, STEM
 
 MAX_REQUEST = 32_768
 """Longest request, bytes: a pattern of some thousand rows, written out."""
@@ -107,6 +107,26 @@ class ExportSession(StrictRequest, frozen=True, tag="export"):
     format: Format
 
 
+class RenameSession(StrictRequest, frozen=True, tag="rename"):
+    """Give a session of the folder another name."""
+
+    name: FileName
+    to: Stem
+
+
+class DeleteSession(StrictRequest, frozen=True, tag="delete"):
+    """Delete a session of the folder."""
+
+    name: FileName
+
+
+class Annotate(StrictRequest, frozen=True, tag="annotate"):
+    """Write notes on a session of the folder, in place of older ones."""
+
+    name: FileName
+    text: Annotated[str, Meta(max_length=MOST_NOTES)]
+
+
 class ListSources(StrictRequest, frozen=True, tag="sources"):
     """What can be connected."""
 
@@ -162,6 +182,9 @@ FlowRequest = (
     | OpenSession
     | GoLive
     | ExportSession
+    | RenameSession
+    | DeleteSession
+    | Annotate
     | ListSources
     | Connect
     | BeginFlow

@@ -9,7 +9,7 @@ from typing import Any
 
 from tomoskin.core import PatternError, SkinError, TomoskinError
 from tomoskin.pattern import named
-from tomoskin.server.page_messages import text_of
+from tomoskin.server.page_messages import as_on_bench, text_of
 from tomoskin.skin import (
     SECTIONS,
     Choice,
@@ -32,7 +32,8 @@ MOST_ROWS = 2000
 LOCKED = frozenset({("surface", "file")})
 """Keys that name files: a page cannot set them."""
 
-_PLACE = re.compile(r"\[(\w+)\](?: (\w+))?$")
+_PLACE = re.compile(r"\[(\w+)\](?: (\w+))?(?:, (.+))?$")
+"""Section, key, and what of them: ``[electrodes], electrode 3``."""
 
 
 @cache
@@ -49,7 +50,8 @@ def schema() -> str:
                     "expected": key.kind.expected,
                     "meaning": key.meaning,
                     "required": key.required,
-                    "when": key.when and {"key": key.when[0], "words": key.when[1]},
+                    "when": _condition(key.when),
+                    "effective": _condition(key.effective),
                     "unless": key.unless or None,
                     "locked": (section.section, key.name) in LOCKED,
                 }
@@ -61,13 +63,17 @@ def schema() -> str:
     return text_of(type="schema", sections=sections)
 
 
+def _condition(of: tuple[str, tuple[str, ...]] | None) -> dict[str, Any] | None:
+    return None if of is None else {"key": of[0], "words": of[1]}
+
+
 def refusal(error: TomoskinError) -> str:
     """Message that a setting was refused, with its section and key where the error names them."""
     place = _PLACE.search(error.where)
-    section, key = place.groups() if place else (None, None)
+    section, key, part = place.groups() if place else (None, None, None)
     advice = f" ({error.hint})" if error.hint else ""
-    text = error.message + advice if place else str(error)
-    return text_of(type="settings_error", section=section, key=key, message=text)
+    text = f"{f'{part}: ' if part else ''}{error.message}{advice}" if place else str(error)
+    return text_of(type="settings_error", section=section, key=key, message=as_on_bench(text))
 
 
 def table_of(name: str, n_electrodes: int) -> str:

@@ -319,7 +319,9 @@ def _change(runner: Runner, prepared: Prepared, open_source: commands.Opener) ->
 
 def _save(path: Path, skin: Skin, *, replace: bool) -> None:
     if "file" in skin.document["surface"]:
-        raise SkinError("a skin on a scanned surface stays beside its file")
+        raise SkinError(
+            "a skin on a scanned surface cannot be saved here: its file names another one"
+        )
     if path.is_symlink():
         raise SkinError("is a link, and what it leads to is left alone", hint="choose another name")
     check_outputs([Output(path)], overwrite=replace, consent="save again")

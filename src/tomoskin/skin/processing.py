@@ -6,6 +6,7 @@ from tomoskin.skin.kinds import Choice, Number, NumberOrWord, Quantity, Whole
 from tomoskin.skin.section import Section, key
 
 _ONE_STEP = "one-step"
+_IN_IMAGE = ("method", ("image",))
 
 
 class MeshSettings(Section, section="mesh"):
@@ -33,6 +34,7 @@ class InverseSettings(Section, section="inverse"):
         Number(0, 2),
         "With noser: the power of a cell's sensitivity that weighs it down.",
         default=0.5,
+        effective=("prior", ("noser",)),
         method=_ONE_STEP,
     )
     correlation_length: float | None = key(
@@ -40,6 +42,7 @@ class InverseSettings(Section, section="inverse"):
         "With exponential and matern: how far a change is alike; without it a tenth of "
         "the sheet's extent.",
         default=None,
+        effective=("prior", ("exponential", "matern")),
         method=_ONE_STEP,
     )
     alpha: float | str = key(
@@ -96,16 +99,19 @@ class TouchSettings(Section, section="touch"):
         Number(0.1, 0.99),
         "First threshold, as a part of the extreme value; 0.6 to 0.7 is usual.",
         default=0.65,
+        effective=_IN_IMAGE,
     )
     gamma2: float = key(
         Number(0.1, 1),
         "Second threshold, after smoothing, as a part of the first.",
         default=0.9,
+        effective=_IN_IMAGE,
     )
     smoothing: float = key(
         Quantity("length", "mm", 0, 1000),
         "Standard deviation of the Gaussian between the two thresholds.",
         default="5 mm",
+        effective=_IN_IMAGE,
     )
     sign: str = key(
         Choice(("decrease", "increase", "both")),
@@ -121,6 +127,7 @@ class TouchSettings(Section, section="touch"):
         Choice(("centroid", "peak")),
         "One touch a region, at its weighted centroid; or one at each local extreme.",
         default="centroid",
+        effective=_IN_IMAGE,
     )
     max_touches: int = key(Whole(1, 50), "Most touches reported at once.", default=8)
 

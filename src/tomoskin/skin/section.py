@@ -40,6 +40,9 @@ class Key:
         Another key of the section that takes this one's place.
     needs
         Another key of the section that must stand beside this one.
+    effective
+        Another key of the section and the values of it with which this one has an effect; it may
+        stand beside others.
     """
 
     kind: ValueKind[Any]
@@ -49,6 +52,7 @@ class Key:
     when: tuple[str, tuple[str, ...]] | None
     unless: str
     needs: str
+    effective: tuple[str, tuple[str, ...]] | None = None
     name: str = ""
 
     def conflict(self, given: Mapping[str, object], filled: Mapping[str, object]) -> str:
@@ -81,18 +85,20 @@ def key(
     default: Any = MISSING,
     unless: str = "",
     needs: str = "",
+    effective: tuple[str, tuple[str, ...]] | None = None,
     **when: str | tuple[str, ...],
 ) -> T:
     """A field of a :class:`Section`; without ``default`` (None: none at all) the key is required.
 
-    ``when`` names another key and its values for which this one may stand: ``shape="disc"``. In the
-    record a key that is absent has its default in SI units, or None.
+    ``when`` names another key and its values for which this one may stand: ``shape="disc"``;
+    ``effective`` those for which it does anything. In the record a key that is absent has its
+    default in SI units, or None.
     """
     condition = None
     for other, words in when.items():
         condition = other, (words,) if isinstance(words, str) else words
     written = None if default is MISSING else default
-    declared = Key(kind, meaning, written, default is MISSING, condition, unless, needs)
+    declared = Key(kind, meaning, written, default is MISSING, condition, unless, needs, effective)
     metadata = {"key": declared}
     if declared.required and not (when or unless):
         return field(metadata=metadata)  # type: ignore[no-any-return]

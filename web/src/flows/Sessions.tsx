@@ -1,6 +1,6 @@
 /** The drawer of the session folder: what was recorded, played again, taken along. */
 
-import { signal } from "@preact/signals";
+import { signal, useSignal } from "@preact/signals";
 import { addDrawer, whenOpened } from "../drawers";
 import { send, status } from "../state";
 import { bytes, day } from "./format";
@@ -27,30 +27,131 @@ function Download({ name }: { name: string }) {
   );
 }
 
+const stemOf = (name: string): string => name.replace(/\.[^.]*$/, "");
+
+/** The session that is being changed, and whether its deletion has been asked for once. */
+const changing = signal<string | null>(null);
+const doomed = signal(false);
+
+function change(name: string | null): void {
+  changing.value = name;
+  doomed.value = false;
+  // The form goes, and with it what had the focus.
+  if (name === null) document.getElementById("drawer")?.focus();
+}
+
+/** Another name, notes, deletion; what is in use keeps its name. */
+function Change({ file, busy }: { file: FoundFile; busy: boolean }) {
+  const { name } = file;
+  const to = useSignal(stemOf(name));
+  const notes = useSignal(file.notes);
+  const id = `of-${stemOf(name)}`;
+  return (
+    <div class="changing" data-testid="session-change">
+      <form
+        class="row"
+        onSubmit={(event) => {
+          event.preventDefault();
+          if (to.value !== stemOf(name)) send({ type: "rename", name, to: to.value });
+          change(null);
+        }}
+      >
+        <label for={`name-${id}`}>Name</label>
+        <input
+          id={`name-${id}`}
+          data-testid="session-name"
+          type="text"
+          autocomplete="off"
+          required
+          pattern="[A-Za-z0-9][A-Za-z0-9_\-]{0,63}"
+          title="Letters, digits, dash and underscore"
+          disabled={busy}
+          value={to.value}
+          onInput={({ currentTarget }) => (to.value = currentTarget.value)}
+        />
+        <button type="submit" disabled={busy}>
+          Rename
+        </button>
+      </form>
+      <form
+        class="row"
+        onSubmit={(event) => {
+          event.preventDefault();
+          send({ type: "annotate", name, text: notes.value });
+          change(null);
+        }}
+      >
+        <label for={`notes-${id}`}>Notes</label>
+        <textarea
+          id={`notes-${id}`}
+          data-testid="session-notes"
+          rows={3}
+          maxLength={4000}
+          value={notes.value}
+          onInput={({ currentTarget }) => (notes.value = currentTarget.value)}
+        />
+        <button type="submit">Save notes</button>
+      </form>
+      <div class="does">
+        <button
+          type="button"
+          data-testid="session-delete"
+          disabled={busy}
+          onClick={() => {
+            if (doomed.value) {
+              send({ type: "delete", name });
+              change(null);
+            } else doomed.value = true;
+          }}
+        >
+          {doomed.value ? "Delete for good" : "Delete"}
+        </button>
+        {busy && <span class="small">in use: it keeps its name</span>}
+      </div>
+    </div>
+  );
+}
+
+function aboutOf(file: FoundFile): string {
+  if (files.value?.recording === file.name) return "being recorded";
+  if (files.value?.playing === file.name) return "being played";
+  return `${day(file.written)}, ${bytes(file.size)}`;
+}
+
 function Session({ file }: { file: FoundFile }) {
-  const playing = files.value?.playing === file.name;
-  const busy = files.value?.recording === file.name;
+  const { name } = file;
+  const playing = files.value?.playing === name;
+  const recorded = files.value?.recording === name;
+  const open = changing.value === name;
   return (
     <li class={playing ? "current" : ""} data-testid="session">
       <div>
-        <strong>{file.name}</strong>
-        <span class="small">
-          {busy ? "being recorded" : playing ? "being played" : `${day(file.written)}, ${bytes(file.size)}`}
-        </span>
+        <strong>{name}</strong>
+        <span class="small">{aboutOf(file)}</span>
+        {file.notes && <p class="noted">{file.notes}</p>}
       </div>
       <div class="does">
-        <button type="button" disabled={busy} onClick={() => send({ type: "open", name: file.name })}>
+        <button type="button" disabled={recorded} onClick={() => send({ type: "open", name })}>
           Play
         </button>
         <button
           type="button"
-          disabled={busy || files.value?.exporting != null}
-          onClick={() => send({ type: "export", name: file.name, format: chosen.value })}
+          disabled={recorded || files.value?.exporting != null}
+          onClick={() => send({ type: "export", name, format: chosen.value })}
         >
           Export
         </button>
-        {!busy && <Download name={file.name} />}
+        {!recorded && <Download name={name} />}
+        <button
+          type="button"
+          aria-expanded={open}
+          aria-label={`Name and notes of ${name}`}
+          onClick={() => change(open ? null : name)}
+        >
+          Edit
+        </button>
       </div>
+      {open && <Change file={file} busy={playing || recorded || files.value?.exporting === name} />}
     </li>
   );
 }
@@ -62,7 +163,7 @@ function Other({ file }: { file: FoundFile }) {
       <div>
         <strong>{file.name}</strong>
         <span class="small">
-          {calibration ? "gives the places of touches" : `${file.kind}, ${bytes(file.size)}`}
+          {calibration ? "gives the positions of touches" : `${file.kind}, ${bytes(file.size)}`}
         </span>
       </div>
       <div class="does">
@@ -105,7 +206,7 @@ function View() {
         </p>
       )}
       {sessions.length === 0 && (
-        <p class="hint">Nothing has been recorded here yet: press Record below, then touch the skin.</p>
+        <p class="hint">Nothing has been recorded yet. Press Record, then touch the skin.</p>
       )}
       <ul class="filed">
         {sessions.map((file) => (
@@ -127,7 +228,7 @@ function View() {
   );
 }
 
-addDrawer({ id: "sessions", label: "Sessions", key: "S", title: "Recordings: play, export, download", View });
+addDrawer({ id: "sessions", label: "Sessions", key: "S", title: "Recordings: play, export, download, rename, delete, write notes", View });
 
 const OFTEN = 1000;
 let timer = 0;

@@ -22,7 +22,7 @@ const names: Readonly<Record<FlowKind, ReturnType<typeof signal<string>>>> = {
 function Identity() {
   const found = sources.value;
   const board = found?.board;
-  if (!found || !board) return <p class="hint">The board has not said yet what it is.</p>;
+  if (!found || !board) return <p class="hint">The board has not reported what it is yet.</p>;
   return (
     <dl class="identity" data-testid="board">
       <dt>Firmware</dt>
@@ -38,7 +38,7 @@ function Identity() {
       <dd>{board.adc_bits} bits</dd>
       <dt>Current</dt>
       <dd>{board.current_ma} mA</dd>
-      <dt>Number</dt>
+      <dt>Serial number</dt>
       <dd>{/^0*$/.test(board.unique_id) ? "none" : board.unique_id}</dd>
     </dl>
   );
@@ -54,14 +54,14 @@ function Reference() {
       <h3>Reference</h3>
       <p data-testid="reference-words">
         {!ready
-          ? `Being taken, ${frames} of ${needed} frames: keep hands off the skin.`
+          ? `Taking the reference, ${frames} of ${needed} frames: keep hands off the skin.`
           : stale
-            ? `Stale: ${stale}. Take hands off the skin, then take it again.`
-            : `Stands for ${duration(age ?? 0)}. Pictures show what has changed since then.`}
+            ? `Stale: ${stale}. Take your hands off the skin, then take the reference again.`
+            : `Taken ${duration(age ?? 0)} ago. Images show what has changed since then.`}
       </p>
       {!ready && <progress value={frames} max={needed} aria-label="Reference" />}
       <button type="button" disabled={!ready} onClick={takeReference.run} data-testid="take-reference">
-        Hands are off: take the reference <kbd>R</kbd>
+        Take the reference, hands off <kbd>R</kbd>
       </button>
     </>
   );
@@ -82,10 +82,10 @@ function Board() {
             <div class="does">
               <button
                 type="button"
-                aria-label={id === found.current ? `${text}: open it anew` : `Connect ${text}`}
+                aria-label={id === found.current ? `${text}: reconnect` : `Connect ${text}`}
                 onClick={() => send({ type: "connect", source: id })}
               >
-                {id === found.current ? "Anew" : "Connect"}
+                {id === found.current ? "Reconnect" : "Connect"}
               </button>
             </div>
           </li>
@@ -107,21 +107,21 @@ function Board() {
 
 const TEACHING: Readonly<Record<FlowKind, string>> = {
   wiring:
-    "Which wire ends where? Press where the dot is, a few times. The answer becomes a skin file, and pictures are right.",
+    "This finds which wire ends at which electrode. Press the skin where the dot is, a few times. The answer is saved as a skin file.",
   touch:
-    "Teach the skin where a touch is: press where the dot is, softly and hard in turn, ten times or more. From then on places come from what it has learnt, each with its uncertainty.",
+    "This teaches the skin where a touch is. Press where the dot is, softly and hard in turn, ten times or more. Positions then come from these presses, each with its uncertainty.",
 };
 
 const PHASES: Readonly<Record<Phase, string>> = {
-  rest: "Hands off…",
+  rest: "Hands off",
   press: "Press where the dot is",
-  hold: "Hold still…",
-  release: "Taken. Let go",
+  hold: "Hold still",
+  release: "Recorded. Let go",
 };
 
 function Going({ kind }: { kind: FlowKind }) {
   const { phase = "rest", effort, presses = [], text, ready, thinking, figures } = flow.value;
-  const taken = `${presses.length} press${presses.length === 1 ? "" : "es"} taken`;
+  const taken = `${presses.length} press${presses.length === 1 ? "" : "es"} recorded`;
   const doubtful = figures?.doubtful ?? [];
   const name = names[kind];
   return (
@@ -131,19 +131,19 @@ function Going({ kind }: { kind: FlowKind }) {
       </p>
       <p data-testid="taken">
         {taken}
-        {thinking ? ", thinking…" : ""}
+        {thinking ? ", computing…" : ""}
       </p>
-      <p data-testid="told">{text}</p>
+      <p data-testid="flow-text">{text}</p>
       {kind === "wiring" && figures?.probability !== undefined && (
         <progress value={figures.probability} max={1} aria-label="How sure the answer is" />
       )}
       {doubtful.length > 0 && (
         <p class="wrong">
           {doubtful.length === 1 ? "Press " : "Presses "}
-          {doubtful.map((row) => row + 1).join(", ")} do not fit the others: the place may be wrong.
+          {doubtful.map((row) => row + 1).join(", ")} do not fit the others: the position may be wrong.
         </p>
       )}
-      <ol class="presses" aria-label="Presses taken">
+      <ol class="presses" aria-label="Presses recorded">
         {presses.map(([x, y], k) => (
           <li key={k} class={doubtful.includes(k) ? "doubtful" : ""}>
             x {millimetres(x, 0)}, y {millimetres(y, 0)} mm
@@ -160,7 +160,7 @@ function Going({ kind }: { kind: FlowKind }) {
           disabled={presses.length === 0}
           onClick={() => send({ type: "flow_undo" })}
         >
-          Take the last back
+          Undo the last press
         </button>
         <button type="button" data-testid="flow-end" onClick={() => send({ type: "flow_end" })}>
           Leave
@@ -206,7 +206,7 @@ function Guided({ kind }: { kind: FlowKind }) {
       >
         Begin
       </button>
-      {status.value?.replay && <p class="hint">Nobody can press a recording: go back to live first.</p>}
+      {status.value?.replay && <p class="hint">A recording cannot be pressed: go back to live first.</p>}
     </>
   );
 }
@@ -220,8 +220,8 @@ function Calibration() {
       <h3>In use</h3>
       <p data-testid="calibration">
         {known === null
-          ? "Places of touches come from the picture."
-          : `Places of touches come from ${known || "the calibration that it was started with"}.`}
+          ? "Positions of touches come from the voltages and the model of the skin."
+          : `Positions of touches come from ${known || "the calibration that tomoskin was started with"}.`}
       </p>
       {(kept.length > 0 || known !== null) && (
         <label class="row">
@@ -232,7 +232,7 @@ function Calibration() {
               send({ type: "calibration", name: value || null })
             }
           >
-            <option value="">none: the picture</option>
+            <option value="">none</option>
             {kept.map(({ name }) => (
               <option key={name}>{name}</option>
             ))}

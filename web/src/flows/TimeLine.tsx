@@ -18,7 +18,7 @@ addCommand({
   label: "Mark",
   key: "M",
   code: "m",
-  title: "Mark this moment, with a few words if you like",
+  title: "Mark this moment in the recording, with a few words",
   run: () => (marking.value = true),
 });
 
@@ -138,8 +138,8 @@ function MarkForm() {
         type="text"
         maxLength={500}
         data-testid="mark-text"
-        aria-label="Words for the mark; may be left out"
-        placeholder="What is to be seen? (may be left out)"
+        aria-label="Words for the mark (optional)"
+        placeholder="What happens now? (optional)"
       />
       <button type="submit">Mark</button>
       <button type="button" onClick={done}>
@@ -152,20 +152,9 @@ function MarkForm() {
 function PlayButtons() {
   const replay = status.value?.replay;
   if (!replay) return null;
-  const paused = status.value?.paused ?? false;
   return (
     <div role="group" aria-label="Replay">
-      <button
-        type="button"
-        data-testid="play"
-        title="Play or hold (Space)"
-        onClick={() =>
-          replay.ended ? seek(0) : send({ type: "pause", on: !paused })
-        }
-      >
-        {replay.ended ? "Again" : paused ? "Play" : "Hold"}
-      </button>
-      <button type="button" data-testid="step" title="One read further" onClick={() => send({ type: "step" })}>
+      <button type="button" data-testid="step" title="Play one step" onClick={() => send({ type: "step" })}>
         Step
       </button>
       <select
@@ -183,13 +172,13 @@ function PlayButtons() {
               {speed} ×
             </option>
           ))}
-        <option value="null">as fast as it goes</option>
+        <option value="null">as fast as possible</option>
       </select>
       <button
         type="button"
         data-testid="loop"
         aria-pressed={replay.loop}
-        title="Begin again at the end"
+        title="Start again at the end"
         onClick={() => send({ type: "loop", on: !replay.loop })}
       >
         Loop
@@ -203,7 +192,7 @@ export function TimeLine() {
   if (of === null && !marking.value) return null;
   const end = of === "replay" ? ` of ${clock(duration.value)}` : "";
   return (
-    <section class="timeline" data-testid="timeline" aria-label="Line of time">
+    <section class="timeline" data-testid="timeline" aria-label="Time line">
       {of === "replay" && <PlayButtons />}
       {of && (
         <output class="when" data-testid="when">

@@ -11,6 +11,8 @@ export interface FoundFile {
   readonly size: number;
   /** Seconds since 1970. */
   readonly written: number;
+  /** What a person wrote about it; "" for nothing. */
+  readonly notes: string;
 }
 
 interface Files {
@@ -119,10 +121,10 @@ onMessage<Scene>("scene", (message) => {
 const began = signal<number | null>(null);
 
 /** Page time, s, at which the newest state came. */
-let told = 0;
+let statusTime = 0;
 effect(() => {
   void status.value;
-  told = now.peek();
+  statusTime = now.peek();
 });
 
 function restart(): void {
@@ -146,7 +148,7 @@ export const position = computed(() => {
   const replay = status.value?.replay;
   if (replay) {
     const moving = !status.value?.paused && !replay.ended && replay.speed !== null;
-    const since = moving ? Math.max(0, now.value - told) * (replay.speed ?? 0) : 0;
+    const since = moving ? Math.max(0, now.value - statusTime) * (replay.speed ?? 0) : 0;
     return Math.max(0, Math.min(replay.end_s, replay.now_s + since));
   }
   return began.value === null ? 0 : now.value - began.value;

@@ -10,7 +10,7 @@ const WORDS: Readonly<Record<Bend["state"], string>> = {
   bend: "bent",
   touch: "touched, not bent",
   "bend and touch": "bent and touched",
-  unknown: "neither bends nor touches explain this",
+  unknown: "neither a bend nor a touch explains this",
 };
 
 const degrees = (angle: number, decimals: number): string =>

@@ -1,5 +1,6 @@
 /** Every command as a button with its words and its key. */
 
+import { signal } from "@preact/signals";
 import * as commands from "../commands";
 import type { Command } from "../commands";
 import { fixed } from "../format";
@@ -48,19 +49,28 @@ function Force() {
   );
 }
 
+/** On a telephone the rest of the buttons stand behind one. */
+const unfolded = signal(false);
+
+/** What Space does: hold, go on, or play a recording again from its beginning. */
+function pauseLabel(): string {
+  if (status.value?.replay?.ended) return "Play again";
+  return status.value?.paused ? "Go on" : "Pause";
+}
+
 export function Controls() {
   const pressable = scene.value?.pressable ?? false;
   const paused = status.value?.paused ?? false;
   const recording = status.value?.recording != null;
   return (
-    <footer class="controls">
+    <footer class={`controls${unfolded.value ? " unfolded" : ""}`}>
       <div role="group" aria-label="Measurement">
         <Button remote command={commands.takeReference} />
         <Button
           remote
           command={commands.pause}
           pressed={paused}
-          label={paused ? "Go on" : "Pause"}
+          label={pauseLabel()}
         />
         <Button
           remote
@@ -68,6 +78,15 @@ export function Controls() {
           pressed={recording}
           label={recording ? "End recording" : "Record"}
         />
+        <button
+          type="button"
+          class="unfold"
+          data-testid="do-unfold"
+          aria-expanded={unfolded.value}
+          onClick={() => (unfolded.value = !unfolded.value)}
+        >
+          {unfolded.value ? "Less" : "More"}
+        </button>
       </div>
       {pressable && (
         <div role="group" aria-label="Pressing">

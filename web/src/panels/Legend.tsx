@@ -4,25 +4,29 @@ import { useEffect, useRef } from "preact/hooks";
 import { MAP_SIZE } from "../colours";
 import { autoOnce } from "../commands";
 import { inScale, scaleFor } from "../format";
+import { narrow } from "../screen";
 import { limit, ownLimit, scene } from "../state";
 import { theme } from "../theme";
 
-/** The map as an upright strip, largest increase on top. */
+/** The map as a strip: upright with the largest increase on top; lying, with it at the right. */
 function Strip() {
   const canvas = useRef<HTMLCanvasElement>(null);
   const { map } = theme.value;
+  const lying = narrow.value;
   useEffect(() => {
     const pen = canvas.current?.getContext("2d");
     if (!pen) return;
-    const strip = pen.createImageData(1, MAP_SIZE);
+    const strip = lying ? pen.createImageData(MAP_SIZE, 1) : pen.createImageData(1, MAP_SIZE);
     for (let k = 0; k < MAP_SIZE; k++) {
-      const from = 4 * (MAP_SIZE - 1 - k);
+      const from = 4 * (lying ? k : MAP_SIZE - 1 - k);
       strip.data.set(map.subarray(from, from + 4), 4 * k);
     }
     pen.putImageData(strip, 0, 0);
-  }, [map]);
-  return <canvas ref={canvas} width={1} height={MAP_SIZE} class="strip" />;
+  }, [map, lying]);
+  return <canvas ref={canvas} width={lying ? MAP_SIZE : 1} height={lying ? 1 : MAP_SIZE} class="strip" />;
 }
+
+const PARTS = [1, 0.5, 0, -0.5, -1];
 
 export function Legend() {
   if (!scene.value) return null;
@@ -30,7 +34,7 @@ export function Legend() {
   const fixedScale = scaleFor(scene.value.limit, scene.value.unit);
   const fixedLimit = inScale(scene.value.limit, fixedScale);
   const resetTitle = `Back to the skin's own limits, ±${fixedLimit} ${fixedScale.unit}`;
-  const marks = [1, 0.5, 0, -0.5, -1].map((part) => {
+  const marks = (narrow.value ? [...PARTS].reverse() : PARTS).map((part) => {
     const value = part * limit.value;
     return (value > 0 ? "+" : "") + (part === 0 ? "0" : inScale(value, scale));
   });
@@ -53,7 +57,7 @@ export function Legend() {
           Reset
         </button>
       )}
-      <p class="ring" title="The ellipse around a touch: where it is with 90 % of certainty, by the noise">
+      <p class="ring" title="The ellipse around a touch holds its position with 90 % probability">
         <svg viewBox="0 0 14 14" aria-hidden="true">
           <circle cx="7" cy="7" r="5.5" />
         </svg>{" "}

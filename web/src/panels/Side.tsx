@@ -1,19 +1,21 @@
-/** The right of the page: its tabs, the panels, and the drawer that lies over the panels. */
+/** The right of the page: touches and their strength, and below them the voltages or a drawer. */
 
 import { useEffect, useRef } from "preact/hooks";
 import { closeDrawer, type Drawer, drawers, opened, toggleDrawer } from "../drawers";
+import { narrow } from "../screen";
 import { Strength } from "./Strength";
 import { Touches } from "./Touches";
 import { Voltages } from "./Voltages";
 
 function Tab({ drawer }: { drawer: Drawer }) {
   const { id, key, label, title } = drawer;
+  const open = opened.value?.id === id;
   return (
     <button
       type="button"
       data-testid={`open-${id}`}
-      aria-expanded={opened.value?.id === id}
-      aria-controls="drawer"
+      aria-expanded={open}
+      {...(open ? { "aria-controls": "drawer" } : {})}
       title={`${title} (${key})`}
       onClick={() => toggleDrawer(id)}
     >
@@ -24,7 +26,15 @@ function Tab({ drawer }: { drawer: Drawer }) {
 
 function OpenDrawer({ drawer }: { drawer: Drawer }) {
   const box = useRef<HTMLElement>(null);
-  useEffect(() => box.current?.focus(), [drawer.id]);
+  useEffect(() => {
+    const before = document.activeElement;
+    box.current?.focus();
+    if (narrow.peek()) box.current?.scrollIntoView();
+    // Whoever opened it with a button goes on from there.
+    return () => {
+      if (before instanceof HTMLElement && before.isConnected) before.focus({ preventScroll: true });
+    };
+  }, [drawer.id]);
   const { View } = drawer;
   return (
     <section
@@ -57,20 +67,21 @@ export function Side() {
   const drawer = opened.value;
   return (
     <div class="side">
-      <nav class="tabs" aria-label="Drawers">
-        <button type="button" aria-expanded={drawer === null} onClick={closeDrawer}>
-          Now
-        </button>
-        {drawers.value.map((each) => (
-          <Tab key={each.id} drawer={each} />
-        ))}
-      </nav>
-      <div class="panels" {...(drawer ? { inert: true } : {})}>
+      <div class="upper">
         <Touches />
-        <Voltages />
         <Strength />
       </div>
-      {drawer && <OpenDrawer key={drawer.id} drawer={drawer} />}
+      <div class="lower">
+        <nav class="tabs" aria-label="Drawers">
+          <button type="button" aria-expanded={drawer === null} onClick={closeDrawer}>
+            Voltages
+          </button>
+          {drawers.value.map((each) => (
+            <Tab key={each.id} drawer={each} />
+          ))}
+        </nav>
+        {drawer ? <OpenDrawer key={drawer.id} drawer={drawer} /> : <Voltages />}
+      </div>
     </div>
   );
 }

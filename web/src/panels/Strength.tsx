@@ -2,7 +2,7 @@
 
 import { computed } from "@preact/signals";
 import type uPlot from "uplot";
-import { inScale, scaleFor } from "../format";
+import { inScale, niceAbove, scaleFor } from "../format";
 import { SLOTS, SPAN } from "../history";
 import { history, limit, link, newest, scene, shown } from "../state";
 import { theme } from "../theme";
@@ -11,7 +11,12 @@ import { axis, Plot, type Plan } from "./Plot";
 /** Names of more times would run into one another, px. */
 const NARROW = 320;
 
-const scale = computed(() => scaleFor(limit.value, scene.value?.unit ?? "S"));
+/** A touch is stronger than the image of it, by about so much at first. */
+const HEADROOM = 5;
+
+/** The end of the ordinate: it follows the colour scale, and moves for nothing else. */
+const top = computed(() => niceAbove(HEADROOM * limit.value));
+const scale = computed(() => scaleFor(top.value, scene.value?.unit ?? "S"));
 
 /** The touch's number where its line ends. */
 function nameLines(plot: uPlot): void {
@@ -28,7 +33,7 @@ function nameLines(plot: uPlot): void {
   const ends = history.columns.flatMap((column, slot) => {
     const value = column[last] ?? null;
     if (value === null) return [];
-    return { text: String(history.idOf(slot)), y: plot.valToPos(Math.min(value, limit.peek()), "y", true) };
+    return { text: String(history.idOf(slot)), y: plot.valToPos(Math.min(value, top.peek()), "y", true) };
   });
   let above = -Infinity;
   for (const { text, y } of ends.sort((a, b) => a.y - b.y)) {
@@ -40,23 +45,23 @@ function nameLines(plot: uPlot): void {
 
 function plan(): Plan | null {
   const colours = theme.value;
-  const top = limit.value;
+  const end = top.value;
   const shownScale = scale.value;
   return {
     legend: { show: false },
     cursor: { show: false },
     padding: [6, 26, 0, 0],
-    scales: { x: { time: false, range: [-SPAN, 0] }, y: { range: [0, top] } },
+    scales: { x: { time: false, range: [-SPAN, 0] }, y: { range: [0, end] } },
     axes: [
       axis(colours, {
         size: 26,
         gap: 8,
-        splits: (plot) => (plot.width < NARROW ? [-10, -5, 0] : [-10, -8, -6, -4, -2, 0]),
+        splits: (plot) => (plot.width < NARROW ? [-10, 0] : [-10, -8, -6, -4, -2, 0]),
         values: (_, splits) => splits.map((v) => (v === 0 ? "now" : `−${-v} s`)),
       }),
       axis(colours, {
         size: 52,
-        splits: () => [0, top / 2, top],
+        splits: () => [0, end / 2, end],
         values: (_, splits) => splits.map((v) => (v === 0 ? "0" : inScale(v, shownScale))),
       }),
     ],
@@ -75,10 +80,10 @@ function plan(): Plan | null {
 function data(): uPlot.AlignedData {
   void shown.value;
   const end = newest.frame?.hostTime ?? 0;
-  const top = limit.value;
-  // What exceeds the limit runs along the upper edge rather than out of sight.
+  const most = top.value;
+  // What exceeds the end runs along the upper edge rather than out of sight.
   const columns = history.columns.map((column) =>
-    column.map((value) => (value === null ? null : Math.min(value, top))),
+    column.map((value) => (value === null ? null : Math.min(value, most))),
   );
   return [history.times.map((time) => time - end), ...columns];
 }

@@ -3,6 +3,7 @@
 import { signal, useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import type { Force, Touch } from "../decode";
 import { fixed, inScale, millimetres, scaleFor, type Scale } from "../format";
+import { fingers } from "../screen";
 import { limit, link, scene, shown, status } from "../state";
 import { stateInWords } from "../words";
 
@@ -14,7 +15,7 @@ function uncertainty(touch: Touch): string {
   return Number.isFinite(sd) ? millimetres(sd) : "";
 }
 
-/** What cannot be told apart, in words; nothing where there is one touch. */
+/** What cannot be separated, in words; nothing where there is one touch. */
 function tooClose(touch: Touch): string | undefined {
   if (touch.several > 1) return `${touch.several} touches, too close to separate`;
   return touch.several ? "may be several touches, too close to separate" : undefined;
@@ -99,7 +100,9 @@ function Teaching() {
     <>
       <p class="lead">Press the sheet</p>
       <p class="hint">
-        Hold for more force, or set it with the wheel. Drag to slide. With Shift a press stays.
+        {fingers.value
+          ? "Hold for more force, drag to slide. Tap twice and a press stays; twice more, and it lifts."
+          : "Hold for more force, or set it with the wheel. Drag to slide. With Shift a press stays."}
       </p>
     </>
   );
@@ -113,14 +116,14 @@ function Announcer() {
     void ids.value;
     const timer = window.setTimeout(() => {
       const touches = shown.peek()?.touches ?? [];
-      const places = touches.map(
+      const positions = touches.map(
         (touch) =>
           `touch ${touch.id} at ${millimetres(touch.x, 0)}, ${millimetres(touch.y, 0)} ` +
           ["millimetres", touch.force && forceInWords(touch.force), tooClose(touch)]
             .filter(Boolean)
             .join(", "),
       );
-      words.value = places.length ? places.join("; ") : "No touch";
+      words.value = positions.length ? positions.join("; ") : "No touch";
     }, 700);
     return () => window.clearTimeout(timer);
   });
@@ -137,7 +140,7 @@ function State() {
   if (!state) return null;
   const words = stateInWords(state);
   return (
-    <span class="told" title={words} data-testid="told">
+    <span class="reading-of-state" title={words} data-testid="sheet-state">
       {words}
     </span>
   );
@@ -151,6 +154,7 @@ export function Touches() {
     <section class={`panel touches${stale ? " stale" : ""}`} aria-labelledby="touches-title">
       <h2>
         <span id="touches-title">Touches</span>
+        {touches.length > ROWS && <span class="small">{touches.length - ROWS} more on the sheet</span>}
         <State />
       </h2>
       <div class="list" data-testid="touch-list">
@@ -182,7 +186,6 @@ export function Touches() {
             </tbody>
           </table>
         )}
-        {touches.length > ROWS && <p class="hint">and {touches.length - ROWS} more on the sheet</p>}
       </div>
       <Announcer />
     </section>

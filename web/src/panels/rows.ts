@@ -7,7 +7,7 @@ export interface Grouping {
   readonly places: readonly number[];
   /** Row shown at each place, -1 in a gap. */
   readonly rows: readonly number[];
-  /** Where a drive's rows begin and end. */
+  /** Each by its source and sink, and where its measurements begin and end. */
   readonly drives: readonly { readonly label: string; readonly from: number; readonly to: number }[];
 }
 
@@ -19,7 +19,7 @@ export function groupByDrive(pattern: PatternTable): Grouping {
   let last = "";
   for (let row = 0; row < pattern.n_meas; row++) {
     const [source, sink] = [pattern.drive[2 * row], pattern.drive[2 * row + 1]];
-    const label = `${sink + 1}–${source + 1}`;
+    const label = `${source + 1}–${sink + 1}`;
     if (label !== last && row > 0) {
       places.push(places.length);
       rows.push(-1);

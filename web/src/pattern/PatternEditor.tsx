@@ -40,7 +40,7 @@ function Editor({ own }: { readonly own: boolean }) {
   return (
     <div class="own">
       <div class="field">
-        <label for="pattern-start">Begin with the rows of</label>
+        <label for="pattern-start">Start with the rows of</label>
         <select
           id="pattern-start"
           data-testid="pattern-start"
@@ -53,7 +53,7 @@ function Editor({ own }: { readonly own: boolean }) {
           }}
         >
           <option value="">choose…</option>
-          <option value={OWN}>the skin as it is</option>
+          <option value={OWN}>the present pattern</option>
           {NAMED.map((name) => (
             <option key={name}>{name}</option>
           ))}
@@ -113,8 +113,8 @@ export function PatternEditor() {
           <option value={OWN}>a table of your own</option>
         </select>
         <p class="help">
-          Where current flows and what is read: {scene.value?.pattern.n_meas} rows,{" "}
-          {scene.value?.pattern.n_drive} drives. The board is set to it, and the reference taken anew.
+          Which electrodes drive and read: {scene.value?.pattern.n_meas} measurements,{" "}
+          {scene.value?.pattern.n_drive} drives. A change configures the board and takes a new reference.
         </p>
       </div>
       {editing.value && <Editor own={own} />}

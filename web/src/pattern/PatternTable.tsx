@@ -6,7 +6,7 @@ import { shownDrive, shownPair } from "../sheet/space";
 import { type Cells, COLUMNS, electrode, fresh, fromText, type Row } from "./rows";
 
 const ROW = 36;
-const SHOWN = 8;
+const SHOWN = 5;
 const BEYOND = 6;
 
 export interface TableProps {

@@ -3,18 +3,18 @@
 import { useSignal } from "@preact/signals";
 import { addDrawer } from "../drawers";
 import { PatternEditor } from "../pattern/PatternEditor";
-import { say, send } from "../state";
-import { Field, nameOf } from "./Field";
+import { say, scene, send } from "../state";
+import { Field, isRefused, Refusal } from "./Field";
 import {
-  discard,
+  applies,
   doing,
+  type KeyForm,
   progress,
   redo,
   refused,
   schema,
   type SectionForm,
   settings,
-  stands,
   undo,
   valuesOf,
 } from "./model";
@@ -22,7 +22,7 @@ import { Alpha, Threshold } from "./Slider";
 
 /** What is changed most stands first; in words. */
 const ORDER: Readonly<Record<string, string>> = {
-  inverse: "Picture",
+  inverse: "Image",
   touch: "Touches",
   drive: "Drive and measurement",
   electrodes: "Electrodes",
@@ -37,33 +37,43 @@ const ORDER: Readonly<Record<string, string>> = {
 const SLIDERS = new Set(["gamma1", "gamma2"]);
 const TABLE = new Set(["pattern", "drive", "measure"]);
 
-function Section({ section }: { readonly section: SectionForm }) {
+/** The keys that have a field now: those that apply, and can be typed. */
+function fields(section: SectionForm): readonly KeyForm[] {
   const values = valuesOf(section.name);
+  return section.keys.filter(
+    (key) => applies(key, values) && key.kind.form !== "rows" && !TABLE.has(key.name),
+  );
+}
+
+function Setting({ section, form }: { readonly section: string; readonly form: KeyForm }) {
+  const value = valuesOf(section)[form.name];
+  if (form.name === "alpha") return <Alpha value={value} />;
+  if (SLIDERS.has(form.name)) return <Threshold form={form} value={value} />;
+  return <Field section={section} form={form} value={value} />;
+}
+
+function Section({ section }: { readonly section: SectionForm }) {
   const { name } = section;
-  const refusal = refused.value?.section === name ? refused.value : null;
+  const shown = fields(section);
+  // What has no field of its own, as a table, is refused below them all.
+  const elsewhere = refused.value?.section === name && !shown.some((key) => isRefused(name, key.name));
   return (
     <details open={name === "inverse"} data-testid={`section-${name}`}>
       <summary title={section.meaning}>{ORDER[name]}</summary>
       {name === "drive" && <PatternEditor />}
-      {section.keys
-        .filter((key) => stands(key, values) && key.kind.form !== "rows" && !TABLE.has(key.name))
-        .map((key) => {
-          const value = values[key.name];
-          if (name === "inverse" && key.name === "alpha") return <Alpha key="alpha" value={value} />;
-          if (SLIDERS.has(key.name)) return <Threshold key={key.name} form={key} value={value} />;
-          return <Field key={key.name} section={name} form={key} value={value} />;
-        })}
-      {refusal && (
-        <p class="wrong" role="alert" data-testid="refused">
-          {refusal.key ? `${nameOf(refusal.key)}: ` : ""}
-          {refusal.message}{" "}
-          <button type="button" onClick={() => discard(name)}>
-            Leave it as it was
-          </button>
-        </p>
-      )}
+      {shown.map((form) => (
+        <Setting key={form.name} section={name} form={form} />
+      ))}
+      {elsewhere && <Refusal section={name} id={`wrong-${name}`} />}
     </details>
   );
+}
+
+/** The sections that this source has a use for. */
+function offered(): readonly SectionForm[] {
+  const simulated = scene.value?.pressable ?? false;
+  const names = Object.keys(ORDER).filter((name) => name !== "twin" || simulated);
+  return names.flatMap((name) => schema.value.find((section) => section.name === name) ?? []);
 }
 
 /** Save under a name, load what is there. */
@@ -75,7 +85,7 @@ function Files() {
   const save = () => {
     const wanted = name.value.trim();
     if (!/^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$/.test(wanted)) {
-      say("A name has letters, digits, - and _ only");
+      say("A name has letters, digits, dashes and underscores only");
       return;
     }
     send({ type: "save_skin", name: wanted, replace: again.value === wanted });
@@ -123,7 +133,6 @@ function Files() {
 function View() {
   const now = settings.value;
   if (!now) return <p class="hint">Waiting for the settings</p>;
-  const ordered = Object.keys(ORDER).flatMap((name) => schema.value.find((s) => s.name === name) ?? []);
   const took = now.took_ms === null ? "" : `ready in ${now.took_ms.toFixed(0)} ms`;
   return (
     <div class="settings">
@@ -139,11 +148,11 @@ function View() {
         </span>
       </div>
       {refused.value && refused.value.section === null && (
-        <p class="wrong" role="alert">
+        <p class="wrong" role="alert" data-testid="refused">
           {refused.value.message}
         </p>
       )}
-      {ordered.map((section) => (
+      {offered().map((section) => (
         <Section key={section.name} section={section} />
       ))}
       <Files />

@@ -1,6 +1,8 @@
 /** Settings that are drawn rather than typed: alpha on a logarithmic scale, the thresholds. */
 
 import { change, type KeyForm, settings, soon, type Value } from "./model";
+import { status } from "../state";
+import { alpha, alphaInFull } from "../words";
 import { nameOf } from "./Field";
 
 /** Decades of alpha to either side of the automatic choice. */
@@ -19,7 +21,9 @@ export function Alpha({ value }: { readonly value: Value | null | undefined }) {
   return (
     <div class="field slider">
       <label for="set-alpha">α, weight of the prior</label>
-      <output>{Number(present.toPrecision(2))}</output>
+      <output data-testid="alpha" title={status.value ? alphaInFull(status.value) : ""}>
+        {status.value ? alpha(status.value) : Number(present.toPrecision(2))}
+      </output>
       <div class="track">
         {mark !== null && <i class="mark" style={{ left: `${mark}%` }} title="The automatic choice" />}
         <input
@@ -41,7 +45,7 @@ export function Alpha({ value }: { readonly value: Value | null | undefined }) {
         Automatic
       </button>
       <p class="help">
-        Sharper to the left, calmer to the right. Automatic
+        To the left images are sharper, to the right calmer. Automatic
         {automatic === null ? "" : ` (${Number(automatic.toPrecision(2))}, marked)`} follows the noise.
       </p>
     </div>

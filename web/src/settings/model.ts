@@ -13,6 +13,11 @@ export interface KindForm {
   readonly unit?: string;
 }
 
+interface Condition {
+  readonly key: string;
+  readonly words: readonly string[];
+}
+
 export interface KeyForm {
   readonly name: string;
   readonly kind: KindForm;
@@ -20,7 +25,10 @@ export interface KeyForm {
   readonly expected: string;
   readonly meaning: string;
   readonly required: boolean;
-  readonly when: { readonly key: string; readonly words: readonly string[] } | null;
+  /** Beside which values of another key it may stand. */
+  readonly when: Condition | null;
+  /** With which it does anything. */
+  readonly effective: Condition | null;
   readonly unless: string | null;
   readonly locked: boolean;
 }
@@ -68,6 +76,8 @@ export const refused = signal<Refused | null>(null);
 export const progress = signal<Progress | null>(null);
 /** What has been typed and is not the skin's yet, by section. */
 const drafts = signal<Readonly<Record<string, Values>>>({});
+/** The key that was changed last, until the change has been made. */
+let asked: { readonly section: string; readonly key: string } | null = null;
 
 onMessage<{ readonly type: "schema"; readonly sections: readonly SectionForm[] }>(
   "schema",
@@ -75,13 +85,20 @@ onMessage<{ readonly type: "schema"; readonly sections: readonly SectionForm[] }
 );
 onMessage<Settings>("settings", (message) => {
   settings.value = message;
+  if (!message.busy) asked = null;
   const open = refused.value?.section;
   drafts.value = open && drafts.value[open] ? { [open]: drafts.value[open] } : {};
 });
 onMessage<Progress>("progress", (message) => (progress.value = message));
+/** What only shows once the whole sheet is made names no key: it is that of the last change. */
+function placed(message: Refused): Refused {
+  if (!asked || message.key !== null || (message.section ?? asked.section) !== asked.section) return message;
+  return { ...message, ...asked };
+}
+
 onMessage<Refused>("settings_error", (message) => {
-  refused.value = message;
-  if (message.section === null) {
+  refused.value = placed(message);
+  if (refused.value.section === null) {
     drafts.value = {};
     say(message.message);
   }
@@ -89,7 +106,7 @@ onMessage<Refused>("settings_error", (message) => {
 
 const DOING = {
   mesh: "meshing",
-  model: "solving the sheet",
+  model: "computing the model",
   image: "preparing images",
   touches: "preparing touches",
   source: "starting the source",
@@ -105,10 +122,13 @@ export function valuesOf(section: string): Values {
   return { ...settings.value?.document[section], ...drafts.value[section] };
 }
 
-/** Whether a key may stand beside the section's other values. */
-export function stands(key: KeyForm, values: Values): boolean {
+const holds = (condition: Condition | null, values: Values): boolean =>
+  !condition || condition.words.includes(String(values[condition.key]));
+
+/** Whether a key applies beside the section's other values. */
+export function applies(key: KeyForm, values: Values): boolean {
   if (key.unless && values[key.unless] != null) return false;
-  return !key.when || key.when.words.includes(String(values[key.when.key]));
+  return holds(key.when, values) && holds(key.effective, values);
 }
 
 /** Ask for a value; null takes the key out. What does not stand beside it any more goes. */
@@ -116,6 +136,7 @@ export function change(section: string, values: Values): void {
   const draft = { ...drafts.value[section], ...values };
   drafts.value = { ...drafts.value, [section]: draft };
   refused.value = null;
+  asked = { section, key: Object.keys(values)[0] };
   send({ type: "settings", changes: { [section]: draft } });
 }
 
@@ -126,8 +147,12 @@ export function discard(section: string): void {
   refused.value = null;
 }
 
-export const undo = (): void => send({ type: "undo" });
-export const redo = (): void => send({ type: "redo" });
+function step(type: "undo" | "redo"): void {
+  asked = null;
+  send({ type });
+}
+export const undo = (): void => step("undo");
+export const redo = (): void => step("redo");
 
 const WAIT_MS = 60;
 let waiting: (() => void) | null = null;
@@ -144,13 +169,20 @@ export function soon(work: () => void): void {
   }, WAIT_MS);
 }
 
+/** A quantity in two: the number, and the unit that it has or gets; else as it is. */
+export function parted(value: Value | null | undefined, kind: KindForm): readonly [text: string, unit: string] {
+  const text = Array.isArray(value) ? value.join(", ") : String(value ?? "");
+  if (kind.form !== "quantity") return [text, ""];
+  const found = /^\s*([-+.\deE]+)\s+(\S+)\s*$/.exec(text);
+  return found ? [found[1], found[2]] : [text, kind.unit ?? ""];
+}
+
 /** What a person typed, as the skin file writes it: a bare number gets the unit that was there. */
 export function typed(text: string, kind: KindForm, before: Value | null | undefined): Value {
   const trimmed = text.trim();
   if (kind.form === "number" && trimmed !== "" && Number.isFinite(Number(trimmed))) return Number(trimmed);
   if (kind.form === "quantity" && trimmed !== "" && Number.isFinite(Number(trimmed))) {
-    const unit = typeof before === "string" ? before.trim().split(/\s+/).slice(1).join(" ") : "";
-    return `${trimmed} ${unit || kind.unit}`;
+    return `${trimmed} ${parted(before, kind)[1]}`;
   }
   return trimmed;
 }

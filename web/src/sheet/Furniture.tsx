@@ -1,19 +1,28 @@
 /** What stands still around the image: the outline, the electrodes, the scale bar. */
 
 import type { Electrode, Scene, Sick } from "../protocol";
+import { narrow } from "../screen";
 import { barLength, boxOf, outward, toPixels, type View } from "./view";
 
-const DOT = 15;
-/** From the rim to a label's middle above and below the sheet, to its near end beside it. */
-const LABEL = 36;
-const SIDE_LABEL = 28;
+/** From the rim, px: to the middle of a dot; to a label's middle above and below the sheet; to its
+ * near end beside it. */
+export const LABELS = {
+  wide: { dot: 15, middle: 36, beside: 28 },
+  narrow: { dot: 8, middle: 23, beside: 16 },
+} as const;
+type Distances = (typeof LABELS)[keyof typeof LABELS];
 
-function Label({ text, x, y, dx, dy }: Record<"x" | "y" | "dx" | "dy", number> & { text: string }) {
+interface LabelProps extends Readonly<Record<"x" | "y" | "dx" | "dy", number>> {
+  readonly text: string;
+  readonly away: Distances;
+}
+
+function Label({ text, x, y, dx, dy, away }: LabelProps) {
   const beside = Math.abs(dx) > 0.5;
-  const away = beside ? SIDE_LABEL : LABEL;
+  const distance = beside ? away.beside : away.middle;
   const anchor = beside ? (dx > 0 ? "start" : "end") : "middle";
   return (
-    <text class={anchor} x={x + away * dx} y={y - away * dy}>
+    <text class={anchor} x={x + distance * dx} y={y - distance * dy}>
       {text}
     </text>
   );
@@ -29,11 +38,11 @@ function pathOf(view: View, flat: readonly number[]): string {
 
 function ScaleBar({ view, length }: { view: View; length: number }) {
   const width = length * view.scale;
-  const y = view.height - 26;
+  const [x, y] = narrow.value ? [10, view.height - 8] : [24, view.height - 26];
   return (
     <g class="bar">
-      <path d={`M24 ${y - 5}V${y}H${(24 + width).toFixed(1)}V${y - 5}`} />
-      <text x={24 + width / 2} y={y - 13}>
+      <path d={`M${x} ${y - 5}V${y}H${(x + width).toFixed(1)}V${y - 5}`} />
+      <text x={x + width / 2} y={y - 13}>
         {length >= 0.01 ? `${length * 100} cm` : `${length * 1000} mm`}
       </text>
     </g>
@@ -50,15 +59,48 @@ function pixelsOut(scene: Scene, view: View, electrode: Electrode): readonly [nu
   return [(x - x0) / length, (y0 - y) / length];
 }
 
-/** A dot where it is well; a square on its corner, with a cross, where it is not. */
-function Dot({ x, y, sick }: { x: number; y: number; sick: Sick | undefined }) {
-  if (!sick) return <circle cx={x} cy={y} r={5} />;
+/** A dot where it is well, with its sign while it is driven; a square on its corner, with a cross,
+ * where it is not well. */
+function Dot({ x, y, sick, sign }: { x: number; y: number; sick: Sick | undefined; sign: string }) {
+  if (!sick && sign) {
+    return (
+      <>
+        <circle cx={x} cy={y} r={narrow.value ? 7 : 9} />
+        <text class="middle sign" x={x} y={y}>
+          {sign}
+        </text>
+      </>
+    );
+  }
+  if (!sick) return <circle cx={x} cy={y} r={narrow.value ? 4 : 5} />;
   const arm = `M${x - 4} ${y - 4}L${x + 4} ${y + 4}M${x - 4} ${y + 4}L${x + 4} ${y - 4}`;
   return (
     <>
       <rect x={x - 9} y={y - 9} width={18} height={18} transform={`rotate(45 ${x} ${y})`} />
       <path class="cross" d={arm} />
     </>
+  );
+}
+
+/** Half of the arrow's head, px, and how far it stays from the electrodes. */
+const HEAD = 7;
+const CLEAR = 12;
+
+/** The current's way: from the source to the sink, inside the sheet. */
+function Arrow({ from, to }: Readonly<Record<"from" | "to", readonly [number, number]>>) {
+  const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
+  if (length < 4 * CLEAR) return null;
+  const [ex, ey] = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];
+  const [x0, y0] = [from[0] + CLEAR * ex, from[1] + CLEAR * ey];
+  const [x1, y1] = [to[0] - CLEAR * ex, to[1] - CLEAR * ey];
+  const wing = (side: number) =>
+    `${(x1 - 2 * HEAD * ex + side * HEAD * ey).toFixed(1)} ${(y1 - 2 * HEAD * ey - side * HEAD * ex).toFixed(1)}`;
+  const path = `M${x0.toFixed(1)} ${y0.toFixed(1)}L${x1.toFixed(1)} ${y1.toFixed(1)}M${wing(1)}L${x1.toFixed(1)} ${y1.toFixed(1)}L${wing(-1)}`;
+  return (
+    <g class="current" data-testid="current">
+      <path class="under" d={path} />
+      <path d={path} />
+    </g>
   );
 }
 
@@ -74,16 +116,25 @@ export interface FurnitureProps {
 
 const SIGNS = ["+", "\u2212"];
 
-/** What an electrode does under the drive and measurement that are looked at. */
+/** What an electrode does under the measurement that is looked at, beside its name. */
 function roles(number: number, drive: FurnitureProps["drive"], pair: FurnitureProps["pair"]): string {
-  const [role, read] = [drive?.indexOf(number) ?? -1, pair?.indexOf(number) ?? -1];
-  const driven = role < 0 ? "" : ` ${pair ? "I" : ""}${SIGNS[role]}`;
-  return driven + (read < 0 ? "" : ` V${SIGNS[read]}`);
+  if (!pair) return "";
+  const [role, read] = [drive?.indexOf(number) ?? -1, pair.indexOf(number)];
+  return (role < 0 ? "" : ` I${SIGNS[role]}`) + (read < 0 ? "" : ` V${SIGNS[read]}`);
 }
 
+/** The same in words. */
+function inWords(number: number, { drive, pair }: FurnitureProps): string {
+  const [role, read] = [drive?.indexOf(number) ?? -1, pair?.indexOf(number) ?? -1];
+  const words = [["source", "sink"][role], ["read plus", "read minus"][read]].filter(Boolean);
+  return words.map((word) => `, ${word}`).join("");
+}
 
-export function Furniture({ scene, view, sick, drive, pair }: FurnitureProps) {
-  const { outline, points } = scene;
+export function Furniture(props: FurnitureProps) {
+  const { scene, view, sick, drive, pair } = props;
+  const { outline, points, electrodes } = scene;
+  const away = narrow.value ? LABELS.narrow : LABELS.wide;
+  const ends = drive?.map((e) => electrodes[e] && toPixels(view, electrodes[e].x, electrodes[e].y));
   return (
     <svg class="furniture" width={view.width} height={view.height} role="group" aria-label="Electrodes">
       <path class="outline" d={`${pathOf(view, outline)}Z`} />
@@ -92,7 +143,9 @@ export function Furniture({ scene, view, sick, drive, pair }: FurnitureProps) {
         const [x, y] = toPixels(view, electrode.x, electrode.y);
         const arc = electrode.points.flatMap((p) => [points[2 * p], points[2 * p + 1]]);
         const ill = sick.find((one) => one.electrode === number);
-        const reason = ill ? `${electrode.label}: ${ill.reason}` : `${electrode.label}: good`;
+        const health = ill ? ill.reason : "good";
+        const reason = `${electrode.label}: ${health}${inWords(number, props)}`;
+        const role = pair ? -1 : (drive?.indexOf(number) ?? -1);
         const driven = drive?.includes(number) ?? false;
         const read = pair?.includes(number) ?? false;
         return (
@@ -106,17 +159,19 @@ export function Furniture({ scene, view, sick, drive, pair }: FurnitureProps) {
           >
             <title>{reason}</title>
             {arc.length > 2 && <path class="arc" d={pathOf(view, arc)} />}
-            <Dot x={x + DOT * dx} y={y - DOT * dy} sick={ill} />
+            <Dot x={x + away.dot * dx} y={y - away.dot * dy} sick={ill} sign={SIGNS[role] ?? ""} />
             <Label
               text={electrode.label + roles(number, drive, pair)}
               x={x}
               y={y}
               dx={dx}
               dy={dy}
+              away={away}
             />
           </g>
         );
       })}
+      {ends?.[0] && ends[1] && <Arrow from={ends[0]} to={ends[1]} />}
       {!view.seen && <ScaleBar view={view} length={barLength(boxOf(outline))} />}
     </svg>
   );

@@ -2,7 +2,7 @@
 
 import { effect, signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { inScale, millimetres, scaleFor } from "../format";
+import { fixed, inScale, millimetres, scaleFor } from "../format";
 import {
   hand,
   limit,
@@ -18,17 +18,21 @@ import {
 } from "../state";
 import { theme } from "../theme";
 import { Target } from "../flows/Target";
-import { Furniture } from "./Furniture";
+import { narrow } from "../screen";
+import { Furniture, LABELS } from "./Furniture";
 import { Painter } from "./painter";
 import { cursor, listen } from "./pointer";
 import { hovered, locator, seen, shownDrive, shownPair } from "./space";
 import { around, boxOf, fit, type Margin, type View } from "./view";
 
-/** Room for the electrodes' labels all round and for the legend at the left; on a telephone less. */
-const margin = (width: number): Margin =>
-  width > 600
-    ? { left: 186, right: 64, top: 52, bottom: 80 }
-    : { left: 134, right: 50, top: 46, bottom: 46 };
+/** Room for the electrodes' labels all round and for the legend at the left; on a telephone for
+ * the labels alone, px. */
+function margin(): Margin {
+  if (!narrow.value) return { left: 186, right: 64, top: 52, bottom: 80 };
+  const longest = Math.max(2, ...(scene.value?.electrodes.map(({ label }) => label.length) ?? []));
+  const side = LABELS.narrow.beside + 10 * longest;
+  return { left: side, right: side, top: 32, bottom: 32 };
+}
 const NOWHERE: View = { scale: 1, originX: 0, originY: 0, width: 0, height: 0 };
 
 export const view = signal<View>(NOWHERE);
@@ -54,6 +58,19 @@ function Reading() {
   );
 }
 
+/** Where the keyboard's probe is and what it holds, for who cannot see it. */
+function Probe() {
+  const place = cursor.value;
+  if (!place) return null;
+  const held = hand.value.held.map(({ x, y, force }) => `${millimetres(x, 0)}, ${millimetres(y, 0)} with ${fixed(force, 1)} newtons`);
+  return (
+    <p class="unseen" role="status" data-testid="probe">
+      Probe at {millimetres(place[0], 0)}, {millimetres(place[1], 0)} millimetres.{" "}
+      {held.length > 0 && `Pressed at ${held.join("; ")}.`}
+    </p>
+  );
+}
+
 export function Sheet() {
   const sheet = useRef<HTMLDivElement>(null);
   const image = useRef<HTMLCanvasElement>(null);
@@ -71,8 +88,8 @@ export function Sheet() {
         const [width, height] = size.value;
         if (scene.value && width > 0) {
           view.value = seen.value
-            ? around(seen.value, width, height, margin(width))
-            : fit(boxOf(scene.value.outline), width, height, margin(width));
+            ? around(seen.value, width, height, margin())
+            : fit(boxOf(scene.value.outline), width, height, margin());
         }
         painter.resize(width, height);
       }),
@@ -121,8 +138,9 @@ export function Sheet() {
       )}
       {view.value.width > 0 && <Target view={view.value} />}
       <Reading />
+      <Probe />
       {!accelerated.value && (
-        <p class="remark">WebGL 2 is missing in this browser: the sheet is drawn flat and more slowly.</p>
+        <p class="remark">This browser lacks WebGL 2: the sheet is drawn flat, and more slowly.</p>
       )}
     </div>
   );

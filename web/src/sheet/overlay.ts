@@ -105,6 +105,24 @@ function drawTrail(pen: Pen, theme: Theme, view: View, trail: readonly Place[]):
   pen.globalAlpha = 1;
 }
 
+/** A closed line through places in pixels. */
+function closed(places: readonly Place[]): Path2D {
+  const path = new Path2D();
+  places.forEach(([x, y], k) => (k ? path.lineTo(x, y) : path.moveTo(x, y)));
+  path.closePath();
+  return path;
+}
+
+/** Places on a circle of the sheet, m. */
+const circle = (x: number, y: number, radius: number): Place[] =>
+  Array.from({ length: CORNERS }, (_, k) => {
+    const phase = (2 * Math.PI * k) / CORNERS;
+    return [x + radius * Math.cos(phase), y + radius * Math.sin(phase)] as const;
+  });
+
+/** From the edge of what presses to its ring, px. */
+const TRUTH_GAP = 6;
+
 function drawTouch(pen: Pen, theme: Theme, view: View, touch: Touch): void {
   const [x, y] = toPixels(view, touch.x, touch.y);
   const path = new Path2D();
@@ -149,19 +167,28 @@ function drawNumber(pen: Pen, theme: Theme, view: View, touch: Touch): void {
   pen.fillText(remark, cx + half + 5, cy + 1);
 }
 
+/** Dashes on a band, with a dot in the middle, so that it shows beside and over every other mark. */
 function drawTruth(pen: Pen, theme: Theme, view: View, truth: Truth): void {
   const [x, y] = toPixels(view, truth.x, truth.y);
-  pen.beginPath();
-  pen.ellipse(x, y, truth.radius * view.scale, truth.radius * view.scale, 0, 0, 2 * Math.PI);
+  // Never under the rim of the press that made it.
+  const ring = circle(truth.x, truth.y, truth.radius + TRUTH_GAP / view.scale);
+  const path = closed(ring.map((place) => toPixels(view, ...place)));
   pen.setLineDash([]);
   pen.strokeStyle = theme.halo;
-  pen.lineWidth = 3;
-  pen.stroke();
-  pen.setLineDash([5, 4]);
-  pen.strokeStyle = theme.ink;
-  pen.lineWidth = 1.25;
-  pen.stroke();
+  pen.lineWidth = 4;
+  pen.stroke(path);
+  pen.setLineDash([6, 4]);
+  pen.strokeStyle = theme.truth;
+  pen.lineWidth = 2;
+  pen.stroke(path);
   pen.setLineDash([]);
+  pen.beginPath();
+  pen.ellipse(x, y, 3, 3, 0, 0, 2 * Math.PI);
+  pen.fillStyle = theme.truth;
+  pen.strokeStyle = theme.halo;
+  pen.lineWidth = 1.5;
+  pen.fill();
+  pen.stroke();
 }
 
 /** The first part of a closed line through `corners`, by its length. */
@@ -183,6 +210,9 @@ function around(corners: readonly Place[], part: number): Path2D {
   return path;
 }
 
+/** From the rim to the words of the force, px: beyond the truth's ring. */
+const FORCE_GAP = 13;
+
 /** The hand's own press: the rim of its probe, drawn as far as its force goes, the force in words. */
 function drawHeld(pen: Pen, theme: Theme, view: View, held: Held, maxForce: number): void {
   const [x] = toPixels(view, held.x, held.y);
@@ -200,9 +230,9 @@ function drawHeld(pen: Pen, theme: Theme, view: View, held: Held, maxForce: numb
   pen.lineWidth = 4;
   pen.lineJoin = "round";
   const text = `${held.force.toFixed(1)} N`;
-  pen.strokeText(text, x, lowest + 6);
+  pen.strokeText(text, x, lowest + FORCE_GAP);
   pen.fillStyle = theme.ink;
-  pen.fillText(text, x, lowest + 6);
+  pen.fillText(text, x, lowest + FORCE_GAP);
 }
 
 function drawCursor(pen: Pen, theme: Theme, view: View, place: readonly [number, number]): void {
@@ -234,9 +264,9 @@ export function drawMarks(
     }
   }
   for (const trail of marks.trails) drawTrail(pen, theme, view, trail);
-  for (const truth of marks.truths ?? []) drawTruth(pen, theme, view, truth);
   for (const held of marks.held) drawHeld(pen, theme, view, held, maxForce);
   for (const touch of marks.touches) drawTouch(pen, theme, view, touch);
+  for (const truth of marks.truths ?? []) drawTruth(pen, theme, view, truth);
   for (const touch of marks.touches) drawNumber(pen, theme, view, touch);
   if (marks.cursor) drawCursor(pen, theme, view, marks.cursor);
 }

@@ -47,12 +47,32 @@ function onArrow(event: KeyboardEvent): void {
   requestRepaint();
 }
 
+/** A second tap so soon, s, and so near, px, is one gesture with the first. */
+const TAP_S = 0.35;
+const TAP_NEAR = 30;
+
+/** Tells a finger's second tap: it keeps its press, or lifts a kept one, as Shift does for a mouse. */
+class Taps {
+  private last = { time: -Infinity, x: 0, y: 0 };
+
+  isSecond(event: PointerEvent): boolean {
+    if (event.pointerType !== "touch") return false;
+    const { clientX: x, clientY: y } = event;
+    const time = event.timeStamp / 1e3;
+    const { last } = this;
+    const second = time - last.time < TAP_S && Math.hypot(x - last.x, y - last.y) < TAP_NEAR;
+    this.last = { time: second ? -Infinity : time, x, y };
+    return second;
+  }
+}
+
 /** Listen on an element that shows the sheet in the view of the moment. Returns the undoing. */
 export function listen(element: HTMLElement, view: () => View): () => void {
   const quit = new AbortController();
   const { signal } = quit;
   let turned = 0;
   let turning: number | null = null;
+  const taps = new Taps();
 
   const placeOf = (event: PointerEvent): readonly [number, number] => {
     const box = element.getBoundingClientRect();
@@ -64,14 +84,14 @@ export function listen(element: HTMLElement, view: () => View): () => void {
     "pointerdown",
     (event) => {
       const [x, y] = placeOf(event);
-      if (inSpace.value && (event.button === 2 || !onSheet(x, y))) {
+      if (inSpace.value && (event.button === 2 || !onSheet(x, y) || !pressable())) {
         turning = event.pointerId;
         element.setPointerCapture(event.pointerId);
         return;
       }
       if (event.button !== 0 || !pressable() || !onSheet(x, y)) return;
       element.setPointerCapture(event.pointerId);
-      const keeping = event.shiftKey || keepPresses.value;
+      const keeping = taps.isSecond(event) || event.shiftKey || keepPresses.value;
       hand.value = press(hand.value, event.pointerId, x, y, keeping);
     },
     { signal },

@@ -1,4 +1,4 @@
-/** Where the age of a picture comes from: a table of stages, from the sample to the page. */
+/** Where the age of an image comes from: a table of stages, from the sample to the page. */
 
 import { fixed } from "../format";
 import { status } from "../state";
@@ -6,7 +6,7 @@ import { status } from "../state";
 const MEANINGS: Readonly<Record<string, string>> = {
   sample: "between the scans of two frames, by the device",
   decode: "from a frame's last byte to the pipeline",
-  reconstruct: "voltages, picture, touches",
+  reconstruct: "voltages, image, touches",
   publish: "from the touches to the last byte given to a page",
   paint: "from its arrival to the end of drawing; the slowest page",
 };

@@ -1,4 +1,4 @@
-/** The signals drawer: the pattern drive by drive, noise, drift, reciprocity, ways of touches. */
+/** The signals drawer: the pattern drive by drive, noise, drift, reciprocity, positions of touches. */
 
 import { computed, effect, signal } from "@preact/signals";
 import type uPlot from "uplot";
@@ -95,7 +95,7 @@ const TABS: readonly Tab[] = [
     id: "drive",
     label: "Drive",
     unit: "mV",
-    meaning: "Voltages under one drive (thin) against the reference (broad); its electrodes are marked on the sheet.",
+    meaning: "Voltages of one drive (thin) against the reference (broad). The arrow on the sheet runs from the source to the sink.",
     fit: () => {
       const frame = shown.peek();
       const top = niceAbove(1.2e3 * largest(frame?.reference ?? []));
@@ -110,7 +110,7 @@ const TABS: readonly Tab[] = [
     id: "noise",
     label: "Noise",
     unit: "µV",
-    meaning: "Standard deviation of each row between one frame and the next, drive by drive.",
+    meaning: "Standard deviation of each measurement from one frame to the next, drive by drive.",
     fit: () => [0, niceAbove(1.5 * largest(noiseData()[1]))],
     range: [-1, 0],
     data: noiseData,
@@ -120,7 +120,7 @@ const TABS: readonly Tab[] = [
     id: "drift",
     label: "Drift",
     unit: "%",
-    meaning: "How far the untouched voltages have moved since the reference, over the last hour (minutes).",
+    meaning: "How far the untouched voltages have drifted from the reference, over the last hour (minutes).",
     fit: () => [0, niceAbove(Math.max(0.1, 1.5 * largest(driftData()[1])))],
     range: [-60, 0],
     data: driftData,
@@ -130,7 +130,7 @@ const TABS: readonly Tab[] = [
     id: "reciprocity",
     label: "Reciprocity",
     unit: "%",
-    meaning: "Rows with drive and measurement exchanged must read alike: their differences, as a part of the mean.",
+    meaning: "With drive and measuring pair exchanged, a measurement must read the same. These are the differences, relative to the mean.",
     fit: () => {
       const top = niceAbove(Math.max(0.1, 1.3 * largest(reciprocityData()[1])));
       return [-top, top];
@@ -154,7 +154,7 @@ const TABS: readonly Tab[] = [
     id: "latency",
     label: "Latency",
     unit: "ms",
-    meaning: "Where the age of a picture comes from: how long each stage took over the last frames.",
+    meaning: "How long each stage of the last frames took, from the sample to the screen.",
     fit: () => [0, 1],
     range: [0, 1],
     data: () => [[], []],
@@ -306,6 +306,6 @@ addDrawer({
   id: "signals",
   label: "Signals",
   key: "G",
-  title: "Voltages drive by drive, noise, drift, reciprocity, ways of touches",
+  title: "Voltages drive by drive, noise, drift, reciprocity, positions, latency",
   View,
 });

@@ -104,7 +104,7 @@ export function Bends() {
         </p>
       )}
       <button type="button" data-testid="lay-flat" disabled={level} onClick={layFlat}>
-        Lay it as it was
+        Reset bend and stretch
       </button>
     </fieldset>
   );

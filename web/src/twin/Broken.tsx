@@ -4,7 +4,7 @@ import { scene } from "../state";
 import { harm, twin } from "./model";
 
 const NOISES: readonly (readonly [string, number | null])[] = [
-  ["its own", null],
+  ["as in the twin", null],
   ["2 LSB", 2],
   ["10 LSB", 10],
   ["50 LSB", 50],

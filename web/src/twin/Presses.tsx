@@ -11,7 +11,7 @@ export function Presses() {
       <legend>Presses</legend>
       {held.length === 0 ? (
         <p class="help">
-          Press the sheet with the pointer; with Shift a press stays, up to {MAX_PRESSES} of them.
+          Press the sheet with the pointer. With Shift a press stays. At most {MAX_PRESSES} presses.
         </p>
       ) : (
         <ol class="held">

@@ -54,7 +54,7 @@ export function Probes() {
           <button
             key={radius}
             type="button"
-            title={`${fixed(2e3 * radius, 0)} mm across (key ${k + 1})`}
+            title={`${fixed(2e3 * radius, 0)} mm wide (key ${k + 1})`}
             aria-pressed={Math.abs(radius - probe.radius) < 1e-6}
             onClick={() => choose({ radius })}
           >
@@ -65,7 +65,7 @@ export function Probes() {
       </div>
       {probe.face.shape !== "circle" && (
         <Slider
-          name="Turned by"
+          name="Rotation"
           id="probe-angle"
           low={0}
           high={175}
@@ -76,7 +76,7 @@ export function Probes() {
         />
       )}
       <Slider
-        name="Force at first"
+        name="First force"
         id="probe-force"
         low={0.5}
         high={probe.maxForce}
@@ -86,7 +86,7 @@ export function Probes() {
         set={(force) => choose({ force })}
       />
       <button type="button" aria-pressed={showTruth.value} onClick={truth.run}>
-        Show where it is really pressed
+        Show the true presses
       </button>
     </fieldset>
   );

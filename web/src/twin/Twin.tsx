@@ -23,7 +23,7 @@ addDrawer({
   id: "twin",
   label: "Twin",
   key: "W",
-  title: "Probe, presses, bends, and what is broken on the twin",
+  title: "Probe, presses, bends and faults of the simulated skin",
   offered: () => scene.value?.pressable ?? false,
   View,
 });
