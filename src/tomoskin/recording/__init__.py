@@ -39,6 +39,7 @@ from tomoskin.recording.recorder import (
 from tomoskin.recording.repair import Lost, Repaired, repair
 from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.recording.replayed import advance, as_recorded, replayed
+from tomoskin.recording.robot_log import LogPart, RobotLog
 from tomoskin.recording.scanned import idle_count, scanned_touches
 from tomoskin.recording.session_reader import (
     SessionReader,
@@ -48,7 +49,8 @@ from tomoskin.recording.session_reader import (
     tick_rate,
     touches_before,
 )
-from tomoskin.recording.session_writer import SessionWriter
+from tomoskin.recording.session_writer import Log, SessionWriter
+from tomoskin.recording.split import split, split_names, split_targets
 from tomoskin.touch import Span
 
 __all__ = [
@@ -56,6 +58,8 @@ __all__ = [
     "Advance",
     "Block",
     "BoardInfo",
+    "Log",
+    "LogPart",
     "Lost",
     "Mark",
     "MarkedFrame",
@@ -64,6 +68,7 @@ __all__ = [
     "Recorder",
     "Repaired",
     "ReplayTransport",
+    "RobotLog",
     "Rows",
     "RunMessage",
     "RunSettings",
@@ -96,6 +101,9 @@ __all__ = [
     "scene_message",
     "schema_of",
     "session_info",
+    "split",
+    "split_names",
+    "split_targets",
     "tick_rate",
     "touch_colour",
     "touch_row",

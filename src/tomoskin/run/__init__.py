@@ -12,6 +12,7 @@ from tomoskin.run.labelled_frames import (
     processors,
 )
 from tomoskin.run.marker import ReplaySource
+from tomoskin.run.robot_run import Member, RobotRun
 from tomoskin.run.runner import Runner
 from tomoskin.run.simulate import Simulated, simulate
 from tomoskin.run.status import Status
@@ -20,7 +21,9 @@ from tomoskin.run.twin_requests import MAX_FORCE, SetPose, SetPresses, SetTwin, 
 
 __all__ = [
     "MAX_FORCE",
+    "Member",
     "ReplaySource",
+    "RobotRun",
     "Runner",
     "SetMade",
     "SetPose",

@@ -64,7 +64,7 @@ class Flow:
         self.pipeline, self.marker, self.twin = Pipeline(prepared), Marker(), TwinControl()
         self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered)
         self.latency = Latency()
-        self._clock = audience.clock
+        self._clock, self._turns = audience.clock, audience.turns
         self._settings = ScanSettings.of(prepared.skin)
         self._losses, self._earlier, self._skipped = Losses(), Losses(), 0
         self._drops, self._polled = 0, 0.0
@@ -235,7 +235,8 @@ class Flow:
                 for before in self.out.recordings.again():
                     advance(self.pipeline, *before)
                 self.out.put(MarkedFrame(frame, mark))
-                self._take_frame(frame, mark)
+                with self._turns:
+                    self._take_frame(frame, mark)
 
     def _take_frame(self, frame: Frame, mark: Mark) -> None:
         if mark & Mark.SKIPPED:

@@ -22,13 +22,10 @@ class Contact:
         Its identity, and where it is on the sheet.
     pose
         Where it is in the frame of its :class:`Contacts`.
-    force
-        N, against the normal; None where no calibration measures it.
     """
 
     touch: Touch
     pose: SpacePose = field(repr=False)
-    force: float | None = None
 
     @property
     def position(self) -> Vector:
@@ -45,14 +42,22 @@ class Contact:
         """(3, 3) m² of the position on the surface; None where it is not known."""
         return self.pose.position_covariance(self.touch.detection)
 
+    @property
+    def force(self) -> float | None:
+        """N, against the normal; None where nothing tells it."""
+        force = self.touch.detection.force
+        return None if force is None else force.newtons
+
     def content(self) -> dict[str, Any]:
         """As plain values by name: on the sheet, and in space."""
-        spread = self.covariance
+        spread, force = self.covariance, self.touch.detection.force
         return touch_row(self.touch) | {
             "position": self.position,
             "normal": self.normal,
             "covariance": None if spread is None else spread.tolist(),
             "force": self.force,
+            "force_interval": None if force is None else (force.low, force.high),
+            "force_calibrated": force is not None and force.calibrated,
         }
 
 
