@@ -21,6 +21,7 @@ from tomoskin.cli.named_files import RECORDING, Otherwise, Reads, Writes
 from tomoskin.cli.options import BendOption, SinkOption, SkinOption, SourceOption, StatesOption
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.record import ended_by_signals, recording_to
+from tomoskin.cli.robot import Served, run_robot
 
 if TYPE_CHECKING:
     from tomoskin.pipeline import Prepared
@@ -30,6 +31,13 @@ if TYPE_CHECKING:
 
 def live(
     *,
+    robot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="ROBOT.toml", help="All skins of a robot file, instead of --skin and --source."
+        ),
+        Reads(),
+    ] = None,
     skin: SkinOption = None,
     source: SourceOption = "twin",
     record: Annotated[
@@ -70,6 +78,16 @@ def live(
     json: JsonFlag = False,
 ) -> None:
     """Run source, pipeline and server until a signal comes."""
+    from tomoskin.server import is_loopback
+
+    if robot is not None:
+        if skin or source != "twin" or calibration or bend or states:
+            raise typer.BadParameter("the robot file says skins, sources and calibrations")
+        served = Served(host, port, _token(token_file), folder, record, open_browser, json)
+        if not is_loopback(host):
+            _warn(host)
+        run_robot(robot, sink, served)
+        return
     with ended_by_signals():
         from tomoskin.pipeline import colour_limit
         from tomoskin.run import Runner
@@ -79,7 +97,6 @@ def live(
             Server,
             application,
             check_page,
-            is_loopback,
             listen,
             serve_requests,
         )

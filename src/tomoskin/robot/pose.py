@@ -12,6 +12,10 @@ from tomoskin.core import FloatArray
 from tomoskin.mesh import Surface
 
 
+_UPRIGHT = 1e-9
+"""Cosine of the pitch below which it is a right angle."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
     """A rigid motion: a point p of the inner frame is at ``rotation`` p + ``position``.
@@ -37,6 +41,17 @@ class Pose:
         for axis, angle in enumerate(np.asarray(angles, dtype=np.float64).tolist()):
             rotation = turn(np.eye(3)[axis], angle) @ rotation
         return cls(np.asarray(position, dtype=np.float64), rotation)
+
+    def degrees(self) -> tuple[float, float, float]:
+        """Roll, pitch and yaw, as :meth:`of` takes them but in degrees."""
+        r = self.rotation
+        pitch = np.arctan2(-r[2, 0], np.hypot(r[0, 0], r[1, 0]))
+        if np.hypot(r[0, 0], r[1, 0]) > _UPRIGHT:
+            roll, yaw = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(r[1, 0], r[0, 0])
+        else:  # x points along z: only the sum or difference of the two is told
+            roll, yaw = 0.0, np.arctan2(-r[0, 1], r[1, 1])
+        found: list[float] = np.degrees([roll, pitch, yaw]).tolist()
+        return found[0], found[1], found[2]
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """(n, 3) m: points of the inner frame, in the outer one."""

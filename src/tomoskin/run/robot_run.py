@@ -185,6 +185,6 @@ def board_problems(found: Mapping[str, str], wanted: Mapping[str, str | None]) -
         elif others:
             problems[name] = (
                 f"its board {number} has the same number as that of {', '.join(others)}: "
-                "flash one of them with another (tomoskin firmware flash --name)"
+                "give one another (tomoskin firmware configure PORT --id NAME)"
             )
     return problems

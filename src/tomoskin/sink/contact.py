@@ -106,7 +106,7 @@ class Contacts:
             latency=stream.latency(moment.host_time),
             valid=moment.valid,
             problem=moment.problem,
-            touches=tuple(contact_of(stream, touch) for touch in moment.touches),
+            touches=contacts_of(stream, moment),
         )
 
     def header(self) -> dict[str, Any]:
@@ -125,6 +125,11 @@ class Contacts:
     def content(self) -> dict[str, Any]:
         """As plain values by name."""
         return self.header() | {"touches": [touch.content() for touch in self.touches]}
+
+
+def contacts_of(stream: Stream, moment: Moment) -> tuple[Contact, ...]:
+    """The touches of a frame, in space."""
+    return tuple(contact_of(stream, touch) for touch in moment.touches)
 
 
 def contact_of(stream: Stream, touch: Touch) -> Contact:
