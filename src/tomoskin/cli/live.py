@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.choices import (
+    board_memory,
     chosen_sinks,
     say_headroom,
     skin_for_source,
@@ -114,7 +115,9 @@ def live(
                 _warn(host)
             port = listener.getsockname()[1]
             policy = AccessPolicy(port, host, **_token(token_file))
-            runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
+            runner = Runner(
+                prepared, lambda: open_source(source, chosen), sinks=sinks, memory=board_memory()
+            )
             with recording_to(runner, record):
                 hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
                 hub.opener = partial(open_source, source)

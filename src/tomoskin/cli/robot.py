@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.choices import chosen_sinks, skin_for_source
+from tomoskin.cli.choices import board_memory, chosen_sinks, skin_for_source
 from tomoskin.cli.named_files import Otherwise, Reads
 from tomoskin.cli.output import Bar, emit, remark
 from tomoskin.cli.record import ended_by_signals
@@ -48,7 +48,8 @@ def run_robot(file: Path, sinks: list[str] | None, served: Served) -> None:
     robot = Robot.load(file)
     with ended_by_signals():
         with Bar("preparing"):
-            run = RobotRun([_member(skin, sinks) for skin in robot.skins])
+            members = [_member(skin, sinks) for skin in robot.skins]
+        run = RobotRun(members, board_memory())
         _serve(robot, run, served)
         _farewell(run, json=served.json)
 

@@ -27,6 +27,7 @@ from tomoskin.recording.layout import (
     touch_row,
     touches_message,
 )
+from tomoskin.recording.message_log import errors_of
 from tomoskin.recording.playback import Timeline, read_timeline
 from tomoskin.recording.recorder import (
     BoardInfo,
@@ -83,6 +84,7 @@ __all__ = [
     "as_recorded",
     "encode_json",
     "end_time",
+    "errors_of",
     "event_of",
     "grid_message",
     "idle_count",

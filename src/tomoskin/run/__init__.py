@@ -1,6 +1,7 @@
 """The running loop: a thread that owns the source, commands to it and messages from it."""
 
 from tomoskin.run import commands
+from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.flow import Snapshot
 from tomoskin.run.labelled_frames import (
     SetMade,
@@ -21,6 +22,7 @@ from tomoskin.run.twin_requests import MAX_FORCE, SetPose, SetPresses, SetTwin, 
 
 __all__ = [
     "MAX_FORCE",
+    "BoardMemory",
     "Member",
     "ReplaySource",
     "RobotRun",

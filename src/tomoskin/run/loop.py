@@ -185,6 +185,7 @@ class Loop:
         except TomoskinError as error:
             future.set_exception(error)
             return None
+        self.flow.remember()
         self.flow.out.stop()
         self.flow, self.open = Flow(change.prepared, self._audience), opener
         self.flow.begin(transport)

@@ -13,6 +13,7 @@ from tomoskin.core import Event
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.recording import RunMessage
 from tomoskin.robot import Place
+from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.recordings import Recordings
 from tomoskin.run.turns import Turns
 from tomoskin.sink import (
@@ -90,6 +91,8 @@ class Audience:
         Which of a robot's skins it is; None where there is no robot.
     turns
         Taken for each frame; those of a robot's skins share them.
+    memory
+        Where boards are remembered from one start to the next; None: nowhere.
     """
 
     def __init__(
@@ -98,9 +101,10 @@ class Audience:
         sinks: Sequence[Sink] = (),
         place: Place | None = None,
         turns: Turns | None = None,
+        memory: BoardMemory | None = None,
     ) -> None:
         self.clock, self.sinks, self.events = clock, sinks, EventLog()
-        self.place, self.turns = place, turns or Turns()
+        self.place, self.turns, self.memory = place, turns or Turns(), memory
         self._calls: list[Callable[[], None]] = []
         self._subscribers: list[Worker[Subscriber]] = []
         self._lock = threading.Lock()

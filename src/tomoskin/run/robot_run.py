@@ -15,6 +15,7 @@ from tomoskin.pipeline import Prepared
 from tomoskin.recording import RobotLog
 from tomoskin.robot import Place
 from tomoskin.run import commands
+from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.commands import Opener
 from tomoskin.run.runner import Runner
 from tomoskin.run.status import Status
@@ -52,10 +53,12 @@ class RobotRun:
         By the names of the skins, in their order.
     """
 
-    def __init__(self, members: Sequence[Member]) -> None:
+    def __init__(self, members: Sequence[Member], memory: BoardMemory | None = None) -> None:
         turns = Turns()
         self.runners: Mapping[str, Runner] = {
-            m.place.name: Runner(m.prepared, m.open, sinks=m.sinks, place=m.place, turns=turns)
+            m.place.name: Runner(
+                m.prepared, m.open, sinks=m.sinks, place=m.place, turns=turns, memory=memory
+            )
             for m in members
         }
         self._boards = {m.place.name: m.board for m in members}

@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager
 
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.robot import Place
+from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.commands import Command, DirectCommand, Opener
 from tomoskin.run.counters import Latency
 from tomoskin.run.flow import Snapshot
@@ -42,6 +43,8 @@ class Runner:
         Where results go, beside those who take :attr:`newest`; a slow one delays nobody.
     place, turns
         Which of a robot's skins it is, and what its runs share.
+    memory
+        Where boards are remembered from one start to the next; None: nowhere.
 
     Attributes
     ----------
@@ -58,8 +61,9 @@ class Runner:
         sinks: Sequence[Sink] = (),
         place: Place | None = None,
         turns: Turns | None = None,
+        memory: BoardMemory | None = None,
     ) -> None:
-        self._audience = Audience(clock, tuple(sinks), place, turns)
+        self._audience = Audience(clock, tuple(sinks), place, turns, memory)
         self.events = self._audience.events
         self._loop = Loop(prepared, open_transport, self._audience)
         self._thread: threading.Thread | None = None
@@ -92,6 +96,7 @@ class Runner:
         self._loop.stop()
         if self._thread is not None:
             self._thread.join()
+        self._loop.flow.remember()
         self._loop.flow.out.stop()
 
     def submit(self, command: Command) -> Future[None]:
