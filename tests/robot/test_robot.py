@@ -83,7 +83,8 @@ def test_a_moved_surface_is_the_surface_moved():
     assert moved.normal(uv) == pytest.approx(cylinder.normal(uv) @ pose.rotation.T)
     assert moved.metric(uv) == pytest.approx(cylinder.metric(uv))
     step = 1e-6
-    slope = (moved.point(uv + [step, 0]) - moved.point(uv - [step, 0])) / (2 * step)
+    aside = np.array([step, 0.0])
+    slope = (moved.point(uv + aside) - moved.point(uv - aside)) / (2 * step)
     assert moved.jacobian(uv)[:, :, 0] == pytest.approx(slope, abs=1e-6)
     plane = Plane()
     assert Place("left", "", pose).moved(plane) is plane

@@ -125,16 +125,16 @@ def test_another_board_on_the_same_port_gets_its_own_reference(prepared, samples
         assert board.sought.acquire(timeout=PATIENCE)
         board.lost = False
         watch.until(
-            lambda: any(e.kind == "other-board" for e in runner.events.since(0)[1])
-            and runner.status().frames >= 2 * ENOUGH
+            lambda: (
+                any(e.kind == "other-board" for e in runner.events.since(0)[1])
+                and runner.status().frames >= 2 * ENOUGH
+            )
         )
     finally:
         runner.stop()
 
 
-def test_a_replay_of_a_run_that_came_back_is_the_same_to_the_bit(
-    prepared, samples, memory, once, tmp_path
-):
+def test_a_replay_of_a_run_that_came_back_is_the_same_to_the_bit(prepared, memory, once, tmp_path):
     del once
     path = tmp_path / "run.mcap"
     board = Numbered(samples_of(prepared, pressed(prepared, *PLACE)), seed=1)

@@ -38,8 +38,9 @@ link = "fore"
 position = ["0 mm", "0 mm", "-50 mm"]
 angles = ["180 deg", "0 deg", "0 deg"]
 """
-URDF = """<robot name="arm"><link name="base"/><link name="fore"/><joint name="elbow" type="revolute">
-<parent link="base"/><child link="fore"/><origin xyz="0.3 0 0.1"/></joint></robot>"""
+URDF = """<robot name="arm"><link name="base"/><link name="fore"/><joint name="elbow"
+type="revolute"><parent link="base"/><child link="fore"/>
+<origin xyz="0.3 0 0.1"/></joint></robot>"""
 PLACE = (0.03, -0.02)
 
 

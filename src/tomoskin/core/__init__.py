@@ -109,6 +109,7 @@ __all__ = [
     "Touch",
     "Voltages",
     "WireError",
+    "cache_folder",
     "check_fits",
     "check_outputs",
     "electrode_table",

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from tomoskin.core import FloatArray
 from tomoskin.mesh import Surface
 
-
 _UPRIGHT = 1e-9
 """Cosine of the pitch below which it is a right angle."""
 

@@ -140,4 +140,3 @@ class Trial:
                 "it, take a new reference"
             )
         return True if self._quiet >= REFERENCE_FRAMES else None
-

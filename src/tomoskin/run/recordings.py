@@ -155,7 +155,8 @@ class Recordings:
     def begin(self, path: Path, log: Log | None = None) -> Future[None]:
         """Record from the next bytes on, and end what was being recorded.
 
-        ``log``: where it goes, instead of a file of its own. Done when the file has been made; DataError where it cannot be.
+        ``log``: where it goes, instead of a file of its own. Done when the file has been made;
+        DataError where it cannot be.
         """
         self.end()
         worker = self._awaiting = _worker(path, self._prepared, self._clock(), self._say, log)

@@ -84,7 +84,9 @@ class Overview:
         self._robot, self._tasks = robot, Tasks()
         self._pages: set[Listener] = set()
         placed = {skin.name: skin for skin in robot.skins}
-        streams = {n: Stream.of(r.prepared, n, 0.0, placed[n].place) for n, r in run.runners.items()}
+        streams = {
+            n: Stream.of(r.prepared, n, 0.0, placed[n].place) for n, r in run.runners.items()
+        }
         poses = {n: robot.link_pose(placed[n].place) for n in run.runners}
         self.frame = NewestTouches(run, streams, poses)
         self._scene = scene(robot, streams, poses)
@@ -197,4 +199,3 @@ def _rounded(values: FloatArray) -> list[float]:
     """To 0.01 mm, which nobody sees."""
     rounded: list[float] = np.round(values, 5).tolist()
     return rounded
-

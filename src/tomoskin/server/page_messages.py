@@ -206,10 +206,12 @@ def chain(facets: IntArray) -> list[int]:
 
 
 def finite(value: float | None) -> float | None:
+    """The value; None for what JSON has no number for."""
     return None if value is None or not math.isfinite(value) else value
 
 
 def flat(table: FloatArray | IntArray) -> list[float]:
+    """All numbers of a table, row by row."""
     flat: list[float] = np.asarray(table).reshape(-1).tolist()
     return flat
 
