@@ -2,6 +2,7 @@
 
 import { describe, expect, it } from "vitest";
 import { cameraOf, isFacing, toPicture } from "../src/robot/model";
+import { parts } from "../src/robot/solids";
 
 const ENDS = [-1, -1, -1, 1, 1, 1];
 
@@ -38,5 +39,13 @@ describe("a camera", () => {
 
   it("does without any skin", () => {
     expect(toPicture(cameraOf([], { turn: 0, tilt: 1 }, 300, 200), 0, 0, 0)).toEqual([150, 100, 0]);
+  });
+});
+
+describe("a colour", () => {
+  it("is the same however the build has written it", () => {
+    expect(parts("#ffffff")).toEqual([1, 1, 1]);
+    expect(parts("#fff")).toEqual([1, 1, 1]);
+    expect(parts("#0f8")).toEqual(parts("#00ff88"));
   });
 });

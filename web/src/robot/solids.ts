@@ -17,11 +17,13 @@ const FRAGMENT = `#version 300 es
 precision highp float;
 uniform vec3 base;
 uniform vec3 line;
+uniform float radius;
 in vec3 seen;
 out vec4 colour;
 void main() {
   vec3 normal = normalize(cross(dFdx(seen), dFdy(seen)));
-  colour = vec4(mix(line, base, 0.35 + 0.65 * abs(normal.z)), 1.0);
+  float near = 0.5 + 0.5 * clamp(seen.z / radius, -1.0, 1.0);
+  colour = vec4(mix(line, base, 0.2 + 0.4 * abs(normal.z) + 0.4 * near), 1.0);
 }`;
 
 function built(gl: WebGL2RenderingContext): WebGLProgram {
@@ -43,9 +45,10 @@ function built(gl: WebGL2RenderingContext): WebGLProgram {
   return program;
 }
 
-/** #rrggbb as parts of one. */
-function parts(colour: string): [number, number, number] {
-  return [1, 3, 5].map((k) => Number.parseInt(colour.slice(k, k + 2), 16) / 255) as [number, number, number];
+/** #rrggbb as parts of one; the build shortens some to #rgb. */
+export function parts(colour: string): [number, number, number] {
+  const full = colour.length === 4 ? colour.replace(/[^#]/g, "$&$&") : colour;
+  return [1, 3, 5].map((k) => Number.parseInt(full.slice(k, k + 2), 16) / 255) as [number, number, number];
 }
 
 /** Paints triangles, the nearer over the farther. */
@@ -76,6 +79,7 @@ export class Solids {
     gl.uniformMatrix3fv(at("turn"), false, camera.matrix);
     gl.uniform3fv(at("middle"), camera.middle);
     gl.uniform3f(at("scale"), (2 * scale) / width, (2 * scale) / height, 0.9 / radius);
+    gl.uniform1f(at("radius"), radius);
     gl.uniform3fv(at("base"), parts(base));
     gl.uniform3fv(at("line"), parts(line));
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
