@@ -82,7 +82,7 @@ def test_bad_sinks_delay_nothing(runner, sinks):
     assert [item.ready for item in good] == [
         number >= REFERENCE_FRAMES - 1 for number in range(len(good))
     ]
-    assert all(len(item.told) == len(item.happened) for item in good)
+    assert all(len(item.messages) == len(item.happened) for item in good)
     kinds = [item.kind for item in sinks["good"].items if isinstance(item, Event)]
     assert {"connected", "sink-away"} <= set(kinds)
     (stream,) = sinks["good"].streams

@@ -58,7 +58,7 @@ def split(source: Path, advance: Advance = no_report) -> dict[str, int]:
             name, _, rest = record.name.partition("/")
             if name in parts and isinstance(record, Attachment):
                 parts[name].attach(rest, record.media_type, record.data, record.log_time)
-            elif name in parts:
+            elif name in parts and isinstance(record, Metadata):
                 parts[name].describe(rest, record.metadata)
         names = tuple(parts)
         for stretch, size in _stretches(source):
