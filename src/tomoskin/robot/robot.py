@@ -44,7 +44,7 @@ class SkinSection(Section, section="skin", many=True):
     skin: str = key(_FILE, "Built-in name or path.")
     source: str = key(_FILE, "As `--source`: where its frames come from.", default="twin")
     board: str | None = key(
-        Text(32), "Its board's unique id, as `doctor` and the page show it: another is said.",
+        Text(32), "Its board's unique id, as the page's set-up shows it: another is said.",
         default=None,
     )  # fmt: skip
     link: str | None = key(Text(200), "Link of the URDF that it lies on.", default=None)
