@@ -105,6 +105,7 @@ class Overview:
         if len(self._pages) >= MAX_PAGES:
             return False
         self._pages.add(page)
+        self.frame.renew()  # while nobody looked it was not
         page.post(self._scene)
         page.post(states(self.run))
         return True
