@@ -1,7 +1,8 @@
 """Write the tables of the documentation that follow from declarations: `python docs/doc_tables.py`.
 
 Each page is written by hand down to its mark. Below stand the keys of the skin file
-(skin-file.md) and of a script (simulate.md), and the numbers of the twin (twin.md).
+(skin-file.md), of a script (simulate.md) and of a robot (robot-file.md), and the numbers of the
+twin (twin.md).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from tomoskin.robot import SECTIONS as ROBOT_SECTIONS
 from tomoskin.skin import SECTIONS, Key, Section, literal
 from tomoskin.twin import (
     PRESETS,
@@ -52,6 +54,7 @@ def parameter_tables() -> str:
 PAGES: dict[str, Callable[[], str]] = {
     "skin-file.md": lambda: tables(SECTIONS.values()),
     "simulate.md": lambda: tables(SCRIPT_SECTIONS.values()),
+    "robot-file.md": lambda: tables(ROBOT_SECTIONS.values()),
     "twin.md": parameter_tables,
 }
 

@@ -16,7 +16,7 @@ from tomoskin._moved import RENAMED
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = [
-    *("core", "mesh", "pattern", "skin", "forward", "inverse", "wire", "source", "signal"),
+    *("core", "mesh", "pattern", "skin", "robot", "forward", "inverse", "wire", "source", "signal"),
     *("touch", "calibration", "pipeline", "twin", "emulator", "recording", "formats"),
     *("sink", "run", "server", "cli"),
 ]

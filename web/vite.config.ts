@@ -9,6 +9,7 @@ export default defineConfig({
     target: "es2022",
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
+    rolldownOptions: { input: ["index.html", "robot.html"] },
   },
   oxc: { jsx: { runtime: "automatic", importSource: "preact" } },
 });

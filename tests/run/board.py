@@ -45,6 +45,7 @@ class Board:
         self.name = "board on the table"
         self.free = free
         self.presses = ()
+        self.number = bytes(8)
         self.commands = []
         self.lost = False
         self.tick = 160_000
@@ -133,7 +134,7 @@ class Board:
                     tick_rate=16_000_000,
                     current=1000,
                     max_baud=115200,
-                    unique_id=bytes(8),
+                    unique_id=self.number,
                 )
             )
         if isinstance(command, SetScan):

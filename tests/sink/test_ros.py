@@ -187,11 +187,13 @@ def test_contacts_say_where_and_which_way(stream):
     assert np.isnan([*values["wrench"]["wrench"]["force"].values()]).all()
 
 
+def pushing(touch, newtons):
+    force = Force(newtons, 0.5 * newtons, 2 * newtons)
+    return replace(touch, detection=replace(touch.detection, force=force))
+
+
 def test_a_wrench_is_that_of_all_touches_about_the_origin(stream):
-    touches = [
-        contact_of(stream, replace(touch, detection=replace(touch.detection, force=Force(2, 1, 3))))
-        for touch in (TOUCH, touch_of(5))
-    ]
+    touches = [contact_of(stream, pushing(touch, 2.0)) for touch in (TOUCH, touch_of(5))]
     found = replace(Contacts.of(stream, Naming(), moment_at(0.0)), touches=tuple(touches))
     value = ros_messages.wrench(ros_messages.header(0, "skin"), found)["wrench"]
     assert [*value["force"].values()] == [0, 0, -4]

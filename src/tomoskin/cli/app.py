@@ -36,7 +36,7 @@ COMMANDS = {
     "simulate": "Run a script on the twin into a session file, or draw labelled frames.",
     "bench": "Measure speed on this machine.",
     "session": "Inspect, mend and convert recorded sessions.",
-    "skin": "List, show, check and lay skins.",
+    "skin": "List, show, check and lay skins, and place them on a robot.",
     "firmware": "Build, flash and emulate the board's firmware.",
     "board": "Check a board that has just been built, before a skin is connected.",
     "doctor": "Look at this installation: versions, page, sources, sinks, skins, ports.",

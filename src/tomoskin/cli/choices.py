@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from tomoskin.formats import Display
     from tomoskin.inverse import AlphaChoice
     from tomoskin.pipeline import Prepared
+    from tomoskin.run import BoardMemory
     from tomoskin.signal import Headroom
     from tomoskin.sink import Sink
     from tomoskin.skin import Skin
@@ -126,6 +127,15 @@ def chosen_sinks(specs: list[str] | None) -> tuple[Sink, ...]:
     from tomoskin.sink import make_sink
 
     return tuple(make_sink(spec) for spec in specs or ())
+
+
+def board_memory() -> BoardMemory | None:
+    """Where boards are remembered; None where nothing is kept on this disk."""
+    from tomoskin.core import cache_folder
+    from tomoskin.run import BoardMemory
+
+    folder = cache_folder()
+    return None if folder is None else BoardMemory(folder / "boards")
 
 
 def with_calibrations(prepared: Prepared, paths: list[Path] | None, skin: Skin) -> Prepared:

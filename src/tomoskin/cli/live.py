@@ -11,15 +11,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.choices import (
+    board_memory,
     chosen_sinks,
     say_headroom,
     skin_for_source,
     with_calibrations,
 )
-from tomoskin.cli.named_files import RECORDING, Otherwise, Writes
+from tomoskin.cli.named_files import RECORDING, Otherwise, Reads, Writes
 from tomoskin.cli.options import CalibrationsOption, SinkOption, SkinOption, SourceOption
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.record import ended_by_signals, recording_to
+from tomoskin.cli.robot import Served, run_robot
 
 if TYPE_CHECKING:
     from tomoskin.pipeline import Prepared
@@ -29,6 +31,13 @@ if TYPE_CHECKING:
 
 def live(
     *,
+    robot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="ROBOT.toml", help="All skins of a robot file, instead of --skin and --source."
+        ),
+        Reads(),
+    ] = None,
     skin: SkinOption = None,
     source: SourceOption = "twin",
     record: Annotated[
@@ -63,6 +72,16 @@ def live(
     json: JsonFlag = False,
 ) -> None:
     """Run source, pipeline and server until a signal comes."""
+    from tomoskin.server import is_loopback
+
+    if robot is not None:
+        if skin or source != "twin" or calibration:
+            raise typer.BadParameter("the robot file says skins, sources and calibrations")
+        served = Served(host, port, _token(token_file), folder, record, open_browser, json)
+        if not is_loopback(host):
+            _warn(host)
+        run_robot(robot, sink, served)
+        return
     with ended_by_signals():
         from tomoskin.pipeline import colour_limit
         from tomoskin.run import Runner
@@ -72,7 +91,6 @@ def live(
             Server,
             application,
             check_page,
-            is_loopback,
             listen,
             serve_requests,
         )
@@ -90,7 +108,9 @@ def live(
                 _warn(host)
             port = listener.getsockname()[1]
             policy = AccessPolicy(port, host, **_token(token_file))
-            runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
+            runner = Runner(
+                prepared, lambda: open_source(source, chosen), sinks=sinks, memory=board_memory()
+            )
             with recording_to(runner, record):
                 hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
                 hub.opener = partial(open_source, source)

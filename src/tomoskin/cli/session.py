@@ -110,6 +110,23 @@ def repair(
 
 
 @app.command()
+def split(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A recording of several skins."), Reads()
+    ],
+    json: JsonFlag = False,
+) -> None:
+    """Make a session file of each skin in the recording of a robot: FILE-NAME.mcap."""
+    from tomoskin.recording import split, split_targets
+
+    with Bar("splitting") as bar:
+        counts = split(file, bar)
+    made = split_targets(file)
+    lines = (f"{made[name]}: {count} messages" for name, count in counts.items())
+    tell({name: str(made[name]) for name in counts}, lines, json=json)
+
+
+@app.command()
 def export(
     file: _File,
     out: Annotated[

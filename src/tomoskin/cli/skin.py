@@ -1,4 +1,4 @@
-"""``tomoskin skin``: the built-in skins, whether a skin file can be meant, and one for a body."""
+"""``tomoskin skin``: the built-in skins, skin files checked, made for a body, put on a robot."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from tomoskin.cli.merit import merit
 from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
 from tomoskin.cli.options import SkinArgument
 from tomoskin.cli.output import JsonFlag, tell
+from tomoskin.cli.robot import place
 
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 app = group("skin")
 app.command("alpha")(alpha)
 app.command("merit")(merit)
+app.command("place")(place)
 
 
 @app.command("list")

@@ -25,7 +25,7 @@ from tomoskin.core.written import write_text, written
 
 if TYPE_CHECKING:
     from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
-    from tomoskin.core.cache import kept
+    from tomoskin.core.cache import cache_folder, kept
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
     from tomoskin.core.json_bytes import encode_json, plain_values
     from tomoskin.core.memory import check_fits, machine_memory, most_bytes
@@ -60,6 +60,7 @@ _HOME = {
     "MOST_ELECTRODES": "typed_arrays",
     "electrode_table": "typed_arrays",
     "encode_json": "json_bytes",
+    "cache_folder": "cache",
     "kept": "cache",
     "load_arrays": "archive",
     "machine_memory": "memory",
@@ -108,6 +109,7 @@ __all__ = [
     "Touch",
     "Voltages",
     "WireError",
+    "cache_folder",
     "check_fits",
     "check_outputs",
     "electrode_table",

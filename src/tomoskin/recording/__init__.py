@@ -27,6 +27,7 @@ from tomoskin.recording.layout import (
     touch_row,
     touches_message,
 )
+from tomoskin.recording.message_log import errors_of
 from tomoskin.recording.playback import Timeline, read_timeline
 from tomoskin.recording.recorder import (
     BoardInfo,
@@ -39,6 +40,7 @@ from tomoskin.recording.recorder import (
 from tomoskin.recording.repair import Lost, Repaired, repair
 from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.recording.replayed import advance, as_recorded, replayed
+from tomoskin.recording.robot_log import LogPart, RobotLog
 from tomoskin.recording.scanned import idle_count, scanned_touches
 from tomoskin.recording.session_reader import (
     SessionReader,
@@ -49,7 +51,8 @@ from tomoskin.recording.session_reader import (
     tick_rate,
     touches_before,
 )
-from tomoskin.recording.session_writer import SessionWriter
+from tomoskin.recording.session_writer import Log, SessionWriter
+from tomoskin.recording.split import split, split_names, split_targets
 from tomoskin.touch import Span
 
 __all__ = [
@@ -57,6 +60,8 @@ __all__ = [
     "Advance",
     "Block",
     "BoardInfo",
+    "Log",
+    "LogPart",
     "Lost",
     "Mark",
     "MarkedFrame",
@@ -65,6 +70,7 @@ __all__ = [
     "Recorder",
     "Repaired",
     "ReplayTransport",
+    "RobotLog",
     "Rows",
     "RunMessage",
     "RunSettings",
@@ -79,6 +85,7 @@ __all__ = [
     "as_recorded",
     "encode_json",
     "end_time",
+    "errors_of",
     "event_of",
     "grid_message",
     "idle_count",
@@ -97,6 +104,9 @@ __all__ = [
     "scene_message",
     "schema_of",
     "session_info",
+    "split",
+    "split_names",
+    "split_targets",
     "start_time",
     "tick_rate",
     "touch_colour",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from mcap.records import Channel, Schema
@@ -61,8 +63,7 @@ _TOUCH = _object(
     close={"type": "boolean"},
     merged=_list(_INTEGER),
     force=_MAYBE,
-    force_low=_MAYBE,
-    force_high=_MAYBE,
+    force_interval=_list(_NUMBER),
     force_calibrated={"type": "boolean"},
 )
 _PRESS = _object(x=_NUMBER, y=_NUMBER, force=_NUMBER, radius=_NUMBER)
@@ -170,6 +171,19 @@ CHANNELS = tuple(
 
 TOPICS = {channel.id: channel.topic for channel in CHANNELS}
 """Topic by number of the channel."""
+
+
+SPAN = 16
+"""Numbers that each of a robot's skins has for its channels in a file of all."""
+
+
+def robot_channels(names: Sequence[str]) -> tuple[Channel, ...]:
+    """Channels of a file of several skins: those of the first by the usual numbers."""
+    return tuple(
+        replace(channel, id=SPAN * number + channel.id, topic=f"/{name}{channel.topic}")
+        for number, name in enumerate(names)
+        for channel in CHANNELS
+    )
 
 
 def schema_of(topic: str) -> Schema:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from enum import IntFlag
 from typing import Any
 
@@ -105,7 +105,6 @@ def _wrong(what: str, data: bytes | memoryview, where: str) -> DataError:
     return DataError(f"expected {what}, got {len(data)} bytes that are not", where=where)
 
 
-_FORCE = ("force", "force_low", "force_high", "force_calibrated")
 _NO_CELLS = np.empty(0, dtype=np.int64)
 
 
@@ -136,12 +135,19 @@ def touches_message(host_time: float, sequence: int, touches: Sequence[Touch]) -
 def touch_row(touch: Touch) -> dict[str, Any]:
     """One touch as plain values by name; its force, N, only where a calibration tells it."""
     r, force = touch.detection, touch.detection.force
-    newtons = {} if force is None else dict(zip(_FORCE, astuple(force), strict=True))
-    return newtons | {
+    return ({} if force is None else _newtons(force)) | {
         "id": touch.id, "kind": touch.kind, "since": touch.since,
         "x": r.x, "y": r.y, "sd_x": r.sd_x, "sd_y": r.sd_y, "area": r.area, "peak": r.peak,
         "cov_xy": r.cov_xy, "close": r.close, "merged": touch.merged,
     }  # fmt: skip
+
+
+def _newtons(force: Force) -> dict[str, Any]:
+    return {
+        "force": force.newtons,
+        "force_interval": (force.low, force.high),
+        "force_calibrated": force.calibrated,
+    }
 
 
 def touches_of(content: Mapping[str, Any]) -> RecordedTouches:
@@ -165,6 +171,8 @@ def _touch_of(item: dict[str, Any]) -> Touch:
     sd_x, sd_y = (float("nan") if item[k] is None else item[k] for k in ("sd_x", "sd_y"))
     place = item["x"], item["y"], sd_x, sd_y, item["area"], item["peak"], _NO_CELLS
     cov_xy, close, merged = (item.get(k) for k in ("cov_xy", "close", "merged"))  # format 1.0: none
-    force = Force(*(item[k] for k in _FORCE)) if item.get("force") is not None else None
+    force = None
+    if item.get("force") is not None:
+        force = Force(item["force"], *item["force_interval"], item["force_calibrated"])
     reading = Detection(*place, cov_xy=cov_xy or 0.0, close=bool(close), force=force)
     return Touch(item["id"], item["kind"], item["since"], reading, tuple(merged or ()))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
+
+from mcap.records import Channel
 
 from tomoskin import __version__
 from tomoskin.core import DataError, Output, OutputError, check_outputs
@@ -34,13 +36,13 @@ class MessageLog:
     ----------
     path
         A file that does not exist yet.
-    name, about
-        What the file says of itself.
     epoch
         What is added to a host time (monotonic s) to give seconds since 1970; 0: the log times
         are host times.
     start
         Host time of what has none of its own.
+    channels
+        All that it will hold.
 
     Raises
     ------
@@ -52,7 +54,12 @@ class MessageLog:
     """
 
     def __init__(
-        self, path: Path, name: str, about: Mapping[str, str], *, epoch: float, start: float
+        self,
+        path: Path,
+        *,
+        epoch: float,
+        start: float,
+        channels: Sequence[Channel] = CHANNELS,
     ) -> None:
         self.path, self.epoch = path, epoch
         self._now = start
@@ -60,7 +67,11 @@ class MessageLog:
         check_outputs([Output(path)])
         with errors_of(path):
             file = path.open("xb", buffering=0)
-            self._file = ContainerWriter(file, LIBRARY, SCHEMAS, CHANNELS)
+            self._file = ContainerWriter(file, LIBRARY, SCHEMAS, channels)
+
+    def describe(self, name: str, about: Mapping[str, str]) -> None:
+        """Put named strings inside: what the file says of itself."""
+        with errors_of(self.path):
             self._file.describe(name, about)
 
     def put(self, channel: int, host_time: float, data: bytes) -> None:

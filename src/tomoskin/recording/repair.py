@@ -23,7 +23,13 @@ from tomoskin.recording.layout import host_time_of
 from tomoskin.recording.mcap_records import LARGEST, PREFIX, decode, decode_chunk, messages_in
 from tomoskin.recording.message_log import LIBRARY, errors_of
 from tomoskin.recording.session_reader import epoch_of
-from tomoskin.recording.session_writer import ABOUT, OLD_INDEX_FILE, SKIN_FILE, about_session
+from tomoskin.recording.session_writer import (
+    ABOUT,
+    OLD_INDEX_FILE,
+    SKIN_FILE,
+    SKINS,
+    about_session,
+)
 from tomoskin.skin import Skin
 
 _WINDOW = 1 << 20
@@ -152,6 +158,9 @@ def _front(
             about = record.metadata
         elif isinstance(record, Chunk):
             epoch = min(epoch, _earliest_epoch(record))
+    if SKINS in about:
+        hint = f"tomoskin session split {where} keeps what is whole, in one file a skin"
+        raise DataError("holds the sessions of several skins", where=where, hint=hint)
     if not is_session:
         raise DataError("holds no part of a session: nothing can be recovered", where=where)
     skin = skin or _skin_of(attachments.get(SKIN_FILE), about, where)

@@ -26,7 +26,7 @@ from tomoskin.recording.layout import (
     truth_of,
 )
 from tomoskin.recording.mcap_records import LoggedMessage
-from tomoskin.recording.session_writer import ABOUT, FORMAT, SKIN_FILE
+from tomoskin.recording.session_writer import ABOUT, FORMAT, SKIN_FILE, SKINS
 from tomoskin.skin import Skin
 
 _RAW, _FRAMES = frozenset({channels.RAW}), frozenset({channels.FRAMES})
@@ -172,6 +172,12 @@ def _epoch(container: ContainerReader) -> float:
     about = container.description(ABOUT)
     if about is None:
         raise DataError("is an MCAP file, but no session of tomoskin", where=container.where)
+    if SKINS in about:
+        raise DataError(
+            f"holds the sessions of several skins: {about[SKINS]}",
+            where=container.where,
+            hint=f"tomoskin session split {container.where} makes one file of each",
+        )
     if about.get("format") != str(FORMAT):
         raise DataError(
             f"expected a session of format {FORMAT}, got {about.get('format')}",

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from tomoskin.core import Event, Frame, Image, PixelMap, Touch, encode_json, plain_values
 from tomoskin.recording import channels
@@ -28,6 +29,9 @@ FORMAT = 1
 ABOUT = "tomoskin"
 """Name of the strings that say what the file is."""
 
+SKINS = "skins"
+"""Key of the strings by which a file of several skins names them, in their order."""
+
 SKIN_FILE = "skin.toml"
 """Name of the attachment that holds the skin."""
 
@@ -46,7 +50,32 @@ def about_session(skin: Skin, epoch: float) -> dict[str, str]:
     }
 
 
-class SessionWriter(MessageLog):
+class Log(Protocol):
+    """Where the messages of a session go: a file of its own, or a part of one."""
+
+    path: Path
+    epoch: float
+
+    def describe(self, name: str, about: Mapping[str, str]) -> None:
+        """Put named strings inside."""
+
+    def attach(self, name: str, media_type: str, data: bytes) -> None:
+        """Put a file inside."""
+
+    def put(self, channel: int, host_time: float, data: bytes) -> None:
+        """Add a message."""
+
+    def log_time(self, host_time: float) -> int:
+        """Ns of a message."""
+
+    def settle(self) -> None:
+        """Write what waits."""
+
+    def close(self) -> None:
+        """No more comes."""
+
+
+class SessionWriter:
     """Writes one session file; a context manager.
 
     The same calls give the same bytes: no time of day goes in but the one given. Messages are
@@ -62,6 +91,8 @@ class SessionWriter(MessageLog):
         What is added to a host time to give seconds since 1970; 0: the log times are host times.
     start
         Host time that what has no time of its own is logged at.
+    log
+        Where the session goes, instead of a file of its own; ``epoch`` is then the log's.
 
     Raises
     ------
@@ -71,21 +102,55 @@ class SessionWriter(MessageLog):
         From every method: see :class:`MessageLog`.
     """
 
-    def __init__(self, path: Path, skin: Skin, *, epoch: float = 0.0, start: float = 0.0) -> None:
-        super().__init__(path, ABOUT, about_session(skin, epoch), epoch=epoch, start=start)
-        self._start = start
+    def __init__(
+        self,
+        path: Path,
+        skin: Skin,
+        *,
+        epoch: float = 0.0,
+        start: float = 0.0,
+        log: Log | None = None,
+    ) -> None:
+        self.path, self._start = path, start
+        self._log = MessageLog(path, epoch=epoch, start=start) if log is None else log
+        self._log.describe(ABOUT, about_session(skin, self._log.epoch))
         self.attach(SKIN_FILE, "application/toml", skin.to_toml().encode())
+
+    def attach(self, name: str, media_type: str, data: bytes) -> None:
+        """Put a file inside: a calibration, a photograph."""
+        self._log.attach(name, media_type, data)
+
+    def settle(self) -> None:
+        """Write the open chunk, and see that the file is still in its folder."""
+        self._log.settle()
+
+    def close(self) -> None:
+        """End the session; a second call does nothing."""
+        self._log.close()
+
+    def __enter__(self) -> Self:
+        """The writer itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close."""
+        self.close()
 
     def raw(self, host_time: float, data: bytes) -> None:
         """Bytes as they were read from the source at ``host_time``."""
-        self.put(channels.RAW, host_time, encode_raw(host_time, data))
+        self._log.put(channels.RAW, host_time, encode_raw(host_time, data))
 
     def frame(self, frame: Frame, mark: Mark = Mark.NONE) -> None:
         """One frame, and what became of it; after the raw bytes that it came in.
 
         A frame from before ``start`` is logged at ``start``.
         """
-        self.put(channels.FRAMES, max(frame.host_time, self._start), encode_frame(frame, mark))
+        self._log.put(channels.FRAMES, max(frame.host_time, self._start), encode_frame(frame, mark))
 
     def touches(self, host_time: float, sequence: int, touches: Sequence[Touch]) -> None:
         """Touches of the frame ``sequence``; none is worth saying when there were some before."""
@@ -95,7 +160,7 @@ class SessionWriter(MessageLog):
         self, host_time: float, image: Image, pixels: PixelMap, touches: Sequence[Touch] = ()
     ) -> None:
         """One image for tools that show it, with its touches; the frames give it exactly."""
-        log_time = self.log_time(host_time)
+        log_time = self._log.log_time(host_time)
         self._document(channels.IMAGE, host_time, grid_message(image, pixels, host_time, log_time))
         self._document(channels.SCENE, host_time, scene_message(touches, log_time))
 
@@ -113,12 +178,12 @@ class SessionWriter(MessageLog):
 
     def event(self, event: Event) -> None:
         """Something that happened."""
-        content = log_message(event, self.log_time(event.host_time))
+        content = log_message(event, self._log.log_time(event.host_time))
         self._document(channels.EVENTS, event.host_time, content)
 
     def note(self, host_time: float, text: str) -> None:
         """A person's remark at ``host_time``."""
-        content = log_message(Event(host_time, "note", text), self.log_time(host_time))
+        content = log_message(Event(host_time, "note", text), self._log.log_time(host_time))
         self._document(channels.NOTES, host_time, content)
 
     def device(self, host_time: float, info: Info) -> None:
@@ -141,4 +206,4 @@ class SessionWriter(MessageLog):
         self._document(channels.SETTINGS, host_time, {"host_time": host_time} | dict(settings))
 
     def _document(self, channel: int, host_time: float, content: Mapping[str, Any]) -> None:
-        self.put(channel, host_time, encode_json(content))
+        self._log.put(channel, host_time, encode_json(content))

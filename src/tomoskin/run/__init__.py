@@ -2,6 +2,7 @@
 
 from tomoskin.run import commands
 from tomoskin.run.board_check import CheckFinding, check_board
+from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.flow import Snapshot
 from tomoskin.run.labelled_frames import (
     SetMade,
@@ -13,6 +14,7 @@ from tomoskin.run.labelled_frames import (
     processors,
 )
 from tomoskin.run.marker import ReplaySource
+from tomoskin.run.robot_run import Member, RobotRun
 from tomoskin.run.runner import Runner
 from tomoskin.run.simulate import Simulated, simulate
 from tomoskin.run.status import Status
@@ -21,8 +23,11 @@ from tomoskin.run.twin_requests import MAX_FORCE, SetPose, SetPresses, SetTwin, 
 
 __all__ = [
     "MAX_FORCE",
+    "BoardMemory",
     "CheckFinding",
+    "Member",
     "ReplaySource",
+    "RobotRun",
     "Runner",
     "SetMade",
     "SetPose",

@@ -14,6 +14,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from tomoskin.pipeline import Prepared
+from tomoskin.recording import Log
 from tomoskin.run.twin_requests import SetPose, SetTwin, StrictRequest
 from tomoskin.source import Transport
 from tomoskin.twin import Contact
@@ -81,6 +82,8 @@ class Record:
     """
 
     path: Path
+    log: Log | None = None
+    """Where the session goes, instead of a file of its own."""
 
 
 @dataclass(frozen=True, slots=True)

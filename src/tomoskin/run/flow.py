@@ -13,6 +13,7 @@ from tomoskin.run.commands import DirectCommand, Note, ReplayCommand
 from tomoskin.run.counters import Latency, Losses
 from tomoskin.run.marker import Marker, play, replay_status
 from tomoskin.run.publisher import Audience, Publisher
+from tomoskin.run.recall import Recall
 from tomoskin.run.status import Status
 from tomoskin.run.twin_control import Pressable, TwinControl, described
 from tomoskin.run.twin_requests import SetPose, SetTwin
@@ -64,13 +65,18 @@ class Flow:
         self.pipeline, self.marker, self.twin = Pipeline(prepared), Marker(), TwinControl()
         self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered)
         self.latency = Latency()
-        self._clock = audience.clock
+        self._clock, self._turns = audience.clock, audience.turns
+        self._recall = Recall(audience.memory)
         self._settings = ScanSettings.of(prepared.skin)
         self._losses, self._earlier, self._skipped = Losses(), Losses(), 0
         self._drops, self._polled = 0, 0.0
         self._standstill: str | None = None
         self._saturated: str | None = None
         self._ended = False
+
+    def now(self) -> float:
+        """Host monotonic seconds."""
+        return self._clock()
 
     def begin(self, transport: Transport) -> None:
         """Its source has been opened for the first time; say what it is."""
@@ -194,17 +200,27 @@ class Flow:
             or self._standstill
             or self._saturated
             or (result.problem if result else None)
+            or self._recall.problem
             or _doubt(self.prepared, reference),
             board=self.board,
         )
 
+    def remember(self) -> None:
+        """Keep what the next start of this board begins with."""
+        if self._recall.is_due(self._clock(), at_end=True):
+            self._recall.keep(self.prepared, self.out)
+
     def _note_board(self, info: Info | None) -> None:
-        if info is not self.board:
-            self.board = info
-            if info is not None:
-                self.out.put(BoardInfo(self._clock(), info))
-        if info is not None and info.tick_rate:
+        if info is self.board:
+            return
+        self.board = info
+        if info is None:
+            return
+        self.out.put(BoardInfo(self._clock(), info))
+        if info.tick_rate:
             self.pipeline.tick_rate = info.tick_rate
+        if self.marker.replay is None:
+            self._recall.meet(info, self)
 
     def _break(self, command: SetTwin) -> None:
         if not self.twin.breakable:
@@ -235,7 +251,8 @@ class Flow:
                 for before in self.out.recordings.again():
                     advance(self.pipeline, *before)
                 self.out.put(MarkedFrame(frame, mark))
-                self._take_frame(frame, mark)
+                with self._turns:
+                    self._take_frame(frame, mark)
 
     def _take_frame(self, frame: Frame, mark: Mark) -> None:
         if mark & Mark.SKIPPED:
@@ -258,6 +275,7 @@ class Flow:
         self.latency.add_age(ready - read)
         self.latency.add("reconstruct", ready - begun)
         self.newest = Snapshot(result, self.twin.truth, ready - read, ready)
+        self._recall.see(result, self)
         self.out.put(result)
 
 

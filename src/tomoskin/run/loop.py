@@ -58,12 +58,16 @@ class Loop:
         self.commands.nudge()
 
     def run(self, transport: Transport | None) -> None:
-        """Follow ``transport``, and what comes after it; returns at the end."""
+        """Follow ``transport``, and what comes after it; returns at the end.
+
+        None: it could not be opened yet.
+        """
         try:
             # a frame's products are small: more threads would only wait for each other
             with threadpool_limits(1):
                 self._warm_up()
                 self.trouble = _WAITING
+                transport = transport or self._next()
                 while transport is not None:
                     self._follow(transport)
                     transport = self._next()
@@ -125,11 +129,15 @@ class Loop:
             if self.commands.wait(due - time.monotonic()):
                 continue
             try:
-                return self.open()
+                transport = self.open()
             except TomoskinError as error:
                 self.trouble = str(error)
                 delay = min(2 * delay, _LONGEST_DELAY)
                 due = time.monotonic() + delay
+            else:
+                if not self.flow.source:
+                    self.flow.begin(transport)
+                return transport
         return None
 
     def _handle(self, command: commands.QueuedCommand) -> Future[None] | None:
@@ -143,7 +151,7 @@ class Loop:
             case commands.HoldPresses():
                 flow.twin.hold(command.owner, command.presses)
             case commands.Record():
-                return flow.out.recordings.begin(command.path)
+                return flow.out.recordings.begin(command.path, command.log)
             case commands.StopRecording():
                 return flow.out.recordings.end()
             case commands.Adopt():
@@ -177,6 +185,7 @@ class Loop:
         except TomoskinError as error:
             future.set_exception(error)
             return None
+        self.flow.remember()
         self.flow.out.stop()
         self.flow, self.open = Flow(change.prepared, self._audience), opener
         self.flow.begin(transport)

@@ -112,6 +112,10 @@ class Marker:
         """The next frame begins a reference."""
         self._reference = True
 
+    def keep_reference(self) -> None:
+        """A reference stands: the next frame begins none."""
+        self._reference = False
+
     def begin(self, transport: Transport) -> None:
         """What comes from now on is of ``transport``, which has just been opened."""
         self._opened = True

@@ -12,7 +12,10 @@ from typing import Any
 from tomoskin.core import Event
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.recording import RunMessage
+from tomoskin.robot import Place
+from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.recordings import Recordings
+from tomoskin.run.turns import Turns
 from tomoskin.sink import (
     Capacity,
     Consumer,
@@ -74,7 +77,7 @@ class Subscriber(Consumer):
 
 
 class Audience:
-    """Who listens, whatever skin or source there is.
+    """Around a run, whatever skin or source there is: who listens, and what it is one of.
 
     Attributes
     ----------
@@ -84,10 +87,24 @@ class Audience:
         Where results go; each run opens them again.
     events
         What happened, for any number of readers at their own pace.
+    place
+        Which of a robot's skins it is; None where there is no robot.
+    turns
+        Taken for each frame; those of a robot's skins share them.
+    memory
+        Where boards are remembered from one start to the next; None: nowhere.
     """
 
-    def __init__(self, clock: Callable[[], float], sinks: Sequence[Sink] = ()) -> None:
+    def __init__(
+        self,
+        clock: Callable[[], float],
+        sinks: Sequence[Sink] = (),
+        place: Place | None = None,
+        turns: Turns | None = None,
+        memory: BoardMemory | None = None,
+    ) -> None:
         self.clock, self.sinks, self.events = clock, sinks, EventLog()
+        self.place, self.turns, self.memory = place, turns or Turns(), memory
         self._calls: list[Callable[[], None]] = []
         self._subscribers: list[Worker[Subscriber]] = []
         self._lock = threading.Lock()
@@ -160,7 +177,7 @@ class Publisher:
     def begin(self, prepared: Prepared, source: str, recorded: float | None = None) -> None:
         """A source has been opened, and this is what it is called; a replay's epoch."""
         self.recordings.name_source(source)
-        stream = Stream.of(prepared, source, recorded)
+        stream = Stream.of(prepared, source, recorded, self._audience.place)
         self._sinks = tuple(sink_worker(sink, stream, self.say) for sink in self._audience.sinks)
         for worker in self._sinks:
             worker.start()

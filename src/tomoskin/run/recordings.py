@@ -11,6 +11,7 @@ from tomoskin.core import Frame
 from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Prepared
 from tomoskin.recording import (
     BoardInfo,
+    Log,
     Mark,
     MarkedFrame,
     RawRead,
@@ -77,6 +78,11 @@ class PreRoll:
         if len(self._waiting) > _DELAY:
             self._untouched.append(self._waiting.popleft())
 
+    @property
+    def untouched(self) -> tuple[Frame, ...]:
+        """The newest frames in which nothing touched, as many as a recording begins with."""
+        return tuple(self._untouched)
+
     def invalidate(self) -> None:
         """The pipeline is no longer what these frames would make of a new one."""
         self._complete = False
@@ -141,13 +147,19 @@ class Recordings:
         worker = self._awaiting or self._current
         return None if worker is None or worker.ending.done() else worker.consumer.path
 
-    def begin(self, path: Path) -> Future[None]:
+    @property
+    def untouched(self) -> tuple[Frame, ...]:
+        """The newest frames in which nothing touched."""
+        return self._pre_roll.untouched
+
+    def begin(self, path: Path, log: Log | None = None) -> Future[None]:
         """Record from the next bytes on, and end what was being recorded.
 
-        Done when the file has been made; DataError where it cannot be.
+        ``log``: where it goes, instead of a file of its own. Done when the file has been made;
+        DataError where it cannot be.
         """
         self.end()
-        worker = self._awaiting = _worker(path, self._prepared, self._clock(), self._say)
+        worker = self._awaiting = _worker(path, self._prepared, self._clock(), self._say, log)
         worker.start()
         return worker.opening
 
@@ -226,9 +238,11 @@ class Recordings:
         )
 
 
-def _worker(path: Path, prepared: Prepared, start: float, say: Say) -> Worker[Recorder]:
+def _worker(
+    path: Path, prepared: Prepared, start: float, say: Say, log: Log | None
+) -> Worker[Recorder]:
     def make() -> SessionWriter:
-        session = SessionWriter(path, prepared.skin, epoch=epoch(), start=start)
+        session = SessionWriter(path, prepared.skin, epoch=epoch(), start=start, log=log)
         for calibration in prepared.calibrations.values():
             session.attach(calibration.kind.attachment, "application/zip", calibration.encode())
         return session

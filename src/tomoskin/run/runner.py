@@ -9,6 +9,8 @@ from concurrent.futures import Future
 from contextlib import AbstractContextManager
 
 from tomoskin.pipeline import FrameResult, Prepared
+from tomoskin.robot import Place
+from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.commands import Command, DirectCommand, Opener
 from tomoskin.run.counters import Latency
 from tomoskin.run.flow import Snapshot
@@ -16,9 +18,11 @@ from tomoskin.run.loop import Loop
 from tomoskin.run.marker import ReplaySource
 from tomoskin.run.publisher import Audience
 from tomoskin.run.status import Status
+from tomoskin.run.turns import Turns
 from tomoskin.run.twin_control import TwinControl
 from tomoskin.signal import Reference
 from tomoskin.sink import Sink
+from tomoskin.source import Transport
 
 
 class Runner:
@@ -37,6 +41,10 @@ class Runner:
         Host monotonic seconds, the same as in ``Frame.host_time``.
     sinks
         Where results go, beside those who take :attr:`newest`; a slow one delays nobody.
+    place, turns
+        Which of a robot's skins it is, and what its runs share.
+    memory
+        Where boards are remembered from one start to the next; None: nowhere.
 
     Attributes
     ----------
@@ -51,8 +59,11 @@ class Runner:
         *,
         clock: Callable[[], float] = time.monotonic,
         sinks: Sequence[Sink] = (),
+        place: Place | None = None,
+        turns: Turns | None = None,
+        memory: BoardMemory | None = None,
     ) -> None:
-        self._audience = Audience(clock, tuple(sinks))
+        self._audience = Audience(clock, tuple(sinks), place, turns, memory)
         self.events = self._audience.events
         self._loop = Loop(prepared, open_transport, self._audience)
         self._thread: threading.Thread | None = None
@@ -67,6 +78,13 @@ class Runner:
         """
         transport = self._loop.open()
         self._loop.flow.begin(transport)
+        self._begin(transport)
+
+    def start_without_source(self) -> None:
+        """Begin, and go on trying to open the source: one of several boards may be missing."""
+        self._begin(None)
+
+    def _begin(self, transport: Transport | None) -> None:
         self._loop.commands.begin()
         self._thread = threading.Thread(
             target=self._loop.run, args=(transport,), name="tomoskin-runner", daemon=True
@@ -78,6 +96,7 @@ class Runner:
         self._loop.stop()
         if self._thread is not None:
             self._thread.join()
+        self._loop.flow.remember()
         self._loop.flow.out.stop()
 
     def submit(self, command: Command) -> Future[None]:

@@ -3,6 +3,7 @@
 from tomoskin.server.access import AccessPolicy, is_loopback, load_token
 from tomoskin.server.handlers import serve_requests
 from tomoskin.server.hub import Hub
+from tomoskin.server.overview import Overview
 from tomoskin.server.page_messages import readings, stages
 from tomoskin.server.server import (
     DEFAULT_PORT,
@@ -12,6 +13,7 @@ from tomoskin.server.server import (
     application,
     check_page,
     listen,
+    robot_application,
 )
 from tomoskin.server.settings_handlers import SettingsHandlers
 from tomoskin.server.twin_handlers import TwinHandlers
@@ -21,6 +23,7 @@ __all__ = [
     "STATIC",
     "AccessPolicy",
     "Hub",
+    "Overview",
     "Server",
     "ServerError",
     "SettingsHandlers",
@@ -31,6 +34,7 @@ __all__ = [
     "listen",
     "load_token",
     "readings",
+    "robot_application",
     "serve_requests",
     "stages",
 ]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import deque
+from typing import Protocol
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from tomoskin.core import TomoskinError, WireError
 from tomoskin.server import page_messages
-from tomoskin.server.hub import Hub
-from tomoskin.server.requests import decode_request
+from tomoskin.server.requests import Request, decode_request
+from tomoskin.server.task import Listener
 
 FRAME_PERIOD = 1 / 60
 """A page gets no more frames than it can show, s."""
@@ -23,15 +24,42 @@ _OUTBOX = 64
 _TRY_AGAIN_LATER = 1013
 
 
+class NewestMessage(Protocol):
+    """What a page is sent again and again, the newest only."""
+
+    def __call__(self) -> bytes | None:
+        """The message; None before the first."""
+
+    def note_sent(self, message: bytes) -> None:
+        """A page's connection has it."""
+
+
+class Host(Protocol):
+    """Whom a page's connection is one of."""
+
+    @property
+    def frame(self) -> NewestMessage:
+        """What it is sent."""
+
+    def join(self, page: Listener) -> bool:
+        """Serve ``page`` from now on; False where there are too many."""
+
+    def leave(self, page: Listener, why: str = "") -> None:
+        """Serve ``page`` no longer."""
+
+    def obey(self, page: Listener, request: Request) -> None:
+        """Do what a page asks. Raises WireError where that cannot be."""
+
+
 class Page:
     """Serves one WebSocket until it is closed, or does not read for :data:`PATIENCE`.
 
     Frames are never queued: each time the page can take one, it gets the newest.
     """
 
-    def __init__(self, socket: WebSocket, hub: Hub) -> None:
+    def __init__(self, socket: WebSocket, host: Host) -> None:
         self._socket = socket
-        self._hub = hub
+        self._host = host
         self._outbox: deque[str] = deque(maxlen=_OUTBOX)
         self._due = asyncio.Event()
         self._sent: bytes | None = None
@@ -48,7 +76,7 @@ class Page:
     async def run(self) -> None:
         """Serve until either side ends it."""
         await self._socket.accept()
-        if not self._hub.join(self):
+        if not self._host.join(self):
             await self._socket.close(_TRY_AGAIN_LATER, "too many pages are open")
             return
         reason = ""
@@ -57,7 +85,7 @@ class Page:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             reason = _reason(done)
         finally:
-            self._hub.leave(self, reason)
+            self._host.leave(self, reason)
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -73,7 +101,7 @@ class Page:
         try:
             if text is None:
                 raise WireError("expected text, got a binary message")
-            self._hub.obey(self, decode_request(text))
+            self._host.obey(self, decode_request(text))
         except TomoskinError as error:
             self.post(page_messages.error(str(error)))
 
@@ -92,11 +120,11 @@ class Page:
         while self._outbox:
             await self._socket.send_text(self._outbox.popleft())
             await asyncio.sleep(0)  # that the page is gone is said in the loop's next turn
-        frame = self._hub.frame()
+        frame = self._host.frame()
         if frame is not None and frame is not self._sent:
             await self._socket.send_bytes(frame)
             self._sent = frame
-            self._hub.frame.note_sent(frame)
+            self._host.frame.note_sent(frame)
 
 
 def _reason(done: set[asyncio.Task[None]]) -> str:

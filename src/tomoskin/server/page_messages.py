@@ -42,17 +42,17 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
         skin={"name": skin.name, "description": skin.description, "source": str(skin.source)},
         unit=prepared.operator.unit,
         limit=limit,
-        points=_flat(mesh.points),
-        solid=None if skin.is_flat else _flat(skin.surface.point(mesh.points)),
-        cells=_flat(mesh.cells),
-        outline=_flat(skin.outline.polyline(skin.outline.length / _OUTLINE_POINTS)),
+        points=flat(mesh.points),
+        solid=None if skin.is_flat else flat(skin.surface.point(mesh.points)),
+        cells=flat(mesh.cells),
+        outline=flat(skin.outline.polyline(skin.outline.length / _OUTLINE_POINTS)),
         electrodes=_electrodes(prepared),
         pattern={
             "name": pattern.identity,
             "n_meas": pattern.n_meas,
             "n_drive": pattern.n_drive,
-            "drive": _flat(pattern.drive),
-            "measure": _flat(pattern.measure),
+            "drive": flat(pattern.drive),
+            "measure": flat(pattern.measure),
         },
         source=source,
         pressable=pressable,
@@ -78,8 +78,8 @@ def state(status: Status) -> str:
         dropped=status.dropped,
         corrupt=status.corrupt,
         gaps=status.gaps,
-        p50_ms=_finite(1e3 * status.p50),
-        p99_ms=_finite(1e3 * status.p99),
+        p50_ms=finite(1e3 * status.p50),
+        p99_ms=finite(1e3 * status.p99),
         stages=stages(status),
         reference={
             "frames": reference.frames,
@@ -89,7 +89,7 @@ def state(status: Status) -> str:
         },
         baseline=_baseline(reference.baseline),
         sick=[_sick(electrode) for electrode in status.electrodes],
-        noise_v=_finite(reference.noise),
+        noise_v=finite(reference.noise),
         alpha=status.choice.alpha,
         rule=status.choice.rule,
         left_out=status.left_out,
@@ -107,8 +107,8 @@ def stages(status: Status) -> list[dict[str, Any]]:
     return [
         {
             "name": stage.name,
-            "p50_ms": _finite(1e3 * stage.p50),
-            "p99_ms": _finite(1e3 * stage.p99),
+            "p50_ms": finite(1e3 * stage.p50),
+            "p99_ms": finite(1e3 * stage.p99),
         }
         for stage in status.stages
     ]
@@ -124,9 +124,9 @@ def _baseline(now: BaselineState | None) -> dict[str, Any] | None:
     if now is None:
         return None
     return {
-        "drift": _finite(now.drift),
+        "drift": finite(now.drift),
         "held_s": now.held,
-        "noise_v": _finite(now.noise),
+        "noise_v": finite(now.noise),
         "stale": now.stale,
     }
 
@@ -215,11 +215,13 @@ def chain(facets: IntArray) -> list[int]:
     return walk
 
 
-def _finite(value: float | None) -> float | None:
+def finite(value: float | None) -> float | None:
+    """The value; None for what JSON has no number for."""
     return None if value is None or not math.isfinite(value) else value
 
 
-def _flat(table: FloatArray | IntArray) -> list[float]:
+def flat(table: FloatArray | IntArray) -> list[float]:
+    """All numbers of a table, row by row."""
     flat: list[float] = np.asarray(table).reshape(-1).tolist()
     return flat
 

@@ -17,7 +17,8 @@ from tomoskin.server.task import Handlers, Listener, Tasks
 from tomoskin.skin import Skin
 from tomoskin.twin import Contact
 
-_FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"
+FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"
+"""Of a recording that is asked for on a page, for ``time.strftime``."""
 
 
 def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
@@ -50,7 +51,7 @@ def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
 
 
 async def _record(runner: Runner, folder: Path, *, on: bool) -> None:
-    begin = commands.Record(folder / time.strftime(_FILE_NAME))
+    begin = commands.Record(folder / time.strftime(FILE_NAME))
     try:
         await asyncio.wrap_future(runner.submit(begin if on else commands.StopRecording()))
     except DataError as error:

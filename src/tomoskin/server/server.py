@@ -8,14 +8,15 @@ import errno
 import mimetypes
 import signal
 import socket
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
-from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
@@ -26,7 +27,8 @@ from tomoskin.server import page_messages
 from tomoskin.server.access import AccessControl, AccessPolicy
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_connection import PATIENCE, Page
+from tomoskin.server.overview import Overview, states
+from tomoskin.server.page_connection import PATIENCE, Host, Page
 
 STATIC = Path(__file__).parent / "static"
 """Where the built page lies."""
@@ -82,17 +84,26 @@ def listen(host: str, port: int) -> socket.socket:
 def application(hub: Hub, policy: AccessPolicy, static: Path = STATIC) -> ASGIApp:
     """ASGI application: the built page, ``/ws`` for each open page, ``/status`` for programs,
     ``/files/NAME`` for what is in the session folder."""
-    # Whether Python knows the page's typeface depends on its version and on the machine's list.
-    mimetypes.add_type("font/woff2", ".woff2")
+    return _guarded([*_routes(hub), _page(static)], [hub], policy)
 
-    async def stream(websocket: WebSocket) -> None:
-        await Page(websocket, hub).run()
 
-    async def no_icon(_: Request) -> Response:
-        return Response(status_code=204)
+def robot_application(
+    overview: Overview, hubs: Mapping[str, Hub], policy: AccessPolicy, static: Path = STATIC
+) -> ASGIApp:
+    """ASGI application: the page of the whole robot with its ``/ws`` and ``/status``; below
+    ``/skin/NAME/`` what :func:`application` has of one skin."""
+    skins = (Mount(f"/skin/{n}", routes=[*_routes(h), _page(static)]) for n, h in hubs.items())
+    routes = [
+        *_ends(overview, lambda: states(overview.run)),
+        Route("/", partial(_file, static / "robot.html")),
+        *skins,
+        _page(static),
+    ]
+    return _guarded(routes, [overview, *hubs.values()], policy)
 
-    async def status(_: Request) -> Response:
-        return Response(page_messages.state(hub.runner.status()), media_type="application/json")
+
+def _routes(hub: Hub) -> list[BaseRoute]:
+    """Of one skin, but for the page itself."""
 
     async def download(request: Request) -> Response:
         name = request.path_params["name"]
@@ -102,19 +113,51 @@ def application(hub: Hub, policy: AccessPolicy, static: Path = STATIC) -> ASGIAp
             return PlainTextResponse(f"{error}\n", 404)
         return FileResponse(path, media_type="application/octet-stream", filename=name)
 
+    ends = _ends(hub, lambda: page_messages.state(hub.runner.status()))
+    return [*ends, Route("/files/{name}", download)]
+
+
+def _ends(host: Host, state: Callable[[], str]) -> list[BaseRoute]:
+    """A socket for each open page, and the state for programs."""
+
+    async def stream(websocket: WebSocket) -> None:
+        await Page(websocket, host).run()
+
+    async def status(_: Request) -> Response:
+        return Response(state(), media_type="application/json")
+
+    return [WebSocketRoute("/ws", stream), Route("/status", status)]
+
+
+def _page(static: Path) -> BaseRoute:
+    """The built page."""
+    # Whether Python knows the page's typeface depends on its version and on the machine's list.
+    mimetypes.add_type("font/woff2", ".woff2")
+    return Mount("/", StaticFiles(directory=static, html=True))
+
+
+async def _file(path: Path, _: Request) -> Response:
+    return FileResponse(path)
+
+
+async def _no_icon(_: Request) -> Response:
+    return Response(status_code=204)
+
+
+def _guarded(
+    routes: Sequence[BaseRoute], hosts: Sequence[Hub | Overview], policy: AccessPolicy
+) -> ASGIApp:
+    """Behind the access policy; all ``hosts`` run while it is served."""
+
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        async with hub.running():
+        async with contextlib.AsyncExitStack() as stack:
+            for host in hosts:
+                await stack.enter_async_context(host.running())
             yield
 
-    routes = [
-        WebSocketRoute("/ws", stream),
-        Route("/favicon.ico", no_icon),
-        Route("/status", status),
-        Route("/files/{name}", download),
-        Mount("/", StaticFiles(directory=static, html=True)),
-    ]
-    return AccessControl(Starlette(routes=routes, lifespan=lifespan), policy)
+    served = Starlette(routes=[Route("/favicon.ico", _no_icon), *routes], lifespan=lifespan)
+    return AccessControl(served, policy)
 
 
 class Server(uvicorn.Server):

@@ -9,7 +9,7 @@ from tomoskin.sink.consumer import (
     sink_report,
     sink_worker,
 )
-from tomoskin.sink.contact import Contact, Contacts
+from tomoskin.sink.contact import Contact, Contacts, contacts_of
 from tomoskin.sink.listener import ContactListener
 from tomoskin.sink.naming import Mount, Naming
 from tomoskin.sink.rerun import write_rerun
@@ -31,6 +31,7 @@ __all__ = [
     "SinkReport",
     "Stream",
     "Worker",
+    "contacts_of",
     "epoch",
     "make_sink",
     "raster",

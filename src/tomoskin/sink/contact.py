@@ -28,12 +28,6 @@ class Contact:
     pose: SpacePose = field(repr=False)
 
     @property
-    def force(self) -> float | None:
-        """N, against the normal; None where no calibration tells it."""
-        force = self.touch.detection.force
-        return None if force is None else force.newtons
-
-    @property
     def position(self) -> Vector:
         """(3,) m, on the surface."""
         return self.pose.position
@@ -48,14 +42,22 @@ class Contact:
         """(3, 3) m² of the position on the surface; None where it is not known."""
         return self.pose.position_covariance(self.touch.detection)
 
+    @property
+    def force(self) -> float | None:
+        """N, against the normal; None where nothing tells it."""
+        force = self.touch.detection.force
+        return None if force is None else force.newtons
+
     def content(self) -> dict[str, Any]:
         """As plain values by name: on the sheet, and in space."""
-        spread = self.covariance
+        spread, force = self.covariance, self.touch.detection.force
         return touch_row(self.touch) | {
             "position": self.position,
             "normal": self.normal,
             "covariance": None if spread is None else spread.tolist(),
             "force": self.force,
+            "force_interval": None if force is None else (force.low, force.high),
+            "force_calibrated": force is not None and force.calibrated,
         }
 
 
@@ -104,7 +106,7 @@ class Contacts:
             latency=stream.latency(moment.host_time),
             valid=moment.valid,
             problem=moment.problem,
-            touches=tuple(contact_of(stream, touch) for touch in moment.touches),
+            touches=contacts_of(stream, moment),
         )
 
     def header(self) -> dict[str, Any]:
@@ -123,6 +125,11 @@ class Contacts:
     def content(self) -> dict[str, Any]:
         """As plain values by name."""
         return self.header() | {"touches": [touch.content() for touch in self.touches]}
+
+
+def contacts_of(stream: Stream, moment: Moment) -> tuple[Contact, ...]:
+    """The touches of a frame, in space."""
+    return tuple(contact_of(stream, touch) for touch in moment.touches)
 
 
 def contact_of(stream: Stream, touch: Touch) -> Contact:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from tomoskin.core import Event, SinkError, encode_json
@@ -22,34 +24,44 @@ DEFAULT_PORT = 8766
 _TOPICS = ("/touches", "/scene", "/image", "/events")
 
 
+@dataclass
+class _Server:
+    """A server, the context of its channels, and how many sinks use it."""
+
+    context: Any
+    server: Any
+    users: int = 1
+
+
+_robots: dict[tuple[str, int], _Server] = {}
+_robots_lock = threading.Lock()
+"""Foxglove shows one connection at a time: all skins of a robot are behind one port."""
+
+
 class FoxgloveSink:
     """Serves ``ws://host:port`` by Foxglove's SDK; what nobody has subscribed to is not made."""
 
     def __init__(self, host: str, port: int) -> None:
         self.name = f"foxglove at ws://{host}:{port}"
-        self._address = {"host": host, "port": port}
+        self._address = host, port
         self._sdk = needed("foxglove", "foxglove")
-        self._server: Any = None
-        self._context: Any = None
+        self._server: _Server | None = None
         self._channels: dict[str, Any] = {}
 
     def open(self, stream: Stream) -> None:
         """Begin to serve."""
-        sdk = self._sdk
-        # kept: with its last reference the SDK lets go of the channels too
-        self._context = context = sdk.Context()
+        sdk, prefix = self._sdk, "" if stream.place is None else f"/{stream.place.name}"
+        self._stream, self._pace = stream, TouchPace()
+        self._server = self._joined(stream)
         for topic in _TOPICS:
             found = schema_of(topic)
             schema = sdk.Schema(name=found.name, encoding=found.encoding, data=found.data)
             self._channels[topic] = sdk.Channel(
-                topic, schema=schema, message_encoding="json", context=context
+                prefix + topic,
+                schema=schema,
+                message_encoding="json",
+                context=self._server.context,
             )
-        name = f"tomoskin, {stream.source}"
-        try:
-            self._server = sdk.start_server(name=name, context=context, **self._address)
-        except RuntimeError as error:
-            raise SinkError(str(error), where=self.name, hint="choose another port") from error
-        self._stream, self._pace = stream, TouchPace()
 
     def publish(self, item: Item) -> None:
         """Send the messages of ``item``."""
@@ -76,9 +88,38 @@ class FoxgloveSink:
         server, self._server = self._server, None
         for channel in self._channels.values():
             channel.close()
-        self._channels, self._context = {}, None
-        if server is not None:
-            server.stop()
+        self._channels = {}
+        if server is None:
+            return
+        with _robots_lock:
+            server.users -= 1
+            if server.users:
+                return
+            if _robots.get(self._address) is server:
+                del _robots[self._address]
+        server.server.stop()
+
+    def _joined(self, stream: Stream) -> _Server:
+        """The server of the robot, or one of its own."""
+        if stream.place is None:
+            return self._begun(f"tomoskin, {stream.source}")
+        with _robots_lock:
+            server = _robots.get(self._address)
+            if server is None:
+                server = _robots[self._address] = self._begun("tomoskin, a robot's skins")
+            else:
+                server.users += 1
+        return server
+
+    def _begun(self, name: str) -> _Server:
+        host, port = self._address
+        # the SDK lets go of the channels too with the last reference to their context
+        context = self._sdk.Context()
+        try:
+            server = self._sdk.start_server(name=name, context=context, host=host, port=port)
+        except RuntimeError as error:
+            raise SinkError(str(error), where=self.name, hint="choose another port") from error
+        return _Server(context, server)
 
     def _send(self, topic: str, content: Mapping[str, Any], now: int) -> None:
         channel = self._channels[topic]

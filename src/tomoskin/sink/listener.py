@@ -26,12 +26,12 @@ class ContactListener:
 
     def open(self, stream: Stream) -> None:
         """Remember whose contacts they are."""
-        self._stream = stream
+        self._stream, self._of_skin = stream, self._naming.of_skin(stream)
 
     def publish(self, item: Item) -> None:
         """Call the function with the contacts of a frame."""
         if self._stream is not None and not isinstance(item, Event):
-            self._react(Contacts.of(self._stream, self._naming, item))
+            self._react(Contacts.of(self._stream, self._of_skin, item))
 
     def close(self) -> None:
         """Nothing is held."""

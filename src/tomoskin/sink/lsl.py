@@ -25,12 +25,14 @@ class LslSink:
 
     def __init__(self, prefix: str) -> None:
         self.name = f"lsl {prefix}"
-        self._prefix = prefix
+        self._root = prefix
         self._lsl = needed("pylsl", "lsl")
         self._outlets: dict[str, Any] = {}
 
     def open(self, stream: Stream) -> None:
         """Announce the streams."""
+        place = stream.place
+        self._prefix = self._root if place is None else f"{self._root}-{place.name}"
         # both are the machine's monotonic clock, but LSL may count from elsewhere
         self._offset = self._lsl.local_clock() - time.monotonic()
         self._pace = TouchPace()

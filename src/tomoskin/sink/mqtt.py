@@ -30,15 +30,15 @@ class MqttSink:
     """
 
     def __init__(self, url: SplitResult, port: int, naming: Naming) -> None:
-        self.topic, self._naming = naming.namespace, naming
-        self.name = f"mqtt://{url.hostname}:{port}/{self.topic}"
+        self._root = self._naming = naming
+        self.name = f"mqtt://{url.hostname}:{port}/{naming.namespace}"
         self._url, self._port = url, port
         self._paho = needed("paho.mqtt.client", "mqtt")
         self._client: Any = None
 
     def open(self, stream: Stream) -> None:
         """Connect; SinkError when the broker does not let us in."""
-        self._stream = stream
+        self._stream, self._naming = stream, self._root.of_skin(stream)
         paho = self._paho
         client = paho.Client(paho.CallbackAPIVersion.VERSION2, reconnect_on_failure=False)
         self._client = client
@@ -46,7 +46,7 @@ class MqttSink:
             password = unquote(self._url.password) if self._url.password else None
             client.username_pw_set(unquote(self._url.username), password)
         client.connect_timeout = _PATIENCE
-        client.will_set(f"{self.topic}/status", "offline", retain=True)
+        client.will_set(f"{self._naming.namespace}/status", "offline", retain=True)
         answer = _Answer()
         client.on_connect = answer
         client.connect(self._url.hostname, self._port, keepalive=_KEEPALIVE)
@@ -77,13 +77,13 @@ class MqttSink:
         if client is None:
             return
         if client.is_connected():
-            last = client.publish(f"{self.topic}/status", "offline", retain=True)
+            last = client.publish(f"{self._naming.namespace}/status", "offline", retain=True)
             last.wait_for_publish(_PATIENCE)
             client.disconnect()
         client.loop_stop()
 
     def _put(self, name: str, data: bytes, *, keep: bool = False) -> None:
-        sent = self._client.publish(f"{self.topic}/{name}", data, retain=keep)
+        sent = self._client.publish(f"{self._naming.namespace}/{name}", data, retain=keep)
         if sent.rc:
             raise SinkError(self._paho.error_string(sent.rc), where=self.name)
 

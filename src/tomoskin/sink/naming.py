@@ -6,10 +6,13 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from tomoskin.core import SinkError
 from tomoskin.sink.space import Vector
+
+if TYPE_CHECKING:
+    from tomoskin.sink.sink import Stream
 
 _NAMESPACE = re.compile(r"[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)
 _FRAME = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)
@@ -96,6 +99,17 @@ class Naming:
             mount = Mount.of(options["parent"], options.get("at", ""), where)
         named = {key: options[key] for key in ("namespace", "frame") if key in options}
         return cls(**named, mount=mount)
+
+    def of_skin(self, stream: Stream) -> Naming:
+        """Of one of a robot's skins, below this; this itself where there is no robot.
+
+        What lies on a link is told in the link's frame, and needs no transform of its own.
+        """
+        place = stream.place
+        if place is None:
+            return self
+        frame = place.link or (f"{self.frame}/{place.name}" if self.frame else "")
+        return Naming(f"{self.namespace}/{place.name}", frame)
 
     @property
     def frame_id(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 import numpy as np
 
@@ -22,6 +23,9 @@ _WHERE = "sink rerun"
 _ADDRESS, _PORT = "127.0.0.1", 9876
 _ARROW = 0.02
 """Length of a touch's normal, m."""
+
+_ROBOT = uuid4()
+"""Identity of what the skins of one robot log."""
 
 _PATIENCE = 5.0
 """Seconds in which a viewer must take what was sent."""
@@ -121,12 +125,13 @@ class RerunSink:
         """Begin a recording; OutputError when its file is there already."""
         recording = _recording(self._rerun, stream)
         if self._target.endswith(".rrd"):
-            check_outputs([Output(Path(self._target))], overwrite=False)
-            recording.save(self._target)
+            path = _file_of(Path(self._target), stream)
+            check_outputs([Output(path)], overwrite=False)
+            recording.save(path)
         else:
             recording.connect_grpc(f"rerun+http://{self._target}/proxy")
         self._recording = recording
-        self._view = RerunView(self._rerun, recording, stream, self._naming)
+        self._view = RerunView(self._rerun, recording, stream, self._naming.of_skin(stream))
 
     def publish(self, item: Item) -> None:
         """Log ``item``."""
@@ -178,11 +183,23 @@ def write_rerun(job: Export, path: Path) -> None:
         recording.disconnect()
 
 
+def _file_of(path: Path, stream: Stream) -> Path:
+    """The file of one skin: on a robot its name stands in that of the file."""
+    place = stream.place
+    return path if place is None else path.with_stem(f"{path.stem}-{place.name}")
+
+
 def _recording(rerun: Any, stream: Stream) -> Any:
-    """A recording whose only times are those of the measurements."""
+    """A recording whose only times are those of the measurements.
+
+    Those of a robot's skins have one identity in a process: a viewer shows them as one.
+    """
     if stream.corners is None and stream.points is not None:
         raise SinkError("Rerun shows sheets, and this skin is a body", where=_WHERE)
-    recording = rerun.RecordingStream(f"tomoskin {stream.skin}")
+    if stream.place is None:
+        recording = rerun.RecordingStream(f"tomoskin {stream.skin}")
+    else:
+        recording = rerun.RecordingStream("tomoskin robot", recording_id=_ROBOT)
     recording.set_log_time_enabled(False)
     recording.set_log_tick_enabled(False)
     return recording

@@ -55,14 +55,15 @@ class Ros2Sink:
             participant = self._dds["domain"].DomainParticipant(
                 self._domain, qos=core.Qos(core.Policy.Userdata(b"enclave=/;"))
             )
-            self._writers = {topic: self._writer(participant, topic) for topic in TOPICS}
+            naming = self._naming.of_skin(stream)
+            self._writers = {topic: self._writer(participant, naming, topic) for topic in TOPICS}
         except core.DDSException as error:
             raise SinkError(
                 f"cannot join domain {self._domain}: {error}",
                 where=self.name,
                 hint="CYCLONEDDS_URI names the network interface that it is to use",
             ) from error
-        self._view = RosView(stream, self._naming)
+        self._view = RosView(stream, naming)
 
     def publish(self, item: Item) -> None:
         """Write the messages of ``item``; the source time is that of the measurement."""
@@ -77,7 +78,7 @@ class Ros2Sink:
         """Leave: with the last reference to a writer its participant goes too."""
         self._writers = {}
 
-    def _writer(self, participant: Any, topic: str) -> Any:
+    def _writer(self, participant: Any, naming: Naming, topic: str) -> Any:
         core, kind = self._dds["core"], TOPICS[topic]
         policy = core.Policy
         kept = topic in KEPT
@@ -88,7 +89,7 @@ class Ros2Sink:
             policy.DataRepresentation(use_cdrv0_representation=True),
             policy.Userdata(f"typehash={type_hash(kind)};".encode()),
         )
-        name = f"rt/{self._naming.topic(topic)}"
+        name = f"rt/{naming.topic(topic)}"
         return self._dds["pub"].DataWriter(
             participant, self._dds["topic"].Topic(participant, name, struct_of(kind)), qos=qos
         )

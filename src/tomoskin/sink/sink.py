@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from typing import Protocol, Self
 
 from tomoskin.core import Event, FloatArray, GeometryError, Image, PixelMap, Touch
-from tomoskin.mesh import Plane, Surface
+from tomoskin.mesh import Mesh, Plane, Surface
 from tomoskin.pattern import Pattern
 from tomoskin.pipeline import FrameResult, Prepared, colour_limit
 from tomoskin.recording import event_of
+from tomoskin.robot import Place
 from tomoskin.touch import TouchEvent
 
 NO_REFERENCE = "the untouched skin has not been measured yet: leave it alone for a moment"
@@ -30,7 +31,7 @@ class Stream:
     Attributes
     ----------
     skin, source
-        Name of the skin, and the source in words.
+        Name of the skin (on a robot the one that it has there), and the source in words.
     pattern
         What the voltages are rows of.
     pixels
@@ -38,7 +39,7 @@ class Stream:
     epoch
         What is added to a host time to give seconds since 1970.
     surface
-        What the sheet lies on.
+        What the sheet lies on, in the coordinates of its link where it is on one.
     replayed
         Whether frames have the times of a recording, and ``epoch`` is theirs.
     points
@@ -49,6 +50,8 @@ class Stream:
         End of the symmetric scale of colours, in the image's unit.
     clock
         What host times are times of; None where they are those of a recording.
+    place
+        Which of a robot's skins it is; None where there is no robot.
     """
 
     skin: str
@@ -62,22 +65,32 @@ class Stream:
     corners: FloatArray | None = None
     limit: float = 1.0
     clock: Callable[[], float] | None = None
+    place: Place | None = None
 
     @classmethod
-    def of(cls, prepared: Prepared, source: str, recorded: float | None = None) -> Self:
+    def of(
+        cls,
+        prepared: Prepared,
+        source: str,
+        recorded: float | None = None,
+        place: Place | None = None,
+    ) -> Self:
         """Of a run that begins now; ``source`` in words; ``recorded``: the epoch of a replay."""
+        own = prepared.skin.surface
+        surface = own if place is None else place.moved(own)
         return cls(
-            skin=prepared.skin.name,
+            skin=prepared.skin.name if place is None else place.name,
             source=source,
             pattern=prepared.pattern,
             pixels=raster(prepared),
             epoch=epoch() if recorded is None else recorded,
-            surface=prepared.skin.surface,
+            surface=surface,
             replayed=recorded is not None,
-            points=_cell_points(prepared),
-            corners=_corners(prepared),
+            points=_in_space(surface, prepared.mesh.centroids),
+            corners=_corners(surface, prepared.mesh),
             limit=colour_limit(prepared),
             clock=time.monotonic if recorded is None else None,
+            place=place,
         )
 
     def log_time(self, host_time: float) -> int:
@@ -204,18 +217,13 @@ def raster(prepared: Prepared) -> PixelMap | None:
         return None
 
 
-def _cell_points(prepared: Prepared) -> FloatArray:
-    return _in_space(prepared, prepared.mesh.centroids)
+def _corners(surface: Surface, mesh: Mesh) -> FloatArray | None:
+    return _in_space(surface, mesh.points)[mesh.cells] if mesh.cells.shape[1] == 3 else None
 
 
-def _corners(prepared: Prepared) -> FloatArray | None:
-    mesh = prepared.mesh
-    return _in_space(prepared, mesh.points)[mesh.cells] if mesh.cells.shape[1] == 3 else None
-
-
-def _in_space(prepared: Prepared, places: FloatArray) -> FloatArray:
-    """(n, 3) m of places on the sheet, or of a body."""
-    return places if places.shape[1] == 3 else prepared.skin.surface.point(places)
+def _in_space(surface: Surface, positions: FloatArray) -> FloatArray:
+    """(n, 3) m of positions on the sheet, or of a body."""
+    return positions if positions.shape[1] == 3 else surface.point(positions)
 
 
 def epoch() -> float:

@@ -39,7 +39,6 @@ class ZenohSink:
         self._endpoint, self._domain, self._naming = endpoint, domain, naming
         self._zenoh = needed("zenoh", "zenoh")
         self._ext = needed("zenoh.ext", "zenoh")
-        self._keys = {topic: _key(naming, topic, domain) for topic in TOPICS}
         self._identity = list(os.urandom(16))
         self._session: Any = None
 
@@ -57,7 +56,9 @@ class ZenohSink:
         except self._zenoh.ZError as error:
             reason = str(error).partition(" at /")[0]  # where in its own sources
             raise SinkError(f"cannot be joined: {reason}", where=self.name) from error
-        self._view = RosView(stream, self._naming)
+        naming = self._naming.of_skin(stream)
+        self._keys = {topic: _key(naming, topic, self._domain) for topic in TOPICS}
+        self._view = RosView(stream, naming)
         self._sent: Counter[str] = Counter()
 
     def publish(self, item: Item) -> None:

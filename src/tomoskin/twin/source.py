@@ -63,6 +63,7 @@ def make_twin(skin: Skin, settings: TwinSettings, clock: Clock, pace: float = 1.
         adc_bits=skin.readout.adc_bits,
         current=skin.current,
         tick_rate=skin.readout.tick_rate,
+        unique_id=b"twin" + (settings.seed % 2**32).to_bytes(4, "big"),
     )
     device = TwinDevice(electronics, board, clock.now(), pace)
     return TwinTransport(electronics, device, clock, Line(settings.line, settings.seed))

@@ -1,0 +1,228 @@
+"""All skins of a robot live on one page, and ``tomoskin skin place``."""
+
+from __future__ import annotations
+
+import sys
+import webbrowser
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from os import path
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tomoskin.cli.choices import board_memory, chosen_sinks, skin_for_source
+from tomoskin.cli.named_files import Otherwise, Reads
+from tomoskin.cli.output import Bar, emit, remark
+from tomoskin.cli.record import ended_by_signals
+
+if TYPE_CHECKING:
+    from tomoskin.pipeline import Prepared
+    from tomoskin.robot import PlacedSkin, Robot
+    from tomoskin.run import Member, RobotRun
+    from tomoskin.server import AccessPolicy, Hub
+
+
+@dataclass(frozen=True)
+class Served:
+    """How the page of a robot is served, as the options of ``live`` say it."""
+
+    host: str
+    port: int
+    token: Mapping[str, str]
+    folder: Path
+    record: Path | None
+    open_browser: bool
+    json: bool
+
+
+def run_robot(file: Path, sinks: list[str] | None, served: Served) -> None:
+    """Run the skins of a robot file and their page until a signal comes."""
+    from tomoskin.robot import Robot
+    from tomoskin.run import RobotRun
+    from tomoskin.server import check_page
+
+    check_page()
+    robot = Robot.load(file)
+    with ended_by_signals():
+        with Bar("preparing"):
+            members = [_member(skin, sinks) for skin in robot.skins]
+        run = RobotRun(members, board_memory())
+        _serve(robot, run, served)
+        _farewell(run, json=served.json)
+
+
+def _member(skin: PlacedSkin, sinks: list[str] | None) -> Member:
+    from tomoskin.run import Member
+    from tomoskin.source import open_source
+
+    prepared = _prepared(skin)
+    if prepared.headroom.problem is not None:
+        remark(f"{skin.name}: {prepared.headroom.problem}")
+    opened = partial(open_source, skin.source, prepared.skin)
+    return Member(skin.place, prepared, opened, chosen_sinks(sinks), skin.board)
+
+
+def _prepared(skin: PlacedSkin) -> Prepared:
+    """With the calibrations that the robot file names."""
+    from tomoskin.calibration import KINDS
+    from tomoskin.pipeline import prepare
+
+    prepared, named = prepare(skin_for_source(skin.skin, skin.source)), skin.calibrations or {}
+    for kind in KINDS:
+        if (file := named.get(kind.name)) is not None:
+            prepared = prepared.calibrated(kind.read(file))
+    return prepared
+
+
+def _serve(robot: Robot, run: RobotRun, served: Served) -> None:
+    from tomoskin.server import AccessPolicy, Overview, Server, listen, robot_application
+
+    with listen(served.host, served.port) as listener:
+        policy = AccessPolicy(listener.getsockname()[1], served.host, **served.token)
+        try:
+            run.start()
+            if served.record is not None:
+                run.record(served.record)
+            overview, hubs = Overview(robot, run, served.folder), _hubs(robot, run, served.folder)
+            server = Server.of(robot_application(overview, hubs, policy))
+            with server.stopped_by_signals():
+                _announce(policy, robot, json=served.json)
+                if served.open_browser:
+                    webbrowser.open(policy.address)
+                server.run_on(listener)
+        finally:
+            run.stop()
+
+
+def _hubs(robot: Robot, run: RobotRun, folder: Path) -> dict[str, Hub]:
+    """What serves the page of each skin."""
+    from tomoskin.pipeline import colour_limit
+    from tomoskin.server import Hub, serve_requests
+    from tomoskin.source import open_source
+
+    hubs = {}
+    for skin in robot.skins:
+        runner = run.runners[skin.name]
+        hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
+        hub.opener = partial(open_source, skin.source)
+        serve_requests(hub, skin.source)
+        hubs[skin.name] = hub
+    return hubs
+
+
+def _announce(policy: AccessPolicy, robot: Robot, *, json: bool) -> None:
+    if json:
+        emit({"type": "listening", "address": policy.address, "port": policy.port})
+    else:
+        typer.echo(f"{len(robot.skins)} skins of {robot.name} are live at {policy.address}")
+    sys.stdout.flush()
+
+
+def _farewell(run: RobotRun, *, json: bool) -> None:
+    if json:
+        skins = {
+            name: {"frames": s.frames, "p50_ms": 1e3 * s.p50, "p99_ms": 1e3 * s.p99}
+            for name, s in run.statuses().items()
+        }
+        emit({"type": "stopped", "skins": skins})
+
+
+def place(
+    urdf: Annotated[Path, typer.Argument(metavar="ROBOT.urdf", help="The robot."), Reads()],
+    link: Annotated[str, typer.Argument(help="Link that the skin lies on.")],
+    out: Annotated[
+        Path,
+        typer.Option(metavar="ROBOT.toml", help="The robot file: one is added to, or made."),
+        Otherwise("a skin is added to what it holds"),
+    ] = Path("robot.toml"),
+    skin: Annotated[str, typer.Option(help="Built-in name or path.")] = "textile-disc-16",
+    name: Annotated[
+        str | None, typer.Option(help="Of the skin on the robot; without it the link's.")
+    ] = None,
+    source: Annotated[
+        str | None, typer.Option(help="serial:PORT, replay:FILE, …; without it a twin.")
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X/Y/Z[/ROLL/PITCH/YAW]",
+            help="Of the skin's frame in the link's, mm and degrees.",
+        ),
+    ] = None,
+    on_mesh: Annotated[
+        bool,
+        typer.Option(
+            "--on-mesh", help="The skin's surface file has the coordinates of the link's mesh."
+        ),
+    ] = False,
+) -> None:
+    """Lay a skin on a link of a robot: add it to a robot file, for `tomoskin live --robot`."""
+    from tomoskin.core import write_text
+    from tomoskin.robot import Robot, Urdf, add_skin
+    from tomoskin.skin import Skin
+
+    found = Urdf.read(urdf)
+    found.check_link(link, "LINK")
+    Skin.load(skin)
+    earlier = Robot.load(out).skins if out.exists() else ()
+    given: dict[str, Any] = {
+        "name": name or _name_of(link),
+        "skin": _from(skin, out) if skin.endswith(".toml") else skin,
+        "source": source or f"twin:seed={len(earlier) + 1}",
+        "link": link,
+    } | _pose(found, link, at, on_mesh=on_mesh)
+    text = add_skin(out, given, _from(str(urdf), out))
+    before = out.read_text(encoding="utf-8") if out.exists() else None
+    write_text(out, text, overwrite=True)
+    try:
+        count = len(Robot.load(out).skins)
+    except Exception:
+        if before is None:
+            out.unlink()
+        else:
+            write_text(out, before, overwrite=True)
+        raise
+    typer.echo(f"{out}: {given['name']} on {link}; {count} skins, tomoskin live --robot {out}")
+
+
+def _from(file: str, out: Path) -> str:
+    """A file by its path from the folder of the robot file."""
+    return path.relpath(file, out.parent)
+
+
+def _name_of(link: str) -> str:
+    """A link's name as that of a skin."""
+    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in link.lower())
+    return (name if name[:1].isalpha() else f"skin_{name}")[:32]
+
+
+def _pose(urdf: Any, link: str, at: str | None, *, on_mesh: bool) -> dict[str, list[str]]:
+    """Keys of the skin's section that say where it lies."""
+    from tomoskin.core import SkinError
+
+    if on_mesh:
+        if at is not None:
+            raise typer.BadParameter("--at and --on-mesh cannot both be", param_hint="--at")
+        if link not in urdf.meshes:
+            raise SkinError(f'link "{link}" has no mesh', where=urdf.source, hint="say --at")
+        numbers = [*(1e3 * urdf.meshes[link].position), *urdf.meshes[link].degrees()]
+    else:
+        numbers = _numbers(at)
+    position, angles = ([f"{x:.6g}" for x in part] for part in (numbers[:3], numbers[3:]))
+    return {"position": [f"{x} mm" for x in position], "angles": [f"{x} deg" for x in angles]}
+
+
+def _numbers(at: str | None) -> list[float]:
+    try:
+        numbers = [float(word) for word in at.split("/")] if at else [0.0] * 6
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (3, 6):
+        raise typer.BadParameter(
+            f'expected X/Y/Z or X/Y/Z/ROLL/PITCH/YAW in mm and degrees, got "{at}"',
+            param_hint="--at",
+        )
+    return [*numbers, 0.0, 0.0, 0.0][:6]

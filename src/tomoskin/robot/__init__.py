@@ -1,0 +1,17 @@
+"""Skins on a robot: which there are, and where on its links they lie."""
+
+from tomoskin.robot.pose import Moved, Place, Pose
+from tomoskin.robot.robot import FORMAT, SECTIONS, PlacedSkin, Robot, add_skin
+from tomoskin.robot.urdf import Urdf
+
+__all__ = [
+    "FORMAT",
+    "SECTIONS",
+    "Moved",
+    "Place",
+    "PlacedSkin",
+    "Pose",
+    "Robot",
+    "Urdf",
+    "add_skin",
+]

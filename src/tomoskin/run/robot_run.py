@@ -1,0 +1,193 @@
+"""All skins of a robot in one program: a run each, one clock, one recording, one watch."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import wait
+from contextlib import AbstractContextManager, ExitStack, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import monotonic
+
+from tomoskin.core import SourceError, TomoskinError
+from tomoskin.pipeline import Prepared
+from tomoskin.recording import RobotLog
+from tomoskin.robot import Place
+from tomoskin.run import commands
+from tomoskin.run.board_memory import BoardMemory
+from tomoskin.run.commands import Opener
+from tomoskin.run.runner import Runner
+from tomoskin.run.status import Status
+from tomoskin.run.turns import Turns
+from tomoskin.sink import Sink, epoch
+
+_OFTEN = 0.25
+"""Seconds between two looks at all runs."""
+
+_STEP = 0.1
+"""Seconds by which the time of the day may move against the monotonic clock."""
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One skin of the robot: what its run is made of; ``board``: the unique id that its board must
+    have, hexadecimal, or None."""
+
+    place: Place
+    prepared: Prepared
+    open: Opener
+    sinks: Sequence[Sink] = ()
+    board: str | None = None
+
+
+class RobotRun:
+    """Runs the skins of a robot.
+
+    Each has a thread that reads its board; they compute in turns, so that none disturbs another.
+    A board that is missing at the start, or lost later, is sought on; the others go on.
+
+    Attributes
+    ----------
+    runners
+        By the names of the skins, in their order.
+    """
+
+    def __init__(self, members: Sequence[Member], memory: BoardMemory | None = None) -> None:
+        turns = Turns()
+        self.runners: Mapping[str, Runner] = {
+            m.place.name: Runner(
+                m.prepared, m.open, sinks=m.sinks, place=m.place, turns=turns, memory=memory
+            )
+            for m in members
+        }
+        self._boards = {m.place.name: m.board for m in members}
+        self._problems: Mapping[str, str] = {}
+        self._log: RobotLog | None = None
+        self._ended = threading.Event()
+        self._watch = threading.Thread(target=self._look_on, name="tomoskin-robot", daemon=True)
+
+    def start(self) -> None:
+        """Open the sources and begin.
+
+        Raises
+        ------
+        SourceError
+            When none of the sources can be opened.
+        """
+        errors = []
+        for runner in self.runners.values():
+            try:
+                runner.start()
+            except SourceError as error:
+                errors.append(error)
+                runner.say("source-lost", f"it is sought on: {error}")
+                runner.start_without_source()
+        if len(errors) == len(self.runners):
+            self.stop()
+            raise errors[0]
+        self._watch.start()
+
+    def stop(self) -> None:
+        """Stop all boards and end; returns when it is done. A second call does nothing."""
+        self._ended.set()
+        if self._watch.ident is not None:
+            self._watch.join()
+        for runner in self.runners.values():
+            runner.stop()
+        self._close_log()
+
+    def record(self, path: Path) -> None:
+        """Record all skins to one new file, from now on.
+
+        Raises
+        ------
+        OutputError, DataError
+            When it exists or cannot be made.
+        """
+        self.stop_recording()
+        self._log = RobotLog(path, tuple(self.runners), epoch=epoch(), start=monotonic())
+        parts = self._log.parts
+        asked = [r.submit(commands.Record(path, parts[n])) for n, r in self.runners.items()]
+        try:
+            for future in asked:
+                future.result()
+        except TomoskinError:
+            self.stop_recording()
+            raise
+
+    def stop_recording(self) -> None:
+        """End the recording, if there is one; returns when the file is complete."""
+        if self._log is not None:
+            wait([r.submit(commands.StopRecording()) for r in self.runners.values()])
+        self._close_log()
+
+    @property
+    def recording(self) -> Path | None:
+        """The file that is being recorded to, or None."""
+        return None if self._log is None else self._log.path
+
+    def statuses(self) -> dict[str, Status]:
+        """How each skin is doing now, by its name."""
+        problems = self._problems
+        found = {}
+        for name, runner in self.runners.items():
+            status = runner.status()
+            problem = status.problem or problems.get(name)
+            found[name] = replace(status, problem=problem, source=status.source or name)
+        return found
+
+    def watch(self, call: Callable[[], None]) -> AbstractContextManager[object]:
+        """While the block lasts, ``call`` is called at each result of any skin."""
+        stack = ExitStack()
+        for runner in self.runners.values():
+            stack.enter_context(runner.watch(call))
+        return stack
+
+    def _close_log(self) -> None:
+        log, self._log = self._log, None
+        if log is not None:
+            for part in log.parts.values():
+                with suppress(TomoskinError):  # whoever wrote last has said so
+                    part.close()
+
+    def _look_on(self) -> None:
+        """What no run can see by itself."""
+        begun = epoch()
+        while not self._ended.wait(_OFTEN):
+            boards = {name: r.status().board for name, r in self.runners.items()}
+            ids = {name: board.unique_id.hex() for name, board in boards.items() if board}
+            problems = board_problems(ids, self._boards)
+            for name, text in problems.items():
+                if self._problems.get(name) != text:
+                    self.runners[name].say("wrong-board", text)
+            self._problems = problems
+            if abs(step := epoch() - begun) > _STEP:
+                begun += step
+                for runner in self.runners.values():
+                    runner.say("clock-step", _STEPPED.format(step))
+
+
+_STEPPED = (
+    "the time of the day was set by {:+.1f} s: messages go on by the clock as it was at the start"
+)
+
+
+def board_problems(found: Mapping[str, str], wanted: Mapping[str, str | None]) -> dict[str, str]:
+    """What is wrong with the boards' unique ids, in a sentence, by the names of the skins.
+
+    Boards without a number have zeros only, and cannot be told apart.
+    """
+    problems = {}
+    for name, number in found.items():
+        others = [o for o, n in found.items() if n == number and o != name and n.strip("0")]
+        if wanted.get(name) not in (None, number):
+            problems[name] = (
+                f"board {number} answers, expected {wanted[name]}: are two cables exchanged?"
+            )
+        elif others:
+            problems[name] = (
+                f"its board {number} has the same number as that of {', '.join(others)}: "
+                "give one another (tomoskin firmware configure PORT --id NAME)"
+            )
+    return problems

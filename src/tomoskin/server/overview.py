@@ -1,0 +1,202 @@
+"""The page of a whole robot: its skins in space, the touches on them, and how each is doing."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import AsyncIterator, Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tomoskin import __version__
+from tomoskin.core import FloatArray, WireError, encode_json
+from tomoskin.robot import PlacedSkin, Pose, Robot
+from tomoskin.run import RobotRun, Runner, Status, commands
+from tomoskin.server.page_messages import finite, flat, text_of
+from tomoskin.server.requests import Request, SetRecording
+from tomoskin.server.run_handlers import FILE_NAME
+from tomoskin.server.task import Listener, Tasks
+from tomoskin.sink import Moment, Naming, Stream, contacts_of
+
+PERIOD = 1 / 20
+"""Seconds between two looks at the touches."""
+
+_STATES = 5
+"""So many looks, and all states are sent."""
+
+MAX_PAGES = 16
+
+
+class NewestTouches:
+    """Touches of all skins as one message, JSON in bytes; a page gets the newest only."""
+
+    def __init__(self, run: RobotRun, streams: Mapping[str, Stream], poses: Mapping[str, Pose]):
+        self._run, self._streams, self._poses = run, streams, poses
+        self._made = b""
+
+    def __call__(self) -> bytes | None:
+        """The message that was made last; None before the first."""
+        return self._made or None
+
+    def note_sent(self, message: bytes) -> None:
+        """Nothing is measured here."""
+
+    def renew(self) -> None:
+        """Make it of the newest results; the same object where nothing has changed."""
+        skins = {n: self._touches(n, r) for n, r in self._run.runners.items() if r.newest}
+        made = encode_json({"skins": skins})
+        if made != self._made:
+            self._made = made
+
+    def _touches(self, name: str, runner: Runner) -> dict[str, Any]:
+        assert runner.newest is not None
+        moment = Moment.of(runner.newest.result, with_image=False)
+        found, pose = contacts_of(self._streams[name], moment), self._poses[name]
+        touches = [
+            {
+                "id": contact.touch.id,
+                "position": _rounded(pose(np.array([contact.position]))[0]),
+                "normal": _rounded(pose.rotation @ contact.normal),
+                "peak": contact.touch.detection.peak,
+                "force": contact.force,
+            }
+            for contact in found
+        ]
+        return {"valid": moment.valid, "touches": touches}
+
+
+class Overview:
+    """What the pages of the whole robot are told, and may ask; lives in the event loop.
+
+    Parameters
+    ----------
+    robot, run
+        The robot, and what runs.
+    folder
+        Where recordings go, under names of their own.
+    """
+
+    def __init__(self, robot: Robot, run: RobotRun, folder: Path) -> None:
+        self.run, self.folder = run, folder
+        self._robot, self._tasks = robot, Tasks()
+        self._pages: set[Listener] = set()
+        placed = {skin.name: skin for skin in robot.skins}
+        streams = {
+            n: Stream.of(r.prepared, n, 0.0, placed[n].place) for n, r in run.runners.items()
+        }
+        poses = {n: robot.link_pose(placed[n].place) for n in run.runners}
+        self.frame = NewestTouches(run, streams, poses)
+        self._scene = scene(robot, streams, poses)
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[None]:
+        """Look at the runs while the block lasts."""
+        ticker = asyncio.create_task(self._tick())
+        yield
+        ticker.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await ticker
+
+    def join(self, page: Listener) -> bool:
+        """Serve ``page`` from now on; False where there are too many."""
+        if len(self._pages) >= MAX_PAGES:
+            return False
+        self._pages.add(page)
+        self.frame.renew()  # while nobody looked it was not
+        page.post(self._scene)
+        page.post(states(self.run))
+        return True
+
+    def leave(self, page: Listener, why: str = "") -> None:
+        """Serve ``page`` no longer."""
+        self._pages.discard(page)
+        if why:
+            for runner in self.run.runners.values():
+                runner.say("page-dropped", why)
+
+    def obey(self, page: Listener, request: Request) -> None:
+        """Do what a page asks of all skins. Raises WireError where that cannot be."""
+        match request:
+            case commands.TakeReference():
+                for runner in self.run.runners.values():
+                    runner.submit(request)
+            case SetRecording():
+                self._tasks.run(page, self._recording(on=request.on), lambda _: self._tell())
+            case _:
+                raise WireError("ask it on the page of one skin")
+
+    def _recording(self, *, on: bool) -> Callable[[], None]:
+        def record() -> None:
+            if on:
+                self.run.record(self.folder / time.strftime(FILE_NAME))
+            else:
+                self.run.stop_recording()
+
+        return record
+
+    def _tell(self) -> None:
+        for page in self._pages:
+            page.post(states(self.run))
+
+    async def _tick(self) -> None:
+        count = 0
+        while True:
+            if self._pages:
+                self.frame.renew()
+                if count % _STATES == 0:
+                    self._tell()
+                for page in self._pages:
+                    page.wake()
+            count += 1
+            await asyncio.sleep(PERIOD)
+
+
+def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]) -> str:
+    """Skins and links in the frame of the robot's root, m; coordinates lie flat as x0, y0, z0, …"""
+    bones = np.zeros((0, 2, 3)) if robot.urdf is None else robot.urdf.bones()
+    return text_of(
+        type="robot",
+        name=robot.name,
+        bones=flat(bones),
+        skins=[_skin(s, streams[s.name], poses[s.name]) for s in robot.skins],
+        version=__version__,
+    )
+
+
+def _skin(skin: PlacedSkin, stream: Stream, pose: Pose) -> dict[str, Any]:
+    corners = np.zeros((0, 3)) if stream.corners is None else stream.corners.reshape(-1, 3)
+    return {
+        "name": skin.name,
+        "frame": Naming().of_skin(stream).frame_id,
+        "source": skin.source,
+        "corners": _rounded(pose(corners).ravel()),
+    }
+
+
+def states(run: RobotRun) -> str:
+    """How each skin is doing."""
+    skins = {name: _state(status) for name, status in run.statuses().items()}
+    recording = None if run.recording is None else run.recording.name
+    return text_of(type="robot-state", skins=skins, recording=recording)
+
+
+def _state(status: Status) -> dict[str, Any]:
+    return {
+        "running": status.running,
+        "ready": status.reference.ready,
+        "fps": status.fps,
+        "frames": status.frames,
+        "lost": status.dropped + status.gaps,
+        "p99_ms": finite(1e3 * status.p99),
+        "problem": status.problem,
+        "text": status.text,
+    }
+
+
+def _rounded(values: FloatArray) -> list[float]:
+    """To 0.01 mm, which nobody sees."""
+    rounded: list[float] = np.round(values, 5).tolist()
+    return rounded

@@ -1,0 +1,191 @@
+"""Several skins in one program: none disturbs another, and one file holds them all."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from run.board import Board, samples_of
+from tomoskin.core import DataError, OutputError, SourceError
+from tomoskin.recording import SessionReader, repair, split, split_names
+from tomoskin.robot import Place, Pose
+from tomoskin.run import Member, RobotRun
+from tomoskin.run.robot_run import board_problems
+from tomoskin.run.turns import Turns
+from tomoskin.sink import ContactListener
+
+PATIENCE = 300
+
+
+class Watch:
+    """Waits for results of any skin."""
+
+    def __init__(self, run):
+        self._run, self._news = run, threading.Condition()
+
+    def __call__(self):
+        with self._news:
+            self._news.notify_all()
+
+    def until(self, true):
+        with self._run.watch(self), self._news:
+            assert self._news.wait_for(true, PATIENCE)
+
+
+@pytest.fixture
+def boards(prepared):
+    return {name: Board(samples_of(prepared)) for name in ("left", "right", "hand")}
+
+
+@contextmanager
+def running(members):
+    run = RobotRun(members)
+    try:
+        run.start()
+        yield run
+    finally:
+        run.stop()
+
+
+def member(prepared, name, board, **more):
+    return Member(Place(name), prepared, board.open, **more)
+
+
+def frames_of(run):
+    return {name: runner.status().frames for name, runner in run.runners.items()}
+
+
+def grown(run, names, by=40):
+    """Whether so many frames more have come of each of these skins: a condition."""
+    before = frames_of(run)
+    return lambda: all(frames_of(run)[name] > before[name] + by for name in names)
+
+
+def test_all_run_and_each_says_who_it_is(prepared, boards):
+    told, news = {}, threading.Event()
+
+    def react(contacts):
+        told[contacts.skin] = contacts.frame_id
+        if len(told) == len(boards):
+            news.set()
+
+    pose = Pose.of((0, 0, 0.1), (0, 0, 0))
+    members = [
+        Member(Place(n, f"{n}_link", pose), prepared, b.open, [ContactListener(react)])
+        for n, b in boards.items()
+    ]
+    with running(members):
+        assert news.wait(PATIENCE)
+    assert told == {"left": "left_link", "right": "right_link", "hand": "hand_link"}
+
+
+def test_a_missing_board_and_a_lost_one_disturb_no_other(prepared, boards):
+    boards["left"].lost = True
+    members = [member(prepared, name, board) for name, board in boards.items()]
+    with running(members) as run:
+        watch = Watch(run)
+        watch.until(grown(run, ["right", "hand"]))
+        assert frames_of(run)["left"] == 0
+        assert "the port is gone" in run.statuses()["left"].problem
+        boards["hand"].lose()
+        watch.until(grown(run, ["right"]))
+        assert run.runners["right"].status().dropped == 0
+        assert "gone" in run.statuses()["hand"].problem
+        boards["left"].lost = boards["hand"].lost = False  # plugged in again
+        watch.until(grown(run, ["left", "right", "hand"]))
+        watch.until(lambda: run.runners["hand"].status().running)
+        assert run.statuses()["hand"].problem is None
+
+
+def test_without_any_board_it_says_so(prepared, boards):
+    for board in boards.values():
+        board.lost = True
+    with pytest.raises(SourceError, match="the port is gone"):
+        RobotRun([member(prepared, n, b) for n, b in boards.items()]).start()
+
+
+def test_boards_of_one_number_are_said(prepared, boards):
+    found = {"left": "0a", "right": "0a", "hand": "00"}
+    wrong = board_problems(found, {"hand": "0b"})
+    assert "same number as that of right" in wrong["left"]
+    assert "expected 0b" in wrong["hand"]
+    assert board_problems({"left": "00", "right": "00"}, {}) == {}  # boards without a number
+    members = [Member(Place(n), prepared, b.open, board="0102") for n, b in boards.items()]
+    with running(members) as run:
+        Watch(run).until(lambda: "expected 0102" in (run.statuses()["left"].problem or ""))
+
+
+def test_a_clock_that_is_set_is_said_and_nothing_stops(prepared, boards, monkeypatch):
+    members = [member(prepared, "left", boards["left"])]
+    with running(members) as run:
+        monkeypatch.setattr("tomoskin.run.robot_run.epoch", lambda: 5e9)
+        events = run.runners["left"].events
+        Watch(run).until(lambda: any(e.kind == "clock-step" for e in events.since(0)[1]))
+
+
+def test_a_board_whose_ticks_jump_goes_on(prepared, boards):
+    board = boards["left"]
+    with running([member(prepared, "left", board)]) as run:
+        watch = Watch(run)
+        watch.until(grown(run, ["left"]))
+        for tick in (2**40, 160_000, 1):
+            board.tick = tick  # the next frame is at number * tick: hours ahead, then back
+            watch.until(grown(run, ["left"], by=5))
+        newest = run.runners["left"].newest.result
+        assert newest.ready
+        assert newest.touches == ()
+
+
+def test_one_file_holds_all_and_is_split(prepared, boards, tmp_path):
+    path = tmp_path / "robot.mcap"
+    seen = {name: [] for name in boards}
+    members = [member(prepared, name, board) for name, board in boards.items()]
+    with running(members) as run:
+        run.record(path)
+        Watch(run).until(grown(run, boards))
+        assert run.recording == path
+        run.stop_recording()
+        assert run.recording is None
+        with pytest.raises(OutputError):
+            run.record(path)
+    assert split_names(path) == ("left", "right", "hand")
+    with pytest.raises(DataError, match="several skins: left right hand"):
+        SessionReader(path)
+    with pytest.raises(DataError, match="several skins"):
+        repair(path, tmp_path / "mended.mcap")
+    counts = split(path)
+    for name in boards:
+        with SessionReader(tmp_path / f"robot-{name}.mcap") as session:
+            assert session.skin.identity == prepared.skin.identity
+            seen[name] = [item.frame.sequence for item in session.frames()]
+            assert session.device()["channels"] == 16
+            assert not session.torn
+        assert len(seen[name]) > 40
+        assert np.all(np.diff(seen[name][25:]) == 1)  # nothing is lost
+        assert counts[name] > 2 * len(seen[name])
+    with pytest.raises(OutputError):
+        split(path)
+
+
+def test_turns_are_taken_in_order():
+    turns, taken = Turns(), []
+
+    def take(name):
+        with turns:
+            taken.append(name)
+
+    with turns:
+        threads = []
+        for name in "abc":
+            thread = threading.Thread(target=take, args=name)
+            thread.start()
+            threads.append(thread)
+            while len(turns._waiting) < len(threads):
+                pass
+        assert taken == []
+    for thread in threads:
+        thread.join(PATIENCE)
+    assert taken == ["a", "b", "c"]

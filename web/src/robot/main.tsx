@@ -1,0 +1,96 @@
+/** Where the page of a whole robot starts. */
+
+import "../styles/tokens.css";
+import "../styles/typeface.css";
+import "../styles/page.css";
+import "../styles/robot.css";
+import { effect, signal } from "@preact/signals";
+import { render } from "preact";
+import { Connection, type LinkState, socketAddress } from "../socket";
+import { typeface } from "../theme";
+import { type RobotScene, type RobotState, robot, states, touches } from "./model";
+import { Skins } from "./Skins";
+import { Space } from "./Space";
+
+const link = signal<LinkState>({ phase: "connecting" });
+const error = signal<string | null>(null);
+
+const connection = new Connection(socketAddress(window.location), {
+  message(said) {
+    const message: unknown = said; // the server of a robot has messages of its own
+    const { type } = message as { type: string };
+    if (type === "robot") robot.value = message as RobotScene;
+    if (type === "robot-state") states.value = message as RobotState;
+    if (type === "error") error.value = (message as { message: string }).message;
+  },
+  frame(bytes) {
+    touches.value = (JSON.parse(new TextDecoder().decode(bytes)) as { skins: typeof touches.value }).skins;
+  },
+  link(state) {
+    link.value = state;
+  },
+});
+
+function Line() {
+  const lost = link.value.phase === "lost";
+  const ill = Object.values(states.value?.skins ?? {}).filter((skin) => skin.problem !== null).length;
+  const words = lost
+    ? "The program does not answer: what is shown is old."
+    : ill > 0
+      ? `${ill} of ${robot.value?.skins.length ?? 0} skins need a look.`
+      : "All skins are well.";
+  return (
+    <header class={`state${lost || ill > 0 ? " amber" : ""}`}>
+      <h1>{robot.value?.name ?? "tomoskin"}</h1>
+      <p role="status" data-testid="robot-line">
+        {error.value ?? words}
+      </p>
+    </header>
+  );
+}
+
+function Bar() {
+  const recording = states.value?.recording ?? null;
+  const off = link.value.phase !== "open";
+  const record = () => {
+    const request = { type: "record", on: recording === null };
+    connection.send(request);
+  };
+  return (
+    <footer class="doings">
+      <button type="button" disabled={off} data-testid="references" onClick={() => connection.send({ type: "reference" })}>
+        Take all references
+      </button>
+      <button
+        type="button"
+        disabled={off}
+        data-testid="record-all"
+        aria-pressed={recording !== null}
+        onClick={record}
+      >
+        {recording === null ? "Record all" : "End recording"}
+      </button>
+      <span>{recording ?? ""}</span>
+    </footer>
+  );
+}
+
+connection.open();
+await typeface();
+const page = document.getElementById("page");
+if (page) {
+  render(
+    <>
+      <Line />
+      <main class="robot">
+        <Space />
+        <Skins />
+      </main>
+      <Bar />
+    </>,
+    page,
+  );
+}
+effect(() => {
+  document.title = robot.value ? `${robot.value.name} · tomoskin` : "tomoskin";
+});

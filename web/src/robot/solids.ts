@@ -1,0 +1,88 @@
+/** The robot's skins in WebGL2: one buffer of corners, shaded by the way their triangles look. */
+
+import type { Camera } from "./model";
+
+const VERTEX = `#version 300 es
+layout(location = 0) in vec3 place;
+uniform mat3 turn;
+uniform vec3 middle;
+uniform vec3 scale;
+out vec3 seen;
+void main() {
+  seen = (place - middle) * turn;
+  gl_Position = vec4(seen * scale * vec3(1.0, 1.0, -1.0), 1.0);
+}`;
+
+const FRAGMENT = `#version 300 es
+precision highp float;
+uniform vec3 base;
+uniform vec3 line;
+uniform float radius;
+in vec3 seen;
+out vec4 colour;
+void main() {
+  vec3 normal = normalize(cross(dFdx(seen), dFdy(seen)));
+  float near = 0.5 + 0.5 * clamp(seen.z / radius, -1.0, 1.0);
+  colour = vec4(mix(line, base, 0.2 + 0.4 * abs(normal.z) + 0.4 * near), 1.0);
+}`;
+
+function built(gl: WebGL2RenderingContext): WebGLProgram {
+  const program = gl.createProgram();
+  for (const [kind, text] of [
+    [gl.VERTEX_SHADER, VERTEX],
+    [gl.FRAGMENT_SHADER, FRAGMENT],
+  ] as const) {
+    const shader = gl.createShader(kind);
+    if (!shader) throw new Error("no shader");
+    gl.shaderSource(shader, text);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
+    throw new Error(gl.getProgramInfoLog(program) ?? "the robot's program does not link");
+  }
+  return program;
+}
+
+/** #rrggbb as parts of one; the build shortens some to #rgb. */
+export function parts(colour: string): [number, number, number] {
+  const full = colour.length === 4 ? colour.replace(/[^#]/g, "$&$&") : colour;
+  return [1, 3, 5].map((k) => Number.parseInt(full.slice(k, k + 2), 16) / 255) as [number, number, number];
+}
+
+/** Paints triangles, the nearer over the farther. */
+export class Solids {
+  private readonly program: WebGLProgram;
+  private count = 0;
+
+  constructor(private readonly gl: WebGL2RenderingContext) {
+    this.program = built(gl);
+    gl.useProgram(this.program);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 12, 0);
+    gl.enable(gl.DEPTH_TEST);
+  }
+
+  /** Corners of all triangles, x0, y0, z0, … */
+  set(corners: readonly number[]): void {
+    this.count = corners.length / 3;
+    this.gl.bufferData(this.gl.ARRAY_BUFFER, new Float32Array(corners), this.gl.STATIC_DRAW);
+  }
+
+  paint(camera: Camera, base: string, line: string): void {
+    const { gl, program } = this;
+    const at = (name: string) => gl.getUniformLocation(program, name);
+    const { scale, width, height, radius } = camera;
+    gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
+    gl.uniformMatrix3fv(at("turn"), false, camera.matrix);
+    gl.uniform3fv(at("middle"), camera.middle);
+    gl.uniform3f(at("scale"), (2 * scale) / width, (2 * scale) / height, 0.9 / radius);
+    gl.uniform1f(at("radius"), radius);
+    gl.uniform3fv(at("base"), parts(base));
+    gl.uniform3fv(at("line"), parts(line));
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.drawArrays(gl.TRIANGLES, 0, this.count);
+  }
+}

@@ -1,0 +1,51 @@
+/** The page of a robot: from metres to pixels, whichever way it is turned. */
+
+import { describe, expect, it } from "vitest";
+import { cameraOf, isFacing, toPicture } from "../src/robot/model";
+import { parts } from "../src/robot/solids";
+
+const ENDS = [-1, -1, -1, 1, 1, 1];
+
+describe("a camera", () => {
+  it("sees all of a robot from everywhere", () => {
+    for (const turn of [0, 1, 2, 3, 4, 5, 6]) {
+      for (const tilt of [0.05, 0.9, 1.6, 3.0]) {
+        const camera = cameraOf(ENDS, { turn, tilt }, 300, 200);
+        for (let corner = 0; corner < 8; corner++) {
+          const [x, y, z] = [1, 2, 4].map((bit) => (corner & bit ? 1 : -1));
+          const [px, py] = toPicture(camera, x, y, z);
+          expect(px).toBeGreaterThan(0);
+          expect(px).toBeLessThan(300);
+          expect(py).toBeGreaterThan(0);
+          expect(py).toBeLessThan(200);
+        }
+      }
+    }
+  });
+
+  it("looks down on what faces up, and has its middle in the middle", () => {
+    const camera = cameraOf(ENDS, { turn: 0.3, tilt: 0.2 }, 300, 200);
+    expect(isFacing(camera, [0, 0, 1])).toBe(true);
+    expect(isFacing(camera, [0, 0, -1])).toBe(false);
+    expect(toPicture(camera, 0, 0, 0)).toEqual([150, 100, 0]);
+  });
+
+  it("keeps lengths across the line of sight", () => {
+    const camera = cameraOf(ENDS, { turn: 0, tilt: 0 }, 300, 200);
+    const [ax] = toPicture(camera, 0, 0, 0);
+    const [bx] = toPicture(camera, 0.5, 0, 0);
+    expect(bx - ax).toBeCloseTo(0.5 * camera.scale);
+  });
+
+  it("does without any skin", () => {
+    expect(toPicture(cameraOf([], { turn: 0, tilt: 1 }, 300, 200), 0, 0, 0)).toEqual([150, 100, 0]);
+  });
+});
+
+describe("a colour", () => {
+  it("is the same however the build has written it", () => {
+    expect(parts("#ffffff")).toEqual([1, 1, 1]);
+    expect(parts("#fff")).toEqual([1, 1, 1]);
+    expect(parts("#0f8")).toEqual(parts("#00ff88"));
+  });
+});
