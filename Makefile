@@ -150,7 +150,7 @@ LOCKS := uv runtime dev docs bench node
 lock-uv:
 	@$(COMPILE) requirements/uv.in -o requirements/uv.txt
 lock-runtime:
-	@$(COMPILE) pyproject.toml requirements/build.in -o requirements/runtime.txt
+	@$(COMPILE) pyproject.toml --extra plot requirements/build.in -o requirements/runtime.txt
 lock-dev:
 	@$(COMPILE) pyproject.toml --extra mesh --extra plot --extra parquet --extra hdf5 --extra foxglove --extra mqtt --extra lsl --extra zenoh --extra ros2 --extra cluster requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
 lock-docs:

@@ -80,12 +80,6 @@ def design(
         own = resolution_bounds(chosen, demand, _PLACES, _part(bar, 0, jobs))
         rows = _compared(chosen, demand, counts, patterns.split(","), bar)
     radius_m = demand.on(chosen.mesh())
-    if out is not None:
-        title = (
-            f"{chosen.name}: one frame, press of radius {1e3 * radius_m:.0f} mm taking "
-            f"{100 * depth:.0f} %; noticed: {100 * found:g} % found, {false_alarm:g} false alarms"
-        )
-        write_promise(out, chosen, own, title, overwrite=force)
     say_headroom(own.headroom)
     document = {
         "skin": chosen.name,
@@ -96,6 +90,12 @@ def design(
         "compared": rows,
     }
     tell(document, _lines(document), json=json)
+    if out is not None:  # last: what may fail must not cost the table
+        title = (
+            f"{chosen.name}: one frame, press of radius {1e3 * radius_m:.0f} mm taking "
+            f"{100 * depth:.0f} %; noticed: {100 * found:g} % found, {false_alarm:g} false alarms"
+        )
+        write_promise(out, chosen, own, title, overwrite=force)
 
 
 def _check_size(radius: float | None, skin: Skin) -> None:

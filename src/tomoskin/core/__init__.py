@@ -18,7 +18,8 @@ from tomoskin.core.errors import (
     TomoskinError,
     WireError,
 )
-from tomoskin.core.outputs import MAGIC, RECORDING, Output, check_outputs
+from tomoskin.core.extras import install_hint
+from tomoskin.core.outputs import MAGIC, RECORDING, Output, StrPath, check_outputs
 from tomoskin.core.stages import finished, reach, watch_stages
 from tomoskin.core.units import DIMENSIONS, parse_quantity
 from tomoskin.core.written import write_text, written
@@ -104,6 +105,7 @@ __all__ = [
     "SinkError",
     "SkinError",
     "SourceError",
+    "StrPath",
     "TomoskinError",
     "Touch",
     "Voltages",
@@ -113,6 +115,7 @@ __all__ = [
     "electrode_table",
     "encode_json",
     "finished",
+    "install_hint",
     "kept",
     "load_arrays",
     "machine_memory",

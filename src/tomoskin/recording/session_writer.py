@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tomoskin.core import Event, Frame, Image, PixelMap, Touch, encode_json, plain_values
+from tomoskin.core import Event, Frame, Image, PixelMap, StrPath, Touch, encode_json, plain_values
 from tomoskin.recording import channels
 from tomoskin.recording.foxglove import grid_message, log_message, scene_message
 from tomoskin.recording.layout import (
@@ -71,8 +71,10 @@ class SessionWriter(MessageLog):
         From every method: see :class:`MessageLog`.
     """
 
-    def __init__(self, path: Path, skin: Skin, *, epoch: float = 0.0, start: float = 0.0) -> None:
-        super().__init__(path, ABOUT, about_session(skin, epoch), epoch=epoch, start=start)
+    def __init__(
+        self, path: StrPath, skin: Skin, *, epoch: float = 0.0, start: float = 0.0
+    ) -> None:
+        super().__init__(Path(path), ABOUT, about_session(skin, epoch), epoch=epoch, start=start)
         self._start = start
         self.attach(SKIN_FILE, "application/toml", skin.to_toml().encode())
 

@@ -21,7 +21,7 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 from websockets.exceptions import InvalidState
 
-from tomoskin.core import DataError, TomoskinError
+from tomoskin.core import DataError, StrPath, TomoskinError
 from tomoskin.server import page_messages
 from tomoskin.server.access import AccessControl, AccessPolicy
 from tomoskin.server.folder import Folder
@@ -44,8 +44,9 @@ class ServerError(TomoskinError):
     """The page cannot be served: port in use, address not of this machine, page not built."""
 
 
-def check_page(static: Path = STATIC) -> None:
+def check_page(static: StrPath = STATIC) -> None:
     """Raise ServerError when the page has not been built."""
+    static = Path(static)
     if not (static / "index.html").is_file():
         raise ServerError(
             "the page has not been built", where="page", hint='"make live" builds and starts it'
@@ -79,10 +80,11 @@ def listen(host: str, port: int) -> socket.socket:
     return listener
 
 
-def application(hub: Hub, policy: AccessPolicy, static: Path = STATIC) -> ASGIApp:
+def application(hub: Hub, policy: AccessPolicy, static: StrPath = STATIC) -> ASGIApp:
     """ASGI application: the built page, ``/ws`` for each open page, ``/status`` for programs,
     ``/files/NAME`` for what is in the session folder."""
     # Whether Python knows the page's typeface depends on its version and on the machine's list.
+    static = Path(static)
     mimetypes.add_type("font/woff2", ".woff2")
 
     async def stream(websocket: WebSocket) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tomoskin.core import CHANGE, Event, Image, Output, SinkError, check_outputs, written
+from tomoskin.core import CHANGE, Event, Image, Output, SinkError, StrPath, check_outputs, written
 from tomoskin.recording import as_recorded, touch_colour, touch_width
 from tomoskin.sink.consumer import needed, options_of, port_of
 from tomoskin.sink.contact import Contacts
@@ -152,7 +152,7 @@ def open_rerun(argument: str) -> RerunSink:
     return RerunSink(target, naming)
 
 
-def write_rerun(job: Export, path: Path) -> None:
+def write_rerun(job: Export, path: StrPath) -> None:
     """Write what the sink would have sent of a session; an image every ``job.every`` s.
 
     Raises
@@ -162,6 +162,7 @@ def write_rerun(job: Export, path: Path) -> None:
     SinkError
         When Rerun is not installed.
     """
+    path = Path(path)
     rerun, prepared = needed("rerun", "rerun"), as_recorded(job.session)
     stream = recorded_stream(job, prepared)
     with written(path, overwrite=job.overwrite) as part:
