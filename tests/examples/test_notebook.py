@@ -27,4 +27,5 @@ def test_the_notebook_runs_and_finds_the_finger(
     plt.close("all")
     assert names["d"].x == pytest.approx(0.03, abs=0.005)
     assert names["d"].y == pytest.approx(0.02, abs=0.005)
-    assert names["speed"] == pytest.approx(0.08, rel=0.15)
+    assert names["x"][0] < -15
+    assert names["x"][-1] > 15
