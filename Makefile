@@ -45,7 +45,7 @@ bench: native  ## all in one table, beside plain scipy and, where it is installe
 soak: native  ## an hour of a bad day, compressed: faults, a sleeping page, a hanging sink
 	@$(VENV)/bin/tomoskin bench soak $(ARGS)
 
-bench-docs: native page  ## measure the table of all and the forward engine anew into docs/benchmarks.md; ten minutes
+bench-docs: native page  ## measure the table of all and the forward engine again into docs/benchmarks.md; ten minutes
 	@$(PIP) install --require-hashes --requirement requirements/bench.txt  # pyEIT has no wheel
 	@$(PY) scripts/native.py reference
 	@$(VENV)/bin/tomoskin bench --into docs/benchmarks.md
@@ -58,7 +58,7 @@ docs: dev $(VENV)/.docs  ## the documentation, in build/docs; a warning is an er
 board: dev  ## the circuit boards: rules, then netlists, bills, Gerbers, pictures, zip; needs KiCad 9
 	@$(PY) hardware/fabricate.py $(ARGS)
 
-gallery: native  ## run the examples anew into docs/gallery.md; two minutes
+gallery: native  ## run the examples again into docs/gallery.md; two minutes
 	@$(PY) docs/make_gallery.py
 
 lint: style types page-check engine-check  ## ruff, mypy, the page's types, and the native engine's where Rust is installed

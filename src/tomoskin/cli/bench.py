@@ -39,7 +39,7 @@ def bench(
     ] = None,
     into: Annotated[
         Path | None,
-        typer.Option(help="Markdown file whose part of that name is written anew."),
+        typer.Option(help="Markdown file whose part of that name is written again."),
         Otherwise("a part between two marks is replaced, which is what it is for"),
     ] = None,
     list_: Annotated[bool, typer.Option("--list", help="List them, and measure nothing.")] = False,

@@ -143,7 +143,7 @@ def calibrate_states(
 def _what_of(
     name: str | None, path: Path, old: Calibration[FrameClassifier] | None
 ) -> tuple[Skin | None, Pattern | None]:
-    """The skin, where there is one, and the table of rows where it is known beforehand."""
+    """The skin, where there is one, and the table of rows where it is known before."""
     from tomoskin.cli.choices import skin_if_any
 
     skin = skin_if_any(name, path)
