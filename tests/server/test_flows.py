@@ -217,7 +217,7 @@ def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
     assert told["playing"] == "run.mcap"
     assert {f["name"] for f in told["files"]} >= {"run.mcap", "run.npz", "run-touches.csv"}
     page.ask("flow_begin", kind="touch")
-    assert "nobody can press a recording" in page.told("error")["message"]
+    assert "a recording cannot be pressed" in page.told("error")["message"]
     page.ask("live")
     assert page.told("scene")["source"] == "twin of textile-disc-8"
     assert page.told("state")["replay"] is None

@@ -64,7 +64,7 @@ def touch(
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Learn where a touch is from presses at known places."""
+    """Learn where a touch is from presses at known positions."""
     import numpy as np
 
     from tomoskin.core import DataError

@@ -100,8 +100,8 @@ def calibrate_states(
         list[str] | None,
         typer.Option(
             metavar="NAME=A:B",
-            help="Frames A to B-1 show this state; once for each. Without it the file's own "
-            "state, or flags.",
+            help="Label: frames A to B-1 show this state. May be repeated. Without it the file's "
+            "own state or flags count.",
         ),
     ] = None,
     onto: Annotated[

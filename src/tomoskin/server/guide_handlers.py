@@ -61,7 +61,7 @@ class GuideHandlers:
 
     def _begin(self, kind: FlowKind) -> None:
         if self._hub.runner.replay is not None:
-            raise WireError("nobody can press a recording: go back to live first")
+            raise WireError("a recording cannot be pressed: go back to live first")
         self._leave()
         flow = self._flow = PressFlow(kind, self._hub.runner.prepared)
         loop = asyncio.get_running_loop()
