@@ -18,7 +18,6 @@ from tomoskin.core.errors import (
     TomoskinError,
     WireError,
 )
-from tomoskin.core.extras import install_hint
 from tomoskin.core.outputs import MAGIC, RECORDING, Output, StrPath, check_outputs
 from tomoskin.core.stages import finished, reach, watch_stages
 from tomoskin.core.units import DIMENSIONS, parse_quantity
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
     from tomoskin.core.cache import kept
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
+    from tomoskin.core.extras import install_hint
     from tomoskin.core.json_bytes import encode_json, plain_values
     from tomoskin.core.memory import check_fits, machine_memory, most_bytes
     from tomoskin.core.records import (
@@ -61,6 +61,7 @@ _HOME = {
     "MOST_ELECTRODES": "typed_arrays",
     "electrode_table": "typed_arrays",
     "encode_json": "json_bytes",
+    "install_hint": "extras",
     "kept": "cache",
     "load_arrays": "archive",
     "machine_memory": "memory",
@@ -73,7 +74,7 @@ _HOME = {
     "unpack_arrays": "archive",
     "whole_number": "typed_arrays",
 }
-"""Where names live that need numpy, if not in ``records``: loaded when they are first asked for."""
+"""Where names live that need more, if not in ``records``: loaded when they are first asked for."""
 
 __all__ = [
     "AMOUNT",
