@@ -45,7 +45,7 @@ bench: native  ## all in one table, beside plain scipy and, where it is installe
 soak: native  ## an hour of a bad day, compressed: faults, a sleeping page, a hanging sink
 	@$(VENV)/bin/tomoskin bench soak $(ARGS)
 
-bench-docs: native page  ## measure the table of all and the forward engine anew into docs/benchmarks.md; ten minutes
+bench-docs: native page  ## measure the table of all and the forward engine again into docs/benchmarks.md; ten minutes
 	@$(PIP) install --require-hashes --requirement requirements/bench.txt  # pyEIT has no wheel
 	@$(PY) scripts/native.py reference
 	@$(VENV)/bin/tomoskin bench --into docs/benchmarks.md
@@ -59,7 +59,7 @@ board: dev  ## the circuit boards: rules, then netlists, bills, Gerbers, picture
 	@$(PIP) install --no-deps --require-hashes --upgrade --target build/board/tools --requirement requirements/board.txt
 	@$(PY) hardware/fabricate.py $(ARGS)
 
-gallery: native  ## run the examples anew into docs/gallery.md; two minutes
+gallery: native  ## run the examples again into docs/gallery.md; two minutes
 	@$(PY) docs/make_gallery.py
 
 lint: style types page-check engine-check  ## ruff, mypy, the page's types, and the native engine's where Rust is installed
@@ -151,7 +151,7 @@ LOCKS := uv runtime dev docs bench node
 lock-uv:
 	@$(COMPILE) requirements/uv.in -o requirements/uv.txt
 lock-runtime:
-	@$(COMPILE) pyproject.toml requirements/build.in -o requirements/runtime.txt
+	@$(COMPILE) pyproject.toml --extra plot requirements/build.in -o requirements/runtime.txt
 lock-dev:
 	@$(COMPILE) pyproject.toml --extra mesh --extra plot --extra parquet --extra hdf5 --extra foxglove --extra mqtt --extra lsl --extra zenoh --extra ros2 --extra cluster requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
 lock-docs:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import is_dataclass
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import tomoskin
+from tomoskin import core, formats, recording
 
 
 @pytest.mark.parametrize("name", tomoskin.__all__)
@@ -91,3 +97,54 @@ def test_every_entry_point_leads_to_a_function() -> None:
         for name, value in tomllib.loads(text)["project"]["entry-points"][group].items():
             module, _, function = value.partition(":")
             assert callable(getattr(import_module(module), function)), name
+
+
+ROOMS = (
+    *("core", "mesh", "pattern", "skin", "forward", "inverse", "wire", "source", "signal", "touch"),
+    *("calibration", "pipeline", "twin", "emulator", "recording", "formats", "sink", "run"),
+)
+
+
+def functions(room: str) -> Iterator[tuple[str, Callable[..., object]]]:
+    """Public functions of a room, and public methods of its classes other than records."""
+    module = import_module(f"tomoskin.{room}")
+    for name in module.__all__:
+        thing = getattr(module, name)
+        if inspect.isfunction(thing):
+            yield name, thing
+        elif inspect.isclass(thing):
+            for key, value in vars(thing).items():
+                method = getattr(value, "__func__", value)
+                own = key == "__init__" and not is_dataclass(thing)
+                if inspect.isfunction(method) and (own or not key.startswith("_")):
+                    yield f"{name}.{key}", method
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_what_takes_a_path_takes_its_name_too(room: str) -> None:
+    """By the annotations: str is among them wherever Path is."""
+    asked = [
+        (name, annotation)
+        for name, function in functions(room)
+        for parameter in inspect.signature(function).parameters.values()
+        if re.search(r"\bPath\b", annotation := str(parameter.annotation))
+    ]
+    assert [name for name, annotation in asked if "str" not in annotation] == []
+
+
+def test_names_of_files_as_plain_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read and written by functions of several rooms."""
+    monkeypatch.chdir(tmp_path)
+    skin = tomoskin.Skin.load("textile-disc-8")
+    recording.SessionWriter("empty.mcap", skin).close()
+    assert recording.session_info("empty.mcap").frames == 0
+    assert tomoskin.Session("empty.mcap").skin.identity == skin.identity
+    assert formats.is_session("empty.mcap")
+    core.save_arrays("a.npz", {"a": np.arange(3)})
+    assert core.load_arrays("a.npz")["a"].tolist() == [0, 1, 2]
+    core.check_outputs([core.Output("b.csv", {".csv": "a table"})], inputs=["a.npz"])
+    assert formats.write_touches("b.csv", []) == 0
+    formats.write_vtu("c.vtu", skin.mesh(), {})
+    mesh = skin.mesh()
+    formats.write_picture("d.svg", mesh, [formats.Panel("", np.ones(len(mesh.cells)), ())], "S")
+    assert sorted(p.suffix for p in tmp_path.iterdir()) == [".csv", ".mcap", ".npz", ".svg", ".vtu"]

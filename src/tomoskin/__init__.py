@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tomoskin.calibration import Locator
+    from tomoskin.formats import plot
     from tomoskin.forward import ForwardModel
     from tomoskin.inverse import OneStep
     from tomoskin.mesh import Mesh
     from tomoskin.pattern import Pattern
+    from tomoskin.recording import Session
     from tomoskin.skin import Skin
 
 __version__ = "0.1.0"
@@ -21,11 +23,23 @@ _HOME = {
     "Mesh": "mesh",
     "OneStep": "inverse",
     "Pattern": "pattern",
+    "Session": "recording",
     "Skin": "skin",
+    "plot": "formats",
 }
 """Where each public name lives; it is imported when it is first asked for."""
 
-__all__ = ["ForwardModel", "Locator", "Mesh", "OneStep", "Pattern", "Skin", "__version__"]
+__all__ = [
+    "ForwardModel",
+    "Locator",
+    "Mesh",
+    "OneStep",
+    "Pattern",
+    "Session",
+    "Skin",
+    "__version__",
+    "plot",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -253,7 +253,7 @@ def test_presses_that_do_not_belong_together():
     before, during, force = measured(30, 1)
     with pytest.raises(DataError, match="20 or more presses"):
         ForceProcess.fit(before[:10], during[:10], force[:10])
-    with pytest.raises(DataError, match="not all alike"):
+    with pytest.raises(DataError, match="not all equal"):
         ForceProcess.fit(before, during, 0 * force + 1)
     with pytest.raises(DataError, match="expected dv of shape"):
         ForceProcess.fit(before, during, force).predict(before[:, 1:], during[:, 1:])

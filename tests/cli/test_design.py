@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tomoskin.cli import design
+from tomoskin.core import DataError
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -29,6 +31,33 @@ def test_a_map_and_a_comparison(tomoskin: Run, tmp_path: Path) -> None:
     assert "textile-disc-8: a press of radius 15 mm" in out
     assert "the same sheet otherwise" in out
     assert "8 electrodes, skip:3: " in out
+
+
+def test_without_matplotlib_it_says_so_before_the_work(
+    tomoskin: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def work(*_: object) -> None:
+        raise AssertionError("the work has begun")
+
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setattr("tomoskin.touch.resolution_bounds", work)
+    code, out, err = tomoskin("design", "--out", tmp_path / "map.png", "--electrodes", "")
+    assert (code, out) == (1, "")
+    assert "matplotlib writes it, and is not installed" in err
+    assert f"{sys.executable} -m pip install" in err
+
+
+def test_a_map_that_cannot_be_written_does_not_cost_the_table(
+    tomoskin: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise DataError("cannot be written: No space left on device")
+
+    monkeypatch.setattr("tomoskin.formats.write_promise", full)
+    code, out, err = tomoskin("design", "--out", tmp_path / "map.png", "--electrodes", "")
+    assert code == 1
+    assert "No space left" in err
+    assert "its place is missed by" in out
 
 
 def test_for_programs(tomoskin: Run) -> None:

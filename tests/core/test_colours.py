@@ -102,7 +102,7 @@ def test_matplotlib_has_the_same(scale):
 
 def test_without_matplotlib_it_says_what_to_do(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.colors", None)
-    with pytest.raises(DataError, match=r"need matplotlib.*tomoskin\[plot\]"):
+    with pytest.raises(DataError, match=r"need matplotlib.*pip install .*matplotlib"):
         CHANGE.colormap()
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from shapes import box, disc
-from tomoskin.core import DataError, FloatArray, Image
+from tomoskin.core import DataError, Detection, FloatArray, Image, Touch
 from tomoskin.formats import Display, Panel, circular_average, plot, write_picture
 from tomoskin.mesh import Mesh
 
@@ -94,6 +94,21 @@ def test_no_change_is_drawn_too() -> None:
     pytest.importorskip("matplotlib")
     figure = plot(image(np.zeros(len(mesh().cells))), mesh(), title="nothing")
     assert figure.axes[0].get_title() == "nothing"
+
+
+def test_a_plot_goes_on_axes_that_are_given_with_electrodes_touches_and_a_bar() -> None:
+    plt = pytest.importorskip("matplotlib.pyplot")
+    plt.switch_backend("agg")
+    figure, (left, right) = plt.subplots(1, 2)
+    detection = Detection(0.02, -0.03, 1e-3, 1e-3, 1e-4, -0.1, np.empty(0))
+    touch = Touch(1, "decrease", 0.0, detection)
+    drawn = plot(image(np.ones(len(mesh().cells))), mesh(), touches=[touch], ax=right)
+    plt.close(figure)
+    assert drawn is figure
+    assert not left.collections
+    texts = {text.get_text() for text in right.texts}
+    assert {f"E{n}" for n in range(1, len(mesh().electrodes) + 1)} | {"20, -30"} == texts
+    assert figure.axes[-1].get_ylabel() == "change of conductivity (S)"
 
 
 def test_a_volume_is_refused() -> None:

@@ -153,5 +153,5 @@ def test_no_scheduler(plan, monkeypatch):
 
 def test_without_dask_it_says_what_to_install(plan, monkeypatch):
     monkeypatch.setitem(sys.modules, "dask", None)
-    with pytest.raises(SourceError, match=r"pip install 'tomoskin\[cluster\]'"):
+    with pytest.raises(SourceError, match=r"-m pip install .*distributed"):
         list(on_cluster("tcp://127.0.0.1:1")(plan, [0]))

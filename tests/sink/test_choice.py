@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from tomoskin.core import SinkError
+from tomoskin.core import SinkError, install_hint
 from tomoskin.sink import make_sink, sink_names
 
 
@@ -85,4 +85,4 @@ def test_a_missing_extra_is_named(monkeypatch, spec, module, extra):
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(SinkError) as raised:
         make_sink(spec)
-    assert raised.value.hint == f"pip install 'tomoskin[{extra}]'"
+    assert raised.value.hint == install_hint(extra)

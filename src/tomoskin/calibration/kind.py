@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
@@ -26,6 +25,7 @@ from tomoskin.core import (
     IntArray,
     ModelError,
     PatternError,
+    StrPath,
     electrode_table,
     load_arrays,
     pack_arrays,
@@ -205,7 +205,7 @@ class Kind(Generic[M]):
         """A calibration of this kind, of the measurements of ``pattern``."""
         return Calibration(self, model, pattern, skin.name if skin else "")
 
-    def read(self, path: Path, progress: Progress = silent) -> Calibration[M]:
+    def read(self, path: StrPath, progress: Progress = silent) -> Calibration[M]:
         """Read a file of this kind and learn from its examples again.
 
         Raises
@@ -254,7 +254,7 @@ class Calibration(Generic[M]):
     pattern: Pattern
     skin_name: str = ""
 
-    def write(self, path: Path, *, overwrite: bool = False) -> None:
+    def write(self, path: StrPath, *, overwrite: bool = False) -> None:
         """Write the file; raises as :func:`tomoskin.core.written` does."""
         save_arrays(path, self._arrays(), overwrite=overwrite)
 

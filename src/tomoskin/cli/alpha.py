@@ -27,12 +27,12 @@ def alpha(
     skin: SkinArgument,
     recording: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Frames that the rules may look at."),
+        typer.Option(metavar="FILE", help="Frames that the criteria may look at."),
         Reads(),
     ] = None,
     reference: ReferenceOption = None,
     frames: FramesOption = None,
-    rule: Annotated[str | None, typer.Option(help="Only this rule.")] = None,
+    rule: Annotated[str | None, typer.Option(help="Only this criterion.")] = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="X.png", help="Where the curves are drawn."),
@@ -41,7 +41,8 @@ def alpha(
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Show what each rule chooses for alpha; with a recording, by its noise, frames and labels."""
+    """Show what each criterion chooses for alpha; with a recording, by its noise, frames and
+    labels."""
     from tomoskin.formats import write_choices
     from tomoskin.inverse import RULES, AlphaChoice, Spectrum, picard
     from tomoskin.pipeline import prepare

@@ -26,7 +26,7 @@ _FOLDER = Path(__file__).parents[3] / "benchmarks"
 
 def bench(
     name: Annotated[
-        str, typer.Argument(metavar="NAME", help="Which one; see --list.", show_default=True)
+        str, typer.Argument(metavar="NAME", help="Name of one part; see --list.", show_default=True)
     ] = "whole",
     data: Annotated[
         Path | None,
@@ -35,11 +35,13 @@ def bench(
     ] = None,
     cores: Annotated[
         int | None,
-        typer.Option(min=1, help="Processor cores that may be used: 1, unless it asks for more."),
+        typer.Option(
+            min=1, help="Processor cores to use: by default 1, or what the benchmark asks for."
+        ),
     ] = None,
     into: Annotated[
         Path | None,
-        typer.Option(help="Markdown file whose part of that name is written anew."),
+        typer.Option(help="Markdown file in which the part of that name is replaced."),
         Otherwise("a part between two marks is replaced, which is what it is for"),
     ] = None,
     list_: Annotated[bool, typer.Option("--list", help="List them, and measure nothing.")] = False,
@@ -47,8 +49,8 @@ def bench(
 ) -> None:
     """Run one benchmark and show its tables.
 
-    Of all in one table, or of one part. Two to three minutes for all; others take seconds to an
-    hour.
+    Without a name, all parts in one table: two to three minutes. Single parts take from seconds to
+    an hour.
     """
     from threadpoolctl import threadpool_limits
 

@@ -64,7 +64,7 @@ def touch(
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Learn where a touch is from presses at known places."""
+    """Learn where a touch is from presses at known positions."""
     import numpy as np
 
     from tomoskin.core import DataError
@@ -211,7 +211,7 @@ def _say(facts: dict[str, Any]) -> None:
     if facts["drift"] > _DRIFTED:
         typer.echo(
             f"the last presses are missed {facts['drift']:.1f} times as far as usual: "
-            "the skin has changed; press it anew"
+            "the skin has changed; press it again"
         )
     x, y = facts["next_press_mm"]
     typer.echo(f"the next press tells most at x {x:+.0f} mm, y {y:+.0f} mm")

@@ -35,16 +35,16 @@ def calibrate_bend(
         list[str] | None,
         typer.Option(
             metavar="DEG[@AXIS]=A:B",
-            help="Frames A to B-1 are bent so far, about an axis in this direction from x "
-            f"({_ALONG_Y:.0f} where it is left out); once for each. Without it the session's "
-            "own truth.",
+            help="Label: frames A to B-1 are bent by this angle, about an axis in this direction "
+            f"from x (default {_ALONG_Y:.0f}). May be repeated. Without it the session's own "
+            "truth counts.",
         ),
     ] = None,
     reference: ReferenceOption = None,
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Learn the bends of a skin, so that touches are told from them and angles are read."""
+    """Learn the bends of a skin: touches are then separated from them, and angles are read."""
     import numpy as np
 
     from tomoskin.calibration import BENDS, BendExamples, BendModel

@@ -47,11 +47,11 @@ def calibrate_force(
         list[str] | None,
         typer.Option(
             metavar="FORCE=A:B",
-            help="So much pressed in frames A to B-1; once for each. Without it the file's own "
-            "force_n.",
+            help="Label: this weight pressed in frames A to B-1. May be repeated. Without it the "
+            "file's own force_n counts.",
         ),
     ] = None,
-    unit: Annotated[Unit, typer.Option(help="Of the forces.")] = Unit.N,
+    unit: Annotated[Unit, typer.Option(help="Unit of the forces.")] = Unit.N,
     reference: ReferenceOption = None,
     force: ForceFlag = False,
     json: JsonFlag = False,

@@ -83,8 +83,8 @@ def calibrate_states(
         list[str] | None,
         typer.Option(
             metavar="NAME=A:B",
-            help="Frames A to B-1 show this state; once for each. Without it the file's own "
-            "state, or flags.",
+            help="Label: frames A to B-1 show this state. May be repeated. Without it the file's "
+            "own state or flags count.",
         ),
     ] = None,
     onto: Annotated[
@@ -126,7 +126,7 @@ def calibrate_states(
 def _what_of(
     name: str | None, path: Path, old: Calibration[FrameClassifier] | None
 ) -> tuple[Skin | None, Pattern | None]:
-    """The skin, where there is one, and the table of rows where it is known beforehand."""
+    """The skin, where there is one, and the table of rows where it is known before."""
     from tomoskin.cli.choices import skin_if_any
 
     skin = skin_if_any(name, path)

@@ -34,9 +34,9 @@ def calibrate_wiring(
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Find rotation, mirroring, swapped wires and polarity from a handful of presses.
+    """Find rotation, mirroring, swapped wires and polarity from some presses.
 
-    The result is a skin file whose electrodes are where the wires end: give it as --skin to any
+    The result is a skin file whose electrodes are where the wires end. Give it as --skin to any
     other command.
     """
     from tomoskin.calibration import solve_channel_mapping

@@ -43,28 +43,30 @@ def design(
     ] = None,
     radius: Annotated[
         str | None,
-        typer.Option(metavar='"15 mm"', help="Of the press; without it, 7.5 % of the sheet."),
+        typer.Option(
+            metavar='"15 mm"', help="Radius of the press; without it, 7.5 % of the sheet."
+        ),
     ] = None,
     depth: Annotated[
-        float, typer.Option(help="Part of the conductivity that the press takes.")
+        float, typer.Option(help="Part of the conductivity that the press takes away.")
     ] = 0.25,
     false_alarm: Annotated[
-        float, typer.Option(help="Chance of a false alarm at a place, in a frame.")
+        float, typer.Option(help="Chance of a false alarm at a position, in a frame.")
     ] = 1e-4,
     found: Annotated[float, typer.Option(help="Chance that a press is found in a frame.")] = 0.95,
     electrodes: Annotated[
-        str, typer.Option(metavar="N,N", help='To compare; none: "".')
+        str, typer.Option(metavar="N,N", help='Numbers of electrodes to compare; "" for none.')
     ] = _ELECTRODES,
     patterns: Annotated[
-        str, typer.Option(metavar="NAME,NAME", help="To compare, as in a skin file.")
+        str, typer.Option(metavar="NAME,NAME", help="Patterns to compare, named as in a skin file.")
     ] = _PATTERNS,
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
     """Bound what a skin can resolve, and compare it with variants.
 
-    Bounds the error of a press's place, and the faintest press, by the skin's own read-out. No
-    method can do better without more knowledge (Cramér–Rao); a good one comes near.
+    Bounds the error of a press's position, and the faintest press, by the skin's own read-out. No
+    method can do better without more knowledge (Cramér–Rao).
     """
     from tomoskin.formats import write_promise
     from tomoskin.skin import Skin
@@ -80,12 +82,6 @@ def design(
         own = resolution_bounds(chosen, demand, _PLACES, _part(bar, 0, jobs))
         rows = _compared(chosen, demand, counts, patterns.split(","), bar)
     radius_m = demand.on(chosen.mesh())
-    if out is not None:
-        title = (
-            f"{chosen.name}: one frame, press of radius {1e3 * radius_m:.0f} mm taking "
-            f"{100 * depth:.0f} %; noticed: {100 * found:g} % found, {false_alarm:g} false alarms"
-        )
-        write_promise(out, chosen, own, title, overwrite=force)
     say_headroom(own.headroom)
     document = {
         "skin": chosen.name,
@@ -96,6 +92,12 @@ def design(
         "compared": rows,
     }
     tell(document, _lines(document), json=json)
+    if out is not None:  # last: what may fail must not cost the table
+        title = (
+            f"{chosen.name}: one frame, press of radius {1e3 * radius_m:.0f} mm taking "
+            f"{100 * depth:.0f} %; noticed: {100 * found:g} % found, {false_alarm:g} false alarms"
+        )
+        write_promise(out, chosen, own, title, overwrite=force)
 
 
 def _check_size(radius: float | None, skin: Skin) -> None:

@@ -98,7 +98,7 @@ def configure(
         typer.Option(
             "--id",
             metavar="NAME",
-            help="Tells this board from others; at most 8 characters.",
+            help="Name of this board, of at most 8 characters.",
             callback=_eight_bytes,
         ),
     ] = None,
@@ -106,7 +106,8 @@ def configure(
         str | None, typer.Option(help="Built-in name or path: no current above its own.")
     ] = None,
 ) -> None:
-    """Write a board's current and id into its EEPROM, read them back; without either, say them."""
+    """Write a board's current and id into its EEPROM and read them back; without either, show
+    them."""
     from tomoskin.emulator import (
         check_current,
         read_identity,

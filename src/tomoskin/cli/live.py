@@ -48,23 +48,24 @@ def live(
     calibration: CalibrationsOption = None,
     folder: Annotated[
         Path,
-        typer.Option(
-            exists=True, file_okay=False, help="Where the page's files go and are looked for."
-        ),
+        typer.Option(exists=True, file_okay=False, help="Folder of the page's files."),
         Otherwise("what the page writes gets a name that is free"),
     ] = Path(),
     token_file: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Keeps the token, so that open pages find a server that was started again.",
+            help="File that keeps the token, so that open pages find a server that was started "
+            "again.",
         ),
         Otherwise("made where there is none, else only read"),
     ] = None,
     sink: SinkOption = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = 8765,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of the page; 0 takes a free one.")
+    ] = 8765,
     host: Annotated[
-        str, typer.Option(help="Address to listen on; others than this machine can reach it.")
+        str, typer.Option(help="Address to listen on; 0.0.0.0 lets other machines reach the page.")
     ] = "127.0.0.1",
     open_browser: Annotated[
         bool, typer.Option("--open", help="Open the page in the browser.")

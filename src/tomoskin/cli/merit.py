@@ -30,11 +30,12 @@ _FIGURES = ("amplitude", "position_error", "offset", "resolution", "deformation"
 def merit(
     skin: SkinArgument,
     towards: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Targets lie from the centre to electrode N.")
+        int,
+        typer.Option(min=1, metavar="N", help="Targets lie between the centre and electrode N."),
     ] = 1,
     greit: Annotated[
         float | None,
-        typer.Option(metavar="FIGURE", help="Also a GREIT operator of that noise figure."),
+        typer.Option(metavar="FIGURE", help="Also show a GREIT operator of that noise figure."),
     ] = None,
     out: Annotated[
         Path | None,

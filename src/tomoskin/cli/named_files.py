@@ -10,6 +10,7 @@ import functools
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
@@ -35,6 +36,15 @@ TABLE = {".csv": "a table"}
 CALIBRATION = {".npz": "a calibration"}
 SKIN = {".toml": "a skin file"}
 FIGURE = {".png": "a picture", ".pdf": "a figure", ".svg": "a drawing"}
+
+
+_PACKAGES = {
+    **dict.fromkeys((".png", ".pdf", ".svg", ".gif", ".mp4"), ("matplotlib", "plot")),
+    **dict.fromkeys((".parquet", ".lerobot"), ("pyarrow", "parquet")),
+    ".h5": ("h5py", "hdf5"),
+    ".rrd": ("rerun", "rerun"),
+}
+"""What an output of that ending is made by: the package, and the extra that brings it."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +87,8 @@ class Writes:
 def guarded(command: Callable[..., None]) -> Callable[..., None]:
     """The command; what it writes is looked at before it runs, against all that it is given.
 
-    Raises OutputError as :func:`tomoskin.core.check_outputs` does.
+    Raises OutputError as :func:`tomoskin.core.check_outputs` does, and DataError where the package
+    that would write is not installed.
     """
     written = dict(_written(command))
     if not written:
@@ -97,9 +108,23 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
         ]
         overwrite = given.get("force", False)
         check_outputs(outputs, inputs, overwrite=overwrite, consent="--force")
+        _check_packages(outputs)
         command(**given)
 
     return run
+
+
+def _check_packages(outputs: Iterable[Output]) -> None:
+    from tomoskin.core import DataError, install_hint
+
+    for output in outputs:
+        package, extra = _PACKAGES.get(output.path.suffix.lower(), ("", ""))
+        if package and find_spec(package) is None:
+            raise DataError(
+                f"{package} writes it, and is not installed",
+                where=f"{output.name} {output.path}".strip(),
+                hint=install_hint(extra),
+            )
 
 
 def _written(command: Callable[..., None]) -> Iterator[tuple[str, tuple[str, Writes]]]:

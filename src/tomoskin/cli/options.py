@@ -37,7 +37,9 @@ RecordingArgument = Annotated[
 LabelledArgument = Annotated[
     Path, typer.Argument(metavar="INPUT", help="Frames with labels: one touch each."), Reads()
 ]
-SourceOption = Annotated[str, typer.Option(help="twin, serial:PORT, replay:FILE@SPEED, …")]
+SourceOption = Annotated[
+    str, typer.Option(help="Where frames come from: twin, serial:PORT, replay:FILE@SPEED, …")
+]
 ReferenceOption = Annotated[
     str | None,
     typer.Option(
@@ -76,15 +78,15 @@ TimeConstantOption = Annotated[
     str | None,
     typer.Option(
         metavar="TIME",
-        help='How long an image lasts, such as "0.2 s", instead of the skin\'s; "0 s": each frame '
-        "by itself.",
+        help='Time constant of the images, such as "0.2 s", instead of the skin\'s; "0 s": each '
+        "frame by itself.",
     ),
 ]
 
 # How images are shown.
 
 PercentFlag = Annotated[
-    bool, typer.Option("--percent", help="Changes as a part of the skin's own conductivity.")
+    bool, typer.Option("--percent", help="Show changes as a part of the skin's own conductivity.")
 ]
 LimitOption = Annotated[
     float | None,

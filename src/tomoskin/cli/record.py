@@ -36,9 +36,9 @@ def record(
     source: SourceOption = "twin",
     seconds: Annotated[
         float | None,
-        typer.Option(help="How long; else until Ctrl-C or a replay's end."),
+        typer.Option(help="How long to record; without it until Ctrl-C or a replay's end."),
     ] = None,
-    frames: Annotated[int | None, typer.Option(min=1, help="How many frames.")] = None,
+    frames: Annotated[int | None, typer.Option(min=1, help="How many frames to record.")] = None,
     sink: SinkOption = None,
     json: JsonFlag = False,
 ) -> None:

@@ -88,7 +88,7 @@ def repair(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="NEW.mcap", help="Where to; without it FILE with .repaired in its name."
+            metavar="NEW.mcap", help="New file; without it FILE with .repaired in its name."
         ),
         Writes(RECORDING, _mended),
     ] = None,

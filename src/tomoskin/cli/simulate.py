@@ -40,7 +40,7 @@ def simulate(
     skin: NamedSkinOption = DEFAULT_SKIN,
     script: Annotated[
         Path | None,
-        typer.Option(metavar="X.toml", help="What happens; see docs/simulate.md."),
+        typer.Option(metavar="X.toml", help="Script of what happens (docs/simulate.md)."),
         Reads(),
     ] = None,
     out: Annotated[
@@ -50,13 +50,21 @@ def simulate(
     ],
     presses: Annotated[
         int | None,
-        typer.Option(min=1, metavar="N", help="Instead of a timeline, N labelled frames."),
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Make N labelled frames of random presses instead of a recording.",
+        ),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Same seed, same data; wins over the script's.")
+        int | None,
+        typer.Option(min=0, help="The same seed gives the same data; it overrides the script's."),
     ] = None,
     processes: Annotated[
-        int | None, typer.Option(min=1, help="For --presses; otherwise one a processor.")
+        int | None,
+        typer.Option(
+            min=1, help="For --presses: how many processes; by default one per processor."
+        ),
     ] = None,
     cluster: Annotated[
         str | None,

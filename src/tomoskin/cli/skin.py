@@ -83,7 +83,7 @@ def lay(
     out: Annotated[
         Path, typer.Option(metavar="X.toml", help="Where the skin file goes."), Writes(SKIN)
     ],
-    unit: Annotated[str, typer.Option(help="Of the file: mm, cm or m.")] = "mm",
+    unit: Annotated[str, typer.Option(help="Unit of the file: mm, cm or m.")] = "mm",
     like: Annotated[
         str, typer.Option(metavar="SKIN", help="Skin to take material, contacts and drive from.")
     ] = "textile-disc-16",

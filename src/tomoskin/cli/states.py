@@ -36,7 +36,7 @@ def states(
     skin: SameSkinOption = None,
     reference: ReferenceOption = None,
     ask: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Name the N frames whose label tells most.")
+        int, typer.Option(min=0, metavar="N", help="Name the N frames whose label would help most.")
     ] = 0,
     json: JsonFlag = False,
 ) -> None:

@@ -18,7 +18,7 @@ from tomoskin.core.errors import (
     TomoskinError,
     WireError,
 )
-from tomoskin.core.outputs import MAGIC, RECORDING, Output, check_outputs
+from tomoskin.core.outputs import MAGIC, RECORDING, Output, StrPath, check_outputs
 from tomoskin.core.stages import finished, reach, watch_stages
 from tomoskin.core.units import DIMENSIONS, parse_quantity
 from tomoskin.core.written import write_text, written
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
     from tomoskin.core.cache import cache_folder, kept
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
+    from tomoskin.core.extras import install_hint
     from tomoskin.core.json_bytes import encode_json, plain_values
     from tomoskin.core.memory import check_fits, machine_memory, most_bytes
     from tomoskin.core.records import (
@@ -61,6 +62,7 @@ _HOME = {
     "electrode_table": "typed_arrays",
     "encode_json": "json_bytes",
     "cache_folder": "cache",
+    "install_hint": "extras",
     "kept": "cache",
     "load_arrays": "archive",
     "machine_memory": "memory",
@@ -73,7 +75,7 @@ _HOME = {
     "unpack_arrays": "archive",
     "whole_number": "typed_arrays",
 }
-"""Where names live that need numpy, if not in ``records``: loaded when they are first asked for."""
+"""Where names live that need more, if not in ``records``: loaded when they are first asked for."""
 
 __all__ = [
     "AMOUNT",
@@ -105,6 +107,7 @@ __all__ = [
     "SinkError",
     "SkinError",
     "SourceError",
+    "StrPath",
     "TomoskinError",
     "Touch",
     "Voltages",
@@ -115,6 +118,7 @@ __all__ = [
     "electrode_table",
     "encode_json",
     "finished",
+    "install_hint",
     "kept",
     "load_arrays",
     "machine_memory",

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tomoskin.core.errors import EMPTY, DataError
 from tomoskin.core.memory import check_fits
+from tomoskin.core.outputs import StrPath
 from tomoskin.core.written import written
 
 _UNREADABLE = (
@@ -100,9 +101,9 @@ class Archive(Arrays):
             raise DataError(f"holds an array that cannot be read: {error}", where=where) from error
 
 
-def load_arrays(path: Path) -> Arrays:
+def load_arrays(path: StrPath) -> Arrays:
     """The arrays of a .npz file; raises as :class:`Archive` does."""
-    return Archive(path, str(path))
+    return Archive(Path(path), str(path))
 
 
 def unpack_arrays(data: bytes, where: str) -> Arrays:
@@ -117,7 +118,7 @@ def pack_arrays(arrays: Arrays) -> bytes:
     return file.getvalue()
 
 
-def save_arrays(path: Path, arrays: Arrays, *, overwrite: bool = False) -> None:
+def save_arrays(path: StrPath, arrays: Arrays, *, overwrite: bool = False) -> None:
     """Write a .npz file, the same bytes each time; raises as :func:`written` does."""
     with written(path, overwrite=overwrite) as part, part.open("wb") as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core.errors import DataError
+from tomoskin.core.extras import install_hint
 
 if TYPE_CHECKING:
     from matplotlib.colors import ListedColormap
@@ -44,8 +45,7 @@ class ColourScale:
         try:
             from matplotlib.colors import ListedColormap
         except ImportError as error:
-            hint = "pip install 'tomoskin[plot]'"
-            raise DataError("colour maps need matplotlib", hint=hint) from error
+            raise DataError("colour maps need matplotlib", hint=install_hint("plot")) from error
         return ListedColormap(self.table / 255, self.name)
 
 

@@ -10,6 +10,9 @@ from pathlib import Path
 
 from tomoskin.core.errors import OutputError
 
+StrPath = str | os.PathLike[str]
+"""What every public function takes for a file: its name, or its path."""
+
 MAGIC = b"\x89MCAP0\r\n"
 """What a session file begins with."""
 
@@ -38,10 +41,14 @@ class Output:
     name: str = ""
     makes_folders: bool = False
 
+    def __post_init__(self) -> None:
+        """Take its name too."""
+        object.__setattr__(self, "path", Path(self.path))
+
 
 def check_outputs(
     outputs: Iterable[Output],
-    inputs: Iterable[Path] = (),
+    inputs: Iterable[StrPath] = (),
     *,
     overwrite: bool = False,
     consent: str = "overwrite=True",
@@ -65,7 +72,7 @@ def check_outputs(
     OutputError
         For the first output with a fault.
     """
-    wanted, read = list(outputs), list(inputs)
+    wanted, read = list(outputs), list(map(Path, inputs))
     for number, output in enumerate(wanted):
         fault = (
             _fault_of_others(output, wanted[:number], read)

@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tomoskin.core.errors import DataError
-from tomoskin.core.outputs import Output, check_outputs, real_path
+from tomoskin.core.outputs import Output, StrPath, check_outputs, real_path
 
 
 @contextmanager
-def written(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
+def written(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
     """An empty file beside ``path``, of the same ending, that takes its place after the block.
 
     When the block raises, and at Ctrl-C, it is taken away, and what was at ``path`` stays as it
@@ -27,6 +27,7 @@ def written(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
     DataError
         When the disk refuses.
     """
+    path = Path(path)
     check_outputs([Output(path)], overwrite=overwrite)
     target = real_path(path)
     part = target.with_name(f".tomoskin-{secrets.token_hex(8)}{target.suffix}")
@@ -47,7 +48,7 @@ def written(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
         ) from error
 
 
-def write_text(path: Path, text: str, *, overwrite: bool = False) -> None:
+def write_text(path: StrPath, text: str, *, overwrite: bool = False) -> None:
     """Write ``text`` as UTF-8, complete or not at all; raises as :func:`written` does."""
     with written(path, overwrite=overwrite) as part:
         part.write_text(text, encoding="utf-8", newline="\n")

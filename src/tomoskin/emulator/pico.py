@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from tomoskin.core import SourceError, written
+from tomoskin.core import SourceError, StrPath, written
 from tomoskin.emulator.program import BUILD, FOLDER, IMAGES, make_firmware
 from tomoskin.emulator.uf2 import check_boot, pack_uf2, unpack_uf2
 
@@ -92,8 +92,9 @@ def build_pico_programs() -> PicoPrograms:
     return PicoPrograms(build_uf2(), _find_node())
 
 
-def write_uf2(uf2: bytes, drive: Path) -> None:
+def write_uf2(uf2: bytes, drive: StrPath) -> None:
     """Write ``uf2`` to the boot ``drive`` of a Pico; SourceError when either is another's."""
+    drive = Path(drive)
     unpack_uf2(uf2, "the file")
     about = drive / _ABOUT
     board = _board_of(about)
@@ -116,7 +117,7 @@ def write_uf2(uf2: bytes, drive: Path) -> None:
 _HINT = "hold BOOTSEL while you plug the Pico in: it shows itself as a drive, RPI-RP2"
 
 
-def find_boot_drive(roots: Iterable[Path] | None = None) -> Path:
+def find_boot_drive(roots: Iterable[StrPath] | None = None) -> Path:
     """The boot drive of the only Pico that waits for its firmware.
 
     Raises
@@ -124,7 +125,7 @@ def find_boot_drive(roots: Iterable[Path] | None = None) -> Path:
     SourceError
         When there is none, or more than one.
     """
-    tops = [Path(root) for root in _MOUNTS] if roots is None else list(roots)
+    tops = [Path(root) for root in (_MOUNTS if roots is None else roots)]
     found = [about.parent for top in tops for depth in _DEPTHS for about in top.glob(depth)]
     drives = [drive for drive in found if "RP2" in _board_of(drive / _ABOUT)]
     if len(drives) != 1:

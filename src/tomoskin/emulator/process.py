@@ -11,7 +11,7 @@ from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import IO, Protocol
 
-from tomoskin.core import FloatArray, SourceError
+from tomoskin.core import FloatArray, SourceError, StrPath
 from tomoskin.emulator.flash import BoardIdentity
 
 MOST_ELECTRODES = 32
@@ -73,19 +73,19 @@ class SkinMemory:
 
     def __init__(
         self,
-        path: Path,
+        path: StrPath,
         front: Front,
         resistance: FloatArray,
         faults: BoardFaults | None = None,
     ) -> None:
         """Make the file; ``resistance`` as in :meth:`write`; without ``faults``, none."""
-        self.path = path
+        self.path = Path(path)
         self._n = len(resistance)
         if self._n > MOST_ELECTRODES:
             raise SourceError(
                 f"expected at most {MOST_ELECTRODES} electrodes, got {self._n}", where="emulator"
             )
-        with path.open("w+b") as file:
+        with self.path.open("w+b") as file:
             file.truncate(_SIZE)
             self._map = mmap.mmap(file.fileno(), _SIZE)
         self._sequence = 0
@@ -126,12 +126,13 @@ class BoardProcess:
     """An emulated board; ``port`` is its serial port."""
 
     def __init__(
-        self, programs: BoardPrograms, memory: Path, current: float, *options: str | Path
+        self, programs: BoardPrograms, memory: StrPath, current: float, *options: str | Path
     ) -> None:
         """Power on. ``memory``: of the skin; ``current`` A: what its limiter is set to.
 
         ``options``: further ones of the emulator.
         """
+        memory = Path(memory)
         eeprom = memory.with_name("eeprom")
         eeprom.write_bytes(BoardIdentity(current, b"emulated").pack())
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process

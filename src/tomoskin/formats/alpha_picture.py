@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tomoskin.core import StrPath
 from tomoskin.formats.figure import new_figure, save_figure
 from tomoskin.inverse import AlphaChoice, Curve, Picard
 
@@ -21,7 +21,7 @@ _MOST = 30.0
 
 
 def write_choices(
-    path: Path,
+    path: StrPath,
     title: str,
     choices: Sequence[AlphaChoice],
     picard: Picard | None = None,

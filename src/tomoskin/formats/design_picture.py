@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tomoskin.core import AMOUNT, FloatArray
+from tomoskin.core import AMOUNT, FloatArray, StrPath
 from tomoskin.formats.figure import new_figure, save_figure
 from tomoskin.skin import Skin
 from tomoskin.touch import ResolutionBounds
@@ -20,7 +19,7 @@ _TICKS = (*_LEVELS, 0.3, 0.7, 1.5, 3.0, 4.0, 7.0, 15.0, 30.0, 70.0)
 
 
 def write_promise(
-    path: Path, skin: Skin, found: ResolutionBounds, title: str, *, overwrite: bool = False
+    path: StrPath, skin: Skin, found: ResolutionBounds, title: str, *, overwrite: bool = False
 ) -> None:
     """Draw both maps side by side, with the electrodes and, within 85 % of the way out, contours.
 

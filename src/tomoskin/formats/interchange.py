@@ -7,7 +7,6 @@ Keys: ``voltages`` (n_frames, n_meas) V, or ``dv``; ``drive`` (n_meas, 2) source
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from tomoskin.core import (
     Arrays,
     DataError,
+    StrPath,
     electrode_table,
     numbers,
     real_numbers,
@@ -58,7 +58,7 @@ def parse(arrays: Arrays, source: str) -> Recording:
     )
 
 
-def write_interchange(path: Path, recording: Recording, *, overwrite: bool = False) -> None:
+def write_interchange(path: StrPath, recording: Recording, *, overwrite: bool = False) -> None:
     """Write ``recording`` as an interchange file; raises as :func:`written` does."""
     arrays: dict[str, NDArray[Any]] = {
         "dv" if recording.is_change else "voltages": recording.voltages,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import Arrays, DataError, OutputError, load_arrays, save_arrays
+from tomoskin.core import Arrays, DataError, OutputError, StrPath, load_arrays, save_arrays
 
 IDENTITY = "identity"
 """Array that says of which set and shard a file is."""
@@ -22,29 +22,31 @@ _FIXED = ("drive", "measure", "reference")
 """Arrays that are the same in every shard."""
 
 
-def shard_path(folder: Path, shard: int) -> Path:
+def shard_path(folder: StrPath, shard: int) -> Path:
     """File of a shard."""
-    return folder / f"part-{shard:05d}.npz"
+    return Path(folder) / f"part-{shard:05d}.npz"
 
 
-def write_whole(path: Path, arrays: Mapping[str, NDArray[Any]], *, overwrite: bool = False) -> None:
+def write_whole(
+    path: StrPath, arrays: Mapping[str, NDArray[Any]], *, overwrite: bool = False
+) -> None:
     """:func:`save_arrays` into a folder that is made where it is not there."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise DataError(f"cannot be written: {error.strerror}", where=str(path)) from error
     save_arrays(path, arrays, overwrite=overwrite)
 
 
-def is_done(path: Path, identity: str, *, overwrite: bool = False) -> bool:
+def is_done(path: StrPath, identity: str, *, overwrite: bool = False) -> bool:
     """Whether the shard is there, whole, and the one of this ``identity``.
 
     A damaged shard, or one of the set with fewer frames, is to be made again. Raises OutputError
     for any other file, unless ``overwrite``.
     """
-    if not path.exists():
+    if not Path(path).exists():
         return False
-    found = _identity_in(path)
+    found = _identity_in(Path(path))
     if found.split()[:1] == identity.split()[:1]:
         return found == identity
     if found != _DAMAGED and not overwrite:
@@ -69,7 +71,7 @@ def _identity_in(path: Path) -> str:
         return _DAMAGED if f"{IDENTITY}.npy".encode() in path.read_bytes() else ""
 
 
-def join_shards(paths: Iterable[Path], path: Path, *, overwrite: bool = False) -> None:
+def join_shards(paths: Iterable[StrPath], path: StrPath, *, overwrite: bool = False) -> None:
     """One file of all shards, in their order.
 
     Raises

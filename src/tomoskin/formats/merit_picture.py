@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 
-from tomoskin.core import written
+from tomoskin.core import StrPath, written
 from tomoskin.formats.figure import new_figure, save_figure
 from tomoskin.inverse import Merit
 
@@ -35,7 +34,7 @@ COLUMNS = (
 )
 
 
-def write_merit(path: Path, found: Mapping[str, Merit], *, overwrite: bool = False) -> None:
+def write_merit(path: StrPath, found: Mapping[str, Merit], *, overwrite: bool = False) -> None:
     """Draw a panel per figure with a curve per operator, named by the keys of ``found``.
 
     Raises
@@ -58,7 +57,9 @@ def write_merit(path: Path, found: Mapping[str, Merit], *, overwrite: bool = Fal
     save_figure(path, figure, overwrite=overwrite)
 
 
-def write_merit_table(path: Path, found: Mapping[str, Merit], *, overwrite: bool = False) -> None:
+def write_merit_table(
+    path: StrPath, found: Mapping[str, Merit], *, overwrite: bool = False
+) -> None:
     """Write a CSV file of :data:`COLUMNS`, a row for each operator and target.
 
     Raises as :func:`written` does.

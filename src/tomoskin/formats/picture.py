@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import CHANGE, DataError, FloatArray, Image, Touch
+from tomoskin.core import CHANGE, DataError, FloatArray, Image, StrPath, Touch
 from tomoskin.formats.display import Display
 from tomoskin.formats.figure import new_figure, save_figure
 from tomoskin.mesh import Mesh
@@ -33,7 +32,7 @@ class Panel:
 
 
 def write_picture(
-    path: Path,
+    path: StrPath,
     mesh: Mesh,
     panels: Sequence[Panel],
     unit: str,
@@ -55,7 +54,8 @@ def write_picture(
     DataError
         When matplotlib is not installed or the mesh is a volume, and as :func:`written` does.
     """
-    save_figure(path, _figure(path, mesh, panels, unit, limit), overwrite=overwrite)
+    sheet = _Sheet.of(str(path), mesh, panels, unit, limit)
+    save_figure(path, sheet.figure(), overwrite=overwrite)
 
 
 def plot(
@@ -65,8 +65,23 @@ def plot(
     touches: Sequence[Touch] = (),
     title: str = "",
     display: Display | None = None,
+    ax: Axes | None = None,
 ) -> Figure:
-    """Draw ``image`` on its ``mesh`` as a matplotlib figure, which a notebook shows by itself.
+    """Draw ``image`` on its ``mesh`` by matplotlib, with electrodes, touches and a colour bar.
+
+    Parameters
+    ----------
+    touches
+        Marked where they are, in mm.
+    display
+        Filter, unit and end of the colour scale; without it, the image as it is, to its extremes.
+    ax
+        Axes to draw on, such as one of ``pyplot.subplots()``; without them, a figure is made.
+
+    Returns
+    -------
+    Figure
+        The one that was drawn on; ``savefig`` writes it.
 
     Raises
     ------
@@ -76,44 +91,71 @@ def plot(
     how = Display() if display is None else display
     shown = how.shown(image, mesh)
     panel = Panel(title, shown.values, tuple(touches))
-    return _figure(Path("plot"), mesh, [panel], shown.unit, how.limit)
+    sheet = _Sheet.of("plot", mesh, [panel], shown.unit, how.limit)
+    if ax is None:
+        return sheet.figure()
+    figure = ax.get_figure(root=True)
+    assert figure is not None, "axes are part of a figure"
+    figure.colorbar(sheet.draw(ax, panel), ax=ax, **sheet.bar)
+    return figure
 
 
-def rendered(path: Path, mesh: Mesh, panel: Panel, unit: str, limit: float) -> NDArray[np.uint8]:
+def rendered(path: StrPath, mesh: Mesh, panel: Panel, unit: str, limit: float) -> NDArray[np.uint8]:
     """One panel as pixels (h, w, 3), for the film ``path``; raises as :func:`write_picture`."""
-    canvas: Any = _figure(path, mesh, [panel], unit, limit).canvas
+    canvas: Any = _Sheet.of(str(path), mesh, [panel], unit, limit).figure().canvas
     canvas.draw()
     return np.array(canvas.buffer_rgba())[..., :3]
 
 
-def _figure(
-    path: Path, mesh: Mesh, panels: Sequence[Panel], unit: str, limit: float | None
-) -> Figure:
-    if mesh.dimension != 2:
-        raise DataError(
-            "a volume cannot be drawn as a sheet",
-            where=str(path),
-            hint="take a slice with mesh.pixels(z=…), or write a .vtu file",
-        )
-    columns = min(len(panels), 4)
-    rows = -(-len(panels) // columns)
-    figure = new_figure(path, 3.2 * columns + 1.1, 3.3 * rows)
-    factor, label = (100.0, "%") if unit == "relative" else (1.0, unit)
-    greatest = max(float(np.abs(p.values).max()) for p in panels)
-    end = factor * (limit or greatest or 1.0)
-    axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
-    for ax, panel in zip(axes, panels, strict=False):
-        drawn = _draw(ax, mesh, replace(panel, values=factor * panel.values), end)
-    for ax in axes[len(panels) :]:
-        ax.set_visible(False)
-    figure.colorbar(
-        drawn,
-        ax=list(axes),
-        label=f"change of conductivity ({label})",
-        shrink=0.8,
-        extend="both" if factor * greatest > end * (1 + 1e-9) else "neither",
-    )
-    return figure
+@dataclass(frozen=True, eq=False)
+class _Sheet:
+    """Panels on one colour scale: ``factor`` makes the values those that the scale counts."""
+
+    name: str
+    mesh: Mesh
+    panels: Sequence[Panel]
+    factor: float
+    end: float
+    bar: Mapping[str, Any]
+
+    @classmethod
+    def of(
+        cls, name: str, mesh: Mesh, panels: Sequence[Panel], unit: str, limit: float | None
+    ) -> _Sheet:
+        if mesh.dimension != 2:
+            raise DataError(
+                "a volume cannot be drawn as a sheet",
+                where=name,
+                hint="take a slice with mesh.pixels(z=…), or write a .vtu file",
+            )
+        factor, label = (100.0, "%") if unit == "relative" else (1.0, unit)
+        greatest = max(float(np.abs(p.values).max()) for p in panels)
+        end = factor * (limit or greatest or 1.0)
+        beyond = factor * greatest > end * (1 + 1e-9)
+        bar = {
+            "label": f"change of conductivity ({label})",
+            "shrink": 0.8,
+            "extend": "both" if beyond else "neither",
+        }
+        return cls(name, mesh, panels, factor, end, bar)
+
+    def figure(self) -> Figure:
+        """All panels, in rows of four."""
+        panels = self.panels
+        columns = min(len(panels), 4)
+        rows = -(-len(panels) // columns)
+        figure = new_figure(self.name, 3.2 * columns + 1.1, 3.3 * rows)
+        axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+        for ax, panel in zip(axes, panels, strict=False):
+            drawn = self.draw(ax, panel)
+        for ax in axes[len(panels) :]:
+            ax.set_visible(False)
+        figure.colorbar(drawn, ax=list(axes), **self.bar)
+        return figure
+
+    def draw(self, ax: Axes, panel: Panel) -> Any:
+        """One panel on ``ax``; what a colour bar is made for."""
+        return _draw(ax, self.mesh, replace(panel, values=self.factor * panel.values), self.end)
 
 
 def _draw(ax: Axes, mesh: Mesh, panel: Panel, limit: float) -> Any:

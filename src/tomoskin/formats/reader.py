@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import EMPTY, MAGIC, Arrays, DataError, load_arrays
+from tomoskin.core import EMPTY, MAGIC, Arrays, DataError, StrPath, load_arrays
 from tomoskin.formats import interchange
 from tomoskin.formats.imports import (
     csv_table,
@@ -57,7 +57,7 @@ _HDF5 = b"\x89HDF"
 _PICKLE = b"\x80"
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: StrPath) -> Recording:
     """Recording in ``path``: a session, an interchange file or a format that can be imported.
 
     Absurd values are excluded; its notes name them.
@@ -67,7 +67,7 @@ def read_recording(path: Path) -> Recording:
     DataError
         When the file cannot be read or is of no known kind; the message lists its keys.
     """
-    return _read(path).plausible()
+    return _read(Path(path)).plausible()
 
 
 def _read(path: Path) -> Recording:
@@ -81,9 +81,9 @@ def _read(path: Path) -> Recording:
     return _from_text(head, path)
 
 
-def is_session(path: Path) -> bool:
+def is_session(path: StrPath) -> bool:
     """Whether the file begins as a session does; DataError when it cannot be read."""
-    return _beginning(path).startswith(MAGIC)
+    return _beginning(Path(path)).startswith(MAGIC)
 
 
 def _from_arrays(arrays: Arrays, path: Path) -> Recording:

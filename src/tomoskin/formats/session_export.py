@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tomoskin.core import DataError
+from tomoskin.core import DataError, StrPath
 from tomoskin.formats.exports.hdf5 import write_hdf5
 from tomoskin.formats.exports.lerobot import write_lerobot
 from tomoskin.formats.exports.matlab import write_matlab
@@ -51,50 +51,50 @@ class Export:
     advance: Advance
     overwrite: bool = False
 
-    def npz(self, path: Path) -> None:
+    def npz(self, path: StrPath) -> None:
         """Write the interchange file."""
         write_interchange(path, recording_of(self.session), overwrite=self.overwrite)
 
-    def csv(self, path: Path) -> None:
+    def csv(self, path: StrPath) -> None:
         """Write a table of voltages."""
         write_csv(path, self.session, self.advance, overwrite=self.overwrite)
 
-    def parquet(self, path: Path) -> None:
+    def parquet(self, path: StrPath) -> None:
         """Write a table of voltages for data tools."""
         write_parquet(path, self.session, self.advance, overwrite=self.overwrite)
 
-    def hdf5(self, path: Path) -> None:
+    def hdf5(self, path: StrPath) -> None:
         """Write everything."""
         write_hdf5(path, self.session, self.advance, overwrite=self.overwrite)
 
-    def lerobot(self, path: Path) -> None:
+    def lerobot(self, path: StrPath) -> None:
         """Write a LeRobot dataset, a row every ``every`` s."""
         write_lerobot(path, self.session, self.every, self.advance)
 
-    def matlab(self, path: Path) -> None:
+    def matlab(self, path: StrPath) -> None:
         """Write EIDORS' structures."""
         skin = self.session.skin
         recording = recording_of(self.session)
         write_matlab(path, recording, skin.current, skin.n_electrodes, overwrite=self.overwrite)
 
-    def series(self, path: Path) -> None:
+    def series(self, path: StrPath) -> None:
         """Write a series of meshes with their images."""
         prepared = as_recorded(self.session)
         moments = ((r.host_time, r.image.values) for r in self._images(prepared))
-        listing = path.with_suffix(".pvd")
+        listing = Path(path).with_suffix(".pvd")
         write_series(listing, prepared.mesh, moments, overwrite=self.overwrite)
 
-    def film(self, path: Path) -> None:
+    def film(self, path: StrPath) -> None:
         """Write a film of the map."""
         prepared = as_recorded(self.session)
         unit, limit = prepared.operator.unit, colour_limit(prepared)
         pictures = (
             rendered(path, prepared.mesh, panel, unit, limit) for panel in self._panels(prepared)
         )
-        write = FILMS[path.suffix.lower()]
+        write = FILMS[Path(path).suffix.lower()]
         write(path, pictures, 1.0 / self.every, overwrite=self.overwrite)
 
-    def picture(self, path: Path) -> None:
+    def picture(self, path: StrPath) -> None:
         """Write a sheet of maps, evenly spread over the session."""
         prepared = as_recorded(self.session)
         panels = list(self._panels(prepared))
@@ -103,7 +103,7 @@ class Export:
         unit, limit = prepared.operator.unit, colour_limit(prepared)
         write_picture(path, prepared.mesh, some, unit, limit, overwrite=self.overwrite)
 
-    def touches(self, path: Path) -> None:
+    def touches(self, path: StrPath) -> None:
         """Write a table of the recorded touches."""
         rows, surface = list(scanned_touches(self.session)), self.session.skin.surface
         forces = any(t.detection.force is not None for _, _, touches in rows for t in touches)

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, Output, check_outputs, written
+from tomoskin.core import FloatArray, Output, StrPath, check_outputs, written
 from tomoskin.mesh import Mesh
 
 _VTK_TYPE = {3: 5, 4: 10}
@@ -21,7 +21,7 @@ _VTK_NAME = {"float64": "Float64", "int64": "Int64", "uint8": "UInt8"}
 
 
 def write_vtu(
-    path: Path, mesh: Mesh, fields: Mapping[str, FloatArray], *, overwrite: bool = False
+    path: StrPath, mesh: Mesh, fields: Mapping[str, FloatArray], *, overwrite: bool = False
 ) -> None:
     """Write ``fields``, each (n_cells,), as cell data of ``mesh``; raises as :func:`written`."""
     document = _document(mesh, fields)
@@ -29,15 +29,16 @@ def write_vtu(
         document.write(part, encoding="utf-8", xml_declaration=True)
 
 
-def series_files(path: Path) -> list[Path]:
+def series_files(path: StrPath) -> list[Path]:
     """``path`` (.pvd), and the parts of a series of its name that are there."""
+    path = Path(path)
     part = re.compile(rf"{re.escape(path.stem)}_\d{{6,}}\.vtu")
     beside = path.parent.iterdir() if path.parent.is_dir() else ()
     return [path, *sorted(file for file in beside if part.fullmatch(file.name))]
 
 
 def write_series(
-    path: Path,
+    path: StrPath,
     mesh: Mesh,
     moments: Iterable[tuple[float, FloatArray]],
     *,
@@ -48,6 +49,7 @@ def write_series(
     Returns the number of them; the field is called ``change``. All appear at the end, ``path``
     last. Raises as :func:`written` does, for each of :func:`series_files`.
     """
+    path = Path(path)
     check_outputs(map(Output, series_files(path)), overwrite=overwrite)
     root = Xml.Element("VTKFile", {"type": "Collection", "version": "1.0"})
     collection = Xml.SubElement(root, "Collection")

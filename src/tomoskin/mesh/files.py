@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import FloatArray, GeometryError, IntArray
+from tomoskin.core import FloatArray, GeometryError, IntArray, install_hint
 
 READERS = {".msh": "gmsh", ".vtu": "vtu", ".stl": "stl", ".obj": "obj", ".ply": "ply"}
 """meshio's reader for each ending."""
@@ -42,7 +42,7 @@ def parsed(file: Path) -> Any:
         reader = import_module(f"meshio.{name}")
     except ImportError as error:
         raise GeometryError(
-            "mesh files need meshio", where=str(file), hint="pip install 'tomoskin[mesh]'"
+            "mesh files need meshio", where=str(file), hint=install_hint("mesh")
         ) from error
     try:
         with np.errstate(over="ignore"):  # its test for binary STL multiplies text

@@ -6,6 +6,7 @@ from tomoskin.recording.blocks import (
     Block,
     Rows,
     all_blocks,
+    no_report,
     press_positions,
     read_session,
     recording_of,
@@ -42,6 +43,7 @@ from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.recording.replayed import advance, as_recorded, replayed
 from tomoskin.recording.robot_log import LogPart, RobotLog
 from tomoskin.recording.scanned import idle_count, scanned_touches
+from tomoskin.recording.session import Session
 from tomoskin.recording.session_reader import (
     SessionReader,
     end_time,
@@ -74,6 +76,7 @@ __all__ = [
     "Rows",
     "RunMessage",
     "RunSettings",
+    "Session",
     "SessionInfo",
     "SessionReader",
     "SessionWriter",
@@ -92,6 +95,7 @@ __all__ = [
     "indexed_frames",
     "log_message",
     "message_counts",
+    "no_report",
     "open_replay",
     "parse_replay",
     "press_positions",

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.core import DataError, FloatArray, IntArray, StrPath
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.recording.scanned import ScannedFrame, idle_count, scanned_frames
 from tomoskin.recording.session_reader import SessionReader, indexed_frames
@@ -91,7 +90,7 @@ def all_blocks(session: SessionReader, rows: Rows, advance: Advance = no_report)
         raise DataError(f"holds no frame of its skin{but}", where=str(session.path))
 
 
-def read_session(path: Path) -> Recording:
+def read_session(path: StrPath) -> Recording:
     """All frames of a session file as voltages; see :func:`recording_of`."""
     with SessionReader(path) as session:
         return recording_of(session)

@@ -9,6 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from tomoskin.core import StrPath
 from tomoskin.recording.blocks import Advance, no_report
 from tomoskin.recording.clock import ClockFit, ClockFitter
 from tomoskin.recording.layout import Mark, MarkedFrame
@@ -168,7 +169,7 @@ def _begun(counts: Sequence[int]) -> int:
     return sum(max(0, now - before) for before, now in pairwise([0, *counts]))
 
 
-def session_info(path: Path, advance: Advance = no_report) -> SessionInfo:
+def session_info(path: StrPath, advance: Advance = no_report) -> SessionInfo:
     """Read a whole session and say what is in it.
 
     Raises
@@ -176,6 +177,7 @@ def session_info(path: Path, advance: Advance = no_report) -> SessionInfo:
     DataError
         When the file cannot be read, is no session, or is damaged.
     """
+    path = Path(path)
     size = path.stat().st_size if path.is_file() else 0
     frames, clock = _Frames(), ClockFitter()
     with SessionReader(path) as session:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain, islice
-from pathlib import Path
 
-from tomoskin.core import Event, Frame
+from tomoskin.core import Event, Frame, StrPath
 from tomoskin.recording.layout import Mark, MarkedFrame
 from tomoskin.recording.session_reader import SessionReader, end_time, start_time
 from tomoskin.touch import Span, touch_spans
@@ -27,7 +26,7 @@ class Timeline:
     touches: tuple[Span, ...]
 
 
-def read_timeline(path: Path) -> Timeline:
+def read_timeline(path: StrPath) -> Timeline:
     """Timeline of a session; its touches are those that were recorded.
 
     Raises

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tomoskin.core import DataError, Event, Image, PixelMap, Touch
+from tomoskin.core import DataError, Event, Image, PixelMap, StrPath, Touch
 from tomoskin.pipeline import FrameResult
 from tomoskin.recording.clock import ClockFitter
 from tomoskin.recording.layout import Mark, MarkedFrame, Truth
@@ -98,11 +98,12 @@ class Recorder:
 
     def __init__(
         self,
-        path: Path,
+        path: StrPath,
         make: Callable[[], SessionWriter],
         pixels: PixelMap | None,
         say: Callable[[str, str], None],
     ) -> None:
+        path = Path(path)
         self.path, self.name = path, f"{path}:"
         self._make, self._pixels, self._say = make, pixels, say
         self._session: SessionWriter

@@ -15,7 +15,16 @@ from mcap import records
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Chunk, DataEnd, McapRecord, Metadata
 
-from tomoskin.core import EMPTY, MAGIC, DataError, Output, SkinError, check_outputs, written
+from tomoskin.core import (
+    EMPTY,
+    MAGIC,
+    DataError,
+    Output,
+    SkinError,
+    StrPath,
+    check_outputs,
+    written,
+)
 from tomoskin.recording.blocks import Advance, no_report
 from tomoskin.recording.channels import CHANNELS, SCHEMAS, TOPICS
 from tomoskin.recording.container import ContainerWriter
@@ -80,7 +89,7 @@ class Stretch(NamedTuple):
 
 
 def repair(
-    source: Path, target: Path, *, skin: Skin | None = None, advance: Advance = no_report
+    source: StrPath, target: StrPath, *, skin: Skin | None = None, advance: Advance = no_report
 ) -> Repaired:
     """Write every whole chunk of ``source`` to the new file ``target``, which appears at the end.
 
@@ -97,6 +106,8 @@ def repair(
         When the source cannot be read or nothing in it is whole, the target cannot be written, or
         the skin is lost and none is given.
     """
+    source = Path(source)
+    target = Path(target)
     check_outputs([Output(target)], [source])
     if not source.exists():
         raise DataError("there is no such file", where=str(source))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
-from tomoskin.core import DataError, Frame, Touch
+from tomoskin.core import DataError, Frame
 from tomoskin.pattern import Scan
 from tomoskin.recording.layout import Mark, MarkedFrame
 from tomoskin.recording.session_reader import SessionReader, indexed_frames, tick_rate
+from tomoskin.touch import TouchedFrame
 
 
 class ScannedFrame(NamedTuple):
@@ -46,17 +47,27 @@ def scanned_frames(session: SessionReader, scan: Scan) -> Iterator[ScannedFrame]
         )
 
 
-def scanned_touches(
-    session: SessionReader,
-) -> Iterator[tuple[int | None, float, tuple[Touch, ...]]]:
-    """(frame, time, touches) of the recorded touches; None and host time without their frame."""
-    keys = {(item.host_time, item.sequence) for item in session.touches()}
-    numbers: dict[tuple[float, int], tuple[int, float]] = {}
+FrameKey = tuple[float, int]
+"""Host time and sequence: they name a frame of a session."""
+
+
+def frame_numbers(
+    session: SessionReader, keys: Collection[FrameKey]
+) -> dict[FrameKey, tuple[int, float]]:
+    """Number and time of the frames of those ``keys``; without those that are not in the file."""
+    numbers: dict[FrameKey, tuple[int, float]] = {}
     scan = Scan.of(session.skin.pattern())
     for number, time, item in scanned_frames(session, scan) if keys else ():
         key = item.frame.host_time, item.frame.sequence
         if key in keys:
             numbers.setdefault(key, (number, time))
+    return numbers
+
+
+def scanned_touches(session: SessionReader) -> Iterator[TouchedFrame]:
+    """(frame, time, touches) of the recorded touches; None and host time without their frame."""
+    keys = {(item.host_time, item.sequence) for item in session.touches()}
+    numbers = frame_numbers(session, keys)
     for touched in session.touches():
         key = touched.host_time, touched.sequence
         yield *numbers.get(key, (None, touched.host_time)), touched.touches

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from tomoskin.core import DataError, Event, SkinError
+from tomoskin.core import DataError, Event, SkinError, StrPath
 from tomoskin.recording import channels
 from tomoskin.recording.container_reader import MEND, ContainerReader
 from tomoskin.recording.layout import (
@@ -55,9 +55,9 @@ class SessionReader(AbstractContextManager["SessionReader"]):
         When the file cannot be read, is no session, or is damaged; from every method.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.container = ContainerReader(path)
+    def __init__(self, path: StrPath) -> None:
+        self.path = Path(path)
+        self.container = ContainerReader(self.path)
         try:
             self.epoch = _epoch(self.container)
             self.skin = _skin(self.container)

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
-from tomoskin.core import Event, Frame, Image, PixelMap, Touch, encode_json, plain_values
+from tomoskin.core import Event, Frame, Image, PixelMap, StrPath, Touch, encode_json, plain_values
 from tomoskin.recording import channels
 from tomoskin.recording.foxglove import grid_message, log_message, scene_message
 from tomoskin.recording.layout import (
@@ -104,15 +104,15 @@ class SessionWriter:
 
     def __init__(
         self,
-        path: Path,
+        path: StrPath,
         skin: Skin,
         *,
         epoch: float = 0.0,
         start: float = 0.0,
         log: Log | None = None,
     ) -> None:
-        self.path, self._start = path, start
-        self._log = MessageLog(path, epoch=epoch, start=start) if log is None else log
+        self.path, self._start = Path(path), start
+        self._log = MessageLog(self.path, epoch=epoch, start=start) if log is None else log
         self._log.describe(ABOUT, about_session(skin, self._log.epoch))
         self.attach(SKIN_FILE, "application/toml", skin.to_toml().encode())
 

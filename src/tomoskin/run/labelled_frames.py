@@ -12,7 +12,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from tomoskin.core import Output, SourceError, check_outputs
+from tomoskin.core import Output, SourceError, StrPath, check_outputs, install_hint
 from tomoskin.formats import is_done, join_shards, shard_path, write_whole
 from tomoskin.twin import SetPlan, make_shard
 
@@ -37,7 +37,7 @@ class SetMade:
 
 def make_set(
     plan: SetPlan,
-    out: Path,
+    out: StrPath,
     workers: Workers,
     advance: Callable[[int, int], None],
     *,
@@ -64,6 +64,7 @@ def make_set(
     ScriptError
         When there is no room on the skin for what is to be drawn.
     """
+    out = Path(out)
     single = out.suffix.lower() == ".npz"
     if single:
         check_outputs([Output(out, makes_folders=True)], overwrite=overwrite)
@@ -127,7 +128,7 @@ def on_cluster(address: str) -> Workers:
             from dask import distributed  # noqa: PLC0415
         except ImportError as error:
             raise SourceError(
-                "needs Dask's distributed", where=address, hint="pip install 'tomoskin[cluster]'"
+                "needs Dask's distributed", where=address, hint=install_hint("cluster")
             ) from error
         try:
             client = distributed.Client(address, timeout=_PATIENCE)

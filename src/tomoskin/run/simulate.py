@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from tomoskin.core import DataError, Event, Frame
+from tomoskin.core import DataError, Event, Frame, StrPath
 from tomoskin.pattern import Scan
 from tomoskin.pipeline import REFERENCE_FRAMES
-from tomoskin.recording import Mark, SessionWriter
+from tomoskin.recording import Advance, Mark, SessionWriter, no_report
 from tomoskin.run.twin_control import described
 from tomoskin.skin import Skin
 from tomoskin.source import Configuration, Link, ScanSettings, Transport
@@ -50,10 +49,10 @@ class Simulated:
 def simulate(
     script: Script,
     skin: Skin,
-    out: Path,
+    out: StrPath,
     *,
     seed: int | None = None,
-    advance: Callable[[float, float], None],
+    advance: Advance = no_report,
 ) -> Simulated:
     """Run ``script`` on the twin of ``skin`` into the new session file ``out``.
 
@@ -77,6 +76,7 @@ def simulate(
     SourceError
         When the board cannot be brought to scan any more, for all the script's faults.
     """
+    out = Path(out)
     check_script(script, skin)
     chosen = script.seed if seed is None else seed
     settings = TwinSettings.preset(script.preset or skin.twin.preset, chosen)
@@ -127,7 +127,7 @@ class _Run:
         self._marks = sorted(script.marks, key=lambda mark: mark.at)
         self._frames = 0
 
-    def to_the_end(self, advance: Callable[[float, float], None]) -> Simulated:
+    def to_the_end(self, advance: Advance) -> Simulated:
         """Connect, idle for the lead-in, then follow the script."""
         script, clock = self._script, self._clock
         transport: Transport = self._wire
@@ -147,7 +147,7 @@ class _Run:
                 raise
             return Simulated(self._frames, link.frames.lost, script.duration + script.lead_in)
 
-    def _follow(self, link: Link, advance: Callable[[float, float], None]) -> None:
+    def _follow(self, link: Link, advance: Advance) -> None:
         script, clock = self._script, self._clock
         begin, last = clock.now() + script.lead_in, -script.lead_in
         while (time := clock.now() - begin) < script.duration:

@@ -17,7 +17,7 @@ from starlette.datastructures import Headers
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from tomoskin.core import DataError
+from tomoskin.core import DataError, StrPath
 
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
 """Names under which the server is always reached from this machine."""
@@ -126,7 +126,7 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def load_token(path: Path) -> str:
+def load_token(path: StrPath) -> str:
     """The token in ``path``, made there when the file does not exist.
 
     Raises
@@ -134,6 +134,7 @@ def load_token(path: Path) -> str:
     DataError
         When the file cannot be read or made, holds no token, or others may read it.
     """
+    path = Path(path)
     try:
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     except FileExistsError:

@@ -22,7 +22,7 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 from websockets.exceptions import InvalidState
 
-from tomoskin.core import DataError, TomoskinError
+from tomoskin.core import DataError, StrPath, TomoskinError
 from tomoskin.server import page_messages
 from tomoskin.server.access import AccessControl, AccessPolicy
 from tomoskin.server.folder import Folder
@@ -46,8 +46,9 @@ class ServerError(TomoskinError):
     """The page cannot be served: port in use, address not of this machine, page not built."""
 
 
-def check_page(static: Path = STATIC) -> None:
+def check_page(static: StrPath = STATIC) -> None:
     """Raise ServerError when the page has not been built."""
+    static = Path(static)
     if not (static / "index.html").is_file():
         raise ServerError(
             "the page has not been built", where="page", hint='"make live" builds and starts it'
@@ -81,10 +82,10 @@ def listen(host: str, port: int) -> socket.socket:
     return listener
 
 
-def application(hub: Hub, policy: AccessPolicy, static: Path = STATIC) -> ASGIApp:
+def application(hub: Hub, policy: AccessPolicy, static: StrPath = STATIC) -> ASGIApp:
     """ASGI application: the built page, ``/ws`` for each open page, ``/status`` for programs,
     ``/files/NAME`` for what is in the session folder."""
-    return _guarded([*_routes(hub), _page(static)], [hub], policy)
+    return _guarded([*_routes(hub), _page(Path(static))], [hub], policy)
 
 
 def robot_application(

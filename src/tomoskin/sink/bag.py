@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tomoskin import __version__
-from tomoskin.core import written
+from tomoskin.core import StrPath, written
 from tomoskin.recording import as_recorded
 from tomoskin.sink.cdr import encode_cdr
 from tomoskin.sink.naming import Naming
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _BETWEEN = "\n" + 80 * "=" + "\n"
 
 
-def write_bag(job: Export, path: Path) -> None:
+def write_bag(job: Export, path: StrPath) -> None:
     """Write the messages that the sink ``ros2`` would have sent; an image every ``job.every`` s.
 
     Raises
@@ -30,6 +30,7 @@ def write_bag(job: Export, path: Path) -> None:
     DataError, OutputError
         When the session cannot be replayed, or the file not be written.
     """
+    path = Path(path)
     from mcap.writer import CompressionType, Writer  # noqa: PLC0415 - no live run needs it
 
     prepared, naming = as_recorded(job.session), Naming()

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import entry_points
 from typing import Any
 
-from tomoskin.core import Event, SinkError, TomoskinError
+from tomoskin.core import Event, SinkError, TomoskinError, install_hint
 from tomoskin.pipeline import FrameResult
 from tomoskin.sink.sink import Item, Moment, Sink, Stream
 from tomoskin.sink.worker import Capacity, Consumer, Say, Worker
@@ -56,7 +56,7 @@ def needed(module: str, extra: str) -> Any:
         raise SinkError(
             f"needs {module.partition('.')[0]}: {error}",
             where=f"sink {extra}",
-            hint=f"pip install 'tomoskin[{extra}]'",
+            hint=install_hint(extra),
         ) from error
 
 

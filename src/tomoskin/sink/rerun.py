@@ -8,7 +8,7 @@ from uuid import uuid4
 
 import numpy as np
 
-from tomoskin.core import CHANGE, Event, Image, Output, SinkError, check_outputs, written
+from tomoskin.core import CHANGE, Event, Image, Output, SinkError, StrPath, check_outputs, written
 from tomoskin.recording import as_recorded, touch_colour, touch_width
 from tomoskin.sink.consumer import needed, options_of, port_of
 from tomoskin.sink.contact import Contacts
@@ -161,7 +161,7 @@ def open_rerun(argument: str) -> RerunSink:
     return RerunSink(target, naming)
 
 
-def write_rerun(job: Export, path: Path) -> None:
+def write_rerun(job: Export, path: StrPath) -> None:
     """Write what the sink would have sent of a session; an image every ``job.every`` s.
 
     Raises
@@ -171,6 +171,7 @@ def write_rerun(job: Export, path: Path) -> None:
     SinkError
         When Rerun is not installed.
     """
+    path = Path(path)
     rerun, prepared = needed("rerun", "rerun"), as_recorded(job.session)
     stream = recorded_stream(job, prepared)
     with written(path, overwrite=job.overwrite) as part:

@@ -7,7 +7,7 @@ from importlib.resources import files
 from os import PathLike, fspath
 from pathlib import Path
 
-from tomoskin.core import EMPTY, SkinError
+from tomoskin.core import EMPTY, SkinError, StrPath
 
 BUILT_IN = "built-in"
 """Source of the skins that come with tomoskin."""
@@ -49,11 +49,12 @@ def _missing(path: Path) -> SkinError:
     )
 
 
-def read_text(path: Path, what: str, most: int = 10_000_000) -> str:
+def read_text(path: StrPath, what: str, most: int = 10_000_000) -> str:
     """Text of ``what`` a person has written, of at most so many bytes.
 
     Raises SkinError for what is no such file, and what cannot be read as text.
     """
+    path = Path(path)
     where = str(path)
     try:
         if path.exists() and not path.is_file():

@@ -39,7 +39,7 @@ class InverseSettings(Section, section="inverse"):
     )
     correlation_length: float | None = key(
         Quantity("length", "mm", 0.1, 5000),
-        "With exponential and matern: how far a change is alike; without it a tenth of "
+        "With exponential and matern: how far a change is the same; without it a tenth of "
         "the sheet's extent.",
         default=None,
         effective=("prior", ("exponential", "matern")),

@@ -89,7 +89,7 @@ class ProtocolSession:
         """Set the board up again at a slower ``rate``, Bd: the line damages what it carries."""
         self._set_up(now, at=rate)
         return Event(
-            now, "rate", f"the line damages messages: the board is set up anew at {rate:,} Bd"
+            now, "rate", f"the line damages messages: the board is set up again at {rate:,} Bd"
         )
 
     def receive(self, message: Message, now: float) -> list[Frame | Event]:
@@ -184,7 +184,7 @@ class ProtocolSession:
                 hint="is its supply strong enough?",
             )
         self._set_up(now)
-        text = "the board has been reset or has missed the heartbeat: it is set up anew"
+        text = "the board has been reset or has missed the heartbeat: it is set up again"
         return [Event(now, "reset", text)] if was_running else []
 
     def _info(self, info: Info, now: float) -> None:
@@ -211,7 +211,7 @@ class ProtocolSession:
             # It hears the heartbeat but does not scan: its HELLO or FAULT was lost.
             self.is_silent = False
             self._set_up(now)
-            return [Event(now, "reset", "the board answers but does not scan: it is set up anew")]
+            return [Event(now, "reset", "the board answers but does not scan: it is set up again")]
         if pending is None or ack.request != pending.request:
             return []
         if ack.command != type_byte(type(pending)):

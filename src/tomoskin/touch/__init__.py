@@ -12,10 +12,12 @@ from tomoskin.touch.fit.spot import Response, Spots, spots_of
 from tomoskin.touch.region import Region
 from tomoskin.touch.segment import ImageNoise, Segmenter
 from tomoskin.touch.spans import Span, touch_spans
+from tomoskin.touch.table import ELAPSED, TouchedFrame, columns_of, touch_columns, touch_rows
 from tomoskin.touch.tracking.motion import STILL, TrackSettings
 from tomoskin.touch.tracking.tracker import TouchEvent, Tracker
 
 __all__ = [
+    "ELAPSED",
     "EXHAUSTIVE",
     "LIVE",
     "STILL",
@@ -31,14 +33,18 @@ __all__ = [
     "SpotModel",
     "Spots",
     "TouchEvent",
+    "TouchedFrame",
     "TrackSettings",
     "Tracker",
     "Variant",
     "Whitener",
+    "columns_of",
     "idle_covariance",
     "measured_covariance",
     "resolution_bounds",
     "spots_of",
+    "touch_columns",
+    "touch_rows",
     "touch_spans",
     "variants",
 ]

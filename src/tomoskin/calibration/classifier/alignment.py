@@ -65,7 +65,7 @@ class Alignment:
         why = "; ".join(self.reasons)
         return (
             f"the session cannot be aligned: {why}; {size}. Its frames are called unknown: "
-            "label ten of them (--ask 10 names the frames), or learn anew"
+            "label ten of them (--ask 10 names the frames), or learn again"
         )
 
 

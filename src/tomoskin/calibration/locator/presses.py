@@ -174,7 +174,7 @@ class Features:
         rows = np.flatnonzero(_changing(dv))
         if not len(rows):
             raise DataError(
-                f"expected data that change from press to press, got {len(dv)} alike presses"
+                f"expected data that change from press to press, got {len(dv)} equal presses"
             )
         used = dv[:, rows]
         scale = _scales(np.abs(used))

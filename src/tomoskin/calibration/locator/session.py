@@ -183,7 +183,7 @@ class SessionAlignment:
         if not self.holds:
             found.append(
                 "the session cannot be aligned with the calibration: touch all of the skin, press "
-                "ten known positions as well, or calibrate anew"
+                "ten known positions as well, or calibrate again"
             )
         return tuple(found)
 

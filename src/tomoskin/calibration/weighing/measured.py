@@ -126,7 +126,7 @@ class ForceProcess:
                 where=_WHERE,
             )
         if not np.isfinite(newtons).all() or np.ptp(newtons) == 0:
-            raise DataError("expected forces that are finite and not all alike", where=_WHERE)
+            raise DataError("expected forces that are finite and not all equal", where=_WHERE)
         blocks = {
             name: FeatureBlock.of(data, _COMPONENTS[name], is_change=name == "change")
             for name, data in _named(rest, pressed).items()

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 
-from tomoskin.core import DataError, Force, written
+from tomoskin.core import DataError, Force, StrPath, install_hint, written
 from tomoskin.recording import (
     Advance,
     Block,
@@ -27,7 +26,7 @@ _TOUCH = np.dtype(
 
 
 def write_hdf5(
-    path: Path, session: SessionReader, advance: Advance, *, overwrite: bool = False
+    path: StrPath, session: SessionReader, advance: Advance, *, overwrite: bool = False
 ) -> None:
     """Groups ``frames`` (one dataset a column), ``touches``, ``truth`` and ``events``.
 
@@ -42,9 +41,7 @@ def write_hdf5(
     try:
         import h5py
     except ImportError as error:
-        raise DataError(
-            "HDF5 needs h5py", where=str(path), hint="pip install 'tomoskin[hdf5]'"
-        ) from error
+        raise DataError("HDF5 needs h5py", where=str(path), hint=install_hint("hdf5")) from error
     rows = Rows.of(session)
     with written(path, overwrite=overwrite) as part, h5py.File(part, "w") as file:
         file.attrs["skin"] = session.skin.to_toml()

@@ -20,9 +20,11 @@ from tomoskin.core import (
     DataError,
     FloatArray,
     Output,
+    StrPath,
     Touch,
     check_outputs,
     encode_json,
+    install_hint,
     write_text,
 )
 from tomoskin.mesh import Surface
@@ -44,7 +46,7 @@ _COUNTERS = ("frame_index", "episode_index", "index", "task_index")
 Columns = dict[str, Any]
 
 
-def write_lerobot(path: Path, session: SessionReader, every: float, advance: Advance) -> None:
+def write_lerobot(path: StrPath, session: SessionReader, every: float, advance: Advance) -> None:
     """Write a row each ``every`` s, from the first frame with a reference on, into a new folder.
 
     Raises
@@ -62,13 +64,13 @@ def write_lerobot(path: Path, session: SessionReader, every: float, advance: Adv
         raise DataError(
             "LeRobot's format needs pyarrow",
             where=str(path),
-            hint="pip install 'tomoskin[parquet]'",
+            hint=install_hint("parquet"),
         ) from error
     rate = _rate(every, path)
     rows = _rows(session, rate, advance)
     statistics = {name: _statistics(values) for name, values in rows.items()}
     features = _features(session, rows)
-    with _folder(path) as part:
+    with _folder(Path(path)) as part:
         (part / "data/chunk-000").mkdir(parents=True)
         (part / "meta/episodes/chunk-000").mkdir(parents=True)
         pq.write_table(pa.table(_arrays(pa, rows)), part / "data" / _FILE)
@@ -80,7 +82,7 @@ def write_lerobot(path: Path, session: SessionReader, every: float, advance: Adv
             write_text(part / f"meta/{name}.json", encode_json(content).decode())
 
 
-def _rate(every: float, path: Path) -> int:
+def _rate(every: float, path: StrPath) -> int:
     rate = round(1 / every)
     if abs(rate * every - 1) > 1e-9:
         raise DataError(

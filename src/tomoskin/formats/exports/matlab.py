@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.io import savemat
 from scipy.sparse import csc_matrix
 
-from tomoskin.core import DataError, FloatArray, IntArray, written
+from tomoskin.core import DataError, FloatArray, IntArray, StrPath, written
 from tomoskin.signal import Recording
 
 _LARGEST = 2**31 - 1
@@ -17,7 +16,12 @@ _STIMULATION = [("stimulation", "O"), ("stim_pattern", "O"), ("meas_pattern", "O
 
 
 def write_matlab(
-    path: Path, recording: Recording, current: float, n_electrodes: int, *, overwrite: bool = False
+    path: StrPath,
+    recording: Recording,
+    current: float,
+    n_electrodes: int,
+    *,
+    overwrite: bool = False,
 ) -> None:
     """Write ``stimulation`` (structure array), ``vi`` (n_meas, n_frames) V, ``time_s``, ``idle``.
 

@@ -5,18 +5,17 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, written
+from tomoskin.core import DataError, StrPath, install_hint, written
 
 Pictures = Iterable[NDArray[np.uint8]]
 
 
-def write_gif(path: Path, pictures: Pictures, fps: float, *, overwrite: bool = False) -> None:
+def write_gif(path: StrPath, pictures: Pictures, fps: float, *, overwrite: bool = False) -> None:
     """Write pictures (h, w, 3) as a GIF that repeats.
 
     Raises
@@ -27,16 +26,14 @@ def write_gif(path: Path, pictures: Pictures, fps: float, *, overwrite: bool = F
     try:
         from PIL import Image
     except ImportError as error:
-        raise DataError(
-            "a GIF needs Pillow", where=str(path), hint="pip install 'tomoskin[plot]'"
-        ) from error
+        raise DataError("a GIF needs Pillow", where=str(path), hint=install_hint("plot")) from error
     images = (Image.fromarray(figure) for figure in pictures)
     first = next(images)
     with written(path, overwrite=overwrite) as part:
         first.save(part, "GIF", save_all=True, append_images=images, duration=1e3 / fps, loop=0)
 
 
-def write_mp4(path: Path, pictures: Pictures, fps: float, *, overwrite: bool = False) -> None:
+def write_mp4(path: StrPath, pictures: Pictures, fps: float, *, overwrite: bool = False) -> None:
     """Write pictures (h, w, 3) as H.264 through ffmpeg.
 
     Raises
@@ -69,7 +66,7 @@ class Film(Protocol):
     """What writes pictures (h, w, 3) as a film."""
 
     def __call__(
-        self, path: Path, pictures: Pictures, fps: float, *, overwrite: bool = False
+        self, path: StrPath, pictures: Pictures, fps: float, *, overwrite: bool = False
     ) -> None:
         """Raises DataError."""
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, written
+from tomoskin.core import DataError, StrPath, install_hint, written
 from tomoskin.formats.imports.csv_table import column_names
 from tomoskin.recording import (
     Advance,
@@ -42,7 +41,7 @@ class _Beside:
 
 
 def write_csv(
-    path: Path, session: SessionReader, advance: Advance, *, overwrite: bool = False
+    path: StrPath, session: SessionReader, advance: Advance, *, overwrite: bool = False
 ) -> None:
     """One line a frame, in the interchange table's columns: ``tomoskin image`` reads it again.
 
@@ -65,7 +64,7 @@ def write_csv(
 
 
 def write_parquet(
-    path: Path, session: SessionReader, advance: Advance, *, overwrite: bool = False
+    path: StrPath, session: SessionReader, advance: Advance, *, overwrite: bool = False
 ) -> None:
     """One row a frame: the columns beside, and ``voltages`` as a list of floats.
 
@@ -81,7 +80,7 @@ def write_parquet(
         import pyarrow.parquet as pq
     except ImportError as error:
         raise DataError(
-            "Parquet needs pyarrow", where=str(path), hint="pip install 'tomoskin[parquet]'"
+            "Parquet needs pyarrow", where=str(path), hint=install_hint("parquet")
         ) from error
     rows = Rows.of(session)
     n = rows.pattern.n_meas

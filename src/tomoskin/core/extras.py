@@ -1,0 +1,30 @@
+"""Packages that only some work needs: how a person installs those of an extra."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import PackageNotFoundError, requires
+
+
+def install_hint(extra: str) -> str:
+    """The command that installs what ``extra`` stands for, into the Python that runs.
+
+    It names the packages, not the extra: that works in a checkout too, whose version no index has.
+    """
+    names = " ".join(f'"{name}"' for name in _requirements(extra)) or f'"tomoskin[{extra}]"'
+    python = f'"{sys.executable}"' if " " in sys.executable else sys.executable
+    return f"{python} -m pip install {names}"
+
+
+def _requirements(extra: str) -> list[str]:
+    try:
+        listed = requires("tomoskin") or []
+    except PackageNotFoundError:
+        return []
+    parted = [line.partition(";") for line in listed]
+    return [name.strip() for name, _, marker in parted if _is_of(marker, extra)]
+
+
+def _is_of(marker: str, extra: str) -> bool:
+    words = marker.replace("'", '"').split()
+    return words == ["extra", "==", f'"{extra}"']
