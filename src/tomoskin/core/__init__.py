@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from tomoskin.core.memory import check_fits, machine_memory, most_bytes
     from tomoskin.core.records import (
         ComplexArray,
+        DeferredImage,
         Detection,
         Event,
         FloatArray,
@@ -93,6 +94,7 @@ __all__ = [
     "Force",
     "Frame",
     "GeometryError",
+    "DeferredImage",
     "Image",
     "IntArray",
     "ModelError",

@@ -6,6 +6,7 @@ SI units throughout; electrodes, measurements and cells are counted from 0.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -139,6 +140,29 @@ class Image:
                 hint="make the pixels from the mesh that the image was made on",
             )
         return pixels.spread(self.values)
+
+
+class DeferredImage(Image):
+    """An image whose values are computed when they are first asked for, in the thread that asks."""
+
+    __slots__ = ("_make", "_made")
+
+    def __init__(self, make: Callable[[], FloatArray], unit: str, mesh_id: str) -> None:
+        """``make`` returns the values, always the same."""
+        for name, value in {"_make": make, "unit": unit, "mesh_id": mesh_id}.items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "_made", None)
+
+    @property
+    def values(self) -> FloatArray:  # type: ignore[override]
+        """(n_cells,) see :class:`Image`."""
+        if self._made is None:
+            object.__setattr__(self, "_made", self._make())
+        made: FloatArray = self._made
+        return made
+
+    def __reduce__(self) -> tuple[type[Image], tuple[FloatArray, str, str]]:
+        return Image, (self.values, self.unit, self.mesh_id)
 
 
 @dataclass(frozen=True, slots=True)
