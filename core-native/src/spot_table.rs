@@ -244,14 +244,20 @@ impl WithSimd for Mix<'_> {
         let used = self.mixed.len() / MIXED;
         let whole = used - used % ABREAST;
         for first in (0..whole).step_by(ABREAST) {
-            self.lines_at::<ABREAST>(first).into_iter().enumerate().for_each(|(row, sums)| {
-                self.mixed[row * used + first..][..ABREAST].copy_from_slice(&sums);
-            });
+            self.lines_at::<ABREAST>(first)
+                .into_iter()
+                .enumerate()
+                .for_each(|(row, sums)| {
+                    self.mixed[row * used + first..][..ABREAST].copy_from_slice(&sums);
+                });
         }
         for first in whole..used {
-            self.lines_at::<1>(first).into_iter().enumerate().for_each(|(row, sums)| {
-                self.mixed[row * used + first] = sums[0];
-            });
+            self.lines_at::<1>(first)
+                .into_iter()
+                .enumerate()
+                .for_each(|(row, sums)| {
+                    self.mixed[row * used + first] = sums[0];
+                });
         }
     }
 }

@@ -145,7 +145,7 @@ class Image:
 class DeferredImage(Image):
     """An image whose values are computed when they are first asked for, in the thread that asks."""
 
-    __slots__ = ("_make", "_made")
+    __slots__ = ("_made", "_make")
 
     def __init__(self, make: Callable[[], FloatArray], unit: str, mesh_id: str) -> None:
         """``make`` returns the values, always the same."""
@@ -162,6 +162,7 @@ class DeferredImage(Image):
         return made
 
     def __reduce__(self) -> tuple[type[Image], tuple[FloatArray, str, str]]:
+        """What is pickled is a plain image: what makes it stays here."""
         return Image, (self.values, self.unit, self.mesh_id)
 
 

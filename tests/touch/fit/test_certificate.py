@@ -58,10 +58,12 @@ def test_no_more_is_wrong_than_is_certified() -> None:
     exact = ours.response.changes(list(spots[:, None]))
     sizes = np.linalg.norm(exact, axis=1)
     errors = np.linalg.norm(by_table(spots)[:, 0] - exact, axis=1)
-    said = np.array([
-        ours.reduced.error(spot[None], size[None], 0.0)
-        for spot, size in zip(spots, sizes, strict=True)
-    ])
+    said = np.array(
+        [
+            ours.reduced.error(spot[None], size[None], 0.0)
+            for spot, size in zip(spots, sizes, strict=True)
+        ]
+    )
     assert np.mean(errors <= said) >= 0.9
     assert np.median(said) < 6 * np.median(errors), "and not for want of saying much"
 

@@ -135,7 +135,7 @@ class Certificate:
 
 @dataclass(frozen=True, eq=False)
 class Rim:
-    """Where a sheet ends: points (n, 2) m, in a tree; and its ``radius``, a spot's median one, m."""
+    """Where a sheet ends: points (n, 2) m in a ``tree``; ``radius``: a spot's median one, m."""
 
     tree: cKDTree
     radius: float

@@ -188,7 +188,8 @@ def layout(response: Response, prior: SpotPrior) -> tuple[FloatArray, tuple[Posi
     low, high = prior.log_radii
     log_radii = np.linspace(low, high, 1 + math.ceil((high - low) / LOG_STEP))
     points = response.spots.mesh.points
-    return log_radii, tuple(PositionGrid.over(points, STEP * math.exp((low + r) / 2)) for r in log_radii)
+    steps = STEP * np.exp((low + log_radii) / 2)
+    return log_radii, tuple(PositionGrid.over(points, step) for step in steps.tolist())
 
 
 def _nodes(low: float, high: float) -> FloatArray:
