@@ -1,8 +1,6 @@
 //! What one spot does to the voltages, from a table of splines.
 
-use pulp::{Simd, WithSimd};
-
-use crate::instructions::narrow;
+use pulp::{Arch, Simd, WithSimd};
 
 /// Columns of a spot: x, y, logarithm of the radius, content.
 pub const PARAMETERS: usize = 4;
@@ -103,7 +101,7 @@ impl Table {
                 };
             }
         }
-        narrow(Mix {
+        Arch::new().dispatch(Mix {
             values: &self.values,
             width,
             lines: &lines,
@@ -244,7 +242,7 @@ impl WithSimd for Mix<'_> {
         let used = self.mixed.len() / MIXED;
         let whole = used - used % ABREAST;
         for first in (0..whole).step_by(ABREAST) {
-            self.lines_at::<ABREAST>(first)
+            self.lines_at::<S, ABREAST>(first)
                 .into_iter()
                 .enumerate()
                 .for_each(|(row, sums)| {
@@ -252,7 +250,7 @@ impl WithSimd for Mix<'_> {
                 });
         }
         for first in whole..used {
-            self.lines_at::<1>(first)
+            self.lines_at::<S, 1>(first)
                 .into_iter()
                 .enumerate()
                 .for_each(|(row, sums)| {
@@ -265,7 +263,7 @@ impl WithSimd for Mix<'_> {
 impl Mix<'_> {
     /// The sums of so many entries.
     #[inline(always)]
-    fn lines_at<const N: usize>(&self, first: usize) -> [[f64; N]; MIXED] {
+    fn lines_at<S: Simd, const N: usize>(&self, first: usize) -> [[f64; N]; MIXED] {
         let mut out = [[0.0; N]; MIXED];
         for line in self.lines {
             let (mut sum, mut slope) = ([0.0; N], [0.0; N]);
@@ -274,18 +272,28 @@ impl Mix<'_> {
                 let values = &self.values[line.first + point * self.width + first..][..N];
                 for n in 0..N {
                     let value = f64::from(values[n]);
-                    sum[n] += weights[point] * value;
-                    slope[n] += slopes[point] * value;
+                    sum[n] = fused::<S>(weights[point], value, sum[n]);
+                    slope[n] = fused::<S>(slopes[point], value, slope[n]);
                 }
             }
             let [here, by_x, by_radius] = line.along;
             for n in 0..N {
-                out[0][n] += here * sum[n];
-                out[1][n] += by_x * sum[n];
-                out[2][n] += here * slope[n];
-                out[3][n] += by_radius * sum[n];
+                out[0][n] = fused::<S>(here, sum[n], out[0][n]);
+                out[1][n] = fused::<S>(by_x, sum[n], out[1][n]);
+                out[2][n] = fused::<S>(here, slope[n], out[2][n]);
+                out[3][n] = fused::<S>(by_radius, sum[n], out[3][n]);
             }
         }
         out
+    }
+}
+
+/// a · b + c, at once where there is an instruction for that.
+#[inline(always)]
+fn fused<S: Simd>(a: f64, b: f64, c: f64) -> f64 {
+    if S::IS_SCALAR {
+        a * b + c
+    } else {
+        a.mul_add(b, c)
     }
 }

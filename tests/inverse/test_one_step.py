@@ -121,9 +121,15 @@ def test_a_deferred_image_is_the_quick_one_computed_once_when_asked_for(
 ) -> None:
     operator = OneStep(ForwardModel(disc(), Pattern.adjacent(8), 0.01), alpha=0.1)
     dv = np.random.default_rng(2).normal(0.0, 1e-4, operator.matrix.shape[1])
-    quick, asked, compute = operator.quick(dv), [], OneStep._quick_values
-    monkeypatch.setattr(OneStep, "_quick_values", lambda *a: asked.append(1) or compute(*a))
-    image = operator.deferred(dv.copy())
+    quick, compute = operator.quick(dv), OneStep._quick_values
+    asked: list[int] = []
+
+    def counted(self: OneStep, checked: FloatArray) -> FloatArray:
+        asked.append(len(checked))
+        return compute(self, checked)
+
+    monkeypatch.setattr(OneStep, "_quick_values", counted)
+    image = operator.deferred(dv)
     assert not asked
     np.testing.assert_array_equal(image.values, quick.values)
     assert image.values is image.values

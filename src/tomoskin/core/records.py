@@ -146,6 +146,8 @@ class DeferredImage(Image):
     """An image whose values are computed when they are first asked for, in the thread that asks."""
 
     __slots__ = ("_made", "_make")
+    _make: Callable[[], FloatArray]
+    _made: FloatArray | None
 
     def __init__(self, make: Callable[[], FloatArray], unit: str, mesh_id: str) -> None:
         """``make`` returns the values, always the same."""
@@ -154,11 +156,12 @@ class DeferredImage(Image):
         object.__setattr__(self, "_made", None)
 
     @property
-    def values(self) -> FloatArray:  # type: ignore[override]
+    def values(self) -> FloatArray:
         """(n_cells,) see :class:`Image`."""
-        if self._made is None:
-            object.__setattr__(self, "_made", self._make())
-        made: FloatArray = self._made
+        made = self._made
+        if made is None:
+            made = self._make()
+            object.__setattr__(self, "_made", made)
         return made
 
     def __reduce__(self) -> tuple[type[Image], tuple[FloatArray, str, str]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -35,8 +37,8 @@ def live(frame: Problem, fit: Fit) -> Fit:
 @pytest.mark.parametrize(("apart", "most"), [(0.045, 0.3), (0.07, 0.2)])
 def test_the_interaction_is_nearly_what_the_exact_model_has(apart: float, most: float) -> None:
     for turn in (0.0, 1.0, 2.0):
-        way = apart / 2 * np.array([np.cos(turn), np.sin(turn)])
-        spots = np.concatenate([press(*-way, 0.016, -0.4), press(*way, 0.022, -0.2)])
+        x, y = apart / 2 * float(np.cos(turn)), apart / 2 * float(np.sin(turn))
+        spots = np.concatenate([press(-x, -y, 0.016, -0.4), press(x, y, 0.022, -0.2)])
         exact, ours = beyond(spots), model().reduced.interaction.change(spots)
         assert np.linalg.norm(ours - exact) < most * np.linalg.norm(exact)
 
@@ -73,11 +75,16 @@ def test_a_live_frame_asks_the_exact_model_where_more_may_be_wrong(
 ) -> None:
     asked: list[int] = []
     changes = Response.changes
+
+    def counted(self: Response, sets: Sequence[FloatArray]) -> FloatArray:
+        asked.append(len(sets))
+        return changes(self, sets)
+
     for spots, often in ((APART, 0), (STRONG, 1)):
         frame, fit = fitted(spots)
         asked.clear()
         with monkeypatch.context() as patch:
-            patch.setattr(Response, "changes", lambda *a: asked.append(1) or changes(*a))
+            patch.setattr(Response, "changes", counted)
             found = live(frame, fit)
         assert len(asked) == often
         table = by_table(found.spots)[:, 0].sum(axis=0)

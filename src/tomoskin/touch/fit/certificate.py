@@ -126,7 +126,8 @@ class Certificate:
     def _around(self, like: FloatArray, first: int) -> FloatArray:
         """(k,) root mean square of the errors of spots (k, 2) like these, from the ``first`` on."""
         _, near = self._tree.query(like, _NEIGHBOURS + first)
-        return np.asarray(np.sqrt(np.mean(self.parts[near[:, first:]] ** 2, axis=1)))
+        own = np.asarray(near)[:, first:]
+        return np.asarray(np.sqrt(np.mean(self.parts[own] ** 2, axis=1)))
 
     @cached_property
     def _tree(self) -> cKDTree:

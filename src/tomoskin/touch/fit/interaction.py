@@ -105,8 +105,9 @@ def _patches(centroids: FloatArray, volumes: FloatArray) -> tuple[IntArray, Floa
     x, y = np.meshgrid(*(np.arange(a, b + step, step) for a, b in zip(low, high, strict=True)))
     x[1::2] += step / 2
     _, nearest = cKDTree(np.column_stack([x.ravel(), y.ravel()])).query(centroids)
-    _, patch = np.unique(nearest, return_inverse=True)
-    area = np.bincount(patch, volumes)
+    _, inverse = np.unique(nearest, return_inverse=True)
+    patch = np.asarray(inverse, dtype=np.int64)
+    area = np.asarray(np.bincount(patch, volumes), dtype=np.float64)
     sums = [np.bincount(patch, volumes * column) for column in centroids.T]
     return patch, np.stack(sums, axis=1) / area[:, None], area
 

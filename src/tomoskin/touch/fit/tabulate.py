@@ -133,8 +133,13 @@ class Tabulation:
 
     def packed(self) -> Arrays:
         """What takes long to compute."""
-        made = {"values": self.table.values, "basis": self.table.basis, "parts": self.parts}
-        return made | self.certificate.packed()
+        table = self.table
+        return {
+            "values": table.values,
+            "basis": table.basis,
+            "parts": self.parts,
+            **self.certificate.packed(),
+        }
 
     def adapted(self, response: Response) -> Generator[None, None, ResponseTable]:
         """The table of ``response``, another sheet on the same mesh, a piece between two yields."""
