@@ -53,7 +53,8 @@ def run(data: Path | None) -> tuple[Report, ...]:
             f"{PRESSED * REPEATS} frames, {PRESSED * FIT_REPEATS} by fit, with presses of a twin "
             f"that go round by 5 mm a frame, seed {SEED}",
             f"{clock()[1]} of each",
-            "decode, voltages, difference, one-step image, touches by image or fit, tracking",
+            "decode, voltages, difference, touches by image or fit, tracking",
+            "a picture that nobody looks at is not computed",
             "filter: the time constant of the Kalman filter over frames, 0 without it",
             "growth: allocated memory that stays, per frame",
         ),

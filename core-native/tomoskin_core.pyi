@@ -181,7 +181,7 @@ class SpotTable:
         log_radii: NDArray[np.float64],
         grids: NDArray[np.float64],
         nodes: NDArray[np.float64],
-        values: NDArray[np.float64],
+        values: NDArray[np.float32],
         filling: float,
         sheet: NDArray[np.float64],
         prior: NDArray[np.float64],

@@ -55,7 +55,7 @@ impl SpotTable {
         prior: &Any<'_>,
         log_range: [f64; 2],
     ) -> PyResult<Self> {
-        let values = array::<f64, Ix3>("values", values)?;
+        let values = array::<f32, Ix3>("values", values)?;
         let nodes = array::<f64, Ix1>("nodes", nodes)?;
         same(
             "planes of values",

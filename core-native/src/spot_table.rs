@@ -42,7 +42,7 @@ pub struct Table {
     /// Of exp(depth/4) − 1.
     pub nodes: Vec<f64>,
     /// By points, nodes and directions, and entries of the basis.
-    pub values: Vec<f64>,
+    pub values: Vec<f32>,
     /// Entries of the basis.
     pub rank: usize,
     /// Content of a spot of radius and depth one.
@@ -84,25 +84,29 @@ impl Table {
         let most = (self.log_radii.len() - NEAR) as f64;
         let first = (place.floor() - 1.0).clamp(0.0, most);
         let [radius, wider] = cubic(place - first);
+        let mut lines = [Line::default(); NEAR * NEAR];
         for level in 0..NEAR {
             let grid = &self.grids[first as usize + level];
             let (x, along) = grid.along(0, spot[0]);
             let (y, across) = grid.along(1, spot[1]);
             for (i, (&weight, &slope)) in along[0].iter().zip(&along[1]).enumerate() {
-                let row = (grid.start + (x + i) * grid.shape[1] + y) * width;
-                let points = &self.values[row..row + NEAR * width];
-                Arch::new().dispatch(Mix {
-                    points: std::array::from_fn(|k| &points[k * width..][..used]),
-                    across: &across,
+                lines[level * NEAR + i] = Line {
+                    first: (grid.start + (x + i) * grid.shape[1] + y) * width,
+                    across,
                     along: [
                         radius[level] * weight,
                         radius[level] * slope,
                         wider[level] / step * weight,
                     ],
-                    mixed: &mut mixed,
-                });
+                };
             }
         }
+        Arch::new().dispatch(Mix {
+            values: &self.values,
+            width,
+            lines: &lines,
+            mixed: &mut mixed,
+        });
         self.of_depth(spot, planes, &mixed, out);
     }
 
@@ -207,70 +211,89 @@ fn add(target: &mut [f64], scale: f64, values: &[f64]) {
     }
 }
 
-/// Adds four points of a line across, by their weights, to the sums.
-struct Mix<'a> {
-    points: [&'a [f64]; NEAR],
-    across: &'a Weights,
+/// Four points of a line across, and what they count for.
+#[derive(Clone, Copy, Default)]
+struct Line {
+    /// Where the first one is.
+    first: usize,
+    across: Weights,
     /// Weight of the line, and the slopes of that by x and by the logarithm of the radius.
     along: [f64; 3],
+}
+
+/// Sums over the points of all lines: the change, and its slopes by x, y and the logarithm of the
+/// radius, one after the other.
+struct Mix<'a> {
+    values: &'a [f32],
+    /// From one point to the next.
+    width: usize,
+    lines: &'a [Line; NEAR * NEAR],
     mixed: &'a mut [f64],
 }
+
+/// Entries that are summed at a time, so that the sums stay in registers.
+const ABREAST: usize = 8;
 
 impl WithSimd for Mix<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let width = self.mixed.len() / MIXED;
-        let (flat, rest) = self.mixed.split_at_mut(width);
-        let (by_x, rest) = rest.split_at_mut(width);
-        let (by_y, wider) = rest.split_at_mut(width);
-        let [p, q, r, s] = self.points;
-        let whole = width - width % S::F64_LANES;
-        for n in whole..width {
-            let values = [p[n], q[n], r[n], s[n]];
-            let (mut sum, mut slope) = (0.0, 0.0);
-            let [weights, slopes] = self.across;
-            for ((value, weight), by) in values.iter().zip(weights).zip(slopes) {
-                sum += weight * value;
-                slope += by * value;
+    fn with_simd<S: Simd>(self, _: S) {
+        let used = self.mixed.len() / MIXED;
+        let whole = used - used % ABREAST;
+        for first in (0..whole).step_by(ABREAST) {
+            self.lines_at::<S, ABREAST>(first)
+                .into_iter()
+                .enumerate()
+                .for_each(|(row, sums)| {
+                    self.mixed[row * used + first..][..ABREAST].copy_from_slice(&sums);
+                });
+        }
+        for first in whole..used {
+            self.lines_at::<S, 1>(first)
+                .into_iter()
+                .enumerate()
+                .for_each(|(row, sums)| {
+                    self.mixed[row * used + first] = sums[0];
+                });
+        }
+    }
+}
+
+impl Mix<'_> {
+    /// The sums of so many entries.
+    #[inline(always)]
+    fn lines_at<S: Simd, const N: usize>(&self, first: usize) -> [[f64; N]; MIXED] {
+        let mut out = [[0.0; N]; MIXED];
+        for line in self.lines {
+            let (mut sum, mut slope) = ([0.0; N], [0.0; N]);
+            let [weights, slopes] = line.across;
+            for point in 0..NEAR {
+                let values = &self.values[line.first + point * self.width + first..][..N];
+                for n in 0..N {
+                    let value = f64::from(values[n]);
+                    sum[n] = fused::<S>(weights[point], value, sum[n]);
+                    slope[n] = fused::<S>(slopes[point], value, slope[n]);
+                }
             }
-            flat[n] += self.along[0] * sum;
-            by_x[n] += self.along[1] * sum;
-            by_y[n] += self.along[0] * slope;
-            wider[n] += self.along[2] * sum;
+            let [here, by_x, by_radius] = line.along;
+            for n in 0..N {
+                out[0][n] = fused::<S>(here, sum[n], out[0][n]);
+                out[1][n] = fused::<S>(by_x, sum[n], out[1][n]);
+                out[2][n] = fused::<S>(here, slope[n], out[2][n]);
+                out[3][n] = fused::<S>(by_radius, sum[n], out[3][n]);
+            }
         }
-        let (p, q) = (S::as_simd_f64s(p).0, S::as_simd_f64s(q).0);
-        let (r, s) = (S::as_simd_f64s(r).0, S::as_simd_f64s(s).0);
-        let (flat, by_x) = (S::as_mut_simd_f64s(flat).0, S::as_mut_simd_f64s(by_x).0);
-        let (by_y, wider) = (S::as_mut_simd_f64s(by_y).0, S::as_mut_simd_f64s(wider).0);
-        let [[w0, w1, w2, w3], [d0, d1, d2, d3]] = *self.across;
-        let (w0, w1) = (simd.splat_f64s(w0), simd.splat_f64s(w1));
-        let (w2, w3) = (simd.splat_f64s(w2), simd.splat_f64s(w3));
-        let (d0, d1) = (simd.splat_f64s(d0), simd.splat_f64s(d1));
-        let (d2, d3) = (simd.splat_f64s(d2), simd.splat_f64s(d3));
-        let here = simd.splat_f64s(self.along[0]);
-        let (x, by_radius) = (
-            simd.splat_f64s(self.along[1]),
-            simd.splat_f64s(self.along[2]),
-        );
-        let n = p.len();
-        let (q, r, s) = (&q[..n], &r[..n], &s[..n]);
-        let (flat, by_x) = (&mut flat[..n], &mut by_x[..n]);
-        let (by_y, wider) = (&mut by_y[..n], &mut wider[..n]);
-        for n in 0..n {
-            let sum = simd.mul_f64s(w0, p[n]);
-            let sum = simd.mul_add_e_f64s(w1, q[n], sum);
-            let sum = simd.mul_add_e_f64s(w2, r[n], sum);
-            let sum = simd.mul_add_e_f64s(w3, s[n], sum);
-            let slope = simd.mul_f64s(d0, p[n]);
-            let slope = simd.mul_add_e_f64s(d1, q[n], slope);
-            let slope = simd.mul_add_e_f64s(d2, r[n], slope);
-            let slope = simd.mul_add_e_f64s(d3, s[n], slope);
-            flat[n] = simd.mul_add_e_f64s(here, sum, flat[n]);
-            by_x[n] = simd.mul_add_e_f64s(x, sum, by_x[n]);
-            by_y[n] = simd.mul_add_e_f64s(here, slope, by_y[n]);
-            wider[n] = simd.mul_add_e_f64s(by_radius, sum, wider[n]);
-        }
+        out
+    }
+}
+
+/// a · b + c, at once where there is an instruction for that.
+#[inline(always)]
+fn fused<S: Simd>(a: f64, b: f64, c: f64) -> f64 {
+    if S::IS_SCALAR {
+        a * b + c
+    } else {
+        a.mul_add(b, c)
     }
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from functools import cache
 from typing import Any
 
@@ -113,6 +114,31 @@ def test_the_quick_image_is_the_image_to_single_precision() -> None:
     assert (quick.unit, quick.mesh_id) == (exact.unit, exact.mesh_id)
     with pytest.raises(DataError, match="not"):
         operator.quick(np.full_like(dv, np.nan))
+
+
+def test_a_deferred_image_is_the_quick_one_computed_once_when_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    operator = OneStep(ForwardModel(disc(), Pattern.adjacent(8), 0.01), alpha=0.1)
+    dv = np.random.default_rng(2).normal(0.0, 1e-4, operator.matrix.shape[1])
+    quick, compute = operator.quick(dv), OneStep._quick_values
+    asked: list[int] = []
+
+    def counted(self: OneStep, checked: FloatArray) -> FloatArray:
+        asked.append(len(checked))
+        return compute(self, checked)
+
+    monkeypatch.setattr(OneStep, "_quick_values", counted)
+    image = operator.deferred(dv)
+    assert not asked
+    np.testing.assert_array_equal(image.values, quick.values)
+    assert image.values is image.values
+    assert len(asked) == 1
+    again = pickle.loads(pickle.dumps(image))
+    np.testing.assert_array_equal(again.values, quick.values)
+    assert (again.unit, again.mesh_id) == (image.unit, image.mesh_id) == (quick.unit, quick.mesh_id)
+    with pytest.raises(DataError, match="not"):
+        operator.deferred(np.full_like(dv, np.nan))
 
 
 def test_image_names_its_mesh_and_unit() -> None:

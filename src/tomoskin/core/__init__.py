@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from tomoskin.core.memory import check_fits, machine_memory, most_bytes
     from tomoskin.core.records import (
         ComplexArray,
+        DeferredImage,
         Detection,
         Event,
         FloatArray,
@@ -90,6 +91,7 @@ __all__ = [
     "ColourScale",
     "ComplexArray",
     "DataError",
+    "DeferredImage",
     "Detection",
     "Event",
     "FloatArray",

@@ -6,6 +6,7 @@ SI units throughout; electrodes, measurements and cells are counted from 0.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -139,6 +140,33 @@ class Image:
                 hint="make the pixels from the mesh that the image was made on",
             )
         return pixels.spread(self.values)
+
+
+class DeferredImage(Image):
+    """An image whose values are computed when they are first asked for, in the thread that asks."""
+
+    __slots__ = ("_made", "_make")
+    _make: Callable[[], FloatArray]
+    _made: FloatArray | None
+
+    def __init__(self, make: Callable[[], FloatArray], unit: str, mesh_id: str) -> None:
+        """``make`` returns the values, always the same."""
+        for name, value in {"_make": make, "unit": unit, "mesh_id": mesh_id}.items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "_made", None)
+
+    @property
+    def values(self) -> FloatArray:
+        """(n_cells,) see :class:`Image`."""
+        made = self._made
+        if made is None:
+            made = self._make()
+            object.__setattr__(self, "_made", made)
+        return made
+
+    def __reduce__(self) -> tuple[type[Image], tuple[FloatArray, str, str]]:
+        """What is pickled is a plain image: what makes it stays here."""
+        return Image, (self.values, self.unit, self.mesh_id)
 
 
 @dataclass(frozen=True, slots=True)

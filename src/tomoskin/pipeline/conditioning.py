@@ -346,6 +346,9 @@ def _gain_of(values: FloatArray, mean: FloatArray, excluded: NDArray[np.bool_]) 
     if not counts.any():
         return None
     ratio = values[counts] / mean[counts]
+    usual = (ratio > 1 / _GAIN) & (ratio < _GAIN)
+    if 2 * np.count_nonzero(usual) > len(ratio):  # so the median is too
+        return None
     times = float(np.median(ratio))
     alike = float(np.median(np.abs(ratio - times))) < _ALIKE * abs(times)
     return times if alike and not 1 / _GAIN < times < _GAIN else None

@@ -24,7 +24,7 @@ _GAP = 2.5
 
 
 class SingleFrame:
-    """Each image from its own frame."""
+    """Each image from its own frame, computed where somebody looks at it."""
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class SingleFrame:
     def push(self, dv: FloatArray, time: float) -> ImageAndNoise:
         """Image of ``dv`` (n_meas,), measured at ``time`` s. Raises DataError for other data."""
         del time
-        return self._operator.quick(dv), self._noise
+        return self._operator.deferred(dv), self._noise
 
 
 class Filtered:

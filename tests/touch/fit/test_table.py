@@ -35,7 +35,7 @@ def by_table(spots: FloatArray) -> FloatArray:
     return table.expanded(spots) @ table.basis
 
 
-@pytest.mark.parametrize(("within", "median", "most"), [(0.06, 0.01, 0.04), (0.09, 0.02, 0.12)])
+@pytest.mark.parametrize(("within", "median", "most"), [(0.06, 0.005, 0.03), (0.09, 0.008, 0.05)])
 def test_a_spot_is_nearly_what_the_exact_model_has(
     within: float, median: float, most: float
 ) -> None:
@@ -62,7 +62,7 @@ def test_a_shape_is_the_way_from_a_tail_to_a_bell() -> None:
     spot = press(0.03, 0.02, 0.025, -0.3)
     *_, nuisances = model().response.expanded(spot)
     exact, ours = nuisances[:, 1], by_table(spot)[0, -1]
-    assert np.linalg.norm(ours - exact) < 0.3 * np.linalg.norm(exact)
+    assert np.linalg.norm(ours - exact) < 0.35 * np.linalg.norm(exact)
 
 
 def problem(solver: Solver, spots: FloatArray, reach: float) -> Problem:
@@ -72,6 +72,7 @@ def problem(solver: Solver, spots: FloatArray, reach: float) -> Problem:
     left = 0.05 * data(press(0.0, 0.06))[None] @ seen.matrix.T
     return Problem(
         response=model().response,
+        reduced=model().reduced,
         seen=seen,
         prior=model().prior,
         sign="decrease",
@@ -164,7 +165,7 @@ def test_several_spots_are_those_of_the_exact_model() -> None:
     near = np.concatenate([press(-0.015, 0.0, 0.02, -0.8), press(0.025, 0.0, 0.02, -0.8)])
     frame = problem(model().solver, near, 0.0)
     fit = frame.refined(near, Deficit.none(len(frame.solver.table.basis)), 6)
-    exact = frame.corrected(fit, EXHAUSTIVE.rounds, EXHAUSTIVE.near)
+    exact = frame.corrected(fit, EXHAUSTIVE.rounds, EXHAUSTIVE.near, EXHAUSTIVE.tolerance)
     assert exact.misfit < fit.misfit
     assert np.abs((exact.spots - near)[:, :2]).max() < 1.5e-3
     alone = frame.solver.expanded(exact.spots)[:, 0].sum(axis=0)

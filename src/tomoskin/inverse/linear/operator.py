@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from tomoskin.core import DataError, Image
+from tomoskin.core import DataError, DeferredImage, Image
 from tomoskin.forward import ForwardModel
 from tomoskin.pattern import Pattern
 
@@ -138,10 +138,18 @@ class Operator:
 
         The product reads all of the matrix once, so its time is that of the memory.
         """
+        return self._image(self._quick_values(self.check(dv)))
+
+    def deferred(self, dv: NDArray[Any]) -> Image:
+        """:meth:`quick` where nobody may look at it: checked at once, computed when asked for."""
         checked = self.check(dv)
+        make = partial(self._quick_values, checked)
+        return DeferredImage(make, self.unit, self.model.mesh.identity)
+
+    def _quick_values(self, checked: NDArray[Any]) -> NDArray[Any]:
         single = checked.astype(np.complex64 if np.iscomplexobj(checked) else np.float32)
         values = self._single @ single
-        return self._image(values.astype(np.result_type(values, np.float64)))
+        return np.asarray(values.astype(np.result_type(values, np.float64)))
 
     def check(self, dv: NDArray[Any]) -> NDArray[Any]:
         """``dv`` with zeros in excluded rows; see :meth:`__call__` for what is refused."""

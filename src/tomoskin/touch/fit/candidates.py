@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Self
 
@@ -11,7 +12,7 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Fit, Limits, Solver, WhitenedTable
-from tomoskin.touch.fit.spot import CONTENT, Response, spots_of
+from tomoskin.touch.fit.spot import CONTENT, FILLING, Response, spots_of
 
 _SPACING = 0.7
 """Between candidates, in median radii."""
@@ -47,8 +48,7 @@ class Candidates:
     @classmethod
     def of(cls, response: Response, prior: SpotPrior) -> Self:
         """On a hexagonal grid, in three sizes."""
-        mesh = response.spots.mesh
-        positions = _grid(mesh.centroids, _SPACING * prior.radius)
+        positions = _positions(response, prior)
         spots = np.concatenate(
             [spots_of(positions, size * prior.radius, -_FAINT) for size in _SIZES]
         )
@@ -56,6 +56,20 @@ class Candidates:
         content = spots[:, CONTENT].copy()
         spots[:, CONTENT] = 1.0
         return cls(spots, changes / content[:, None])
+
+    def adapted(
+        self, even: Response, uneven: Response, prior: SpotPrior
+    ) -> Generator[None, None, Candidates]:
+        """Those of an ``uneven`` sheet, from these of an ``even`` one on the same mesh, a piece
+        between two yields: what faint spots change is linear in the fields."""
+        more, positions = uneven.by_cell - even.by_cell, _positions(even, prior)
+        moved = []
+        for size in _SIZES:
+            yield
+            radius = size * prior.radius
+            feet = even.spots.footprints(positions, radius)
+            moved.append(feet.linear(more, feet.height) / (FILLING * radius**2))
+        return Candidates(self.spots, self.signatures + np.concatenate(moved))
 
     def matched(self, seen: WhitenedTable) -> Matched:
         """The same for one noise."""
@@ -100,6 +114,11 @@ def limits_of(sign: str) -> Limits:
     low = 0.0 if sign == "increase" else -math.inf
     high = 0.0 if sign == "decrease" else math.inf
     return Limits(low, high, _LEAST, _USEFUL)
+
+
+def _positions(response: Response, prior: SpotPrior) -> FloatArray:
+    """(n, 2) m."""
+    return _grid(response.spots.mesh.centroids, _SPACING * prior.radius)
 
 
 def _grid(inside: FloatArray, step: float) -> FloatArray:

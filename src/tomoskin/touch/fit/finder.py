@@ -16,6 +16,7 @@ from tomoskin.forward import ForwardModel
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
 from tomoskin.touch.fit.candidates import Candidates, Matched
+from tomoskin.touch.fit.certificate import Certificate, Reduced
 from tomoskin.touch.fit.excess import Gauge
 from tomoskin.touch.fit.native import NativeSolver
 from tomoskin.touch.fit.noise import ResidualResponse, Whitener
@@ -47,6 +48,21 @@ _MASKS = 8
 
 
 @dataclass(frozen=True, eq=False)
+class Adapted:
+    """What an even sheet's model became for an uneven one.
+
+    Attributes
+    ----------
+    table, certificate, candidates
+        See :class:`ResponseTable`, :class:`Certificate` and :class:`Candidates`.
+    """
+
+    table: ResponseTable
+    certificate: Certificate
+    candidates: Candidates
+
+
+@dataclass(frozen=True, eq=False)
 class SpotModel:
     """What is made once for a skin and pattern; a table only where touches are fitted on it.
 
@@ -61,8 +77,8 @@ class SpotModel:
     scale
         (n_meas,) 1/V by which the model's changes become difference data; ones where these are
         in volts.
-    table
-        Of an uneven sheet; None: that of :attr:`tabulation`.
+    adapted
+        Of an uneven sheet; None: what there is is made for this one.
     even
         The model that an uneven sheet's began from; None where this is it.
     """
@@ -71,7 +87,7 @@ class SpotModel:
     prior: SpotPrior
     sign: str
     scale: FloatArray
-    table: ResponseTable | None = None
+    adapted: Adapted | None = None
     even: SpotModel | None = None
 
     @classmethod
@@ -97,17 +113,25 @@ class SpotModel:
     @cached_property
     def candidates(self) -> Candidates:
         """Where touches are looked for."""
+        if self.adapted is not None:
+            return self.adapted.candidates
         return Candidates.of(self.response, self.prior)
 
     @cached_property
     def solver(self) -> Solver:
         """What fits spots by a table of what one does."""
-        table = self.tabulation.table if self.table is None else self.table
-        return _solver(self.response, table, self.prior)
+        made = self.tabulation if self.adapted is None else self.adapted
+        return _solver(self.response, made.table, self.prior)
+
+    @cached_property
+    def reduced(self) -> Reduced:
+        """What stands for the exact model on this sheet."""
+        made = self.tabulation if self.adapted is None else self.adapted
+        return Reduced.of(self.response, made.certificate, self.prior)
 
     def warm_up(self) -> None:
         """Do what takes seconds the first time, and half a second later on, before frames come."""
-        _ = self.tabulation.lattices, self.candidates, self.solver
+        _ = self.tabulation.lattices, self.candidates, self.solver, self.reduced
 
     def changes(self, spots: FloatArray) -> FloatArray:
         """(k, n_meas) V that each of ``spots`` (k, 4) alone adds to the reference, by the table."""
@@ -130,10 +154,18 @@ class SpotModel:
             return self
         response = Response(state)
         table = yield from self.tabulation.adapted(response)
+        certificate = yield from self.tabulation.certificate.adapted(response, table)
+        candidates = yield from self.candidates.adapted(self.response, response, self.prior)
         scale = self.scale
         if (scale != 1.0).any():
             scale = 1 / np.abs(response.reference)
-        return replace(self, response=response, scale=scale, table=table, even=self)
+        adapted = Adapted(table, certificate, candidates)
+        made = replace(self, response=response, scale=scale, adapted=adapted, even=self)
+        yield
+        _ = made.reduced
+        yield
+        _ = made.solver.table.typical
+        return made
 
 
 class SpotFinder:
@@ -178,6 +210,8 @@ class SpotFinder:
         self._pace, self._reach, self._unrest = pace, pace.speed * scan_time, 1.0
         self._fading = math.ceil(pace.fading / scan_time) if scan_time else 0
         self._residual = ResidualResponse.none(len(model.scale))
+        self._newest_left: tuple[FloatArray, WhitenedTable | None, FloatArray]
+        self._newest_left = self._residual.changes, None, np.zeros((0, 0))
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
         self._before, self._way = np.zeros((0, N_PARAMETERS)), np.zeros((0, 2))
@@ -224,6 +258,7 @@ class SpotFinder:
         whitened, rest = seen.whitened(data)
         problem = Problem(
             response=self._model.response,
+            reduced=self._model.reduced,
             seen=seen,
             prior=self._model.prior,
             sign=self._settings.sign,
@@ -231,11 +266,20 @@ class SpotFinder:
             grows=self._unrest * _GROWS,
             data=whitened,
             rest=rest,
-            left=self._residual.directions.T @ seen.matrix.T,
+            left=self._left(seen),
         )
         problem = replace(problem, sign=self.watch.sign(problem, matched))
         search = Search(problem, matched, self._settings.snr, self._most, self._pace, self._deficit)
         return search(self._expected), matched
+
+    def _left(self, seen: WhitenedTable) -> FloatArray:
+        """(q, c) whitened directions of residual responses; those of the last frame where nothing
+        has changed."""
+        responses, noise, left = self._newest_left
+        if responses is not self._residual.changes or noise is not seen:
+            left = self._residual.directions.T @ seen.matrix.T
+            self._newest_left = self._residual.changes, seen, left
+        return left
 
     @property
     def _expected(self) -> FloatArray:

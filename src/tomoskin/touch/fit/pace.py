@@ -24,6 +24,9 @@ class Pace:
     near
         Part of radius and content by which a touch may differ before the exact model is solved
         for it again.
+    tolerance
+        Part of the noise, measurement by measurement in the mean square, that what stands for the
+        exact model may differ from it by; 0: nothing stands for it.
     tries
         New touches that are tried in a frame.
     look
@@ -48,6 +51,7 @@ class Pace:
     rounds: int
     closing: int
     near: float
+    tolerance: float
     tries: int
     look: float
     rare: float
@@ -65,6 +69,7 @@ EXHAUSTIVE = Pace(
     rounds=4,
     closing=0,
     near=0.0,
+    tolerance=0.0,
     tries=5,
     look=0.5,
     rare=0.0,
@@ -83,6 +88,7 @@ LIVE = Pace(
     rounds=0,
     closing=1,
     near=0.5,
+    tolerance=0.1,
     tries=1,
     look=0.8,
     rare=math.log(200),

@@ -10,11 +10,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.touch.fit.certificate import Reduced
 from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.pace import Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, Response
-from tomoskin.touch.fit.table import ResponseTable
+from tomoskin.touch.fit.table import ABREAST, ResponseTable
 
 _CERTAIN = 10.0
 """Deviations up to which a single spot's table is exact to less than the noise."""
@@ -24,6 +25,9 @@ _AGAIN = 2
 
 _UNSEEN = 0.1
 """Deviations, in the mean over strong touches, that are left out of what changes show along."""
+
+_CLEAR = 1e-10
+"""Part of the largest square above which an axis is one to ten digits."""
 
 _EXACT = 0.1
 """Deviations by which the exact model may differ from what a fit was made with."""
@@ -200,11 +204,14 @@ class WhitenedTable:
 
 def _axes(typical: FloatArray, least: int) -> FloatArray:
     """(r, c) orthonormal: along them ``typical`` changes (r, n) are but for ``_UNSEEN``; so many at
-    the ``least``, in whatever noise."""
+    the ``least``, in whatever noise, and full vectors where there are as many."""
     square, vectors = np.linalg.eigh(typical.T @ typical)
     dropped = int(np.searchsorted(np.cumsum(np.maximum(square, 0.0)), _UNSEEN**2))
-    dropped = min(dropped, len(square) - least)
-    return np.asarray(typical @ (vectors[:, dropped:] / np.sqrt(square[dropped:])))
+    wanted = max(len(square) - dropped, least)
+    clear = int(np.count_nonzero(square > _CLEAR * square[-1]))
+    kept = max(wanted, min(-(-wanted // ABREAST) * ABREAST, clear))
+    first = len(square) - kept
+    return np.asarray(typical @ (vectors[:, first:] / np.sqrt(square[first:])))
 
 
 def _less(columns: FloatArray, axes: FloatArray) -> FloatArray:
@@ -339,6 +346,7 @@ class Question:
 class Problem:
     """Whitened data (c,) of one frame, and what they are explained with.
 
+    ``response`` is the exact model, and ``reduced`` what stands for it where its error is small.
     ``rest`` is the square of what the data have along no axis of theirs.
     ``sign`` is "decrease", "increase" or "both". Standard deviations of what a touch does within a
     scan: its way along each axis, ``reach`` m, and what it ``grows`` by, in parts of it.
@@ -346,6 +354,7 @@ class Problem:
     """
 
     response: Response
+    reduced: Reduced
     seen: WhitenedTable
     prior: SpotPrior
     sign: str
@@ -374,27 +383,42 @@ class Problem:
         """See :meth:`Solver.settled`."""
         return self.solver.settled(self, spots, deficit, most)
 
-    def corrected(self, fit: Fit, rounds: int, near: float) -> Fit:
-        """The fit with the exact model at its spots, solved so often at most, and not where it has
-        been for spots as ``near``.
+    def corrected(self, fit: Fit, rounds: int, near: float, tolerance: float) -> Fit:
+        """The fit with what the table lacks at its spots, so many rounds at most, and not where
+        that is there for spots as ``near``.
 
-        A single faint spot is left as it is: what its table lacks is below the noise.
+        The exact model says what that is, or what stands for it to a ``tolerance`` as
+        :class:`Pace` has it. A single faint spot is left as it is: what its table lacks is below
+        the noise.
         """
         if not rounds or not len(fit.spots) or fit.deficit.holds_for(fit.spots, near):
             return fit
         if len(fit.spots) == 1 and np.linalg.norm(fit.each) < _CERTAIN:
             return fit
+        allowed = max(_EXACT, tolerance * math.sqrt(len(self.seen.full)))
         for _ in range(rounds):
-            exact = self.solver.table.basis @ self.response.changes([fit.spots])[0]
-            change = exact - self.solver.expanded(fit.spots)[:, 0].sum(axis=0)
-            far = np.linalg.norm(self.seen.direct @ (change - fit.deficit.change))
-            deficit = Deficit(fit.spots, change)
-            if far < _EXACT:
+            deficit = self._lacking(fit, allowed if tolerance else 0.0)
+            far = np.linalg.norm(self.seen.direct @ (deficit.change - fit.deficit.change))
+            if far < allowed:
                 return replace(fit, deficit=deficit)
             fit = self.solver.settled(self, fit.spots, deficit, _AGAIN)
             if fit.deficit.holds_for(fit.spots, near):
                 break
         return fit
+
+    def _lacking(self, fit: Fit, allowed: float) -> Deficit:
+        """What the table lacks of the spots of a fit; so many deviations may be wrong of it."""
+        spots, basis = fit.spots, self.solver.table.basis
+        sizes = np.linalg.norm(fit.each, axis=1)
+        if allowed:
+            change = np.zeros(len(basis))
+            if len(spots) > 1:
+                change = basis @ self.reduced.interaction.change(spots)
+            together = float(np.linalg.norm(self.seen.direct @ change))
+            if self.reduced.error(spots, sizes, together) < allowed:
+                return Deficit(spots, change)
+        exact = basis @ self.response.changes([spots])[0]
+        return Deficit(spots, exact - self.solver.expanded(spots)[:, 0].sum(axis=0))
 
     def evidence(self, fit: Fit) -> float:
         """See :meth:`Fit.log_evidence`."""

@@ -87,17 +87,17 @@ class Search:
         answer = self.problem.solver.searched(self.question, before)
         fit = self.found(before) if answer is None else answer.fit
         if answer and answer.others:
-            self._matches.append((fit, answer.others))
+            self._matches.append((fit.residual, answer.others))
         return self._judged(self._confirmed(fit, before))
 
     def _confirmed(self, fit: Fit, before: FloatArray) -> Fit:
         """A fit by the exact model. Where touches begin beside others: with or without these, since
         a further one may be what the table lacks of those."""
         pace, problem = self.pace, self.problem
-        exact = problem.corrected(fit, pace.closing, pace.near)
+        exact = problem.corrected(fit, pace.closing, pace.near, pace.tolerance)
         if not pace.closing or len(fit.spots) < 2 or len(fit.spots) <= len(before):
             return exact
-        other = problem.corrected(self._started(before), pace.closing, pace.near)
+        other = problem.corrected(self._started(before), pace.closing, pace.near, pace.tolerance)
         worth = self._ratios(exact).min() >= self._threshold(other, 1.0)
         gain = problem.evidence(exact) - problem.evidence(other)
         return exact if worth and gain > pace.rare else other
@@ -135,7 +135,7 @@ class Search:
             return self.problem.nothing()
         problem, spots = self.problem, before[: self.most]
         fit = problem.refined(spots, self.deficit, self.pace.warm)
-        return problem.corrected(fit, self.pace.rounds, self.pace.near)
+        return problem.corrected(fit, self.pace.rounds, self.pace.near, self.pace.tolerance)
 
     def _pruned(self, fit: Fit) -> Fit:
         """Without the spots that have faded."""
@@ -181,14 +181,14 @@ class Search:
         return part * self.least * float(np.hypot(1.0, misshapen / self.least))
 
     def _standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
-        if not self._matches or self._matches[-1][0] is not fit:
+        if not self._matches or self._matches[-1][0] is not fit.residual:
             ratios = self.matched.ratios(self.problem.solver, fit, self.problem.sign)
-            self._matches.append((fit, ratios))
+            self._matches.append((fit.residual, ratios))
         return self._matches[-1][1]
 
     @cached_property
-    def _matches(self) -> list[tuple[Fit, tuple[FloatArray, FloatArray]]]:
-        """What candidates are to the fits that have been looked at, the newest last."""
+    def _matches(self) -> list[tuple[FloatArray, tuple[FloatArray, FloatArray]]]:
+        """What candidates are to the residuals that have been looked at, the newest last."""
         return []
 
     def _joint_starts(self, count: int) -> list[FloatArray]:
@@ -213,7 +213,7 @@ class Search:
             fit if fit.settled else problem.refined(fit.spots, fit.deficit, pace.cold)
             for fit in fits[: pace.finalists]
         ]
-        exact = [problem.corrected(fit, pace.rounds, pace.near) for fit in settled]
+        exact = [problem.corrected(fit, pace.rounds, pace.near, pace.tolerance) for fit in settled]
         return max(exact, key=self.problem.evidence)
 
     def _ratios(self, fit: Fit) -> FloatArray:

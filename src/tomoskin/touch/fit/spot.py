@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, IntArray, ModelError, reach
@@ -165,6 +166,11 @@ class Footprints:
     directed: FloatArray
     reshaped: FloatArray
 
+    def linear(self, slopes: FloatArray, part: FloatArray) -> FloatArray:
+        """(n, r) of ``slopes`` (n_cells, r) where each cell (c,) has its ``part`` (c,)."""
+        shape = len(self.starts) - 1, len(slopes)
+        return np.asarray(csr_array((part, self.cells, self.starts), shape) @ slopes)
+
 
 class Spots:
     """Spots on the cells of a mesh of triangles in the sheet's own flat coordinates.
@@ -283,6 +289,12 @@ class Response:
         for k in many:
             out[k] = self._solved(*touches[k]).voltages
         return out
+
+    @cached_property
+    def by_cell(self) -> FloatArray:
+        """(n_cells, n_meas) V: derivatives by log σ of a cell."""
+        state = self.state
+        return np.asarray((state.jacobian * state.conductivity).T)
 
     @cached_property
     def by_direction(self) -> tuple[FloatArray, FloatArray]:

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.touch.fit.spot import FILLING, LOG_RADIUS, X, Y, depth_of
@@ -20,8 +21,14 @@ from tomoskin.touch.fit.spot import FILLING, LOG_RADIUS, X, Y, depth_of
 PADDING = 2
 """Grid points beyond the sheet on each side: splines need one, the filter another."""
 
+ABREAST = 8
+"""Numbers that a processor multiplies at a time: as many more cost nothing."""
+
 NEAR = 4
 """Radii that a spot is between."""
+
+_TYPICAL = 2000
+"""Points of a table that tell what is typical."""
 
 N_DIRECTIONS = 2
 """Of each spot: of a stretched sheet's direction, and of its shape; see :class:`Part`."""
@@ -84,7 +91,8 @@ class ResponseTable:
         (n_nodes,) of the depth: s = exp(depth/4) − 1.
     values
         (n_points, n_nodes + N_DIRECTIONS, rank) V: spline coefficients, of all grids one after the
-        other: of the change divided by s at the nodes, and of directions divided by the depth.
+        other: of the change divided by s at the nodes, and of directions divided by the depth. In
+        single precision, far below the table's own error: a spot reads some hundred kilobytes.
     basis
         (rank, n_meas), orthonormal rows: all changes lie in their span.
     """
@@ -93,7 +101,7 @@ class ResponseTable:
     grids: tuple[PositionGrid, ...]
     sign: str
     nodes: FloatArray
-    values: FloatArray
+    values: NDArray[np.float32]
     basis: FloatArray
 
     def expanded(self, spots: FloatArray) -> FloatArray:
@@ -151,8 +159,8 @@ class ResponseTable:
     @cached_property
     def typical(self) -> FloatArray:
         """(rank, rank) V whose rows' squares are the mean ones of spots of all depths."""
-        n = len(self.nodes)
-        strong = (self.values[:, :n] * self.nodes[:, None]).reshape(-1, len(self.basis))
+        n, some = len(self.nodes), self.values[:: max(1, len(self.values) // _TYPICAL)]
+        strong = (some[:, :n] * self.nodes[:, None]).reshape(-1, len(self.basis))
         square, vectors = np.linalg.eigh(strong.T @ strong / len(strong))
         return np.asarray(vectors * np.sqrt(np.maximum(square, 0.0)))
 

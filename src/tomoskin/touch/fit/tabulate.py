@@ -17,21 +17,22 @@ from typing import Self
 
 import numpy as np
 from scipy.ndimage import spline_filter1d
-from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from tomoskin.core import Arrays, FloatArray, IntArray, kept, reach
+from tomoskin.touch.fit.certificate import Certificate
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.spot import Footprints, Response, Spots
-from tomoskin.touch.fit.table import N_DIRECTIONS, PADDING, PositionGrid, ResponseTable
+from tomoskin.touch.fit.table import ABREAST, N_DIRECTIONS, PADDING, PositionGrid, ResponseTable
 
-FORMAT = 1
+FORMAT = 2
 """Of tables on disk: one more whenever the same spots would be tabulated otherwise."""
 
 STEP = 0.5
-"""Between grid points, in radii of the spot."""
+"""Between grid points, in radii of the smallest spot; in larger ones as their root: at the rim,
+where all is steep, the sheet's end counts more than a spot's size."""
 
-LOG_STEP = 0.35
+LOG_STEP = 0.26
 """Between radii, in their logarithm."""
 
 NEGLIGIBLE, SAMPLED = 3e-5, 3000
@@ -73,9 +74,7 @@ class Lattice:
 
     def linear(self, slopes: FloatArray, part: FloatArray) -> FloatArray:
         """(n_points, r) of ``slopes`` (n_cells, r) where each cell (c,) has its ``part`` (c,)."""
-        shape = len(self.feet.starts) - 1, len(slopes)
-        spread = csr_array((part, self.feet.cells, self.feet.starts), shape)
-        return np.asarray(spread @ slopes)[self.nearest]
+        return self.feet.linear(slopes, part)[self.nearest]
 
     def exact(self, response: Response, depth: float) -> FloatArray:
         """(n_points, n_meas) V of each spot alone, of that ``depth``."""
@@ -96,11 +95,14 @@ class Tabulation:
         Of ``response``.
     parts
         (n_points, n_nodes): each change divided by s, in parts of the linear model's change.
+    certificate
+        How far the table is from the exact model.
     """
 
     response: Response
     table: ResponseTable
     parts: FloatArray
+    certificate: Certificate
 
     @classmethod
     def of(cls, response: Response, prior: SpotPrior, sign: str) -> Self:
@@ -116,27 +118,34 @@ class Tabulation:
             parts.append(part)
         basis = _basis(sampled)
         values = [_filtered(s @ basis.T, g.shape) for s, g in zip(sampled, grids, strict=True)]
-        table = ResponseTable(log_radii, grids, sign, nodes, np.concatenate(values), basis)
-        return cls(response, table, np.concatenate(parts))
+        every = np.concatenate(values).astype(np.float32)
+        table = ResponseTable(log_radii, grids, sign, nodes, every, basis)
+        certificate = Certificate.of(response, table, prior)
+        return cls(response, table, np.concatenate(parts), certificate)
 
     @classmethod
     def unpacked(cls, arrays: Arrays, response: Response, prior: SpotPrior, sign: str) -> Self:
         """Of the arrays that :meth:`packed` made of the same."""
         log_radii, grids = layout(response, prior)
-        nodes, values = _nodes(*prior.depths(sign)), arrays["values"].astype(np.float64)
-        table = ResponseTable(log_radii, grids, sign, nodes, values, arrays["basis"])
-        return cls(response, table, arrays["parts"])
+        nodes = _nodes(*prior.depths(sign))
+        table = ResponseTable(log_radii, grids, sign, nodes, arrays["values"], arrays["basis"])
+        return cls(response, table, arrays["parts"], Certificate.unpacked(arrays))
 
     def packed(self) -> Arrays:
-        """What takes long to compute, to seven digits."""
-        values = self.table.values.astype(np.float32)
-        return {"values": values, "basis": self.table.basis, "parts": self.parts}
+        """What takes long to compute."""
+        table = self.table
+        return {
+            "values": table.values,
+            "basis": table.basis,
+            "parts": self.parts,
+            **self.certificate.packed(),
+        }
 
     def adapted(self, response: Response) -> Generator[None, None, ResponseTable]:
         """The table of ``response``, another sheet on the same mesh, a piece between two yields."""
         table = self.table
         basis, n_nodes = table.basis.T, len(table.nodes)
-        more = (_by_cell(response) - _by_cell(self.response)) @ basis
+        more = (response.by_cell - self.response.by_cell) @ basis
         values, start = table.values.copy(), 0
         for lattice in self.lattices:
             yield
@@ -184,7 +193,8 @@ def layout(response: Response, prior: SpotPrior) -> tuple[FloatArray, tuple[Posi
     low, high = prior.log_radii
     log_radii = np.linspace(low, high, 1 + math.ceil((high - low) / LOG_STEP))
     points = response.spots.mesh.points
-    return log_radii, tuple(PositionGrid.over(points, STEP * math.exp(r)) for r in log_radii)
+    steps = STEP * np.exp((low + log_radii) / 2)
+    return log_radii, tuple(PositionGrid.over(points, step) for step in steps.tolist())
 
 
 def _nodes(low: float, high: float) -> FloatArray:
@@ -202,19 +212,13 @@ def _sampled(
     out = np.empty((len(lattice.nearest), len(nodes) + N_DIRECTIONS, len(response.reference)))
     for number, (node, depth) in enumerate(zip(nodes, depths.tolist(), strict=True)):
         out[:, number] = lattice.exact(response, depth) / node
-    parts = _parts(out[:, : len(nodes)], lattice.linear(_by_cell(response), feet.height))
+    parts = _parts(out[:, : len(nodes)], lattice.linear(response.by_cell, feet.height))
     directed = zip(response.by_direction, feet.directed, strict=True)
     out[:, -2] = sum(lattice.linear(slopes.T, part) for slopes, part in directed)
     faint = int(np.abs(depths - FAINT).argmin())
     less = parts[:, faint, None] * nodes[faint] / depths[faint]  # than the linear model has
-    out[:, -1] = less * lattice.linear(_by_cell(response), feet.reshaped)
+    out[:, -1] = less * lattice.linear(response.by_cell, feet.reshaped)
     return out, parts
-
-
-def _by_cell(response: Response) -> FloatArray:
-    """(n_cells, n_meas) V: derivatives by log σ of a cell."""
-    state = response.state
-    return np.asarray((state.jacobian * state.conductivity).T)
 
 
 def _parts(samples: FloatArray, linear: FloatArray) -> FloatArray:
@@ -230,7 +234,8 @@ def _basis(sampled: list[FloatArray]) -> FloatArray:
     rows = np.concatenate([s[:, :-N_DIRECTIONS].reshape(-1, s.shape[2]) for s in sampled])
     rows = rows[:: max(1, len(rows) // SAMPLED)]
     square, basis = np.linalg.eigh(rows.T @ rows)
-    return np.asarray(basis.T[square > NEGLIGIBLE**2 * square[-1]])
+    wanted = int(np.count_nonzero(square > NEGLIGIBLE**2 * square[-1]))
+    return np.asarray(basis.T[-min(-(-wanted // ABREAST) * ABREAST, len(square)) :])
 
 
 def _filtered(samples: FloatArray, shape: tuple[int, int]) -> FloatArray:
