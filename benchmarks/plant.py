@@ -70,6 +70,17 @@ class Plant:
         codes = self._codes(resistance, self._current)
         return np.array([self.volts(self._frame(codes)).values for _ in range(count)])
 
+    def scan_of(self, begin: Sequence[Finger], middle: Sequence[Finger], end: Sequence[Finger]) -> Frame:
+        """One frame of what presses at its ``begin``, ``middle`` and ``end``: drives come one after
+        the other, and what they see between is a parabola's."""
+        found = self.state.local.transfer_resistances_of(
+            [self._pressed(presses) for presses in (begin, middle, end)]
+        )
+        codes = np.array([self._codes(resistance, self._current) for resistance in found])
+        part = self.scan.sample_drive / len(self.scan.drives)
+        weights = ((2 * part - 1) * (part - 1), 4 * part * (1 - part), part * (2 * part - 1))
+        return self._frame(np.einsum("ks,ks->s", weights, codes))
+
     def least(self, presses: Sequence[Finger], noise: Whitener) -> Floats:
         """(k,) m: root mean square error of each place that no unbiased estimate goes below.
 
