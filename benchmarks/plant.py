@@ -110,7 +110,7 @@ class Plant:
             away = np.linalg.norm(self._points - [finger.x, finger.y], axis=2) / finger.radius
             part = np.clip((away - 1 + SOFT) / (2 * SOFT), 0.0, 1.0)
             left *= 1 - finger.fall * np.mean((1 + np.cos(np.pi * part)) / 2, axis=1)
-        cells = np.flatnonzero(left < 1)
+        cells = np.flatnonzero(left != 1)
         return cells, self.state.conductivity[cells] * left[cells]
 
     def _codes(self, resistance: Floats, current: float) -> Floats:

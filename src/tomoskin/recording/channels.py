@@ -60,6 +60,7 @@ _TOUCH = _object(
     cov_xy=_MAYBE,
     close={"type": "boolean"},
     merged=_list(_INTEGER),
+    possible=_list(_INTEGER),
 )
 _PRESS = _object(x=_NUMBER, y=_NUMBER, force=_NUMBER, radius=_NUMBER)
 _LOG = _object(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from tomoskin.core import Detection, FloatArray
@@ -14,6 +15,9 @@ from tomoskin.touch.tracking.strength import ELSEWHERE, NOISE, Strength, log_con
 
 _STRENGTH = 4.0
 """What a strength costs at the most, in logarithms of a likelihood: forces come and go."""
+
+_PARTED = 0.02
+"""How far from the middle of two, along each axis, what is seen of them may be, m."""
 
 _JUMP = 4.0
 """What it costs that two touches are seen as one, half-way between."""
@@ -30,13 +34,14 @@ _OPEN = 6.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
-    """Touches as they are expected: ``states`` of n, ``signs`` (n,), their ``strengths``, and
-    ``odds`` (n,), logarithms, that they are there."""
+    """Touches as they are expected: ``states`` of n, ``signs`` (n,), their ``strengths``,
+    ``odds`` (n,), logarithms, that they are there, and which stand for ``several`` (n,) fingers."""
 
     states: States
     signs: FloatArray
     strengths: Sequence[Strength]
     odds: FloatArray
+    several: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +82,7 @@ def _costs(
     followed: Followed, detections: Sequence[Detection], seen: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     positions, spreads = seen
+    spreads = spreads + _PARTED**2 * followed.several[:, None, None, None] * np.eye(2)
     far = distances(followed.states, positions, spreads)
     both = followed.states.covariance[:, None, :2, :2] + spreads
     area = both[..., 0, 0] * both[..., 1, 1] - both[..., 0, 1] ** 2

@@ -19,9 +19,6 @@ MET = 2.0
 """Logarithm of the odds from which a touch that has just gone missing is held to have met another;
 later any odds do."""
 
-FORGOTTEN = -2.5
-"""The same of one that was not reported."""
-
 # Chosen on the moving plant, seeds 1 to 3 (docs/touch.md).
 
 _BEGINS = 3.0
@@ -34,7 +31,7 @@ _TAIL, _MISFIT = 0.6, 0.05
 """Deviations over which detections of nothing get rare above the threshold; beside other touches
 at least so much of the strongest one's."""
 
-_AGAIN = 5.0
+_AGAIN = 7.0
 """Logarithm of how much rarer a detection of nothing is where another has been the frame before."""
 
 _CLUTTER = 3.0
@@ -43,7 +40,7 @@ _CLUTTER = 3.0
 _LIFE = 2.0
 """Seconds that a touch lasts, as an expectation before it has ended."""
 
-_MISSES = 0.10
+_MISSES = 0.2
 """Probability that a finder loses a touch, however strong, for a frame."""
 
 _COHERENCE = 0.02
@@ -52,18 +49,18 @@ _COHERENCE = 0.02
 
 def first(detection: Detection, threshold: float, strongest: float) -> float:
     """Log odds that a new ``detection`` is a touch; ``strongest`` is the largest ratio of others
-    that stand, 0 where there are none."""
+    that stand, 0 where there are none: beside others one frame is never enough."""
     if math.isnan(detection.snr):
         return 0.0
-    beside = _BESIDE if strongest > 0 else 0.0
-    return _BEGINS - beside + _standing_out(detection.snr, threshold, strongest)
+    odds = _BEGINS + _standing_out(detection.snr, threshold, strongest)
+    return min(odds - _BESIDE, BEGUN - 1) if strongest > 0 else odds
 
 
 def seen(
     odds: float, detection: Detection, threshold: float, strongest: float, seconds: float
 ) -> float:
     """Log odds after a further detection, so many ``seconds`` after the frame before."""
-    snr = threshold if math.isnan(detection.snr) else max(detection.snr, threshold)
+    snr = 2 * threshold if math.isnan(detection.snr) else max(detection.snr, threshold)
     gain = _AGAIN - (_BESIDE if strongest > 0 else 0.0) + _standing_out(snr, threshold, strongest)
     return min(odds + _share(seconds) * max(gain, 0.0), MOST)
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-SURE = 0.95
+SURE = 0.8
 """Probability from which an identity is said without any other."""
 
 _RULED_OUT = 0.01

@@ -18,9 +18,12 @@ _RESOLUTION = 0.035
 """Two touches so far apart, m, are seen as one with a probability of 0.6 of that when they are in
 one place (Koch & van Keuk 1997)."""
 
-_MEETS = 2.5
-"""Logarithm of how many times as often a touch that goes missing in the midst of another has met it
-as it has been lifted."""
+_MEETS, _STANDS = 3.0, -1.0
+"""Logarithms of how many times as often a touch that goes missing in the midst of another has met
+it as it has been lifted: where they come closer, and where they were as near before and seen."""
+
+_CLOSING = 0.01
+"""Speed at which two touches come closer, m/s, beside which they stand."""
 
 _CLOSE = 2.0
 """The same of a detection that may be several."""
@@ -28,19 +31,20 @@ _CLOSE = 2.0
 _PARTS = 3.0
 """Logarithm of how many times as often merged touches part as a new one begins beside them."""
 
-_FRAME = 3.0
-"""What one frame says at the most: its errors are those of the next."""
+_LEAST, _MOST = -0.75, 3.0
+"""What one frame says at the least and the most: its errors are those of the next, and of two that
+are too close a fit may find one alone."""
 
 _OFF = 0.006
 """Deviation of the position of what is seen as one, beside its noise, m."""
 
-_COURSE, _BACK, _ANY = 0.5, 0.25, 0.25
+_COURSE, _BACK, _ANY = 0.6, 0.2, 0.2
 """How often touches go on as they went, come out where they went in, or anywhere."""
 
-_ASIDE, _ANYWHERE = 0.025, 0.08
+_ASIDE, _ANYWHERE = 0.04, 0.08
 """Deviations along each axis of the latter two, m."""
 
-_SWERVE = 0.02
+_SWERVE = 0.001
 """Variance by which a course changes its speed along an axis in a second, m²/s²."""
 
 
@@ -73,7 +77,7 @@ def met(lost: Alone, other: Alone, detection: Detection) -> float:
     there = _normal(position - middle, spread[:2, :2] + noise)
     alone = _normal(position - one.mean[0, :2], one.covariance[0, :2, :2] + noise)
     content = grown(detection, other.strength, lost.strength)
-    return min(max(there - alone + content, -_FRAME), _FRAME)
+    return min(max(there - alone + content, _LEAST), _MOST)
 
 
 def grown(detection: Detection, alone: Strength, more: Strength) -> float:
@@ -86,29 +90,23 @@ def meeting(lost: Alone, other: Alone, evidence: float, *, close: bool) -> float
     """Log odds that two have met, and not one been lifted, after the ``evidence`` of frames."""
     away = lost.states.mean[0, :2] - other.states.mean[0, :2]
     near = -0.5 * float(away @ away) / _RESOLUTION**2
-    return _MEETS + near + evidence + _CLOSE * close
+    closing = -float(away @ (lost.states.mean[0, 2:] - other.states.mean[0, 2:]))
+    comes = closing > _CLOSING * math.sqrt(float(away @ away))
+    return (_MEETS if comes else _STANDS) + near + evidence + _CLOSE * close
 
 
-def parting(
-    carrier: Detection, before: Strength, branch: Detection, reach: float
-) -> float:
-    """Log odds that a new detection has come out of a merged touch, and has not begun beside it.
-
-    ``before`` is the strength of the merged one; ``reach`` m, how far from each other its members
-    have been.
-    """
+def parting(carrier: Detection, branch: Detection, reach: float) -> float:
+    """Log odds that a new detection has come out of a merged touch, and has not begun beside it, as
+    their positions say; ``reach`` m, how far from each other its members have been."""
     away = math.hypot(carrier.x - branch.x, carrier.y - branch.y)
-    far = -0.5 * (away / (2 * _RESOLUTION + 0.5 * reach)) ** 2
-    left = Strength.of(carrier)
-    content = grown_back(before, left, Strength.of(branch))
-    return _PARTS + 4 * far + content
+    return _PARTS - 2 * (away / (2 * _RESOLUTION + 0.5 * reach)) ** 2
 
 
-def grown_back(before: Strength, left: Strength, branch: Strength) -> float:
+def shrunk(before: Strength, left: Strength, branch: Strength) -> float:
     """What contents say for two touches having been one before, log likelihood ratio."""
     both = left.plus(branch)
     odds = before.log_likelihood(both) - before.log_likelihood(left)
-    return min(max(odds, -_FRAME), _FRAME)
+    return min(max(odds, 2 * _LEAST), _MOST)
 
 
 def crossing(one: Member, other: Member, apart: FloatArray, time: float) -> float:

@@ -35,9 +35,9 @@ class TrackSettings:
 
     snr: float = 5.0
     still: bool = False
-    speed: float = 0.2
-    turning: float = 0.5
-    wander: float = 0.005
+    speed: float = 0.1
+    turning: float = 1.0
+    wander: float = 0.004
 
     @property
     def least_snr(self) -> float:

@@ -10,13 +10,13 @@ from tomoskin.core import Detection
 
 # Deviations are those of fits to the moving plant, seeds 1 to 3 (docs/touch.md).
 
-NOISE = 0.17
+NOISE = 0.15
 """Of the logarithm of a content from frame to frame."""
 
-ELSEWHERE = 0.13
+ELSEWHERE = 0.10
 """Of the difference that another position makes: the sheet is uneven."""
 
-_WALK = 0.06
+_WALK = 0.03
 """Variance by which a finger's force changes it in a second."""
 
 

@@ -12,7 +12,7 @@ from tomoskin.touch.tracking import existence, identity, motion
 from tomoskin.touch.tracking.association import NOTHING, Association, Followed, associate
 from tomoskin.touch.tracking.event import Happening, TouchEvent
 from tomoskin.touch.tracking.identity import NOBODY, SURE, Naming
-from tomoskin.touch.tracking.merging import Alone, Member, crossing, meeting, met, parting, reach_of
+from tomoskin.touch.tracking.merging import Alone, Member, crossing, meeting, met, parting, reach_of, shrunk
 from tomoskin.touch.tracking.motion import TrackSettings
 from tomoskin.touch.tracking.residual import ResidualResponses, is_residual
 from tomoskin.touch.tracking.strength import Strength
@@ -21,7 +21,10 @@ from tomoskin.touch.tracking.trace import Trace
 _MOVED, _BY_DEVIATIONS = 0.003, 3.0
 """A touch moves when it is so many metres, and deviations, from where it was last reported."""
 
-_POSSIBLE = 0.02
+_PAUSE = 0.5
+"""Seconds without frames, in which touches move; in a longer pause they stand: nobody looked."""
+
+_POSSIBLE = 0.05
 """Probability from which another identity is said beside the likeliest."""
 
 
@@ -102,10 +105,11 @@ class Tracker:
         seen = motion.observe(detections, self.settings)
         found, states = NOTHING, _stacked(traces)
         if traces:
-            states = motion.predict(states, self._passed, self.settings)
+            states = motion.predict(states, min(self._passed, _PAUSE), self.settings)
             if detections:
                 found = associate(_followed(traces, states), detections, seen)
-        merged = {t.key: t.alone(self._now) for t in traces if len(t.members) > 1}
+        groups = [trace for trace in traces if len(trace.members) > 1]
+        merged = {m.key: t.alone(self._now) for t in groups for m in t.members}
         strongest = max((d.snr for d in detections if not math.isnan(d.snr)), default=0.0)
         self._miss(set(found.pairs.values()), states)
         self._see(detections, found, seen, states, strongest)
@@ -223,10 +227,10 @@ class Tracker:
         if self.settings.still and trace.missing is None:
             self._report_onset(trace)
             return
-        if trace.odds < existence.FORGOTTEN or trace.detection.snr < self.settings.snr:
+        if trace.missing is not None or trace.detection.snr < self.settings.snr:
             self._traces.remove(trace)
             return
-        if trace.odds < existence.BEGUN or trace.missing is not None:
+        if trace.odds < existence.BEGUN:
             return
         if self._residuals.explain(trace.detection, self._now, self._traces):
             self._traces.remove(trace)
@@ -255,7 +259,9 @@ class Tracker:
             before = branch.beside.get(trace.key)
             if before and len(trace.members) > 1 and trace.sign == branch.sign:
                 reach = reach_of(trace.members)
-                odds = parting(trace.detection, before.strength, branch.detection, reach)
+                odds = parting(trace.detection, branch.detection, reach)
+                if trace.missing is None:
+                    odds += shrunk(before.strength, Strength.of(trace.detection), Strength.of(branch.detection))
                 if odds > best[0]:
                     best = odds, trace
         return best[1]
@@ -272,7 +278,8 @@ class Tracker:
             self._namings = identity.exchanged(self._namings, stays.key, leaves.key, odds)
         for trace in (carrier, branch):
             trace.change(self._now)
-        for trace in (carrier, branch):
+        names = self._namings[0].names
+        for trace in sorted((carrier, branch), key=lambda t: names[t.key]):
             self._report("split", trace)
 
     def _lose(self, trace: Trace) -> None:
@@ -379,7 +386,8 @@ class Tracker:
 def _followed(traces: Sequence[Trace], states: motion.States) -> Followed:
     signs = np.array([trace.sign for trace in traces])
     odds = np.array([trace.odds for trace in traces])
-    return Followed(states, signs, [trace.strength for trace in traces], odds)
+    several = np.array([len(trace.members) > 1 for trace in traces])
+    return Followed(states, signs, [trace.strength for trace in traces], odds, several)
 
 
 def _unlike(member: Member, branch: Trace) -> float:
