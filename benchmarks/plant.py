@@ -70,7 +70,9 @@ class Plant:
         codes = self._codes(resistance, self._current)
         return np.array([self.volts(self._frame(codes)).values for _ in range(count)])
 
-    def scan_of(self, begin: Sequence[Finger], middle: Sequence[Finger], end: Sequence[Finger]) -> Frame:
+    def scan_of(
+        self, begin: Sequence[Finger], middle: Sequence[Finger], end: Sequence[Finger]
+    ) -> Frame:
         """One frame of what presses at its ``begin``, ``middle`` and ``end``: drives come one after
         the other, and what they see between is a parabola's."""
         found = self.state.local.transfer_resistances_of(

@@ -26,9 +26,7 @@ def moving(random: np.random.Generator, count: int) -> tuple[list[Slide], float]
             for s in slides
         ]
         gaps = [
-            np.linalg.norm(ways[i] - ways[j], axis=1).min()
-            for i in range(count)
-            for j in range(i)
+            np.linalg.norm(ways[i] - ways[j], axis=1).min() for i in range(count) for j in range(i)
         ]
         if min(gaps, default=APART) >= APART:
             return slides, 3.4

@@ -11,7 +11,6 @@ from tomoskin.core import Detection
 from tomoskin.touch import STILL, Tracker
 from touch.tracking.detections import AREA, Run, detection
 
-
 FAINT = {"snr": 6.0}
 
 
@@ -224,3 +223,9 @@ def test_of_frames_that_do_not_follow_each_other_none_tells_of_another() -> None
     assert [len(ids) for ids in run.shown] == [1, 0, 1]
     run = Run(settings=STILL)([[strong], [detection(0, weak=True), detection(0.05)]])
     assert [[touch.detection.x for touch in frame] for frame in run.touches] == [[0], [0.05]]
+
+
+def test_of_frames_that_do_not_follow_each_other_presses_elsewhere_are_others() -> None:
+    """One a second, 50 mm from the last; a touch that goes on a little is the same."""
+    run = Run(1, STILL)([[detection(0.0)], [detection(0.05)], [detection(0.055)], [detection(0.0)]])
+    assert run.shown == [[1], [2], [2], [3]]

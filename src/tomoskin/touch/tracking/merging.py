@@ -99,7 +99,7 @@ def parting(carrier: Detection, branch: Detection, reach: float) -> float:
     """Log odds that a new detection has come out of a merged touch, and has not begun beside it, as
     their positions say; ``reach`` m, how far from each other its members have been."""
     away = math.hypot(carrier.x - branch.x, carrier.y - branch.y)
-    return _PARTS - 2 * (away / (2 * _RESOLUTION + 0.5 * reach)) ** 2
+    return float(_PARTS - 2 * (away / (2 * _RESOLUTION + 0.5 * reach)) ** 2)
 
 
 def shrunk(before: Strength, left: Strength, branch: Strength) -> float:
@@ -148,7 +148,7 @@ def _normal(away: FloatArray, spread: FloatArray) -> float:
     (xx, xy), (_, yy) = spread.tolist()
     x, y = away.tolist()
     area = xx * yy - xy * xy
-    return -0.5 * ((yy * x * x - 2 * xy * x * y + xx * y * y) / area + math.log(area))
+    return float(-0.5 * ((yy * x * x - 2 * xy * x * y + xx * y * y) / area + math.log(area)))
 
 
 def _log_density(value: float, strength: Strength) -> float:

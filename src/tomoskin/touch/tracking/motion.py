@@ -55,6 +55,7 @@ GATE = 16.0
 _UNKNOWN = 0.004
 """Deviation of a detection whose noise is unknown, m."""
 
+
 @dataclass(frozen=True, slots=True, eq=False)
 class States:
     """``mean`` (n, 4) m and m/s, ``covariance`` (n, 4, 4)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from tomoskin.core import Detection, FloatArray
+from tomoskin.core import Detection
 from tomoskin.touch.tracking.merging import Alone, Member
 from tomoskin.touch.tracking.motion import States, region_radius
 from tomoskin.touch.tracking.position import Position

@@ -12,7 +12,16 @@ from tomoskin.touch.tracking import existence, identity, motion
 from tomoskin.touch.tracking.association import NOTHING, Association, Followed, associate
 from tomoskin.touch.tracking.event import Happening, TouchEvent
 from tomoskin.touch.tracking.identity import NOBODY, SURE, Naming
-from tomoskin.touch.tracking.merging import Alone, Member, crossing, meeting, met, parting, reach_of, shrunk
+from tomoskin.touch.tracking.merging import (
+    Alone,
+    Member,
+    crossing,
+    meeting,
+    met,
+    parting,
+    reach_of,
+    shrunk,
+)
 from tomoskin.touch.tracking.motion import TrackSettings
 from tomoskin.touch.tracking.residual import ResidualResponses, is_residual
 from tomoskin.touch.tracking.strength import Strength
@@ -105,7 +114,8 @@ class Tracker:
         seen = motion.observe(detections, self.settings)
         found, states = NOTHING, _stacked(traces)
         if traces:
-            states = motion.predict(states, min(self._passed, _PAUSE), self.settings)
+            moving = 0.0 if self.settings.still else min(self._passed, _PAUSE)
+            states = motion.predict(states, moving, self.settings)
             if detections:
                 found = associate(_followed(traces, states), detections, seen)
         groups = [trace for trace in traces if len(trace.members) > 1]
@@ -176,8 +186,9 @@ class Tracker:
             trace.see(detection, self._now, self._passed, still=self.settings.still)
             trace.states = state
             if number in found.jumped:  # its region has changed: it has not moved
-                trace.states = motion.begin(positions[row], spreads[row], self.settings)
                 trace.change(self._now)
+            if number in found.jumped or self.settings.still:
+                trace.states = motion.begin(positions[row], spreads[row], self.settings)
             others = any(t.reported and t is not trace for t in self._traces)
             trace.odds = existence.seen(
                 trace.odds,
@@ -261,7 +272,9 @@ class Tracker:
                 reach = reach_of(trace.members)
                 odds = parting(trace.detection, branch.detection, reach)
                 if trace.missing is None:
-                    odds += shrunk(before.strength, Strength.of(trace.detection), Strength.of(branch.detection))
+                    odds += shrunk(
+                        before.strength, Strength.of(trace.detection), Strength.of(branch.detection)
+                    )
                 if odds > best[0]:
                     best = odds, trace
         return best[1]
@@ -302,7 +315,8 @@ class Tracker:
 
     def _met_by(self, lost: Trace) -> tuple[float, Trace | None]:
         """The touch that the ``lost`` one is too close to be told from, with the log odds of it."""
-        alone, best = lost.beside.get(lost.key), (-math.inf, None)
+        alone = lost.beside.get(lost.key)
+        best: tuple[float, Trace | None] = (-math.inf, None)
         for trace in self._traces:
             other = lost.beside.get(trace.key)
             if alone and other and trace.key in lost.met and trace.missing is None:
