@@ -24,10 +24,10 @@ later any odds do."""
 _BEGINS = 3.0
 """Logarithm of how many times as often a touch begins as a finder sees one that is none."""
 
-_BESIDE = 3.0
+_BESIDE = 2.0
 """By so much that is less beside another touch, whose model errs in frame after frame."""
 
-_TAIL, _MISFIT = 0.6, 0.05
+_TAIL, _MISFIT = 0.6, 0.03
 """Deviations over which detections of nothing get rare above the threshold; beside other touches
 at least so much of the strongest one's."""
 
