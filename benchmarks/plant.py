@@ -70,6 +70,19 @@ class Plant:
         codes = self._codes(resistance, self._current)
         return np.array([self.volts(self._frame(codes)).values for _ in range(count)])
 
+    def scan_of(
+        self, begin: Sequence[Finger], middle: Sequence[Finger], end: Sequence[Finger]
+    ) -> Frame:
+        """One frame of what presses at its ``begin``, ``middle`` and ``end``: drives come one after
+        the other, and what they see between is a parabola's."""
+        found = self.state.local.transfer_resistances_of(
+            [self._pressed(presses) for presses in (begin, middle, end)]
+        )
+        codes = np.array([self._codes(resistance, self._current) for resistance in found])
+        part = self.scan.sample_drive / len(self.scan.drives)
+        weights = ((2 * part - 1) * (part - 1), 4 * part * (1 - part), part * (2 * part - 1))
+        return self._frame(np.einsum("ks,ks->s", weights, codes))
+
     def least(self, presses: Sequence[Finger], noise: Whitener) -> Floats:
         """(k,) m: root mean square error of each place that no unbiased estimate goes below.
 
@@ -99,7 +112,7 @@ class Plant:
             away = np.linalg.norm(self._points - [finger.x, finger.y], axis=2) / finger.radius
             part = np.clip((away - 1 + SOFT) / (2 * SOFT), 0.0, 1.0)
             left *= 1 - finger.fall * np.mean((1 + np.cos(np.pi * part)) / 2, axis=1)
-        cells = np.flatnonzero(left < 1)
+        cells = np.flatnonzero(left != 1)
         return cells, self.state.conductivity[cells] * left[cells]
 
     def _codes(self, resistance: Floats, current: float) -> Floats:

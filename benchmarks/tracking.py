@@ -142,7 +142,7 @@ def _identities(method: str, seeds: Sequence[int]) -> Report:
         (
             f"twin, textile preset, 12 mm presses of 2 to 5 N, seeds {_listed(seeds)}, {RUNS} runs "
             "each",
-            "right: both presses end with the id that they began with, and there is no other id",
+            "right: both end with the id that they began with, surely, and there is no other id",
             "seen or said: two touches, or one that says that it is merged or too close",
         ),
     )
@@ -152,6 +152,7 @@ def _judged(frames: list[Frame]) -> tuple[bool, bool, float, float]:
     ids: set[int] = set()
     owners: list[dict[int, int]] = []
     third = said = both = 0
+    unsure = False
     for frame in frames:
         touches = frame.result.touches
         ids |= {number for t in touches for number in (t.id, *t.merged)}
@@ -160,13 +161,14 @@ def _judged(frames: list[Frame]) -> tuple[bool, bool, float, float]:
             continue
         both += 1
         third += len(touches) > 2
-        apart = all(t.said == t.kind for t in touches)
+        apart = not any(t.merged or t.detection.close for t in touches)
         said += len(touches) == 2 or not apart
         if len(touches) == 2 and apart:
             away = [[_away(t.detection, p) for p in presses] for t in touches]
             swapped = away[0][0] + away[1][1] > away[0][1] + away[1][0]
             owners.append({touches[k].id: k ^ swapped for k in (0, 1)})
-    right = bool(owners) and owners[0] == owners[-1] and len(ids) == 2
+            unsure = any(t.possible for t in touches)
+    right = bool(owners) and owners[0] == owners[-1] and len(ids) == 2 and not unsure
     return right, len(ids) == 2, third / both, said / both
 
 

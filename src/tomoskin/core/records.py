@@ -257,6 +257,9 @@ class Touch:
     merged
         Identities of all the touches that it stands for, its own among them, where several have
         come too close to separate; else empty.
+    possible
+        Identities that it may have, its own among them, where it has been too close to another
+        for frames to tell who is who; else empty.
     """
 
     id: int
@@ -264,6 +267,7 @@ class Touch:
     since: float
     detection: Detection = field(repr=False)
     merged: tuple[int, ...] = ()
+    possible: tuple[int, ...] = ()
 
     @property
     def reading(self) -> Detection:
@@ -272,9 +276,11 @@ class Touch:
 
     @property
     def said(self) -> str:
-        """Its kind for tables: "merged 1+2" and "too close" say what cannot be told apart."""
+        """Its kind for tables: "merged 1+2", "1 or 2" and "too close" say what is not certain."""
         if self.merged:
             return f"merged {'+'.join(map(str, self.merged))}"
+        if self.possible:
+            return " or ".join(map(str, self.possible))
         return "too close" if self.detection.close else self.kind
 
 

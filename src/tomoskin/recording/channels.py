@@ -65,6 +65,7 @@ _TOUCH = _object(
     force=_MAYBE,
     force_interval=_list(_NUMBER),
     force_calibrated={"type": "boolean"},
+    possible=_list(_INTEGER),
 )
 _PRESS = _object(x=_NUMBER, y=_NUMBER, force=_NUMBER, radius=_NUMBER)
 _LOG = _object(

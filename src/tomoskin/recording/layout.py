@@ -139,6 +139,7 @@ def touch_row(touch: Touch) -> dict[str, Any]:
         "id": touch.id, "kind": touch.kind, "since": touch.since,
         "x": r.x, "y": r.y, "sd_x": r.sd_x, "sd_y": r.sd_y, "area": r.area, "peak": r.peak,
         "cov_xy": r.cov_xy, "close": r.close, "merged": touch.merged,
+        "possible": touch.possible,
     }  # fmt: skip
 
 
@@ -171,8 +172,9 @@ def _touch_of(item: dict[str, Any]) -> Touch:
     sd_x, sd_y = (float("nan") if item[k] is None else item[k] for k in ("sd_x", "sd_y"))
     place = item["x"], item["y"], sd_x, sd_y, item["area"], item["peak"], _NO_CELLS
     cov_xy, close, merged = (item.get(k) for k in ("cov_xy", "close", "merged"))  # format 1.0: none
+    possible = tuple(item.get("possible", ()))  # none in 0.1
     force = None
     if item.get("force") is not None:
         force = Force(item["force"], *item["force_interval"], item["force_calibrated"])
     reading = Detection(*place, cov_xy=cov_xy or 0.0, close=bool(close), force=force)
-    return Touch(item["id"], item["kind"], item["since"], reading, tuple(merged or ()))
+    return Touch(item["id"], item["kind"], item["since"], reading, tuple(merged or ()), possible)

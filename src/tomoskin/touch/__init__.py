@@ -13,8 +13,9 @@ from tomoskin.touch.region import Region
 from tomoskin.touch.segment import ImageNoise, Segmenter
 from tomoskin.touch.spans import Span, touch_spans
 from tomoskin.touch.table import ELAPSED, TouchedFrame, columns_of, touch_columns, touch_rows
+from tomoskin.touch.tracking.event import TouchEvent
 from tomoskin.touch.tracking.motion import STILL, TrackSettings
-from tomoskin.touch.tracking.tracker import TouchEvent, Tracker
+from tomoskin.touch.tracking.tracker import Tracker
 
 __all__ = [
     "ELAPSED",

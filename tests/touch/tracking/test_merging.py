@@ -37,7 +37,8 @@ def test_together_and_apart_again_are_the_same_two(rate: float) -> None:
     assert (touch.id, touch.merged, touch.said) == (1, (1, 2), "merged 1+2")
     slide(run, lambda t: 0.01 + 0.03 * min(t, 1), 1.5)
     assert [(t.id, t.merged) for t in run.touches[-1]] == [(1, ()), (2, ())]
-    assert [t.detection.x for t in run.touches[-1]] == pytest.approx([-0.04, 0.04])
+    assert all(t.possible == (1, 2) for t in run.touches[-1]), "they are alike, and have rested"
+    assert {t.said for t in run.touches[-1]} == {"1 or 2"}
     assert run.happened == [
         *(("onset", 1), ("onset", 2), ("merge", 1)),
         *(("split", 1), ("split", 2)),
@@ -56,10 +57,19 @@ def test_two_that_pass_each_other_swiftly_go_on_where_they_went(rate: float) -> 
     assert [(t.id, t.detection.x > 0) for t in run.touches[-1]] == [(1, True), (2, False)]
 
 
-def test_two_that_meet_and_rest_return_to_their_own_sides() -> None:
-    run = slide(Run(), lambda t: 0.04 - 0.06 * min(t, 0.5), 3.0)
-    slide(run, lambda t: 0.01 + 0.06 * min(t, 0.5), 1.0)
-    assert [(t.id, round(t.detection.x, 2)) for t in run.touches[-1]] == [(1, -0.04), (2, 0.04)]
+@pytest.mark.parametrize("rate", [10, 40])
+def test_strengths_say_who_is_who(rate: float) -> None:
+    """One is twice as strong: it is known again wherever it comes out."""
+    for side in (1, -1):
+        run, strong = Run(rate), 2.0
+        times = np.arange(0, 1, 1 / rate)
+        apart = [0.05 - 0.04 * t for t in times]
+        run([[detection(-x, peak=-strong), detection(x)] for x in apart])
+        run([[detection(-0.003, peak=-1 - strong)]] * round(0.4 * rate))
+        back = [0.04 + 0.01 * t for t in times]
+        run([[detection(-side * x, peak=-strong), detection(side * x)] for x in back])
+        touches = sorted(run.touches[-1], key=lambda touch: touch.detection.peak)
+        assert [(t.id, t.possible) for t in touches] == [(1, ()), (2, ())]
 
 
 def test_a_touch_that_is_lifted_near_another_has_not_merged() -> None:
@@ -94,8 +104,13 @@ def test_three_become_one_and_three_again() -> None:
 
     spreads = [*np.linspace(0.045, 0.01, 40), *[0.01] * 10, *np.linspace(0.01, 0.045, 40)]
     run = Run()([three(s) for s in spreads])
-    first = Run()([three(0.045)] * 3).touches[-1]
     assert any(t.merged == (1, 2, 3) for touches in run.touches for t in touches)
-    for before, after in zip(first, run.touches[-1], strict=True):
-        assert after.id == before.id
-        assert after.detection.x == pytest.approx(before.detection.x)
+    assert [(t.id, t.merged) for t in run.touches[-1]] == [(1, ()), (2, ()), (3, ())]
+    assert all(t.possible == (1, 2, 3) for t in run.touches[-1]), "they are alike"
+
+
+def test_a_merged_touch_that_jumps_is_the_same() -> None:
+    """What is seen of two that part may be either of them, far from their middle."""
+    run = slide(Run(10), lambda t: 0.04 - 0.03 * min(t, 1), 1.5)
+    run([[detection(-0.035), detection(0.035)]] * 4)
+    assert [t.id for t in run.touches[-1]] == [1, 2]

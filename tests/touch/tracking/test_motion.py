@@ -39,7 +39,9 @@ def test_speed_does_not_grow_over_a_gap() -> None:
     got = predict(state(), 100.0, SETTINGS)
     assert np.sqrt(got.covariance[0, 2, 2]) == pytest.approx(SETTINGS.speed)
     drift = np.array([[-1 / SETTINGS.turning]])
-    lasting = solve_continuous_lyapunov(drift, -np.array([[2 * SETTINGS.speed**2 / 0.3]]))
+    lasting = solve_continuous_lyapunov(
+        drift, -np.array([[2 * SETTINGS.speed**2 / SETTINGS.turning]])
+    )
     assert lasting[0, 0] == pytest.approx(SETTINGS.speed**2)
 
 

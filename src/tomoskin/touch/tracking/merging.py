@@ -1,132 +1,156 @@
-"""Touches that come too close to separate, and come apart again."""
+"""Touches that come too close to separate, and come apart again: what speaks for either."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
-from tomoskin.core import FloatArray
-from tomoskin.touch.tracking.motion import region_radius
-from tomoskin.touch.tracking.trace import Trace, Unmerged, content
+from tomoskin.core import Detection, FloatArray
+from tomoskin.touch.tracking.motion import States
+from tomoskin.touch.tracking.strength import NOISE, Strength, log_content
 
-_REACH = 2.0
-"""A touch merges into a region, and comes out of it, within so many of its radii."""
+# Chosen on the moving plant, seeds 1 to 3 (docs/touch.md).
 
-_CLOSE = 0.005
-_CHANGED = 0.25
-"""By so much a region that takes up another has grown, in parts of its content, and moved to where
-that was, in parts of the way. Chosen on two presses that slide together (twin, seeds 1 to 3)."""
+_RESOLUTION = 0.035
+"""Two touches so far apart, m, are seen as one with a probability of 0.6 of that when they are in
+one place (Koch & van Keuk 1997)."""
 
+_MEETS, _STANDS = 3.0, -1.0
+"""Logarithms of how many times as often a touch that goes missing in the midst of another has met
+it as it has been lifted: where they come closer, and where they were as near before and seen."""
 
-_PASSING = 1.2
-"""Touches that have been one for longer than this many times as long as it takes to pass each other
-have stopped, and come out where they went in."""
+_CLOSING = 0.01
+"""Speed at which two touches come closer, m/s, beside which they stand."""
 
+_CLOSE = 2.0
+"""The same of a detection that may be several."""
 
-def carrier_of(lost: Trace, traces: Sequence[Trace]) -> Trace | None:
-    """The touch in whose region the ``lost`` one has been since it went missing, or None.
+_PARTS = 3.0
+"""Logarithm of how many times as often merged touches part as a new one begins beside them."""
 
-    A touch that is lifted leaves its neighbour as it was; one that has merged makes the
-    neighbour's region larger and draws it over.
-    """
-    near = [t for t in traces if t is not lost and t.missing is None and _holds(t, lost)]
-    return min(near, key=lambda t: _between(t, lost), default=None)
+_LEAST, _MOST = -0.75, 3.0
+"""What one frame says at the least and the most: its errors are those of the next, and of two that
+are too close a fit may find one alone."""
 
+_OFF = 0.006
+"""Deviation of the position of what is seen as one, beside its noise, m."""
 
-def _holds(trace: Trace, lost: Trace) -> bool:
-    before = lost.beside.get(trace.number)
-    if before is None or trace.sign != lost.sign:
-        return False
-    if _between(trace, lost) > _REACH * region_radius(trace.detection):
-        return False
-    return trace.detection.close or _change(trace, before, lost) > _CHANGED
+_COURSE, _BACK, _ANY = 0.6, 0.2, 0.2
+"""How often touches go on as they went, come out where they went in, or anywhere."""
 
+_ASIDE, _ANYWHERE = 0.04, 0.08
+"""Deviations along each axis of the latter two, m."""
 
-def _change(trace: Trace, before: Unmerged, lost: Trace) -> float:
-    start = before.states.mean[0, :2]
-    way = np.array([lost.detection.x, lost.detection.y]) - start
-    moved = np.array([trace.detection.x, trace.detection.y]) - start
-    was = content(before.detection)
-    grown = content(trace.detection) / was - 1 if was > 0 else 0.0
-    return float(grown + moved @ way / max(float(way @ way), _CLOSE**2))
+_SWERVE = 0.001
+"""Variance by which a course changes its speed along an axis in a second, m²/s²."""
 
 
-def _between(trace: Trace, lost: Trace) -> float:
-    r, (x, y) = trace.detection, lost.position.tolist()
-    return min(
-        math.hypot(r.x - x, r.y - y), math.hypot(r.x - lost.detection.x, r.y - lost.detection.y)
+@dataclass(frozen=True, slots=True, eq=False)
+class Alone:
+    """A touch as it was when last seen by itself, at the device's ``time`` s: one row of states."""
+
+    states: States
+    strength: Strength
+    time: float
+
+
+@dataclass(eq=False, slots=True)
+class Member:
+    """One finger, as far as frames told it from others: its number, and how it was ``alone``."""
+
+    key: int
+    alone: Alone | None = None
+
+
+def met(lost: Alone, other: Alone, detection: Detection) -> float:
+    """What a ``detection`` of the ``other`` says for its being both, log likelihood ratio."""
+    share = 1 / (1 + math.exp(lost.strength.mean - other.strength.mean))
+    one, two = other.states, lost.states
+    middle = share * one.mean[0, :2] + (1 - share) * two.mean[0, :2]
+    spread = share**2 * one.covariance[0] + (1 - share) ** 2 * two.covariance[0]
+    position = np.array([detection.x, detection.y])
+    noise = np.array([[detection.sd_x**2, detection.cov_xy], [detection.cov_xy, detection.sd_y**2]])
+    noise = np.where(np.isfinite(noise), noise, 0.0) + _OFF**2 * np.eye(2)
+    there = _normal(position - middle, spread[:2, :2] + noise)
+    alone = _normal(position - one.mean[0, :2], one.covariance[0, :2, :2] + noise)
+    content = grown(detection, other.strength, lost.strength)
+    return min(max(there - alone + content, _LEAST), _MOST)
+
+
+def grown(detection: Detection, alone: Strength, more: Strength) -> float:
+    """What a content says for being that of two touches, log likelihood ratio against the one."""
+    value, both = log_content(detection), alone.plus(more)
+    return _log_density(value, both) - _log_density(value, alone)
+
+
+def meeting(lost: Alone, other: Alone, evidence: float, *, close: bool) -> float:
+    """Log odds that two have met, and not one been lifted, after the ``evidence`` of frames."""
+    away = lost.states.mean[0, :2] - other.states.mean[0, :2]
+    near = -0.5 * float(away @ away) / _RESOLUTION**2
+    closing = -float(away @ (lost.states.mean[0, 2:] - other.states.mean[0, 2:]))
+    comes = closing > _CLOSING * math.sqrt(float(away @ away))
+    return (_MEETS if comes else _STANDS) + near + evidence + _CLOSE * close
+
+
+def parting(carrier: Detection, branch: Detection, reach: float) -> float:
+    """Log odds that a new detection has come out of a merged touch, and has not begun beside it, as
+    their positions say; ``reach`` m, how far from each other its members have been."""
+    away = math.hypot(carrier.x - branch.x, carrier.y - branch.y)
+    return float(_PARTS - 2 * (away / (2 * _RESOLUTION + 0.5 * reach)) ** 2)
+
+
+def shrunk(before: Strength, left: Strength, branch: Strength) -> float:
+    """What contents say for two touches having been one before, log likelihood ratio."""
+    both = left.plus(branch)
+    odds = before.log_likelihood(both) - before.log_likelihood(left)
+    return min(max(odds, 2 * _LEAST), _MOST)
+
+
+def crossing(one: Member, other: Member, apart: FloatArray, time: float) -> float:
+    """Log odds that two members have come out the other way round than ``apart`` (2,) m, the way
+    from the other to the one, at a ``time`` s."""
+    if one.alone is None or other.alone is None:
+        return 0.0
+    return _way(one.alone, other.alone, -apart, time) - _way(one.alone, other.alone, apart, time)
+
+
+def _way(one: Alone, other: Alone, apart: FloatArray, time: float) -> float:
+    """Log likelihood of two that went in being so far apart by now."""
+    offset = np.zeros(4)
+    spread = np.zeros((4, 4))
+    for alone, sign in ((one, 1.0), (other, -1.0)):
+        since = max(time - alone.time, 0.0)
+        step = np.eye(4)
+        step[[0, 1], [2, 3]] = since
+        offset += sign * step @ alone.states.mean[0]
+        spread += step @ alone.states.covariance[0] @ step.T
+        spread[[0, 1], [0, 1]] += _SWERVE * since**3 / 3
+    went_in = one.states.mean[0, :2] - other.states.mean[0, :2]
+    ways = (
+        (_COURSE, apart - offset[:2], spread[:2, :2] + 2 * _OFF**2 * np.eye(2)),
+        (_BACK, apart - went_in, 2 * _ASIDE**2 * np.eye(2)),
+        (_ANY, apart, 2 * _ANYWHERE**2 * np.eye(2)),
     )
+    return math.log(sum(part * math.exp(_normal(away, wide)) for part, away, wide in ways))
 
 
-def merge(carrier: Trace, lost: Trace) -> None:
-    """Merge the ``lost`` touch into ``carrier``; both keep what they were alone."""
-    if carrier.alone is None:
-        carrier.alone = lost.beside[carrier.number]
-    if lost.alone is None:
-        lost.alone = lost.beside[lost.number]
-    carrier.others += [lost, *lost.others]
-    lost.others = []
+def reach_of(members: Sequence[Member]) -> float:
+    """The largest distance between members when they were last alone, m."""
+    places = np.array([m.alone.states.mean[0, :2] for m in members if m.alone]).reshape(-1, 2)
+    return float(np.linalg.norm(places[:, None] - places, axis=2).max(initial=0.0))
 
 
-def origin_of(branch: Trace, traces: Sequence[Trace]) -> Trace | None:
-    """The merged touch that a new one has come out of, or None."""
-    for trace in traces:
-        if trace.others and trace.sign == branch.sign:
-            away = (trace.detection.x - branch.detection.x, trace.detection.y - branch.detection.y)
-            if np.hypot(*away) <= max(_REACH * region_radius(trace.detection), _spread(trace)):
-                return trace
-    return None
+def _normal(away: FloatArray, spread: FloatArray) -> float:
+    """Log density, 1/m²."""
+    (xx, xy), (_, yy) = spread.tolist()
+    x, y = away.tolist()
+    area = xx * yy - xy * xy
+    return float(-0.5 * ((yy * x * x - 2 * xy * x * y + xx * y * y) / area + math.log(area)))
 
 
-def _spread(carrier: Trace) -> float:
-    """Twice the largest distance between the merged touches when they last were apart."""
-    apart = [member.alone.detection for member in carrier.members if member.alone]
-    positions = np.array([(detection.x, detection.y) for detection in apart])
-    return 2 * float(np.linalg.norm(positions[:, None] - positions, axis=2).max(initial=0.0))
-
-
-def split(carrier: Trace, branch: Trace, time: float) -> tuple[Trace, Trace]:
-    """The two touches that ``carrier`` and the new ``branch`` are now.
-
-    Each branch takes the identity that is expected nearest to it, about their common middle.
-    """
-    members = [carrier, *carrier.others]
-    carrier.others = []
-    seen = np.array([(t.detection.x, t.detection.y) for t in (carrier, branch)])
-    seen -= seen.mean(axis=0)
-    cost = min((_costs(expected, seen) for expected in _expected(members, time)), key=_least)
-    owners, branches = linear_sum_assignment(cost)
-    sides = [replace(t) for t in (carrier, branch)]
-    chosen = {int(b): members[m] for m, b in zip(owners, branches, strict=True)}
-    for side, trace in chosen.items():
-        trace.become(sides[side])
-    for number, member in enumerate(members):
-        if number not in owners:
-            chosen[int(cost[number].argmin())].others.append(member)
-    for trace in chosen.values():
-        trace.alone = trace.alone if trace.others else None
-    return chosen[0], chosen[1]
-
-
-def _costs(expected: FloatArray, seen: FloatArray) -> FloatArray:
-    return np.asarray(((expected[:, None] - seen) ** 2).sum(axis=2))
-
-
-def _least(cost: FloatArray) -> float:
-    return float(cost[linear_sum_assignment(cost)].sum())
-
-
-def _expected(members: Sequence[Trace], time: float) -> Iterator[FloatArray]:
-    """(n, 2) m about their middle: where they went in, and where their course would be by now."""
-    apart = [member.alone for member in members if member.alone]
-    means = np.array([alone.states.mean[0] for alone in apart])
-    since = time - max(alone.time for alone in apart)
-    offset, velocity = (means[:, k : k + 2] - means[:, k : k + 2].mean(axis=0) for k in (0, 2))
-    yield offset
-    passing = 2 * np.linalg.norm(offset) / max(float(np.linalg.norm(velocity)), 1e-9)
-    if since < _PASSING * passing:
-        yield offset + velocity * since
+def _log_density(value: float, strength: Strength) -> float:
+    variance = strength.variance + NOISE**2
+    return -0.5 * ((value - strength.mean) ** 2 / variance + math.log(variance))

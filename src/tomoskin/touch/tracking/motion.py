@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from tomoskin.core import Detection, FloatArray
 
@@ -19,15 +18,14 @@ neither begins nor ends."""
 
 @dataclass(frozen=True, slots=True)
 class TrackSettings:
-    """Times are seconds of the device, so that 10 and 1,000 frames/s are treated the same.
+    """Times are seconds of the device, so that 10 and 1,000 frames/s are treated alike.
 
     Attributes
     ----------
     snr
         Signal-to-noise ratio at which a touch begins; at :data:`HELD` of it, it ends.
-    onset, release
-        Seconds for which a touch must be seen before it is reported, and missing before it is
-        released; two frames at least, unless they are 0.
+    still
+        Whether frames do not follow each other in time: each shows what it holds.
     speed, turning
         Standard deviation of a finger's speed along each axis, m/s, and the time after which it
         moves otherwise, s.
@@ -36,24 +34,18 @@ class TrackSettings:
     """
 
     snr: float = 5.0
-    onset: float = 0.02
-    release: float = 0.05
-    speed: float = 0.3
-    turning: float = 0.3
-    wander: float = 0.006
+    still: bool = False
+    speed: float = 0.1
+    turning: float = 1.0
+    wander: float = 0.004
 
     @property
     def least_snr(self) -> float:
         """Below which there is no detection."""
         return HELD * self.snr
 
-    @property
-    def still(self) -> bool:
-        """Whether a frame tells nothing of the next one."""
-        return self.onset == 0 and self.release == 0
 
-
-STILL = TrackSettings(onset=0.0, release=0.0)
+STILL = TrackSettings(still=True)
 """For frames that do not follow each other in time: each shows what it holds."""
 
 
@@ -62,11 +54,6 @@ GATE = 16.0
 
 _UNKNOWN = 0.004
 """Deviation of a detection whose noise is unknown, m."""
-
-_BEHIND = 4.0
-"""Added to the cost of what is not yet a touch, or was not seen last: one that was comes first."""
-
-_LEAST = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,32 +142,3 @@ def _step(seconds: float, settings: TrackSettings) -> tuple[FloatArray, FloatArr
 def region_radius(detection: Detection) -> float:
     """Radius of the disc of the detection's area, m; 0 where it has none."""
     return math.sqrt(detection.area / math.pi) if detection.area > 0 else 0.0
-
-
-def assign(
-    states: States,
-    signs: FloatArray,
-    behind: FloatArray,
-    detections: Sequence[Detection],
-    seen: tuple[FloatArray, FloatArray],
-) -> tuple[dict[int, int], FloatArray]:
-    """Pairs {detection: trace} of least cost (Kuhn 1955), and the distances (n, m).
-
-    ``signs`` and ``behind`` are (n,), ``seen`` the detections' positions and covariances. A pair
-    costs its squared Mahalanobis distance, but no more than the gate where the trace is within the
-    detection's region: when two regions become one, its centre jumps. Beyond the gate, and between
-    signs, there are none.
-    """
-    positions, spreads = seen
-    far = distances(states, positions, spreads)
-    radii = np.array([max(region_radius(r), _LEAST) for r in detections])
-    away = (states.mean[:, None, :2] - positions) / radii[:, None]
-    share = away[..., 0] ** 2 + away[..., 1] ** 2
-    cost = np.minimum(far, np.where(share < 1, GATE * (0.5 + 0.5 * share), np.inf))
-    cost[signs[:, None] != np.sign([r.peak for r in detections])] = np.inf
-    allowed = cost <= GATE
-    limit = GATE + _BEHIND + 1
-    cost = np.where(allowed, cost + _BEHIND * behind[:, None], limit)
-    rows, columns = linear_sum_assignment(cost)
-    pairs = zip(rows.tolist(), columns.tolist(), strict=True)
-    return {column: row for row, column in pairs if allowed[row, column]}, far

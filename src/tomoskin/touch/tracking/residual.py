@@ -35,6 +35,9 @@ _GONE = 0.5
 """Seconds without any detection after which there is no residual response: a finder loses what is
 faint for a few frames."""
 
+_LASTS = 0.05
+"""Seconds for which a touch must look like a residual response to be one."""
+
 _MOST = 64
 
 
@@ -125,7 +128,7 @@ class ResidualResponses:
 
 
 def _is_on_track(detection: Detection, trace: Trace) -> bool:
-    if not trace.number or sign_of(detection) != trace.sign:
+    if not trace.reported or sign_of(detection) != trace.sign:
         return False
     radius = region_radius(trace.detection)
     return any(_may_be_residual(detection, foot, radius) for foot in trace.footprints)
@@ -138,8 +141,8 @@ def _may_be_residual(detection: Detection, foot: Footprint, radius: float) -> bo
     return near and size_of(detection) <= _PART * foot.top
 
 
-def is_residual(trace: Trace, time: float, lasting: float) -> bool:
-    """Whether a touch has ended and only its residual response is seen, for ``lasting`` s.
+def is_residual(trace: Trace, time: float) -> bool:
+    """Whether a touch has ended and only its residual response is seen.
 
     It must have fallen fast and not grown since.
     """
@@ -150,4 +153,4 @@ def is_residual(trace: Trace, time: float, lasting: float) -> bool:
     if trace.low is None or size > _GROWTH * trace.least:
         trace.low, trace.least = time, size
     trace.least = min(trace.least, size)
-    return time - trace.low >= lasting and time > trace.low
+    return time - trace.low >= _LASTS and time > trace.low

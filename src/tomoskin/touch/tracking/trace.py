@@ -1,20 +1,23 @@
-"""One touch in the tracker's memory, from its first detection to its release."""
+"""One spot in the tracker's memory, from its first detection to its release."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from tomoskin.core import Detection, FloatArray, Touch
+from tomoskin.core import Detection
+from tomoskin.touch.tracking.merging import Alone, Member
 from tomoskin.touch.tracking.motion import States, region_radius
 from tomoskin.touch.tracking.position import Position
+from tomoskin.touch.tracking.strength import Strength
 
 _STEP = 0.012
 """A touch that slides leaves a footprint every so many metres."""
 
 _MOST_FOOTPRINTS = 40
 _STRONG = 0.5
+_FRESH = 1.0
+"""Seconds for which the strength of a touch that has come out of a merged one tells who it is."""
 
 
 @dataclass(slots=True)
@@ -26,78 +29,70 @@ class Footprint:
     top: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Unmerged:
-    """A touch as it was last seen by itself, and expected in the frame thereafter, device s."""
-
-    detection: Detection
-    states: States
-    time: float
-
-
 @dataclass(eq=False)
 class Trace:
-    """One touch, or what may become one, as the tracker remembers it.
+    """One spot, or what may become one, as the tracker remembers it.
 
     Attributes
     ----------
-    detection, states
-        Newest detection; position and velocity, one row.
+    detection, states, strength
+        Newest detection; position and velocity, one row; how strong it is.
     since, host_since
         Device and host time of its first frame, s.
-    number
-        Its identity; 0 until it is reported.
-    frames
-        Readings so far.
+    odds
+        Logarithm of those that it is there.
+    members
+        The fingers that it stands for.
+    reported
+        Whether anyone has heard of it.
     missing
         Device time of the first frame without a detection since the last one, or None.
+    beside, met
+        The other spots as they were before this one came, or went missing, and what frames since
+        then say for its having met them.
+    parted, fresh
+        Device time at which it came out of a merged one, and its strength shortly after that.
     strong, low, least
         Device times at which it was last strong for its position, and since which it has been
         so weak that it may be a residual response, or None; least size of its peak since then.
     footprints, top
         Where it has been, the newest last; and how large it has been where its detection is now,
         for a press that slid leaves a residual response anywhere along its way.
-    alone
-        As it was before it merged with others, or None.
-    others
-        Touches that have merged into it.
-    beside
-        The other touches as they were when this one went missing, by number.
     held
         Where it is held to be.
-    reported_at
-        (2,) m, its position in the last event.
     """
 
     detection: Detection
     states: States
     since: float
     host_since: float
-    number: int = 0
-    frames: int = 1
+    odds: float
+    members: list[Member]
+    reported: bool = False
     missing: float | None = None
+    beside: dict[int, Alone] = field(default_factory=dict)
+    met: dict[int, float] = field(default_factory=dict)
+    parted: float = -math.inf
     strong: float = 0.0
     low: float | None = None
     least: float = 0.0
     footprints: list[Footprint] = field(default_factory=list)
     top: float = 0.0
-    alone: Unmerged | None = None
-    others: list[Trace] = field(default_factory=list)
-    beside: Mapping[int, Unmerged] = field(default_factory=dict)
-    reported_at: tuple[float, float] = (0.0, 0.0)
+    strength: Strength = field(init=False)
+    fresh: Strength = field(init=False)
     held: Position = field(init=False)
 
     def __post_init__(self) -> None:
         """Leave the first footprint."""
         self.strong = self.since
+        self.strength = self.fresh = Strength.of(self.detection)
         self.held = Position.of(self.detection, size_of(self.detection), self.since)
         self._step()
 
     @property
-    def position(self) -> FloatArray:
-        """(2,) m where it is expected."""
-        expected: FloatArray = self.states.mean[0, :2]
-        return expected
+    def key(self) -> int:
+        """Of the first of its members."""
+        return self.members[0].key
 
     @property
     def sign(self) -> float:
@@ -109,36 +104,41 @@ class Trace:
         """Its newest detection, where it is held to be."""
         return self.held.of_detection(self.detection)
 
-    @property
-    def members(self) -> tuple[Trace, ...]:
-        """Itself and those that have merged into it, in the order of their numbers."""
-        return tuple(sorted((self, *self.others), key=lambda trace: trace.number))
+    def alone(self, time: float) -> Alone:
+        """As it is now."""
+        return Alone(self.states, self.strength, time)
 
-    @property
-    def touch(self) -> Touch:
-        """As it is reported: a merged one by the oldest of its numbers."""
-        first = self.members[0]
-        merged = tuple(t.number for t in self.members) if self.others else ()
-        kind = "decrease" if self.sign < 0 else "increase"
-        return Touch(first.number, kind, first.host_since, self.shown, merged)
-
-    def see(self, detection: Detection, time: float, *, still: bool) -> None:
-        """Take the detection of this frame; ``still``: the last ones say nothing of it."""
+    def see(self, detection: Detection, time: float, seconds: float, *, still: bool) -> None:
+        """Take the detection of this frame, ``seconds`` after the frame before; ``still``: the last
+        ones say nothing of it."""
         self.detection = detection
         held = Position.of if still else self.held.after
         self.held = held(detection, size_of(detection), time)
-        self.frames += 1
+        self.strength = self.strength.after(detection, seconds)
+        if time - self.parted < _FRESH:
+            self.fresh = self.fresh.after(detection, seconds)
         self.missing = None
         self._step()
         if size_of(detection) >= _STRONG * self.top:
             self.strong = time
 
+    def change(self, time: float) -> None:
+        """It stands for other fingers from now on: what it was says nothing of them."""
+        self.parted = time
+        self.strength = self.fresh = Strength.of(self.detection)
+        self.held = Position.of(self.detection, size_of(self.detection), time)
+
     def become(self, other: Trace) -> None:
         """Go on from where ``other`` is."""
         self.detection, self.states, self.strong = other.detection, other.states, other.strong
-        self.held = other.held
+        self.held, self.strength, self.odds = other.held, other.strength, other.odds
         self.missing, self.low = other.missing, None
         self._step()
+
+    def absorb(self, other: Trace) -> None:
+        """Stand for ``other`` too."""
+        self.members += other.members
+        self.footprints = [*other.footprints, *self.footprints][-_MOST_FOOTPRINTS:]
 
     def _step(self) -> None:
         x, y, size = self.detection.x, self.detection.y, size_of(self.detection)
@@ -160,11 +160,6 @@ def size_of(detection: Detection) -> float:
     """By how many deviations it stands out, or its peak where the noise is unknown: a fit knows
     the depth of a faint touch badly, but well what it does to the voltages."""
     return detection.snr if 0 < detection.snr < math.inf else abs(detection.peak)
-
-
-def content(detection: Detection) -> float:
-    """Size of the peak times the region's area: two regions that become one add them up."""
-    return abs(detection.peak) * detection.area
 
 
 def sign_of(detection: Detection) -> float:

@@ -4,61 +4,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from tomoskin.core import Detection, FloatArray, Touch
-from tomoskin.touch.tracking import motion
-from tomoskin.touch.tracking.merging import carrier_of, merge, origin_of, split
-from tomoskin.touch.tracking.motion import TrackSettings, assign
+from tomoskin.touch.tracking import existence, identity, motion
+from tomoskin.touch.tracking.association import NOTHING, Association, Followed, associate
+from tomoskin.touch.tracking.event import Happening, TouchEvent
+from tomoskin.touch.tracking.identity import NOBODY, SURE, Naming
+from tomoskin.touch.tracking.merging import (
+    Alone,
+    Member,
+    crossing,
+    meeting,
+    met,
+    parting,
+    reach_of,
+    shrunk,
+)
+from tomoskin.touch.tracking.motion import TrackSettings
 from tomoskin.touch.tracking.residual import ResidualResponses, is_residual
-from tomoskin.touch.tracking.trace import Trace, Unmerged
-
-Happening = Literal["onset", "move", "release", "merge", "split"]
-
-_ROUNDING = 1e-9
+from tomoskin.touch.tracking.strength import Strength
+from tomoskin.touch.tracking.trace import Trace
 
 _MOVED, _BY_DEVIATIONS = 0.003, 3.0
 """A touch moves when it is so many metres, and deviations, from where it was last reported."""
 
+_PAUSE = 0.5
+"""Seconds without frames, in which touches move; in a longer pause they stand: nobody looked."""
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TouchEvent:
-    """One thing that happened to one touch.
-
-    Attributes
-    ----------
-    kind
-        "onset"; "move", by more than noise since the last event; "release"; "merge", where it
-        can no longer be separated from others; "split", where it can again.
-    touch
-        As it is after it; at a release, as it was last.
-    host_time
-        Of the frame in which it was noticed, host monotonic s.
-    """
-
-    kind: Happening
-    touch: Touch
-    host_time: float
-
-    @property
-    def text(self) -> str:
-        """A sentence for people."""
-        r = self.touch.detection
-        position = f"{1e3 * r.x:.0f}, {1e3 * r.y:.0f} mm"
-        others = [str(number) for number in self.touch.merged if number != self.touch.id]
-        return (
-            f"touch {self.touch.id}: "
-            + {
-                "onset": f"begins at {position}",
-                "move": f"is at {position}",
-                "release": f"ends at {position}",
-                "merge": f"and {' and '.join(others)} are too close to separate, at {position}",
-                "split": f"is apart again, at {position}",
-            }[self.kind]
-        )
+_POSSIBLE = 0.05
+"""Probability from which another identity is said beside the likeliest."""
 
 
 class Tracker:
@@ -75,13 +51,21 @@ class Tracker:
     def __init__(self, settings: TrackSettings | None = None) -> None:
         self.settings = settings or TrackSettings()
         self.events: tuple[TouchEvent, ...] = ()
-        self._traces: list[Trace] = []
-        self._residuals = ResidualResponses(self.settings.least_snr)
         self.numbered = 0
+        self._residuals = ResidualResponses(self.settings.least_snr)
         self._last: float | None = None
-        self._now = 0.0
-        self._host = 0.0
+        self._now = self._host = self._passed = 0.0
         self._happened: list[TouchEvent] = []
+        self._keys = 0
+        self._forget()
+
+    def _forget(self) -> None:
+        self._traces: list[Trace] = []
+        self._namings = NOBODY
+        self._numbers: dict[int, int] = {}
+        self._began: dict[int, float] = {}
+        self._strengths: dict[int, Strength] = {}
+        self._reported_at: dict[int, tuple[float, float]] = {}
 
     def update(
         self, detections: Sequence[Detection], time: float, host_time: float
@@ -91,17 +75,17 @@ class Tracker:
         ``time`` is the device's, s; where it does not go on, as when a board starts again, the
         host's counts. ``host_time`` is what touches and events carry.
         """
-        elapsed = self._elapse(time, host_time)
+        self._passed = self._elapse(time, host_time)
         self._host = host_time
         if self.settings.still:  # what stood there before says nothing of this frame
             detections = [detection for detection in detections if not detection.weak]
             self._residuals.forget()
         if detections or self._traces:
-            self._follow(list(detections), elapsed)
+            self._follow(list(detections))
         self._residuals.note(self._now, quiet=not detections)
+        touches = self._touches()
         self.events, self._happened = tuple(self._happened), []
-        shown = [trace.touch for trace in self._traces if trace.number]
-        return tuple(sorted(shown, key=lambda touch: touch.id))
+        return touches
 
     def reset(self) -> None:
         """Release every touch and forget all else; identities go on counting.
@@ -109,9 +93,9 @@ class Tracker:
         The next frame tells that they were released. Time starts again at zero: what follows is
         to the bit what a new tracker would make of it.
         """
-        for trace in [trace for trace in self._traces if trace.number]:
+        for trace in [trace for trace in self._traces if trace.reported]:
             self._end(trace)
-        self._traces = []
+        self._forget()
         self._residuals.forget()
         self.events = ()
         self._last, self._now, self._host = None, 0.0, 0.0
@@ -124,137 +108,307 @@ class Tracker:
         self._now += elapsed
         return elapsed
 
-    def _follow(self, detections: list[Detection], elapsed: float) -> None:
-        traces, settings = self._traces, self.settings
-        seen = motion.observe(detections, settings)
-        states = _stacked(traces)
-        pairs: dict[int, int] = {}
+    def _follow(self, detections: list[Detection]) -> None:
+        """One frame: who is where, who has begun, ended, met and parted."""
+        traces = list(self._traces)
+        seen = motion.observe(detections, self.settings)
+        found, states = NOTHING, _stacked(traces)
         if traces:
-            states = motion.predict(states, elapsed, settings)
-        if traces and detections:
-            signs = np.array([trace.sign for trace in traces])
-            behind = np.array([not t.number or t.missing is not None for t in traces], float)
-            pairs, far = assign(states, signs, behind, detections, seen)
-            self._note_missing(set(pairs.values()), states)
-            self._see(detections, pairs, seen, states, far)
-        else:
-            self._note_missing(set(), states)
+            moving = 0.0 if self.settings.still else min(self._passed, _PAUSE)
+            states = motion.predict(states, moving, self.settings)
+            if detections:
+                found = associate(_followed(traces, states), detections, seen)
+        groups = [trace for trace in traces if len(trace.members) > 1]
+        merged = {m.key: t.alone(self._now) for t in groups for m in t.members}
+        strongest = max((d.snr for d in detections if not math.isnan(d.snr)), default=0.0)
+        self._miss(set(found.pairs.values()), states)
+        self._see(detections, found, seen, states, strongest)
+        self._weigh_meetings()
         for index, detection in enumerate(detections):
-            if index not in pairs and self._begins(detection):
-                state = motion.begin(seen[0][index], seen[1][index], settings)
-                traces.append(Trace(detection, state, self._now, self._host))
+            if index not in found.pairs and self._begins(detection):
+                state = motion.begin(seen[0][index], seen[1][index], self.settings)
+                self._begin(detection, state, strongest, merged)
+        self._exchange(traces, found)
         self._settle()
+        self._know()
 
-    def _note_missing(self, paired: set[int], states: motion.States) -> None:
-        """Of those that no detection is of: they are where they are expected."""
-        if len(paired) == len(self._traces):
-            return
-        for trace, state in zip(self._traces, _rows(states), strict=True):
-            trace.states = state
-        lost = [trace for k, trace in enumerate(self._traces) if k not in paired]
-        going = [trace for trace in lost if trace.missing is None]
-        if going:
-            reported = [trace for trace in self._traces if trace.number]
-            now = {t.number: Unmerged(t.detection, t.states, self._now) for t in reported}
-            for trace in going:
-                trace.missing, trace.beside = self._now, now
-
-    def _see(
+    def _begin(
         self,
-        detections: list[Detection],
-        pairs: dict[int, int],
-        seen: tuple[FloatArray, FloatArray],
-        states: motion.States,
-        far: FloatArray,
+        detection: Detection,
+        state: motion.States,
+        strongest: float,
+        merged: dict[int, Alone],
     ) -> None:
-        if not pairs:
-            return
-        own, which = list(pairs.values()), list(pairs)
-        positions, spreads = seen[0][which], seen[1][which]
-        before = motion.States(states.mean[own], states.covariance[own])
-        after = _rows(motion.update(before, positions, spreads))
-        jumped = far[own, which] > motion.GATE
-        for row, (trace, index, state) in enumerate(zip(own, which, after, strict=True)):
-            followed = self._traces[trace]
-            followed.see(detections[index], self._now, still=self.settings.still)
-            followed.states = state
-            if jumped[row]:  # its region has changed: it has not moved
-                followed.states = motion.begin(positions[row], spreads[row], self.settings)
+        self._keys += 1
+        others = any(trace.reported for trace in self._traces)
+        odds = existence.first(detection, self.settings.snr, strongest if others else 0.0)
+        member = Member(self._keys)
+        trace = Trace(detection, state, self._now, self._host, odds, [member])
+        trace.beside = merged
+        self._traces.append(trace)
 
     def _begins(self, detection: Detection) -> bool:
         if detection.weak or detection.snr < self.settings.snr:
             return False
         return not self._residuals.explain(detection, self._now, self._traces)
 
+    def _miss(self, paired: set[int], states: motion.States) -> None:
+        """Of those that no detection is of: they are where they are expected."""
+        if len(paired) == len(self._traces):
+            return
+        now = {t.key: t.alone(self._now) for t in self._traces if t.reported}
+        for number, (trace, state) in enumerate(zip(self._traces, _rows(states), strict=True)):
+            if number in paired:
+                continue
+            if trace.missing is None:
+                trace.missing, trace.beside, trace.met = self._now, now, {}
+            trace.states = state
+            trace.odds = existence.missed(
+                trace.odds, trace.detection.snr, self.settings.least_snr, self._passed
+            )
+
+    def _see(
+        self,
+        detections: list[Detection],
+        found: Association,
+        seen: tuple[FloatArray, FloatArray],
+        states: motion.States,
+        strongest: float,
+    ) -> None:
+        if not found.pairs:
+            return
+        own, which = list(found.pairs.values()), list(found.pairs)
+        positions, spreads = seen[0][which], seen[1][which]
+        before = motion.States(states.mean[own], states.covariance[own])
+        after = _rows(motion.update(before, positions, spreads))
+        for row, (number, index, state) in enumerate(zip(own, which, after, strict=True)):
+            trace, detection = self._traces[number], detections[index]
+            trace.see(detection, self._now, self._passed, still=self.settings.still)
+            trace.states = state
+            if number in found.jumped:  # its region has changed: it has not moved
+                trace.change(self._now)
+            if number in found.jumped or self.settings.still:
+                trace.states = motion.begin(positions[row], spreads[row], self.settings)
+            others = any(t.reported and t is not trace for t in self._traces)
+            trace.odds = existence.seen(
+                trace.odds,
+                detection,
+                self.settings.snr,
+                strongest if others else 0.0,
+                self._passed,
+            )
+
+    def _weigh_meetings(self) -> None:
+        for lost in self._traces:
+            if not lost.reported or lost.missing is None:
+                continue
+            alone = lost.beside.get(lost.key)
+            for trace in self._traces:
+                other = lost.beside.get(trace.key)
+                if alone is None or other is None or trace.missing is not None:
+                    continue
+                if trace is not lost and trace.sign == lost.sign:
+                    said = met(alone, other, trace.detection)
+                    lost.met[trace.key] = lost.met.get(trace.key, 0.0) + said
+
+    def _exchange(self, traces: Sequence[Trace], found: Association) -> None:
+        """Note who may have changed places with whom while both were seen."""
+        for i, k, odds in found.exchanges:
+            one, other = traces[i], traces[k]
+            both = one in self._traces and other in self._traces
+            if both and one.reported and other.reported and not self.settings.still:
+                for trace in (one, other):
+                    if len(self._namings) == 1:
+                        trace.change(self._now)
+                self._namings = identity.exchanged(self._namings, one.key, other.key, odds)
+
     def _settle(self) -> None:
-        """Report what has stood long enough, end what has been gone long enough."""
-        for trace in list(self._traces):
-            if not trace.number:
-                self._consider(trace)
-        for trace in [t for t in self._traces if t.number]:
-            if trace.missing is not None and self._lasts(trace.missing, self.settings.release):
+        """Report what is there, end what is gone."""
+        for trace in [t for t in self._traces if not t.reported]:
+            self._consider(trace)
+        for trace in [t for t in self._traces if t.reported]:
+            if trace.missing is not None:
                 self._lose(trace)
-            elif trace.missing is None and is_residual(trace, self._now, self.settings.release):
+            elif trace.missing is None and is_residual(trace, self._now):
                 self._end(trace)
-        for trace in self._traces:
-            if trace.number and self._has_moved(trace):
-                self._report("move", trace)
+        self._namings = identity.judged(self._namings, self._evidence)
 
     def _consider(self, trace: Trace) -> None:
-        """Report a newcomer that has stood, forget one that has not."""
+        """Report a newcomer that is sure to be there, forget one that is not."""
+        if self.settings.still and trace.missing is None:
+            self._report_onset(trace)
+            return
         if trace.missing is not None or trace.detection.snr < self.settings.snr:
             self._traces.remove(trace)
             return
-        if not self._lasts(trace.since, self.settings.onset):
+        if trace.odds < existence.BEGUN:
             return
         if self._residuals.explain(trace.detection, self._now, self._traces):
             self._traces.remove(trace)
             return
-        origin = origin_of(trace, self._traces)
+        origin = self._origin_of(trace)
         if origin is None:
-            self.numbered += 1
-            trace.number = self.numbered
-            self._report("onset", trace)
-            return
-        if origin.missing is not None:  # its region is gone, and this is one of those it was
+            self._report_onset(trace)
+        elif origin.missing is not None:  # its region is gone, and this is one of those it was
             self._traces.remove(trace)
             origin.become(trace)
-            return
-        both = split(origin, trace, self._now)
-        self._traces.remove(trace)
-        self._traces.remove(origin)
-        self._traces += both
-        for one in both:
-            self._report("split", one)
+        else:
+            self._split(origin, trace)
 
-    def _lasts(self, since: float, seconds: float) -> bool:
-        """Whether ``seconds`` have gone by, and a frame at least."""
-        return not seconds or (self._now > since and self._now - since >= seconds - _ROUNDING)
+    def _report_onset(self, trace: Trace) -> None:
+        trace.reported = True
+        self.numbered += 1
+        self._numbers[trace.key] = self.numbered
+        self._began[trace.key] = trace.host_since
+        self._namings = identity.begun(self._namings, trace.key)
+        self._report("onset", trace)
+
+    def _origin_of(self, branch: Trace) -> Trace | None:
+        """The merged touch that a new one has come out of, or None."""
+        best: tuple[float, Trace | None] = (0.0, None)
+        for trace in self._traces:
+            before = branch.beside.get(trace.key)
+            if before and len(trace.members) > 1 and trace.sign == branch.sign:
+                reach = reach_of(trace.members)
+                odds = parting(trace.detection, branch.detection, reach)
+                if trace.missing is None:
+                    odds += shrunk(
+                        before.strength, Strength.of(trace.detection), Strength.of(branch.detection)
+                    )
+                if odds > best[0]:
+                    best = odds, trace
+        return best[1]
+
+    def _split(self, carrier: Trace, branch: Trace) -> None:
+        """Divide the fingers of ``carrier``: who is who now, motion and strength will say."""
+        ends = [np.array([t.detection.x, t.detection.y]) for t in (carrier, branch)]
+        members = carrier.members
+        leaves = min(members, key=lambda m: _unlike(m, branch))
+        carrier.members = [m for m in members if m is not leaves]
+        branch.members, branch.reported = [leaves], True
+        for stays in carrier.members:
+            odds = crossing(stays, leaves, ends[0] - ends[1], self._now)
+            self._namings = identity.exchanged(self._namings, stays.key, leaves.key, odds)
+        for trace in (carrier, branch):
+            trace.change(self._now)
+        names = self._namings[0].names
+        for trace in sorted((carrier, branch), key=lambda t: names[t.key]):
+            self._report("split", trace)
 
     def _lose(self, trace: Trace) -> None:
-        carrier = carrier_of(trace, self._traces)
-        if carrier is None:
+        """Of one that is missing: it has met another, or has been lifted, or is waited for."""
+        odds, carrier = self._met_by(trace)
+        over = self.settings.still or trace.odds < existence.ENDED
+        if carrier is not None and (odds > existence.MET or (over and odds > 0)):
+            self._merge(carrier, trace)
+        elif over:
             self._end(trace)
-            return
-        self._traces.remove(trace)
-        merge(carrier, trace)
+
+    def _merge(self, carrier: Trace, lost: Trace) -> None:
+        self._traces.remove(lost)
+        for one in (carrier, lost):
+            if len(one.members) == 1:
+                one.members[0].alone = lost.beside[one.key]
+        carrier.absorb(lost)
+        carrier.change(self._now)
         self._report("merge", carrier)
+
+    def _met_by(self, lost: Trace) -> tuple[float, Trace | None]:
+        """The touch that the ``lost`` one is too close to be told from, with the log odds of it."""
+        alone = lost.beside.get(lost.key)
+        best: tuple[float, Trace | None] = (-math.inf, None)
+        for trace in self._traces:
+            other = lost.beside.get(trace.key)
+            if alone and other and trace.key in lost.met and trace.missing is None:
+                said = meeting(alone, other, lost.met[trace.key], close=trace.detection.close)
+                if said > best[0]:
+                    best = said, trace
+        return best
 
     def _end(self, trace: Trace) -> None:
         self._traces.remove(trace)
-        for member in trace.members:
-            self._residuals.leave(member, self._now)
-            ended = replace(trace.touch, id=member.number, since=member.host_since, merged=())
+        self._residuals.leave(trace, self._now)
+        keys = [member.key for member in trace.members]
+        names = sorted(self._namings[0].names[key] for key in keys)
+        for name in names:
+            number = self._numbers[name]
+            kind = "decrease" if trace.sign < 0 else "increase"
+            ended = Touch(number, kind, self._began[name], trace.shown)
             self._happened.append(TouchEvent("release", ended, self._host))
+        self._namings = identity.ended(self._namings, keys)
 
-    def _has_moved(self, trace: Trace) -> bool:
-        (x, y), held = trace.reported_at, trace.held
-        far = math.hypot(held.x - x, held.y - y)
-        return far > _MOVED and not far < _BY_DEVIATIONS * held.wavers
+    def _know(self) -> None:
+        """Remember how strong each finger is of which it is sure who it is."""
+        for trace in self._traces:
+            if trace.reported and trace.missing is None and len(trace.members) == 1:
+                names = {naming.names[trace.key] for naming in self._namings}
+                if len(names) == 1:
+                    self._strengths[names.pop()] = trace.strength
+
+    def _evidence(self, naming: Naming) -> float:
+        """What strengths say for it."""
+        said = 0.0
+        for trace in self._traces:
+            if trace.reported and len(trace.members) == 1:
+                before = self._strengths.get(naming.names[trace.key])
+                if before is not None:
+                    said += trace.fresh.log_likelihood(before)
+        return said
+
+    def _touches(self) -> tuple[Touch, ...]:
+        parts = identity.probabilities(self._namings, self._evidence)
+        shown = [(t, self._touch(t, parts)) for t in self._traces if t.reported]
+        for trace, touch in sorted(shown, key=lambda pair: pair[1].id):
+            self._note_move(trace, touch)
+        return tuple(sorted((touch for _, touch in shown), key=lambda touch: touch.id))
+
+    def _touch(self, trace: Trace, parts: Sequence[float]) -> Touch:
+        """As it is reported: a merged one by the oldest of its numbers."""
+        keys = [member.key for member in trace.members]
+        weights: dict[tuple[int, ...], float] = {}
+        for naming, part in zip(self._namings, parts, strict=True):
+            names = tuple(sorted(naming.names[key] for key in keys))
+            weights[names] = weights.get(names, 0.0) + part
+        names = tuple(sorted(self._namings[0].names[key] for key in keys))
+        possible: set[int] = set()
+        if weights[names] < SURE:
+            possible = {n for group, part in weights.items() if part > _POSSIBLE for n in group}
+        numbers = tuple(sorted(self._numbers[name] for name in names))
+        return Touch(
+            numbers[0],
+            "decrease" if trace.sign < 0 else "increase",
+            self._began[names[0]],
+            trace.shown,
+            numbers if len(numbers) > 1 else (),
+            tuple(sorted(self._numbers[name] for name in possible)),
+        )
+
+    def _note_move(self, trace: Trace, touch: Touch) -> None:
+        now = touch.detection.x, touch.detection.y
+        before = self._reported_at.setdefault(touch.id, now)
+        far = math.hypot(now[0] - before[0], now[1] - before[1])
+        if far > _MOVED and not far < _BY_DEVIATIONS * trace.held.wavers:
+            self._happened.append(TouchEvent("move", touch, self._host))
+            self._reported_at[touch.id] = now
 
     def _report(self, kind: Happening, trace: Trace) -> None:
-        trace.reported_at = (trace.held.x, trace.held.y)
-        self._happened.append(TouchEvent(kind, trace.touch, self._host))
+        touch = self._touch(trace, identity.probabilities(self._namings, self._evidence))
+        self._reported_at[touch.id] = touch.detection.x, touch.detection.y
+        self._happened.append(TouchEvent(kind, touch, self._host))
+
+
+def _followed(traces: Sequence[Trace], states: motion.States) -> Followed:
+    signs = np.array([trace.sign for trace in traces])
+    odds = np.array([trace.odds for trace in traces])
+    several = np.array([len(trace.members) > 1 for trace in traces])
+    return Followed(states, signs, [trace.strength for trace in traces], odds, several)
+
+
+def _unlike(member: Member, branch: Trace) -> float:
+    """How much less than the others it seems to be the ``branch``."""
+    if member.alone is None:
+        return 0.0
+    return -branch.strength.log_likelihood(member.alone.strength)
 
 
 def _stacked(traces: Sequence[Trace]) -> motion.States:

@@ -1,0 +1,211 @@
+"""Fingers that slide, meet and part on an independent plant: ghosts, delays, identities."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from moving_plant import RAMP, Sheet, Shown, Slide
+from plant import Finger
+from report import Report, progress
+from tomoskin.core import Touch
+from tracking_scenes import moving, past, quick, together
+
+SEEDS = (11, 12, 13)
+"""What was chosen was chosen on seeds 1 to 3."""
+
+SCENES = 5
+"""Of each kind on each sheet."""
+
+OVERSAMPLING = {8: 16, 16: 8}
+"""Of the built-in skins: 18 and 10 frames a second."""
+
+KINDS: dict[str, Callable[[np.random.Generator], tuple[list[Slide], float]]] = {
+    "past": past,
+    "together": together,
+    "quick": quick,
+    "one": lambda random: moving(random, 1),
+    "two": lambda random: moving(random, 2),
+    "three": lambda random: moving(random, 3),
+}
+MEETINGS = ("past", "together")
+NEAR, ALMOST, FAR = 0.0225, 0.030, 0.060
+LATE = 99
+
+
+@dataclass
+class Scores:
+    """Frames, those with a ghost, and with more touches than fingers; identities given, and
+    fingers; of each finger the frame in which it was reported, and in which it was gone, from 1; of
+    meetings what became of who is who, by kind."""
+
+    frames: int = 0
+    ghosts: int = 0
+    surplus: int = 0
+    ids: int = 0
+    fingers: int = 0
+    onsets: list[int] = field(default_factory=list)
+    releases: list[int] = field(default_factory=list)
+    who: dict[str, Counter[str]] = field(
+        default_factory=lambda: {kind: Counter() for kind in MEETINGS}
+    )
+
+    def add(self, kind: str, slides: Sequence[Slide], shown: Sequence[Shown]) -> None:
+        """Take a scene."""
+        self.frames += len(shown)
+        self.ghosts += sum(has_ghost(frame, slides) for frame in shown)
+        self.surplus += sum(len(f.result.touches) > len(_present(f, slides)) for f in shown)
+        touches = [touch for frame in shown for touch in frame.result.touches]
+        self.ids += len({number for t in touches for number in (t.merged or (t.id,))})
+        self.fingers += len(slides)
+        for slide in slides:
+            self.onsets.append(onset(slide, shown))
+            if kind != "quick":  # the next one is there before this is gone
+                self.releases.append(release(slide, shown))
+        if kind in MEETINGS:
+            self.who[kind][identity(slides, shown)] += 1
+
+
+def run(data: Path | None) -> tuple[Report, ...]:
+    """No recordings are needed: the plant is the truth."""
+    del data
+    return (table(SEEDS, SCENES),)
+
+
+def table(seeds: Sequence[int], scenes: int) -> Report:
+    """By electrodes."""
+    rows = []
+    for electrodes in OVERSAMPLING:
+        scores = Scores()
+        for seed in seeds:
+            _measure(scores, electrodes, seed, scenes)
+        onsets, releases = np.array(scores.onsets), np.array(scores.releases)
+        rows.append(
+            (
+                electrodes,
+                scores.frames,
+                *(round(1000 * n / scores.frames, 1) for n in (scores.ghosts, scores.surplus)),
+                *(_percent(v) for v in (onsets <= 1, onsets <= 2, onsets < LATE, releases <= 3)),
+                f"{scores.ids} for {scores.fingers}",
+                *(", ".join(f"{n} {w}" for w, n in scores.who[k].most_common()) for k in MEETINGS),
+            )
+        )
+    return Report(
+        "fingers that move, on uneven sheets",
+        (
+            *("electrodes", "frames", "with a ghost, of 1,000", "with one too many"),
+            *(
+                "reported in their first frame",
+                "in two",
+                "at all",
+                "gone in three",
+                "identities",
+                "past each other",
+            ),
+            "together and apart",
+        ),
+        tuple(rows),
+        (
+            f"seeds {tuple(seeds)}, {scenes} scenes of each kind; radii 12 to 20 mm, conductivity "
+            f"down by 15 to 35 %, up and down in {1e3 * RAMP:.0f} ms, sheet uneven by 10 %",
+            f"ghost: a touch farther than {1e3 * NEAR:.1f} mm from every finger of its own that "
+            "presses or has been lifted two frames ago, and not said to be several",
+            "first frame: from that in whose middle half of the finger is down; gone: from the "
+            "first frame without it; meetings: at the end, both ids as at first",
+        ),
+    )
+
+
+def _measure(scores: Scores, electrodes: int, seed: int, scenes: int) -> None:
+    sheet = Sheet(electrodes, seed, OVERSAMPLING[electrodes])
+    for index, (kind, drawn) in enumerate(KINDS.items()):
+        for number in range(scenes):
+            progress(f"{electrodes} electrodes, seed {seed}, {kind} {number}")
+            slides, seconds = drawn(np.random.default_rng([seed, index, number]))
+            scores.add(kind, slides, list(sheet.scene(slides, seconds)))
+
+
+def has_ghost(frame: Shown, slides: Sequence[Slide]) -> bool:
+    """Whether a touch is not where a finger is."""
+    touches, here = frame.result.touches, _present(frame, slides)
+    alone = {k for k, t in enumerate(touches) if not t.merged and not t.detection.close}
+    if not touches or not here:
+        return bool(alone)
+    away = np.array([[_away(t, _held(s, frame)) for t in touches] for s in here])
+    pairs = zip(*linear_sum_assignment(away), strict=True)
+    return bool(alone - {int(k) for finger, k in pairs if away[finger, k] < NEAR})
+
+
+def _present(frame: Shown, slides: Sequence[Slide]) -> list[Slide]:
+    """Those that are down, or have been up to two frames ago."""
+    grace = 2 * (frame.end - frame.begin)
+    return [s for s in slides if s.start < frame.end and frame.begin < s.end + grace]
+
+
+def onset(slide: Slide, shown: Sequence[Shown]) -> int:
+    """Number of the frame in which it is reported, counted from the first that holds half of it."""
+    first = next(f.number for f in shown if (f.begin + f.end) / 2 >= slide.start + RAMP / 2)
+    seen = (
+        f for f in shown if first - 2 <= f.number and f.begin < slide.end and _is_seen(slide, f)
+    )
+    return next((f.number - first + 1 for f in seen), LATE)
+
+
+def release(slide: Slide, shown: Sequence[Shown]) -> int:
+    """Number of the frame in which it is gone, counted from the first without it."""
+    gone = next(f.number for f in shown if f.begin >= slide.end)
+    free = (f.number - gone + 1 for f in shown if f.number >= gone - 1 and not _is_seen(slide, f))
+    return next(free, LATE)
+
+
+def identity(slides: Sequence[Slide], shown: Sequence[Shown]) -> str:
+    """Whether two fingers that have met end as who they were: right, wrong, unsure, new, never two.
+
+    Counted are frames with two touches near them; they began more than 60 mm apart.
+    """
+    first, last, unsure = None, None, False
+    for frame in shown:
+        touches = frame.result.touches
+        down = [s for s in slides if s.start + RAMP < frame.begin and frame.end < s.end - RAMP]
+        if len(down) < 2 or len(touches) != 2 or any(t.merged for t in touches):
+            continue
+        fingers = [_held(s, frame) for s in down]
+        away = np.array([[_away(t, f) for f in fingers] for t in touches])
+        swapped = int(away[0, 0] + away[1, 1] > away[0, 1] + away[1, 0])
+        if max(away[0, swapped], away[1, 1 - swapped]) > ALMOST:
+            continue
+        owners = {touches[k].id: k ^ swapped for k in (0, 1)}
+        apart = np.hypot(fingers[0].x - fingers[1].x, fingers[0].y - fingers[1].y)
+        first = owners if first is None and apart > FAR else first
+        last, unsure = owners, any(t.possible for t in touches)
+    if first is None or last is None:
+        return "never two"
+    if set(first) != set(last):
+        return "new"
+    return "unsure" if unsure else "right" if first == last else "wrong"
+
+
+def _is_seen(slide: Slide, frame: Shown) -> bool:
+    finger = _held(slide, frame)
+    return any(_away(touch, finger) < ALMOST for touch in frame.result.touches)
+
+
+def _held(slide: Slide, frame: Shown) -> Finger:
+    """It in the middle of a frame, or the moment nearest to that in which it is down."""
+    middle = (frame.begin + frame.end) / 2
+    finger = slide.at(min(max(middle, slide.start + 1e-3), slide.end - 1e-3))
+    assert finger is not None
+    return finger
+
+
+def _away(touch: Touch, finger: Finger) -> float:
+    return float(np.hypot(touch.detection.x - finger.x, touch.detection.y - finger.y))
+
+
+def _percent(which: np.ndarray) -> str:
+    return f"{100 * which.mean():.0f} %"
