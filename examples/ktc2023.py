@@ -73,9 +73,9 @@ NOISE, OF_CHANGE, OF_VOLTAGE = 2.4e-3, 0.14, 0.032
 """The same of a change: V, a part of the change and a part of the reference's voltage. Four times
 what the true targets leave unexplained, for that is alike in many rows."""
 
-CLOSER, MOST_SHORT = 0.5, 30.0
-"""Noise of the sampled regions, which are simple and fit no errors, over that; and the misfit by
-which they may fall short of regions of any shape. Beyond, those are given."""
+CLOSER, IN_WALK, MOST_SHORT = 0.5, 0.25, 3.5
+"""Noise of the sampled regions over that, and in the walk over that again; and the misfit by which
+they may fall short of regions of any shape. Beyond, those are given."""
 
 
 # The challenge's score.
@@ -213,7 +213,7 @@ def segment(
     expected = rows @ water.solve(sigma).voltages
     values = expected + change
     start = ShapeImaging(water, LENGTH, drift=DRIFT)(Observation.of(values, noise, rows), sigma)
-    posterior = ShapeSampling(water, SIZE, drift=DRIFT)(
+    posterior = ShapeSampling(water, SIZE, drift=DRIFT, walk_noise=IN_WALK)(
         Observation.of(values, CLOSER * noise, rows), start, sigma
     )
     short = posterior.shortfall > MOST_SHORT

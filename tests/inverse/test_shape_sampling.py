@@ -117,7 +117,7 @@ def test_without_data_the_walk_samples_what_was_expected() -> None:
     Regions that crowd are less probable: independent draws, weighted by that, give the same.
     """
     regions, rng = no_data(1.0), np.random.default_rng(7)
-    walked = list(walk(regions.place((), np.zeros(1)), 2500, rng))[200:]
+    walked = list(walk(regions.place((), np.zeros(1)), 1500, rng))[100:]
     counts = np.array([len(sample.kinds) for sample in walked])
     radii = np.concatenate([sample.stars[:, 2] for sample in walked])
     weights, drawn, sizes = [], rng.poisson(1.0, 600), []
@@ -178,7 +178,7 @@ def posterior(excluded: int = 0) -> ShapePosterior:
     model = ForwardModel(disc(16, 700), Pattern.adjacent(16), 0.01)
     seen = observation(excluded)
     start = ShapeImaging(model, 0.04)(seen, 1.0)
-    return ShapeSampling(model, SIZE, steps=250, samples=40)(seen, start)
+    return ShapeSampling(model, SIZE, steps=120, samples=30)(seen, start)
 
 
 def test_regions_are_told_apart_and_found() -> None:
@@ -210,6 +210,21 @@ def test_the_same_seed_gives_the_same_samples() -> None:
     one, again, other = (sampling(seen, start, seed=k) for k in (1, 1, 2))
     assert [s.objective for s in one.samples] == [s.objective for s in again.samples]
     assert [s.objective for s in one.samples] != [s.objective for s in other.samples]
+
+
+def test_a_walk_of_less_noise_stays_nearer_the_likeliest() -> None:
+    """Its regions' law is that of the noise it is given."""
+    begin = posterior().likeliest
+    near, far = (
+        [
+            sample.unknowns
+            for sample in walk(begin.with_noise(noise), 60, np.random.default_rng(0))
+            if sample.kinds == begin.kinds
+        ]
+        for noise in (0.2, 1.0)
+    )
+    assert begin.with_noise(0.5).misfit == pytest.approx(4.0 * begin.misfit)
+    assert np.std(near, axis=0).mean() < 0.7 * np.std(far, axis=0).mean()
 
 
 def test_no_regions_in_an_empty_medium() -> None:
@@ -283,6 +298,7 @@ def test_one_picture_is_its_own_answer() -> None:
         ({"expected": 0.0}, "expected a number of regions above 0, got 0.0"),
         ({"drift": np.nan}, "drift above 0, got nan"),
         ({"contrast": 1.0}, "expected a contrast above 1, got 1.0"),
+        ({"walk_noise": 0.0}, "expected a noise of the walk above 0, got 0.0"),
         ({"samples": 0}, "expected 1 to 400 samples of 500 steps, got 0"),
         ({"steps": 10}, "expected 1 to 8 samples of 10 steps, got 50"),
     ],

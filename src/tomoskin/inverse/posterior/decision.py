@@ -139,16 +139,16 @@ def most_similar(pictures: NDArray[np.uint8], width: float) -> tuple[NDArray[np.
     if pictures.ndim != 3 or not len(pictures) or pictures.shape[1] != pictures.shape[2]:
         raise DataError(f"expected pictures of shape (k, n, n), got {pictures.shape}")
     windows = SimilarityWindows.of(pictures.shape[1], width, WINDOWS)
-    chosen, often, values = np.zeros(pictures.shape[1:], np.uint8), 0.0, [1.0]
-    kinds = [int(kind) for kind in np.unique(pictures) if kind]
-    for kind in kinds:
+    chosen, often = np.zeros(pictures.shape[1:], np.uint8), np.zeros(pictures.shape[1:])
+    values = []
+    for kind in (int(kind) for kind in np.unique(pictures) if kind):
         masks = (pictures == kind).astype(np.float64)
         mask, value = _best_mask(_Belief(masks, windows.mean(masks), windows))
         likelier = (mask > 0.5) & ((chosen == 0) | (masks.mean(axis=0) > often))
         chosen[likelier] = kind
-        often = np.where(likelier, masks.mean(axis=0), often)
+        often[likelier] = masks.mean(axis=0)[likelier]
         values.append(value)
-    return chosen, float(np.mean(values[1:] or values))
+    return chosen, float(np.mean(values or [1.0]))
 
 
 def _best_mask(belief: _Belief) -> tuple[FloatArray, float]:

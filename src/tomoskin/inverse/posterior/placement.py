@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -142,6 +142,12 @@ class Placement:
         n = len(self.kinds)
         spread = 2.0 * np.log(self.among.drift) + np.linalg.slogdet(self.precision)[1]
         return float(n * np.log(self.among.expected / 2.0) - 0.5 * (self.objective + spread))
+
+    def with_noise(self, factor: float) -> Placement:
+        """The same regions, judged by data of so many times the noise."""
+        data, of = self.among.data, self.among
+        scaled = replace(data, target=data.target / factor, rows=data.rows / factor)
+        return replace(of, data=scaled).place(self.kinds, self.unknowns)
 
     def without(self, i: int) -> Placement:
         """The same but for region ``i``."""

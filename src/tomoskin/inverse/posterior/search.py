@@ -154,9 +154,8 @@ def _split(placement: Placement) -> Iterator[Placement]:
 def _added(placement: Placement) -> Iterator[Placement]:
     """One small disc more, anywhere in the medium where no region is."""
     prior, mesh = placement.among.prior, placement.among.model.mesh
-    taken = np.zeros(len(mesh.cells), bool)
-    if placement.kinds:
-        taken = (prior.level(placement.stars, mesh.centroids) > -0.2).any(axis=0)
+    level = prior.level(placement.stars, mesh.centroids)
+    taken = np.asarray((level > -0.2).any(axis=0))
     for place in _spread_out(mesh.centroids[~taken], _APART * prior.size):
         for kind in (LESS, MORE):
             yield placement.with_star(kind, prior.ellipse(place, _SMALL * prior.size))

@@ -93,6 +93,9 @@ class ShapeSampling:
         Deviation expected of the logarithm of the medium's conductivity.
     steps, samples, rounds
         Of the walk and the search; a step costs one forward solution.
+    walk_noise
+        Noise in the walk over that in the search: below one where the noise was widened for
+        errors of the model, which make a search choose too many regions.
 
     Raises
     ------
@@ -111,10 +114,12 @@ class ShapeSampling:
         steps: int = STEPS,
         samples: int = SAMPLES,
         rounds: int = ROUNDS,
+        walk_noise: float = 1.0,
     ) -> None:
         if not (np.isfinite(contrast) and contrast > 1):
             raise ModelError(f"expected a contrast above 1, got {contrast}")
-        for name, value in (("number of regions", expected), ("drift", drift)):
+        numbers = {"number of regions": expected, "drift": drift, "noise of the walk": walk_noise}
+        for name, value in numbers.items():
             if not (np.isfinite(value) and value > 0):
                 raise ModelError(f"expected a {name} above 0, got {value}")
         most = int((1.0 - _BURN) * steps)
@@ -126,6 +131,7 @@ class ShapeSampling:
         self.reflection = (contrast - 1.0) / (contrast + 1.0)
         self.drift = drift
         self.steps, self.samples, self.rounds = steps, samples, rounds
+        self.walk_noise = walk_noise
 
     def __call__(
         self,
@@ -160,7 +166,7 @@ class ShapeSampling:
     def _walked(self, begin: Alternative, rng: np.random.Generator) -> list[Placement]:
         """Its share of the samples, from its share of the steps."""
         steps, samples = (int(np.ceil(begin.weight * n)) for n in (self.steps, self.samples))
-        walked = list(walk(begin.placement, steps, rng))
+        walked = list(walk(begin.placement.with_noise(self.walk_noise), steps, rng))
         kept = np.linspace(_BURN * steps, steps - 1, samples).astype(int)
         return [walked[k] for k in kept]
 
