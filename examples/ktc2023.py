@@ -8,8 +8,7 @@ each sample and level where there is a truth, beside a linear method and a pictu
 
 The tank (Räsänen et al., 23 cm across, 32 electrodes) has its own faults, which are measured on
 water: each channel lets some of the common voltage through, and each electrode has its contact
-impedance. Redundant rows tell the noise. :class:`tomoskin.inverse.ShapeImaging` finds the regions,
-:class:`tomoskin.inverse.ShapeSampling` what else explains them; the labels expect the best score.
+impedance. Redundant rows tell the noise. :class:`tomoskin.inverse.ShapeImaging` finds the regions.
 """
 
 from __future__ import annotations
@@ -37,10 +36,8 @@ from tomoskin.inverse import (
     Matern,
     Observation,
     ShapeImaging,
-    ShapeSampling,
     SimilarityWindows,
     homogeneous,
-    most_similar,
 )
 from tomoskin.mesh import Disc, ElectrodeArc, Mesh, triangulate
 from tomoskin.pattern import Pattern
@@ -60,8 +57,8 @@ SIGMA, CONTACT = 0.73, 3e-4
 LENGTH = 0.025
 """Correlation length of shapes, m: about half a target's width."""
 
-SIZE, DRIFT = 0.026, 0.2
-"""Usual radius of a target, m, and change of the water since the reference, relative."""
+DRIFT = 0.2
+"""Change of the water between reference and target, relative."""
 
 SMALLEST = 200
 """Pixels: a smaller region, 14 mm across, is below what the electrodes resolve."""
@@ -72,10 +69,6 @@ REFERENCE_NOISE, REFERENCE_TOUCHED = 5e-3, 0.17
 NOISE, OF_CHANGE, OF_VOLTAGE = 2.4e-3, 0.14, 0.032
 """The same of a change: V, a part of the change and a part of the reference's voltage. Four times
 what the true targets leave unexplained, for that is alike in many rows."""
-
-CLOSER, IN_WALK, MOST_SHORT = 0.5, 0.25, 3.5
-"""Noise of the sampled regions over that, and in the walk over that again; and the misfit by which
-they may fall short of regions of any shape. Beyond, those are given."""
 
 
 # The challenge's score.
@@ -205,23 +198,24 @@ def segment(
     keep
         (n·k,) bool, rows that count; without it, all.
     """
-    readout, u, u_ref = checked(u, u_ref, inj, mpat, keep)
+    water, sigma, observation = observed(*checked(u, u_ref, inj, mpat, keep))
+    found = ShapeImaging(water, LENGTH, drift=DRIFT)(observation, sigma)
+    places, inside = pixels(PIXELS)
+    labels = np.zeros((PIXELS, PIXELS), np.uint8)
+    labels[inside] = found.at(places)
+    return without_specks(labels)
+
+
+def observed(
+    readout: Readout, u: FloatArray, u_ref: FloatArray
+) -> tuple[ForwardModel, float, Observation]:
+    """The tank's model and its water, S, and what was measured of the targets."""
     water, leak, sigma = calibrate(readout, u_ref)
     rows, change = readout.rows(leak), u - u_ref
     noise = np.sqrt(NOISE**2 + (OF_CHANGE * change) ** 2 + (OF_VOLTAGE * u_ref) ** 2)
     # the change is measured, the model's own water stands for the reference
     expected = rows @ water.solve(sigma).voltages
-    values = expected + change
-    start = ShapeImaging(water, LENGTH, drift=DRIFT)(Observation.of(values, noise, rows), sigma)
-    posterior = ShapeSampling(water, SIZE, drift=DRIFT, walk_noise=IN_WALK)(
-        Observation.of(values, CLOSER * noise, rows), start, sigma
-    )
-    short = posterior.shortfall > MOST_SHORT
-    places, inside = pixels(PIXELS if short else PIXELS // 2)
-    labels = np.zeros((1 if short else len(posterior.samples), *inside.shape), np.uint8)
-    labels[:, inside] = start.at(places) if short else posterior.at(places)
-    best, _ = most_similar(labels, SIMILAR * len(inside) / PIXELS)
-    return without_specks(best.repeat(PIXELS // len(best), 0).repeat(PIXELS // len(best), 1))
+    return water, sigma, Observation.of(expected + change, noise, rows)
 
 
 def without_specks(labels: Labels) -> Labels:
@@ -428,9 +422,9 @@ def scored(sample: Sample, level: int) -> Scored:
     """Segment, and compare where there is a truth."""
     arrays = (sample.u, sample.u_ref, sample.inj, sample.mpat)
     keep = kept(sample.inj, sample.mpat, level)
-    begun = time.perf_counter()
+    begun = time.process_time()
     labels = segment(*arrays, keep)
-    seconds = time.perf_counter() - begun
+    seconds = time.process_time() - begun
     if sample.truth is None:
         return Scored(sample, level, labels, seconds, None)
     others = linear(*arrays, keep), np.zeros_like(labels)
