@@ -31,13 +31,21 @@ from scipy.spatial import cKDTree
 from tomoskin import core
 from tomoskin.core import CHANGE, DataError, FloatArray, TomoskinError
 from tomoskin.forward import ForwardModel
-from tomoskin.inverse import AbsoluteImaging, Matern, Observation, ShapeImaging, homogeneous
+from tomoskin.inverse import (
+    AbsoluteImaging,
+    Matern,
+    Observation,
+    ShapeImaging,
+    SimilarityWindows,
+    homogeneous,
+)
 from tomoskin.mesh import Disc, ElectrodeArc, Mesh, triangulate
 from tomoskin.pattern import Pattern
 
 Labels = NDArray[np.uint8]
 WATER, RESISTIVE, CONDUCTIVE = 0, 1, 2
 PIXELS = 256
+SIMILAR = 80.0  # pixels, width of the score's window
 
 RADIUS, N_ELECTRODES, WIDTH = 0.115, 32, 0.0125
 """The tank, and its electrodes' width as the voltages of water tell it, m."""
@@ -72,26 +80,9 @@ def score(labels: NDArray[Any], truth: NDArray[Any]) -> float:
     return float(np.mean([similarity(labels == kind, truth == kind).mean() for kind in kinds]))
 
 
-@cache
-def _window() -> FloatArray:
-    """(256, 256) weights of the rows around each row, summing to one within the picture."""
-    away = np.subtract.outer(np.arange(PIXELS), np.arange(PIXELS))
-    weights = np.where(np.abs(away) <= 160, np.exp(-0.5 * (away / 80.0) ** 2), 0.0)
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
-
-
-def _mean(image: FloatArray) -> FloatArray:
-    return np.asarray(_window() @ image @ _window().T)
-
-
 def similarity(one: NDArray[Any], other: NDArray[Any]) -> FloatArray:
-    """(256, 256) structural similarity with one very wide window (Wang et al. 2004)."""
-    a, b = one.astype(np.float64), other.astype(np.float64)
-    mean_a, mean_b = _mean(a), _mean(b)
-    var_a, var_b = _mean(a * a) - mean_a**2, _mean(b * b) - mean_b**2
-    both = _mean(a * b) - mean_a * mean_b
-    light = (2 * mean_a * mean_b + 1e-4) / (mean_a**2 + mean_b**2 + 1e-4)
-    return np.asarray(light * (2 * both + 9e-4) / (var_a + var_b + 9e-4))
+    """(256, 256) structural similarity of masks, with one very wide window."""
+    return SimilarityWindows.of(PIXELS, SIMILAR).similarity(one, other)
 
 
 # The tank.
@@ -120,9 +111,9 @@ def model() -> ForwardModel:
 
 
 @cache
-def pixels() -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Centres (n, 2) m of the pixels in the tank, and which those are."""
-    step = (np.arange(PIXELS) + 0.5) / PIXELS * 2 - 1
+def pixels(count: int) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Centres (n, 2) m of the pixels in the tank, of ``count`` a side, and which those are."""
+    step = (np.arange(count) + 0.5) / count * 2 - 1
     x, y = np.meshgrid(RADIUS * step, -RADIUS * step)
     inside = np.hypot(x, y) < RADIUS
     return np.column_stack([x[inside], y[inside]]), inside
@@ -207,19 +198,24 @@ def segment(
     keep
         (n·k,) bool, rows that count; without it, all.
     """
-    readout, u, u_ref = checked(u, u_ref, inj, mpat, keep)
+    water, sigma, observation = observed(*checked(u, u_ref, inj, mpat, keep))
+    found = ShapeImaging(water, LENGTH, drift=DRIFT)(observation, sigma)
+    places, inside = pixels(PIXELS)
+    labels = np.zeros((PIXELS, PIXELS), np.uint8)
+    labels[inside] = found.at(places)
+    return without_specks(labels)
+
+
+def observed(
+    readout: Readout, u: FloatArray, u_ref: FloatArray
+) -> tuple[ForwardModel, float, Observation]:
+    """The tank's model and its water, S, and what was measured of the targets."""
     water, leak, sigma = calibrate(readout, u_ref)
     rows, change = readout.rows(leak), u - u_ref
     noise = np.sqrt(NOISE**2 + (OF_CHANGE * change) ** 2 + (OF_VOLTAGE * u_ref) ** 2)
     # the change is measured, the model's own water stands for the reference
     expected = rows @ water.solve(sigma).voltages
-    found = ShapeImaging(water, LENGTH, drift=DRIFT)(
-        Observation.of(expected + change, noise, rows), sigma
-    )
-    places, inside = pixels()
-    labels = np.zeros((PIXELS, PIXELS), np.uint8)
-    labels[inside] = found.at(places)
-    return without_specks(labels)
+    return water, sigma, Observation.of(expected + change, noise, rows)
 
 
 def without_specks(labels: Labels) -> Labels:
@@ -303,7 +299,7 @@ def linear(
     imaging = AbsoluteImaging(water, Matern(RADIUS, 0.5), alpha=16.0, steps=1)
     expected = rows @ water.solve(sigma).voltages
     image = imaging(Observation.of(expected + u - u_ref, noise, rows), sigma).conductivity
-    places, inside = pixels()
+    places, inside = pixels(PIXELS)
     picture = np.full((PIXELS, PIXELS), sigma)
     picture[inside] = image.values[cKDTree(tank().centroids).query(places)[1]]
     return _by_otsu(picture)
@@ -426,9 +422,9 @@ def scored(sample: Sample, level: int) -> Scored:
     """Segment, and compare where there is a truth."""
     arrays = (sample.u, sample.u_ref, sample.inj, sample.mpat)
     keep = kept(sample.inj, sample.mpat, level)
-    begun = time.perf_counter()
+    begun = time.process_time()
     labels = segment(*arrays, keep)
-    seconds = time.perf_counter() - begun
+    seconds = time.process_time() - begun
     if sample.truth is None:
         return Scored(sample, level, labels, seconds, None)
     others = linear(*arrays, keep), np.zeros_like(labels)

@@ -26,6 +26,8 @@ from tomoskin.inverse.linear.operator import Operator
 from tomoskin.inverse.linear.problem import LinearProblem, noise_weights
 from tomoskin.inverse.linear.spectrum import Assembly, Spectrum
 from tomoskin.inverse.linear.temporal import Smoothed, Smoother, Steady, Temporal
+from tomoskin.inverse.posterior.decision import SimilarityWindows, most_similar
+from tomoskin.inverse.posterior.shape_sampling import ShapePosterior, ShapeSampling
 from tomoskin.inverse.priors.named import (
     PRIORS,
     Identity,
@@ -83,9 +85,12 @@ __all__ = [
     "Regions",
     "Segmented",
     "ShapeImaging",
+    "ShapePosterior",
+    "ShapeSampling",
     "SharpDifference",
     "SharpImage",
     "SharpPrior",
+    "SimilarityWindows",
     "Smoothed",
     "Smoother",
     "Sparse",
@@ -104,6 +109,7 @@ __all__ = [
     "figures",
     "homogeneous",
     "image_series",
+    "most_similar",
     "named_prior",
     "noise_figure",
     "noise_weights",

@@ -1,0 +1,1 @@
+"""What the data leave open of an image: samples of the regions that explain them."""
