@@ -175,6 +175,7 @@ def _touch_of(item: dict[str, Any]) -> Touch:
     possible = tuple(item.get("possible", ()))  # none in 0.1
     force = None
     if item.get("force") is not None:
-        force = Force(item["force"], *item["force_interval"], item["force_calibrated"])
+        low, high = item["force_interval"]
+        force = Force(item["force"], low, high, item["force_calibrated"])
     reading = Detection(*place, cov_xy=cov_xy or 0.0, close=bool(close), force=force)
     return Touch(item["id"], item["kind"], item["since"], reading, tuple(merged or ()), possible)

@@ -37,9 +37,8 @@ def columns_of(
 ) -> tuple[str, ...]:
     """Names of the columns, with those of forces, of a ``surface`` that is not flat, and of the
     time since the recording has ``begun``."""
-    further = FORCE if forces else ()
-    further += IN_SPACE if _curved(surface) else ()
-    return COLUMNS + further + (() if begun is None else (ELAPSED,))
+    in_space = IN_SPACE if _curved(surface) else ()
+    return COLUMNS + (FORCE if forces else ()) + in_space + (() if begun is None else (ELAPSED,))
 
 
 def touch_rows(
