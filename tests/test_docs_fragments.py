@@ -52,7 +52,7 @@ def given() -> dict[str, Any]:
         "flags": np.where(rng.random((60, 1)) < 0.3, more_xy > 0, np.nan),
         "sample_sd": NOISE, "places": xy[:2], "points": xy,
         "drive": pattern.drive, "measure": pattern.measure,
-        "readings": (), "time": 0.1, "host_time": 0.1,
+        "detections": (), "time": 0.1, "host_time": 0.1,
         "sheet": TwinSkin.of(Skin.load("textile-square-16"), TwinSettings.preset("ideal", seed=1)),
         "ShapeImaging": ShapeImaging,
     }  # fmt: skip

@@ -22,7 +22,7 @@ from tomoskin.inverse import (
 from tomoskin.inverse.iterative.observation import Whitened
 from tomoskin.inverse.iterative.shapes import LESS, MORE
 from tomoskin.inverse.posterior.packing import Covers, Packing
-from tomoskin.inverse.posterior.placement import Regions
+from tomoskin.inverse.posterior.placement import PlacedRegions
 from tomoskin.inverse.posterior.sampling import walk
 from tomoskin.inverse.posterior.search import search
 from tomoskin.inverse.posterior.stars import N_PARAMETERS, StarPrior
@@ -104,11 +104,11 @@ def test_regions_that_meet_or_reach_out_cost_more() -> None:
 # The law of the regions.
 
 
-def no_data(expected: float) -> Regions:
+def no_data(expected: float) -> PlacedRegions:
     """Voltages that say nothing."""
     model = ForwardModel(disc(), Pattern.adjacent(8), 0.01)
     data = Whitened(np.zeros(1), np.zeros((1, 40)), 0.0, 0)
-    return Regions(model, data, StarPrior.on(disc(), 0.01), 0.98, 1.0, 0.1, expected)
+    return PlacedRegions(model, data, StarPrior.on(disc(), 0.01), 0.98, 1.0, 0.1, expected)
 
 
 def test_without_data_the_walk_samples_what_was_expected() -> None:
@@ -138,7 +138,7 @@ def test_evidence_of_the_medium_alone_is_the_integral() -> None:
     model = ForwardModel(disc(), Pattern.adjacent(8), 0.01)
     v = model.solve(1.1).voltages
     data = Observation.of(v, 0.1 * np.abs(v)).whitened(40)
-    regions = Regions(model, data, StarPrior.on(disc(), SIZE), 0.98, 1.0, 0.2, 2.0)
+    regions = PlacedRegions(model, data, StarPrior.on(disc(), SIZE), 0.98, 1.0, 0.2, 2.0)
     best = regions.fitted(regions.place((), np.zeros(1)), 8)
     at = np.linspace(-0.5, 0.7, 241)
     density = [np.exp(-0.5 * regions.place((), np.array([x])).objective) for x in at]
@@ -232,7 +232,7 @@ def test_no_regions_in_an_empty_medium() -> None:
     v = model.solve(1.0).voltages
     seen = Observation.of(v, 0.01 * np.abs(v))
     start = ShapeImaging(model, 0.04)(seen, 1.0)
-    regions = Regions(model, seen.whitened(208), prior(), 0.98, 1.0, 0.2, 2.0)
+    regions = PlacedRegions(model, seen.whitened(208), prior(), 0.98, 1.0, 0.2, 2.0)
     assert search(regions, start, 1)[0].placement.kinds == ()
 
 

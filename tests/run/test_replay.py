@@ -10,11 +10,10 @@ import pytest
 
 from run.board import Board, pressed, samples_of
 from run.test_runner import PATIENCE, Watch
-from tomoskin.calibration import FORCE, ForceModel, WeighedPresses
-from tomoskin.core import DataError, Detection, Frame, SourceError
+from tomoskin.core import DataError, Frame, SourceError
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.recording import Mark, SessionReader, advance, as_recorded, replayed
+from tomoskin.recording import Mark, SessionReader, advance, replayed
 from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.run import Runner, commands
 from tomoskin.run.flow import MOST_AT_ONCE
@@ -160,33 +159,6 @@ def test_the_skin_in_the_file_gives_the_same_touches(run):
     with SessionReader(run) as session:
         got = {r.sequence: touches_of(r) for r in replayed(prepare(session.skin), session)}
     assert all(same(got[n], rows) for n, rows in recorded_touches(run).items())
-
-
-def test_forces_are_recorded_and_are_the_same_again(prepared, tmp_path):
-    rng, path = np.random.default_rng(5), tmp_path / "weighed.mcap"
-    newtons = np.linspace(1.0, 12.0, 12)
-    weighed = WeighedPresses.of(
-        [
-            Detection(*rng.uniform(-0.04, 0.04, 2), 1e-3, 1e-3, 4e-4, -0.01 * force, np.empty(0))
-            for force in newtons
-        ],
-        newtons,
-        np.arange(12),
-        np.arange(12.0),
-    )
-    model = ForceModel.fit(weighed, prepared.skin)
-    weighing = prepared.calibrated(FORCE.of(model, prepared.pattern, prepared.skin))
-    with Recorded(weighing, path) as live:
-        live.idle(REFERENCE_FRAMES + 5)
-        live.touch(0, 8)
-        live.idle(3)
-    found = recorded_touches(path)
-    forces = [row[-1] for rows in found.values() for row in rows]
-    assert len(forces) >= 6
-    assert all(0 < f.low < f.newtons < f.high and f.calibrated for f in forces)
-    with SessionReader(path) as session:
-        again = {r.sequence: touches_of(r) for r in replayed(as_recorded(session), session)}
-    assert all(same(again[n], rows) for n, rows in found.items())
 
 
 def test_replayed_as_a_source_the_touches_are_the_same_to_the_bit(run, prepared, tmp_path):

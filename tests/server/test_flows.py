@@ -391,7 +391,7 @@ def test_a_press_is_taken_back_and_the_flow_left(flows):
     page.ask("flow_undo")
     assert "no press" in page.told("error")["message"]
     page.ask("flow_keep", name="early")
-    assert "nothing has been pressed" in page.told("error")["message"]
+    assert "no press has been recorded" in page.told("error")["message"]
     page.ask("flow_begin", kind="touch")
     first = press_dots(site, page, 1)["presses"][0]
     page.ask("flow_keep", name="early")

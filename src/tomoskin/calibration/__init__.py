@@ -37,14 +37,15 @@ from tomoskin.calibration.weighing.identify import MaterialFit, identify
 from tomoskin.calibration.weighing.measured import ForceProcess
 from tomoskin.calibration.weighing.model import ForceModel, LabelRemark, PressedSpot
 from tomoskin.calibration.weighing.presses import WeighedPresses
-from tomoskin.core import DataError, load_arrays
+from tomoskin.core import DataError, StrPath, load_arrays
 
 KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, BENDS, CLASSES)
 """Every kind whose calibrations are applied to frames, in the order in which they are applied."""
 
 
-def load_calibration(path: Path, progress: Progress = silent) -> Calibration[Any]:
+def load_calibration(path: StrPath, progress: Progress = silent) -> Calibration[Any]:
     """Read a file of any of the :data:`KINDS`. Raises DataError where it is of none."""
+    path = Path(path)
     title = str(load_arrays(path).get("kind", ""))
     kind = next((kind for kind in KINDS if kind.title == title), None)
     if kind is None:

@@ -42,8 +42,8 @@ def check(
 ) -> None:
     """Walk through the first power-up: readings of a multimeter, then all that the board can tell.
 
-    For the second part the terminals hold a ring of equal resistors, 1 Ω at 100 mA (0.1 V over the
-    current), one between neighbours, but two in parallel from E1 to E2 and three from E2 to E3.
+    The second part needs a ring of resistors at the terminals, 1 Ω each at 100 mA (0.1 V over the
+    current). One lies between neighbours, two in parallel from E1 to E2, three from E2 to E3.
     """
     amperes = quantity(current, "current", "--current")
     if not 1e-6 <= amperes <= 0.1:

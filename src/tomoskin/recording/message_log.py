@@ -11,7 +11,7 @@ from typing import Self
 from mcap.records import Channel
 
 from tomoskin import __version__
-from tomoskin.core import DataError, Output, OutputError, check_outputs
+from tomoskin.core import DataError, Output, OutputError, StrPath, check_outputs
 from tomoskin.recording.channels import CHANNELS, SCHEMAS
 from tomoskin.recording.container import ContainerWriter
 
@@ -127,7 +127,7 @@ class MessageLog:
 
 
 @contextmanager
-def errors_of(path: Path) -> Iterator[None]:
+def errors_of(path: StrPath) -> Iterator[None]:
     """OSError → DataError that names the file."""
     try:
         yield

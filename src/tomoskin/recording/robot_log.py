@@ -6,6 +6,7 @@ import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from tomoskin.core import StrPath
 from tomoskin.recording.channels import SPAN, robot_channels
 from tomoskin.recording.message_log import MessageLog
 from tomoskin.recording.session_writer import ABOUT, FORMAT, SKINS
@@ -38,7 +39,8 @@ class RobotLog:
         When the file exists or cannot be made.
     """
 
-    def __init__(self, path: Path, names: Sequence[str], *, epoch: float, start: float) -> None:
+    def __init__(self, path: StrPath, names: Sequence[str], *, epoch: float, start: float) -> None:
+        path = Path(path)
         self.log = MessageLog(path, epoch=epoch, start=start, channels=robot_channels(names))
         self.lock, self._open = threading.Lock(), len(names)
         self.parts: Mapping[str, LogPart] = {

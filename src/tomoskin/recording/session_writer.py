@@ -111,7 +111,8 @@ class SessionWriter:
         start: float = 0.0,
         log: Log | None = None,
     ) -> None:
-        self.path, self._start = Path(path), start
+        self.path = path if isinstance(path, Path) else Path(path)
+        self._start = start
         self._log = MessageLog(self.path, epoch=epoch, start=start) if log is None else log
         self._log.describe(ABOUT, about_session(skin, self._log.epoch))
         self.attach(SKIN_FILE, "application/toml", skin.to_toml().encode())

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mcap.records import Attachment, Chunk, Metadata
 
-from tomoskin.core import DataError, Output, check_outputs, written
+from tomoskin.core import DataError, Output, StrPath, check_outputs, written
 from tomoskin.recording.blocks import Advance, no_report
 from tomoskin.recording.channels import CHANNELS, SCHEMAS, SPAN, TOPICS
 from tomoskin.recording.container import ContainerWriter
@@ -18,8 +18,9 @@ from tomoskin.recording.repair import Stretch, stretches
 from tomoskin.recording.session_writer import ABOUT, SKINS
 
 
-def split_names(source: Path) -> tuple[str, ...]:
+def split_names(source: StrPath) -> tuple[str, ...]:
     """Names of the skins in a robot's recording. DataError where it is none."""
+    source = Path(source)
     about = next(
         (r.metadata for r in _about(source) if isinstance(r, Metadata) and r.name == ABOUT), {}
     )
@@ -28,12 +29,13 @@ def split_names(source: Path) -> tuple[str, ...]:
     return tuple(about[SKINS].split())
 
 
-def split_targets(source: Path) -> dict[str, Path]:
+def split_targets(source: StrPath) -> dict[str, Path]:
     """The files that a split makes, by the names of the skins."""
+    source = Path(source)
     return {name: source.with_stem(f"{source.stem}-{name}") for name in split_names(source)}
 
 
-def split(source: Path, advance: Advance = no_report) -> dict[str, int]:
+def split(source: StrPath, advance: Advance = no_report) -> dict[str, int]:
     """Write the session of each skin to a file of its own; messages by the names of the skins.
 
     What is whole in a torn or damaged file is kept.
@@ -45,13 +47,15 @@ def split(source: Path, advance: Advance = no_report) -> dict[str, int]:
     DataError
         When the file is no recording of several skins, or cannot be read or written.
     """
+    source = Path(source)
     targets = split_targets(source)
     check_outputs([Output(path) for path in targets.values()], [source])
     counts = dict.fromkeys(targets, 0)
     with ExitStack() as stack:
         parts = {}
         for name, path in targets.items():
-            output = stack.enter_context(written(path)).open("wb", buffering=0)
+            part = stack.enter_context(written(path))
+            output = part.open("wb", buffering=0)
             writer = ContainerWriter(output, LIBRARY, SCHEMAS, CHANNELS)
             parts[name] = stack.enter_context(closing(writer))
         for record in _about(source):

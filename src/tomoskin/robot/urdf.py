@@ -21,7 +21,7 @@ _LARGEST = 20_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Joint:
+class UrdfJoint:
     """What holds the link ``child`` to the link ``parent``: its frame's pose there, at rest."""
 
     name: str
@@ -51,7 +51,7 @@ class Urdf:
     source: str
     name: str
     links: tuple[str, ...]
-    joints: dict[str, Joint]
+    joints: dict[str, UrdfJoint]
     meshes: dict[str, Pose]
 
     @classmethod
@@ -104,7 +104,7 @@ class Urdf:
         ends = [(self.pose(j.parent), self.pose(j.child)) for j in self.joints.values()]
         return np.array([[a.position, b.position] for a, b in ends]).reshape(-1, 2, 3)
 
-    def _check(self, joints: list[Joint]) -> None:
+    def _check(self, joints: list[UrdfJoint]) -> None:
         if len(set(self.links)) < len(self.links) or len(self.joints) < len(joints):
             raise SkinError("names a link twice, or holds one by two joints", where=self.source)
         for joint in joints:
@@ -125,11 +125,11 @@ def _name(element: ElementTree.Element, where: str) -> str:
     return name
 
 
-def _joint(element: ElementTree.Element, where: str) -> Joint:
+def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
     name = _name(element, where)
     ends = [element.find(end) for end in ("parent", "child")]
     parent, child = ("" if end is None else end.get("link", "") for end in ends)
-    return Joint(name, parent, child, _origin(element, f'{where}: joint "{name}"'))
+    return UrdfJoint(name, parent, child, _origin(element, f'{where}: joint "{name}"'))
 
 
 def _meshes(root: ElementTree.Element, where: str) -> Iterator[tuple[str, Pose]]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from tomoskin.calibration import KINDS, Calibration
-from tomoskin.core import Frame
+from tomoskin.core import Frame, StrPath
 from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Prepared
 from tomoskin.recording import SessionReader, SessionWriter, errors_of
 from tomoskin.wire import Info
@@ -42,8 +42,8 @@ class Remembered:
 class BoardMemory:
     """Files of boards in a folder, by their unique ids."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: StrPath) -> None:
+        self.folder = Path(folder)
 
     def keep(self, board: Info, prepared: Prepared, frames: Sequence[Frame]) -> None:
         """Keep ``frames`` of the untouched skin; nothing where there are too few or no id.

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from time import monotonic
 
-from tomoskin.core import SourceError, TomoskinError
+from tomoskin.core import SourceError, StrPath, TomoskinError
 from tomoskin.pipeline import Prepared
 from tomoskin.recording import RobotLog
 from tomoskin.robot import Place
@@ -97,7 +97,7 @@ class RobotRun:
             runner.stop()
         self._close_log()
 
-    def record(self, path: Path) -> None:
+    def record(self, path: StrPath) -> None:
         """Record all skins to one new file, from now on.
 
         Raises
@@ -105,6 +105,7 @@ class RobotRun:
         OutputError, DataError
             When it exists or cannot be made.
         """
+        path = Path(path)
         self.stop_recording()
         self._log = RobotLog(path, tuple(self.runners), epoch=epoch(), start=monotonic())
         parts = self._log.parts

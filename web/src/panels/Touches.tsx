@@ -35,7 +35,7 @@ function Strength({ touch, scale }: { touch: Touch; scale: Scale }) {
   if (force && !asChange.value) {
     return (
       <td class="large" title={`${forceInWords(force)} (nine in ten)`} data-testid="force">
-        {!force.calibrated && "≈ "}
+        {!force.calibrated && "~"}
         {fixed(force.newtons, 1)}
       </td>
     );

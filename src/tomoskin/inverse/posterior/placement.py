@@ -24,7 +24,7 @@ _TOLERANCE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Regions:
+class PlacedRegions:
     """What regions are compared by: data, forward model and what was expected.
 
     Attributes
@@ -92,7 +92,7 @@ class Placement:
         was expected.
     """
 
-    among: Regions
+    among: PlacedRegions
     kinds: tuple[int, ...]
     unknowns: FloatArray
 

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.inverse.iterative.shapes import LESS, MORE, Segmented
-from tomoskin.inverse.posterior.placement import Placement, Regions
+from tomoskin.inverse.posterior.placement import PlacedRegions, Placement
 
 _STEPS = 4
 """Gauss–Newton steps for a placement."""
@@ -43,7 +43,7 @@ class Alternative:
     weight: float
 
 
-def search(regions: Regions, start: Segmented, rounds: int) -> tuple[Alternative, ...]:
+def search(regions: PlacedRegions, start: Segmented, rounds: int) -> tuple[Alternative, ...]:
     """The most probable placements that are found from the regions of ``start``, best first.
 
     Each round fits the best changes, ranked by one forward solution each, and takes the one with
@@ -81,7 +81,7 @@ def _same(one: Placement, other: Placement) -> bool:
     return area < _DIFFERENT * np.pi * of.prior.size**2
 
 
-def of_segments(regions: Regions, start: Segmented) -> Placement:
+def of_segments(regions: PlacedRegions, start: Segmented) -> Placement:
     """A region for each connected segment of ``start``, with its area and its ellipse."""
     mesh, labels = regions.model.mesh, start.cells
     first, second = mesh.neighbours[
@@ -100,7 +100,7 @@ def of_segments(regions: Regions, start: Segmented) -> Placement:
     return placement
 
 
-def _ellipse(regions: Regions, points: FloatArray, areas: FloatArray) -> FloatArray:
+def _ellipse(regions: PlacedRegions, points: FloatArray, areas: FloatArray) -> FloatArray:
     """Latent numbers of the ellipse with the centre, area and second moments of cells."""
     share = areas / areas.sum()
     centre = share @ points

@@ -11,7 +11,7 @@ from tomoskin.core import FloatArray, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse.iterative.observation import Observation, Whitened
 from tomoskin.inverse.iterative.shapes import CONTRAST, LESS, MORE, Segmented
-from tomoskin.inverse.posterior.placement import Placement, Regions
+from tomoskin.inverse.posterior.placement import PlacedRegions, Placement
 from tomoskin.inverse.posterior.sampling import walk
 from tomoskin.inverse.posterior.search import Alternative, search
 from tomoskin.inverse.posterior.stars import StarPrior
@@ -148,7 +148,7 @@ class ShapeSampling:
         """
         data = observation.whitened(self.model.pattern.n_meas)
         medium = start.found.background if background is None else background
-        regions = Regions(
+        regions = PlacedRegions(
             self.model,
             informative(data, self.model, start, medium),
             self.prior,

@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.touch.tracking.motion import GATE, States, distances
-from tomoskin.touch.tracking.strength import ELSEWHERE, NOISE, Strength, log_content
+from tomoskin.touch.tracking.strength import ELSEWHERE, NOISE, TouchStrength, log_content
 
 _STRENGTH = 4.0
 """What a strength costs at the most, in logarithms of a likelihood: forces come and go."""
@@ -33,13 +33,13 @@ _OPEN = 6.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Followed:
+class ExpectedTouches:
     """Touches as they are expected: ``states`` of n, ``signs`` (n,), their ``strengths``,
     ``odds`` (n,), logarithms, that they are there, and which stand for ``several`` (n,) fingers."""
 
     states: States
     signs: FloatArray
-    strengths: Sequence[Strength]
+    strengths: Sequence[TouchStrength]
     odds: FloatArray
     several: NDArray[np.bool_]
 
@@ -58,7 +58,7 @@ NOTHING = Association({}, frozenset(), ())
 
 
 def associate(
-    followed: Followed, detections: Sequence[Detection], seen: tuple[FloatArray, FloatArray]
+    followed: ExpectedTouches, detections: Sequence[Detection], seen: tuple[FloatArray, FloatArray]
 ) -> Association:
     """The likeliest (Kuhn 1955). ``seen`` are the detections' positions and covariances.
 
@@ -79,7 +79,7 @@ def associate(
 
 
 def _costs(
-    followed: Followed, detections: Sequence[Detection], seen: tuple[FloatArray, FloatArray]
+    followed: ExpectedTouches, detections: Sequence[Detection], seen: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     positions, spreads = seen
     spreads = spreads + _PARTED**2 * followed.several[:, None, None, None] * np.eye(2)
@@ -97,7 +97,7 @@ def _costs(
 
 
 def _jumps(
-    followed: Followed, detections: Sequence[Detection], seen: tuple[FloatArray, FloatArray]
+    followed: ExpectedTouches, detections: Sequence[Detection], seen: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     """(n, m) what it costs that a touch and another one are seen together."""
     contents = np.exp([s.mean for s in followed.strengths])

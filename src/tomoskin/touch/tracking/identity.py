@@ -16,26 +16,26 @@ _MOST = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Naming:
+class IdentityHypothesis:
     """One hypothesis: ``names`` {member: identity}, and the logarithm of its weight."""
 
     weight: float
     names: Mapping[int, int]
 
-    def exchanged(self, one: int, other: int, odds: float) -> Naming:
+    def exchanged(self, one: int, other: int, odds: float) -> IdentityHypothesis:
         """With two members' names the other way round."""
         names = {**self.names, one: self.names[other], other: self.names[one]}
-        return Naming(self.weight + odds, names)
+        return IdentityHypothesis(self.weight + odds, names)
 
 
-Namings = tuple[Naming, ...]
+Namings = tuple[IdentityHypothesis, ...]
 
-NOBODY: Namings = (Naming(0.0, {}),)
+NOBODY: Namings = (IdentityHypothesis(0.0, {}),)
 
 
 def begun(namings: Namings, member: int) -> Namings:
     """With a new ``member``, whose identity is its own."""
-    return tuple(Naming(n.weight, {**n.names, member: member}) for n in namings)
+    return tuple(IdentityHypothesis(n.weight, {**n.names, member: member}) for n in namings)
 
 
 def ended(namings: Namings, members: Sequence[int]) -> Namings:
@@ -43,7 +43,9 @@ def ended(namings: Namings, members: Sequence[int]) -> Namings:
     best = namings[0].names
     kept = [n for n in namings if all(n.names[m] == best[m] for m in members)]
     rest = [{m: i for m, i in n.names.items() if m not in members} for n in kept]
-    return _bounded([Naming(n.weight, names) for n, names in zip(kept, rest, strict=True)])
+    return _bounded(
+        [IdentityHypothesis(n.weight, names) for n, names in zip(kept, rest, strict=True)]
+    )
 
 
 def exchanged(namings: Namings, one: int, other: int, odds: float) -> Namings:
@@ -52,7 +54,7 @@ def exchanged(namings: Namings, one: int, other: int, odds: float) -> Namings:
     return _bounded([*namings, *turned])
 
 
-def judged(namings: Namings, evidence: Callable[[Naming], float]) -> Namings:
+def judged(namings: Namings, evidence: Callable[[IdentityHypothesis], float]) -> Namings:
     """The most likely first, by what speaks for each; those that are ruled out are dropped."""
     if len(namings) == 1:
         return namings
@@ -62,7 +64,7 @@ def judged(namings: Namings, evidence: Callable[[Naming], float]) -> Namings:
     return tuple(sorted(kept, key=lambda n: -total[id(n)]))
 
 
-def probabilities(namings: Namings, evidence: Callable[[Naming], float]) -> list[float]:
+def probabilities(namings: Namings, evidence: Callable[[IdentityHypothesis], float]) -> list[float]:
     """Of each hypothesis."""
     if len(namings) == 1:
         return [1.0]
@@ -71,14 +73,14 @@ def probabilities(namings: Namings, evidence: Callable[[Naming], float]) -> list
     return [value / sum(odds) for value in odds]
 
 
-def _bounded(namings: Sequence[Naming]) -> Namings:
+def _bounded(namings: Sequence[IdentityHypothesis]) -> Namings:
     """Equal ones as one, the likeliest first, and no more than there may be."""
     sums: dict[tuple[tuple[int, int], ...], float] = {}
     for naming in namings:
         key = tuple(sorted(naming.names.items()))
         sums[key] = _log_sum(sums[key], naming.weight) if key in sums else naming.weight
     most = max(sums.values())
-    found = [Naming(weight - most, dict(key)) for key, weight in sums.items()]
+    found = [IdentityHypothesis(weight - most, dict(key)) for key, weight in sums.items()]
     return tuple(sorted(found, key=lambda naming: -naming.weight)[:_MOST])
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.touch.tracking.motion import States
-from tomoskin.touch.tracking.strength import NOISE, Strength, log_content
+from tomoskin.touch.tracking.strength import NOISE, TouchStrength, log_content
 
 # Chosen on the moving plant, seeds 1 to 3 (docs/touch.md).
 
@@ -53,12 +53,12 @@ class Alone:
     """A touch as it was when last seen by itself, at the device's ``time`` s: one row of states."""
 
     states: States
-    strength: Strength
+    strength: TouchStrength
     time: float
 
 
 @dataclass(eq=False, slots=True)
-class Member:
+class MergedFinger:
     """One finger, as far as frames told it from others: its number, and how it was ``alone``."""
 
     key: int
@@ -80,7 +80,7 @@ def met(lost: Alone, other: Alone, detection: Detection) -> float:
     return min(max(there - alone + content, _LEAST), _MOST)
 
 
-def grown(detection: Detection, alone: Strength, more: Strength) -> float:
+def grown(detection: Detection, alone: TouchStrength, more: TouchStrength) -> float:
     """What a content says for being that of two touches, log likelihood ratio against the one."""
     value, both = log_content(detection), alone.plus(more)
     return _log_density(value, both) - _log_density(value, alone)
@@ -102,14 +102,14 @@ def parting(carrier: Detection, branch: Detection, reach: float) -> float:
     return float(_PARTS - 2 * (away / (2 * _RESOLUTION + 0.5 * reach)) ** 2)
 
 
-def shrunk(before: Strength, left: Strength, branch: Strength) -> float:
+def shrunk(before: TouchStrength, left: TouchStrength, branch: TouchStrength) -> float:
     """What contents say for two touches having been one before, log likelihood ratio."""
     both = left.plus(branch)
     odds = before.log_likelihood(both) - before.log_likelihood(left)
     return min(max(odds, 2 * _LEAST), _MOST)
 
 
-def crossing(one: Member, other: Member, apart: FloatArray, time: float) -> float:
+def crossing(one: MergedFinger, other: MergedFinger, apart: FloatArray, time: float) -> float:
     """Log odds that two members have come out the other way round than ``apart`` (2,) m, the way
     from the other to the one, at a ``time`` s."""
     if one.alone is None or other.alone is None:
@@ -137,7 +137,7 @@ def _way(one: Alone, other: Alone, apart: FloatArray, time: float) -> float:
     return math.log(sum(part * math.exp(_normal(away, wide)) for part, away, wide in ways))
 
 
-def reach_of(members: Sequence[Member]) -> float:
+def reach_of(members: Sequence[MergedFinger]) -> float:
     """The largest distance between members when they were last alone, m."""
     places = np.array([m.alone.states.mean[0, :2] for m in members if m.alone]).reshape(-1, 2)
     return float(np.linalg.norm(places[:, None] - places, axis=2).max(initial=0.0))
@@ -151,6 +151,6 @@ def _normal(away: FloatArray, spread: FloatArray) -> float:
     return float(-0.5 * ((yy * x * x - 2 * xy * x * y + xx * y * y) / area + math.log(area)))
 
 
-def _log_density(value: float, strength: Strength) -> float:
+def _log_density(value: float, strength: TouchStrength) -> float:
     variance = strength.variance + NOISE**2
     return -0.5 * ((value - strength.mean) ** 2 / variance + math.log(variance))

@@ -21,7 +21,7 @@ _WALK = 0.03
 
 
 @dataclass(frozen=True, slots=True)
-class Strength:
+class TouchStrength:
     """``mean`` of the logarithm of a touch's content, and its ``variance``."""
 
     mean: float
@@ -39,17 +39,17 @@ class Strength:
         mean = self.mean + gain * (log_content(detection) - self.mean)
         return type(self)(mean, (1 - gain) * before)
 
-    def log_likelihood(self, other: Strength) -> float:
+    def log_likelihood(self, other: TouchStrength) -> float:
         """Of being that of the same touch as ``other``, elsewhere."""
         variance = self.variance + other.variance + ELSEWHERE**2
         return -0.5 * ((self.mean - other.mean) ** 2 / variance + math.log(variance))
 
-    def plus(self, other: Strength) -> Strength:
+    def plus(self, other: TouchStrength) -> TouchStrength:
         """Of two touches that are seen as one: contents add up."""
         mean = math.log(math.exp(self.mean) + math.exp(other.mean))
         share = 1 / (1 + math.exp(other.mean - self.mean))
         variance = share**2 * self.variance + (1 - share) ** 2 * other.variance
-        return Strength(mean, variance)
+        return TouchStrength(mean, variance)
 
 
 def log_content(detection: Detection) -> float:

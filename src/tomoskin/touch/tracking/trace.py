@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass, field
 
 from tomoskin.core import Detection
-from tomoskin.touch.tracking.merging import Alone, Member
+from tomoskin.touch.tracking.merging import Alone, MergedFinger
 from tomoskin.touch.tracking.motion import States, region_radius
 from tomoskin.touch.tracking.position import Position
-from tomoskin.touch.tracking.strength import Strength
+from tomoskin.touch.tracking.strength import TouchStrength
 
 _STEP = 0.012
 """A touch that slides leaves a footprint every so many metres."""
@@ -67,7 +67,7 @@ class Trace:
     since: float
     host_since: float
     odds: float
-    members: list[Member]
+    members: list[MergedFinger]
     reported: bool = False
     missing: float | None = None
     beside: dict[int, Alone] = field(default_factory=dict)
@@ -78,14 +78,14 @@ class Trace:
     least: float = 0.0
     footprints: list[Footprint] = field(default_factory=list)
     top: float = 0.0
-    strength: Strength = field(init=False)
-    fresh: Strength = field(init=False)
+    strength: TouchStrength = field(init=False)
+    fresh: TouchStrength = field(init=False)
     held: Position = field(init=False)
 
     def __post_init__(self) -> None:
         """Leave the first footprint."""
         self.strong = self.since
-        self.strength = self.fresh = Strength.of(self.detection)
+        self.strength = self.fresh = TouchStrength.of(self.detection)
         self.held = Position.of(self.detection, size_of(self.detection), self.since)
         self._step()
 
@@ -125,7 +125,7 @@ class Trace:
     def change(self, time: float) -> None:
         """It stands for other fingers from now on: what it was says nothing of them."""
         self.parted = time
-        self.strength = self.fresh = Strength.of(self.detection)
+        self.strength = self.fresh = TouchStrength.of(self.detection)
         self.held = Position.of(self.detection, size_of(self.detection), time)
 
     def become(self, other: Trace) -> None:

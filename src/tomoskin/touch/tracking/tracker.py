@@ -9,12 +9,12 @@ import numpy as np
 
 from tomoskin.core import Detection, FloatArray, Touch
 from tomoskin.touch.tracking import existence, identity, motion
-from tomoskin.touch.tracking.association import NOTHING, Association, Followed, associate
+from tomoskin.touch.tracking.association import NOTHING, Association, ExpectedTouches, associate
 from tomoskin.touch.tracking.event import Happening, TouchEvent
-from tomoskin.touch.tracking.identity import NOBODY, SURE, Naming
+from tomoskin.touch.tracking.identity import NOBODY, SURE, IdentityHypothesis
 from tomoskin.touch.tracking.merging import (
     Alone,
-    Member,
+    MergedFinger,
     crossing,
     meeting,
     met,
@@ -24,7 +24,7 @@ from tomoskin.touch.tracking.merging import (
 )
 from tomoskin.touch.tracking.motion import TrackSettings
 from tomoskin.touch.tracking.residual import ResidualResponses, is_residual
-from tomoskin.touch.tracking.strength import Strength
+from tomoskin.touch.tracking.strength import TouchStrength
 from tomoskin.touch.tracking.trace import Trace
 
 _MOVED, _BY_DEVIATIONS = 0.003, 3.0
@@ -64,7 +64,7 @@ class Tracker:
         self._namings = NOBODY
         self._numbers: dict[int, int] = {}
         self._began: dict[int, float] = {}
-        self._strengths: dict[int, Strength] = {}
+        self._strengths: dict[int, TouchStrength] = {}
         self._reported_at: dict[int, tuple[float, float]] = {}
 
     def update(
@@ -142,7 +142,7 @@ class Tracker:
         self._keys += 1
         others = any(trace.reported for trace in self._traces)
         odds = existence.first(detection, self.settings.snr, strongest if others else 0.0)
-        member = Member(self._keys)
+        member = MergedFinger(self._keys)
         trace = Trace(detection, state, self._now, self._host, odds, [member])
         trace.beside = merged
         self._traces.append(trace)
@@ -273,7 +273,9 @@ class Tracker:
                 odds = parting(trace.detection, branch.detection, reach)
                 if trace.missing is None:
                     odds += shrunk(
-                        before.strength, Strength.of(trace.detection), Strength.of(branch.detection)
+                        before.strength,
+                        TouchStrength.of(trace.detection),
+                        TouchStrength.of(branch.detection),
                     )
                 if odds > best[0]:
                     best = odds, trace
@@ -345,7 +347,7 @@ class Tracker:
                 if len(names) == 1:
                     self._strengths[names.pop()] = trace.strength
 
-    def _evidence(self, naming: Naming) -> float:
+    def _evidence(self, naming: IdentityHypothesis) -> float:
         """What strengths say for it."""
         said = 0.0
         for trace in self._traces:
@@ -397,14 +399,14 @@ class Tracker:
         self._happened.append(TouchEvent(kind, touch, self._host))
 
 
-def _followed(traces: Sequence[Trace], states: motion.States) -> Followed:
+def _followed(traces: Sequence[Trace], states: motion.States) -> ExpectedTouches:
     signs = np.array([trace.sign for trace in traces])
     odds = np.array([trace.odds for trace in traces])
     several = np.array([len(trace.members) > 1 for trace in traces])
-    return Followed(states, signs, [trace.strength for trace in traces], odds, several)
+    return ExpectedTouches(states, signs, [trace.strength for trace in traces], odds, several)
 
 
-def _unlike(member: Member, branch: Trace) -> float:
+def _unlike(member: MergedFinger, branch: Trace) -> float:
     """How much less than the others it seems to be the ``branch``."""
     if member.alone is None:
         return 0.0
