@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -167,6 +169,16 @@ def test_reset_releases_all_and_counts_on() -> None:
     assert run([[]]).shown == [[]]
     assert run([[detection(0)]] * 3).shown[-1] == [2]
     assert run.happened == [("onset", 1), ("release", 1), ("onset", 2)]
+
+
+def test_touches_that_have_gone_are_forgotten() -> None:
+    """But for residual responses of the last ones: weeks need no more memory than an hour."""
+    run, sizes = Run(10.0), []
+    for number in range(200):
+        run([[detection(0.03 * (number % 3))]] * 3 + [[]] * 20)
+        sizes.append(len(pickle.dumps(run.tracker)))
+    assert run.tracker.numbered == 200
+    assert max(sizes[150:]) <= max(sizes[80:120]) + 16  # numbers become longer
 
 
 def test_a_clock_that_begins_again_keeps_the_touches() -> None:

@@ -95,6 +95,11 @@ class Trace:
         return self.members[0].key
 
     @property
+    def kind(self) -> str:
+        """Whether it lowers the conductivity or raises it."""
+        return "decrease" if self.sign < 0 else "increase"
+
+    @property
     def sign(self) -> float:
         """Of its peak."""
         return sign_of(self.detection)

@@ -229,7 +229,7 @@ class Tracker:
         for trace in [t for t in self._traces if t.reported]:
             if trace.missing is not None:
                 self._lose(trace)
-            elif trace.missing is None and is_residual(trace, self._now):
+            elif is_residual(trace, self._now):
                 self._end(trace)
         self._namings = identity.judged(self._namings, self._evidence)
 
@@ -332,10 +332,11 @@ class Tracker:
         self._residuals.leave(trace, self._now)
         keys = [member.key for member in trace.members]
         names = sorted(self._namings[0].names[key] for key in keys)
-        for name in names:
-            number = self._numbers[name]
-            kind = "decrease" if trace.sign < 0 else "increase"
-            ended = Touch(number, kind, self._began[name], trace.shown)
+        for name in names:  # nobody else can be it any more, and a run may last for weeks
+            number, began = self._numbers.pop(name), self._began.pop(name)
+            self._strengths.pop(name, None)
+            self._reported_at.pop(number, None)
+            ended = Touch(number, trace.kind, began, trace.shown)
             self._happened.append(TouchEvent("release", ended, self._host))
         self._namings = identity.ended(self._namings, keys)
 
@@ -378,7 +379,7 @@ class Tracker:
         numbers = tuple(sorted(self._numbers[name] for name in names))
         return Touch(
             numbers[0],
-            "decrease" if trace.sign < 0 else "increase",
+            trace.kind,
             self._began[names[0]],
             trace.shown,
             numbers if len(numbers) > 1 else (),
