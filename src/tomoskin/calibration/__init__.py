@@ -45,14 +45,14 @@ KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, BENDS, CLASSES)
 
 def load_calibration(path: StrPath, progress: Progress = silent) -> Calibration[Any]:
     """Read a file of any of the :data:`KINDS`. Raises DataError where it is of none."""
-    path = Path(path)
-    title = str(load_arrays(path).get("kind", ""))
+    arrays = load_arrays(Path(path))
+    title = str(arrays.get("kind", ""))
     kind = next((kind for kind in KINDS if kind.title == title), None)
     if kind is None:
         raise DataError(
             "is not a calibration", where=str(path), hint="make one: tomoskin calibrate --help"
         )
-    return kind.read(path, progress)
+    return kind.learn(arrays, str(path), progress)
 
 
 __all__ = [

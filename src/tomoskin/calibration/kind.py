@@ -213,13 +213,14 @@ class Kind(Generic[M]):
         DataError
             When it is missing, damaged, or of another kind.
         """
-        return self._learn(load_arrays(path), str(path), progress)
+        return self.learn(load_arrays(path), str(path), progress)
 
     def decode(self, data: bytes, where: str) -> Calibration[M]:
         """:meth:`read` from the file's bytes."""
-        return self._learn(unpack_arrays(data, where), where, silent)
+        return self.learn(unpack_arrays(data, where), where, silent)
 
-    def _learn(self, arrays: Arrays, where: str, progress: Progress) -> Calibration[M]:
+    def learn(self, arrays: Arrays, where: str, progress: Progress) -> Calibration[M]:
+        """:meth:`read` from the arrays of the file."""
         pattern = self._pattern(arrays, where)
         model = self.unpack(arrays, pattern, where, progress)
         return Calibration(self, model, pattern, str(arrays.get("skin_name", "")))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 import webbrowser
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,11 +20,11 @@ from tomoskin.cli.options import CalibrationsOption, SinkOption, SkinOption, Sou
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.record import ended_by_signals, recording_to
 from tomoskin.cli.robot import Served, run_robot
+from tomoskin.cli.serving import announce, hub_of
 
 if TYPE_CHECKING:
     from tomoskin.pipeline import Prepared
     from tomoskin.run import Runner
-    from tomoskin.server import AccessPolicy
 
 
 def live(
@@ -84,17 +82,8 @@ def live(
         run_robot(robot, sink, served)
         return
     with ended_by_signals():
-        from tomoskin.pipeline import colour_limit
         from tomoskin.run import Runner
-        from tomoskin.server import (
-            AccessPolicy,
-            Hub,
-            Server,
-            application,
-            check_page,
-            listen,
-            serve_requests,
-        )
+        from tomoskin.server import AccessPolicy, Server, application, check_page, listen
         from tomoskin.source import open_source
 
         check_page()
@@ -113,12 +102,9 @@ def live(
                 prepared, lambda: open_source(source, chosen), sinks=sinks, memory=board_memory()
             )
             with recording_to(runner, record):
-                hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
-                hub.opener = partial(open_source, source)
-                serve_requests(hub, source)
-                server = Server.of(application(hub, policy))
+                server = Server.of(application(hub_of(runner, source, folder), policy))
                 with server.stopped_by_signals():
-                    _announce(policy, runner, json=json)
+                    announce(policy, f"{runner.status().source} is live", json=json)
                     if open_browser:
                         webbrowser.open(policy.address)
                     server.run_on(listener)
@@ -148,14 +134,6 @@ def _warn(host: str) -> None:
         f"warning: --host {host} lets other machines reach this page, unencrypted; "
         "whoever has the address with its token can control it"
     )
-
-
-def _announce(policy: AccessPolicy, runner: Runner, *, json: bool) -> None:
-    if json:
-        emit({"type": "listening", "address": policy.address, "port": policy.port})
-    else:
-        typer.echo(f"{runner.status().source} is live at {policy.address}")
-    sys.stdout.flush()
 
 
 def _farewell(runner: Runner, *, json: bool) -> None:

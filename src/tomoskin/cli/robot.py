@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import webbrowser
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,12 +16,12 @@ from tomoskin.cli.choices import board_memory, chosen_sinks, skin_for_source
 from tomoskin.cli.named_files import Otherwise, Reads
 from tomoskin.cli.output import Bar, emit, remark
 from tomoskin.cli.record import ended_by_signals
+from tomoskin.cli.serving import announce, hub_of
 
 if TYPE_CHECKING:
     from tomoskin.pipeline import Prepared
     from tomoskin.robot import PlacedSkin, Robot
     from tomoskin.run import Member, RobotRun
-    from tomoskin.server import AccessPolicy, Hub
 
 
 @dataclass(frozen=True)
@@ -86,39 +85,19 @@ def _serve(robot: Robot, run: RobotRun, served: Served) -> None:
             run.start()
             if served.record is not None:
                 run.record(served.record)
-            overview, hubs = Overview(robot, run, served.folder), _hubs(robot, run, served.folder)
+            overview = Overview(robot, run, served.folder)
+            hubs = {
+                s.name: hub_of(run.runners[s.name], s.source, served.folder) for s in robot.skins
+            }
             server = Server.of(robot_application(overview, hubs, policy))
             with server.stopped_by_signals():
-                _announce(policy, robot, json=served.json)
+                live = f"{len(robot.skins)} skins of {robot.name} are live"
+                announce(policy, live, json=served.json)
                 if served.open_browser:
                     webbrowser.open(policy.address)
                 server.run_on(listener)
         finally:
             run.stop()
-
-
-def _hubs(robot: Robot, run: RobotRun, folder: Path) -> dict[str, Hub]:
-    """What serves the page of each skin."""
-    from tomoskin.pipeline import colour_limit
-    from tomoskin.server import Hub, serve_requests
-    from tomoskin.source import open_source
-
-    hubs = {}
-    for skin in robot.skins:
-        runner = run.runners[skin.name]
-        hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
-        hub.opener = partial(open_source, skin.source)
-        serve_requests(hub, skin.source)
-        hubs[skin.name] = hub
-    return hubs
-
-
-def _announce(policy: AccessPolicy, robot: Robot, *, json: bool) -> None:
-    if json:
-        emit({"type": "listening", "address": policy.address, "port": policy.port})
-    else:
-        typer.echo(f"{len(robot.skins)} skins of {robot.name} are live at {policy.address}")
-    sys.stdout.flush()
 
 
 def _farewell(run: RobotRun, *, json: bool) -> None:

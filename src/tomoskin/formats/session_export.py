@@ -33,6 +33,7 @@ from tomoskin.recording import (
     start_time,
 )
 from tomoskin.skin import Skin
+from tomoskin.touch import has_forces
 
 if TYPE_CHECKING:
     from tomoskin.pipeline import FrameResult
@@ -106,7 +107,7 @@ class Export:
     def touches(self, path: StrPath) -> None:
         """Write a table of the recorded touches."""
         rows, surface = list(scanned_touches(self.session)), self.session.skin.surface
-        forces = any(t.detection.force is not None for _, _, touches in rows for t in touches)
+        forces = has_forces(rows)
         begun = start_time(self.session)
         write_touches(path, rows, surface, forces=forces, begun=begun, overwrite=self.overwrite)
 

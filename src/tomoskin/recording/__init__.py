@@ -40,7 +40,7 @@ from tomoskin.recording.recorder import (
 )
 from tomoskin.recording.repair import Lost, Repaired, repair
 from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
-from tomoskin.recording.replayed import advance, as_recorded, replayed
+from tomoskin.recording.replayed import advance, as_recorded, recorded_calibrations, replayed
 from tomoskin.recording.robot_log import LogPart, RobotLog
 from tomoskin.recording.scanned import idle_count, scanned_touches
 from tomoskin.recording.session import Session
@@ -101,6 +101,7 @@ __all__ = [
     "press_positions",
     "read_session",
     "read_timeline",
+    "recorded_calibrations",
     "recording_of",
     "repair",
     "replayed",

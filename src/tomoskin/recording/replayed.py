@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
-from tomoskin.calibration import KINDS
+from tomoskin.calibration import KINDS, Calibration
 from tomoskin.core import DataError, Frame
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
 from tomoskin.recording.layout import Mark
@@ -13,12 +14,18 @@ from tomoskin.recording.session_reader import SessionReader, tick_rate, touches_
 
 def as_recorded(session: SessionReader) -> Prepared:
     """The session's own skin, with the calibrations that were on. Raises DataError."""
-    prepared, held = prepare(session.skin), session.attachments()
+    prepared = prepare(session.skin)
+    for calibration in recorded_calibrations(session):
+        prepared = prepared.calibrated(calibration)
+    return prepared
+
+
+def recorded_calibrations(session: SessionReader) -> Iterator[Calibration[Any]]:
+    """The calibrations that were on, in the order in which they are applied. Raises DataError."""
+    held = session.attachments()
     for kind in KINDS:
         if (data := held.get(kind.attachment)) is not None:
-            where = f"{session.path}, {kind.attachment}"
-            prepared = prepared.calibrated(kind.decode(data, where))
-    return prepared
+            yield kind.decode(data, f"{session.path}, {kind.attachment}")
 
 
 def advance(pipeline: Pipeline, frame: Frame, mark: Mark) -> FrameResult | None:

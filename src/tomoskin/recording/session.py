@@ -17,7 +17,7 @@ from tomoskin.recording.replayed import as_recorded, replayed
 from tomoskin.recording.scanned import frame_numbers
 from tomoskin.recording.session_reader import SessionReader
 from tomoskin.signal import Recording
-from tomoskin.touch import touch_columns
+from tomoskin.touch import has_forces, touch_columns
 
 
 class Session:
@@ -82,5 +82,4 @@ class Session:
             (*numbers.get((time, sequence), (None, time)), touches)
             for time, sequence, touches in touched
         ]
-        forces = any(touch.detection.force for _, _, touches in touched for touch in touches)
-        return touch_columns(frames, self.skin.surface, forces=forces)
+        return touch_columns(frames, self.skin.surface, forces=has_forces(frames))

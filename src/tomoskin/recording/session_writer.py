@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol
 
 from tomoskin.core import Event, Frame, Image, PixelMap, StrPath, Touch, encode_json, plain_values
 from tomoskin.recording import channels
@@ -75,7 +75,7 @@ class Log(Protocol):
         """No more comes."""
 
 
-class SessionWriter:
+class SessionWriter(AbstractContextManager["SessionWriter"]):
     """Writes one session file; a context manager.
 
     The same calls give the same bytes: no time of day goes in but the one given. Messages are
@@ -129,16 +129,7 @@ class SessionWriter:
         """End the session; a second call does nothing."""
         self._log.close()
 
-    def __enter__(self) -> Self:
-        """The writer itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close."""
         self.close()
 

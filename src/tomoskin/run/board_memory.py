@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from tomoskin.calibration import KINDS, Calibration
+from tomoskin.calibration import Calibration
 from tomoskin.core import Frame, StrPath
 from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Prepared
-from tomoskin.recording import SessionReader, SessionWriter, errors_of
+from tomoskin.recording import SessionReader, SessionWriter, errors_of, recorded_calibrations
 from tomoskin.wire import Info
 
 _SPACING = 1e-3
@@ -88,13 +88,8 @@ class BoardMemory:
             if session.skin.body != prepared.skin.body:
                 return None
             frames = [item.frame for item in session.frames()]
-            held = session.attachments()
+            calibrations = {one.kind.name: one for one in recorded_calibrations(session)}
             kept = session.epoch + (frames[0].host_time if frames else 0.0)
-        calibrations = {
-            kind.name: kind.decode(held[kind.attachment], f"{path}, {kind.attachment}")
-            for kind in KINDS
-            if kind.attachment in held
-        }
         if len(frames) < REFERENCE_FRAMES:
             return None
         times = (now - _SPACING * (len(frames) - k) for k in range(len(frames)))

@@ -30,6 +30,7 @@ from tomoskin.calibration import BendReading
 from tomoskin.core import Force, Touch
 from tomoskin.pipeline import FrameResult
 from tomoskin.run import Runner, Snapshot
+from tomoskin.touch import force_values
 from tomoskin.twin import Contact
 
 READY, NO_PICTURE, ROWS_LEFT_OUT, BEND = 1, 2, 4, 8
@@ -152,7 +153,7 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
             t.detection.peak,
             now - t.since,
             t.detection.cov_xy,
-            *_newtons(t.detection.force),
+            *force_values(t.detection.force)[:3],
         )
         for t in touches
     ]
@@ -161,10 +162,6 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
 
 def _force_state(force: Force | None) -> int:
     return 0 if force is None else 1 if force.calibrated else 2
-
-
-def _newtons(force: Force | None) -> tuple[float, float, float]:
-    return (np.nan,) * 3 if force is None else (force.newtons, force.low, force.high)
 
 
 def _bend(bend: BendReading | None) -> bytes:

@@ -16,7 +16,7 @@ from tomoskin.server import page_messages
 from tomoskin.server.frames import NewestFrame
 from tomoskin.server.requests import Request
 from tomoskin.server.run_handlers import run_handlers
-from tomoskin.server.task import Handler, Handlers, Listener, Tasks
+from tomoskin.server.task import Handler, Handlers, Listener, Tasks, beside
 from tomoskin.skin import Skin
 from tomoskin.source import Transport
 
@@ -84,13 +84,10 @@ class Hub:
                 self._wake_is_due = True
                 loop.call_soon_threadsafe(self._wake)
 
-        ticker = asyncio.create_task(self._tick())
-        self._read_timeline()
-        with self.runner.watch(announce):
-            yield
-        ticker.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await ticker
+        async with beside(self._tick()):
+            self._read_timeline()
+            with self.runner.watch(announce):
+                yield
 
     def join(self, page: Listener) -> bool:
         """Serve ``page`` from now on; False where there are too many."""

@@ -18,7 +18,7 @@ from tomoskin.run import RobotRun, Runner, Status, commands
 from tomoskin.server.page_messages import finite, flat, text_of
 from tomoskin.server.requests import Request, SetRecording
 from tomoskin.server.run_handlers import FILE_NAME
-from tomoskin.server.task import Listener, Tasks
+from tomoskin.server.task import Listener, Tasks, beside
 from tomoskin.sink import Moment, Naming, Stream, contacts_of
 
 PERIOD = 1 / 20
@@ -81,7 +81,7 @@ class Overview:
 
     def __init__(self, robot: Robot, run: RobotRun, folder: Path) -> None:
         self.run, self.folder = run, folder
-        self._robot, self._tasks = robot, Tasks()
+        self._tasks = Tasks()
         self._pages: set[Listener] = set()
         placed = {skin.name: skin for skin in robot.skins}
         streams = {
@@ -94,11 +94,8 @@ class Overview:
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Look at the runs while the block lasts."""
-        ticker = asyncio.create_task(self._tick())
-        yield
-        ticker.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await ticker
+        async with beside(self._tick()):
+            yield
 
     def join(self, page: Listener) -> bool:
         """Serve ``page`` from now on; False where there are too many."""

@@ -11,6 +11,9 @@ from tomoskin.sink.naming import Naming
 from tomoskin.sink.sink import Moment, Stream
 from tomoskin.sink.space import SpacePose, Vector
 
+_NO_FORCE = {"force": None, "force_interval": None, "force_calibrated": False}
+"""What a row says of a touch whose force nothing tells."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
@@ -50,15 +53,16 @@ class Contact:
 
     def content(self) -> dict[str, Any]:
         """As plain values by name: on the sheet, and in space."""
-        spread, force = self.covariance, self.touch.detection.force
-        return touch_row(self.touch) | {
-            "position": self.position,
-            "normal": self.normal,
-            "covariance": None if spread is None else spread.tolist(),
-            "force": self.force,
-            "force_interval": None if force is None else (force.low, force.high),
-            "force_calibrated": force is not None and force.calibrated,
-        }
+        spread = self.covariance
+        return (
+            _NO_FORCE
+            | touch_row(self.touch)
+            | {
+                "position": self.position,
+                "normal": self.normal,
+                "covariance": None if spread is None else spread.tolist(),
+            }
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,15 @@ from tomoskin.touch.fit.spot import Response, Spots, spots_of
 from tomoskin.touch.region import Region
 from tomoskin.touch.segment import ImageNoise, Segmenter
 from tomoskin.touch.spans import Span, touch_spans
-from tomoskin.touch.table import ELAPSED, TouchedFrame, columns_of, touch_columns, touch_rows
+from tomoskin.touch.table import (
+    ELAPSED,
+    TouchedFrame,
+    columns_of,
+    force_values,
+    has_forces,
+    touch_columns,
+    touch_rows,
+)
 from tomoskin.touch.tracking.event import TouchEvent
 from tomoskin.touch.tracking.motion import STILL, TrackSettings
 from tomoskin.touch.tracking.tracker import Tracker
@@ -40,6 +48,8 @@ __all__ = [
     "Variant",
     "Whitener",
     "columns_of",
+    "force_values",
+    "has_forces",
     "idle_covariance",
     "measured_covariance",
     "resolution_bounds",

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import Touch
+from tomoskin.core import Force, Touch
 from tomoskin.mesh import Plane, Surface
 
 COLUMNS = (
@@ -52,7 +52,7 @@ def touch_rows(
     on = _curved(surface)
     for frame, time, touches in frames:
         for touch in touches:
-            more = _force(touch) if forces else ()
+            more = force_values(touch.detection.force) if forces else ()
             last = () if begun is None else (time - begun,)
             yield _row(frame, time, touch) + more + _in_space(touch, on) + last
 
@@ -86,8 +86,13 @@ def _row(frame: int | None, time: float, touch: Touch) -> tuple[Value, ...]:
     return (number, time, touch.id, d.x, d.y, d.sd_x, d.sd_y, d.area, d.peak, touch.said)
 
 
-def _force(touch: Touch) -> tuple[Value, ...]:
-    force = touch.detection.force
+def has_forces(frames: Iterable[TouchedFrame]) -> bool:
+    """Whether a touch of any frame has a force."""
+    return any(t.detection.force is not None for *_, touches in frames for t in touches)
+
+
+def force_values(force: Force | None) -> tuple[float, float, float, str]:
+    """As in the columns :data:`FORCE`; NaN and "" where nothing tells it."""
     if force is None:
         return (math.nan, math.nan, math.nan, "")
     return (force.newtons, force.low, force.high, force.state)

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from tomoskin.core import DataError, Force, StrPath, install_hint, written
+from tomoskin.core import DataError, StrPath, install_hint, written
 from tomoskin.recording import (
     Advance,
     Block,
@@ -16,6 +16,7 @@ from tomoskin.recording import (
     all_blocks,
     scanned_touches,
 )
+from tomoskin.touch import force_values
 
 _FRAMES = ("number", "time", "host_time", "sequence", "ticks", "mark", "samples", "voltages")
 _TOUCH = np.dtype(
@@ -75,19 +76,12 @@ def _touches(session: SessionReader) -> Any:
     """By frame, as in every table; -1 where a touch's frame is not in the file."""
     table = [
         (-1 if frame is None else frame, time, t.id, t.said.encode(), t.since,
-         r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak, *_newtons(r.force))
+         r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak, *force_values(r.force))
         for frame, time, touches in scanned_touches(session)
         for t in touches
         for r in [t.detection]
     ]  # fmt: skip
     return np.array(table, dtype=_TOUCH)
-
-
-def _newtons(force: Force | None) -> tuple[float, float, float, bytes]:
-    """N and state; NaN and nothing where no calibration tells it."""
-    if force is None:
-        return (np.nan, np.nan, np.nan, b"")
-    return force.newtons, force.low, force.high, force.state.encode()
 
 
 def _json(item: Any) -> str:
