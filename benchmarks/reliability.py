@@ -24,9 +24,10 @@ def run(data: Path | None) -> tuple[Report, ...]:
     notes = (
         "refused: with a TomoskinError, one sentence; accepted: what was read is right, or nothing "
         "in the file can tell that it is not",
-        f"hangs: over {HANG:g} s; memory: over {MEMORY >> 20} MB in the process; wrong: a frame "
-        "that was never written, other arrays or positions, a repair that loses frames, a run that "
-        "stands still; a kill before the first second leaves a file that is refused",
+        f"hangs: over {HANG:g} s; memory: over {MEMORY >> 20} MB in the process",
+        "wrong: a frame that was never written, other arrays or positions, a repair that loses "
+        "frames, a run that stands still",
+        "a kill before the first second leaves a file that is refused",
         *(f"{fault}: {text}" for tally in tallies for fault, text in tally.examples.items()),
     )
     return (Report("reliability", COLUMNS, rows, notes),)

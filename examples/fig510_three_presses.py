@@ -1,16 +1,16 @@
 """Figure 5.10: three 15 mm probes of 400 g put on one by one, and taken off in the same order.
 
 One step with NOSER's prior on normalised differences against the idle frame; threshold 70 % of the
-maximum, 60 % where all three are on. The thesis shows the places in a photograph only: here they
-stand 70 mm from the centre, towards E1, E4 and E7, where the sheet answers each alike (between
-electrodes it answers by a sixth less, and a threshold of 70 % then leaves a few cells in pieces).
+maximum, 60 % where all three are on. The thesis shows the places in a photograph only. Here they
+stand 70 mm from the centre, towards E1, E4 and E7, where the sheet responds equally to each.
+Between electrodes the response is a sixth smaller; a threshold of 70 % then leaves scattered cells.
 
 Shown: six stages on one scale; contours are the regions that were found, crosses their centres,
 probes dashed.
 Thesis saw: one, two, three found (the third at 60 % only); a remainder after unloading, hysteresis.
-Checked: as many regions as probes in every loaded stage, each within 15 mm of a probe; after
-unloading a fall of conductivity remains where the probes were, more than four standard deviations
-of its noise and less than a quarter of the fall under load.
+Checked: as many regions as probes in every loaded stage, each within 15 mm of a probe. After
+unloading a fall of conductivity remains where the probes were. It is more than four standard
+deviations of its noise, and less than a quarter of the fall under load.
 """
 
 from __future__ import annotations

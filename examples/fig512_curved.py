@@ -8,10 +8,10 @@ differences, threshold 70 %, the twin of ``textile-disc-8``.
 Shown: the same press on three bodies, and on the arm with its joint at 37° by three references; in
 the last the joint hides the press.
 Thesis saw: the touch found on all of them; moving the joint needs a new reference, by its encoder.
-Checked: one touch within 15 mm of the probe on each body, and on the arm with its joint at 37° by
-the reference interpolated between 0, 15, 30 and 45° of the encoder, no farther off than 1.2 times
-as by a reference taken there, or 3 mm more; against the straight arm's reference the moved joint
-alone changes the picture by more than half of what a touch does, by the encoder's by less than 0.3.
+Checked: one touch within 15 mm of the probe on each body. The arm's joint at 37° uses a reference
+interpolated between 0, 15, 30 and 45° of the encoder. Its touch is at most 1.2 times as far off as
+with a reference taken there, or 3 mm more. Against the straight arm's reference the moved joint
+alone changes the picture by more than half of what a touch does; with the encoder by less than 0.3.
 """
 
 from __future__ import annotations

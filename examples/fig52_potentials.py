@@ -7,10 +7,10 @@ Shown: one value for each of the eight drives, in their order; the bars are fift
 one cannot be seen.
 Thesis saw: the extremes where the driving pair is near; a positive peak beside the ground, the
 negative one where the electrode itself is the ground (sink).
-Checked: the greatest value stands where the next electrode is the ground; where the electrode
-itself is, the value is negative, and one of the two least (an even sheet reads as much where the
-next electrode is the source, its mirror image); without the three drives that touch the pair, no
-value is over 10 % of the peak; the standard deviation is below 1 % of the peak, and above 0.
+Checked: the greatest value stands where the next electrode is the ground. Where the electrode
+itself is the ground, the value is negative and one of the two least: on an even sheet, the mirror
+image (the next electrode as source) reads the same. Without the three drives that touch the pair,
+no value is over 10 % of the peak. The standard deviation is below 1 % of the peak, and above 0.
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ Shown: forty rows in eight groups, one for each grounded electrode; gaps are pai
 read.
 Thesis saw: a frame whose extremes stand where the driving pair is near.
 Checked: under each drive the two pairs beside the driving one read most, at least twice as much
-as the pair opposite; exchanging drive and measuring pair changes no value by more than 15 % of
-the largest (reciprocity, Geselowitz 1971; each channel has an amplifier of its own, and a gain that
-differs by 0.2 % shows in the small difference of two potentials); the model of the skin expects
+as the pair opposite. Exchanging drive and measuring pair changes no value by more than 15 % of
+the largest (reciprocity, Geselowitz 1971). Each channel has its own amplifier, and a gain that
+differs by 0.2 % shows in the small difference of two potentials. The model of the skin expects
 this frame (cosine over 0.98).
 """
 

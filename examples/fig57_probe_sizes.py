@@ -6,8 +6,8 @@ Shown: the change of each row for three probes; grey groups are drives through E
 Thesis saw: the change grows with the size of the probe; it stays largest and negative where E4 is
 in the measured pair.
 Checked: the root of the summed squares of the change grows from size to size, by more than four
-standard deviations of its noise; for each size the most negative row, of those that E4 does not
-drive, contains E4, and every row that contains it falls.
+standard deviations of its noise. For each size, look at the rows that E4 does not drive: the most
+negative one contains E4, and every row that contains E4 falls.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 named by their radius and the square by its side.
 
 Shown: four pictures on one scale, with the greatest change in each title; probes are dashed.
-Thesis saw: the size told by the maximum; round and square not told apart.
+Thesis saw: the maximum shows the size; round and square cannot be distinguished.
 Checked: the maximum grows from 15 to 18 to 25 mm, each time by more than 3 standard deviations
 of its noise; the picture of the square has the shape of the circles' (correlation over 0.97, and
 RES50 within the circles' range ± 5 %). The thesis's four metrics are reported.

@@ -1,7 +1,7 @@
-"""Figure 6.4: six expressions of a face, told by eight electrodes that the expressions move.
+"""Figure 6.4: six expressions of a face, recognised by eight electrodes that they move.
 
 The electrodes sit on a shell of two tissues (face.py), 1 mA through neighbouring ones. Each
-session puts them on anew, 2 mm off, on a face 10 % more or less conductive; an expression is 15 %
+session attaches them again, 2 mm off, on a face 10 % more or less conductive; an expression is 15 %
 stronger or weaker from session to session and from run to run, each bump of it by itself. Every
 frame is taken against a relaxed one just before it. Two sessions of eight runs are learnt, four
 are asked.
@@ -11,7 +11,7 @@ With direct current, an electrode that has just driven stays polarised, otherwis
 
 Shown: pictures of the six expressions, with the true movement of each electrode and the one that
 was found.
-Thesis saw: with direct current, only "A" and the smile are told from the rest.
+Thesis saw: with direct current, only "A" and the smile are recognised.
 Checked: with complex data at least 5 of 6 are right in 90 % of the runs, and in more than with
 direct current. Of a picture with movement, the electrode that is said to have moved most is one
 of the three that did, for at least 5 of 6 expressions.

@@ -2,12 +2,12 @@
 
 A cylinder of conductive silicone, 100 mm across and 40 mm high, with two rings of eight electrodes
 on its wall. First an insulating ball of 20 mm is cast in: the change against a block without it
-gives its place in space. Then a finger indents the top of that block by 5 mm: silicone keeps its
-volume, so the block is deformed as a whole and its electrodes move with the wall; against the
-block untouched, that gives the place of the touch.
+gives its place in space. Then a finger indents the top of that block by 5 mm. Silicone keeps its
+volume, so the whole block deforms and its electrodes move with the wall. The change against the
+untouched block gives the place of the touch.
 
 Shown: level and upright cuts through each picture; dashed is the truth, the cross what was found.
-Thesis saw: nothing of the kind; it wishes for soft bodies that sense by themselves (chapter 8).
+Thesis saw: nothing of the kind; it hopes for soft bodies that sense by themselves (chapter 8).
 Checked: the ball within 8 mm in space, the touch within 6 mm on the surface.
 """
 

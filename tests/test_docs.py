@@ -104,13 +104,6 @@ def test_the_skin_of_the_instructions_is_one_and_costs_what_is_said(tmp_path: Pa
     assert with_arduino < 60
 
 
-def test_the_readme_computes_a_picture() -> None:
-    (block,) = BLOCK.findall((ROOT / "README.md").read_text(encoding="utf-8"))
-    names: dict[str, object] = {"measured": np.ones(40)}
-    exec(compile(block, "README.md", "exec"), names)
-    assert isinstance(names["image"], Image)
-
-
 def test_the_first_steps_give_a_touch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The script on the page of the first steps: simulated, and the press found in it."""
     page = (DOCS / "start.md").read_text(encoding="utf-8")

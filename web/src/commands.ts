@@ -112,9 +112,9 @@ export const truth: Command = {
   run: () => (state.showTruth.value = !state.showTruth.value),
 };
 
-export const autoOnce: Command = {
+export const fitColours: Command = {
   id: "auto",
-  label: "Auto once",
+  label: "Fit colours",
   key: "A",
   code: "a",
   title: "Fit the colour limits to the present image, once",
@@ -146,7 +146,7 @@ export const available = computed<readonly Command[]>(() => [
   record,
   ...(state.scene.value?.pressable ? [lift, keep, softer, harder, truth] : []),
   flat,
-  autoOnce,
+  fitColours,
   ...more.value,
   ...drawerCommands.value,
 ]);

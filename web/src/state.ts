@@ -18,7 +18,7 @@ export const notice = signal<string | null>(null);
 export const smoothed = signal(true);
 export const showTruth = signal(false);
 export const showDifference = signal(false);
-/** Set by "auto once"; null: the scene's own fixed limit. */
+/** Set by "Fit colours"; null: the scene's own fixed limit. */
 export const ownLimit = signal<number | null>(null);
 export const keepPresses = signal(false);
 

@@ -1,8 +1,8 @@
-/** The colour scale of the sheet, its numbers and unit, and "auto once". */
+/** The colour scale of the sheet, its numbers and unit, and "Fit colours". */
 
 import { useEffect, useRef } from "preact/hooks";
 import { MAP_SIZE } from "../colours";
-import { autoOnce } from "../commands";
+import { fitColours } from "../commands";
 import { inScale, scaleFor } from "../format";
 import { narrow } from "../screen";
 import { limit, ownLimit, scene } from "../state";
@@ -49,8 +49,8 @@ export function Legend() {
           ))}
         </ol>
       </div>
-      <button type="button" title={autoOnce.title} onClick={autoOnce.run}>
-        Auto once <kbd>{autoOnce.key}</kbd>
+      <button type="button" title={fitColours.title} onClick={fitColours.run}>
+        Fit colours <kbd>{fitColours.key}</kbd>
       </button>
       {ownLimit.value !== null && (
         <button type="button" title={resetTitle} onClick={() => (ownLimit.value = null)}>

@@ -28,7 +28,7 @@ const bounds = computed<readonly [number, number]>(() => {
 });
 const lowest = computed(() => bounds.value[0]);
 const highest = computed(() => bounds.value[1]);
-/** "Auto once" of the difference: V, null until asked for. */
+/** "Fit axis" of the difference: V, null until asked for. */
 const ownSpan = signal<number | null>(null);
 const span = computed(
   () => ownSpan.value ?? niceAbove(0.1 * Math.max(-lowest.value, highest.value)),
@@ -144,7 +144,7 @@ export function Voltages() {
           </button>
           {showDifference.value && (
             <button type="button" title="Fit the axis to what is shown now, once" onClick={fitSpan}>
-              Auto once
+              Fit axis
             </button>
           )}
         </span>

@@ -53,7 +53,7 @@ export function Refusal({ section, id }: { readonly section: string; readonly id
     <p class="wrong" role="alert" id={id} data-testid="refused">
       {refused.value?.message}{" "}
       <button type="button" onClick={() => discard(section)}>
-        Leave it as it was
+        Revert
       </button>
     </p>
   );

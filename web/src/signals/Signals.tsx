@@ -32,7 +32,7 @@ interface Tab {
   readonly label: string;
   readonly unit: string;
   readonly meaning: string;
-  /** Ends of the ordinate, in the unit, at first and after "Auto once". */
+  /** Ends of the ordinate, in the unit, at first and after "Fit axis". */
   readonly fit: () => readonly [number, number];
   readonly range: readonly [number, number];
   readonly data: () => uPlot.AlignedData;
@@ -165,7 +165,7 @@ const TABS: readonly Tab[] = [
 const current = signal<Tab>(TABS[0]);
 /** Ends of the ordinates; they move when asked to only. */
 const ends = signal<Readonly<Record<string, readonly [number, number]>>>({});
-const autoOnce = (): void => void (ends.value = { ...ends.peek(), [current.peek().id]: current.peek().fit() });
+const fitAxis = (): void => void (ends.value = { ...ends.peek(), [current.peek().id]: current.peek().fit() });
 
 effect(() => {
   const showing = opened.value?.id === "signals" && current.value.id === "drive";
@@ -179,7 +179,7 @@ effect(() => {
 });
 effect(() => {
   const known = ends.value[current.value.id];
-  if (opened.value?.id === "signals" && !known && shown.value) autoOnce();
+  if (opened.value?.id === "signals" && !known && shown.value) fitAxis();
 });
 
 const length = computed(() => {
@@ -268,8 +268,8 @@ function Chart({ tab }: { tab: Tab }) {
       <p class="sum">
         <span>{tab.unit}</span>
         <strong data-testid="signals-sum">{summary(tab)}</strong>
-        <button type="button" onClick={autoOnce}>
-          Auto once
+        <button type="button" onClick={fitAxis}>
+          Fit axis
         </button>
       </p>
       <Plot label={`${tab.label}, ${tab.unit}`} plan={plan} data={data} />
