@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 __version__: str
 
+interface: int
+"""Number of what this file says; raised with each change of it."""
+
 vector_code: str
 """The widest vector instructions that the processor has: AVX-512, AVX2, NEON or none."""
 

@@ -255,10 +255,15 @@ fn keep_freed_memory() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGEST)));
 }
 
+/// Number of what `tomoskin_core.pyi` says: raised with each change of it, so that tomoskin does
+/// not call an engine that was built for other arguments.
+const INTERFACE: u32 = 2;
+
 #[pymodule]
 fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     keep_freed_memory();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("interface", INTERFACE)?;
     module.add("vector_code", name(Arch::new()))?;
     module.add_class::<Symbolic>()?;
     module.add_class::<Factor>()?;

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import hashlib
 import importlib
 from typing import Any
 
@@ -9,9 +11,9 @@ import numpy as np
 import pytest
 
 import shapes
-from conftest import NO_ENGINE
+from conftest import NO_ENGINE, ROOT
 from tomoskin.core import ModelError
-from tomoskin.forward import ForwardModel, choose_engine, engine_choice
+from tomoskin.forward import ForwardModel, choose_engine, engine_choice, native
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern
 
@@ -129,6 +131,36 @@ def test_scipy_runs_where_the_extension_does_not_work(monkeypatch: pytest.Monkey
     engine = choose_engine()
     assert engine.name == "scipy"
     assert "does not work" in engine.reason
+
+
+def test_scipy_runs_where_the_extension_was_built_for_another_tomoskin(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    core = pytest.importorskip("tomoskin_core", reason=NO_ENGINE)
+    monkeypatch.setattr(core, "interface", core.interface - 1)
+    engine = choose_engine()
+    assert engine.name == "scipy"
+    assert "built for another tomoskin" in engine.reason
+    assert "make native" in engine.reason
+
+
+def test_a_change_of_the_interface_raises_its_number() -> None:
+    """The sum of what the stub says, beside the number; change both, in Rust and in Python."""
+    stub = (ROOT / "core-native" / "tomoskin_core.pyi").read_text(encoding="utf-8")
+    signatures = ast.unparse(_without_docs(ast.parse(stub)))
+    assert (native.INTERFACE, hashlib.sha256(signatures.encode()).hexdigest()[:8]) == (2, "79b7f9e5")
+
+
+def _without_docs(tree: ast.AST) -> ast.AST:
+    for node in ast.walk(tree):
+        lines = getattr(node, "body", None)
+        if isinstance(lines, list):
+            lines[:] = [line for line in lines if not _is_doc(line)] or [ast.Pass()]
+    return tree
+
+
+def _is_doc(line: ast.AST) -> bool:
+    return isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant)
 
 
 def test_the_variable_chooses(monkeypatch: pytest.MonkeyPatch) -> None:

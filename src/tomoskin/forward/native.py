@@ -21,6 +21,10 @@ from tomoskin.forward.engine import (
 from tomoskin.pattern import Pattern
 
 
+INTERFACE = 2
+"""The interface of tomoskin_core that is called here and in ``touch``; raised with its own."""
+
+
 @dataclass(frozen=True)
 class Native:
     """Cholesky, products and rows of ``core``, the module tomoskin_core."""
@@ -76,8 +80,14 @@ class Native:
         Raises
         ------
         Exception
-            Of any kind, when a part is missing or a result wrong.
+            Of any kind, when it has another interface, a part is missing or a result wrong.
         """
+        found = getattr(self.core, "interface", 1)
+        if found != INTERFACE:
+            raise ModelError(
+                f"it was built for another tomoskin (interface {found}, expected {INTERFACE}); "
+                "build it again: make native"
+            )
         starts, rows = (np.array(part, dtype=np.int32) for part in ([0, 2, 4], [0, 1, 0, 1]))
         matrix = Compressed(np.array([2.0, 1.0, 1.0, 3.0]), rows, starts)
         factor, both = self.analyse(starts, rows)(matrix.values), np.arange(2)
