@@ -11,13 +11,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from typer.main import get_command
 
 from tomoskin.cli import main
 from tomoskin.cli.app import app
-from tomoskin.core import Image
 from tomoskin.skin import Skin
 
 ROOT = Path(__file__).resolve().parent.parent

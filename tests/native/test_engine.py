@@ -148,7 +148,10 @@ def test_a_change_of_the_interface_raises_its_number() -> None:
     """The sum of what the stub says, beside the number; change both, in Rust and in Python."""
     stub = (ROOT / "core-native" / "tomoskin_core.pyi").read_text(encoding="utf-8")
     signatures = ast.unparse(_without_docs(ast.parse(stub)))
-    assert (native.INTERFACE, hashlib.sha256(signatures.encode()).hexdigest()[:8]) == (2, "79b7f9e5")
+    assert (native.INTERFACE, hashlib.sha256(signatures.encode()).hexdigest()[:8]) == (
+        2,
+        "79b7f9e5",
+    )
 
 
 def _without_docs(tree: ast.AST) -> ast.AST:

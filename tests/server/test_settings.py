@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import threading
 
 import msgspec
 import numpy as np
@@ -47,12 +48,21 @@ class Heard:
 
     def __init__(self):
         self.told = []
+        self._news = None
 
     def wake(self):
         pass
 
     def post(self, text):
         self.told.append(msgspec.json.decode(text))
+        if self._news and not self._news.done():
+            self._news.set_result(None)
+
+    async def until(self, true):
+        """Wait, without taking time from the threads that answer."""
+        while not true():
+            self._news = asyncio.get_running_loop().create_future()
+            await self._news
 
     def last(self, kind):
         return next((m for m in reversed(self.told) if m["type"] == kind), None)
@@ -88,8 +98,7 @@ class Office:
             self.hub.join(self.page)
             for request in requests:
                 self.hub.obey(self.page, decode_request(msgspec.json.encode(request)))
-                while self.page.last("settings")["busy"]:
-                    await asyncio.sleep(0)
+                await self.page.until(lambda: not self.page.last("settings")["busy"])
             self.hub.leave(self.page)
 
 
@@ -195,12 +204,13 @@ def test_a_port_is_let_go_before_it_is_opened_again(prepared, idle, tmp_path):
 
 
 def test_a_newer_change_ends_an_older_one(office, monkeypatch):
-    begun, ended = [], []
+    begun, ended, first = [], [], threading.Event()
 
     def prepare_endlessly(skin, previous):
         if skin.inverse.alpha != 0.5:
             return prepare(skin, previous)
         begun.append(skin)
+        first.set()
         try:
             while True:
                 reach()
@@ -213,10 +223,8 @@ def test_a_newer_change_ends_an_older_one(office, monkeypatch):
             for alpha in (0.5, 0.3):
                 change = settings(inverse={"alpha": alpha})
                 office.hub.obey(office.page, decode_request(msgspec.json.encode(change)))
-                while not begun:
-                    await asyncio.sleep(0)
-            while office.page.last("settings")["busy"]:
-                await asyncio.sleep(0)
+                assert await asyncio.to_thread(first.wait, PATIENCE)
+            await office.page.until(lambda: not office.page.last("settings")["busy"])
 
     monkeypatch.setattr("tomoskin.server.settings_handlers.prepare", prepare_endlessly)
     asyncio.run(asyncio.wait_for(ask(), PATIENCE))

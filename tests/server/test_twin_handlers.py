@@ -49,8 +49,7 @@ def twin(prepared):
 
     runner = Runner(prepared, opener)
     runner.start()
-    while not runner.twin.breakable:
-        pass
+    Watch(runner).until(lambda: runner.twin.breakable)
     hub = Hub(runner, limit=1.0)
     TwinHandlers(hub)
     yield hub, transports
@@ -106,8 +105,7 @@ def posed(hub, page, *requests):
             page.told.clear()
             for request in requests:
                 hub.obey(page, request)
-            while sum(m["type"] == "twin" for m in page.told) < len(requests):
-                await asyncio.sleep(0)
+            await page.until(lambda: sum(m["type"] == "twin" for m in page.told) == len(requests))
             hub.leave(page)
 
     asyncio.run(ask())

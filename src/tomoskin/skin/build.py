@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Self, get_type_hints
 
@@ -19,6 +20,7 @@ from tomoskin.mesh import (
     Draped,
     ElectrodeArc,
     Ellipse,
+    Mesh,
     Outline,
     Plane,
     Polygon,
@@ -26,6 +28,7 @@ from tomoskin.mesh import (
     Saddle,
     Surface,
     check_arcs,
+    triangulate,
 )
 from tomoskin.pattern import Pattern, named
 from tomoskin.skin.body import (
@@ -132,6 +135,16 @@ def check_readout(readout: ReadoutSettings, source: str) -> None:
             where=f"{source}: [readout] oversampling",
             hint=f"a sample is the sum of its readings and must fit in {_SAMPLE_BITS} bits",
         )
+
+
+@lru_cache(maxsize=16)
+def flat_mesh(outline: OutlineSection, electrodes: ElectrodesSection, mesh: MeshSettings) -> Mesh:
+    """The sheet of these sections, laid flat; equal skins of a process share it.
+
+    Raises GeometryError when the electrodes cannot be resolved with so few cells.
+    """
+    rim = _outline(outline)
+    return triangulate(rim, _arcs(rim, electrodes), mesh.cells)
 
 
 def _outline(given: OutlineSection) -> Outline:

@@ -13,7 +13,7 @@ from typing import Any, Self
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.mesh import ElectrodeArc, Mesh, Outline, Surface, laid_on, triangulate
+from tomoskin.mesh import ElectrodeArc, Mesh, Outline, Surface, laid_on
 from tomoskin.pattern import Pattern
 from tomoskin.skin.body import ReadoutSettings
 from tomoskin.skin.build import (
@@ -23,6 +23,7 @@ from tomoskin.skin.build import (
     SkinBody,
     SkinSections,
     check_readout,
+    flat_mesh,
     located,
 )
 from tomoskin.skin.find import built_in_names, skin_text
@@ -184,8 +185,9 @@ class Skin:
 
     @cached_property
     def _mesh(self) -> Mesh:
+        given = self._sections
         with located(f"{self.source}: [mesh] cells"):
-            flat = triangulate(self.outline, self.arcs, self.mesh_cells)
+            flat = flat_mesh(given.outline, given.electrodes, given.mesh)
         with located(f"{self.source}: [surface]"):
             return laid_on(flat, self.surface)
 

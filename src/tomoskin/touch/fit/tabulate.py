@@ -10,8 +10,8 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Generator
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Self
 
@@ -169,13 +169,27 @@ class Tabulation:
 
 
 def kept_tabulation(response: Response, prior: SpotPrior, sign: str) -> Tabulation:
-    """That of :meth:`Tabulation.of`, kept on disk."""
+    """That of :meth:`Tabulation.of`, kept on disk; equal skins of a process share one."""
+    return _shared(_Wanted(_identity(response, prior, sign), response, prior, sign))
 
-    def make() -> Arrays:
-        return Tabulation.of(response, prior, sign).packed()
 
-    arrays = kept(f"touch-{_identity(response, prior, sign)}", make)
-    return Tabulation.unpacked(arrays, response, prior, sign)
+@dataclass(frozen=True)
+class _Wanted:
+    """A tabulation that is asked for; equal where the ``identity`` is."""
+
+    identity: str
+    response: Response = field(compare=False)
+    prior: SpotPrior = field(compare=False)
+    sign: str = field(compare=False)
+
+    def made(self) -> Arrays:
+        return Tabulation.of(self.response, self.prior, self.sign).packed()
+
+
+@lru_cache(maxsize=2)
+def _shared(wanted: _Wanted) -> Tabulation:
+    arrays = kept(f"touch-{wanted.identity}", wanted.made)
+    return Tabulation.unpacked(arrays, wanted.response, wanted.prior, wanted.sign)
 
 
 def _identity(response: Response, prior: SpotPrior, sign: str) -> str:
