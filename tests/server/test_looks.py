@@ -60,13 +60,20 @@ def test_every_panel_looks_right(browser, site, prepared, size):
         wrong |= {
             f"{name}: {fact}": what for fact, what in look_in_both(watched.page, name).items()
         }
-        sheets.append(watched.test_id("sheet").bounding_box())
+        sheets.append(under_the_top_line(watched))
         if size in AXE_LOOKS:
             wrong |= {f"{name}: {rule}": where for rule, where in axe_finds(watched.page)}
     watched.context.close()
     assert not wrong
     assert watched.wrong == []
-    assert all(sheet == sheets[0] for sheet in sheets), "a drawer moves the sheet"
+    assert sheets == [sheets[0]] * len(sheets), "a drawer moves the sheet"
+
+
+def under_the_top_line(watched):
+    """Where the sheet is; a warning, as when a busy machine sends no frame, moves it with all."""
+    sheet = watched.test_id("sheet").bounding_box()
+    top = watched.page.locator("header").first.bounding_box()
+    return sheet | {"y": round(sheet["y"] - top["y"] - top["height"], 2)}
     if size[0] > size[1]:
         assert sheets[0]["width"] > 0.6 * size[0]
 
