@@ -2,11 +2,12 @@
 
 from tomoskin.robot.pose import Moved, Place, Pose, pose_numbers, quaternion
 from tomoskin.robot.robot import FORMAT, SECTIONS, PlacedSkin, Robot, add_skin
-from tomoskin.robot.urdf import Urdf
+from tomoskin.robot.urdf import LinkSolid, Urdf
 
 __all__ = [
     "FORMAT",
     "SECTIONS",
+    "LinkSolid",
     "Moved",
     "Place",
     "PlacedSkin",
