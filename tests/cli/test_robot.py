@@ -74,8 +74,9 @@ def test_one_that_cannot_be_added_leaves_the_file_as_it_was(tomoskin, arm):
     assert out.read_text() == before
 
 
-SHORT = ("--skin", "left=textile-disc-8", "--source", "twin:seed=1")
-SHORT += ("--skin", "right=textile-disc-8", "--source", "twin:seed=2")
+LEFT = ("--skin", "left=textile-disc-8", "--source", "twin:seed=1")
+RIGHT = ("--skin", "right=textile-disc-8", "--source", "twin:seed=2")
+SHORT = (*LEFT, *RIGHT)
 
 
 def test_skins_by_name_are_a_robot(tomoskin, arm):
