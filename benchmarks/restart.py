@@ -17,7 +17,7 @@ from tomoskin.source import ScanSettings
 from tomoskin.twin import Press, TwinSettings, table_of
 from tomoskin.twin.source import make_electronics
 
-SKINS, SEEDS = ("textile-disc-8",), (11, 12, 13, 14)
+SKINS, SEEDS = ("textile-disc-8", "textile-disc-16"), range(11, 23)
 """Nothing here was chosen on them."""
 
 PAUSES = ((60.0, 0.1), (600.0, 0.5), (3600.0, 3.0), (3600.0, -5.0))

@@ -18,13 +18,13 @@ from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.recording.replay_board import ReplayBoard
 from tomoskin.robot import Place
 from tomoskin.run import Member, RobotRun
-from tomoskin.sink import ContactListener
+from tomoskin.sink import ContactListener, Moment, Stream, contacts_of
 from tomoskin.skin import Skin
 from tomoskin.source import Configuration, ScanSettings, Transport
 from tomoskin.twin import Press, TwinSettings
 from tomoskin.twin.scanning import table_of
 from tomoskin.twin.source import make_electronics
-from tomoskin.wire import encode
+from tomoskin.wire import Decoder, encode
 
 SKIN, SKINS, SEED = "textile-disc-16", 8, 11
 RATE, PROMISED = 100.0, 5.0
@@ -42,7 +42,11 @@ PRESSES = (
     Press(0.02, 0.01, force=4.0, radius=0.012),
     Press(-0.03, 0.01, force=4.0, radius=0.012),
 )
-COLUMNS = ("frames/s a board", "of one core, %", "median, ms", "99 of 100, ms", "promised")
+COLUMNS = (
+    *("frames/s a board", "of one core, %", "median, ms", "99 of 100, ms"),
+    *("beside a flooding one: median", "99 of 100", "promised"),
+)
+COSTS = ("presses", "median", "mean", "99 of 100", "of it decoding and contacts")
 LIVE = (
     "boards",
     "frames/s a board",
@@ -60,14 +64,28 @@ def run(data: Path | None) -> tuple[Report, ...]:
     prepared.warm_up()
     frames = frames_of(prepared)
     progress("processor time")
-    costs = processor_times(prepared, frames)
+    parts = processor_times(prepared, frames)
+    costs = parts.sum(axis=1)
     rows = tuple((f"{rate:g}", *queued(costs, rate), f"{PROMISED:g}") for rate in RATES)
     alone = Report(
         f"{SKINS} skins of 16 electrodes on one core that does nothing else", COLUMNS, rows,
-        ("from a frame's bytes to its touches: processor times of the frames as they were "
+        ("from a frame's bytes to its contacts: processor times of the frames as they were "
          "measured, and the wait for the frames of the others in a queue",),
     )  # fmt: skip
-    return alone, _live(prepared, frames)
+    return _costs(parts), alone, _live(prepared, frames)
+
+
+def _costs(parts: FloatArray) -> Report:
+    """What a frame costs with none, one and two presses, and what of it is not the pipeline."""
+    ends = np.cumsum(CYCLE)
+    spans = zip(("none", "one", "two", "none again"), ends - CYCLE, ends, strict=True)
+    rows = []
+    for presses, first, last in spans:
+        whole = 1e3 * parts[first:last].sum(axis=1)
+        around = 1e3 * (parts[first:last, 0] + parts[first:last, 2])
+        figures = (np.median(whole), whole.mean(), np.percentile(whole, 99), np.median(around))
+        rows.append((presses, *(f"{figure:.2f}" for figure in figures)))
+    return Report("processor time of a frame, ms", COSTS, tuple(rows))
 
 
 def frames_of(prepared: Prepared) -> list[Frame]:
@@ -88,33 +106,56 @@ def frames_of(prepared: Prepared) -> list[Frame]:
 
 
 def processor_times(prepared: Prepared, frames: Sequence[Frame]) -> FloatArray:
-    """(n,) s that each frame takes; in a second cycle, when the sheet and the alpha are found."""
-    pipeline, times = Pipeline(prepared), []
+    """(n, 3) s for each frame to be decoded, to become touches, and these contacts.
+
+    In a second cycle, when the sheet and the alpha are found.
+    """
+    pipeline, decoder, times = Pipeline(prepared), Decoder(), []
+    stream = Stream.of(prepared, "skin", 0.0, Place("skin"))
     for number in range(2 * len(frames)):
-        frame = frames[number % len(frames)]
         ticks = round(number / RATE * prepared.skin.readout.tick_rate)
-        frame = replace(frame, sequence=number, ticks=ticks, host_time=number / RATE)
-        begun = time.thread_time()
-        pipeline.push(frame)
-        times.append(time.thread_time() - begun)
+        data = encode(replace(frames[number % len(frames)], sequence=number, ticks=ticks))
+        marks = [time.thread_time()]
+        (frame,) = decoder.feed(data, number / RATE)
+        assert isinstance(frame, Frame)
+        marks.append(time.thread_time())
+        result = pipeline.push(frame)
+        marks.append(time.thread_time())
+        if result is not None:
+            contacts_of(stream, Moment.of(result, with_image=False))
+        marks.append(time.thread_time())
+        times.append(np.diff(marks))
     return np.array(times[len(frames) :])
 
 
-def queued(costs: FloatArray, rate: float, seconds: float = 60.0) -> tuple[str, str, str]:
-    """Load and percentiles of boards that send in no step with each other (Lindley 1952)."""
+def queued(costs: FloatArray, rate: float, seconds: float = 60.0) -> tuple[str, ...]:
+    """Load, and percentiles of the ages alone and beside a board that floods."""
     random = np.random.default_rng(SEED)
     beats = np.arange(int(seconds * rate)) / rate
     arrivals = np.sort(np.concatenate([beats + random.random() / rate for _ in range(SKINS)]))
     work = random.choice(costs, len(arrivals))
-    ages, free = np.empty(len(arrivals)), 0.0
-    for k, (came, takes) in enumerate(zip(arrivals, work, strict=True)):
-        free = max(free, came) + takes
-        ages[k] = free - came
     load = SKINS * rate * float(costs.mean())
     if load >= 1:
-        return f"{100 * load:.0f}", "falls behind", "falls behind"
-    p50, p99 = 1e3 * np.percentile(ages, (50, 99))
-    return f"{100 * load:.0f}", f"{p50:.1f}", f"{p99:.1f}"
+        return (f"{100 * load:.0f}", *("falls behind",) * 4)
+    alone = ages_of(arrivals, work)
+    flooded = ages_of(arrivals, work, random.choice(costs, int(seconds / costs.min())))
+    percentiles = 1e3 * np.concatenate([np.percentile(a, (50, 99)) for a in (alone, flooded)])
+    return (f"{100 * load:.0f}", *(f"{p:.1f}" for p in percentiles))
+
+
+def ages_of(arrivals: FloatArray, work: FloatArray, flood: FloatArray | None = None) -> FloatArray:
+    """(n,) s from each frame's arrival to the end of its ``work``, in turns (Lindley 1952).
+
+    ``flood``: frames of one more board, which asks for a turn as soon as it has had one.
+    """
+    ages, free, asked, count = np.empty(len(arrivals)), 0.0, 0.0, 0
+    for k, (came, takes) in enumerate(zip(arrivals, work, strict=True)):
+        while flood is not None and asked <= came:
+            free = asked = max(free, asked) + flood[count]
+            count += 1
+        free = max(free, came) + takes
+        ages[k] = free - came
+    return ages
 
 
 class Paced:

@@ -12,6 +12,7 @@ import httpx
 import pytest
 
 from robot.test_robot import URDF
+from tomoskin.cli.robot import chosen_robot
 from tomoskin.recording import split_names
 from tomoskin.robot import Robot
 
@@ -73,13 +74,37 @@ def test_one_that_cannot_be_added_leaves_the_file_as_it_was(tomoskin, arm):
     assert out.read_text() == before
 
 
-@pytest.mark.usefixtures("built_page")
-def test_all_skins_are_live_on_one_page_and_in_one_file(tomoskin, arm):
-    out, recording = arm.with_name("robot.toml"), arm.with_name("run.mcap")
+LEFT = ("--skin", "left=textile-disc-8", "--source", "twin:seed=1")
+RIGHT = ("--skin", "right=textile-disc-8", "--source", "twin:seed=2")
+SHORT = (*LEFT, *RIGHT)
+
+
+def test_skins_by_name_are_a_robot(tomoskin, arm):
+    out = arm.with_name("robot.toml")
     for name in ("left", "right"):
         words = ("--name", name, "--skin", "textile-disc-8", "--out", out)
         assert tomoskin("skin", "place", arm, "fore", *words)[0] == 0
-    words = ("live", "--robot", out, "--port", "0", "--json", "--record", recording)
+    written = chosen_robot(out, [], [], [])
+    skins = ["left=textile-disc-8", "right=textile-disc-8"]
+    for short in (chosen_robot(None, skins, [], []), chosen_robot(None, *split(SHORT), [])):
+        assert [(s.name, s.skin, s.source) for s in short.skins] == [
+            (s.name, s.skin, s.source) for s in written.skins
+        ]
+        assert [s.place.link for s in short.skins] == ["", ""]
+    assert chosen_robot(None, ["textile-disc-8"], ["twin"], []) is None
+    assert chosen_robot(None, ["./a=b.toml"], [], []) is None
+    assert len(chosen_robot(None, ["a=./b=c.toml"], [], []).skins) == 1
+
+
+def split(options):
+    """Values of two options by turns."""
+    return list(options[1::4]), list(options[3::4])
+
+
+@pytest.mark.usefixtures("built_page")
+def test_all_skins_are_live_on_one_page_and_in_one_file(tomoskin, tmp_path):
+    recording = tmp_path / "run.mcap"
+    words = ("live", *SHORT, "--port", "0", "--json", "--record", recording)
     with subprocess.Popen([*COMMAND, *map(str, words)], stdout=subprocess.PIPE, text=True) as live:
         try:
             address = json.loads(live.stdout.readline())["address"]
@@ -87,6 +112,7 @@ def test_all_skins_are_live_on_one_page_and_in_one_file(tomoskin, arm):
                 client.get(address)
                 while True:
                     skins = client.get(address.replace("/?", "/status?")).json()["skins"]
+                    assert all(skin["running"] for skin in skins.values()), skins
                     if all(skin["frames"] > 40 for skin in skins.values()):
                         break
                     threading.Event().wait(0.2)
@@ -100,7 +126,7 @@ def test_all_skins_are_live_on_one_page_and_in_one_file(tomoskin, arm):
     code, _, err = tomoskin("session", "info", recording)
     assert (code, "session split" in err) == (1, True)
     assert tomoskin("session", "split", recording)[0] == 0
-    code, said, _ = tomoskin("session", "info", arm.with_name("run-left.mcap"), "--json")
+    code, said, _ = tomoskin("session", "info", tmp_path / "run-left.mcap", "--json")
     assert code == 0
     assert json.loads(said)["frames"] > 20
 
@@ -110,3 +136,27 @@ def test_a_robot_file_says_all(tomoskin, arm):
     assert tomoskin("skin", "place", arm, "fore", "--out", out)[0] == 0
     code, _, err = tomoskin("live", "--robot", out, "--skin", "textile-disc-8")
     assert (code, "the robot file says" in err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--skin left=textile-disc-8 --skin textile-disc-8", "expected NAME=SKIN"),
+        ("--skin textile-disc-8 --skin textile-disc-8", "expected NAME=SKIN"),
+        ("--skin a=textile-disc-8 --skin a=textile-disc-8", "two skins have the name a"),
+        ("--skin Left=textile-disc-8", 'skin 1 "Left": expected a name of small letters'),
+        ("--skin a=textile-disc-8 --skin b=textile-disc-8 --source twin", "one for each --skin: 2"),
+        ("--source twin --source twin", "one for each --skin: 1; got 2"),
+        ("--skin a=textile-disc-8 --calibration {c}", "cannot say of which skin"),
+        ("--skin a=textile-disc-9", "textile-disc-8"),
+        ("--skin a=textile-disc-8 --source serial:/dev/x --skin b=textile-disc-8 "
+         "--source serial:/dev/x", "two skins have the source serial:/dev/x"),
+    ],
+)  # fmt: skip
+@pytest.mark.usefixtures("built_page")
+def test_skins_by_name_that_cannot_be_meant(tomoskin, tmp_path, words, said):
+    calibration = tmp_path / "c.npz"
+    calibration.write_bytes(b"")
+    code, _, err = tomoskin("live", "--port", "0", *words.format(c=calibration).split())
+    assert code in (1, 2)
+    assert said in " ".join(err.replace("│", " ").split())

@@ -33,6 +33,7 @@ source = "twin:seed=1"
 link = "fore"
 position = ["10 mm", "0 mm", "30 mm"]
 angles = ["0 deg", "90 deg", "0 deg"]
+calibration = ["touch.npz", "bend.npz"]
 
 [[skin]]
 name = "right"
@@ -57,7 +58,8 @@ def test_a_robot_is_read_with_its_files_beside_it(files):
     assert left.place.pose.position.tolist() == [0.01, 0, 0.03]
     assert right.skin == str(files / "own.toml")
     assert right.source == f"replay:{files / 'run.mcap@2'}"
-    assert right.calibrations == {"force": files / "force.npz"}
+    assert left.calibrations == (files / "touch.npz", files / "bend.npz")
+    assert right.calibrations == (files / "force.npz",)
     assert robot.link_pose(left.place).position == pytest.approx([0, 0.3, 0.2])
     assert robot.link_pose(right.place).position.tolist() == [0, 0, 0]
     assert robot.urdf.bones() == pytest.approx(
@@ -72,6 +74,12 @@ def test_angles_are_a_urdfs(angles):
     inner = Pose.of((0, 0, 1), (0.3, 0, 0))
     point = np.array([[1.0, 2.0, 3.0]])
     assert (pose @ inner)(point) == pytest.approx(pose(inner(point)))
+
+
+def test_a_rotation_is_a_quaternion():
+    for angles in ((0.3, -0.4, 1.2), (np.pi, 0, 0), (0, np.pi, 0.1), (0, 0, 3.1)):
+        found = Rotation.from_quat(Pose.of((0, 0, 0), angles).quaternion())
+        assert (found.inv() * Rotation.from_euler("xyz", angles)).magnitude() < 1e-7
 
 
 def test_a_moved_surface_is_the_surface_moved():
@@ -102,6 +110,7 @@ def test_a_moved_surface_is_the_surface_moved():
         ('board = "0102"', 'board = "x1"', "hexadecimal"),
         ('board = "0102"', 'bord = "0102"', 'did you mean "board"'),
         ('["10 mm", "0 mm", "30 mm"]', "[1, 2, 3]", "without a unit"),
+        ('"bend.npz"', "3", 'skin 1 "left" calibration: entry 1: expected text'),
     ],
 )
 def test_what_cannot_be_meant_is_said(files, old, new, said):

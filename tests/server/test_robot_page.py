@@ -38,7 +38,10 @@ link = "fore"
 position = ["0 mm", "0 mm", "-50 mm"]
 angles = ["180 deg", "0 deg", "0 deg"]
 """
-URDF = """<robot name="arm"><link name="base"/><link name="fore"/><joint name="elbow"
+URDF = """<robot name="arm"><link name="base"/><link name="fore">
+<visual><geometry><sphere radius="0.04"/></geometry></visual>
+<visual><geometry><mesh filename="package://arm/fore.dae"/></geometry></visual>
+</link><joint name="elbow"
 type="revolute"><parent link="base"/><child link="fore"/>
 <origin xyz="0.3 0 0.1"/></joint></robot>"""
 PLACE = (0.03, -0.02)
@@ -110,6 +113,11 @@ def test_touches_are_told_in_the_frame_of_the_robot(site, pressed):
         scene = json.loads(page.recv(PATIENCE))
         assert [skin["frame"] for skin in scene["skins"]] == ["fore", "fore"]
         assert scene["bones"] == pytest.approx([0, 0, 0, 0.3, 0, 0.1])
+        links = np.array(scene["links"]).reshape(-1, 3)
+        assert links.min(axis=0) == pytest.approx([0.26, -0.04, 0.06], abs=1e-4)
+        assert links.max(axis=0) == pytest.approx([0.34, 0.04, 0.14], abs=1e-4)
+        (undrawn,) = scene["undrawn"]
+        assert undrawn.startswith("fore: package://arm/fore.dae: expected a file ending in")
         middle = np.array(scene["skins"][1]["corners"]).reshape(-1, 3).mean(axis=0)
         assert middle == pytest.approx([0.3, 0, 0.05], abs=0.005)
         state = json.loads(page.recv(PATIENCE))
@@ -158,6 +166,7 @@ def test_in_a_browser_the_touch_is_on_its_skin(browser, site, prepared, pressed)
         watched.page.goto(site.policy.address)
         watched.test_id("touches-left").filter(has_text="no touch").wait_for()
         watched.test_id("touches-right").filter(has_text=re.compile(r"^\d")).wait_for()
+        watched.page.get_by_text("Not drawn: fore").wait_for()
         watched.test_id("robot-line").filter(has_text="All skins are well").wait_for()
         watched.test_id("space").press("ArrowLeft")
         watched.page.get_by_role("link", name="right").click()

@@ -19,7 +19,8 @@ from recording.runs import TOUCH
 from sink.conftest import EPOCH, EVENT, MESH, VALUES, moment_at, touch_of
 from tomoskin.core import Event, Force
 from tomoskin.mesh import Cylinder
-from tomoskin.sink import Contacts, Mount, Naming, ros_messages
+from tomoskin.robot import Place, Pose
+from tomoskin.sink import Contacts, Naming, ros_messages
 from tomoskin.sink.cdr import encode_cdr
 from tomoskin.sink.contact import contact_of
 from tomoskin.sink.ros import IMAGE, ODOMETRY, POSE, TEXT, TOPICS, RosView
@@ -75,7 +76,9 @@ def same(read, written):
 
 def test_every_message_is_read_by_a_library_of_others(store, stream):
     whole = replace(stream, points=np.column_stack([MESH.centroids, np.zeros(len(MESH.cells))]))
-    view = RosView(whole, Naming(mount=Mount("tool0", (0.1, 0.2, 0.3), (0.1, 0.2, 0.3))))
+    view = RosView(
+        whole, Naming(mount=Place("", "tool0", Pose.of((0.1, 0.2, 0.3), (0.1, 0.2, 0.3))))
+    )
     read = []
     for message in [*view.of(moment_at(0.25, TOUCH, touch_of(5))), *view.of(EVENT)]:
         kind = TOPICS[message.topic]
@@ -237,7 +240,7 @@ def test_a_report_says_whether_touches_are_valid(stream):
 
 def test_a_frame_on_a_robot_is_a_transform(stream):
     turn = (0.3, -0.4, 1.2)
-    mount = Mount("tool0", (0.1, 0.2, 0.3), turn)
+    mount = Place("", "tool0", Pose.of((0.1, 0.2, 0.3), turn))
     view = RosView(stream, Naming("left_arm", mount=mount))
     (value,) = (m.value for m in view.of(moment_at(0.0)) if m.topic == "/tf_static")
     (found,) = value["transforms"]

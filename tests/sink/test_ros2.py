@@ -136,9 +136,9 @@ def test_the_listener_of_the_documentation_hears_touches(listener, domain, strea
         ("domain=233", "expected a domain from 0 to 232"),
         ("domain=x", "expected a domain"),
         ("at=0/0/0", "expected parent"),
-        ("parent=tool0,at=0/0", "expected at=X/Y/Z"),
-        ("parent=tool0,at=0/0/nan", "expected at=X/Y/Z"),
-        ("parent=tool0,at=a/b/c", "expected at=X/Y/Z"),
+        ("parent=tool0,at=0/0", "at: expected X/Y/Z"),
+        ("parent=tool0,at=0/0/nan", "at: expected X/Y/Z"),
+        ("parent=tool0,at=a/b/c", "at: expected X/Y/Z"),
     ],
 )
 def test_what_cannot_be_meant(argument, said):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -138,7 +139,7 @@ def board_memory() -> BoardMemory | None:
     return None if folder is None else BoardMemory(folder / "boards")
 
 
-def with_calibrations(prepared: Prepared, paths: list[Path] | None, skin: Skin) -> Prepared:
+def with_calibrations(prepared: Prepared, paths: Iterable[Path] | None, skin: Skin) -> Prepared:
     """The skin with the calibrations named, of any kind.
 
     ``skin`` as its file says, whatever images are made of it. Raises DataError for calibrations of

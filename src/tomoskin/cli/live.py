@@ -16,10 +16,10 @@ from tomoskin.cli.choices import (
     with_calibrations,
 )
 from tomoskin.cli.named_files import RECORDING, Otherwise, Reads, Writes
-from tomoskin.cli.options import CalibrationsOption, SinkOption, SkinOption, SourceOption
+from tomoskin.cli.options import CalibrationsOption, SinkOption, SkinsOption, SourcesOption
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.record import ended_by_signals, recording_to
-from tomoskin.cli.robot import Served, run_robot
+from tomoskin.cli.robot import Served, chosen_robot, run_robot
 from tomoskin.cli.serving import announce, hub_of
 
 if TYPE_CHECKING:
@@ -36,8 +36,8 @@ def live(
         ),
         Reads(),
     ] = None,
-    skin: SkinOption = None,
-    source: SourceOption = "twin",
+    skin: SkinsOption = None,
+    source: SourcesOption = None,
     record: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Record the session to a new file, such as run.mcap."),
@@ -73,14 +73,14 @@ def live(
     """Run source, pipeline and server until a signal comes."""
     from tomoskin.server import is_loopback
 
-    if robot is not None:
-        if skin or source != "twin" or calibration:
-            raise typer.BadParameter("the robot file says skins, sources and calibrations")
+    several = chosen_robot(robot, skin or [], source or [], calibration or [])
+    if several is not None:
         served = Served(host, port, _token(token_file), folder, record, open_browser, json)
         if not is_loopback(host):
             _warn(host)
-        run_robot(robot, sink, served)
+        run_robot(several, sink, served)
         return
+    named, origin = skin[0] if skin else None, source[0] if source else "twin"
     with ended_by_signals():
         from tomoskin.run import Runner
         from tomoskin.server import AccessPolicy, Server, application, check_page, listen
@@ -89,7 +89,7 @@ def live(
         check_page()
         sinks = chosen_sinks(sink)
         with Bar("preparing"):
-            prepared = _prepared(skin, source)
+            prepared = _prepared(named, origin)
             prepared = with_calibrations(prepared, calibration, prepared.skin)
         say_headroom(prepared.headroom)
         chosen = prepared.skin
@@ -99,10 +99,10 @@ def live(
             port = listener.getsockname()[1]
             policy = AccessPolicy(port, host, **_token(token_file))
             runner = Runner(
-                prepared, lambda: open_source(source, chosen), sinks=sinks, memory=board_memory()
+                prepared, lambda: open_source(origin, chosen), sinks=sinks, memory=board_memory()
             )
             with recording_to(runner, record):
-                server = Server.of(application(hub_of(runner, source, folder), policy))
+                server = Server.of(application(hub_of(runner, origin, folder), policy))
                 with server.stopped_by_signals():
                     announce(policy, f"{runner.status().source} is live", json=json)
                     if open_browser:

@@ -22,6 +22,14 @@ SkinOption = Annotated[
     str | None,
     typer.Option(help=f"{_SKIN}; without it that of the session, else {DEFAULT_SKIN}."),
 ]
+SkinsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="[NAME=]SKIN",
+        help=f"{_SKIN}; without it that of the session, else {DEFAULT_SKIN}. With a name, once "
+        "for each of several skins.",
+    ),
+]
 KnownSkinOption = Annotated[
     str | None, typer.Option(help=f"{_SKIN}; without it the rows are taken as they are.")
 ]
@@ -37,8 +45,11 @@ RecordingArgument = Annotated[
 LabelledArgument = Annotated[
     Path, typer.Argument(metavar="INPUT", help="Frames with labels: one touch each."), Reads()
 ]
-SourceOption = Annotated[
-    str, typer.Option(help="Where frames come from: twin, serial:PORT, replay:FILE@SPEED, …")
+_SOURCE = "Where frames come from: twin, serial:PORT, replay:FILE@SPEED, …"
+SourceOption = Annotated[str, typer.Option(help=_SOURCE)]
+SourcesOption = Annotated[
+    list[str] | None,
+    typer.Option(help=f"{_SOURCE} Once for each skin, in their order; without it twins."),
 ]
 ReferenceOption = Annotated[
     str | None,

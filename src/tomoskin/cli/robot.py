@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import webbrowser
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.choices import board_memory, chosen_sinks, skin_for_source
+from tomoskin.cli.choices import board_memory, chosen_sinks, skin_for_source, with_calibrations
 from tomoskin.cli.named_files import Otherwise, Reads
 from tomoskin.cli.output import Bar, emit, remark
 from tomoskin.cli.record import ended_by_signals
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from tomoskin.pipeline import Prepared
     from tomoskin.robot import PlacedSkin, Robot
     from tomoskin.run import Member, RobotRun
+
+_NAMED = re.compile(r"[^=./\\]+=.+")
+"""A skin with its name on the robot; not a path that has "=" in it, such as ./a=b.toml."""
 
 
 @dataclass(frozen=True)
@@ -37,14 +41,50 @@ class Served:
     json: bool
 
 
-def run_robot(file: Path, sinks: list[str] | None, served: Served) -> None:
-    """Run the skins of a robot file and their page until a signal comes."""
+def chosen_robot(
+    file: Path | None, skins: list[str], sources: list[str], calibrations: list[Path]
+) -> Robot | None:
+    """That of a robot file, or of ``--skin NAME=SKIN``; None where one skin runs alone."""
     from tomoskin.robot import Robot
+
+    if file is not None:
+        if skins or sources or calibrations:
+            raise typer.BadParameter("the robot file says skins, sources and calibrations")
+        return Robot.load(file)
+    if sources and len(sources) != max(1, len(skins)):
+        raise typer.BadParameter(
+            f"expected none, or one for each --skin: {max(1, len(skins))}; got {len(sources)}",
+            param_hint="--source",
+        )
+    if len(skins) < 2 and not any(map(_NAMED.match, skins)):
+        return None
+    if calibrations:
+        raise typer.BadParameter(
+            "cannot say of which skin: name them in a robot file", param_hint="--calibration"
+        )
+    twins = [f"twin:seed={number}" for number in range(1, len(skins) + 1)]
+    given = [
+        {"name": name, "skin": skin, "source": source}
+        for (name, skin), source in zip(map(_named, skins), sources or twins, strict=True)
+    ]
+    return Robot.of({"skin": given}, "command line", Path())
+
+
+def _named(given: str) -> tuple[str, str]:
+    if _NAMED.match(given) is None:
+        raise typer.BadParameter(
+            f'expected NAME=SKIN for each of several skins, got "{given}"', param_hint="--skin"
+        )
+    name, _, skin = given.partition("=")
+    return name, skin
+
+
+def run_robot(robot: Robot, sinks: list[str] | None, served: Served) -> None:
+    """Run the skins of a robot and their page until a signal comes."""
     from tomoskin.run import RobotRun
     from tomoskin.server import check_page
 
     check_page()
-    robot = Robot.load(file)
     with ended_by_signals():
         with Bar("preparing"):
             members = [_member(skin, sinks) for skin in robot.skins]
@@ -66,14 +106,10 @@ def _member(skin: PlacedSkin, sinks: list[str] | None) -> Member:
 
 def _prepared(skin: PlacedSkin) -> Prepared:
     """With the calibrations that the robot file names."""
-    from tomoskin.calibration import KINDS
     from tomoskin.pipeline import prepare
 
-    prepared, named = prepare(skin_for_source(skin.skin, skin.source)), skin.calibrations or {}
-    for kind in KINDS:
-        if (file := named.get(kind.name)) is not None:
-            prepared = prepared.calibrated(kind.read(file))
-    return prepared
+    chosen = skin_for_source(skin.skin, skin.source)
+    return with_calibrations(prepare(chosen), skin.calibrations, chosen)
 
 
 def _serve(robot: Robot, run: RobotRun, served: Served) -> None:
@@ -181,6 +217,7 @@ def _name_of(link: str) -> str:
 def _pose(urdf: Any, link: str, at: str | None, *, on_mesh: bool) -> dict[str, list[str]]:
     """Keys of the skin's section that say where it lies."""
     from tomoskin.core import SkinError
+    from tomoskin.robot import pose_numbers
 
     if on_mesh:
         if at is not None:
@@ -189,19 +226,9 @@ def _pose(urdf: Any, link: str, at: str | None, *, on_mesh: bool) -> dict[str, l
             raise SkinError(f'link "{link}" has no mesh', where=urdf.source, hint="say --at")
         numbers = [*(1e3 * urdf.meshes[link].position), *urdf.meshes[link].degrees()]
     else:
-        numbers = _numbers(at)
+        try:
+            numbers = [*pose_numbers(at or "", "mm and degrees")]
+        except ValueError as error:
+            raise typer.BadParameter(str(error), param_hint="--at") from None
     position, angles = ([f"{x:.6g}" for x in part] for part in (numbers[:3], numbers[3:]))
     return {"position": [f"{x} mm" for x in position], "angles": [f"{x} deg" for x in angles]}
-
-
-def _numbers(at: str | None) -> list[float]:
-    try:
-        numbers = [float(word) for word in at.split("/")] if at else [0.0] * 6
-    except ValueError:
-        numbers = []
-    if len(numbers) not in (3, 6):
-        raise typer.BadParameter(
-            f'expected X/Y/Z or X/Y/Z/ROLL/PITCH/YAW in mm and degrees, got "{at}"',
-            param_hint="--at",
-        )
-    return [*numbers, 0.0, 0.0, 0.0][:6]

@@ -7,16 +7,14 @@ import shutil
 import struct
 import subprocess
 import tempfile
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
 from tomoskin.core import SourceError
 from tomoskin.emulator.program import firmware_image
-from tomoskin.source import SerialTransport, Transport
-from tomoskin.wire import Decoder, GetInfo, Info, encode
+from tomoskin.source import Exchange, SerialTransport, Transport
+from tomoskin.wire import GetInfo, Info
 
 MOST_CURRENT = 0.1
 """A, that the parts of the board are made for."""
@@ -26,9 +24,8 @@ _REFERENCE = 1.225
 
 _AVRDUDE = ("avrdude", "-q", "-q", "-p", "atmega2560", "-c", "wiring", "-b", "115200", "-D", "-P")
 _LONGEST = 60.0
-_PATIENCE = 5.0
 _HINT = "is it the board's port, and does nothing else use it?"
-_AGAIN = 0.5
+_AGAIN, _TRIES = 0.5, 10
 _EEPROM = struct.Struct("<I8s")
 _NEVER_WRITTEN = b"\xff" * 8
 
@@ -119,22 +116,16 @@ def read_identity(port: str) -> BoardIdentity:
         transport.close()
 
 
-def ask_info(transport: Transport, clock: Callable[[], float] = time.monotonic) -> Info:
+def ask_info(transport: Transport) -> Info:
     """What a firmware says of itself, asked until it answers; SourceError where none does."""
-    decoder = Decoder()
-    due, end = clock(), clock() + _PATIENCE
-    while (now := clock()) < end:
-        if now >= due:
-            transport.write(encode(GetInfo(1)))
-            due = now + _AGAIN
-        for message in decoder.feed(transport.read(0.1), clock()):
-            if isinstance(message, Info):
-                return message
-    raise SourceError(
-        f"no firmware has answered for {_PATIENCE:.0f} s",
-        where=transport.name,
-        hint="is it the board's port? tomoskin firmware flash comes first",
-    )
+    info = Exchange(transport).ask(GetInfo(0), Info, patience=_AGAIN, tries=_TRIES)
+    if info is None:
+        raise SourceError(
+            f"no firmware has answered for {_AGAIN * _TRIES:.0f} s",
+            where=transport.name,
+            hint="is it the board's port? tomoskin firmware flash comes first",
+        )
+    return info
 
 
 def say_identity(identity: BoardIdentity) -> str:

@@ -1,12 +1,13 @@
 """Skins on a robot: which there are, and where on its links they lie."""
 
-from tomoskin.robot.pose import Moved, Place, Pose
+from tomoskin.robot.pose import Moved, Place, Pose, pose_numbers, quaternion
 from tomoskin.robot.robot import FORMAT, SECTIONS, PlacedSkin, Robot, add_skin
-from tomoskin.robot.urdf import Urdf
+from tomoskin.robot.urdf import LinkSolid, Urdf
 
 __all__ = [
     "FORMAT",
     "SECTIONS",
+    "LinkSolid",
     "Moved",
     "Place",
     "PlacedSkin",
@@ -14,4 +15,6 @@ __all__ = [
     "Robot",
     "Urdf",
     "add_skin",
+    "pose_numbers",
+    "quaternion",
 ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -52,6 +54,10 @@ class Pose:
         found: list[float] = np.degrees([roll, pitch, yaw]).tolist()
         return found[0], found[1], found[2]
 
+    def quaternion(self) -> tuple[float, ...]:
+        """X, y, z, w of the rotation."""
+        return quaternion(self.rotation.T.tolist())
+
     def __call__(self, points: FloatArray) -> FloatArray:
         """(n, 3) m: points of the inner frame, in the outer one."""
         return np.asarray(points @ self.rotation.T + self.position)
@@ -60,6 +66,34 @@ class Pose:
         """A frame inside this one's inner frame, in this one's outer frame."""
         position = self.rotation @ inner.position + self.position
         return Pose(position, self.rotation @ inner.rotation)
+
+
+def pose_numbers(text: str, units: str) -> tuple[float, ...]:
+    """The six of "X/Y/Z" or "X/Y/Z/ROLL/PITCH/YAW"; zeros of "".
+
+    Raises ValueError that names the ``units``.
+    """
+    try:
+        numbers = tuple(map(float, text.split("/"))) if text else (0.0, 0.0, 0.0)
+    except ValueError:
+        numbers = ()
+    if len(numbers) not in (3, 6) or not all(map(math.isfinite, numbers)):
+        raise ValueError(f'expected X/Y/Z or X/Y/Z/ROLL/PITCH/YAW in {units}, got "{text}"')
+    return (*numbers, 0.0, 0.0, 0.0)[:6]
+
+
+def quaternion(axes: Sequence[Sequence[float]]) -> tuple[float, ...]:
+    """X, y, z, w of the rotation to three ``axes``; of 4 q qᵀ the row that is best conditioned."""
+    (xx, yx, zx), (xy, yy, zy), (xz, yz, zz) = axes
+    rows = (
+        (1 + xx - yy - zz, xy + yx, xz + zx, zy - yz),
+        (xy + yx, 1 - xx + yy - zz, yz + zy, xz - zx),
+        (xz + zx, yz + zy, 1 - xx - yy + zz, yx - xy),
+        (zy - yz, xz - zx, yx - xy, 1 + xx + yy + zz),
+    )
+    best = max(enumerate(rows), key=lambda item: item[1][item[0]])[1]
+    length = math.hypot(*best)
+    return tuple(value / length for value in best)
 
 
 def turn(axis: FloatArray, angle: float) -> FloatArray:

@@ -13,7 +13,17 @@ import numpy as np
 from tomoskin.core import SkinError
 from tomoskin.robot.pose import Place, Pose
 from tomoskin.robot.urdf import Urdf
-from tomoskin.skin import Quantity, Row, Section, Text, check_names, key, literal, read_text
+from tomoskin.skin import (
+    OneOrMore,
+    Quantity,
+    Row,
+    Section,
+    Text,
+    check_names,
+    key,
+    literal,
+    read_text,
+)
 from tomoskin.skin import toml_tables as tables_of
 
 FORMAT = 1
@@ -28,6 +38,7 @@ _ANGLE = Quantity("angle", "deg", -360, 360)
 _XYZ = Row({"x": _LENGTH, "y": _LENGTH, "z": _LENGTH})
 _RPY = Row({"roll": _ANGLE, "pitch": _ANGLE, "yaw": _ANGLE})
 _FILE = Text(1000)
+_OLDER = "As `calibration`, in older files."
 
 
 class RobotSection(Section, section="robot"):
@@ -54,10 +65,12 @@ class SkinSection(Section, section="skin", many=True):
     angles: tuple[float, ...] | None = key(
         _RPY, "About the link's fixed x, y and z, as a URDF has them.", default=None, needs="link"
     )
-    calibration: str | None = key(_FILE, "A calibration of touch.", default=None)
-    force: str | None = key(_FILE, "A calibration of force.", default=None)
-    bend: str | None = key(_FILE, "A calibration of bends.", default=None)
-    states: str | None = key(_FILE, "A calibration of states.", default=None)
+    calibration: tuple[str, ...] = key(
+        OneOrMore(_FILE), "From `tomoskin calibrate`, of any kind, one of each.", default=None
+    )
+    force: tuple[str, ...] = key(OneOrMore(_FILE), _OLDER, default=None)
+    bend: tuple[str, ...] = key(OneOrMore(_FILE), _OLDER, default=None)
+    states: tuple[str, ...] = key(OneOrMore(_FILE), _OLDER, default=None)
 
 
 SECTIONS = {section.section: section for section in (RobotSection, SkinSection)}
@@ -78,14 +91,14 @@ class PlacedSkin:
     board
         Unique id of its board, hexadecimal, or None: any.
     calibrations
-        Paths by the names of their kinds: "touch", "force", "bends", "classes".
+        Paths, at most one of each kind.
     """
 
     place: Place
     skin: str
     source: str = "twin"
     board: str | None = None
-    calibrations: Mapping[str, Path] | None = None
+    calibrations: tuple[Path, ...] = ()
 
     @property
     def name(self) -> str:
@@ -112,8 +125,12 @@ class Robot:
             For a value that cannot be meant, two skins of one name, board or source, or a link
             that the URDF does not have; the message says where.
         """
-        source, folder = str(path), path.parent
-        tables = tables_of(read_text(path, "a robot file"), source, FORMAT)
+        tables = tables_of(read_text(path, "a robot file"), str(path), FORMAT)
+        return cls.of(tables, str(path), path.parent)
+
+    @classmethod
+    def of(cls, tables: Mapping[str, Any], source: str, folder: Path) -> Self:
+        """From the tables of a file: ``source`` for errors, ``folder`` of its paths; SkinError."""
         check_names(tables, list(SECTIONS), "section", source)
         robot = RobotSection.read(tables.get("robot", {}), f"{source}: [robot]")
         urdf = None if robot.urdf is None else Urdf.read(folder / robot.urdf)
@@ -154,7 +171,7 @@ def _each(tables: Mapping[str, Any], source: str) -> list[tuple[SkinSection, str
     found = []
     for number, table in enumerate(given, 1):
         title = table.get("name") if isinstance(table, Mapping) else None
-        where = f"{source}: [[skin]] {number}" + (f' "{title}"' if title else "")
+        where = f"{source}: skin {number}" + (f' "{title}"' if title else "")
         found.append((SkinSection.read(table, where), where))
     return found
 
@@ -168,8 +185,7 @@ def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> 
             raise SkinError(f'expected a {what}, got "{text}"', where=where)
     if given.link is not None and urdf is not None:
         urdf.check_link(given.link, where)
-    named = {"touch": given.calibration, "force": given.force, "bends": given.bend}
-    named["classes"] = given.states
+    calibrations = (given.calibration, given.force, given.bend, given.states)
     zero = np.zeros(3)
     pose = Pose.of(given.position or zero, given.angles or zero)
     return PlacedSkin(
@@ -177,7 +193,7 @@ def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> 
         skin=str(folder / given.skin) if given.skin.endswith(".toml") else given.skin,
         source=_from(folder, given.source),
         board=given.board,
-        calibrations={kind: folder / path for kind, path in named.items() if path is not None},
+        calibrations=tuple(folder / path for some in calibrations for path in some or ()),
     )
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Container
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -12,8 +11,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from tomoskin.core import FloatArray, SkinError
+from tomoskin.core import FloatArray, GeometryError, SkinError
+from tomoskin.robot.elements import name_of, origin_of
 from tomoskin.robot.pose import Pose
+from tomoskin.robot.shapes import MOST_TRIANGLES, LinkMesh, LinkShape, read_shapes, thinned
 from tomoskin.skin import read_text
 
 _LARGEST = 20_000_000
@@ -31,6 +32,15 @@ class UrdfJoint:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class LinkSolid:
+    """What of a ``link`` can be drawn: ``triangles`` (n, 3, 3) m in its frame; why not the rest."""
+
+    link: str
+    triangles: FloatArray
+    problems: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Urdf:
     """A tree of links.
 
@@ -44,15 +54,15 @@ class Urdf:
         Names, in the order of the file.
     joints
         By the name of the link that each holds.
-    meshes
-        Pose on its link of the first mesh of each link that has one.
+    shapes
+        Of all links, those that are seen before those for collisions.
     """
 
     source: str
     name: str
     links: tuple[str, ...]
     joints: dict[str, UrdfJoint]
-    meshes: dict[str, Pose]
+    shapes: tuple[LinkShape, ...]
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -74,10 +84,10 @@ class Urdf:
         if root.tag != "robot":
             hint = "expand xacro first: xacro ROBOT.xacro > ROBOT.urdf"
             raise SkinError(f"expected <robot>, got <{root.tag}>", where=where, hint=hint)
-        links = tuple(_name(link, where) for link in root.findall("link"))
+        links = tuple(name_of(link, where) for link in root.findall("link"))
         joints = [_joint(joint, where) for joint in root.findall("joint")]
-        meshes = dict(_meshes(root, where))
-        found = cls(where, root.get("name", ""), links, {j.child: j for j in joints}, meshes)
+        shapes = tuple(read_shapes(root, path))
+        found = cls(where, root.get("name", ""), links, {j.child: j for j in joints}, shapes)
         found._check(joints)
         return found
 
@@ -99,9 +109,27 @@ class Urdf:
             pose, link = joint.pose @ pose, joint.parent
         return pose
 
-    def bones(self) -> FloatArray:
-        """(n_joints, 2, 3) m: from each link's origin to those of the links that it holds."""
-        ends = [(self.pose(j.parent), self.pose(j.child)) for j in self.joints.values()]
+    @property
+    def meshes(self) -> dict[str, Pose]:
+        """Pose on its link of the first mesh of each link that has one."""
+        return {s.link: s.pose for s in self.shapes[::-1] if isinstance(s.form, LinkMesh)}
+
+    def solids(self) -> tuple[LinkSolid, ...]:
+        """What is drawn of each link that has a shape: what is seen, else what may collide.
+
+        Mesh files are read here; one that cannot be is a problem of its link.
+        """
+        found = []
+        for link in self.links:
+            shapes = [s for s in self.shapes if s.link == link]
+            found.append([s for s in shapes if s.seen] or shapes)
+        most = MOST_TRIANGLES // max(1, sum(map(len, found)))
+        return tuple(_solid(shapes, most) for shapes in found if shapes)
+
+    def bones(self, without: Container[str] = ()) -> FloatArray:
+        """(n, 2, 3) m: from each link's origin, but those ``without``, to those that it holds."""
+        joints = [joint for joint in self.joints.values() if joint.parent not in without]
+        ends = [(self.pose(j.parent), self.pose(j.child)) for j in joints]
         return np.array([[a.position, b.position] for a, b in ends]).reshape(-1, 2, 3)
 
     def _check(self, joints: list[UrdfJoint]) -> None:
@@ -118,41 +146,18 @@ class Urdf:
                 raise SkinError(f'the joints before link "{start}" are a ring', where=self.source)
 
 
-def _name(element: ElementTree.Element, where: str) -> str:
-    name = element.get("name") or ""
-    if not name:
-        raise SkinError(f"a <{element.tag}> has no name", where=where)
-    return name
-
-
 def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
-    name = _name(element, where)
+    name = name_of(element, where)
     ends = [element.find(end) for end in ("parent", "child")]
     parent, child = ("" if end is None else end.get("link", "") for end in ends)
-    return UrdfJoint(name, parent, child, _origin(element, f'{where}: joint "{name}"'))
+    return UrdfJoint(name, parent, child, origin_of(element, f'{where}: joint "{name}"'))
 
 
-def _meshes(root: ElementTree.Element, where: str) -> Iterator[tuple[str, Pose]]:
-    for link in root.findall("link"):
-        name = _name(link, where)
-        shown = [*link.findall("visual"), *link.findall("collision")]
-        for part in shown:
-            if part.find("geometry/mesh") is not None:
-                yield name, _origin(part, f'{where}: link "{name}"')
-                break
-
-
-def _origin(element: ElementTree.Element, where: str) -> Pose:
-    origin = element.find("origin")
-    given = {} if origin is None else origin.attrib
-    return Pose.of(*(_three(given.get(key, "0 0 0"), where) for key in ("xyz", "rpy")))
-
-
-def _three(text: str, where: str) -> list[float]:
-    try:
-        numbers = [float(word) for word in text.split()]
-    except ValueError:
-        numbers = []
-    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
-        raise SkinError(f'expected three numbers in <origin>, got "{text}"', where=where)
-    return numbers
+def _solid(shapes: list[LinkShape], most: int) -> LinkSolid:
+    link, corners, problems = shapes[0].link, [], []
+    for shape in shapes:
+        try:
+            corners.append(thinned(shape.triangles(), most))
+        except GeometryError as error:
+            problems.append(str(error))
+    return LinkSolid(link, np.concatenate([np.zeros((0, 3, 3)), *corners]), tuple(problems))

@@ -15,7 +15,7 @@ from tomoskin.run.marker import Marker, play, replay_status
 from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.recall import Recall
 from tomoskin.run.status import Status
-from tomoskin.run.twin_control import Pressable, TwinControl, described
+from tomoskin.run.twin_control import TwinControl, described
 from tomoskin.run.twin_requests import SetPose, SetTwin
 from tomoskin.source import Link, ScanSettings, Transport
 from tomoskin.twin import Contact
@@ -118,10 +118,10 @@ class Flow:
         self.pipeline.adopt(prepared)
         return ended
 
-    def press(self, transport: Transport) -> None:
+    def press(self) -> None:
         """Let the source feel what is pressed now."""
         before = self.twin.refusals
-        if isinstance(transport, Pressable) and self.twin.press(transport):
+        if self.twin.press():
             presses = tuple(map(described, self.twin.truth))
             self.out.put(Truth(self._clock(), presses, self.twin.pose.truth))
             for why in dict.fromkeys(self.twin.refusals):

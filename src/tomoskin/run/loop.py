@@ -96,7 +96,7 @@ class Loop:
         try:
             with flow.link(transport) as link:
                 while not self._is_over():
-                    flow.press(transport)
+                    flow.press()
                     items = link.poll(_POLL)
                     if link.running:
                         self.trouble = None

@@ -23,6 +23,7 @@ from tomoskin.run.twin_control import TwinControl
 from tomoskin.signal import Reference
 from tomoskin.sink import Sink
 from tomoskin.source import Transport
+from tomoskin.wire import Info
 
 
 class Runner:
@@ -148,6 +149,11 @@ class Runner:
     def status(self) -> Status:
         """How it is doing now."""
         return self._loop.flow.status(self._loop.trouble)
+
+    @property
+    def board(self) -> Info | None:
+        """What the board says that it is, once it has."""
+        return self._loop.flow.board
 
     @property
     def prepared(self) -> Prepared:

@@ -97,8 +97,6 @@ class TwinControl:
 
     Attributes
     ----------
-    pressable
-        Whether the source can be pressed.
     truth
         The presses that the source feels.
     refusals
@@ -111,13 +109,13 @@ class TwinControl:
 
     def __init__(self) -> None:
         """Nothing is done, and there is no source."""
-        self.pressable = False
         self.truth: tuple[Contact, ...] = ()
         self.refusals: tuple[str, ...] = ()
         self.pose = SheetPose()
         self.harm = SetTwin((), None)
         self._presses: dict[object, tuple[Contact, ...]] = {}
         self._is_due = True
+        self._pressable: Pressable | None = None
         self._breakable: Breakable | None = None
         self._bendable: Bendable | None = None
         self._lock = threading.Lock()
@@ -125,11 +123,16 @@ class TwinControl:
     def attach(self, source: object) -> None:
         """A source that has just been opened is to be as the one before was."""
         with self._lock:
-            self.pressable = isinstance(source, Pressable)
+            self._pressable = source if isinstance(source, Pressable) else None
             self._breakable = source if isinstance(source, Breakable) else None
             self._bendable = source if isinstance(source, Bendable) else None
             self._break(self.harm)
             self._bend(self.pose)
+
+    @property
+    def pressable(self) -> bool:
+        """Whether the source can be pressed."""
+        return self._pressable is not None
 
     @property
     def breakable(self) -> bool:
@@ -162,13 +165,13 @@ class TwinControl:
             self._presses[owner] = presses
         self._is_due = True
 
-    def press(self, source: Pressable) -> bool:
-        """Let ``source`` feel what is pressed now; whether the truth has changed."""
-        if not self._is_due:
+    def press(self) -> bool:
+        """Let the source feel what is pressed now; whether the truth has changed."""
+        if not self._is_due or self._pressable is None:
             return False
         self._is_due = False
         asked = tuple(press for held in self._presses.values() for press in held)
-        self.truth, self.refusals = _felt(source, asked)
+        self.truth, self.refusals = _felt(self._pressable, asked)
         return True
 
     def _break(self, harm: SetTwin) -> None:

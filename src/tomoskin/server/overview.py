@@ -152,12 +152,22 @@ class Overview:
 
 
 def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]) -> str:
-    """Skins and links in the frame of the robot's root, m; coordinates lie flat as x0, y0, z0, …"""
-    bones = np.zeros((0, 2, 3)) if robot.urdf is None else robot.urdf.bones()
+    """Skins and links in the frame of the robot's root, m; coordinates lie flat as x0, y0, z0, …
+
+    Where a link is shown by its shape no bone is, and what cannot be shown is said.
+    """
+    urdf = robot.urdf
+    solids = {s.link: s for s in urdf.solids()} if urdf else {}
+    shown = [name for name, solid in solids.items() if len(solid.triangles)]
+    links = (solids[n].triangles.reshape(-1, 3) for n in shown)
+    corners = [urdf.pose(n)(points) for n, points in zip(shown, links, strict=True)] if urdf else []
+    undrawn = [f"{link}: {why}" for link, solid in solids.items() for why in solid.problems]
     return text_of(
         type="robot",
         name=robot.name,
-        bones=flat(bones),
+        bones=flat(urdf.bones(without=shown)) if urdf else [],
+        links=_rounded(np.concatenate([np.zeros((0, 3)), *corners]).ravel()),
+        undrawn=undrawn,
         skins=[_skin(s, streams[s.name], poses[s.name]) for s in robot.skins],
         version=__version__,
     )

@@ -11,7 +11,7 @@ from tomoskin.sink.consumer import (
 )
 from tomoskin.sink.contact import Contact, Contacts, contacts_of
 from tomoskin.sink.listener import ContactListener
-from tomoskin.sink.naming import Mount, Naming
+from tomoskin.sink.naming import Naming
 from tomoskin.sink.rerun import write_rerun
 from tomoskin.sink.sink import Item, Moment, Sink, Stream, epoch, raster
 from tomoskin.sink.worker import Capacity, Consumer, Worker, stop_workers
@@ -24,7 +24,6 @@ __all__ = [
     "Contacts",
     "Item",
     "Moment",
-    "Mount",
     "Naming",
     "Sink",
     "SinkConsumer",

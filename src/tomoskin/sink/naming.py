@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 from tomoskin.core import SinkError
-from tomoskin.sink.space import Vector
+from tomoskin.robot import Place, Pose, pose_numbers
 
 if TYPE_CHECKING:
     from tomoskin.sink.sink import Stream
@@ -22,63 +21,18 @@ NAMES = ("namespace", "frame", "parent", "at")
 
 
 @dataclass(frozen=True, slots=True)
-class Mount:
-    """Where the skin's frame is on the robot: in the frame ``parent``.
-
-    Attributes
-    ----------
-    parent
-        Name of the frame of a link.
-    position
-        (3,) m.
-    angles
-        (3,) rad about the parent's fixed x, y and z, in this order, as a URDF has them.
-    """
-
-    parent: str
-    position: Vector = (0.0, 0.0, 0.0)
-    angles: Vector = (0.0, 0.0, 0.0)
-
-    @classmethod
-    def of(cls, parent: str, at: str, where: str) -> Self:
-        """``at`` is X/Y/Z or X/Y/Z/ROLL/PITCH/YAW, m and rad, or ""; SinkError."""
-        try:
-            numbers = tuple(map(float, at.split("/"))) if at else (0.0, 0.0, 0.0)
-        except ValueError:
-            numbers = ()
-        if len(numbers) not in (3, 6) or not all(map(math.isfinite, numbers)):
-            raise SinkError(
-                f'expected at=X/Y/Z or at=X/Y/Z/ROLL/PITCH/YAW in m and rad, got "{at}"',
-                where=where,
-                hint="for example parent=tool0,at=0/0/0.05",
-            )
-        return cls(parent, numbers[:3], numbers[3:] or (0.0, 0.0, 0.0))
-
-    def quaternion(self) -> Vector:
-        """X, y, z, w of the rotation."""
-        (sr, cr), (sp, cp), (sy, cy) = (
-            (math.sin(angle / 2), math.cos(angle / 2)) for angle in self.angles
-        )
-        return (
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-            cr * cp * cy + sr * sp * sy,
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class Naming:
     """Before what its topics begin with, and the frame of coordinates of its positions.
 
     ``frame`` is the sheet's plane, x right and y up seen from the front; of a skin on a surface
     it is that of the surface. Without a name of its own it is "skin", in another namespace
-    "NAMESPACE/skin". ``mount`` is where it is on a robot, where that is known.
+    "NAMESPACE/skin". ``mount`` is the link of a robot that it lies on, where
+    that is to be published.
     """
 
     namespace: str = "tomoskin"
     frame: str = ""
-    mount: Mount | None = None
+    mount: Place | None = None
 
     @classmethod
     def of(cls, options: Mapping[str, str], where: str) -> Self:
@@ -96,7 +50,7 @@ class Naming:
             raise SinkError("expected parent=… beside at=…: at which link is it?", where=where)
         mount = None
         if "parent" in options:
-            mount = Mount.of(options["parent"], options.get("at", ""), where)
+            mount = _mount(options["parent"], options.get("at", ""), where)
         named = {key: options[key] for key in ("namespace", "frame") if key in options}
         return cls(**named, mount=mount)
 
@@ -120,3 +74,12 @@ class Naming:
     def topic(self, name: str) -> str:
         """A topic in full, without its first "/": one that begins with "/" is all robots' own."""
         return name[1:] if name.startswith("/") else f"{self.namespace}/{name}"
+
+
+def _mount(link: str, at: str, where: str) -> Place:
+    try:
+        numbers = pose_numbers(at, "m and rad")
+    except ValueError as error:
+        hint = "for example parent=tool0,at=0/0/0.05"
+        raise SinkError(f"at: {error}", where=where, hint=hint) from None
+    return Place("", link, Pose.of(numbers[:3], numbers[3:]))

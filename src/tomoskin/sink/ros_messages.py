@@ -9,8 +9,8 @@ import numpy as np
 
 from tomoskin.core import FloatArray, Image, PixelMap
 from tomoskin.recording import touch_colour, touch_width
+from tomoskin.robot import Place
 from tomoskin.sink.contact import Contact, Contacts
-from tomoskin.sink.naming import Mount
 from tomoskin.sink.space import UNKNOWN
 
 Value = dict[str, Any]
@@ -99,13 +99,13 @@ def diagnostics(head: Value, found: Contacts, name: str) -> Value:
     return {"header": head, "status": [status]}
 
 
-def transform(stamp: int, frame: str, mount: Mount) -> Value:
+def transform(stamp: int, frame: str, mount: Place) -> Value:
     """``tf2_msgs/TFMessage``: where the skin is on the robot."""
     place = {
-        "translation": _named("xyz", mount.position),
-        "rotation": _named("xyzw", mount.quaternion()),
+        "translation": _named("xyz", mount.pose.position.tolist()),
+        "rotation": _named("xyzw", mount.pose.quaternion()),
     }
-    head = header(stamp, mount.parent)
+    head = header(stamp, mount.link)
     return {"transforms": [{"header": head, "child_frame_id": frame, "transform": place}]}
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.mesh import Surface
+from tomoskin.robot import quaternion
 
 UNKNOWN = 1e6
 """Variance of what is not measured, m² or rad²: what filters take for no knowledge."""
@@ -66,16 +67,9 @@ class SpacePose:
         """(3, 3) of a covariance (2, 2) on the sheet."""
         return np.asarray(self.slope @ sheet @ self.slope.T)
 
-    def quaternion(self) -> tuple[float, ...]:
-        """X, y, z, w of the rotation to the axes; of 4 q qᵀ the row that is best conditioned."""
-        (xx, yx, zx), (xy, yy, zy), (xz, yz, zz) = self.axes
-        rows = (
-            (1 + xx - yy - zz, xy + yx, xz + zx, zy - yz),
-            (xy + yx, 1 - xx + yy - zz, yz + zy, xz - zx),
-            (xz + zx, yz + zy, 1 - xx - yy + zz, yx - xy),
-            (zy - yz, xz - zx, yx - xy, 1 + xx + yy + zz),
-        )
-        return _unit(max(enumerate(rows), key=lambda item: item[1][item[0]])[1])
+    def quaternion(self) -> Vector:
+        """X, y, z, w of the rotation to the axes."""
+        return quaternion(self.axes)
 
 
 def _on_sheet(detection: Detection) -> FloatArray:

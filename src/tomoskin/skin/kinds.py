@@ -158,21 +158,31 @@ class Quantity(ValueKind[float]):
 
 
 @dataclass(frozen=True)
-class OneOrEach(ValueKind[tuple[Any, ...]]):
-    """One value for all electrodes, or a list with one for each; comes back as a tuple."""
+class OneOrMore(ValueKind[tuple[Any, ...]]):
+    """One value, or a list; comes back as a tuple."""
 
     inner: ValueKind[Any]
 
     @property
     def expected(self) -> str:
         """The phrase."""
-        return f"{self.inner.expected}, or a list of these, one per electrode"
+        return f"{self.inner.expected}, or a list of these"
 
     def accept(self, value: object) -> tuple[Any, ...]:
-        """A tuple: of one, or of one per electrode."""
+        """A tuple, of one for one value."""
         if not isinstance(value, list):
             return (self.inner.read(value),)
         return tuple(_entry(f"entry {i}", self.inner, item) for i, item in enumerate(value))
+
+
+@dataclass(frozen=True)
+class OneOrEach(OneOrMore):
+    """One value for all electrodes, or a list with one for each; comes back as a tuple."""
+
+    @property
+    def expected(self) -> str:
+        """The phrase."""
+        return f"{super().expected}, one per electrode"
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from typing import Any
 from tomoskin._moved import moved
 from tomoskin.source.command_queue import FrameCounters, SequenceFilter
 from tomoskin.source.configuration import Configuration
+from tomoskin.source.exchange import Exchange
 from tomoskin.source.link import Link
 from tomoskin.source.protocol_session import ProtocolSession, Stage
 from tomoskin.source.registry import GROUP, open_source, read_options, source_names
@@ -22,6 +23,7 @@ __all__ = [
     "GROUP",
     "PRESCALERS",
     "Configuration",
+    "Exchange",
     "FrameCounters",
     "Link",
     "Played",

@@ -55,7 +55,8 @@ class Link:
         self._timing = timing or Timing()
         self._decoder = Decoder()
         self._quality = LineQuality()
-        self._first_rate = transport.rate if isinstance(transport, Rated) else 0
+        self._rated = transport if isinstance(transport, Rated) else None
+        self._first_rate = self._rated.rate if self._rated else 0
         self._session = ProtocolSession(scan, settings, self._timing, self._clock(), transport.name)
         self._closed = False
         self._heard = b""
@@ -164,8 +165,8 @@ class Link:
 
     def _follow_rate(self, now: float) -> list[Event]:
         """Follow the board to another rate; fall back to a slower one on a bad line."""
-        transport = self.transport
-        if not isinstance(transport, Rated):
+        transport = self._rated
+        if transport is None:
             return []
         rate = self._session.take_rate()
         if self._session.is_silent and transport.rate != self._first_rate:

@@ -26,8 +26,11 @@ function Row({ name, frame }: { name: string; frame: string }) {
 
 export function Skins() {
   return (
-    <ul class="skins" aria-label="Skins">
-      {robot.value?.skins.map(({ name, frame }) => <Row key={name} name={name} frame={frame} />)}
-    </ul>
+    <div class="skins">
+      <ul aria-label="Skins">
+        {robot.value?.skins.map(({ name, frame }) => <Row key={name} name={name} frame={frame} />)}
+      </ul>
+      {robot.value?.undrawn.map((why) => <p key={why}>Not drawn: {why}</p>)}
+    </div>
   );
 }

@@ -27,7 +27,10 @@ function painting(image: HTMLCanvasElement, marks: HTMLCanvasElement): () => voi
   const pen = marks.getContext("2d");
   const solids = gl && new Solids(gl);
   const stops = [
-    effect(() => solids?.set(robot.value?.skins.flatMap((skin) => skin.corners) ?? [])),
+    effect(() => {
+      const scene = robot.value;
+      solids?.set(scene?.links ?? [], scene?.skins.flatMap((skin) => skin.corners) ?? []);
+    }),
     effect(() => {
       const [width, height] = size.value;
       const scene = robot.value;
@@ -38,9 +41,9 @@ function painting(image: HTMLCanvasElement, marks: HTMLCanvasElement): () => voi
         if (canvas.height !== Math.round(height * fine)) canvas.height = Math.round(height * fine);
       }
       pen.setTransform(fine, 0, 0, fine, 0, 0);
-      const all = [...scene.bones, ...scene.skins.flatMap((skin) => skin.corners)];
+      const all = [...scene.bones, ...scene.links, ...scene.skins.flatMap((skin) => skin.corners)];
       const camera = cameraOf(all, orbit.value, width, height);
-      solids?.paint(camera, theme.value.halo, theme.value.muted);
+      solids?.paint(camera, theme.value);
       paintMarks(pen, camera, scene, touches.value, theme.value);
     }),
   ];

@@ -17,6 +17,10 @@ export interface RobotScene {
   readonly name: string;
   /** Both ends of the line from each link to the next, m. */
   readonly bones: readonly number[];
+  /** Corners of the triangles of all links that have a shape, as those of skins. */
+  readonly links: readonly number[];
+  /** Which shapes cannot be drawn, and why. */
+  readonly undrawn: readonly string[];
   readonly skins: readonly PlacedSkin[];
 }
 

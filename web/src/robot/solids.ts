@@ -1,5 +1,6 @@
-/** The robot's skins in WebGL2: one buffer of corners, shaded by the way their triangles look. */
+/** The robot's links and skins in WebGL2: one buffer of corners, shaded by the way their triangles look. */
 
+import type { Theme } from "../theme";
 import type { Camera } from "./model";
 
 const VERTEX = `#version 300 es
@@ -54,7 +55,8 @@ export function parts(colour: string): [number, number, number] {
 /** Paints triangles, the nearer over the farther. */
 export class Solids {
   private readonly program: WebGLProgram;
-  private count = 0;
+  private ofLinks = 0;
+  private ofSkins = 0;
 
   constructor(private readonly gl: WebGL2RenderingContext) {
     this.program = built(gl);
@@ -63,15 +65,20 @@ export class Solids {
     gl.enableVertexAttribArray(0);
     gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 12, 0);
     gl.enable(gl.DEPTH_TEST);
+    gl.polygonOffset(1, 1);
   }
 
   /** Corners of all triangles, x0, y0, z0, … */
-  set(corners: readonly number[]): void {
-    this.count = corners.length / 3;
-    this.gl.bufferData(this.gl.ARRAY_BUFFER, new Float32Array(corners), this.gl.STATIC_DRAW);
+  set(links: readonly number[], skins: readonly number[]): void {
+    const corners = new Float32Array(links.length + skins.length);
+    corners.set(links);
+    corners.set(skins, links.length);
+    this.ofLinks = links.length / 3;
+    this.ofSkins = skins.length / 3;
+    this.gl.bufferData(this.gl.ARRAY_BUFFER, corners, this.gl.STATIC_DRAW);
   }
 
-  paint(camera: Camera, base: string, line: string): void {
+  paint(camera: Camera, { halo, muted, line, mesh }: Theme): void {
     const { gl, program } = this;
     const at = (name: string) => gl.getUniformLocation(program, name);
     const { scale, width, height, radius } = camera;
@@ -80,9 +87,15 @@ export class Solids {
     gl.uniform3fv(at("middle"), camera.middle);
     gl.uniform3f(at("scale"), (2 * scale) / width, (2 * scale) / height, 0.9 / radius);
     gl.uniform1f(at("radius"), radius);
-    gl.uniform3fv(at("base"), parts(base));
-    gl.uniform3fv(at("line"), parts(line));
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    gl.drawArrays(gl.TRIANGLES, 0, this.count);
+    const draw = (near: string, far: string, first: number, count: number) => {
+      gl.uniform3fv(at("base"), parts(near));
+      gl.uniform3fv(at("line"), parts(far));
+      gl.drawArrays(gl.TRIANGLES, first, count);
+    };
+    gl.enable(gl.POLYGON_OFFSET_FILL); // a skin that lies on a link is seen
+    draw(line, mesh, 0, this.ofLinks);
+    gl.disable(gl.POLYGON_OFFSET_FILL);
+    draw(halo, muted, this.ofLinks, this.ofSkins);
   }
 }
