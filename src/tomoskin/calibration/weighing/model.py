@@ -44,12 +44,16 @@ class LabelRemark:
 
 
 @dataclass(frozen=True, eq=False)
-class PressedSpot:
-    """What one spot of the skin remembers: ``xy`` (2,) m, since ``time`` s."""
+class PressedSpots:
+    """What spots of the skin remember: ``xy`` (n, 2) m, ``memory`` of n pieces at ``time`` s."""
 
     xy: FloatArray
     time: float
     memory: MemoryState
+
+    def __len__(self) -> int:
+        """Number of spots."""
+        return len(self.xy)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,52 +145,42 @@ class ForceModel:
             skin_id, method,
         )  # fmt: skip
 
+    @cached_property
+    def untouched(self) -> PressedSpots:
+        """What a skin remembers that nothing has touched."""
+        return PressedSpots(np.zeros((0, 2)), -np.inf, MemoryState.fresh(self.memory, 0))
+
     def read(
-        self, spots: tuple[PressedSpot, ...], detections: Sequence[Detection], time: float
-    ) -> tuple[list[Force], tuple[PressedSpot, ...]]:
+        self, spots: PressedSpots | None, detections: Sequence[Detection], time: float
+    ) -> tuple[list[Force], PressedSpots]:
         """Forces of a frame's detections, and what the spots remember then.
 
-        ``spots`` is what they remembered after the frame before, ``()`` on a skin that nothing
-        has touched; ``time`` is the frame's, s.
+        ``spots`` is what they remembered after the frame before, None on a skin that nothing has
+        touched; ``time`` is the frame's, s. A spot that is new has been pressed since that frame.
         """
-        rest = list(spots)
+        spots = self.untouched if spots is None else spots
+        dt = max(time - spots.time, 0.0) if len(spots) else 0.0
         if not detections:
-            return [], self._released(rest, time)
+            released = self._released(spots, np.arange(len(spots)), dt)
+            return [], PressedSpots(spots.xy, time, released)
         xy, area, peak, snr = _columns(detections)
-        depth = np.maximum(
-            depth_of(peak, area, self.conductivity, self.radius), _SHALLOW * self.depth
-        )
-        pressed = []
-        for at, own in zip(xy, depth, strict=True):
-            before = _nearest(rest, at, 0.5 * self.radius)
-            if before is not None:
-                rest.remove(before)
-            pressed.append(self._pressed(before, at, own, time))
-        free = np.array([float(spot.memory.load[0, 0]) for spot in pressed])
+        least = _SHALLOW * self.depth
+        depth = np.maximum(depth_of(peak, area, self.conductivity, self.radius), least)
+        under, rest = _goes_on(spots.xy, xy, 0.5 * self.radius)
+        before = spots.memory.beside(MemoryState.fresh(self.memory)).of_pieces(under)
+        load, now = load_of(before, self.memory, depth, dt)
         terms = basis(xy, np.log(_radius(area) / self.radius), self.unit)
-        free = np.maximum(free, _SHALLOW * self.depth)
-        forces = self._forces(terms, free, self._beyond(snr))
-        return forces, (*pressed, *self._released(rest, time))[:_MOST_SPOTS]
+        forces = self._forces(terms, np.maximum(load, least), self._beyond(snr))
+        if len(rest):
+            rest = rest[: max(_MOST_SPOTS - len(xy), 0)]
+            now = now.beside(self._released(spots, rest, dt))
+            xy = np.concatenate([xy, spots.xy[rest]])
+        return forces, PressedSpots(xy, time, now)
 
-    def _pressed(
-        self, before: PressedSpot | None, at: FloatArray, depth: float, time: float
-    ) -> PressedSpot:
-        """The spot at ``at`` (2,) with the load that makes its ``depth`` now."""
-        state = before.memory if before else MemoryState.fresh(self.memory)
-        step = max(time - before.time, 0.0) if before else 0.0
-        _, state = load_of(state, self.memory, np.array([depth]), step)
-        return PressedSpot(at, time, state)
-
-    def _released(self, spots: Sequence[PressedSpot], time: float) -> tuple[PressedSpot, ...]:
-        """What ``spots`` that nothing touches remember."""
-        return tuple(
-            PressedSpot(
-                spot.xy,
-                time,
-                advanced(spot.memory, self.memory, np.zeros((1, 1)), max(time - spot.time, 0.0)),
-            )
-            for spot in spots
-        )
+    def _released(self, spots: PressedSpots, which: IntArray, dt: float) -> MemoryState:
+        """What those of ``spots`` that nothing touches remember ``dt`` s later."""
+        memory = spots.memory.of_pieces(which)
+        return advanced(memory, self.memory, np.zeros((1, len(which))), dt)
 
     @property
     def errors(self) -> FloatArray:
@@ -204,7 +198,8 @@ class ForceModel:
 
     def _beyond(self, snr: FloatArray) -> FloatArray:
         """Relative deviation of depths by noise, beyond that of the labelled touches."""
-        return np.sqrt(np.maximum(np.nan_to_num(1 / snr**2) - self._usual_noise, 0.0))
+        own = np.where(snr > 0, 1 / np.square(snr), 0.0)
+        return np.sqrt(np.maximum(own - self._usual_noise, 0.0))
 
     @cached_property
     def _usual_noise(self) -> float:
@@ -333,9 +328,19 @@ def _remarks(presses: WeighedPresses, left_out: FloatArray, unit: float) -> tupl
     return tuple(remarks)
 
 
-def _nearest(spots: Sequence[PressedSpot], at: FloatArray, within: float) -> PressedSpot | None:
-    near = min(spots, key=lambda spot: float(np.hypot(*(spot.xy - at))), default=None)
-    return near if near is not None and np.hypot(*(near.xy - at)) <= within else None
+def _goes_on(spots: FloatArray, xy: FloatArray, within: float) -> tuple[IntArray, IntArray]:
+    """Number of the spot (k,) that each of ``xy`` (k, 2) presses, -1 where it is a new one; numbers
+    of the other ``spots`` (n, 2). The nearest counts, each once."""
+    apart = np.hypot(*(spots[:, None] - xy).T)
+    under = np.full(len(xy), -1)
+    free = np.ones(len(spots), dtype=bool)
+    if len(spots):
+        for k, row in enumerate(apart):
+            row = np.where(free, row, np.inf)
+            nearest = int(np.argmin(row))
+            if row[nearest] <= within:
+                under[k], free[nearest] = nearest, False
+    return under, np.flatnonzero(free)
 
 
 def _columns(
