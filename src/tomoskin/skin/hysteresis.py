@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -26,7 +27,7 @@ from tomoskin.core import FloatArray, IntArray, ModelError
 _WHERE = "MaterialMemory"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MaterialMemory:
     """Parts of a response that depend on the past of its load; without any, there is no memory.
 
@@ -66,6 +67,11 @@ class MaterialMemory:
     def still(self) -> bool:
         """Whether time alone changes nothing."""
         return not (self.creep or self.breakdown)
+
+    @cached_property
+    def half_widths(self) -> FloatArray:
+        """(n_play, 1) of the plays."""
+        return np.array(self.play_widths).reshape(-1, 1)
 
     def kept(self, dt: float) -> tuple[FloatArray, FloatArray]:
         """Parts of late responses, and of breakdowns, that are left after ``dt`` s."""
@@ -113,9 +119,9 @@ class Metric:
             start += len(group)
         return np.stack(sizes, axis=-2)
 
-    def dragged(self, lagging: FloatArray, load: FloatArray, widths: FloatArray) -> FloatArray:
-        """(n_play, d, n): ``lagging`` plays of half ``widths`` (n_play,) behind ``load`` (d, n)."""
-        width = widths[:, None]
+    def dragged(self, lagging: FloatArray, load: FloatArray, width: FloatArray) -> FloatArray:
+        """(n_play, d, n): ``lagging`` plays of half widths ``width`` (n_play, 1) behind ``load``
+        (d, n)."""
         if self._each_alone:
             half = width[:, None]
             return np.minimum(np.maximum(lagging, load - half), load + half)
@@ -207,7 +213,7 @@ def advanced(
         raise ModelError(f"expected a time step of 0 s or more, got {dt}", where=_WHERE)
     lagging, prompt, late, broken = state.lagging, load, state.late, state.broken
     if memory.play:
-        lagging = metric.dragged(lagging, load, np.array(memory.play_widths))
+        lagging = metric.dragged(lagging, load, memory.half_widths)
         prompt = _mixed(load, lagging, memory.play)
     if memory.creep:
         late = late - prompt
@@ -259,8 +265,7 @@ def load_of(
             where=_WHERE,
             hint="read it with the breakdown left out, and wait for that to go",
         )
-    width = np.array(memory.play_widths).reshape(-1, 1)
-    lagging = state.lagging[:, 0]
+    width, lagging = memory.half_widths, state.lagging[:, 0]
     bends = np.sort(np.concatenate([state.load, lagging - width, lagging + width]), axis=0)
     ends = np.concatenate([bends[:1] - 1.0, bends, bends[-1:] + 1.0])
     values = _tried(state, memory, ends, dt)
@@ -283,14 +288,16 @@ def _tried(state: MemoryState, memory: MaterialMemory, loads: FloatArray, dt: fl
 
 def _promptness(memory: MaterialMemory, dt: float) -> float:
     """Response per prompt part after ``dt`` s of one load."""
-    kept, _ = memory.kept(dt)
-    return 1.0 - float(np.array(memory.creep) @ kept)
+    if not memory.creep:
+        return 1.0
+    return 1.0 - float(np.array(memory.creep) @ memory.kept(dt)[0])
 
 
 def _brittleness(memory: MaterialMemory, dt: float) -> float:
     """Response per motion, ``dt`` s after it."""
-    _, kept = memory.kept(dt)
-    return float(np.array(memory.breakdown) @ kept)
+    if not memory.breakdown:
+        return 0.0
+    return float(np.array(memory.breakdown) @ memory.kept(dt)[1])
 
 
 def responses(
@@ -317,6 +324,8 @@ def responses(
 
 def _mixed(load: FloatArray, parts: FloatArray, weights: tuple[float, ...]) -> FloatArray:
     """(d, n): ``parts`` (n_parts, d, n) by their weights, and of ``load`` what these leave."""
+    if not weights:
+        return load
     total = (1 - sum(weights)) * load
     for weight, part in zip(weights, parts, strict=True):
         total += weight * part

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -145,11 +146,6 @@ class ForceModel:
             skin_id, method,
         )  # fmt: skip
 
-    @cached_property
-    def untouched(self) -> PressedSpots:
-        """What a skin remembers that nothing has touched."""
-        return PressedSpots(np.zeros((0, 2)), -np.inf, MemoryState.fresh(self.memory, 0))
-
     def read(
         self, spots: PressedSpots | None, detections: Sequence[Detection], time: float
     ) -> tuple[list[Force], PressedSpots]:
@@ -158,7 +154,7 @@ class ForceModel:
         ``spots`` is what they remembered after the frame before, None on a skin that nothing has
         touched; ``time`` is the frame's, s. A spot that is new has been pressed since that frame.
         """
-        spots = self.untouched if spots is None else spots
+        spots = self._untouched if spots is None else spots
         dt = max(time - spots.time, 0.0) if len(spots) else 0.0
         if not detections:
             released = self._released(spots, np.arange(len(spots)), dt)
@@ -167,20 +163,30 @@ class ForceModel:
         least = _SHALLOW * self.depth
         depth = np.maximum(depth_of(peak, area, self.conductivity, self.radius), least)
         under, rest = _goes_on(spots.xy, xy, 0.5 * self.radius)
-        before = spots.memory.beside(MemoryState.fresh(self.memory)).of_pieces(under)
+        before = spots.memory
+        if under != list(range(len(spots))):
+            before = before.beside(self._fresh).of_pieces(np.array(under))
         load, now = load_of(before, self.memory, depth, dt)
         terms = basis(xy, np.log(_radius(area) / self.radius), self.unit)
         forces = self._forces(terms, np.maximum(load, least), self._beyond(snr))
-        if len(rest):
-            rest = rest[: max(_MOST_SPOTS - len(xy), 0)]
-            now = now.beside(self._released(spots, rest, dt))
-            xy = np.concatenate([xy, spots.xy[rest]])
+        if rest:
+            others = np.array(rest[: max(_MOST_SPOTS - len(xy), 0)], dtype=np.intp)
+            now = now.beside(self._released(spots, others, dt))
+            xy = np.concatenate([xy, spots.xy[others]])
         return forces, PressedSpots(xy, time, now)
 
     def _released(self, spots: PressedSpots, which: IntArray, dt: float) -> MemoryState:
         """What those of ``spots`` that nothing touches remember ``dt`` s later."""
         memory = spots.memory.of_pieces(which)
         return advanced(memory, self.memory, np.zeros((1, len(which))), dt)
+
+    @cached_property
+    def _fresh(self) -> MemoryState:
+        return MemoryState.fresh(self.memory)
+
+    @cached_property
+    def _untouched(self) -> PressedSpots:
+        return PressedSpots(np.zeros((0, 2)), -np.inf, MemoryState.fresh(self.memory, 0))
 
     @property
     def errors(self) -> FloatArray:
@@ -192,8 +198,7 @@ class ForceModel:
     def held(self) -> float:
         """Part of the labels within their own intervals, each press left out."""
         force = self.presses.force[self.presses.labelled]
-        middle, least, most = self.left_out.T
-        _, low, high = _widened(middle, least, most, self.scale)
+        _, low, high = _widened(np.log(self.left_out), self.scale).T
         return float(((low <= force) & (force <= high)).mean())
 
     def _beyond(self, snr: FloatArray) -> FloatArray:
@@ -208,16 +213,13 @@ class ForceModel:
         return float(np.nanmedian(1 / known**2)) if np.isfinite(known).any() else 0.0
 
     def _forces(self, terms: FloatArray, depth: FloatArray, sd: FloatArray) -> list[Force]:
-        middle, low, high = _widened(*self.curve.force(terms, depth, sd), self.scale)
-        return [
-            Force(float(newtons), float(least), float(most))
-            for newtons, least, most in zip(middle, low, high, strict=True)
-        ]
+        points = _widened(self.curve.log_forces(terms, depth, sd), self.scale)
+        return [Force(newtons, low, high) for newtons, low, high in points.tolist()]
 
 
 def depth_of(peak: FloatArray, area: FloatArray, conductivity: float, radius: float) -> FloatArray:
     """(n,) content of touches over ``radius``²: −log σ/σ₀ of one of that radius, m²/m²."""
-    part = np.clip(np.asarray(peak) / conductivity, -_DEEPEST, None)
+    part = np.maximum(np.asarray(peak) / conductivity, -_DEEPEST)
     return np.asarray(-np.log1p(part) * np.asarray(area) / (np.pi * radius**2))
 
 
@@ -273,7 +275,7 @@ def _left_out(presses: WeighedPresses, terms: FloatArray, free: FloatArray) -> F
                 hint="lift the tip between two presses, or give the presses their own numbers",
             )
         curve = ForceCurve.of(terms[others], free[others], presses.force[others])
-        out[mine] = np.column_stack(curve.force(terms[own], free[own], np.zeros(len(own))))
+        out[mine] = np.exp(curve.log_forces(terms[own], free[own], np.zeros(len(own))))
     return out
 
 
@@ -291,10 +293,10 @@ def _half_intervals(left_out: FloatArray, force: FloatArray) -> FloatArray:
     return np.asarray(np.abs(away) / np.where(away > 0, high - middle, middle - low))
 
 
-def _widened(
-    middle: FloatArray, low: FloatArray, high: FloatArray, scale: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    return middle, middle * (low / middle) ** scale, middle * (high / middle) ** scale
+def _widened(log_forces: FloatArray, scale: float) -> FloatArray:
+    """(n, 3) N: forces whose intervals are ``scale`` times as wide as those of ``log_forces``."""
+    middle = log_forces[:, :1]
+    return np.asarray(np.exp(middle + scale * (log_forces - middle)))
 
 
 def _remarks(presses: WeighedPresses, left_out: FloatArray, unit: float) -> tuple[LabelRemark, ...]:
@@ -328,19 +330,16 @@ def _remarks(presses: WeighedPresses, left_out: FloatArray, unit: float) -> tupl
     return tuple(remarks)
 
 
-def _goes_on(spots: FloatArray, xy: FloatArray, within: float) -> tuple[IntArray, IntArray]:
-    """Number of the spot (k,) that each of ``xy`` (k, 2) presses, -1 where it is a new one; numbers
-    of the other ``spots`` (n, 2). The nearest counts, each once."""
-    apart = np.hypot(*(spots[:, None] - xy).T)
-    under = np.full(len(xy), -1)
-    free = np.ones(len(spots), dtype=bool)
-    if len(spots):
-        for k, row in enumerate(apart):
-            row = np.where(free, row, np.inf)
-            nearest = int(np.argmin(row))
-            if row[nearest] <= within:
-                under[k], free[nearest] = nearest, False
-    return under, np.flatnonzero(free)
+def _goes_on(spots: FloatArray, xy: FloatArray, within: float) -> tuple[list[int], list[int]]:
+    """Number of the spot that each of ``xy`` (k, 2) presses, -1 where it is a new one; numbers of
+    the other ``spots`` (n, 2). The nearest counts, each once."""
+    free, under = dict(enumerate(spots.tolist())), []
+    for here in xy.tolist():
+        apart = {k: math.dist(here, spot) for k, spot in free.items()}
+        nearest = min(apart, key=apart.__getitem__, default=-1)
+        under.append(nearest if nearest >= 0 and apart[nearest] <= within else -1)
+        free.pop(under[-1], None)
+    return under, list(free)
 
 
 def _columns(
