@@ -64,9 +64,7 @@ class SlideCorrection:
         if not way.any():
             return touch
         d = touch.detection
-        return replace(
-            touch, detection=replace(d, x=d.x + float(way[0]), y=d.y + float(way[1]))
-        )
+        return replace(touch, detection=replace(d, x=d.x + float(way[0]), y=d.y + float(way[1])))
 
     def _gone_on(self, touch: Touch, time: float) -> Course:
         before = self.courses.get(touch.id, ())
