@@ -158,7 +158,7 @@ def _weighed(scale: Scale, model: ForceModel, count: int, presses: int) -> Weigh
     ratio = np.full((presses, count, len(LOOP)), np.nan)
     held = ratio.copy()
     for number in range(presses):
-        tops, state = scale.random.uniform(4.0, HEAVY, count), ()
+        tops, state = scale.random.uniform(4.0, HEAVY, count), None
         for step, (now, stage) in enumerate(scale.pressed(tops, LOOP, number)):
             seen = [k for k, one in enumerate(stage) if one.detection is not None]
             forces, state = model.read(state, [stage[k].detection for k in seen], now)
@@ -225,7 +225,7 @@ def _cost(model: ForceModel) -> tuple[float, ...]:
                       np.empty(0, np.int64), snr=20.0)
             for x, y in places.tolist()
         ]  # fmt: skip
-        state, start = (), time.process_time()
+        state, start = None, time.process_time()
         for frame in range(200):
             _, state = model.read(state, touches, 0.1 * frame)
         taken.append(1e3 * (time.process_time() - start) / 200)

@@ -51,7 +51,7 @@ def learnt():
 
 
 def read(model, touches):
-    state, forces = (), []
+    state, forces = None, []
     for k, one in enumerate(touches):
         (force,), state = model.read(state, [one], 0.5 * k)
         forces.append(force)
@@ -79,7 +79,7 @@ def test_the_memory_is_what_makes_loading_and_unloading_agree():
         touches, _ = press(rng, 8.0)
         with_past = read(model, touches)
         loop.append(with_past[-1].newtons / with_past[0].newtons)
-        (fresh,), _ = model.read((), [touches[-1]], 0.0)
+        (fresh,), _ = model.read(None, [touches[-1]], 0.0)
         alone.append(fresh.newtons / with_past[0].newtons)
     assert abs(np.mean(loop) - 1) < 0.1 < np.mean(alone) - 1
 
@@ -87,12 +87,13 @@ def test_the_memory_is_what_makes_loading_and_unloading_agree():
 def test_reading_is_pure_and_a_spot_goes_on_where_it_was():
     model, rng = learnt(), np.random.default_rng(6)
     touches, _ = press(rng, 8.0)
-    _, state = model.read((), [touches[2]], 0.0)
+    _, state = model.read(None, [touches[2]], 0.0)
     first = model.read(state, [touches[3]], 0.5)
     second = model.read(state, [touches[3]], 0.5)
     assert first[0] == second[0]
     assert len(first[1]) == 1
-    (released,) = model.read(state, [], 1.0)[1]
+    released = model.read(state, [], 1.0)[1]
+    assert len(released) == 1
     assert released.memory.lagging[0, 0, 0] > 0  # what the press left there
     forces, both = model.read(state, [touches[3], touch(-0.05, 0.05, 0.2)], 0.5)
     assert forces[0] == first[0][0]
@@ -102,7 +103,7 @@ def test_reading_is_pure_and_a_spot_goes_on_where_it_was():
 def test_a_noisy_touch_has_a_wider_interval():
     model = learnt()
     clear, noisy = (
-        model.read((), [touch(0.0, 0.0, 0.2, snr)], 0.0)[0][0] for snr in (60.0, 4.0)
+        model.read(None, [touch(0.0, 0.0, 0.2, snr)], 0.0)[0][0] for snr in (60.0, 4.0)
     )  # fmt: skip
     assert noisy.high / noisy.low > 1.5 * clear.high / clear.low
 
@@ -115,7 +116,7 @@ def test_a_file_gives_the_same_forces(tmp_path):
     again = FORCE.read(path)
     again.check(skin)
     one = touch(0.01, 0.02, 0.15)
-    assert again.model.read((), [one], 0.0)[0] == model.read((), [one], 0.0)[0]
+    assert again.model.read(None, [one], 0.0)[0] == model.read(None, [one], 0.0)[0]
 
 
 def test_the_calibration_of_another_skin_is_refused():
@@ -158,7 +159,7 @@ def test_presses_at_one_spot_say_what_they_can_promise():
     here = [touch(0.001, 0.0, -np.log1p(t.peak / SHEET)) for t in touches]
     model = ForceModel.learn(WeighedPresses.of(here, forces, number, time), SHEET, UNIT)
     assert any("forces hold there" in remark.reason for remark in model.remarks)
-    spot, rim = (model.read((), [touch(x, 0.0, 0.2)], 0.0)[0][0] for x in (0.0, 0.08))
+    spot, rim = (model.read(None, [touch(x, 0.0, 0.2)], 0.0)[0][0] for x in (0.0, 0.08))
     assert rim.high / rim.low > 1.2 * spot.high / spot.low
 
 

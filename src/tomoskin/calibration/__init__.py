@@ -35,7 +35,7 @@ from tomoskin.calibration.several import Several
 from tomoskin.calibration.touch import TOUCH
 from tomoskin.calibration.weighing.identify import MaterialFit, identify
 from tomoskin.calibration.weighing.measured import ForceProcess
-from tomoskin.calibration.weighing.model import ForceModel, LabelRemark, PressedSpot
+from tomoskin.calibration.weighing.model import ForceModel, LabelRemark, PressedSpots
 from tomoskin.calibration.weighing.presses import WeighedPresses
 from tomoskin.core import DataError, StrPath, load_arrays
 
@@ -86,7 +86,7 @@ __all__ = [
     "Locator",
     "MappingAnswer",
     "MaterialFit",
-    "PressedSpot",
+    "PressedSpots",
     "Presses",
     "SessionAlignment",
     "Several",

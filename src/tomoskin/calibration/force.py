@@ -21,7 +21,7 @@ from tomoskin.calibration.kind import (
     Progress,
     located,
 )
-from tomoskin.calibration.weighing.model import ForceModel, PressedSpot
+from tomoskin.calibration.weighing.model import ForceModel, PressedSpots
 from tomoskin.calibration.weighing.presses import WeighedPresses
 from tomoskin.core import Arrays, DataError, Detection, FloatArray, IntArray, real_numbers
 from tomoskin.pattern import Pattern
@@ -35,7 +35,7 @@ class ForceApplied(Applied):
 
     def __init__(self, model: ForceModel) -> None:
         self._model = model
-        self._spots: tuple[PressedSpot, ...] = ()
+        self._spots: PressedSpots | None = None
 
     def locate(self, view: FrameView, detections: list[Detection]) -> list[Detection]:
         """The same detections, with forces."""

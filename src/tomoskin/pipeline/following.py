@@ -23,7 +23,7 @@ from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.records import FrameResult, Measured
 from tomoskin.pipeline.tune import Steps, tune, tuned_sheet
 from tomoskin.signal import Reference
-from tomoskin.touch import EXHAUSTIVE, Pace, Tracker
+from tomoskin.touch import EXHAUSTIVE, Pace, SlideCorrection, TouchEvent, Tracker
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +70,7 @@ class Following:
         self.rest, self._setting = rest, setting
         self._prepared, self._conditioning = prepared, conditioning
         self._tracker = tracker
+        self._slides = SlideCorrection(prepared.skin.touch.slide_lag)
         self._imaging = self._new_imaging(reference)
         self._finder: Finder = finding(prepared, reference, setting.pace)
         conditions = Fitting(prepared, reference)
@@ -123,14 +124,14 @@ class Following:
         self._tune()
         conditioned = self._conditioning.condition(measured)
         if conditioned.differences is None:
-            touches = self._tracker.update([], measured.time, measured.host_time)
+            touches = self._track([], measured)
             return self._result(measured, conditioned, self._prepared.no_image, touches, {})
         image, noise = self._imaging.push(conditioned.differences.dv, measured.time)
         view = FrameView(measured.time, image, noise, conditioned.differences)
         detections = self._finder.push(view)
         for applied in self._applied.values():
             detections = applied.locate(view, detections)
-        touches = self._tracker.update(detections, measured.time, measured.host_time)
+        touches = self._track(detections, measured)
         readings = self._read(view, detections, touched=bool(touches))
         untouched = not (detections or self._finder.like_touch)
         self._learn(measured.time, touched=bool(touches), noise=untouched)
@@ -144,6 +145,21 @@ class Following:
             self._conditioning.mean,
             self._tracker.events,
             self._conditioning.state,
+        )
+
+    def _track(self, detections: list[Detection], measured: Measured) -> tuple[Touch, ...]:
+        """Touches of a frame, where the fingers are."""
+        tracked = self._tracker.update(detections, measured.time, measured.host_time)
+        if not self._tracker.settings.still:
+            self._slides = self._slides.after(tracked, measured.time)
+        return tuple(map(self._slides.of_finger, tracked))
+
+    @property
+    def _events(self) -> tuple[TouchEvent, ...]:
+        """What happened in the newest frame, where the fingers are."""
+        return tuple(
+            replace(event, touch=self._slides.of_finger(event.touch))
+            for event in self._tracker.events
         )
 
     def _read(
@@ -213,7 +229,7 @@ class Following:
             reference=self._conditioning.mean,
             touches=touches,
             left_out=conditioned.n_excluded,
-            events=self._tracker.events,
+            events=self._events,
             health=conditioned.health,
             baseline=self._conditioning.state,
             readings=readings,

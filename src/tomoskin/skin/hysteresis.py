@@ -17,16 +17,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 
-from tomoskin.core import FloatArray, ModelError
+from tomoskin.core import FloatArray, IntArray, ModelError
 
 _WHERE = "MaterialMemory"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MaterialMemory:
     """Parts of a response that depend on the past of its load; without any, there is no memory.
 
@@ -67,6 +68,11 @@ class MaterialMemory:
         """Whether time alone changes nothing."""
         return not (self.creep or self.breakdown)
 
+    @cached_property
+    def half_widths(self) -> FloatArray:
+        """(n_play, 1) of the plays."""
+        return np.array(self.play_widths).reshape(-1, 1)
+
     def kept(self, dt: float) -> tuple[FloatArray, FloatArray]:
         """Parts of late responses, and of breakdowns, that are left after ``dt`` s."""
         return (
@@ -102,6 +108,8 @@ class Metric:
 
     def sizes(self, components: FloatArray) -> FloatArray:
         """(…, n_groups, n) sizes of ``components`` (…, d, n)."""
+        if self._each_alone:
+            return np.abs(components)
         sizes, start = [], 0
         for group in self.weights:
             part = components[..., start : start + len(group), :]
@@ -111,14 +119,24 @@ class Metric:
             start += len(group)
         return np.stack(sizes, axis=-2)
 
-    def drawn(self, slack: FloatArray, width: FloatArray) -> None:
-        """Shorten ``slack`` (n_play, d, n) in place, group by group, to ``width`` (n_play, 1)."""
-        start = 0
-        sizes = self.sizes(slack)
+    def dragged(self, lagging: FloatArray, load: FloatArray, width: FloatArray) -> FloatArray:
+        """(n_play, d, n): ``lagging`` plays of half widths ``width`` (n_play, 1) behind ``load``
+        (d, n)."""
+        if self._each_alone:
+            half = width[:, None]
+            return np.minimum(np.maximum(lagging, load - half), load + half)
+        slack = lagging - load
+        start, sizes = 0, self.sizes(slack)
         for number, group in enumerate(self.weights):
             size = sizes[:, number]
             slack[:, start : start + len(group)] *= (width / np.maximum(size, width))[:, None]
             start += len(group)
+        slack += load
+        return slack
+
+    @property
+    def _each_alone(self) -> bool:
+        return set(self.weights) == {(1.0,)}
 
 
 SCALAR = Metric()
@@ -161,6 +179,19 @@ class MemoryState:
             broken=np.zeros((len(memory.breakdown), len(metric.weights), n)),
         )
 
+    def of_pieces(self, which: IntArray) -> MemoryState:
+        """What the pieces ``which`` (k,) remember, in that order."""
+        return MemoryState(*(part[..., which] for part in self._parts))
+
+    def beside(self, others: MemoryState) -> MemoryState:
+        """What these pieces remember, and then the ``others``."""
+        pairs = zip(self._parts, others._parts, strict=True)
+        return MemoryState(*(np.concatenate(pair, axis=-1) for pair in pairs))
+
+    @property
+    def _parts(self) -> tuple[FloatArray, ...]:
+        return self.load, self.lagging, self.prompt, self.late, self.broken
+
 
 def advanced(
     state: MemoryState,
@@ -180,19 +211,18 @@ def advanced(
     """
     if not 0 <= dt < math.inf:
         raise ModelError(f"expected a time step of 0 s or more, got {dt}", where=_WHERE)
-    slack = state.lagging - load
-    metric.drawn(slack, np.array(memory.play_widths).reshape(-1, 1))
-    slack += load
-    prompt = _mixed(load, slack, memory.play)
-    late_kept, broken_kept = memory.kept(dt)
-    late = state.late - prompt
-    late *= late_kept.reshape(-1, 1, 1)
-    late += prompt
-    broken = state.broken
+    lagging, prompt, late, broken = state.lagging, load, state.late, state.broken
+    if memory.play:
+        lagging = metric.dragged(lagging, load, memory.half_widths)
+        prompt = _mixed(load, lagging, memory.play)
+    if memory.creep:
+        late = late - prompt
+        late *= memory.kept(dt)[0].reshape(-1, 1, 1)
+        late += prompt
     if memory.breakdown:
         moved = metric.sizes(load - state.load)
-        broken = (broken + moved) * broken_kept.reshape(-1, 1, 1)
-    return MemoryState(load, slack, prompt, late, broken)
+        broken = (broken + moved) * memory.kept(dt)[1].reshape(-1, 1, 1)
+    return MemoryState(load, lagging, prompt, late, broken)
 
 
 def followed(state: MemoryState, memory: MaterialMemory) -> FloatArray:
@@ -235,39 +265,39 @@ def load_of(
             where=_WHERE,
             hint="read it with the breakdown left out, and wait for that to go",
         )
-    n = len(answer)
-    width = np.array(memory.play_widths).reshape(-1, 1)
-    lagging = state.lagging[:, 0]
+    width, lagging = memory.half_widths, state.lagging[:, 0]
     bends = np.sort(np.concatenate([state.load, lagging - width, lagging + width]), axis=0)
     ends = np.concatenate([bends[:1] - 1.0, bends, bends[-1:] + 1.0])
-    tried = advanced(_repeated(state, len(ends)), memory, ends.reshape(1, -1), dt)
-    values = response(tried, memory).reshape(ends.shape)
-    piece = np.clip((values[1:-1] <= answer).sum(axis=0), 0, len(bends))
-    column = np.arange(n)
+    values = _tried(state, memory, ends, dt)
+    piece = (values[1:-1] <= answer).sum(axis=0)
+    column = np.arange(len(answer))
     low, high = values[piece, column], values[piece + 1, column]
     part = (answer - low) / np.where(high > low, high - low, 1.0)
-    load = ends[piece, column] + part * (ends[piece + 1, column] - ends[piece, column])
+    first = ends[piece, column]
+    load = first + part * (ends[piece + 1, column] - first)
     return load, advanced(state, memory, load[None], dt)
 
 
-def _repeated(state: MemoryState, times: int) -> MemoryState:
-    """The same pieces so many times, one after the other."""
-    return MemoryState(*(
-        np.tile(part, times)
-        for part in (state.load, state.lagging, state.prompt, state.late, state.broken)
-    ))  # fmt: skip
+def _tried(state: MemoryState, memory: MaterialMemory, loads: FloatArray, dt: float) -> FloatArray:
+    """(m, n) responses to each of ``loads`` (m, n) by itself, after ``dt`` s."""
+    each = Metric(((1.0,),) * len(loads))  # trials take the place of components
+    tried = advanced(state, memory, loads, dt, each)
+    values = followed(tried, memory)
+    return values + broken_down(tried, memory) if memory.breakdown else values
 
 
 def _promptness(memory: MaterialMemory, dt: float) -> float:
     """Response per prompt part after ``dt`` s of one load."""
-    kept, _ = memory.kept(dt)
-    return 1.0 - float(np.array(memory.creep) @ kept)
+    if not memory.creep:
+        return 1.0
+    return 1.0 - float(np.array(memory.creep) @ memory.kept(dt)[0])
 
 
 def _brittleness(memory: MaterialMemory, dt: float) -> float:
     """Response per motion, ``dt`` s after it."""
-    _, kept = memory.kept(dt)
-    return float(np.array(memory.breakdown) @ kept)
+    if not memory.breakdown:
+        return 0.0
+    return float(np.array(memory.breakdown) @ memory.kept(dt)[1])
 
 
 def responses(
@@ -294,6 +324,8 @@ def responses(
 
 def _mixed(load: FloatArray, parts: FloatArray, weights: tuple[float, ...]) -> FloatArray:
     """(d, n): ``parts`` (n_parts, d, n) by their weights, and of ``load`` what these leave."""
+    if not weights:
+        return load
     total = (1 - sum(weights)) * load
     for weight, part in zip(weights, parts, strict=True):
         total += weight * part

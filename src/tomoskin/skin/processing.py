@@ -130,6 +130,12 @@ class TouchSettings(Section, section="touch"):
         effective=_IN_IMAGE,
     )
     max_touches: int = key(Whole(1, 50), "Most touches reported at once.", default=8)
+    slide_lag: float = key(
+        Quantity("length", "mm", 0, 100),
+        "How far behind a finger that slides the sheet responds, as friction drags it along; "
+        "touches that slide are reported so much ahead. 0 mm: as the sheet responds.",
+        default="0 mm",
+    )
 
 
 class TwinChoice(Section, section="twin"):

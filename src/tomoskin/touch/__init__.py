@@ -11,6 +11,7 @@ from tomoskin.touch.fit.pace import EXHAUSTIVE, LIVE, Pace
 from tomoskin.touch.fit.spot import Response, Spots, spots_of
 from tomoskin.touch.region import Region
 from tomoskin.touch.segment import ImageNoise, Segmenter
+from tomoskin.touch.sliding import SlideCorrection
 from tomoskin.touch.spans import Span, touch_spans
 from tomoskin.touch.table import (
     ELAPSED,
@@ -37,6 +38,7 @@ __all__ = [
     "ResolutionBounds",
     "Response",
     "Segmenter",
+    "SlideCorrection",
     "Span",
     "SpotFinder",
     "SpotModel",

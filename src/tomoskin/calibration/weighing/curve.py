@@ -36,14 +36,20 @@ _LEAST_WIDTH = 0.5
 _COUNTS = 3e-3
 _FORCES = 161
 _BEYOND = 4.0
-_NINE_IN_TEN = (0.05, 0.95)
+_LEVELS = np.array([0.5, 0.05, 0.95])
+"""The median, and what nine in ten lie between."""
 
 
 def basis(xy: FloatArray, radius: FloatArray, unit: float) -> FloatArray:
     """(n, 5) terms of a touch at ``xy`` (n, 2) over ``unit`` m, of log ``radius`` (n,) beside the
     usual."""
-    x, y = (xy / unit).T
-    return np.column_stack([np.ones(len(x)), x, y, x * x + y * y - 0.5, radius])
+    terms = np.empty((len(xy), 5))
+    x, y = terms[:, 1:3].T
+    np.divide(xy, unit, out=terms[:, 1:3])
+    terms[:, 0] = 1.0
+    terms[:, 3] = x * x + y * y - 0.5
+    terms[:, 4] = radius
+    return terms
 
 
 _PRIOR = np.array([_LEVEL, _SLOPE, _SLOPE, _SLOPE, _RADIUS]) ** 2
@@ -111,12 +117,13 @@ class ForceCurve:
         """
         grid, prior, curves = self._tabulated
         level = terms @ self.mean.T
-        variance = np.einsum("ni,gij,nj->ng", terms, self.covariance, terms)
+        variance = ((terms @ self.covariance) * terms).sum(axis=2).T
         variance += self.noise**2 + sd[:, None] ** 2
         away = (np.log(depth)[:, None] - level)[:, :, None] - curves
         away *= away
         away *= -0.5 / variance[:, :, None]
-        likely = np.einsum("ng,ngf->nf", self.weight / np.sqrt(variance), np.exp(away))
+        weight = self.weight / np.sqrt(variance)
+        likely = (weight[:, None] @ np.exp(away, out=away))[:, 0]
         chance = np.maximum(likely, 1e-300) * prior
         return grid, chance / chance.sum(axis=1, keepdims=True)
 
@@ -129,18 +136,12 @@ class ForceCurve:
         curves = np.log(force / (force + self.half[:, None]))
         return middle + width * steps, np.exp(-0.5 * steps**2), curves
 
-    def force(
-        self, terms: FloatArray, depth: FloatArray, sd: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Median, 5 % and 95 % point of the force, (n,) N each; see :meth:`posterior`."""
+    def log_forces(self, terms: FloatArray, depth: FloatArray, sd: FloatArray) -> FloatArray:
+        """(n, 3): median, 5 % and 95 % point of log F, F in N; see :meth:`posterior`."""
         grid, chance = self.posterior(terms, depth, sd)
-        below = np.cumsum(chance, axis=1) - 0.5 * chance
-        points = [
-            np.array([np.interp(level, row, grid) for row in below])
-            for level in (0.5, *_NINE_IN_TEN)
-        ]
-        middle, low, high = np.exp(points)
-        return middle, low, high
+        below = np.cumsum(chance, axis=1)
+        below -= 0.5 * chance
+        return np.array([np.interp(_LEVELS, row, grid) for row in below])
 
 
 def _members(

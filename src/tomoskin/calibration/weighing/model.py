@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -44,12 +45,16 @@ class LabelRemark:
 
 
 @dataclass(frozen=True, eq=False)
-class PressedSpot:
-    """What one spot of the skin remembers: ``xy`` (2,) m, since ``time`` s."""
+class PressedSpots:
+    """What spots of the skin remember: ``xy`` (n, 2) m, ``memory`` of n pieces at ``time`` s."""
 
     xy: FloatArray
     time: float
     memory: MemoryState
+
+    def __len__(self) -> int:
+        """Number of spots."""
+        return len(self.xy)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,51 +147,46 @@ class ForceModel:
         )  # fmt: skip
 
     def read(
-        self, spots: tuple[PressedSpot, ...], detections: Sequence[Detection], time: float
-    ) -> tuple[list[Force], tuple[PressedSpot, ...]]:
+        self, spots: PressedSpots | None, detections: Sequence[Detection], time: float
+    ) -> tuple[list[Force], PressedSpots]:
         """Forces of a frame's detections, and what the spots remember then.
 
-        ``spots`` is what they remembered after the frame before, ``()`` on a skin that nothing
-        has touched; ``time`` is the frame's, s.
+        ``spots`` is what they remembered after the frame before, None on a skin that nothing has
+        touched; ``time`` is the frame's, s. A spot that is new has been pressed since that frame.
         """
-        rest = list(spots)
+        spots = self._untouched if spots is None else spots
+        dt = max(time - spots.time, 0.0) if len(spots) else 0.0
         if not detections:
-            return [], self._released(rest, time)
+            released = self._released(spots, np.arange(len(spots)), dt)
+            return [], PressedSpots(spots.xy, time, released)
         xy, area, peak, snr = _columns(detections)
-        depth = np.maximum(
-            depth_of(peak, area, self.conductivity, self.radius), _SHALLOW * self.depth
-        )
-        pressed = []
-        for at, own in zip(xy, depth, strict=True):
-            before = _nearest(rest, at, 0.5 * self.radius)
-            if before is not None:
-                rest.remove(before)
-            pressed.append(self._pressed(before, at, own, time))
-        free = np.array([float(spot.memory.load[0, 0]) for spot in pressed])
+        least = _SHALLOW * self.depth
+        depth = np.maximum(depth_of(peak, area, self.conductivity, self.radius), least)
+        under, rest = _goes_on(spots.xy, xy, 0.5 * self.radius)
+        before = spots.memory
+        if under != list(range(len(spots))):
+            before = before.beside(self._fresh).of_pieces(np.array(under))
+        load, now = load_of(before, self.memory, depth, dt)
         terms = basis(xy, np.log(_radius(area) / self.radius), self.unit)
-        free = np.maximum(free, _SHALLOW * self.depth)
-        forces = self._forces(terms, free, self._beyond(snr))
-        return forces, (*pressed, *self._released(rest, time))[:_MOST_SPOTS]
+        forces = self._forces(terms, np.maximum(load, least), self._beyond(snr))
+        if rest:
+            others = np.array(rest[: max(_MOST_SPOTS - len(xy), 0)], dtype=np.intp)
+            now = now.beside(self._released(spots, others, dt))
+            xy = np.concatenate([xy, spots.xy[others]])
+        return forces, PressedSpots(xy, time, now)
 
-    def _pressed(
-        self, before: PressedSpot | None, at: FloatArray, depth: float, time: float
-    ) -> PressedSpot:
-        """The spot at ``at`` (2,) with the load that makes its ``depth`` now."""
-        state = before.memory if before else MemoryState.fresh(self.memory)
-        step = max(time - before.time, 0.0) if before else 0.0
-        _, state = load_of(state, self.memory, np.array([depth]), step)
-        return PressedSpot(at, time, state)
+    def _released(self, spots: PressedSpots, which: IntArray, dt: float) -> MemoryState:
+        """What those of ``spots`` that nothing touches remember ``dt`` s later."""
+        memory = spots.memory.of_pieces(which)
+        return advanced(memory, self.memory, np.zeros((1, len(which))), dt)
 
-    def _released(self, spots: Sequence[PressedSpot], time: float) -> tuple[PressedSpot, ...]:
-        """What ``spots`` that nothing touches remember."""
-        return tuple(
-            PressedSpot(
-                spot.xy,
-                time,
-                advanced(spot.memory, self.memory, np.zeros((1, 1)), max(time - spot.time, 0.0)),
-            )
-            for spot in spots
-        )
+    @cached_property
+    def _fresh(self) -> MemoryState:
+        return MemoryState.fresh(self.memory)
+
+    @cached_property
+    def _untouched(self) -> PressedSpots:
+        return PressedSpots(np.zeros((0, 2)), -np.inf, MemoryState.fresh(self.memory, 0))
 
     @property
     def errors(self) -> FloatArray:
@@ -198,13 +198,13 @@ class ForceModel:
     def held(self) -> float:
         """Part of the labels within their own intervals, each press left out."""
         force = self.presses.force[self.presses.labelled]
-        middle, least, most = self.left_out.T
-        _, low, high = _widened(middle, least, most, self.scale)
+        _, low, high = _widened(np.log(self.left_out), self.scale).T
         return float(((low <= force) & (force <= high)).mean())
 
     def _beyond(self, snr: FloatArray) -> FloatArray:
         """Relative deviation of depths by noise, beyond that of the labelled touches."""
-        return np.sqrt(np.maximum(np.nan_to_num(1 / snr**2) - self._usual_noise, 0.0))
+        own = np.where(snr > 0, 1 / np.square(snr), 0.0)
+        return np.sqrt(np.maximum(own - self._usual_noise, 0.0))
 
     @cached_property
     def _usual_noise(self) -> float:
@@ -213,16 +213,13 @@ class ForceModel:
         return float(np.nanmedian(1 / known**2)) if np.isfinite(known).any() else 0.0
 
     def _forces(self, terms: FloatArray, depth: FloatArray, sd: FloatArray) -> list[Force]:
-        middle, low, high = _widened(*self.curve.force(terms, depth, sd), self.scale)
-        return [
-            Force(float(newtons), float(least), float(most))
-            for newtons, least, most in zip(middle, low, high, strict=True)
-        ]
+        points = _widened(self.curve.log_forces(terms, depth, sd), self.scale)
+        return [Force(newtons, low, high) for newtons, low, high in points.tolist()]
 
 
 def depth_of(peak: FloatArray, area: FloatArray, conductivity: float, radius: float) -> FloatArray:
     """(n,) content of touches over ``radius``²: −log σ/σ₀ of one of that radius, m²/m²."""
-    part = np.clip(np.asarray(peak) / conductivity, -_DEEPEST, None)
+    part = np.maximum(np.asarray(peak) / conductivity, -_DEEPEST)
     return np.asarray(-np.log1p(part) * np.asarray(area) / (np.pi * radius**2))
 
 
@@ -278,7 +275,7 @@ def _left_out(presses: WeighedPresses, terms: FloatArray, free: FloatArray) -> F
                 hint="lift the tip between two presses, or give the presses their own numbers",
             )
         curve = ForceCurve.of(terms[others], free[others], presses.force[others])
-        out[mine] = np.column_stack(curve.force(terms[own], free[own], np.zeros(len(own))))
+        out[mine] = np.exp(curve.log_forces(terms[own], free[own], np.zeros(len(own))))
     return out
 
 
@@ -296,10 +293,10 @@ def _half_intervals(left_out: FloatArray, force: FloatArray) -> FloatArray:
     return np.asarray(np.abs(away) / np.where(away > 0, high - middle, middle - low))
 
 
-def _widened(
-    middle: FloatArray, low: FloatArray, high: FloatArray, scale: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    return middle, middle * (low / middle) ** scale, middle * (high / middle) ** scale
+def _widened(log_forces: FloatArray, scale: float) -> FloatArray:
+    """(n, 3) N: forces whose intervals are ``scale`` times as wide as those of ``log_forces``."""
+    middle = log_forces[:, :1]
+    return np.asarray(np.exp(middle + scale * (log_forces - middle)))
 
 
 def _remarks(presses: WeighedPresses, left_out: FloatArray, unit: float) -> tuple[LabelRemark, ...]:
@@ -333,9 +330,16 @@ def _remarks(presses: WeighedPresses, left_out: FloatArray, unit: float) -> tupl
     return tuple(remarks)
 
 
-def _nearest(spots: Sequence[PressedSpot], at: FloatArray, within: float) -> PressedSpot | None:
-    near = min(spots, key=lambda spot: float(np.hypot(*(spot.xy - at))), default=None)
-    return near if near is not None and np.hypot(*(near.xy - at)) <= within else None
+def _goes_on(spots: FloatArray, xy: FloatArray, within: float) -> tuple[list[int], list[int]]:
+    """Number of the spot that each of ``xy`` (k, 2) presses, -1 where it is a new one; numbers of
+    the other ``spots`` (n, 2). The nearest counts, each once."""
+    free, under = dict(enumerate(spots.tolist())), []
+    for here in xy.tolist():
+        apart = {k: math.dist(here, spot) for k, spot in free.items()}
+        nearest = min(apart, key=apart.__getitem__, default=-1)
+        under.append(nearest if nearest >= 0 and apart[nearest] <= within else -1)
+        free.pop(under[-1], None)
+    return under, list(free)
 
 
 def _columns(

@@ -1,0 +1,90 @@
+"""Touches that slide: where the finger is, not where the sheet responds.
+
+Friction drags the sheet along with a finger that slides: it is stretched behind the finger and
+compressed ahead of it, so that the middle of its response lies behind the finger. How far depends
+hardly on the speed, and nothing is left of it once the finger stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import FloatArray, Touch
+
+# Chosen on the twin's seeds 1 to 3 (docs/touch.md).
+
+_WINDOW = 0.35
+"""Seconds of a touch's course that tell its direction: as it begins to slide, it jumps back."""
+
+_RECENT = 0.1
+"""A touch that has not gone on for so many seconds stands."""
+
+_FEWEST = 3
+"""Frames within the window that make a course."""
+
+_STANDS, _SLIDES = 0.02, 0.04
+"""Speeds up to which a touch stands, and from which it slides, m/s."""
+
+Course = tuple[tuple[float, float, float], ...]
+"""Where a touch was seen of late: rows of s, x and y m."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlideCorrection:
+    """Moves touches ahead by what the sheet lags behind them, from frame to frame.
+
+    Attributes
+    ----------
+    lag
+        Of the sheet behind a finger that slides, m; 0: no touch is moved.
+    courses
+        Of the touches that are there, by identity.
+    """
+
+    lag: float
+    courses: Mapping[int, Course] = field(default_factory=dict)
+
+    def after(self, touches: Sequence[Touch], time: float) -> Self:
+        """With a frame at ``time`` s of the device, in which ``touches`` were."""
+        if not self.lag or not (touches or self.courses):
+            return self
+        courses = {touch.id: self._gone_on(touch, time) for touch in touches}
+        return type(self)(self.lag, courses)
+
+    def of_finger(self, touch: Touch) -> Touch:
+        """``touch`` of the newest frame where the finger is; itself where it stands."""
+        course = self.courses.get(touch.id, ())
+        if len(course) < _FEWEST:
+            return touch
+        way = self.lag * _heading(np.array(course))
+        if not way.any():
+            return touch
+        d = touch.detection
+        return replace(touch, detection=replace(d, x=d.x + float(way[0]), y=d.y + float(way[1])))
+
+    def _gone_on(self, touch: Touch, time: float) -> Course:
+        before = self.courses.get(touch.id, ())
+        if before and not before[-1][0] < time < before[-1][0] + _WINDOW:
+            before = ()  # another clock, or a pause in which nobody looked
+        since = time - _WINDOW
+        kept = tuple(row for row in before if row[0] >= since)
+        return (*kept, (time, touch.detection.x, touch.detection.y))
+
+
+def _heading(course: FloatArray) -> FloatArray:
+    """(2,) direction in which a touch slides, as long as it is sure that it does: from 0 to 1."""
+    time, places = course[:, 0] - course[-1, 0], course[:, 1:]
+    spread = time - time.mean()
+    velocity = spread @ places / (spread @ spread)
+    speed = float(np.hypot(*velocity))
+    if not speed > _STANDS:
+        return np.zeros(2)
+    direction = velocity / speed
+    last = max(int(np.count_nonzero(time <= -_RECENT)) - 1, 0)
+    of_late = float((places[-1] - places[last]) @ direction) / -float(time[last])
+    part = float(np.clip((min(speed, of_late) - _STANDS) / (_SLIDES - _STANDS), 0.0, 1.0))
+    return np.asarray(part * direction)
