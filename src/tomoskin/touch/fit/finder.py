@@ -269,8 +269,16 @@ class SpotFinder:
             left=self._left(seen),
         )
         problem = replace(problem, sign=self.watch.sign(problem, matched))
+        detected = self._sought(problem, matched)
+        if self.watch.puzzled(detected.fit, problem.sign):
+            both = self._sought(replace(problem, sign="both"), matched)
+            if self.watch.turns(both, detected.fit) and problem.favours(both.fit, detected.fit):
+                detected = both
+        return detected, matched
+
+    def _sought(self, problem: Problem, matched: Matched) -> SpotDetections:
         search = Search(problem, matched, self._settings.snr, self._most, self._pace, self._deficit)
-        return search(self._expected), matched
+        return search(self._expected)
 
     def _left(self, seen: WhitenedTable) -> FloatArray:
         """(q, c) whitened directions of residual responses; those of the last frame where nothing
