@@ -89,16 +89,20 @@ class FrameWatch:
             return self._sign
         ratio, content = matched.ratios(problem.solver, problem.nothing(), "both")
         best = int(ratio.argmax())
-        away = content[best] * _SIGNS[self._sign] < 0
+        away = self._is_wrong(content[best])
         return "both" if away and ratio[best] > _LIFTED * self._least else self._sign
 
-    def puzzled(self, fit: Fit, sign: str) -> bool:
-        """Whether touches of one ``sign`` that begin leave so much of a frame unexplained that some
-        of it may be of the other one: then there would seem to be touches all round."""
-        if sign == "both" or not len(fit.spots):
+    def puzzled(self, problem: Problem, fit: Fit, matched: Matched) -> bool:
+        """Whether touches that begin leave so much of a frame unexplained that some of it may be
+        of the sign that they do not have: then there would seem to be touches all round."""
+        if problem.sign == "both" or not len(fit.spots):
             return False
         begins = len(fit.spots) > len(self._before) or self._age < _YOUNG
-        return begins and fit.misfit - fit.degrees > (_LIFTED * self._least) ** 2
+        if not begins or fit.misfit - fit.degrees < (_LIFTED * self._least) ** 2:
+            return False
+        ratio, content = matched.ratios(problem.solver, fit, "both")
+        best = int(ratio.argmax())
+        return bool(ratio[best] > self._least and self._is_wrong(content[best]))
 
     def turns(self, both: SpotDetections, fit: Fit) -> bool:
         """Whether touches of ``both`` signs explain what those of a ``fit`` leave: some clearly are
@@ -134,7 +138,10 @@ class FrameWatch:
 
     def wrong(self, spots: FloatArray) -> NDArray[np.bool_]:
         """(k,) whether each of ``spots`` (k, 4) is not of the skin's sign."""
-        return np.asarray(spots[:, CONTENT] * _SIGNS[self._sign] < 0)
+        return np.asarray(self._is_wrong(spots[:, CONTENT]))
+
+    def _is_wrong(self, content: FloatArray) -> NDArray[np.bool_]:
+        return np.asarray(content * _SIGNS[self._sign] < 0)
 
     @property
     def problem(self) -> str | None:
