@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from run.board import pressed, samples_of
-from tomoskin.core import Frame
+from tomoskin.core import Frame, ModelError
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.skin import Skin
+from tomoskin.touch import SpotFinder
 
 NEEDED = 30
 PERIOD = 0.05
@@ -96,3 +97,41 @@ def test_ten_measurements_make_no_touch(fitted):
     assert seen(results) == []
     assert not any(result.has_image for result in results)
     assert "no picture" in said(results) or "too little is left" in said(results)
+
+
+def test_a_frame_that_the_model_fails_for_is_said_and_the_next_one_is_tried(fitted, monkeypatch):
+    run = Run(fitted, samples_of(fitted))
+    touched = samples_of(fitted, pressed(fitted, 0.03, 0.02, loss=0.4))
+    (before,) = run.show(touched, 5)[-1].touches
+
+    def fails(*_):
+        raise ModelError("expected a conductivity above 0, got -1")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(SpotFinder, "push", fails)
+        (failed,) = run.show(touched)
+    assert not failed.has_image
+    assert "nothing could be found in this frame: expected a conductivity above" in said([failed])
+    (after,) = run.show(touched)
+    assert after.has_image
+    assert [touch.id for touch in after.touches] == [before.id]
+    assert said([after]) == ""
+
+
+@pytest.mark.parametrize("angle", [0.7, 2.4])
+def test_a_press_and_a_rise_at_once_are_one_touch(fitted, angle):
+    """The stronger the press, the more touches seemed to be round the rise."""
+    press = 0.05 * np.exp(1j * angle)
+    mesh, loss = fitted.mesh, 0.35
+    x, y = mesh.centroids.T
+    sigma = np.full(len(x), fitted.skin.conductivity)
+    for place, change in ((press, -loss), (-press * np.exp(0.3j), loss)):
+        away = np.abs(x + 1j * y - place) / 0.015
+        sigma *= np.exp(change * np.exp(-(away**2)))
+    run = Run(fitted, samples_of(fitted))
+    run.show(samples_of(fitted), 20)
+    results = run.show(samples_of(fitted, sigma), 12)
+    assert all(len(result.touches) <= 1 for result in results)
+    (touch,) = results[-1].touches
+    assert np.hypot(touch.detection.x - press.real, touch.detection.y - press.imag) < 0.008
+    assert "a press had been lifted" in said(results)

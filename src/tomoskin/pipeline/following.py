@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.calibration import FrameView
-from tomoskin.core import Detection, Image, Touch
+from tomoskin.calibration import Differences, FrameView
+from tomoskin.core import Detection, Image, ModelError, Touch
 from tomoskin.pattern import Scan
 from tomoskin.pipeline.collecting import Rest
 from tomoskin.pipeline.conditioning import (
@@ -124,18 +124,33 @@ class Following:
         self._tune()
         conditioned = self._conditioning.condition(measured)
         if conditioned.differences is None:
-            touches = self._track([], measured)
-            return self._result(measured, conditioned, self._prepared.no_image, touches, {})
-        image, noise = self._imaging.push(conditioned.differences.dv, measured.time)
-        view = FrameView(measured.time, image, noise, conditioned.differences)
-        detections = self._finder.push(view)
-        for applied in self._applied.values():
-            detections = applied.locate(view, detections)
+            return self._without_touches(measured, conditioned)
+        try:
+            image, view, detections = self._found(measured.time, conditioned.differences)
+        except ModelError as error:  # the next frame may be well
+            problem = f"nothing could be found in this frame: {error}"
+            failed = replace(conditioned, differences=None, problem=problem)
+            return self._without_touches(measured, failed)
         touches = self._track(detections, measured)
         readings = self._read(view, detections, touched=bool(touches))
         untouched = not (detections or self._finder.like_touch)
         self._learn(measured.time, touched=bool(touches), noise=untouched)
         return self._result(measured, conditioned, image, touches, readings)
+
+    def _found(
+        self, time: float, differences: Differences
+    ) -> tuple[Image, FrameView, list[Detection]]:
+        image, noise = self._imaging.push(differences.dv, time)
+        view = FrameView(time, image, noise, differences)
+        detections = self._finder.push(view)
+        for applied in self._applied.values():
+            detections = applied.locate(view, detections)
+        return image, view, detections
+
+    def _without_touches(self, measured: Measured, conditioned: Conditioned) -> FrameResult:
+        """Of a frame without an image."""
+        touches = self._track([], measured)
+        return self._result(measured, conditioned, self._prepared.no_image, touches, {})
 
     def first(self, measured: Measured) -> FrameResult:
         """The frame that completed the rest: nothing shows in it."""

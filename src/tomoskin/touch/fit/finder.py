@@ -11,11 +11,12 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.core import Detection, FloatArray, IntArray, SkinError, finished
+from tomoskin.core import Detection, FloatArray, SkinError, finished
 from tomoskin.forward import ForwardModel
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
 from tomoskin.touch.fit.candidates import Candidates, Matched
+from tomoskin.touch.fit.cell_discs import CellDiscs
 from tomoskin.touch.fit.certificate import Certificate, Reduced
 from tomoskin.touch.fit.excess import Gauge
 from tomoskin.touch.fit.native import NativeSolver
@@ -26,7 +27,7 @@ from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
 from tomoskin.touch.fit.search import Search, SpotDetections, joined
 from tomoskin.touch.fit.sheet import fitting_sheet
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
-from tomoskin.touch.fit.spot import LOG_RADIUS, N_PARAMETERS, Response, depth_of
+from tomoskin.touch.fit.spot import N_PARAMETERS, Response, depth_of
 from tomoskin.touch.fit.table import ResponseTable
 from tomoskin.touch.fit.tabulate import Tabulation, kept_tabulation
 from tomoskin.touch.fit.watch import FrameWatch
@@ -206,7 +207,7 @@ class SpotFinder:
         pace: Pace = EXHAUSTIVE,
     ) -> None:
         self._model, self._settings = model, skin.touch
-        self._centroids = np.ascontiguousarray(mesh.centroids.T)
+        self._cells = CellDiscs.of(mesh)
         self._pace, self._reach, self._unrest = pace, pace.speed * scan_time, 1.0
         self._fading = math.ceil(pace.fading / scan_time) if scan_time else 0
         self._residual = ResidualResponse.none(len(model.scale))
@@ -269,8 +270,16 @@ class SpotFinder:
             left=self._left(seen),
         )
         problem = replace(problem, sign=self.watch.sign(problem, matched))
+        detected = self._sought(problem, matched)
+        if self.watch.puzzled(problem, detected.fit, matched):
+            both = self._sought(replace(problem, sign="both"), matched)
+            if self.watch.turns(both, detected.fit) and problem.favours(both.fit, detected.fit):
+                detected = both
+        return detected, matched
+
+    def _sought(self, problem: Problem, matched: Matched) -> SpotDetections:
         search = Search(problem, matched, self._settings.snr, self._most, self._pace, self._deficit)
-        return search(self._expected), matched
+        return search(self._expected)
 
     def _left(self, seen: WhitenedTable) -> FloatArray:
         """(q, c) whitened directions of residual responses; those of the last frame where nothing
@@ -295,7 +304,7 @@ class SpotFinder:
         if len(spots) != len(self._before) or not len(spots) or not self._reach:
             return 1.0, np.zeros((len(spots), 2))
         way = spots[:, :2] - self._before[:, :2]
-        moved = float(np.linalg.norm(way, axis=1).max())
+        moved = max([math.sqrt(x * x + y * y) for x, y in way.tolist()])
         unrest = min(1.0, math.hypot(_REST, moved / self._reach))
         return unrest, way if moved <= self._reach else np.zeros_like(way)
 
@@ -316,20 +325,10 @@ class SpotFinder:
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots
         depth = self._unit * np.expm1(depth_of(spots)) if len(spots) else np.zeros(0)
-        cells = self._reached(spots)
         shown = np.flatnonzero(~self.watch.wrong(spots)).tolist()
-        return [self._detection(detected, k, float(depth[k]), cells[k]) for k in shown]
+        return [self._detection(detected, k, float(depth[k])) for k in shown]
 
-    def _reached(self, spots: FloatArray) -> list[IntArray]:
-        """Cells of the image whose middles lie in each spot, or the nearest."""
-        x, y = self._centroids[:, None] - spots.T[:2, :, None]
-        square = x * x + y * y
-        limit = np.maximum(np.exp(2 * spots[:, LOG_RADIUS]), square.min(axis=1))
-        return [np.flatnonzero(row) for row in square <= limit[:, None]]
-
-    def _detection(
-        self, detected: SpotDetections, k: int, peak: float, cells: IntArray
-    ) -> Detection:
+    def _detection(self, detected: SpotDetections, k: int, peak: float) -> Detection:
         x, y, log_radius, _ = detected.fit.spots[k].tolist()
         (xx, xy), (_, yy) = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2].tolist()
         return Detection(
@@ -339,7 +338,7 @@ class SpotFinder:
             sd_y=math.sqrt(yy),
             area=math.pi * math.exp(2 * log_radius),
             peak=peak,
-            cells=cells,
+            cells=self._cells.within(x, y, math.exp(2 * log_radius)),
             cov_xy=xy,
             snr=float(detected.ratio[k]),
             close=bool(detected.close[k]),

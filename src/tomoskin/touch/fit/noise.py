@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Self
@@ -177,17 +178,23 @@ class ResidualResponse:
             if len(self.spots) and self.quiet >= frames:
                 return self.none(self.changes.shape[1])
             return replace(self, quiet=self.quiet + 1)
-        near = np.linalg.norm(self.spots[:, None, :2] - spots[:, :2], axis=2) < _STEP
-        held = near & (_STRONGER * _size(self.spots)[:, None] >= _size(spots))
-        fresh = spots[~held.any(axis=0)]
-        if not len(fresh):
+        kept = self.spots.tolist()
+        news = [not any(_holds(foot, spot) for foot in kept) for spot in spots.tolist()]
+        if not any(news):
             return self if not self.quiet else replace(self, quiet=0)
-        kept = ~near[:, ~held.any(axis=0)].any(axis=1)
+        fresh = spots[news]
+        stays = [not any(_is_near(foot, spot) for spot in fresh.tolist()) for foot in kept]
         return type(self)(
-            np.concatenate([self.spots[kept], fresh])[-_MOST:],
-            np.concatenate([self.changes[kept], changes(fresh)])[-_MOST:],
+            np.concatenate([self.spots[stays], fresh])[-_MOST:],
+            np.concatenate([self.changes[stays], changes(fresh)])[-_MOST:],
         )
 
 
-def _size(spots: FloatArray) -> FloatArray:
-    return np.abs(spots[:, CONTENT])
+def _is_near(foot: list[float], spot: list[float]) -> bool:
+    x, y = foot[0] - spot[0], foot[1] - spot[1]
+    return math.sqrt(x * x + y * y) < _STEP
+
+
+def _holds(foot: list[float], spot: list[float]) -> bool:
+    """Whether a footprint stands for a touch that is there."""
+    return _STRONGER * abs(foot[CONTENT]) >= abs(spot[CONTENT]) and _is_near(foot, spot)

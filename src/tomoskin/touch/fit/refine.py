@@ -29,6 +29,9 @@ _UNSEEN = 0.1
 _CLEAR = 1e-10
 """Part of the largest square above which an axis is one to ten digits."""
 
+_FAVOURS = math.log(200)
+"""Logarithm of the odds from which one explanation is favoured."""
+
 _EXACT = 0.1
 """Deviations by which the exact model may differ from what a fit was made with."""
 
@@ -423,3 +426,7 @@ class Problem:
     def evidence(self, fit: Fit) -> float:
         """See :meth:`Fit.log_evidence`."""
         return fit.log_evidence(self.prior)
+
+    def favours(self, one: Fit, other: Fit) -> bool:
+        """Whether the frame speaks for one explanation against another, by odds of 200."""
+        return self.evidence(one) - self.evidence(other) > _FAVOURS

@@ -13,6 +13,7 @@ from tomoskin.pattern import Pattern
 from tomoskin.touch.fit.candidates import Matched
 from tomoskin.touch.fit.excess import Channels, Excess, Gauge
 from tomoskin.touch.fit.refine import Fit, Problem, Solver
+from tomoskin.touch.fit.search import SpotDetections
 from tomoskin.touch.fit.spot import CONTENT
 
 _EXPLAINS = 0.3
@@ -26,7 +27,11 @@ _CHANCE = 6.0
 """Deviations by which the squares of a residual must be too many to be more noise."""
 
 _LIFTED = 2.0
-"""A press has been lifted where a change of the other sign stands out by so many thresholds."""
+"""A press has been lifted, or the sheet been raised, where a change of the sign that touches do not
+have stands out by so many thresholds."""
+
+_REMAINS = 0.5
+"""Part of what touches of the skin's sign leave beyond noise that may still be left with both."""
 
 _SIGNS = {"decrease": -1.0, "increase": 1.0, "both": 0.0}
 
@@ -84,8 +89,28 @@ class FrameWatch:
             return self._sign
         ratio, content = matched.ratios(problem.solver, problem.nothing(), "both")
         best = int(ratio.argmax())
-        away = content[best] * _SIGNS[self._sign] < 0
+        away = self._is_wrong(content[best])
         return "both" if away and ratio[best] > _LIFTED * self._least else self._sign
+
+    def puzzled(self, problem: Problem, fit: Fit, matched: Matched) -> bool:
+        """Whether touches that begin leave so much of a frame unexplained that some of it may be
+        of the sign that they do not have: then there would seem to be touches all round."""
+        if problem.sign == "both" or not len(fit.spots):
+            return False
+        begins = len(fit.spots) > len(self._before) or self._age < _YOUNG
+        if not begins or fit.misfit - fit.degrees < (_LIFTED * self._least) ** 2:
+            return False
+        ratio, content = matched.ratios(problem.solver, fit, "both")
+        best = int(ratio.argmax())
+        return bool(ratio[best] > self._least and self._is_wrong(content[best]))
+
+    def turns(self, both: SpotDetections, fit: Fit) -> bool:
+        """Whether touches of ``both`` signs explain what those of a ``fit`` leave: some clearly are
+        not of the skin's sign, and little is left then. Where much is, more touches come."""
+        wrong = self.wrong(both.fit.spots)
+        clear = bool((both.ratio[wrong] > _LIFTED * self._least).any())
+        left = both.fit.misfit - both.fit.degrees
+        return clear and left < _REMAINS * (fit.misfit - fit.degrees)
 
     def unexplained(self, solver: Solver, fit: Fit, matched: Matched) -> float:
         """Variance of what is left of a frame before which there was no touch for long.
@@ -113,7 +138,10 @@ class FrameWatch:
 
     def wrong(self, spots: FloatArray) -> NDArray[np.bool_]:
         """(k,) whether each of ``spots`` (k, 4) is not of the skin's sign."""
-        return np.asarray(spots[:, CONTENT] * _SIGNS[self._sign] < 0)
+        return np.asarray(self._is_wrong(spots[:, CONTENT]))
+
+    def _is_wrong(self, content: FloatArray) -> NDArray[np.bool_]:
+        return np.asarray(content * _SIGNS[self._sign] < 0)
 
     @property
     def problem(self) -> str | None:

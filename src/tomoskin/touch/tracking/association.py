@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from tomoskin.core import Detection, FloatArray
-from tomoskin.touch.tracking.motion import GATE, States, distances
-from tomoskin.touch.tracking.strength import ELSEWHERE, NOISE, TouchStrength, log_content
+from tomoskin.touch.tracking.motion import GATE, Observation, State, distance
+from tomoskin.touch.tracking.strength import ELSEWHERE, NOISE, TouchStrength
 
 _STRENGTH = 4.0
 """What a strength costs at the most, in logarithms of a likelihood: forces come and go."""
@@ -32,16 +31,23 @@ _OPEN = 6.0
 """Logarithm of the odds below which two touches may have changed places."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ExpectedTouches:
-    """Touches as they are expected: ``states`` of n, ``signs`` (n,), their ``strengths``,
-    ``odds`` (n,), logarithms, that they are there, and which stand for ``several`` (n,) fingers."""
+class ExpectedTouch(NamedTuple):
+    """A touch as it is expected: ``odds``, a logarithm, that it is there, and whether it stands for
+    ``several`` fingers."""
 
-    states: States
-    signs: FloatArray
-    strengths: Sequence[TouchStrength]
-    odds: FloatArray
-    several: NDArray[np.bool_]
+    state: State
+    sign: float
+    strength: TouchStrength
+    odds: float
+    several: bool
+
+
+class SeenDetection(NamedTuple):
+    """A detection as it is compared: ``content`` is a logarithm."""
+
+    position: Observation
+    sign: float
+    content: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,83 +63,102 @@ class Association:
 NOTHING = Association({}, frozenset(), ())
 
 
-def associate(
-    followed: ExpectedTouches, detections: Sequence[Detection], seen: tuple[FloatArray, FloatArray]
-) -> Association:
-    """The likeliest (Kuhn 1955). ``seen`` are the detections' positions and covariances.
+def associate(expected: Sequence[ExpectedTouch], seen: Sequence[SeenDetection]) -> Association:
+    """The likeliest (Kuhn 1955).
 
     A pair costs the logarithm of its likelihood: of position, strength and existence. Beyond the
     gate, and between signs, there are none. Where a detection is left over and a touch too, two of
     the touches may be seen as one in the middle of their contents.
     """
-    cost = _costs(followed, detections, seen)
+    cost = [_costs(touch, seen) for touch in expected]
     pairs = _least(cost)
     jumped: frozenset[int] = frozenset()
-    if len(pairs) < min(cost.shape) and len(cost) > 1:
-        jumps = _jumps(followed, detections, seen)
-        jumps[:, list(pairs)] = _LIMIT
-        jumps[list(pairs.values())] = _LIMIT
-        more = _least(jumps)
+    if len(pairs) < min(len(expected), len(seen)) and len(expected) > 1:
+        taken = set(pairs.values())
+        more = _least(
+            [
+                [_LIMIT] * len(seen) if i in taken else _jumps(i, expected, seen, set(pairs))
+                for i in range(len(expected))
+            ]
+        )
         pairs, jumped = pairs | more, frozenset(more.values())
     return Association(pairs, jumped, tuple(_exchanges(cost, pairs)))
 
 
-def _costs(
-    followed: ExpectedTouches, detections: Sequence[Detection], seen: tuple[FloatArray, FloatArray]
-) -> FloatArray:
-    positions, spreads = seen
-    spreads = spreads + _PARTED**2 * followed.several[:, None, None, None] * np.eye(2)
-    far = distances(followed.states, positions, spreads)
-    both = followed.states.covariance[:, None, :2, :2] + spreads
-    area = both[..., 0, 0] * both[..., 1, 1] - both[..., 0, 1] ** 2
-    contents = np.array([log_content(d) for d in detections])
-    means = np.array([s.mean for s in followed.strengths])
-    variance = np.array([s.variance for s in followed.strengths]) + NOISE**2 + ELSEWHERE**2
-    apart = (contents - means[:, None]) ** 2 / variance[:, None]
-    cost = 0.5 * far + 0.5 * np.log(area / 1e-8) + np.minimum(0.5 * apart, _STRENGTH)
-    cost += np.log1p(np.exp(-followed.odds))[:, None]
-    allowed = (far <= GATE) & (cost <= _APART) & (followed.signs[:, None] == _signs(detections))
-    return np.where(allowed, cost, _LIMIT)
+def _costs(touch: ExpectedTouch, seen: Sequence[SeenDetection]) -> list[float]:
+    """(m,) of one touch with each detection."""
+    state = touch.state
+    if touch.several:
+        state = state._replace(xx=state.xx + _PARTED**2, yy=state.yy + _PARTED**2)
+    mean, variance = touch.strength.mean, touch.strength.variance + NOISE**2 + ELSEWHERE**2
+    there = math.log1p(math.exp(-touch.odds))
+    costs = []
+    for position, sign, content in seen:
+        far, area = distance(state, position)
+        if far > GATE or sign != touch.sign:
+            costs.append(_LIMIT)
+            continue
+        apart = min(0.5 * ((content - mean) ** 2 / variance), _STRENGTH)
+        cost = 0.5 * far + 0.5 * math.log(area / 1e-8) + apart + there
+        costs.append(cost if cost <= _APART else _LIMIT)
+    return costs
 
 
 def _jumps(
-    followed: ExpectedTouches, detections: Sequence[Detection], seen: tuple[FloatArray, FloatArray]
-) -> FloatArray:
-    """(n, m) what it costs that a touch and another one are seen together."""
-    contents = np.exp([s.mean for s in followed.strengths])
-    share = (contents[:, None] / (contents[:, None] + contents))[..., None]
-    x, spread = followed.states.mean[:, :2], followed.states.covariance[:, :2, :2]
-    middle = share * x[:, None] + (1 - share) * x
-    weights = share[..., None]
-    both = weights**2 * spread[:, None] + (1 - weights) ** 2 * spread
-    n, m = len(x), len(detections)
-    states = States(middle.reshape(-1, 2), both.reshape(-1, 2, 2))
-    far = distances(states, *seen).reshape(n, n, m)
-    signs = followed.signs
-    apart = signs[:, None] != signs
-    far[apart | np.eye(n, dtype=bool)] = np.inf
-    far[signs[:, None, None] != _signs(detections) + np.zeros((n, n, 1))] = np.inf
-    nearest = far.min(axis=1)
-    # the stronger one goes on
-    return np.where(nearest <= GATE, _JUMP + 0.5 * nearest - np.log(contents)[:, None] / 8, _LIMIT)
+    own: int, expected: Sequence[ExpectedTouch], seen: Sequence[SeenDetection], taken: set[int]
+) -> list[float]:
+    """(m,) what it costs that a touch, the ``own``, and another one are seen together, by each
+    detection that is not ``taken``."""
+    touch = expected[own]
+    others = [
+        _between(touch, other)
+        for number, other in enumerate(expected)
+        if number != own and other.sign == touch.sign
+    ]
+    costs = []
+    for number, (position, sign, _) in enumerate(seen):
+        nearest = math.inf
+        if number not in taken and sign == touch.sign:
+            nearest = min((distance(state, position)[0] for state in others), default=math.inf)
+        # the stronger one goes on
+        cost = _JUMP + 0.5 * nearest - touch.strength.mean / 8
+        costs.append(cost if nearest <= GATE else _LIMIT)
+    return costs
 
 
-def _signs(detections: Sequence[Detection]) -> FloatArray:
-    return np.sign([d.peak for d in detections])
+def _between(one: ExpectedTouch, other: ExpectedTouch) -> State:
+    """Where the middle of their contents is; its velocity is not needed."""
+    share = 1 / (1 + math.exp(other.strength.mean - one.strength.mean))
+    rest = 1 - share
+    a, b = one.state, other.state
+    return a._replace(
+        x=share * a.x + rest * b.x,
+        y=share * a.y + rest * b.y,
+        xx=share**2 * a.xx + rest**2 * b.xx,
+        xy=share**2 * a.xy + rest**2 * b.xy,
+        yy=share**2 * a.yy + rest**2 * b.yy,
+    )
 
 
-def _least(cost: FloatArray) -> dict[int, int]:
+def _least(cost: Sequence[Sequence[float]]) -> dict[int, int]:
+    """{column: row} of the pairs whose sum is the least."""
+    allowed = [(i, k) for i, row in enumerate(cost) for k, c in enumerate(row) if c < _LIMIT]
+    pairs = {column: row for row, column in allowed}
+    if len({row for row, _ in allowed}) == len(pairs) == len(allowed):
+        return pairs  # nobody competes
     rows, columns = linear_sum_assignment(cost)
-    pairs = zip(rows.tolist(), columns.tolist(), strict=True)
-    return {column: row for row, column in pairs if cost[row, column] < _LIMIT}
+    found = zip(rows.tolist(), columns.tolist(), strict=True)
+    return {column: row for row, column in found if cost[row][column] < _LIMIT}
 
 
-def _exchanges(cost: FloatArray, pairs: dict[int, int]) -> list[tuple[int, int, float]]:
+def _exchanges(
+    cost: Sequence[Sequence[float]], pairs: dict[int, int]
+) -> list[tuple[int, int, float]]:
     found = list(pairs.items())
     open_ones = []
     for number, (a, i) in enumerate(found):
         for b, k in found[:number]:
-            odds = cost[i, a] + cost[k, b] - cost[i, b] - cost[k, a]
-            if odds > -_OPEN and cost[i, b] < _LIMIT and cost[k, a] < _LIMIT:
-                open_ones.append((i, k, float(min(odds, 0.0))))
+            odds = cost[i][a] + cost[k][b] - cost[i][b] - cost[k][a]
+            if odds > -_OPEN and cost[i][b] < _LIMIT and cost[k][a] < _LIMIT:
+                open_ones.append((i, k, min(odds, 0.0)))
     return open_ones

@@ -6,10 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from tomoskin.core import Detection, FloatArray
-from tomoskin.touch.tracking.motion import States
+from tomoskin.core import Detection
+from tomoskin.touch.tracking.motion import State
 from tomoskin.touch.tracking.strength import NOISE, TouchStrength, log_content
 
 # Chosen on the moving plant, seeds 1 to 3 (docs/touch.md).
@@ -50,9 +48,9 @@ _SWERVE = 0.001
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alone:
-    """A touch as it was when last seen by itself, at the device's ``time`` s: one row of states."""
+    """A touch as it was when last seen by itself, at the device's ``time`` s."""
 
-    states: States
+    state: State
     strength: TouchStrength
     time: float
 
@@ -68,14 +66,19 @@ class MergedFinger:
 def met(lost: Alone, other: Alone, detection: Detection) -> float:
     """What a ``detection`` of the ``other`` says for its being both, log likelihood ratio."""
     share = 1 / (1 + math.exp(lost.strength.mean - other.strength.mean))
-    one, two = other.states, lost.states
-    middle = share * one.mean[0, :2] + (1 - share) * two.mean[0, :2]
-    spread = share**2 * one.covariance[0] + (1 - share) ** 2 * two.covariance[0]
-    position = np.array([detection.x, detection.y])
-    noise = np.array([[detection.sd_x**2, detection.cov_xy], [detection.cov_xy, detection.sd_y**2]])
-    noise = np.where(np.isfinite(noise), noise, 0.0) + _OFF**2 * np.eye(2)
-    there = _normal(position - middle, spread[:2, :2] + noise)
-    alone = _normal(position - one.mean[0, :2], one.covariance[0, :2, :2] + noise)
+    rest, one, two = 1 - share, other.state, lost.state
+    xx, xy, yy = (
+        value if math.isfinite(value) else 0.0
+        for value in (detection.sd_x**2, detection.cov_xy, detection.sd_y**2)
+    )
+    xx, yy = xx + _OFF**2, yy + _OFF**2
+    spread = [
+        share**2 * a + rest**2 * b + noise
+        for a, b, noise in ((one.xx, two.xx, xx), (one.xy, two.xy, xy), (one.yy, two.yy, yy))
+    ]
+    middle = share * one.x + rest * two.x, share * one.y + rest * two.y
+    there = _normal(detection.x - middle[0], detection.y - middle[1], *spread)
+    alone = _normal(detection.x - one.x, detection.y - one.y, one.xx + xx, one.xy + xy, one.yy + yy)
     content = grown(detection, other.strength, lost.strength)
     return min(max(there - alone + content, _LEAST), _MOST)
 
@@ -88,10 +91,12 @@ def grown(detection: Detection, alone: TouchStrength, more: TouchStrength) -> fl
 
 def meeting(lost: Alone, other: Alone, evidence: float, *, close: bool) -> float:
     """Log odds that two have met, and not one been lifted, after the ``evidence`` of frames."""
-    away = lost.states.mean[0, :2] - other.states.mean[0, :2]
-    near = -0.5 * float(away @ away) / _RESOLUTION**2
-    closing = -float(away @ (lost.states.mean[0, 2:] - other.states.mean[0, 2:]))
-    comes = closing > _CLOSING * math.sqrt(float(away @ away))
+    a, b = lost.state, other.state
+    x, y = a.x - b.x, a.y - b.y
+    square = x * x + y * y
+    near = -0.5 * square / _RESOLUTION**2
+    closing = -(x * (a.u - b.u) + y * (a.v - b.v))
+    comes = closing > _CLOSING * math.sqrt(square)
     return (_MEETS if comes else _STANDS) + near + evidence + _CLOSE * close
 
 
@@ -109,46 +114,50 @@ def shrunk(before: TouchStrength, left: TouchStrength, branch: TouchStrength) ->
     return min(max(odds, 2 * _LEAST), _MOST)
 
 
-def crossing(one: MergedFinger, other: MergedFinger, apart: FloatArray, time: float) -> float:
-    """Log odds that two members have come out the other way round than ``apart`` (2,) m, the way
-    from the other to the one, at a ``time`` s."""
+def crossing(
+    one: MergedFinger, other: MergedFinger, apart: tuple[float, float], time: float
+) -> float:
+    """Log odds that two members have come out the other way round than ``apart`` m, the way from
+    the other to the one, at a ``time`` s."""
     if one.alone is None or other.alone is None:
         return 0.0
-    return _way(one.alone, other.alone, -apart, time) - _way(one.alone, other.alone, apart, time)
+    x, y = apart
+    turned = _way(one.alone, other.alone, (-x, -y), time)
+    return turned - _way(one.alone, other.alone, apart, time)
 
 
-def _way(one: Alone, other: Alone, apart: FloatArray, time: float) -> float:
+def _way(one: Alone, other: Alone, apart: tuple[float, float], time: float) -> float:
     """Log likelihood of two that went in being so far apart by now."""
-    offset = np.zeros(4)
-    spread = np.zeros((4, 4))
+    xx = yy = 2 * _OFF**2
+    offset_x = offset_y = xy = 0.0
     for alone, sign in ((one, 1.0), (other, -1.0)):
-        since = max(time - alone.time, 0.0)
-        step = np.eye(4)
-        step[[0, 1], [2, 3]] = since
-        offset += sign * step @ alone.states.mean[0]
-        spread += step @ alone.states.covariance[0] @ step.T
-        spread[[0, 1], [0, 1]] += _SWERVE * since**3 / 3
-    went_in = one.states.mean[0, :2] - other.states.mean[0, :2]
-    ways = (
-        (_COURSE, apart - offset[:2], spread[:2, :2] + 2 * _OFF**2 * np.eye(2)),
-        (_BACK, apart - went_in, 2 * _ASIDE**2 * np.eye(2)),
-        (_ANY, apart, 2 * _ANYWHERE**2 * np.eye(2)),
+        since, state = max(time - alone.time, 0.0), alone.state
+        offset_x += sign * (state.x + since * state.u)
+        offset_y += sign * (state.y + since * state.v)
+        swerve = _SWERVE * since**3 / 3
+        xx += state.xx + 2 * since * state.xu + since**2 * state.uu + swerve
+        yy += state.yy + 2 * since * state.yv + since**2 * state.vv + swerve
+        xy += state.xy + since * (state.xv + state.yu) + since**2 * state.uv
+    x, y = apart
+    went_x, went_y = one.state.x - other.state.x, one.state.y - other.state.y
+    aside, anywhere = 2 * _ASIDE**2, 2 * _ANYWHERE**2
+    return math.log(
+        _COURSE * math.exp(_normal(x - offset_x, y - offset_y, xx, xy, yy))
+        + _BACK * math.exp(_normal(x - went_x, y - went_y, aside, 0.0, aside))
+        + _ANY * math.exp(_normal(x, y, anywhere, 0.0, anywhere))
     )
-    return math.log(sum(part * math.exp(_normal(away, wide)) for part, away, wide in ways))
 
 
 def reach_of(members: Sequence[MergedFinger]) -> float:
     """The largest distance between members when they were last alone, m."""
-    places = np.array([m.alone.states.mean[0, :2] for m in members if m.alone]).reshape(-1, 2)
-    return float(np.linalg.norm(places[:, None] - places, axis=2).max(initial=0.0))
+    states = [m.alone.state for m in members if m.alone]
+    return max((math.hypot(a.x - b.x, a.y - b.y) for a in states for b in states), default=0.0)
 
 
-def _normal(away: FloatArray, spread: FloatArray) -> float:
-    """Log density, 1/m²."""
-    (xx, xy), (_, yy) = spread.tolist()
-    x, y = away.tolist()
+def _normal(x: float, y: float, xx: float, xy: float, yy: float) -> float:
+    """Log density, 1/m², so far from the middle."""
     area = xx * yy - xy * xy
-    return float(-0.5 * ((yy * x * x - 2 * xy * x * y + xx * y * y) / area + math.log(area)))
+    return -0.5 * ((yy * x * x - 2 * xy * x * y + xx * y * y) / area + math.log(area))
 
 
 def _log_density(value: float, strength: TouchStrength) -> float:

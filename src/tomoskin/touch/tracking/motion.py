@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
-import numpy as np
-
-from tomoskin.core import Detection, FloatArray
+from tomoskin.core import Detection
 
 HELD = 0.6
 """Part of the signal-to-noise ratio of an onset above which a touch goes on: between the two it
@@ -56,87 +54,128 @@ _UNKNOWN = 0.004
 """Deviation of a detection whose noise is unknown, m."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class States:
-    """``mean`` (n, 4) m and m/s, ``covariance`` (n, 4, 4)."""
+class State(NamedTuple):
+    """Position ``x``, ``y`` m and velocity ``u``, ``v`` m/s of a touch, and their covariances.
 
-    mean: FloatArray
-    covariance: FloatArray
+    Plain numbers: a handful of touches is quicker without arrays.
+    """
+
+    x: float
+    y: float
+    u: float
+    v: float
+    xx: float
+    xy: float
+    yy: float
+    xu: float
+    xv: float
+    yu: float
+    yv: float
+    uu: float
+    uv: float
+    vv: float
 
 
-def predict(states: States, seconds: float, settings: TrackSettings) -> States:
-    """States after some seconds without a detection."""
+class Observation(NamedTuple):
+    """Position of a detection, m, and its covariance, m², wandering included."""
+
+    x: float
+    y: float
+    xx: float
+    xy: float
+    yy: float
+
+
+def predict(state: State, seconds: float, settings: TrackSettings) -> State:
+    """The state after some seconds without a detection."""
     if not seconds > 0:
-        return states
-    step, noise = _step(seconds, settings)
-    return States(states.mean @ step.T, step @ states.covariance @ step.T + noise)
+        return state
+    b, a, there, cross, moving = _step(seconds, settings)
+    x, y, u, v, xx, xy, yy, xu, xv, yu, yv, uu, uv, vv = state
+    bb, aa = b * b, a * a
+    return State(
+        x + b * u,
+        y + b * v,
+        a * u,
+        a * v,
+        xx + 2 * b * xu + bb * uu + there,
+        xy + b * (xv + yu) + bb * uv,
+        yy + 2 * b * yv + bb * vv + there,
+        a * (xu + b * uu) + cross,
+        a * (xv + b * uv),
+        a * (yu + b * uv),
+        a * (yv + b * vv) + cross,
+        aa * uu + moving,
+        aa * uv,
+        aa * vv + moving,
+    )
 
 
-def begin(detection: FloatArray, spread: FloatArray, settings: TrackSettings) -> States:
-    """State of a touch that is seen for the first time: ``detection`` (2,), ``spread`` (2, 2)."""
-    covariance = np.zeros((1, 4, 4))
-    covariance[0, :2, :2] = spread
-    covariance[0, (2, 3), (2, 3)] = settings.speed**2
-    return States(np.concatenate([detection, [0.0, 0.0]])[None], covariance)
+def begin(seen: Observation, settings: TrackSettings) -> State:
+    """State of a touch that is seen for the first time."""
+    power = settings.speed**2
+    x, y, xx, xy, yy = seen
+    return State(x, y, 0.0, 0.0, xx, xy, yy, 0.0, 0.0, 0.0, 0.0, power, 0.0, power)
 
 
-def update(states: States, positions: FloatArray, spreads: FloatArray) -> States:
-    """States after one detection each: ``positions`` (n, 2) with covariances (n, 2, 2)."""
-    cross = states.covariance[:, :, :2]
-    gain = cross @ _inverse(cross[:, :2] + spreads)
-    away = (positions - states.mean[:, :2])[:, :, None]
-    mean = states.mean + (gain @ away)[:, :, 0]
-    covariance = states.covariance - gain @ cross.transpose(0, 2, 1)
-    return States(mean, 0.5 * (covariance + covariance.transpose(0, 2, 1)))
+def update(state: State, seen: Observation) -> State:
+    """The state after one detection."""
+    x, y, u, v, xx, xy, yy, xu, xv, yu, yv, uu, uv, vv = state
+    sxx, sxy, syy = xx + seen.xx, xy + seen.xy, yy + seen.yy
+    area = sxx * syy - sxy * sxy
+    ixx, ixy, iyy = syy / area, -sxy / area, sxx / area
+    # of each number, how much it follows the detection along x and along y
+    x_x, x_y = xx * ixx + xy * ixy, xx * ixy + xy * iyy
+    y_x, y_y = xy * ixx + yy * ixy, xy * ixy + yy * iyy
+    u_x, u_y = xu * ixx + yu * ixy, xu * ixy + yu * iyy
+    v_x, v_y = xv * ixx + yv * ixy, xv * ixy + yv * iyy
+    dx, dy = seen.x - x, seen.y - y
+    return State(
+        x + x_x * dx + x_y * dy,
+        y + y_x * dx + y_y * dy,
+        u + u_x * dx + u_y * dy,
+        v + v_x * dx + v_y * dy,
+        xx - x_x * xx - x_y * xy,
+        xy - x_x * xy - x_y * yy,
+        yy - y_x * xy - y_y * yy,
+        xu - x_x * xu - x_y * yu,
+        xv - x_x * xv - x_y * yv,
+        yu - y_x * xu - y_y * yu,
+        yv - y_x * xv - y_y * yv,
+        uu - u_x * xu - u_y * yu,
+        uv - u_x * xv - u_y * yv,
+        vv - v_x * xv - v_y * yv,
+    )
 
 
-def distances(states: States, positions: FloatArray, spreads: FloatArray) -> FloatArray:
-    """(n, m) squared Mahalanobis distances of m detections from n states."""
-    away = positions - states.mean[:, None, :2]
-    both = states.covariance[:, None, :2, :2] + spreads
-    xx, xy, yy = both[..., 0, 0], both[..., 0, 1], both[..., 1, 1]
-    dx, dy = away[..., 0], away[..., 1]
-    return np.asarray((yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
+def distance(state: State, seen: Observation) -> tuple[float, float]:
+    """Squared Mahalanobis distance of a detection from a state, and the determinant of the
+    covariance of both, m⁴."""
+    xx, xy, yy = state.xx + seen.xx, state.xy + seen.xy, state.yy + seen.yy
+    dx, dy = seen.x - state.x, seen.y - state.y
+    area = xx * yy - xy * xy
+    return (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / area, area
 
 
-def observe(
-    detections: Sequence[Detection], settings: TrackSettings
-) -> tuple[FloatArray, FloatArray]:
-    """Positions (m, 2) of detections and their covariances (m, 2, 2), wandering included."""
-    positions = np.array([(r.x, r.y) for r in detections]).reshape(-1, 2)
-    spreads = np.array([_spread(r, settings) for r in detections]).reshape(-1, 2, 2)
-    return positions, spreads
-
-
-def _spread(detection: Detection, settings: TrackSettings) -> tuple[float, float, float, float]:
+def observe(detection: Detection, settings: TrackSettings) -> Observation:
+    """Position of a detection and its covariance."""
     more, unknown = settings.wander**2, _UNKNOWN**2
     xx, yy, xy = detection.sd_x**2, detection.sd_y**2, detection.cov_xy
     if not (math.isfinite(xx + yy + xy) and xx * yy > xy * xy):
         xx, yy, xy = unknown, unknown, 0.0
-    return xx + more, xy, xy, yy + more
-
-
-def _inverse(pairs: FloatArray) -> FloatArray:
-    """Of symmetric (n, 2, 2): ten times as fast as a library's for a handful of them."""
-    xx, xy, yy = pairs[:, 0, 0], pairs[:, 0, 1], pairs[:, 1, 1]
-    turned = np.array([[yy, -xy], [-xy, xx]]) / (xx * yy - xy * xy)
-    return np.asarray(turned.transpose(2, 0, 1))
+    return Observation(detection.x, detection.y, xx + more, xy, yy + more)
 
 
 @lru_cache(maxsize=8)
-def _step(seconds: float, settings: TrackSettings) -> tuple[FloatArray, FloatArray]:
-    """Transition and noise (4, 4) each over some ``seconds``."""
+def _step(seconds: float, settings: TrackSettings) -> tuple[float, float, float, float, float]:
+    """Over some ``seconds``: how far a speed leads, and what is left of it; variance of the
+    position along each axis, its covariance with the speed, and the speed's variance."""
     tau, power = settings.turning, settings.speed**2
     u = seconds / tau
     a = math.exp(-u)
     there = power * tau**2 * (2 * u - 3 + 4 * a - a * a)
     cross, moving = power * tau * (1 - a) ** 2, power * (1 - a * a)
-    step, noise = np.zeros((4, 4)), np.zeros((4, 4))
-    for axis in (0, 1):
-        step[axis, axis], step[axis, axis + 2], step[axis + 2, axis + 2] = 1.0, tau * (1 - a), a
-        noise[axis, axis], noise[axis + 2, axis + 2] = there, moving
-        noise[axis, axis + 2] = noise[axis + 2, axis] = cross
-    return step, noise
+    return tau * (1 - a), a, there, cross, moving
 
 
 def region_radius(detection: Detection) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from tomoskin.core import Detection
 from tomoskin.touch.tracking.merging import Alone, MergedFinger
-from tomoskin.touch.tracking.motion import States, region_radius
+from tomoskin.touch.tracking.motion import State, region_radius
 from tomoskin.touch.tracking.position import Position
 from tomoskin.touch.tracking.strength import TouchStrength
 
@@ -35,8 +35,8 @@ class Trace:
 
     Attributes
     ----------
-    detection, states, strength
-        Newest detection; position and velocity, one row; how strong it is.
+    detection, state, strength
+        Newest detection; position and velocity; how strong it is.
     since, host_since
         Device and host time of its first frame, s.
     odds
@@ -63,7 +63,7 @@ class Trace:
     """
 
     detection: Detection
-    states: States
+    state: State
     since: float
     host_since: float
     odds: float
@@ -111,7 +111,7 @@ class Trace:
 
     def alone(self, time: float) -> Alone:
         """As it is now."""
-        return Alone(self.states, self.strength, time)
+        return Alone(self.state, self.strength, time)
 
     def see(self, detection: Detection, time: float, seconds: float, *, still: bool) -> None:
         """Take the detection of this frame, ``seconds`` after the frame before; ``still``: the last
@@ -135,7 +135,7 @@ class Trace:
 
     def become(self, other: Trace) -> None:
         """Go on from where ``other`` is."""
-        self.detection, self.states, self.strong = other.detection, other.states, other.strong
+        self.detection, self.state, self.strong = other.detection, other.state, other.strong
         self.held, self.strength, self.odds = other.held, other.strength, other.odds
         self.missing, self.low = other.missing, None
         self._step()
@@ -147,18 +147,15 @@ class Trace:
 
     def _step(self) -> None:
         x, y, size = self.detection.x, self.detection.y, size_of(self.detection)
-        last = self.footprints[-1] if self.footprints else None
-        if last is None or (x - last.x) ** 2 + (y - last.y) ** 2 >= _STEP**2:
-            last = Footprint(x, y, size)
-            self.footprints.append(last)
-            del self.footprints[:-_MOST_FOOTPRINTS]
-        elif size > last.top:
-            last.top = size
-        self.top = last.top
-        if len(self.footprints) > 1:
-            reach = max(region_radius(self.detection), _STEP) ** 2
-            near = (f.top for f in self.footprints if (f.x - x) ** 2 + (f.y - y) ** 2 <= reach)
-            self.top = max(near, default=last.top)
+        feet = self.footprints
+        if not feet or (x - feet[-1].x) ** 2 + (y - feet[-1].y) ** 2 >= _STEP**2:
+            feet.append(Footprint(x, y, size))
+            del feet[:-_MOST_FOOTPRINTS]
+        elif size > feet[-1].top:
+            feet[-1].top = size
+        reach = max(region_radius(self.detection), _STEP) ** 2
+        near = [foot.top for foot in feet if (foot.x - x) ** 2 + (foot.y - y) ** 2 <= reach]
+        self.top = max(near, default=feet[-1].top)
 
 
 def size_of(detection: Detection) -> float:
