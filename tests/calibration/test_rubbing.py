@@ -13,7 +13,7 @@ from tomoskin import ForwardModel, Pattern, Skin
 from tomoskin.calibration import Rubbing
 from tomoskin.core import DataError
 
-TOUCHES = 300
+TOUCHES = 200
 
 
 @cache
@@ -24,9 +24,7 @@ def skin() -> Skin:
 @cache
 def jacobian() -> Floats:
     sheet = skin()
-    model = ForwardModel(
-        sheet.mesh(), sheet.pattern(), contact_impedance=sheet.contact_impedance
-    )
+    model = ForwardModel(sheet.mesh(), sheet.pattern(), contact_impedance=sheet.contact_impedance)
     return model.jacobian(sheet.conductivity)
 
 
@@ -64,7 +62,7 @@ def test_a_locator_learns_from_them_and_is_honest() -> None:
     asked, xy = touches(200, 1)
     answer, covariance = rubbed().locator().predict(asked)
     assert np.linalg.norm(answer - xy, axis=1).mean() < 0.012
-    assert 0.85 < held(answer - xy, covariance)
+    assert held(answer - xy, covariance) > 0.85
 
 
 def test_labels_are_kept_and_a_turned_skin_contradicts_them() -> None:
@@ -87,12 +85,6 @@ def test_half_of_the_skin_is_not_spread_over_all_of_it() -> None:
     assert found.quiet
     with pytest.raises(DataError, match=r"no touch came near .*E7.*: rub all of the skin"):
         found.locator()
-
-
-def test_two_hands_at_once_are_seen() -> None:
-    dv = touches(TOUCHES, 3)[0]
-    dv[::4] += touches(TOUCHES, 4)[0][::4]
-    assert Rubbing.of(dv, skin()).strange > 2 * rubbed().strange
 
 
 def test_rows_in_another_order_are_not_this_skin() -> None:
@@ -119,7 +111,7 @@ def test_what_cannot_be_learnt_from_is_refused() -> None:
 @pytest.mark.data
 def test_a_real_skin_that_no_setting_was_chosen_on(data_dir: Path) -> None:
     with np.load(data_dir / "eskin_varsens16" / "concentric.npz") as kept:
-        order = np.random.default_rng(31).permutation(len(kept["dv"]))[:300]
+        order = np.random.default_rng(31).permutation(len(kept["dv"]))[:250]
         dv, xy = kept["dv"][order].astype(float), 1e-3 * kept["xy_mm"][order]
         pattern = Pattern.from_tables(kept["inj"], kept["meas"])
     disc = Skin.load("textile-disc-16").altered(

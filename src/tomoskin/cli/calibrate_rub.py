@@ -59,9 +59,7 @@ def calibrate_rub(
         typer.echo(_line(facts))
 
 
-def _touched(
-    data: Recording, dv: FloatArray, reference: str | None, pattern: Pattern
-) -> IntArray:
+def _touched(data: Recording, dv: FloatArray, reference: str | None, pattern: Pattern) -> IntArray:
     """Frames whose changes stand out of the untouched frames' noise; all where none is known."""
     import numpy as np
 
@@ -87,7 +85,6 @@ def _facts(found: Rubbing, touched: int) -> dict[str, Any]:
         "labelled": int((deviation == 0).sum()),
         "deviation_mm": 1e3 * float(np.median(deviation[deviation > 0])),
         "alike": found.alike,
-        "fit_no_single_touch": found.strange,
     }
 
 

@@ -19,8 +19,8 @@ from tomoskin.touch import Region
 
 _POSITIONS = 400
 _LENGTHS, _LEVELLED = (0.3, 0.45), (0.0, 1.0)
-"""Length scales of what is added to the prior responses, in radii, and parts of each frame's own level that are taken
-out: what all fits agree on does not rest on either."""
+"""Length scales, in radii, of what is added to the prior responses, and parts of each frame's own
+level that are taken out: what all fits agree on does not rest on either."""
 
 _ROUNDS = 20
 _KEPT = (150.0, 5.0)
@@ -164,7 +164,7 @@ class _Fit:
     misfit: FloatArray
 
 
-def _fitted(
+def _fitted(  # noqa: PLR0917
     sizes: FloatArray,
     expected: FloatArray,
     grid: FloatArray,
