@@ -123,7 +123,8 @@ class Rubbing:
         dv, xy = dv[chosen], xy[chosen]
         labelled = np.isfinite(xy).all(axis=1)
         alone = UnlabelledFit.of(dv, skin, pattern, region, np.full(xy.shape, np.nan))
-        far = np.linalg.norm(alone.positions - region.scaled(xy), axis=1) > _CONTRADICTED
+        away: FloatArray = np.linalg.norm(alone.positions - region.scaled(xy), axis=1)
+        far = np.asarray(away > _CONTRADICTED)
         fit = alone
         if labelled.any() and not far[labelled].any():
             fit = UnlabelledFit.of(dv, skin, pattern, region, region.scaled(xy))
