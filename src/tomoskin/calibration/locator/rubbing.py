@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.calibration.kind import Progress, silent
 from tomoskin.calibration.locator.locator import Locator
+from tomoskin.calibration.locator.posterior import BoolArray
 from tomoskin.calibration.locator.presses import Presses, frames
 from tomoskin.calibration.locator.unlabelled import UnlabelledFit
 from tomoskin.core import DataError, FloatArray, IntArray
@@ -121,7 +122,7 @@ class Rubbing:
         Presses.of_more(dv[given], xy[given]).within(region)
         chosen = _evenly(len(dv), given)
         dv, xy = dv[chosen], xy[chosen]
-        labelled = np.isfinite(xy).all(axis=1)
+        labelled: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
         alone = UnlabelledFit.of(dv, skin, pattern, region, np.full(xy.shape, np.nan))
         away: FloatArray = np.linalg.norm(alone.positions - region.scaled(xy), axis=1)
         far = np.asarray(away > _CONTRADICTED)
