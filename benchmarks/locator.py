@@ -200,8 +200,8 @@ def _another_session(data: Path) -> Report:
         for count in (0, 5, 10, 20, 50):
             some = new.at(slice(count))
             both = locator.updated(some.dv, some.xy) if count else locator
-            alone = _mean(some.learnt(), asked) if count > 5 else "–"
-            rows.append((before, count, _mean(both, asked), alone))
+            alone = mean_error(some.learnt(), asked) if count > 5 else "–"
+            rows.append((before, count, mean_error(both, asked), alone))
     return Report(
         "an old calibration in another session, mean error in mm",
         ("calibrated on", "presses of the other session", "added to the old", "alone"),
@@ -247,18 +247,18 @@ def _transferred(old: Set, new: Set, seed: int) -> tuple[float, ...]:
     known = [locator]
     for alignment in (none, ten):
         known.append(locator.aligned(alignment) if alignment.holds else locator)
-    scores = [(_mean(one, asked), _held(one, asked)) for one in known]
+    scores = [(mean_error(one, asked), held(one, asked)) for one in known]
     return (float(none.holds), *(figure for score in scores for figure in score))
 
 
-def _held(locator: Locator, asked: Set) -> float:
+def held(locator: Locator, asked: Set) -> float:
     told, covariance = locator.predict(asked.dv)
     error = told - asked.xy
     solved = np.linalg.solve(covariance, error[:, :, None])[:, :, 0]
     return float(((error * solved).sum(axis=1) < 4.605).mean())
 
 
-def _mean(locator: Locator, asked: Set) -> float:
+def mean_error(locator: Locator, asked: Set) -> float:
     return round(float(_missed(locator.predict(asked.dv)[0], asked).mean()), 2)
 
 
@@ -351,7 +351,7 @@ def _of(known: Set, asked: Set) -> Score:
         _missed(told, asked),
         _missed(_plain(known.dv, known.xy, asked.dv), asked),
         _missed(Watch(locator)(asked.dv)[0], asked),
-        _held(locator, asked),
+        held(locator, asked),
         fit,
         1e3 * taken,
     )

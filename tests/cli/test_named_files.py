@@ -62,6 +62,7 @@ CASES = {
     ),
     ("states", "out"): Case("states {presses} --calibration {states} --out {out}", ".csv"),
     ("calibrate touch", "out"): Case("calibrate touch {presses} --out {out}", ".npz"),
+    ("calibrate rub", "out"): Case("calibrate rub {presses} --skin {skin} --out {out}", ".npz"),
     ("calibrate states", "out"): Case(
         "calibrate states {presses} --state a=0:8 --state b=8:16 --out {out}", ".npz"
     ),

@@ -29,6 +29,7 @@ from tomoskin.calibration.kind import (
 )
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
+from tomoskin.calibration.locator.rubbing import Rubbing
 from tomoskin.calibration.locator.session import SessionAlignment
 from tomoskin.calibration.locator.watch import Watch
 from tomoskin.calibration.several import Several
@@ -88,6 +89,7 @@ __all__ = [
     "MaterialFit",
     "PressedSpots",
     "Presses",
+    "Rubbing",
     "SessionAlignment",
     "Several",
     "TouchFit",

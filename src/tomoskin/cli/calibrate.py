@@ -11,6 +11,7 @@ import typer
 from tomoskin.cli.app import group
 from tomoskin.cli.calibrate_bend import calibrate_bend
 from tomoskin.cli.calibrate_force import calibrate_force
+from tomoskin.cli.calibrate_rub import calibrate_rub
 from tomoskin.cli.calibrate_states import calibrate_states
 from tomoskin.cli.calibrate_wiring import calibrate_wiring
 from tomoskin.cli.named_files import ForceFlag, Reads
@@ -35,6 +36,7 @@ _DRIFTED = 2.0
 
 app.command("bend")(calibrate_bend)
 app.command("force")(calibrate_force)
+app.command("rub")(calibrate_rub)
 app.command("states")(calibrate_states)
 app.command("wiring")(calibrate_wiring)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
+from tomoskin.calibration.kind import Progress, silent
 from tomoskin.calibration.locator.posterior import FEW, Estimates, widening
 from tomoskin.calibration.locator.presses import (
     Features,
@@ -36,9 +36,6 @@ from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
 from tomoskin.touch import Region
 
-Advance = Callable[[float, float], None]
-"""Told how much of how much is done."""
-
 _STEPS = 4
 
 _COARSE = 600
@@ -63,10 +60,6 @@ def _bounded(covariance: FloatArray) -> FloatArray:
     """Covariances (n, 2, 2), none larger than not knowing the place."""
     size = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 2)
     return np.asarray(covariance * np.minimum(_WIDEST / size, 1.0)[:, None, None] ** 2)
-
-
-def _silent(_done: float, _total: float) -> None:
-    pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +106,7 @@ class Locator:
         pattern: Pattern | None = None,
         skin: Skin | None = None,
         strength: ArrayLike | None = None,
-        progress: Advance = _silent,
+        progress: Progress = silent,
     ) -> Self:
         """Learn from presses.
 
@@ -151,7 +144,7 @@ class Locator:
         region: Region,
         pattern: Pattern | None = None,
         skin_id: str = "",
-        progress: Advance = _silent,
+        progress: Progress = silent,
     ) -> Self:
         """Learn from checked presses in a region, of a pattern and a skin where they are known."""
         with threadpool_limits(1):  # many small products: more threads only wait for each other
@@ -163,7 +156,7 @@ class Locator:
         presses: Presses,
         region: Region,
         origin: tuple[Pattern | None, str],
-        progress: Advance,
+        progress: Progress,
         like: Locator | None = None,
     ) -> Self:
         positions = region.scaled(presses.xy)
@@ -248,7 +241,7 @@ class Locator:
         """
         return self.estimates(self.features(frames(dv, self.presses.dv.shape[1])))[2]
 
-    def aligned(self, alignment: SessionAlignment, progress: Advance = _silent) -> Self:
+    def aligned(self, alignment: SessionAlignment, progress: Progress = silent) -> Self:
         """Locator that has learnt from the frames of an alignment, with their labels.
 
         Where that is not needed, the labels that were given are added to its own.
@@ -284,9 +277,9 @@ class Locator:
         keep = len(presses) <= _GROWN * self.settled and not changed
         like = self if keep else None
         with threadpool_limits(1):
-            return self._learnt(presses, region, (self.pattern, self.skin_id), _silent, like)
+            return self._learnt(presses, region, (self.pattern, self.skin_id), silent, like)
 
-    def settled_anew(self, progress: Advance = _silent) -> Self:
+    def settled_anew(self, progress: Progress = silent) -> Self:
         """Locator with the same presses, every setting learnt from all of them."""
         if self.settled == len(self.presses):
             return self

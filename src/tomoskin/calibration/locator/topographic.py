@@ -43,13 +43,19 @@ class TopographicMap:
     A frame is Gaussian about the response of its position; positions are those of a grid, all as
     likely. ``values`` (g, m) of a basis on the grid, ``coefficients`` (m, k) of the responses,
     ``variance`` (k,) of the noise, ``power`` to which a frame's likelihood is raised: features err
-    together.
+    together. ``offset`` (g, k): responses that the basis' are added to.
     """
 
     values: FloatArray
     coefficients: FloatArray
     variance: FloatArray
     power: float
+    offset: FloatArray | float = 0.0
+
+    @property
+    def answers(self) -> FloatArray:
+        """(g, k) responses at the grid's positions."""
+        return np.asarray(self.offset + self.values @ self.coefficients)
 
     @property
     def noise(self) -> float:
@@ -59,8 +65,7 @@ class TopographicMap:
     def posterior(self, features: FloatArray) -> FloatArray:
         """(n, g) probabilities of the grid's positions for features (n, k)."""
         scale = 1 / np.sqrt(self.variance)
-        answers = self.values @ self.coefficients
-        misfit = squared_distances(features * scale, answers * scale)
+        misfit = squared_distances(features * scale, self.answers * scale)
         weight = np.exp(-0.5 * self.power * (misfit - misfit.min(axis=1, keepdims=True)))
         return np.asarray(weight / weight.sum(axis=1, keepdims=True))
 
@@ -86,20 +91,34 @@ class TopographicMap:
             weights = fit.posterior(features)
             weights = balanced(weights) if everywhere else weights
             weights[some] = np.eye(len(self.values))[named[some]]
-            fit = fit._renewed(features, weights, self.coefficients)
+            fit = fit.renewed(features, weights, self.coefficients, _KEPT, _LEAST)
             noise = fit.noise
             fit = replace(fit, variance=fit.variance * (self.noise / noise))
         return fit, noise
 
-    def _renewed(self, features: FloatArray, weights: FloatArray, kept: FloatArray) -> Self:
-        count = weights.sum(axis=0)[:, None]
+    def renewed(
+        self, features: FloatArray, weights: FloatArray, kept: FloatArray, keep: float, least: float
+    ) -> Self:
+        """With the responses of frames at positions, one step of the maximisation.
+
+        Parameters
+        ----------
+        features, weights
+            (n, k), and (n, g) how much each frame counts at each position.
+        kept, keep
+            (m, k) coefficients of the prior responses, and their weight in frames.
+        least
+            Variance that the noise has at least.
+        """
+        count, frames = weights.sum(axis=0)[:, None], weights.sum(axis=1)
         pull = weights.T @ features
-        normal = (self.values * count).T @ self.values + _KEPT * np.eye(self.values.shape[1])
-        coefficients = np.linalg.solve(normal, self.values.T @ pull + _KEPT * kept)
-        answers = self.values @ coefficients
-        left = (features**2).sum(axis=0) - 2 * (pull * answers).sum(axis=0)
-        variance = (left + (count * answers**2).sum(axis=0)) / len(features)
-        return replace(self, coefficients=coefficients, variance=np.maximum(variance, _LEAST))
+        normal = (self.values * count).T @ self.values + keep * np.eye(self.values.shape[1])
+        beyond = pull - count * self.offset
+        coefficients = np.linalg.solve(normal, self.values.T @ beyond + keep * kept)
+        answers = self.offset + self.values @ coefficients
+        left = frames @ features**2 - 2 * (pull * answers).sum(axis=0)
+        variance = (left + (count * answers**2).sum(axis=0)) / frames.sum()
+        return replace(self, coefficients=coefficients, variance=np.maximum(variance, least))
 
     def tempered(self, grown: float) -> Self:
         """With likelihoods of less weight where the noise has ``grown``."""

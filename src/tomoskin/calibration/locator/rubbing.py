@@ -1,0 +1,198 @@
+"""A calibration from touches everywhere, without labels: rubbed, not pressed at known positions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from threadpoolctl import threadpool_limits
+
+from tomoskin.calibration.kind import Progress, silent
+from tomoskin.calibration.locator.locator import Locator
+from tomoskin.calibration.locator.posterior import BoolArray
+from tomoskin.calibration.locator.presses import Presses, frames
+from tomoskin.calibration.locator.unlabelled import UnlabelledFit
+from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.pattern import Pattern
+from tomoskin.skin import Skin
+from tomoskin.touch import Region
+
+_FEWEST, _MOST = 150, 800
+"""Touches that are needed, and that are used: spread evenly over those that were made."""
+
+_ALIGNED, _UNSURE = 0.15, 1.2
+"""Deviation, in radii, of labels on a sheet that is nothing like the model, less on one
+that is; and how many times as far as the fits disagree labels may be off. Chosen on two skins."""
+
+_ALIKE = 0.27
+"""Correlation with the skin's own responses below which the data are not of this skin."""
+
+_QUIET = 3.0
+"""An electrode that no touch came near answers in its largest answers less than so many times as
+strongly as usual, by itself times as a part of the frame: 1.8 to 2.6 there, 3.4 and more elsewhere
+on the twin and a hydrogel; touches on half of a patterned skin may pass."""
+
+_NEAR = 0.95
+_CONTRADICTED = 0.5
+"""Way in radii by which a label may differ from where the touch is found without labels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rubbing:
+    """Touches everywhere on a skin, and where they were; made by :meth:`of`.
+
+    Attributes
+    ----------
+    skin, pattern
+        What was touched, and what was measured.
+    presses
+        The touches that are used, with the positions that were found and their covariance.
+    disagreement
+        m by which fits that assume different things differ (root mean square).
+    alike
+        Correlation of the data with what the skin's model expects.
+    quiet
+        Electrodes, from 0, that no touch came near.
+    contradicted
+        Labelled frames that are found far from their label.
+    """
+
+    skin: Skin
+    pattern: Pattern
+    presses: Presses
+    disagreement: float
+    alike: float
+    quiet: tuple[int, ...]
+    contradicted: tuple[int, ...]
+
+    @classmethod
+    def of(
+        cls,
+        dv: ArrayLike,
+        skin: Skin,
+        xy: ArrayLike | None = None,
+        *,
+        pattern: Pattern | None = None,
+    ) -> Self:
+        """Find where the touches were.
+
+        Parameters
+        ----------
+        dv
+            (n, n_meas) touched frame minus untouched frame, one touch each, in any one unit; NaN
+            is missing.
+        skin
+            Its outline, and where its electrodes are.
+        xy
+            (n, 2) m, NaN where a touch has no label; None: no touch has one.
+        pattern
+            What was measured, where that is not the skin's own pattern.
+
+        Raises
+        ------
+        DataError
+            For fewer than 150 touches, arrays that do not belong together, labels outside the
+            skin, and electrodes that the skin does not have.
+        """
+        table = pattern or skin.pattern()
+        if table.n_electrodes != skin.pattern().n_electrodes:
+            raise DataError(
+                f"the pattern has {table.n_electrodes} electrodes, the skin "
+                f"{skin.pattern().n_electrodes}",
+                hint="name the skin that was rubbed: --skin",
+            )
+        data = frames(dv, table.n_meas)
+        labels = np.full((len(data), 2), np.nan) if xy is None else np.asarray(xy, dtype=float)
+        if labels.shape != (len(data), 2):
+            raise DataError(f"expected xy of shape ({len(data)}, 2), got {labels.shape}")
+        if len(data) < _FEWEST:
+            raise DataError(
+                f"expected at least {_FEWEST} touches, got {len(data)}",
+                hint="rub all of the skin with one finger for a minute",
+            )
+        with threadpool_limits(1):
+            return cls._of(data, labels, skin, table)
+
+    @classmethod
+    def _of(cls, dv: FloatArray, xy: FloatArray, skin: Skin, pattern: Pattern) -> Self:
+        region = Region.of(skin)
+        given = np.flatnonzero(np.isfinite(xy).all(axis=1))
+        Presses.of_more(dv[given], xy[given]).within(region)
+        chosen = _evenly(len(dv), given)
+        dv, xy = dv[chosen], xy[chosen]
+        labelled: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
+        alone = UnlabelledFit.of(dv, skin, pattern, region, np.full(xy.shape, np.nan))
+        away: FloatArray = np.linalg.norm(alone.positions - region.scaled(xy), axis=1)
+        far = np.asarray(away > _CONTRADICTED)
+        fit = alone
+        if labelled.any() and not far[labelled].any():
+            fit = UnlabelledFit.of(dv, skin, pattern, region, region.scaled(xy))
+        aside = _ALIGNED * (1 - alone.alike)
+        doubt = aside**2 + (_UNSURE * fit.disagreement) ** 2
+        spread = region.unit**2 * (fit.spread + doubt * np.eye(2))
+        spread[labelled] = 0.0
+        position = np.where(labelled[:, None], xy, region.metres(fit.positions))
+        return cls(
+            skin,
+            pattern,
+            Presses.of(dv, position, spread=spread),
+            region.unit * fit.disagreement,
+            alone.alike,
+            _quiet(np.abs(dv), pattern),
+            tuple(chosen[far & labelled].tolist()),
+        )
+
+    @property
+    def holds(self) -> bool:
+        """Whether the positions can be believed."""
+        return not (self.alike < _ALIKE or self.quiet or self.contradicted)
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What speaks against the positions and what would mend it, in words."""
+        found = []
+        if self.alike < _ALIKE:
+            found.append(
+                "the changes are not as this skin's electrodes should see them: another pattern, "
+                "another skin, or wires that are swapped (tomoskin calibrate wiring)"
+            )
+        if self.quiet:
+            names = ", ".join(f"E{e + 1}" for e in self.quiet)
+            found.append(f"no touch came near {names}: rub all of the skin, out to its rim")
+        if self.contradicted:
+            shown = ", ".join(map(str, self.contradicted[:10]))
+            found.append(
+                f"labels of frames {shown} contradict where the touches are found without labels: "
+                "look at the labels, and at [electrodes] first and order of the skin file"
+            )
+        return tuple(found)
+
+    def locator(self, progress: Progress = silent) -> Locator:
+        """A locator that has learnt from the touches. Raises DataError where they do not hold."""
+        if not self.holds:
+            raise DataError("; ".join(self.findings))
+        region = Region.of(self.skin)
+        return Locator.learn(self.presses, region, self.pattern, self.skin.identity, progress)
+
+
+def _evenly(n: int, given: IntArray) -> IntArray:
+    """Numbers of the touches that are used: labelled ones, and as many others as are needed."""
+    return np.union1d(given, np.linspace(0, n - 1, min(n, _MOST)).astype(int))
+
+
+def _quiet(sizes: FloatArray, pattern: Pattern) -> tuple[int, ...]:
+    """Electrodes whose measurements hardly ever answer more strongly than usual.
+
+    Neither by themselves nor as a part of the frame: the gain of an electrode does not matter.
+    """
+    activity = np.column_stack(
+        [
+            np.nanmean(sizes[:, (pattern.measure == electrode).any(axis=1)], axis=1)
+            for electrode in np.unique(pattern.measure)
+        ]
+    )
+    part = activity / activity.sum(axis=1, keepdims=True)
+    above = [np.nanquantile(x, _NEAR, axis=0) / np.nanmedian(x, axis=0) for x in (activity, part)]
+    return tuple(np.unique(pattern.measure)[above[0] * above[1] < _QUIET].tolist())

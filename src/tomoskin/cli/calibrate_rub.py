@@ -1,0 +1,97 @@
+"""``tomoskin calibrate rub``: learn where touches are from touches everywhere, without labels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from tomoskin.cli.choices import skin_for_file
+from tomoskin.cli.named_files import ForceFlag
+from tomoskin.cli.options import CalibrationOut, LabelledArgument, ReferenceOption, SkinOption
+from tomoskin.cli.output import Bar, JsonFlag, emit
+from tomoskin.cli.recording import changes, idle_frames, say_notes
+from tomoskin.core import DataError
+
+if TYPE_CHECKING:
+    from tomoskin.calibration import Rubbing
+    from tomoskin.core import FloatArray, IntArray
+    from tomoskin.pattern import Pattern
+    from tomoskin.signal import Recording
+
+_STANDS_OUT = 4.0
+"""Root mean square of a frame's changes, in noise deviations, from which it shows a touch."""
+
+
+def calibrate_rub(
+    recording: LabelledArgument,
+    out: CalibrationOut,
+    skin: SkinOption = None,
+    reference: ReferenceOption = None,
+    force: ForceFlag = False,
+    json: JsonFlag = False,
+) -> None:
+    """Learn where a touch is from one finger that rubs all of the skin, without labels.
+
+    The skin file says where the electrodes are. Frames with a label are used as such: five help.
+    """
+    from tomoskin.calibration import TOUCH, Rubbing
+    from tomoskin.formats import read_recording
+
+    data = read_recording(recording)
+    say_notes(data)
+    rubbed = skin_for_file(skin, recording)
+    pattern = rubbed.pattern()
+    data = data.in_order_of(pattern)
+    dv = changes(data, reference, pattern)
+    frames = _touched(data, dv, reference, pattern)
+    xy = None if data.labels is None else data.labels[frames]
+    with Bar("learning") as bar:
+        found = Rubbing.of(dv[frames], rubbed, xy)
+        if not found.holds:
+            raise DataError("; ".join(found.findings), where=str(recording))
+        locator = found.locator(bar)
+    TOUCH.of(locator, pattern, rubbed).write(out, overwrite=force)
+    facts = _facts(found, len(frames))
+    if json:
+        emit(facts)
+    else:
+        typer.echo(_line(facts))
+
+
+def _touched(data: Recording, dv: FloatArray, reference: str | None, pattern: Pattern) -> IntArray:
+    """Frames whose changes stand out of the untouched frames' noise; all where none is known."""
+    import numpy as np
+
+    from tomoskin.signal import Reference
+
+    idle = idle_frames(data, reference, pattern)
+    if idle is None or isinstance(idle, str):
+        return np.arange(len(dv))
+    rest = Reference.of(idle.real.astype(float))
+    if not (rest.noise_is_known and (rest.noise > 0).all()):
+        return np.arange(len(dv))
+    return np.flatnonzero(np.sqrt(np.nanmean((dv / rest.noise) ** 2, axis=1)) > _STANDS_OUT)
+
+
+def _facts(found: Rubbing, touched: int) -> dict[str, Any]:
+    import numpy as np
+
+    spread = found.presses.spreads
+    deviation = np.sqrt(np.trace(spread, axis1=1, axis2=2) / 2)
+    return {
+        "touched_frames": touched,
+        "used": len(found.presses),
+        "labelled": int((deviation == 0).sum()),
+        "deviation_mm": 1e3 * float(np.median(deviation[deviation > 0])),
+        "alike": found.alike,
+    }
+
+
+def _line(facts: dict[str, Any]) -> str:
+    return (
+        f"{facts['touched_frames']} frames with a touch, {facts['used']} used, "
+        f"{facts['labelled']} of them labelled; positions are uncertain by about "
+        f"{facts['deviation_mm']:.1f} mm in each direction, and a few labelled presses make them "
+        "better"
+    )
