@@ -67,6 +67,8 @@ def test_every_panel_looks_right(browser, site, prepared, size):
     assert not wrong
     assert watched.wrong == []
     assert sheets == [sheets[0]] * len(sheets), "a drawer moves the sheet"
+    if size[0] > size[1]:
+        assert sheets[0]["width"] > 0.6 * size[0]
 
 
 def under_the_top_line(watched):
@@ -74,8 +76,6 @@ def under_the_top_line(watched):
     sheet = watched.test_id("sheet").bounding_box()
     top = watched.page.locator("header").first.bounding_box()
     return sheet | {"y": round(sheet["y"] - top["y"] - top["height"], 2)}
-    if size[0] > size[1]:
-        assert sheets[0]["width"] > 0.6 * size[0]
 
 
 def test_what_matters_is_large(opened):

@@ -23,7 +23,7 @@ from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.records import FrameResult, Measured
 from tomoskin.pipeline.tune import Steps, tune, tuned_sheet
 from tomoskin.signal import Reference
-from tomoskin.touch import EXHAUSTIVE, Pace, SlideCorrection, TouchEvent, Tracker
+from tomoskin.touch import EXHAUSTIVE, FingerTracker, Pace, Tracker
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,9 +69,8 @@ class Following:
             prepared = tuned_sheet(prepared, reference, excluded)  # they are applied once
         self.rest, self._setting = rest, setting
         self._prepared, self._conditioning = prepared, conditioning
-        self._tracker = tracker
-        self._slides = SlideCorrection(prepared.skin.touch.slide_lag)
-        self._imaging = self._new_imaging(reference)
+        self._tracker = FingerTracker(tracker, prepared.skin.touch.slide_lag)
+        self._imaging = _imaging(conditioning, rest, reference)
         self._finder: Finder = finding(prepared, reference, setting.pace)
         conditions = Fitting(prepared, reference)
         self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
@@ -131,7 +130,7 @@ class Following:
             problem = f"nothing could be found in this frame: {error}"
             failed = replace(conditioned, differences=None, problem=problem)
             return self._without_touches(measured, failed)
-        touches = self._track(detections, measured)
+        touches = self._tracker.update(detections, measured.time, measured.host_time)
         readings = self._read(view, detections, touched=bool(touches))
         untouched = not (detections or self._finder.like_touch)
         self._learn(measured.time, touched=bool(touches), noise=untouched)
@@ -149,7 +148,7 @@ class Following:
 
     def _without_touches(self, measured: Measured, conditioned: Conditioned) -> FrameResult:
         """Of a frame without an image."""
-        touches = self._track([], measured)
+        touches = self._tracker.update([], measured.time, measured.host_time)
         return self._result(measured, conditioned, self._prepared.no_image, touches, {})
 
     def first(self, measured: Measured) -> FrameResult:
@@ -160,21 +159,6 @@ class Following:
             self._conditioning.mean,
             self._tracker.events,
             self._conditioning.state,
-        )
-
-    def _track(self, detections: list[Detection], measured: Measured) -> tuple[Touch, ...]:
-        """Touches of a frame, where the fingers are."""
-        tracked = self._tracker.update(detections, measured.time, measured.host_time)
-        if not self._tracker.settings.still:
-            self._slides = self._slides.after(tracked, measured.time)
-        return tuple(map(self._slides.of_finger, tracked))
-
-    @property
-    def _events(self) -> tuple[TouchEvent, ...]:
-        """What happened in the newest frame, where the fingers are."""
-        return tuple(
-            replace(event, touch=self._slides.of_finger(event.touch))
-            for event in self._tracker.events
         )
 
     def _read(
@@ -213,17 +197,12 @@ class Following:
         before, self._prepared = self._prepared, prepared
         self._conditioning.renew(prepared)
         reference = self._conditioning.reference
-        self._imaging = self._new_imaging(reference)
+        self._imaging = _imaging(self._conditioning, self.rest, reference)
         now = self._conditioning.prepared
         if prepared.spots is before.spots:
             self._finder.renew(now, reference)
         else:
             self._finder = finding(now, reference, self._setting.pace)
-
-    def _new_imaging(self, reference: Reference | None) -> SingleFrame | Filtered:
-        conditioning = self._conditioning
-        interval = np.nan if self.rest is None else self.rest.interval
-        return imaging(conditioning.prepared, reference, interval, conditioning.subspace())
 
     def _result(
         self,
@@ -244,9 +223,16 @@ class Following:
             reference=self._conditioning.mean,
             touches=touches,
             left_out=conditioned.n_excluded,
-            events=self._events,
+            events=self._tracker.events,
             health=conditioned.health,
             baseline=self._conditioning.state,
             readings=readings,
             unexplained=conditioned.problem or (shows and self._finder.problem) or None,
         )
+
+
+def _imaging(
+    conditioning: Conditioning, rest: Rest | None, reference: Reference | None
+) -> SingleFrame | Filtered:
+    interval = np.nan if rest is None else rest.interval
+    return imaging(conditioning.prepared, reference, interval, conditioning.subspace())

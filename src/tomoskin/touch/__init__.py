@@ -11,7 +11,7 @@ from tomoskin.touch.fit.pace import EXHAUSTIVE, LIVE, Pace
 from tomoskin.touch.fit.spot import Response, Spots, spots_of
 from tomoskin.touch.region import Region
 from tomoskin.touch.segment import ImageNoise, Segmenter
-from tomoskin.touch.sliding import SlideCorrection
+from tomoskin.touch.sliding import FingerTracker, SlideCorrection
 from tomoskin.touch.spans import Span, touch_spans
 from tomoskin.touch.table import (
     ELAPSED,
@@ -32,6 +32,7 @@ __all__ = [
     "LIVE",
     "STILL",
     "Demand",
+    "FingerTracker",
     "ImageNoise",
     "Pace",
     "Region",

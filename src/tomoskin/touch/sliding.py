@@ -13,7 +13,8 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.core import FloatArray, Touch
+from tomoskin.core import Detection, FloatArray, Touch
+from tomoskin.touch.tracking import TouchEvent, Tracker
 
 # Chosen on the twin's seeds 1 to 3 (docs/touch.md).
 
@@ -73,6 +74,28 @@ class SlideCorrection:
         since = time - _WINDOW
         kept = tuple(row for row in before if row[0] >= since)
         return (*kept, (time, touch.detection.x, touch.detection.y))
+
+
+class FingerTracker:
+    """A tracker whose touches are where the fingers are; what is held still is not moved."""
+
+    def __init__(self, tracker: Tracker, lag: float) -> None:
+        self._tracker, self._slides = tracker, SlideCorrection(lag)
+
+    @property
+    def events(self) -> tuple[TouchEvent, ...]:
+        """What happened in the newest frame."""
+        finger = self._slides.of_finger
+        return tuple(replace(e, touch=finger(e.touch)) for e in self._tracker.events)
+
+    def update(
+        self, detections: Sequence[Detection], time: float, host_time: float
+    ) -> tuple[Touch, ...]:
+        """Touches of the next frame; see :meth:`Tracker.update`."""
+        tracked = self._tracker.update(detections, time, host_time)
+        if not self._tracker.settings.still:
+            self._slides = self._slides.after(tracked, time)
+        return tuple(map(self._slides.of_finger, tracked))
 
 
 def _heading(course: FloatArray) -> FloatArray:

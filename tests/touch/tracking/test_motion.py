@@ -8,21 +8,21 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 
 from tomoskin.core import FloatArray
 from tomoskin.touch import TrackSettings
-from tomoskin.touch.tracking.motion import State, begin, distance, observe, predict, update
+from tomoskin.touch.tracking.motion import TrackState, begin, distance, observe, predict, update
 from touch.tracking.detections import detection
 
 SETTINGS = TrackSettings()
 
 
-def state() -> State:
+def state() -> TrackState:
     return begin(observe(detection(0.01, -0.02), SETTINGS), SETTINGS)
 
 
-def mean(state: State) -> FloatArray:
+def mean(state: TrackState) -> FloatArray:
     return np.array(state[:4])
 
 
-def covariance(state: State) -> FloatArray:
+def covariance(state: TrackState) -> FloatArray:
     """(4, 4) in the order x, y, u, v."""
     s = state
     rows = [[s.xx, s.xy, s.xu, s.xv], [s.xy, s.yy, s.yu, s.yv]]
@@ -30,7 +30,7 @@ def covariance(state: State) -> FloatArray:
     return np.array(rows)
 
 
-def moved() -> State:
+def moved() -> TrackState:
     """One whose covariance has no zeros."""
     turned = observe(detection(0.012, -0.021, sd_x=0.004, cov_xy=2e-6), SETTINGS)
     return predict(update(predict(state(), 0.1, SETTINGS), turned), 0.2, SETTINGS)
@@ -46,7 +46,7 @@ def test_noise_is_that_of_the_stochastic_equation(seconds: float) -> None:
     both = expm(block)
     step = both[2:, 2:].T
     grown = step @ both[:2, 2:]
-    known = State(0.0, 0.0, 0.1, 0.0, *np.zeros(10).tolist())
+    known = TrackState(0.0, 0.0, 0.1, 0.0, *np.zeros(10).tolist())
     got = predict(known, seconds, SETTINGS)
     assert mean(got)[[0, 2]] == pytest.approx(step @ [0, 0.1])
     assert covariance(got)[np.ix_([0, 2], [0, 2])] == pytest.approx(grown, rel=1e-6)

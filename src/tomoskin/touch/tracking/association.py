@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from scipy.optimize import linear_sum_assignment
 
-from tomoskin.touch.tracking.motion import GATE, Observation, State, distance
+from tomoskin.touch.tracking.motion import GATE, TrackObservation, TrackState, distance
 from tomoskin.touch.tracking.strength import ELSEWHERE, NOISE, TouchStrength
 
 _STRENGTH = 4.0
@@ -35,7 +35,7 @@ class ExpectedTouch(NamedTuple):
     """A touch as it is expected: ``odds``, a logarithm, that it is there, and whether it stands for
     ``several`` fingers."""
 
-    state: State
+    state: TrackState
     sign: float
     strength: TouchStrength
     odds: float
@@ -45,7 +45,7 @@ class ExpectedTouch(NamedTuple):
 class SeenDetection(NamedTuple):
     """A detection as it is compared: ``content`` is a logarithm."""
 
-    position: Observation
+    position: TrackObservation
     sign: float
     content: float
 
@@ -126,7 +126,7 @@ def _jumps(
     return costs
 
 
-def _between(one: ExpectedTouch, other: ExpectedTouch) -> State:
+def _between(one: ExpectedTouch, other: ExpectedTouch) -> TrackState:
     """Where the middle of their contents is; its velocity is not needed."""
     share = 1 / (1 + math.exp(other.strength.mean - one.strength.mean))
     rest = 1 - share

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Clock:
+class TrackClock:
     """The moment of a frame.
 
     Attributes
@@ -26,10 +26,10 @@ class Clock:
     host: float = 0.0
     device: float | None = None
 
-    def at(self, device: float, host: float) -> Clock:
+    def at(self, device: float, host: float) -> TrackClock:
         """The moment of the next frame: where the device's time does not go on, as when a board
         starts again, the host's counts."""
         passed = 0.0
         if self.device is not None:
             passed = device - self.device if device > self.device else max(host - self.host, 0.0)
-        return Clock(self.now + passed, passed, host, device)
+        return TrackClock(self.now + passed, passed, host, device)

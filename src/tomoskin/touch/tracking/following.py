@@ -16,8 +16,15 @@ from tomoskin.touch.tracking.association import (
     SeenDetection,
     associate,
 )
-from tomoskin.touch.tracking.clock import Clock
-from tomoskin.touch.tracking.motion import State, TrackSettings, begin, observe, predict, update
+from tomoskin.touch.tracking.clock import TrackClock
+from tomoskin.touch.tracking.motion import (
+    TrackSettings,
+    TrackState,
+    begin,
+    observe,
+    predict,
+    update,
+)
 from tomoskin.touch.tracking.strength import log_content
 from tomoskin.touch.tracking.trace import Trace, sign_of
 
@@ -26,7 +33,7 @@ _PAUSE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frame:
+class FrameOfTouches:
     """What a finder has seen.
 
     Attributes
@@ -46,25 +53,29 @@ class Frame:
     detections: Sequence[Detection]
     seen: Sequence[SeenDetection]
     strongest: float
-    clock: Clock
+    clock: TrackClock
     settings: TrackSettings
 
     @classmethod
-    def of(cls, detections: Sequence[Detection], clock: Clock, settings: TrackSettings) -> Self:
+    def of(
+        cls, detections: Sequence[Detection], clock: TrackClock, settings: TrackSettings
+    ) -> Self:
         """Of detections in any order."""
         seen = [SeenDetection(observe(d, settings), sign_of(d), log_content(d)) for d in detections]
         strongest = max([d.snr for d in detections if not math.isnan(d.snr)], default=0.0)
         return cls(detections, seen, strongest, clock, settings)
 
 
-def expected(traces: Sequence[Trace], frame: Frame) -> list[State]:
+def expected(traces: Sequence[Trace], frame: FrameOfTouches) -> list[TrackState]:
     """Where each touch is expected."""
     settings = frame.settings
     moving = 0.0 if settings.still else min(frame.clock.passed, _PAUSE)
     return [predict(trace.state, moving, settings) for trace in traces]
 
 
-def pairs_of(traces: Sequence[Trace], states: Sequence[State], frame: Frame) -> Association:
+def pairs_of(
+    traces: Sequence[Trace], states: Sequence[TrackState], frame: FrameOfTouches
+) -> Association:
     """Which detection is of which touch."""
     if not traces or not frame.seen:
         return NOTHING
@@ -76,7 +87,7 @@ def pairs_of(traces: Sequence[Trace], states: Sequence[State], frame: Frame) -> 
 
 
 def miss(
-    traces: Sequence[Trace], states: Sequence[State], found: Association, frame: Frame
+    traces: Sequence[Trace], states: Sequence[TrackState], found: Association, frame: FrameOfTouches
 ) -> None:
     """Of those that no detection is of: they are where they are expected."""
     paired, clock = set(found.pairs.values()), frame.clock
@@ -94,7 +105,9 @@ def miss(
         )
 
 
-def see(traces: Sequence[Trace], states: Sequence[State], found: Association, frame: Frame) -> None:
+def see(
+    traces: Sequence[Trace], states: Sequence[TrackState], found: Association, frame: FrameOfTouches
+) -> None:
     """Of those that a detection is of."""
     settings, clock = frame.settings, frame.clock
     reported = sum(trace.reported for trace in traces)

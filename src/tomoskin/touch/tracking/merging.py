@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tomoskin.core import Detection
-from tomoskin.touch.tracking.motion import State
+from tomoskin.touch.tracking.motion import TrackState
 from tomoskin.touch.tracking.strength import NOISE, TouchStrength, log_content
 
 # Chosen on the moving plant, seeds 1 to 3 (docs/touch.md).
@@ -50,7 +50,7 @@ _SWERVE = 0.001
 class Alone:
     """A touch as it was when last seen by itself, at the device's ``time`` s."""
 
-    state: State
+    state: TrackState
     strength: TouchStrength
     time: float
 

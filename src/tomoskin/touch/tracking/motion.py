@@ -54,7 +54,7 @@ _UNKNOWN = 0.004
 """Deviation of a detection whose noise is unknown, m."""
 
 
-class State(NamedTuple):
+class TrackState(NamedTuple):
     """Position ``x``, ``y`` m and velocity ``u``, ``v`` m/s of a touch, and their covariances.
 
     Plain numbers: a handful of touches is quicker without arrays.
@@ -76,7 +76,7 @@ class State(NamedTuple):
     vv: float
 
 
-class Observation(NamedTuple):
+class TrackObservation(NamedTuple):
     """Position of a detection, m, and its covariance, m², wandering included."""
 
     x: float
@@ -86,14 +86,14 @@ class Observation(NamedTuple):
     yy: float
 
 
-def predict(state: State, seconds: float, settings: TrackSettings) -> State:
+def predict(state: TrackState, seconds: float, settings: TrackSettings) -> TrackState:
     """The state after some seconds without a detection."""
     if not seconds > 0:
         return state
     b, a, there, cross, moving = _step(seconds, settings)
     x, y, u, v, xx, xy, yy, xu, xv, yu, yv, uu, uv, vv = state
     bb, aa = b * b, a * a
-    return State(
+    return TrackState(
         x + b * u,
         y + b * v,
         a * u,
@@ -111,14 +111,14 @@ def predict(state: State, seconds: float, settings: TrackSettings) -> State:
     )
 
 
-def begin(seen: Observation, settings: TrackSettings) -> State:
+def begin(seen: TrackObservation, settings: TrackSettings) -> TrackState:
     """State of a touch that is seen for the first time."""
     power = settings.speed**2
     x, y, xx, xy, yy = seen
-    return State(x, y, 0.0, 0.0, xx, xy, yy, 0.0, 0.0, 0.0, 0.0, power, 0.0, power)
+    return TrackState(x, y, 0.0, 0.0, xx, xy, yy, 0.0, 0.0, 0.0, 0.0, power, 0.0, power)
 
 
-def update(state: State, seen: Observation) -> State:
+def update(state: TrackState, seen: TrackObservation) -> TrackState:
     """The state after one detection."""
     x, y, u, v, xx, xy, yy, xu, xv, yu, yv, uu, uv, vv = state
     sxx, sxy, syy = xx + seen.xx, xy + seen.xy, yy + seen.yy
@@ -130,7 +130,7 @@ def update(state: State, seen: Observation) -> State:
     u_x, u_y = xu * ixx + yu * ixy, xu * ixy + yu * iyy
     v_x, v_y = xv * ixx + yv * ixy, xv * ixy + yv * iyy
     dx, dy = seen.x - x, seen.y - y
-    return State(
+    return TrackState(
         x + x_x * dx + x_y * dy,
         y + y_x * dx + y_y * dy,
         u + u_x * dx + u_y * dy,
@@ -148,7 +148,7 @@ def update(state: State, seen: Observation) -> State:
     )
 
 
-def distance(state: State, seen: Observation) -> tuple[float, float]:
+def distance(state: TrackState, seen: TrackObservation) -> tuple[float, float]:
     """Squared Mahalanobis distance of a detection from a state, and the determinant of the
     covariance of both, m⁴."""
     xx, xy, yy = state.xx + seen.xx, state.xy + seen.xy, state.yy + seen.yy
@@ -157,13 +157,13 @@ def distance(state: State, seen: Observation) -> tuple[float, float]:
     return (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / area, area
 
 
-def observe(detection: Detection, settings: TrackSettings) -> Observation:
+def observe(detection: Detection, settings: TrackSettings) -> TrackObservation:
     """Position of a detection and its covariance."""
     more, unknown = settings.wander**2, _UNKNOWN**2
     xx, yy, xy = detection.sd_x**2, detection.sd_y**2, detection.cov_xy
     if not (math.isfinite(xx + yy + xy) and xx * yy > xy * xy):
         xx, yy, xy = unknown, unknown, 0.0
-    return Observation(detection.x, detection.y, xx + more, xy, yy + more)
+    return TrackObservation(detection.x, detection.y, xx + more, xy, yy + more)
 
 
 @lru_cache(maxsize=8)

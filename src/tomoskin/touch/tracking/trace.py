@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from tomoskin.core import Detection
 from tomoskin.touch.tracking.merging import Alone, MergedFinger
-from tomoskin.touch.tracking.motion import State, region_radius
+from tomoskin.touch.tracking.motion import TrackState, region_radius
 from tomoskin.touch.tracking.position import Position
 from tomoskin.touch.tracking.strength import TouchStrength
 
@@ -63,7 +63,7 @@ class Trace:
     """
 
     detection: Detection
-    state: State
+    state: TrackState
     since: float
     host_since: float
     odds: float

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from tomoskin.core import Detection, Touch
 from tomoskin.touch.tracking import existence
-from tomoskin.touch.tracking.clock import Clock
+from tomoskin.touch.tracking.clock import TrackClock
 from tomoskin.touch.tracking.event import Happening, TouchEvent
-from tomoskin.touch.tracking.following import Frame, expected, miss, pairs_of, see
+from tomoskin.touch.tracking.following import FrameOfTouches, expected, miss, pairs_of, see
 from tomoskin.touch.tracking.ledger import IdentityLedger
 from tomoskin.touch.tracking.meetings import divide, merge, met_by, origin_of, weigh_meetings
 from tomoskin.touch.tracking.merging import Alone, MergedFinger
@@ -30,7 +30,7 @@ class Tracker:
         self.settings = settings or TrackSettings()
         self.events: tuple[TouchEvent, ...] = ()
         self._residuals = ResidualResponses(self.settings.least_snr)
-        self._clock = Clock()
+        self._clock = TrackClock()
         self._happened: list[TouchEvent] = []
         self._keys = 0
         self._traces: list[Trace] = []
@@ -58,7 +58,7 @@ class Tracker:
             detections = [detection for detection in detections if not detection.weak]
             self._residuals.forget()
         if detections or self._traces:
-            self._follow(Frame.of(detections, self._clock, self.settings))
+            self._follow(FrameOfTouches.of(detections, self._clock, self.settings))
         self._residuals.note(self._clock.now, quiet=not detections)
         touches = self._touches()
         self.events, self._happened = tuple(self._happened), []
@@ -76,9 +76,9 @@ class Tracker:
         self._ledger.forget()
         self._residuals.forget()
         self.events = ()
-        self._clock = Clock()
+        self._clock = TrackClock()
 
-    def _follow(self, frame: Frame) -> None:
+    def _follow(self, frame: FrameOfTouches) -> None:
         """One frame: who is where, who has begun, ended, met and parted."""
         traces, now = list(self._traces), self._clock.now
         states = expected(traces, frame)
@@ -89,7 +89,9 @@ class Tracker:
         see(traces, states, found, frame)
         weigh_meetings(traces)
         for index, detection in enumerate(frame.detections):
-            if index not in found.pairs and self._may_begin(detection):
+            if index in found.pairs or detection.weak or detection.snr < self.settings.snr:
+                continue
+            if not self._residuals.explain(detection, now, self._traces):
                 self._begin(index, frame, merged)
         for i, k, odds in found.exchanges:  # while both were seen
             one, other = traces[i], traces[k]
@@ -101,12 +103,7 @@ class Tracker:
         self._settle()
         self._ledger.judge(self._traces)
 
-    def _may_begin(self, detection: Detection) -> bool:
-        if detection.weak or detection.snr < self.settings.snr:
-            return False
-        return not self._residuals.explain(detection, self._clock.now, self._traces)
-
-    def _begin(self, index: int, frame: Frame, merged: dict[int, Alone]) -> None:
+    def _begin(self, index: int, frame: FrameOfTouches, merged: dict[int, Alone]) -> None:
         self._keys += 1
         detection = frame.detections[index]
         others = any(trace.reported for trace in self._traces)
