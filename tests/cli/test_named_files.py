@@ -62,7 +62,7 @@ CASES = {
     ),
     ("states", "out"): Case("states {presses} --calibration {states} --out {out}", ".csv"),
     ("calibrate touch", "out"): Case("calibrate touch {presses} --out {out}", ".npz"),
-    ("calibrate rub", "out"): Case("calibrate rub {presses} --skin {skin} --out {out}", ".npz"),
+    ("calibrate rub", "out"): Case("calibrate rub {rubbed} --skin {skin} --out {out}", ".npz"),
     ("calibrate states", "out"): Case(
         "calibrate states {presses} --state a=0:8 --state b=8:16 --out {out}", ".npz"
     ),
@@ -110,6 +110,7 @@ def force(case: Case) -> tuple[str, ...]:
 NAMES = {
     "presses": ".npz", "bends": ".npz", "calibration": ".npz", "states": ".npz", "skin": ".toml",
     "surface": ".stl", "places": ".csv", "session": ".mcap", "population": ".toml",
+    "rubbed": ".npz",
 }  # fmt: skip
 
 
@@ -132,6 +133,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     write_all(files["session"])
     files["population"].write_text(examples("simulate.md")[1])
     np.savez(files["presses"], **presses())
+    np.savez(files["rubbed"], **{key: v for key, v in presses(160).items() if key != "xy_m"})
     np.savez(files["bends"], **bends())
     flat = np.pad(1e3 * disc(cells=300).points, ((0, 0), (0, 1)))
     meshio.write(files["surface"], meshio.Mesh(flat, [("triangle", disc(cells=300).cells)]))
@@ -145,13 +147,13 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return files
 
 
-def presses() -> dict[str, Any]:
-    """Sixteen labelled presses of the coarse skin, with noise."""
+def presses(n: int = 16) -> dict[str, Any]:
+    """Labelled presses of the coarse skin, with noise."""
     rng, pattern = np.random.default_rng(3), COARSE.pattern()
     model = ForwardModel(COARSE.mesh(), pattern, COARSE.contact_impedance, COARSE.current)
     state = model.at(COARSE.conductivity)
-    turn = rng.uniform(0, 2 * np.pi, 16)
-    xy = 0.06 * np.sqrt(rng.random(16))[:, None] * np.c_[np.cos(turn), np.sin(turn)]
+    turn = rng.uniform(0, 2 * np.pi, n)
+    xy = 0.06 * np.sqrt(rng.random(n))[:, None] * np.c_[np.cos(turn), np.sin(turn)]
     near = [np.linalg.norm(model.mesh.centroids - place, axis=1) < 0.02 for place in xy]
     touches = [(np.flatnonzero(n), np.full(n.sum(), 0.7 * COARSE.conductivity)) for n in near]
     values = state.local.voltages_of(touches)

@@ -9,7 +9,7 @@ import typer
 from tomoskin.cli.choices import skin_for_file
 from tomoskin.cli.named_files import ForceFlag
 from tomoskin.cli.options import CalibrationOut, LabelledArgument, ReferenceOption, SkinOption
-from tomoskin.cli.output import Bar, JsonFlag, emit
+from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.recording import changes, idle_frames, say_notes
 from tomoskin.core import DataError
 
@@ -51,6 +51,8 @@ def calibrate_rub(
         if not found.holds:
             raise DataError("; ".join(found.findings), where=str(recording))
         locator = found.locator(bar)
+    for finding in found.findings:
+        remark(finding)
     TOUCH.of(locator, pattern, rubbed).write(out, overwrite=force)
     facts = _facts(found, len(frames))
     if json:
