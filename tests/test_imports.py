@@ -81,8 +81,11 @@ def _deferred(tree: ast.Module) -> Iterator[ast.AST]:
 
 
 def room_of(module: str) -> str | None:
+    """None for the package itself, and for the program that stands above all rooms."""
     parts = module.split(".")
-    return parts[1] if parts[0] == "tomoskin" and len(parts) > 1 else None
+    if parts[0] != "tomoskin" or parts[1:] in ([], ["__main__"]):
+        return None
+    return parts[1]
 
 
 def violations(sources: Sources) -> list[str]:

@@ -39,6 +39,17 @@ def test_help_loads_no_command() -> None:
     assert set(_said(code).split()) == LIGHT
 
 
+def test_the_package_is_a_command_too() -> None:
+    """Where a shell does not find the command by its name."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tomoskin", "skin", "list"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "textile-disc-8" in done.stdout
+
+
 def test_importing_the_package_loads_next_to_nothing() -> None:
     """A count, since a time says more of the machine: rooms are loaded when they are used."""
     code = (
