@@ -41,13 +41,14 @@ def given() -> dict[str, Any]:
         changes = state.local.voltages_of(touches) - v
         return np.asarray(changes + rng.normal(0.0, NOISE, changes.shape))
 
+    rubbed = pressed(rng.uniform(-0.06, 0.06, (160, 2)))
     xy, more_xy = rng.uniform(-0.055, 0.055, (2, 60, 2))
     labels = np.column_stack([xy[:, 0] > 0, xy[:, 1] > 0])
     today = pressed(more_xy)
     return {
         "skin": skin, "pattern": pattern, "scan": Scan.of(pattern), "model": model, "np": np,
         "v": v, "voltages": v + pressed(xy[:1])[0], "noise": np.full(len(v), NOISE),
-        "dv": pressed(xy), "xy": xy, "more_dv": today[:10], "more_xy": more_xy[:10],
+        "rubbed": rubbed, "dv": pressed(xy), "xy": xy, "more_dv": today[:10], "more_xy": more_xy[:10],
         "dv_today": today, "labels": labels,
         "flags": np.where(rng.random((60, 1)) < 0.3, more_xy > 0, np.nan),
         "sample_sd": NOISE, "places": xy[:2], "points": xy,

@@ -142,10 +142,12 @@ def _called(name: str, info: Any) -> str:
 
 
 def _files(value: Any) -> Iterator[Path]:
-    """What an argument may name: a path, or the text of an option that also takes other things."""
+    """What an argument may name: a path, or the text of an option that also takes other things,
+    as NAME=FILE does; of a list, what each names."""
     if isinstance(value, Path):
         yield value
     elif isinstance(value, str) and value:
-        yield Path(value)
+        yield from map(Path, {value, value.rpartition("=")[2]} - {""})
     elif isinstance(value, list):
-        yield from (path for path in value if isinstance(path, Path))
+        for one in value:
+            yield from _files(one)

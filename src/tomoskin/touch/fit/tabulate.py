@@ -85,6 +85,26 @@ class Lattice:
         return np.asarray((changed - response.reference)[self.nearest])
 
 
+def lattice_of(spots: Spots, grid: PositionGrid, radius: float) -> Lattice:
+    """That of :meth:`Lattice.of`; equal sheets of a process share one."""
+    return _shared(_Site(spots.mesh.identity, grid, radius, spots))
+
+
+@dataclass(frozen=True)
+class _Site:
+    """What a lattice depends on: its sheet is that of the mesh's identity."""
+
+    mesh: str
+    grid: PositionGrid
+    radius: float
+    spots: Spots = field(compare=False)
+
+
+@lru_cache(maxsize=16)
+def _shared(site: _Site) -> Lattice:
+    return Lattice.of(site.spots, site.grid, site.radius)
+
+
 @dataclass(frozen=True, eq=False)
 class Tabulation:
     """A table of an even sheet, and what it takes to change it to that of an uneven one.
@@ -112,7 +132,7 @@ class Tabulation:
         sampled, parts = [], []
         for log_radius, grid in zip(log_radii, grids, strict=True):
             reach()
-            lattice = Lattice.of(response.spots, grid, math.exp(log_radius))
+            lattice = lattice_of(response.spots, grid, math.exp(log_radius))
             samples, part = _sampled(response, lattice, nodes)
             sampled.append(samples)
             parts.append(part)
@@ -163,33 +183,19 @@ class Tabulation:
         """The spots of the table: half a second of work, for :meth:`adapted`."""
         spots, table = self.response.spots, self.table
         return [
-            Lattice.of(spots, grid, math.exp(log_radius))
+            lattice_of(spots, grid, math.exp(log_radius))
             for log_radius, grid in zip(table.log_radii, table.grids, strict=True)
         ]
 
 
 def kept_tabulation(response: Response, prior: SpotPrior, sign: str) -> Tabulation:
-    """That of :meth:`Tabulation.of`, kept on disk; equal skins of a process share one."""
-    return _shared(_Wanted(_identity(response, prior, sign), response, prior, sign))
+    """That of :meth:`Tabulation.of`, kept on disk."""
 
+    def make() -> Arrays:
+        return Tabulation.of(response, prior, sign).packed()
 
-@dataclass(frozen=True)
-class _Wanted:
-    """A tabulation that is asked for; equal where the ``identity`` is."""
-
-    identity: str
-    response: Response = field(compare=False)
-    prior: SpotPrior = field(compare=False)
-    sign: str = field(compare=False)
-
-    def made(self) -> Arrays:
-        return Tabulation.of(self.response, self.prior, self.sign).packed()
-
-
-@lru_cache(maxsize=2)
-def _shared(wanted: _Wanted) -> Tabulation:
-    arrays = kept(f"touch-{wanted.identity}", wanted.made)
-    return Tabulation.unpacked(arrays, wanted.response, wanted.prior, wanted.sign)
+    arrays = kept(f"touch-{_identity(response, prior, sign)}", make)
+    return Tabulation.unpacked(arrays, response, prior, sign)
 
 
 def _identity(response: Response, prior: SpotPrior, sign: str) -> str:
