@@ -6,8 +6,10 @@ import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
 from tomoskin.core.archive import Arrays, load_arrays
@@ -25,23 +27,28 @@ def kept(name: str, make: Callable[[], Arrays]) -> Arrays:
     """What ``make`` returns: from the file ``name``, which holds it since it was first made.
 
     ``name`` says all that the result depends on, as a hash does. A disk that cannot be read or
-    written costs time, and nothing else.
+    written costs time, and nothing else. Arrays lie in memory as those of the file do: sums over
+    other strides round otherwise, and a replay of the first run would differ in the last bits.
     """
     folder = cache_folder()
     if folder is None:
-        return make()
+        return _dense(make())
     path = folder / f"{name}.npz"
     with suppress(DataError, OSError):
         arrays = dict(load_arrays(path))
         path.touch()  # used last
         return arrays
-    arrays = dict(make())
+    arrays = _dense(make())
     with suppress(DataError, OSError):
         folder.mkdir(parents=True, exist_ok=True)
         with written(path, overwrite=True) as part, part.open("wb") as file:
             np.savez(file, allow_pickle=False, **arrays)
         _discard_oldest(folder)
     return arrays
+
+
+def _dense(arrays: Arrays) -> dict[str, NDArray[Any]]:
+    return {name: np.asarray(array, order="C") for name, array in arrays.items()}
 
 
 def cache_folder() -> Path | None:
