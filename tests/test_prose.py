@@ -16,10 +16,10 @@ from prose import DOCS, PAGES, ROOT, Sentence, helps, sentences, sentences_of
 from tomoskin.cli.app import app
 
 MOST_WORDS, MOST_WORDS_OF_HELP = 40, 26
-LONG_YET = {"docs/touch.md": 11, "docs/touch-fit.md": 9}
+LONG_YET = {"docs/touch-fit.md": 9}
 """Sentences that are longer yet, by page: it may become fewer, and no page may be added."""
 
-OLD_WORDS_YET = ("docs/touch.md", "docs/touch-fit.md", "docs/glossary.md")
+OLD_WORDS_YET = ("docs/touch-fit.md", "docs/glossary.md")
 """Pages that may hold words of the glossary's last table; none may be added."""
 
 AMERICAN = re.compile(
