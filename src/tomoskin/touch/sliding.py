@@ -16,7 +16,7 @@ import numpy as np
 from tomoskin.core import Detection, FloatArray, Touch
 from tomoskin.touch.tracking import TouchEvent, Tracker
 
-# Chosen on the twin's seeds 1 to 3 (docs/touch.md).
+# Chosen on the twin's seeds 1 to 3 (docs/theory/tracking.md).
 
 _WINDOW = 0.35
 """Seconds of a touch's course that tell its direction: as it begins to slide, it jumps back."""

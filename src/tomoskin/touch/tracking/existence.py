@@ -19,7 +19,7 @@ MET = 2.0
 """Logarithm of the odds from which a touch that has just gone missing is held to have met another;
 later any odds do."""
 
-# Chosen on the moving plant, seeds 1 to 3 (docs/touch.md).
+# Chosen on the moving plant, seeds 1 to 3 (docs/theory/tracking.md).
 
 _BEGINS = 3.0
 """Logarithm of how many times as often a touch begins as a finder sees one that is none."""

@@ -10,7 +10,7 @@ from tomoskin.core import Detection
 from tomoskin.touch.tracking.motion import TrackState
 from tomoskin.touch.tracking.strength import NOISE, TouchStrength, log_content
 
-# Chosen on the moving plant, seeds 1 to 3 (docs/touch.md).
+# Chosen on the moving plant, seeds 1 to 3 (docs/theory/tracking.md).
 
 _RESOLUTION = 0.035
 """Two touches so far apart, m, are seen as one with a probability of 0.6 of that when they are in

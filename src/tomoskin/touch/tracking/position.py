@@ -9,7 +9,7 @@ from typing import Self
 from tomoskin.core import Detection
 from tomoskin.touch.tracking.motion import region_radius
 
-# Chosen on the twin's seeds 101 to 103 (docs/touch.md).
+# Chosen on the twin's seeds 101 to 103 (docs/theory/tracking.md).
 
 _RECOVERY = 1.0
 """Seconds in which a sheet recovers: for so long it responds to what no longer presses."""

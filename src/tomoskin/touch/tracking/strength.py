@@ -8,7 +8,7 @@ from typing import Self
 
 from tomoskin.core import Detection
 
-# Deviations are those of fits to the moving plant, seeds 1 to 3 (docs/touch.md).
+# Deviations are those of fits to the moving plant, seeds 1 to 3 (docs/theory/tracking.md).
 
 NOISE = 0.15
 """Of the logarithm of a content from frame to frame."""
