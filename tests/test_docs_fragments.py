@@ -48,8 +48,8 @@ def given() -> dict[str, Any]:
     return {
         "skin": skin, "pattern": pattern, "scan": Scan.of(pattern), "model": model, "np": np,
         "v": v, "voltages": v + pressed(xy[:1])[0], "noise": np.full(len(v), NOISE),
-        "rubbed": rubbed, "dv": pressed(xy), "xy": xy, "more_dv": today[:10], "more_xy": more_xy[:10],
-        "dv_today": today, "labels": labels,
+        "rubbed": rubbed, "dv": pressed(xy), "xy": xy, "more_dv": today[:10],
+        "more_xy": more_xy[:10], "dv_today": today, "labels": labels,
         "flags": np.where(rng.random((60, 1)) < 0.3, more_xy > 0, np.nan),
         "sample_sd": NOISE, "places": xy[:2], "points": xy,
         "drive": pattern.drive, "measure": pattern.measure,
