@@ -269,6 +269,19 @@ def test_with_force_a_file_is_written_over(
 # What belongs to one command.
 
 
+@pytest.mark.parametrize("named", ["left=", ""])
+def test_a_skin_that_is_named_is_an_input(
+    named: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    skin = tmp_path / "a=b.toml"
+    skin.write_text(Skin.load("textile-disc-8").to_toml(), encoding="utf-8")
+    words = ["live", "--skin", f"{named}{skin}", "--record", str(skin), "--port", "0"]
+    with pytest.raises(SystemExit) as end:
+        import_module("tomoskin.cli").main(words)
+    assert end.value.code
+    assert "read here and never written over" in capfd.readouterr().err
+
+
 def test_two_outputs_are_two_files(
     tomoskin: Run, tmp_path: Path, broken: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -147,7 +147,7 @@ def _files(value: Any) -> Iterator[Path]:
     if isinstance(value, Path):
         yield value
     elif isinstance(value, str) and value:
-        yield from map(Path, {value, value.rpartition("=")[2]} - {""})
+        yield from map(Path, {value, value.partition("=")[2]} - {""})
     elif isinstance(value, list):
         for one in value:
             yield from _files(one)

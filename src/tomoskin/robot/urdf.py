@@ -13,8 +13,8 @@ import numpy as np
 
 from tomoskin.core import FloatArray, GeometryError, SkinError
 from tomoskin.robot.elements import name_of, origin_of
+from tomoskin.robot.link_shapes import MOST_TRIANGLES, LinkMesh, LinkShape, read_shapes, thinned
 from tomoskin.robot.pose import Pose
-from tomoskin.robot.shapes import MOST_TRIANGLES, LinkMesh, LinkShape, read_shapes, thinned
 from tomoskin.skin import read_text
 
 _LARGEST = 20_000_000

@@ -131,8 +131,8 @@ class Rubbing:
         if labelled.any() and not far[labelled].any():
             fit = UnlabelledFit.of(dv, skin, pattern, region, region.scaled(xy))
         aside = _ALIGNED * (1 - alone.alike)
-        doubt = aside**2 + (_UNSURE * fit.disagreement) ** 2
-        spread = region.unit**2 * (fit.spread + doubt * np.eye(2))
+        beyond = aside**2 + (_UNSURE * fit.disagreement) ** 2
+        spread = region.unit**2 * (fit.spread + beyond * np.eye(2))
         spread[labelled] = 0.0
         position = np.where(labelled[:, None], xy, region.metres(fit.positions))
         return cls(

@@ -99,15 +99,12 @@ class UnlabelledFit:
         Root mean square by which the fits differ from their mean.
     alike
         Correlation of the features with the prior responses, before these are let go.
-    misfit
-        (n,) least misfit of each frame, in parts of the usual one.
     """
 
     positions: FloatArray
     spread: FloatArray
     disagreement: float
     alike: float
-    misfit: FloatArray
 
     @classmethod
     def of(
@@ -134,7 +131,6 @@ class UnlabelledFit:
             within + between,
             float(np.sqrt(np.trace(between, axis1=1, axis2=2).mean())),
             float(np.mean([fit.alike for fit in fits])),
-            np.asarray(np.mean([fit.misfit / np.median(fit.misfit) for fit in fits], axis=0)),
         )
 
 
@@ -161,7 +157,6 @@ def _first(features: FloatArray, prior: FloatArray) -> tuple[FloatArray, float]:
 class _Fit:
     weights: FloatArray
     alike: float
-    misfit: FloatArray
 
 
 def _fitted(  # noqa: PLR0917
@@ -185,8 +180,7 @@ def _fitted(  # noqa: PLR0917
         surface = replace(surface, power=freedom / k)
         surface = surface.renewed(features, weights * count, kept, trust * keep, _NOISE_FLOOR)
         weights = _named(balanced(surface.posterior(features)), named)
-    left = (features - weights @ surface.answers) ** 2
-    return _Fit(weights, alike, np.asarray((left / surface.variance).mean(axis=1)))
+    return _Fit(weights, alike)
 
 
 def _annealed() -> Iterator[tuple[float, float]]:

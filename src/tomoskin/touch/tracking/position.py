@@ -112,19 +112,19 @@ class Position:
         along_x, along_y = self.x - self.behind[0], self.y - self.behind[1]
         more = self.unseen + self.bias**2
         return Detection(  # of all fields: dataclasses.replace takes several times as long
-            self.x,
-            self.y,
-            math.sqrt(self.xx + more + along_x**2),
-            math.sqrt(self.yy + more + along_y**2),
-            detection.area,
-            detection.peak,
-            detection.cells,
-            self.xy + along_x * along_y,
-            detection.snr,
-            detection.close,
-            detection.weak,
-            0.0,
-            detection.force,
+            x=self.x,
+            y=self.y,
+            sd_x=math.sqrt(self.xx + more + along_x**2),
+            sd_y=math.sqrt(self.yy + more + along_y**2),
+            area=detection.area,
+            peak=detection.peak,
+            cells=detection.cells,
+            cov_xy=self.xy + along_x * along_y,
+            snr=detection.snr,
+            close=detection.close,
+            weak=detection.weak,
+            bias=0.0,
+            force=detection.force,
         )
 
 

@@ -8,11 +8,11 @@ from tomoskin.core import Detection, Touch
 from tomoskin.touch.tracking import existence
 from tomoskin.touch.tracking.clock import TrackClock
 from tomoskin.touch.tracking.event import Happening, TouchEvent
-from tomoskin.touch.tracking.following import FrameOfTouches, expected, miss, pairs_of, see
 from tomoskin.touch.tracking.ledger import IdentityLedger
 from tomoskin.touch.tracking.meetings import divide, merge, met_by, origin_of, weigh_meetings
 from tomoskin.touch.tracking.merging import Alone, MergedFinger
 from tomoskin.touch.tracking.motion import TrackSettings, begin
+from tomoskin.touch.tracking.pairing import FrameOfTouches, expected, miss, pairs_of, see
 from tomoskin.touch.tracking.residual import ResidualResponses, is_residual
 from tomoskin.touch.tracking.trace import Trace
 

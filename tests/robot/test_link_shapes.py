@@ -9,7 +9,7 @@ import pytest
 
 from tomoskin.core import SkinError
 from tomoskin.robot import Urdf
-from tomoskin.robot.shapes import Ball, Box, Rod, thinned
+from tomoskin.robot.link_shapes import Ball, Box, Rod, thinned
 
 LINKS = """<link name="a">
   <visual><origin xyz="0 0 1"/><geometry><box size="0.2 0.4 0.6"/></geometry></visual>
