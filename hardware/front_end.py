@@ -42,6 +42,13 @@ def settling(step: float = 1 / GAIN) -> float:
     return said["settled"][0] - 20e-6
 
 
+def settling_of_tree(step: float = 1 / GAIN, gap: float = 40e-9) -> float:
+    """The same with 32 electrodes, from one multiplexer to the other, which a decoder enables
+    ``gap`` s after the first has been disabled; below zero: before."""
+    said = run("pico_tree", step=step, gain=GAIN, half=LSB / 2, gap=gap)
+    return said["settled"][0] - 20e-6
+
+
 def noise(signal: float = 1 / GAIN, converter: float = CONVERTER_NOISE) -> Figures:
     """Of a conversion, at the amplifier's input: amplifier and current, V; all, V; all in ohm."""
     pin = run("pico_noise", gain=GAIN, signal=signal)["pin"][0]
@@ -55,7 +62,10 @@ def mega_noise() -> Figures:
     return {"total": board["input_noise"], "ohms": board["input_noise"] / 0.1}
 
 
-def cost() -> float:
-    """Euros of the parts of one front end of 16 electrodes, with the Pico."""
+def cost(electrodes: int = 16) -> float:
+    """Euros of the parts of one front end of 16 or 32 electrodes, with the Pico."""
     table = tomllib.loads(PARTS.read_text(encoding="utf-8"))["part"]
-    return float(sum(row["count"] * row["each"] for row in table.values()))
+    tree = electrodes > 16
+    return float(
+        sum((row["count"] + tree * row.get("tree", 0)) * row["each"] for row in table.values())
+    )

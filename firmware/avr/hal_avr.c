@@ -17,6 +17,8 @@
 #include <avr/wdt.h>
 #include <util/delay_basic.h>
 
+static_assert(CHANNELS <= 16u, "a Mega's board has at most 16 channels; a Pico's has 32");
+
 #define BY_64(timer) (_BV(CS##timer##1) | _BV(CS##timer##0)) /* 4 us */
 #define RECEIVE_SIZE 128u
 #define CLOCKS_PER_CONVERSION 14u /* 13, and up to one to begin with */
@@ -86,6 +88,15 @@ uint8_t hal_reset_cause(void) {
     return (reset_flags & _BV(EXTRF)) != 0u ? RESET_EXTERNAL : RESET_UNKNOWN;
 }
 
+const struct hal_board hal_board = {
+    .name = "Arduino Mega 2560",
+    .most_chop_hz = 1000u,
+    .half_ns = 40000u,
+    .sample_ns = 12000u,
+    .conversion_ns = 4000u,
+    .clock_ns = 1000u * CLOCKS_PER_CONVERSION / 16u, /* 16 MHz */
+};
+
 void hal_unique_id(uint8_t *id) {
     eeprom_read_block(id, identity.unique_id, sizeof identity.unique_id);
 }
@@ -138,6 +149,11 @@ void hal_timer_set(uint16_t ticks) {
     TIFR3 = _BV(OCF3A);
     TIMSK3 = _BV(OCIE3A);
     TCCR3B = BY_64(3);
+}
+
+void hal_timer_extend(uint16_t ticks) {
+    uint16_t gone = TCNT3;
+    hal_timer_set(ticks > gone + 1u ? (uint16_t)(ticks - gone) : 1u);
 }
 
 void hal_timer_cancel(void) {
@@ -262,7 +278,7 @@ ISR(TIMER0_OVF_vect) {
 }
 
 ISR(TIMER3_COMPA_vect) {
-    hal_timer_cancel();
+    TIMSK3 = 0u; /* it counts on: it may be extended */
     scan_on_timer();
 }
 

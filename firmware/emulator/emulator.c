@@ -75,6 +75,10 @@ static unsigned chosen(uint8_t low, uint8_t high, unsigned number, const char *b
 static void connect(unsigned new_source, unsigned new_sink) {
     bool was_on = source != OFF || sink != OFF;
     bool is_on = new_source != OFF || new_sink != OFF;
+    if (watch != NULL && source < WATCH_CHANNELS && sink < WATCH_CHANNELS) {
+        int64_t spent = (int64_t)(avr->cycle - watch->since);
+        watch->net[source < sink ? source : sink] += source > sink ? spent : -spent;
+    }
     source = new_source;
     sink = new_sink;
     if (was_on && !is_on) {

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #define WATCH_WORDS 131072u /* of flash */
+#define WATCH_CHANNELS 16u
 
 /* Cycles are of the simulated clock. Python: tests/emulator/watch.py. */
 struct watch {
@@ -16,6 +17,8 @@ struct watch {
     uint64_t resets;       /* after power-on */
     uint64_t lowest_stack; /* address that the stack pointer has come down to */
     uint64_t spent[WATCH_WORDS]; /* cycles in the instruction at each word */
+    int64_t net[WATCH_CHANNELS]; /* of pairs, by the lower channel: cycles from the other one to it, less
+                                    those from it to the other */
 };
 
 /* A memory that shows in `path`, or exit with a sentence. */

@@ -25,6 +25,7 @@
 #define NS_PER_TICK (US_PER_TICK * UINT64_C(1000))
 #define NAP_NS UINT64_C(1000000)
 #define IDLE_NS UINT64_C(10000000)
+#define DROPPED 2u              /* conversions of a Pico after a change of channel */
 #define LATE_NS UINT64_C(100000000) /* so late that the time between is given up */
 
 static const struct skin_memory *skin;
@@ -32,6 +33,7 @@ static uint32_t current_ua;
 static uint64_t started;
 static uint64_t event_time; /* of the interrupt that runs; 0: none runs */
 static uint64_t timer_due = NEVER;
+static uint64_t timer_from;
 static uint64_t adc_due = NEVER;
 static uint64_t sample_ns;
 static uint8_t conversions;
@@ -41,6 +43,7 @@ static uint8_t addressed[2];
 static int line = -1;
 static const uint8_t *unsent;
 static uint16_t n_unsent;
+static bool sending; /* and the main loop has not seen yet that all is sent */
 static uint8_t unread[64];
 static uint8_t n_unread;
 static uint8_t next_unread;
@@ -101,6 +104,15 @@ uint8_t hal_reset_cause(void) {
     return RESET_POWER;
 }
 
+const struct hal_board hal_board = {
+    .name = "Linux process",
+    .most_chop_hz = 5000u,
+    .half_ns = 1000u,
+    .sample_ns = 1000u,
+    .conversion_ns = 0u,
+    .clock_ns = 813u, /* 13 clocks at 16 MHz */
+};
+
 void hal_unique_id(uint8_t *id) {
     (void)memcpy(id, "host\0\0\0\0", 8);
 }
@@ -140,7 +152,13 @@ void hal_delay_us(uint16_t us) {
 }
 
 void hal_timer_set(uint16_t ticks) {
-    timer_due = now_ns() + ticks * NS_PER_TICK;
+    timer_from = now_ns();
+    timer_due = timer_from + ticks * NS_PER_TICK;
+}
+
+void hal_timer_extend(uint16_t ticks) {
+    uint64_t due = timer_from + ticks * NS_PER_TICK;
+    timer_due = due > now_ns() ? due : now_ns();
 }
 
 void hal_timer_cancel(void) {
@@ -149,7 +167,8 @@ void hal_timer_cancel(void) {
 
 void hal_adc_prepare(uint8_t prescaler, uint8_t wanted) {
     conversions = wanted;
-    sample_ns = wanted * (prescaler * UINT64_C(13000) / 16u);
+    sample_ns = ADC_BITS > 10u ? (DROPPED + wanted) * UINT64_C(2000)
+                               : wanted * (prescaler * UINT64_C(13000) / 16u);
 }
 
 uint16_t hal_adc_ticks(void) {
@@ -192,6 +211,7 @@ static void flush_line(void) {
 void hal_uart_send(const uint8_t *bytes, uint16_t size) {
     unsent = bytes;
     n_unsent = size;
+    sending = true;
     flush_line();
 }
 
@@ -266,6 +286,10 @@ static void give_up_lost_time(uint64_t now) {
 void hal_idle(void) {
     uint64_t now = real_time();
     flush_line();
+    if (sending && n_unsent == 0u) { /* before more of the scan: a frame is to be given back */
+        sending = false;
+        return;
+    }
     give_up_lost_time(now);
     awake = false;
     while (!awake && deliver(now)) {

@@ -101,7 +101,7 @@ static double volts_now(const struct skin_memory *skin, unsigned source, unsigne
     if (amperes * load > skin->compliance) {
         amperes = skin->compliance / load;
     }
-    return amperes * (ohms_here - ohms_low);
+    return amperes * (ohms_here - ohms_low) + skin->potential[at] - skin->potential[low.main];
 }
 
 double skin_volts(const struct skin_memory *skin, unsigned source, unsigned sink,

@@ -33,6 +33,7 @@ struct skin_memory {
     double noise;        /* LSB, standard deviation of one conversion */
     double resistance[SKIN_MOST * SKIN_MOST]; /* ohm, transfer, row by row, n by n */
     struct skin_faults faults;
+    double potential[SKIN_MOST]; /* V that each electrode has by itself, whatever flows */
 };
 
 /* Map `path`, or exit with a sentence. */

@@ -87,6 +87,15 @@ uint8_t hal_reset_cause(void) {
     return (uint8_t)reset_cause;
 }
 
+const struct hal_board hal_board = {
+    .name = "Raspberry Pi Pico",
+    .most_chop_hz = 5000u,
+    .half_ns = 6000u,
+    .sample_ns = 6000u, /* two conversions are dropped, and at times a third */
+    .conversion_ns = 2000u,
+    .clock_ns = 0u,
+};
+
 void hal_unique_id(uint8_t *id) {
     flash_unique_id(id);
 }
@@ -137,6 +146,14 @@ void hal_timer_set(uint16_t ticks) {
     uint32_t us = (uint32_t)ticks * US_PER_TICK;
     timer_cycles = us * CYCLES_PER_US;
     REGISTER(TIMER_ALARM(0u)) = REGISTER(TIMER_RAW_LOW) + us - EARLY_US;
+}
+
+void hal_timer_extend(uint16_t ticks) {
+    uint32_t gone = cycles_since(timer_from);
+    timer_cycles = (uint32_t)ticks * US_PER_TICK * CYCLES_PER_US;
+    uint32_t left = gone < timer_cycles ? (timer_cycles - gone) / CYCLES_PER_US : 0u;
+    /* the alarm must lie ahead, or it comes in an hour */
+    REGISTER(TIMER_ALARM(0u)) = REGISTER(TIMER_RAW_LOW) + (left > 2u * EARLY_US ? left - EARLY_US : EARLY_US);
 }
 
 void hal_timer_cancel(void) {

@@ -5,7 +5,10 @@
 
 #include <stdint.h>
 
+#ifndef REGISTER /* tests on another machine have registers of their own */
 #define REGISTER(address) (*(volatile uint32_t *)(address))
+#define BYTES(address) ((volatile uint8_t *)(address))
+#endif
 
 /* Aliases of a register: write the bits to set, or to clear. */
 #define SET_ALIAS 0x2000u

@@ -19,6 +19,9 @@
 #define BIT_IN(endpoint) (1u << (2u * (endpoint)))
 #define BIT_OUT(endpoint) (2u << (2u * (endpoint)))
 #define CODING_SIZE 7u
+#define MOST_ADDRESS 127u
+#define TO_HOST 0x80u
+#define KIND_MASK 0x60u
 
 /* Requests; with the class's bit in the upper byte. */
 enum {
@@ -83,7 +86,7 @@ static void give(uint32_t control_at, uint32_t value) {
 
 static void copy_to(uint32_t memory, const uint8_t *bytes, uint16_t size) {
     for (uint16_t at = 0u; at < size; at++) {
-        ((volatile uint8_t *)memory)[at] = bytes[at];
+        BYTES(memory)[at] = bytes[at];
     }
 }
 
@@ -185,10 +188,11 @@ static void say_descriptor(const struct setup *setup) {
     }
 }
 
-static void obey(const struct setup *setup) {
+/* Requests that are answered. */
+static void tell(uint16_t request, const struct setup *setup) {
     static const uint8_t none[2];
     static uint8_t is_configured;
-    switch (((uint32_t)(setup->kind & 0x60u) << 8) | setup->request) {
+    switch (request) {
     case GET_STATUS:
         answer(none, 2u, setup);
         return;
@@ -202,26 +206,47 @@ static void obey(const struct setup *setup) {
     case GET_LINE_CODING:
         answer(coding, CODING_SIZE, setup);
         return;
+    default:
+        refuse();
+    }
+}
+
+/* Requests without data; false: there is none of that kind. */
+static bool obey(uint16_t request, uint16_t value) {
+    switch (request) {
     case SET_ADDRESS:
-        control.address = (uint8_t)setup->value;
-        break;
+        control.address = (uint8_t)value;
+        return value <= MOST_ADDRESS;
     case SET_CONFIGURATION:
-        open_line();
-        break;
-    case SET_LINE_CODING:
-        control.takes_coding = true;
-        give(USB_BUFFER_OUT(0u), USB_DATA1 | PACKET);
-        return;
+        if (value == 0u) {
+            forget_line();
+        } else if (value == 1u) {
+            open_line();
+        }
+        return value <= 1u;
     case CLEAR_FEATURE:
     case SET_FEATURE:
     case SET_INTERFACE:
     case SET_CONTROL_LINE_STATE:
-        break;
+        return true;
     default:
-        refuse();
-        return;
+        return false;
     }
-    agree();
+}
+
+static void take_request(const struct setup *setup) {
+    uint16_t request = (uint16_t)((uint16_t)(setup->kind & KIND_MASK) << 8 | setup->request);
+    if ((setup->kind & TO_HOST) != 0u) {
+        tell(request, setup);
+    } else if (request == SET_LINE_CODING && setup->length == CODING_SIZE) {
+        control.takes_coding = true;
+        give(USB_BUFFER_OUT(0u), USB_DATA1 | PACKET);
+    } else if (setup->length == 0u && obey(request, setup->value)) {
+        agree();
+    } else {
+        control.address = 0u;
+        refuse();
+    }
 }
 
 static void on_setup(void) {
@@ -233,7 +258,7 @@ static void on_setup(void) {
     control.takes_coding = false;
     control.zero_follows = false;
     control.left = 0u;
-    obey(&setup);
+    take_request(&setup);
 }
 
 static void on_control_in(void) {
@@ -247,13 +272,18 @@ static void on_control_in(void) {
 }
 
 static void on_control_out(void) {
-    if (control.takes_coding) {
-        control.takes_coding = false;
-        for (size_t at = 0u; at < CODING_SIZE; at++) {
-            coding[at] = ((volatile uint8_t *)USB_EP0_DATA)[at];
-        }
-        agree();
+    if (!control.takes_coding) {
+        return;
     }
+    control.takes_coding = false;
+    if ((REGISTER(USB_BUFFER_OUT(0u)) & USB_LENGTH_MASK) != CODING_SIZE) {
+        refuse();
+        return;
+    }
+    for (size_t at = 0u; at < CODING_SIZE; at++) {
+        coding[at] = BYTES(USB_EP0_DATA)[at];
+    }
+    agree();
 }
 
 static void on_received(void) {
@@ -332,7 +362,7 @@ int16_t hal_uart_get(void) {
     if (received.size == 0u) {
         return -1;
     }
-    uint8_t byte = ((volatile uint8_t *)OUT_DATA)[received.next++];
+    uint8_t byte = BYTES(OUT_DATA)[received.next++];
     if (received.next == received.size) {
         hal_lock();
         listen();

@@ -43,7 +43,7 @@ uint32_t commands_take_baud(void) {
 }
 
 static bool is_command(uint8_t type) {
-    return type >= MSG_GET_INFO && type <= MSG_SET_FORMAT;
+    return type >= MSG_GET_INFO && type <= MSG_GET_MODE;
 }
 
 static bool right_length(uint8_t type, uint8_t size) {
@@ -62,6 +62,8 @@ static bool right_length(uint8_t type, uint8_t size) {
         return size == SIZE_GET_PATTERN;
     case MSG_SET_FORMAT:
         return size == SIZE_SET_FORMAT;
+    case MSG_SET_MODE:
+        return size == SIZE_SET_MODE;
     default:
         return size == SIZE_PING; /* only the request id */
     }
@@ -92,6 +94,8 @@ static struct verdict run_idle(const uint8_t *payload, uint8_t size) {
         return config_set_pattern(payload, size);
     case MSG_SET_FORMAT:
         return config_set_format(payload);
+    case MSG_SET_MODE:
+        return config_set_mode(payload);
     case MSG_START:
         return start(payload);
     default:
@@ -147,7 +151,11 @@ static bool answer(const uint8_t *payload, uint8_t reset_cause) {
         link_say_info(request, reset_cause);
         return true;
     }
-    if (type != MSG_GET_SCAN && type != MSG_GET_PATTERN) {
+    if (type == MSG_GET_BOARD) {
+        link_say_board(request);
+        return true;
+    }
+    if (type != MSG_GET_SCAN && type != MSG_GET_PATTERN && type != MSG_GET_MODE) {
         return false;
     }
     uint16_t first = type == MSG_GET_PATTERN ? get_u16(payload + AT_GET_PATTERN_FIRST) : 0u;
@@ -155,6 +163,8 @@ static bool answer(const uint8_t *payload, uint8_t reset_cause) {
         link_say_ack(request, type, RESULT_WRONG_CONFIGURATION, 0u);
     } else if (type == MSG_GET_SCAN) {
         link_say_scan(request);
+    } else if (type == MSG_GET_MODE) {
+        link_say_mode(request);
     } else if (first >= config.n_drives) {
         link_say_ack(request, type, RESULT_BAD_VALUE, FIELD_GET_PATTERN_FIRST);
     } else {

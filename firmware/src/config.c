@@ -60,6 +60,9 @@ struct verdict config_set_scan(const uint8_t *payload) {
     config.oversampling = oversampling;
     config.prescaler = prescaler;
     config.format = FORMAT_SIXTEEN;
+    config.mode = DRIVE_MODE_DIRECT;
+    config.periods = 0u;
+    config.frequency = 0u;
     config.current_limit = get_u32(payload + AT_SET_SCAN_CURRENT_LIMIT);
     for (uint16_t number = 0u; number < n_drives; number++) {
         config.drives[number] = (struct drive){UNSET, UNSET, 0u};
@@ -103,7 +106,7 @@ struct verdict config_set_pattern(const uint8_t *payload, uint8_t size) {
     for (struct drive *drive = config.drives + first; count != 0u; count--, drive++) {
         drive->source = at[AT_DRIVE_SOURCE];
         drive->sink = at[AT_DRIVE_SINK];
-        drive->mask = get_u16(at + AT_DRIVE_MASK);
+        drive->mask = (channel_set)get_u32(at + AT_DRIVE_MASK);
         at += SIZE_DRIVE;
     }
     return verdict(RESULT_OK, 0u);
@@ -121,21 +124,82 @@ struct verdict config_set_format(const uint8_t *payload) {
     return verdict(RESULT_OK, 0u);
 }
 
+struct verdict config_set_mode(const uint8_t *payload) {
+    uint8_t mode = payload[AT_SET_MODE_MODE];
+    uint16_t frequency = get_u16(payload + AT_SET_MODE_FREQUENCY);
+    uint8_t periods = payload[AT_SET_MODE_PERIODS];
+    bool chopped = mode == DRIVE_MODE_CHOPPED;
+    if (!announced(get_u16(payload + AT_SET_MODE_CONFIGURATION))) {
+        return verdict(RESULT_WRONG_CONFIGURATION, 0u);
+    }
+    if (mode != DRIVE_MODE_DIRECT && !chopped) {
+        return bad(FIELD_SET_MODE_MODE);
+    }
+    if (chopped ? frequency < LEAST_CHOP_HZ : frequency != 0u) {
+        return bad(FIELD_SET_MODE_FREQUENCY);
+    }
+    if (frequency > hal_board.most_chop_hz) {
+        return verdict(RESULT_CHOP_TOO_FAST, hal_board.most_chop_hz);
+    }
+    if (chopped ? periods == 0u || config.oversampling % (2u * periods) != 0u : periods != 0u) {
+        return bad(FIELD_SET_MODE_PERIODS);
+    }
+    config.mode = mode;
+    config.frequency = frequency;
+    config.periods = periods;
+    return verdict(RESULT_OK, 0u);
+}
+
+uint8_t config_directions(void) {
+    return config.mode == DRIVE_MODE_CHOPPED ? (uint8_t)(2u * config.periods) : 1u;
+}
+
+uint8_t config_conversions(void) {
+    return (uint8_t)(config.oversampling / config_directions());
+}
+
+uint16_t config_ticks(uint32_t us) {
+    return (uint16_t)((us + US_PER_TICK - 1u) / US_PER_TICK + 1u);
+}
+
+static uint8_t channels_of(const struct drive *drive) {
+    uint8_t channels = 0u;
+    for (channel_set rest = drive->mask; rest != 0u; rest &= (channel_set)(rest - 1u)) {
+        channels++;
+    }
+    return channels;
+}
+
+/* Hz: of the fastest alternating drive in which `channels` can be read in half a period. */
+static uint16_t chop_limit(uint8_t channels) {
+    uint32_t conversion = hal_board.conversion_ns + (uint32_t)hal_board.clock_ns * config.prescaler;
+    uint32_t half = hal_board.half_ns + UINT32_C(1000) * config.dead_time +
+                    UINT32_C(1000) * US_PER_TICK * config_ticks(config.settling) +
+                    channels * (hal_board.sample_ns + config_conversions() * conversion);
+    uint32_t limit = UINT32_C(500000000) / half;
+    return limit < hal_board.most_chop_hz ? (uint16_t)limit : hal_board.most_chop_hz;
+}
+
 struct verdict config_check_start(uint16_t identity) {
     if (!announced(identity)) {
         return verdict(RESULT_WRONG_CONFIGURATION, 0u);
     }
-    uint16_t samples = 0u;
+    bool chopped = config.mode == DRIVE_MODE_CHOPPED;
+    uint16_t values = 0u;
+    uint8_t most = 0u;
     for (uint16_t number = 0u; number < config.n_drives; number++) {
         if (config.drives[number].source == UNSET) {
             return verdict(RESULT_INCOMPLETE, number);
         }
-        for (channel_set rest = config.drives[number].mask; rest != 0u; rest &= (channel_set)(rest - 1u)) {
-            samples++;
-        }
+        uint8_t channels = channels_of(&config.drives[number]);
+        most = channels > most ? channels : most;
+        values = (uint16_t)(values + (chopped ? 2u * channels : channels));
     }
-    if (samples > MOST_SAMPLES) {
-        return verdict(RESULT_TOO_MANY_SAMPLES, MOST_SAMPLES);
+    if (values > MOST_SAMPLES) {
+        return verdict(RESULT_TOO_MANY_SAMPLES, chopped ? MOST_SAMPLES / 2u : MOST_SAMPLES);
+    }
+    if (chopped && config.frequency > chop_limit(most)) {
+        return verdict(RESULT_CHOP_TOO_FAST, chop_limit(most));
     }
     return verdict(RESULT_OK, 0u);
 }

@@ -22,6 +22,9 @@ struct config {
     uint8_t oversampling;
     uint8_t prescaler;
     uint8_t format;
+    uint8_t mode;
+    uint8_t periods;    /* of a drive, where it is chopped */
+    uint16_t frequency; /* Hz, of that */
     uint32_t current_limit; /* uA */
     struct drive drives[MOST_DRIVES];
 };
@@ -40,6 +43,14 @@ void config_forget(void);
 struct verdict config_set_scan(const uint8_t *payload);
 struct verdict config_set_pattern(const uint8_t *payload, uint8_t size);
 struct verdict config_set_format(const uint8_t *payload);
+struct verdict config_set_mode(const uint8_t *payload);
 struct verdict config_check_start(uint16_t identity);
+
+/* Directions of a drive, one after the other; conversions of a channel in each. */
+uint8_t config_directions(void);
+uint8_t config_conversions(void);
+
+/* At least `us`: one tick more, since the present one has begun already. */
+uint16_t config_ticks(uint32_t us);
 
 #endif

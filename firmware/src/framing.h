@@ -8,16 +8,16 @@
 #include <stdint.h>
 
 /* A message is enclosed where it lies: its payload begins at FRAMING_BEFORE, and its buffer has
-   FRAMING_AFTER bytes behind it: checksum, 0x00, and a code byte for every 254 bytes. */
+   FRAMING_AFTER(its most bytes) behind it: checksum, 0x00, and a code byte for every 254 bytes. */
 #define FRAMING_BEFORE 1u
-#define FRAMING_AFTER 8u
+#define FRAMING_AFTER(size) (CHECKSUM_SIZE + 1u + ((size) + CHECKSUM_SIZE) / 254u + 1u)
 
 #define MOST_BLOCK (MOST_TO_DEVICE + 1u) /* from the host, between two 0x00 */
 #define CHECKSUM_SIZE 2u
 
 uint16_t crc16(const uint8_t *data, uint16_t size);
 
-/* Enclose a payload of `size` bytes, at most 1,000; how many bytes of `buffer` go on the line. */
+/* Enclose a payload of `size` bytes; how many bytes of `buffer` go on the line. */
 uint16_t framing_enclose(uint8_t *buffer, uint16_t size);
 
 /* Gathers the bytes from the host. */

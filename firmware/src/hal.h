@@ -17,6 +17,17 @@ void hal_init(void);
 /* Why the machine started: RESET_... of the protocol. */
 uint8_t hal_reset_cause(void);
 
+/* Its name for people, and what half a period of the alternating drive takes: BOARD of the protocol. */
+struct hal_board {
+    const char *name; /* at most 24 bytes */
+    uint16_t most_chop_hz;
+    uint16_t half_ns;
+    uint16_t sample_ns;
+    uint16_t conversion_ns;
+    uint16_t clock_ns;
+};
+extern const struct hal_board hal_board;
+
 /* (eight bytes) tells one board from another; and the setting of its current limiter in uA. */
 void hal_unique_id(uint8_t *id);
 uint32_t hal_current(void);
@@ -33,6 +44,8 @@ void hal_delay_us(uint16_t us);
 
 /* One timer: scan_on_timer() comes no sooner than `ticks` from now; setting it again replaces it. */
 void hal_timer_set(uint16_t ticks);
+/* Once more, `ticks` after it was set; at once where those have gone by. */
+void hal_timer_extend(uint16_t ticks);
 void hal_timer_cancel(void);
 
 /* Converter: scan_on_sample(sum) comes once for each start: the sum of as many conversions of the

@@ -11,11 +11,13 @@
 #include <assert.h>
 #include <stddef.h>
 
-static_assert(SIZE_FRAME == SIZE_FRAME_PACKED, "one head for both");
+static_assert(SIZE_FRAME == SIZE_FRAME_PACKED && SIZE_FRAME == SIZE_FRAME_CHOPPED, "one head for all");
 
 #define MOST_TOLD 9u /* drives in a PATTERN */
 
-static uint8_t buffer[FRAMING_BEFORE + SIZE_PATTERN + MOST_TOLD * SIZE_DRIVE + FRAMING_AFTER];
+#define MOST_SMALL (SIZE_PATTERN + MOST_TOLD * SIZE_DRIVE)
+
+static uint8_t buffer[FRAMING_BEFORE + MOST_SMALL + FRAMING_AFTER(MOST_SMALL)];
 static uint8_t *const small = buffer + FRAMING_BEFORE;
 static uint8_t small_size; /* of the payload; 0: free */
 static enum { NOTHING, SMALL, FRAME } under_way;
@@ -98,6 +100,33 @@ void link_say_scan(uint8_t request) {
     small_size = SIZE_SCAN;
 }
 
+void link_say_mode(uint8_t request) {
+    small[0] = MSG_MODE;
+    small[AT_MODE_REQUEST] = request;
+    put_u16(small + AT_MODE_CONFIGURATION, config.identity);
+    small[AT_MODE_MODE] = config.mode;
+    put_u16(small + AT_MODE_FREQUENCY, config.frequency);
+    small[AT_MODE_PERIODS] = config.periods;
+    small_size = SIZE_MODE;
+}
+
+void link_say_board(uint8_t request) {
+    small[0] = MSG_BOARD;
+    small[AT_BOARD_REQUEST] = request;
+    const char *letter = hal_board.name;
+    for (uint8_t at = AT_BOARD_NAME; at < AT_BOARD_MIN_CHOP; at++) {
+        small[at] = (uint8_t)*letter;
+        letter += *letter != '\0';
+    }
+    put_u16(small + AT_BOARD_MIN_CHOP, LEAST_CHOP_HZ);
+    put_u16(small + AT_BOARD_MAX_CHOP, hal_board.most_chop_hz);
+    put_u16(small + AT_BOARD_HALF, hal_board.half_ns);
+    put_u16(small + AT_BOARD_SAMPLE, hal_board.sample_ns);
+    put_u16(small + AT_BOARD_CONVERSION, hal_board.conversion_ns);
+    put_u16(small + AT_BOARD_CLOCK, hal_board.clock_ns);
+    small_size = SIZE_BOARD;
+}
+
 void link_say_pattern(uint8_t request, uint16_t first) {
     uint16_t rest = (uint16_t)(config.n_drives - first);
     small[0] = MSG_PATTERN;
@@ -137,7 +166,9 @@ static void send(uint8_t *message, uint16_t size) {
 
 static void begin_frame(struct frame *frame, uint32_t now_high, uint32_t now) {
     uint8_t *payload = frame->buffer + FRAMING_BEFORE;
-    payload[0] = config.format == FORMAT_PACKED ? MSG_FRAME_PACKED : MSG_FRAME;
+    payload[0] = config.mode == DRIVE_MODE_CHOPPED   ? MSG_FRAME_CHOPPED
+                 : config.format == FORMAT_PACKED ? MSG_FRAME_PACKED
+                                                  : MSG_FRAME;
     put_u32(payload + AT_FRAME_SEQUENCE, frame->sequence);
     put_u32(payload + AT_FRAME_TICKS, frame->started);
     put_u32(payload + AT_FRAME_TICKS + 4u, high_of(frame->started, now_high, now));

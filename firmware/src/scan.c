@@ -1,6 +1,7 @@
 #include "scan.h"
 
 #include "config.h"
+#include "demodulator.h"
 #include "hal.h"
 #include "protocol.h"
 #include "switches.h"
@@ -11,13 +12,16 @@
 #define LONGEST_BUSY_US 50u
 #define SLACK_TICKS (2u * TICKS_PER_MS)
 
-enum phase { IDLE, DEAD, SETTLING, CONVERTING };
+enum phase { IDLE, DEAD, SETTLING, CONVERTING, HOLDING };
 
 static struct {
     enum phase phase;
     uint8_t channel;
     channel_set rest;
     uint16_t drive;
+    uint8_t direction;  /* of the drive, from 0: odd ones are reversed */
+    uint8_t directions; /* 1: the drive is direct */
+    uint16_t on_ticks;  /* for each direction, where there are several */
     uint8_t *place; /* of the next sample */
     bool packed;
     uint8_t upper; /* bits of the samples whose lower bytes have been put, the newest on top */
@@ -41,11 +45,6 @@ static struct {
     uint32_t sequence;
 } seen; /* where the guard found the scan last */
 
-/* At least `us`: one tick more, since the present one has begun already. */
-static uint16_t ticks_of(uint32_t us) {
-    return (uint16_t)((us + US_PER_TICK - 1u) / US_PER_TICK + 1u);
-}
-
 static void halt(void) {
     switches_off();
     scan.phase = IDLE;
@@ -60,8 +59,15 @@ static void fail(uint8_t code, uint16_t detail) {
     hal_wake();
 }
 
+static bool reversed(void) {
+    return (scan.direction & 1u) != 0u;
+}
+
 static uint32_t allowed_ticks(const struct drive *drive) {
     uint8_t channels = 0u;
+    if (scan.directions > 1u) {
+        return scan.on_ticks + SLACK_TICKS;
+    }
     for (channel_set rest = drive->mask; rest != 0u; rest &= (channel_set)(rest - 1u)) {
         channels++;
     }
@@ -95,14 +101,17 @@ static void begin_frame(void) {
     frame->started = hal_ticks();
     scan.place = frame->buffer + FRAMING_BEFORE + SIZE_FRAME;
     scan.drive = 0u;
+    scan.direction = 0u;
 }
 
 static void connect(uint16_t dead_time) {
     const struct drive *drive = &config.drives[scan.drive];
+    uint8_t source = reversed() ? drive->sink : drive->source;
+    uint8_t sink = reversed() ? drive->source : drive->sink;
     scan.rest = drive->mask;
     scan.channel = 0u;
     scan.allowed = allowed_ticks(drive);
-    if (!switches_set(drive->source, drive->sink, dead_time)) {
+    if (!switches_set(source, sink, dead_time)) {
         fail(FAULT_SWITCH_REFUSED, scan.drive);
         return;
     }
@@ -116,7 +125,7 @@ static void begin_drive(void) {
         connect(config.dead_time);
         return;
     }
-    uint16_t ticks = ticks_of(config.dead_time);
+    uint16_t ticks = config_ticks(config.dead_time);
     scan.phase = DEAD;
     scan.since = hal_ticks();
     scan.allowed = ticks + SLACK_TICKS;
@@ -144,8 +153,28 @@ static void end_frame(void) {
     begin_frame();
 }
 
-static void end_drive(void) {
+static void put_demodulated(void) {
+    uint8_t channel = 0u;
+    for (channel_set rest = config.drives[scan.drive].mask; rest != 0u; rest >>= 1, channel++) {
+        if ((rest & 1u) != 0u) {
+            put_sample(demodulator_difference(channel));
+            put_sample(demodulator_sum(channel));
+        }
+    }
+    demodulator_clear();
+}
+
+/* The next direction of the drive, or the next drive. */
+static void end_direction(void) {
     switches_off();
+    if (++scan.direction < scan.directions) {
+        begin_drive();
+        return;
+    }
+    if (scan.directions > 1u) {
+        put_demodulated();
+    }
+    scan.direction = 0u;
     scan.drive++;
     if (scan.drive == config.n_drives) {
         end_frame();
@@ -166,14 +195,26 @@ static bool next_channel(void) {
     return true;
 }
 
+/* All channels have been read: where the drive has several directions, each is on for as long. */
+static void end_reading(void) {
+    if (scan.directions == 1u) {
+        end_direction();
+        return;
+    }
+    scan.phase = HOLDING;
+    hal_timer_extend(scan.on_ticks);
+}
+
 void scan_on_timer(void) {
     if (scan.phase == DEAD) {
         connect(0u);
     } else if (scan.phase == SETTLING) {
         scan.phase = CONVERTING;
         if (!next_channel()) {
-            end_drive();
+            end_reading();
         }
+    } else if (scan.phase == HOLDING) {
+        end_direction();
     }
 }
 
@@ -181,13 +222,25 @@ void scan_on_sample(uint16_t sum) {
     if (scan.phase != CONVERTING) {
         return;
     }
+    uint8_t channel = scan.channel;
     scan.rest >>= 1;
     scan.channel++;
     bool more = next_channel(); /* it runs while this one is booked */
-    put_sample(sum);
-    if (!more) {
-        end_drive();
+    if (scan.directions == 1u) {
+        put_sample(sum);
+    } else {
+        demodulator_add(channel, reversed(), sum);
     }
+    if (!more) {
+        end_reading();
+    }
+}
+
+/* Half a period ends with the dead time. */
+static uint16_t on_ticks(void) {
+    return config.frequency == 0u
+               ? 0u
+               : (uint16_t)((UINT32_C(500000) / config.frequency - config.dead_time) / US_PER_TICK);
 }
 
 void scan_start(void) {
@@ -196,8 +249,11 @@ void scan_start(void) {
     scan.dropped = false;
     scan.packed = config.format == FORMAT_PACKED;
     scan.group = 0u;
-    scan.settling_ticks = ticks_of(config.settling);
-    hal_adc_prepare(config.prescaler, config.oversampling);
+    scan.settling_ticks = config_ticks(config.settling);
+    scan.directions = config_directions();
+    scan.on_ticks = on_ticks();
+    demodulator_clear();
+    hal_adc_prepare(config.prescaler, config_conversions());
     begin_frame();
     begin_drive();
 }

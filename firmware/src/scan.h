@@ -6,8 +6,12 @@
 #include "limits.h"
 #include "protocol.h"
 
+#include <assert.h>
 #include <stdbool.h>
 #include <stdint.h>
+
+#define MOST_FRAME (SIZE_FRAME + 2u * MOST_SAMPLES)
+static_assert(MOST_FRAME + CHECKSUM_SIZE <= MOST_FROM_DEVICE, "a host takes such a frame");
 
 /* A whole frame: its samples lie where the payload has them, the head is still to be written. */
 struct frame {
@@ -16,7 +20,7 @@ struct frame {
     uint16_t drops;
     uint8_t flags;
     uint16_t size; /* of the payload */
-    uint8_t buffer[FRAMING_BEFORE + SIZE_FRAME + 2u * MOST_SAMPLES + FRAMING_AFTER];
+    uint8_t buffer[FRAMING_BEFORE + MOST_FRAME + FRAMING_AFTER(MOST_FRAME)];
 };
 
 /* What made the scan stop itself; `code` 0: nothing. */

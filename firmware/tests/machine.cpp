@@ -141,6 +141,7 @@ void Machine::note(Move move, int a, int b) {
 
 extern "C" {
 
+const struct hal_board hal_board = {"machine", 5000, 4000, 1000, 0, 813};
 void hal_init(void) {}
 uint8_t hal_reset_cause(void) { return machine.reset_cause; }
 void hal_unique_id(uint8_t *id) { std::fill(id, id + 8, uint8_t{7}); }
@@ -199,7 +200,13 @@ void hal_delay_us(uint16_t us) { machine.ns += us * uint64_t{1000}; }
 
 void hal_timer_set(uint16_t ticks) {
     if (machine.timer_works) {
+        machine.timer_set_ns = machine.ns;
         machine.timer_ns = (machine.ns / 4000 + ticks) * 4000;
+    }
+}
+void hal_timer_extend(uint16_t ticks) {
+    if (machine.timer_works) {
+        machine.timer_ns = std::max(machine.ns, (machine.timer_set_ns / 4000 + ticks) * 4000);
     }
 }
 void hal_timer_cancel(void) { machine.timer_ns = UINT64_MAX; }

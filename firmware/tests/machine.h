@@ -58,6 +58,7 @@ struct Machine {
     std::vector<Bytes> heard();
 
     uint64_t timer_ns = UINT64_MAX;
+    uint64_t timer_set_ns = 0;
     uint64_t adc_ns = UINT64_MAX;
     uint64_t sample_ns = 0;
     uint8_t conversions = 0;

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Frame
+from tomoskin.core import Event, Frame
 from tomoskin.emulator import BoardProcess, Front, PicoPrograms, SkinMemory
 from tomoskin.pattern import Scan
 from tomoskin.source import Link, ScanSettings, SerialTransport
@@ -87,3 +87,13 @@ def frames_of(link: Link, count: int) -> list[Frame]:
         assert time.monotonic() < end
         frames += [item for item in link.poll(0.05) if isinstance(item, Frame)]
     return frames[:count]
+
+
+def events_of(link: Link, *kinds: str) -> Event:
+    """The next event of one of these kinds."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        for item in link.poll(0.05):
+            if isinstance(item, Event) and item.kind in kinds:
+                return item
+    raise AssertionError(f"no event {kinds}")

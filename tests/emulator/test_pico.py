@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import shutil
+import threading
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from emulator.pico import CURRENT, PATIENCE, Pico, frames_of, powered, star
+from emulator.pico import CURRENT, PATIENCE, Pico, events_of, frames_of, powered, star
 from firmware.boards import FIRMWARE, SCAN, Talk, make
 from tomoskin.core import Frame
-from tomoskin.emulator import PicoPrograms
+from tomoskin.emulator import BoardFaults, BoardProcess, PicoPrograms, SkinMemory
 from tomoskin.emulator.source import front_of, open_emulator
 from tomoskin.emulator.uf2 import pack_uf2
 from tomoskin.pattern import Pattern, Scan
+from tomoskin.pipeline import prepare
+from tomoskin.run import Runner
 from tomoskin.skin import Skin
-from tomoskin.source import Link, ScanSettings, SerialTransport
-from tomoskin.twin import TwinSettings
+from tomoskin.source import Link, ScanSettings, SerialTransport, Timing
+from tomoskin.twin import TwinSettings, TwinSkin
 from tomoskin.wire import (
     SCHEMA,
     Ack,
@@ -45,7 +48,7 @@ from tomoskin.wire.messages import Format
 SETTLING = 84e-6
 """s: the slowest that the decks give."""
 DEAD = 5e-6
-LEAST_RATE = {8: 400, 16: 150}
+LEAST_RATE = {8: 400, 16: 150, 32: 60}
 """Frames/s, adjacent, four readings."""
 MOST_JITTER = 1000
 """ns by which one and the same conversion may move against its drive."""
@@ -54,7 +57,7 @@ WATCHDOG = 0.15
 SETTINGS = ScanSettings(4, SETTLING, CURRENT, adc_bits=12, dead_time=DEAD)
 
 
-@pytest.mark.parametrize("electrodes", [8, 16])
+@pytest.mark.parametrize("electrodes", [8, pytest.param(16, marks=pytest.mark.slow), 32])
 def test_scans_in_order_at_its_rate_and_samples_on_time(
     pico: PicoPrograms, tmp_path: Path, electrodes: int
 ) -> None:
@@ -66,7 +69,7 @@ def test_scans_in_order_at_its_rate_and_samples_on_time(
         seen = board.watch()
         assert link.counters.corrupt == 0
         assert link.frames.lost == 0
-    assert (info.channels, info.adc_bits, info.reset) == (16, 12, Reset.POWER)
+    assert (info.channels, info.adc_bits, info.reset) == (32, 12, Reset.POWER)
     assert (info.unique_id, info.schema_hash) == (b"emulated", SCHEMA.hash)
     assert seen["serial"] == b"emulated".hex().upper()
     assert [frame.sequence for frame in frames] == list(range(20))
@@ -108,6 +111,26 @@ MUTANTS: dict[str, Change] = {
     "a pulled plug ignored": ("pico/usb.c", "return configured && !suspended;", "return true;"),
     "USB before the scan": ("pico/hal_pico.c", "#define LOWEST 0xC0u", "#define LOWEST 0x00u"),
     "host silence ignored": ("src/board.c", "if (board.hello_due ||", "if (true ||"),
+    "a bit of the address to read": (
+        "pico/converter.c",
+        "& (ADDRESS_MASK << READ_SHIFT)",
+        "& (3u << READ_SHIFT)",
+    ),
+    "two bits of the addresses to drive": (
+        "pico/pins.h",
+        "#define ADDRESS_MASK 0x1Fu",
+        "#define ADDRESS_MASK 0x03u",
+    ),
+    "the sink stays connected": (
+        "pico/hal_pico.c",
+        "REGISTER(SIO_OUT_CLR) = SOURCE_ENABLE | SINK_ENABLE;",
+        "REGISTER(SIO_OUT_CLR) = SOURCE_ENABLE;",
+    ),
+    "the main loop sleeps on": (
+        "pico/hal_pico.c",
+        "void hal_wake(void) {\n    awake = true;",
+        "void hal_wake(void) {",
+    ),
     "an id of its own": ("pico/flash.c", "#define ID_AT 5u", "#define ID_AT 4u"),
 }
 HANGS: dict[str, Change] = {
@@ -138,10 +161,10 @@ def mutated(change: Change, pico: PicoPrograms, folder: Path) -> PicoPrograms:
     text = (copy / file).read_text(encoding="utf-8")
     assert text.count(old) == 1, f"{file}: {old} is gone or not the only one"
     (copy / file).write_text(text.replace(old, new), encoding="utf-8")
-    made = make("pico", f"BUILD={folder}", "CHANNELS=16", folder=copy)
+    made = make("pico", f"BUILD={folder}", "CHANNELS=32", folder=copy)
     assert made.returncode == 0, made.stderr
     image = folder / "mutant.uf2"
-    image.write_bytes(pack_uf2((folder / "tomoskin-pico-16.bin").read_bytes()))
+    image.write_bytes(pack_uf2((folder / "tomoskin-pico-32.bin").read_bytes()))
     return PicoPrograms(image, pico.node)
 
 
@@ -226,7 +249,11 @@ def test_nothing_is_connected_before_start_after_stop_and_in_silence(
 
 def test_a_host_that_does_not_read_costs_whole_frames(pico: PicoPrograms, tmp_path: Path) -> None:
     settings = ScanSettings(1, SETTLING, CURRENT, adc_bits=12)
-    with powered(pico, tmp_path, "-f") as board, board.link(SCAN, settings) as link:
+    patient = Timing(silence=PATIENCE)
+    with (
+        powered(pico, tmp_path, "-f") as board,
+        Link(SerialTransport(board.board.port), SCAN, settings, timing=patient) as link,
+    ):
         frames_of(link, 3)
         board.order("stall")
         board.until(lambda seen: bool(seen["stalled"]))
@@ -286,3 +313,45 @@ def test_the_watchdog_ends_a_hang(name: str, pico: PicoPrograms, tmp_path: Path)
         assert not seen["connected"]
         assert seen["longestOn"] < 1e9 * WATCHDOG
         talk.transport.close()
+
+
+def test_a_multiplexer_that_does_not_reach_an_electrode_is_named(
+    pico: PicoPrograms, tmp_path: Path
+) -> None:
+    skin = Skin.load("textile-disc-8").altered({"readout": {"settling": "84 us"}})
+    settings = TwinSettings.preset("textile", seed=2)
+    resistance = TwinSkin.of(skin, settings).resistance()
+    faults = BoardFaults(reading={2: 6})
+    memory = SkinMemory(tmp_path / "skin", front_of(skin, settings, "pico"), resistance, faults)
+    board = BoardProcess(pico, memory.path, skin.current, "-f")
+    runner = Runner(prepare(skin), lambda: SerialTransport(board.port))
+    came = threading.Event()
+    with runner.watch(came.set):
+        runner.start()
+        try:
+            while not (sick := runner.status().electrodes):
+                assert came.wait(PATIENCE), runner.status()
+                came.clear()
+        finally:
+            runner.stop()
+            board.close()
+            memory.close()
+    (electrode,) = sick
+    assert electrode.text.startswith("E3 is stuck: it reads as E7 does under every drive")
+
+
+def test_usb_that_stalls_is_said_and_so_is_its_end(pico: PicoPrograms, tmp_path: Path) -> None:
+    timing = Timing(silence=0.3)
+    with powered(pico, tmp_path, "-f") as board:
+        transport = SerialTransport(board.board.port)
+        with Link(transport, SCAN, SETTINGS, timing=timing) as link:
+            frames_of(link, 3)
+            board.order("stall")
+            said = events_of(link, "silent")
+            assert "no frame for" in said.text
+            assert "check the board's power and cable" in said.text
+            board.order("flow")
+            # whichever comes first: a frame, or the answer to a heartbeat without one
+            assert "again" in events_of(link, "resumed", "reset").text
+            frames_of(link, 3)
+            assert link.counters.corrupt == 0

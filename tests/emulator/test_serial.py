@@ -47,7 +47,7 @@ def test_opening_the_port_resets_the_board_each_time(programs: Programs, tmp_pat
                 assert link.info.reset is Reset.EXTERNAL
                 assert [frame.sequence for frame in frames[:3]] == [0, 1, 2]
                 # HELLO was awaited: what the bootloader swallows would have been asked again
-                assert link._session.commands._request == 8
+                assert link._session.commands._request == 9
             seen = Watch.read(tmp_path / "watch")
             assert seen.resets == opened
             while Watch.read(tmp_path / "watch").cycle < seen.cycle + 0.01 * CLOCK:

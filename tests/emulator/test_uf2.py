@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from emulator.pico import powered
 from firmware.boards import FIRMWARE
 from tomoskin.cli.app import app
 from tomoskin.core import SourceError
 from tomoskin.emulator import PicoPrograms, find_boot_drive, write_uf2
+from tomoskin.emulator.flash import ask_info
 from tomoskin.emulator.uf2 import FLASH, boot_checksum, check_boot, pack_uf2, unpack_uf2
+from tomoskin.source import SerialTransport
 
 IMAGE = bytes(range(256)) * 2 + b"end"
 ABOUT = "UF2 Bootloader v3.0\nModel: Raspberry Pi RP2\nBoard-ID: {}\n"
@@ -55,6 +59,10 @@ def test_the_real_image_would_start(pico: PicoPrograms) -> None:
         (lambda data: data[:28] + b"\x12\x34\x56\x78" + data[32:], "for another board"),
         (lambda data: data[:8] + b"\0\0\0\0" + data[12:], "found none"),
         (lambda data: data[:16] + b"\x80\0\0\0" + data[20:], "256 bytes in a block, found 128"),
+        (lambda data: data[:1024], "expected 3 blocks, found 2: block 2 is missing"),
+        (lambda data: data[:512] + data[1024:], "expected 3 blocks, found 2: block 1 is missing"),
+        (lambda data: data[:512] + data, "expected each block once, found block 0 again"),
+        (lambda data: data + data[:20] + b"\7" + data[21:512], "expected each block once"),
     ],
 )
 def test_another_boards_file_is_refused(
@@ -82,11 +90,46 @@ def test_only_a_picos_drive_is_written(tmp_path: Path) -> None:
         find_boot_drive([tmp_path])
 
 
+def test_configure_writes_the_last_sector_and_the_firmware_reads_it(
+    pico: PicoPrograms, tmp_path: Path
+) -> None:
+    boot = drive(tmp_path / "RPI-RP2")
+    words = ["firmware", "configure", str(boot), "--board", "pico", "--current", "50 mA"]
+    said = CliRunner().invoke(app, words).output
+    assert "24.5 Ω" in said
+    ((address, page),) = unpack_uf2((boot / "tomoskin.uf2").read_bytes(), "x").items()
+    assert address == FLASH + 0x1FF000
+    (settings := tmp_path / "settings").write_bytes(page)
+    with (
+        powered(pico, tmp_path, "-f", "-e", str(settings)) as board,
+        closing(SerialTransport(board.board.port)) as transport,
+    ):
+        assert ask_info(transport).current == 50_000
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--current", "150 mA"), "100 mA, which is what the board's parts"),
+        (("--id", "arm"), "its flash chip's, and cannot be changed"),
+        ((), "expected --current"),
+    ],
+)
+def test_what_a_pico_is_not_configured_with(
+    words: tuple[str, ...], said: str, tmp_path: Path
+) -> None:
+    boot = drive(tmp_path / "RPI-RP2")
+    done = CliRunner().invoke(app, ["firmware", "configure", str(boot), "--board", "pico", *words])
+    assert done.exit_code
+    assert said in " ".join(f"{done.output} {done.exception}".replace("│", " ").split())
+    assert len(list(boot.iterdir())) == 1
+
+
 def test_the_command_line_builds_and_flashes(pico: PicoPrograms, tmp_path: Path) -> None:
-    said = CliRunner().invoke(app, ["firmware", "build", "--board", "pico", "--channels", "16"])
+    said = CliRunner().invoke(app, ["firmware", "build", "--board", "pico", "--channels", "32"])
     assert Path(said.output.strip()) == pico.image
     boot = drive(tmp_path / "RPI-RP2")
-    words = ["firmware", "flash", str(boot), "--board", "pico", "--channels", "16"]
+    words = ["firmware", "flash", str(boot), "--board", "pico", "--channels", "32"]
     assert "the Pico starts it" in CliRunner().invoke(app, words).output
     assert (boot / "tomoskin.uf2").read_bytes() == pico.image.read_bytes()
     assert CliRunner().invoke(app, ["firmware", "build", "--board", "uno"]).exit_code == 2

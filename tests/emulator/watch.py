@@ -9,13 +9,18 @@ from pathlib import Path
 import numpy as np
 
 CLOCK = 16e6
+CHANNELS = 16
 TOP_OF_STACK = 0x21FF
 """Last address of the ATmega2560's memory."""
 
 
 @dataclass(frozen=True)
 class Watch:
-    """Cycles of the simulated clock; ``spent`` in the instruction at each word of flash."""
+    """Cycles of the simulated clock.
+
+    ``spent`` in the instruction at each word of flash; ``net`` (16,) of pairs, by the lower
+    channel: from the other one to it, less from it to the other.
+    """
 
     cycle: int
     connected: bool
@@ -25,12 +30,14 @@ class Watch:
     resets: int
     lowest_stack: int
     spent: np.ndarray
+    net: np.ndarray
 
     @classmethod
     def read(cls, path: Path) -> Watch:
         words = np.fromfile(path, "<u8")
         cycle, connected, since, on, off, resets, stack = words[:7].tolist()
-        return cls(cycle, bool(connected), since, on, off, resets, stack, words[7:])
+        net = words[-CHANNELS:].astype(np.int64)
+        return cls(cycle, bool(connected), since, on, off, resets, stack, words[7:-CHANNELS], net)
 
     @property
     def on(self) -> int:

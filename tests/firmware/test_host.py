@@ -15,14 +15,19 @@ from tomoskin.source import serial as port
 from tomoskin.twin import Board, TwinDevice
 from tomoskin.wire import (
     Ack,
+    BoardLimits,
     Decoder,
     Drive,
+    DriveMode,
     Fault,
     FaultCode,
     Format,
+    GetBoard,
     GetInfo,
+    GetMode,
     GetPattern,
     GetScan,
+    HeldMode,
     HeldPattern,
     HeldScan,
     Hello,
@@ -33,6 +38,7 @@ from tomoskin.wire import (
     SetBaud,
     SetFormat,
     SetHeartbeat,
+    SetMode,
     SetPattern,
     SetScan,
     Start,
@@ -40,7 +46,8 @@ from tomoskin.wire import (
     encode,
 )
 
-TWIN = Board(16, 10, 0.1, 250e3, 128, 400, unique_id=b"host\0\0\0\0")
+LIMITS = BoardLimits(0, b"Linux process".ljust(24, b"\0"), 10, 5000, 1000, 1000, 0, 813)
+TWIN = Board(16, 10, 0.1, 250e3, 128, 448, unique_id=b"host\0\0\0\0", limits=LIMITS)
 """The twin's board with this firmware's limits."""
 
 
@@ -141,7 +148,7 @@ def test_unplugged_and_plugged_in_again(board_program, tmp_path):
         link = Link(port.open_serial(first.path, None), SCAN, SETTINGS)
         frames_of(link, 3)
         first.kill()
-        with pytest.raises(SourceError, match="gone away"):
+        with pytest.raises(SourceError, match="been disconnected"):
             frames_of(link, 10_000)
         link.close()
     with (
@@ -205,6 +212,12 @@ commands = st.one_of(
     st.builds(SetFormat, u8, identities, st.sampled_from(list(Format))),
     st.builds(GetScan, u8),
     st.builds(GetPattern, u8, st.integers(0, 3)),
+    st.builds(GetBoard, u8),
+    st.builds(
+        SetMode, u8, identities, st.sampled_from(list(DriveMode)),
+        st.sampled_from([0, 9, 10, 300, 5000, 5001]), st.sampled_from([0, 1, 3, 32, 33]),
+    ),
+    st.builds(GetMode, u8),
 )  # fmt: skip
 
 
@@ -221,5 +234,7 @@ def test_twin_and_firmware_answer_alike(board, said):
     for command in said:
         twin.receive(encode(command), 0.0)
         wanted = Decoder().feed(twin.emit(0.0), 0.0)
-        assert [talk.ask(command, (Ack, Info, HeldScan, HeldPattern))] == wanted
+        assert [
+            talk.ask(command, (Ack, Info, HeldScan, HeldPattern, BoardLimits, HeldMode))
+        ] == wanted
     transport.close()

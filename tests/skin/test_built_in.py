@@ -12,7 +12,7 @@ from tomoskin.forward import ForwardModel
 from tomoskin.mesh import Disc, Rectangle, quality
 from tomoskin.skin import Skin
 
-NAMES = ("tank-16", "textile-disc-16", "textile-disc-8", "textile-square-16")
+NAMES = ("tank-16", "textile-disc-16", "textile-disc-32", "textile-disc-8", "textile-square-16")
 
 
 def test_names() -> None:

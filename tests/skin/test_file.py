@@ -137,10 +137,10 @@ BAD = {
         'diameter = "20 cm"',
         'diameter = "20 cm"\nwidth = "1 cm"',
         "[outline] width",
-        'goes with shape = "ellipse" or "rectangle", got shape = "disc"',
+        'needs shape = "ellipse" or "rectangle", got shape = "disc"',
     ),
     "unknown shape": ('"disc"', '"disk"', "[outline]", '"disk"'),
-    "bare number": ('"20 cm"', "200", "[outline] diameter", '"200 mm"?'),
+    "bare number": ('"20 cm"', "200", "[outline] diameter", 'write it as "200 mm"'),
     "boolean": ('"20 cm"', "true", "[outline] diameter", "got true"),
     "wrong unit": ('"20 cm"', '"20 s"', "[outline] diameter", 'got unit "s"'),
     "no number": ('"20 cm"', '"wide"', "[outline] diameter", "expected a number with a unit"),
@@ -195,10 +195,10 @@ ADDED = {
     "pattern and tables": (
         'pattern = "adjacent"\ndrive = [[1, 0]]\nmeasure = [[2, 3]]',
         "[drive] pattern",
-        "cannot stand beside drive",
+        "cannot be combined with drive",
     ),
-    "drive alone": ("drive = [[1, 0]]", "[drive] drive", "needs measure"),
-    "measure alone": ("measure = [[1, 0]]", "[drive] measure", "needs drive"),
+    "drive alone": ("drive = [[1, 0]]", "[drive] drive", "needs the key measure"),
+    "measure alone": ("measure = [[1, 0]]", "[drive] measure", "needs the key drive"),
     "tables of unequal length": (
         "drive = [[1, 0]]\nmeasure = [[2, 3], [3, 4]]",
         "[drive]",
@@ -269,12 +269,12 @@ def test_position_off_the_rim_names_the_electrode() -> None:
 def test_positions_stand_alone(beside: str) -> None:
     text = changed('shape = "disc"\ndiameter = "20 cm"', SQUARE)
     error = failure(changed("count = 8", f"{PLACES}\n{beside}", text))
-    assert "cannot stand beside positions" in error.message
+    assert "cannot be combined with positions" in error.message
 
 
 def test_too_few_cells_are_told_when_the_mesh_is_made() -> None:
     text = FILE.replace("count = 8", "count = 32") + "[mesh]\ncells = 50\n"
-    with pytest.raises(SkinError, match="50 cells cannot resolve") as caught:
+    with pytest.raises(SkinError, match="50 cells are too few for") as caught:
         Skin.from_toml(text, source="my.toml").mesh()
     assert caught.value.where == "my.toml: [mesh] cells"
 
@@ -318,7 +318,7 @@ def test_files_that_are_no_skin_files(tmp_path: Path) -> None:
         tmp_path: "folder",
         binary: "not a text file",
         large: "too large",
-        empty: "is empty",
+        empty: "is an empty file",
         tmp_path / "none.toml": "no such file",
         Path("/dev/null"): "device",
     }

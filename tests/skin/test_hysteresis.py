@@ -100,7 +100,7 @@ def test_motion_either_way_breaks_contacts_that_form_again():
 
 def test_a_rise_that_may_be_a_release_has_no_load():
     brittle = MaterialMemory(breakdown=(1.5,), breakdown_times=(10.0,))
-    with pytest.raises(ModelError, match="may be a load or a release"):
+    with pytest.raises(ModelError, match="rises both under load and on release"):
         load_of(MemoryState.fresh(brittle), brittle, np.array([1.0]), 0.1)
     found, _ = load_of(MemoryState.fresh(brittle), brittle, np.array([1.0]), 10.0)
     assert found == pytest.approx([1 / (1 + 1.5 / math.e)])

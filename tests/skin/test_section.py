@@ -49,12 +49,12 @@ def test_what_is_written_is_kept_beside_what_is_meant() -> None:
     ("given", "message"),
     [
         ({}, "rod radius: is missing; expected a length from 0 to 100 mm"),
-        ({"shape": "flat", "radius": "5 mm"}, 'goes with shape = "round", got shape = "flat"'),
+        ({"shape": "flat", "radius": "5 mm"}, 'needs shape = "round", got shape = "flat"'),
         ({"shape": "flat", "length": "1 m"}, 'expected a length from 0 to 100 mm, got "1 m"'),
-        ({"shape": "flat", "ends": ["0 mm", "1 mm"]}, "rod ends: needs count beside it"),
+        ({"shape": "flat", "ends": ["0 mm", "1 mm"]}, "rod ends: needs the key count as well"),
         (
             {"shape": "flat", "ends": ["0 mm", "1 mm"], "count": 1, "length": "1 mm"},
-            "rod length: cannot stand beside ends",
+            "rod length: cannot be combined with ends",
         ),
         (
             {"shape": "flat", "ends": ["0 mm"], "count": 1},

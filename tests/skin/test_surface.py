@@ -56,9 +56,9 @@ def test_a_surface_survives_the_file() -> None:
     ("surface", "words"),
     [
         ({"shape": "cylinder", "radius": "20 mm"}, r"\[surface\]: .* overlaps itself"),
-        ({"shape": "cap", "radius": "30 mm"}, r"\[surface\]: .* is covered after"),
+        ({"shape": "cap", "radius": "30 mm"}, r"\[surface\]: .* is covered at"),
         ({"shape": "cap"}, r"\[surface\] radius: is missing"),
-        ({"radius": "70 mm"}, r"\[surface\] radius: goes with shape"),
+        ({"radius": "70 mm"}, r"\[surface\] radius: needs shape"),
         ({"shape": "globe"}, r'\[surface\] shape: expected "flat" or'),
         (
             {"shape": "arm", "radius": "40 mm", "bend": "120 deg", "joint": "60 mm"},

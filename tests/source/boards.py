@@ -14,14 +14,18 @@ from tomoskin.wire import (
     SCHEMA,
     Ack,
     Deframer,
+    GetBoard,
     GetInfo,
+    GetMode,
     GetPattern,
     GetScan,
+    HeldMode,
     HeldPattern,
     HeldScan,
     Hello,
     Result,
     SetFormat,
+    SetMode,
     SetPattern,
     SetScan,
     decode_payload,
@@ -33,7 +37,10 @@ SCAN = Scan.of(Pattern.adjacent(8))
 SETTINGS = ScanSettings(oversampling=4, settling=200e-6, current_limit=0.1, adc_bits=10)
 BOARD = Board(channels=8, adc_bits=10, current=0.1, tick_rate=250e3)
 PATTERN_FIELDS = ("configuration", "first", "drives")
-SET_UP = ["GetInfo", "Stop", "SetScan", "SetPattern", "SetFormat", "GetScan", "GetPattern", "Start"]
+SET_UP = [
+    *("GetInfo", "Stop", "GetBoard", "SetScan", "SetPattern", "SetFormat"),
+    *("GetScan", "GetPattern", "Start"),
+]
 HELLO = Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash)
 
 
@@ -73,7 +80,9 @@ class ScriptedBoard:
     def answer(self, command):
         if isinstance(command, GetInfo):
             return [BOARD.info(command.request)]
-        if isinstance(command, GetScan | GetPattern):
+        if isinstance(command, GetBoard):
+            return [replace(BOARD.limits, request=command.request)]
+        if isinstance(command, GetScan | GetPattern | GetMode):
             return [self.held(command)]
         return [Ack(command.request, type_byte(type(command)), Result.OK, 0)]
 
@@ -82,6 +91,8 @@ class ScriptedBoard:
         if isinstance(command, GetScan):
             scan, fmt = self._last(SetScan), self._last(SetFormat)
             return HeldScan(command.request, *astuple(scan)[1:], fmt.format)
+        if isinstance(command, GetMode):
+            return HeldMode(command.request, *astuple(self._last(SetMode))[1:])
         pattern = self._last(SetPattern, first=command.first)
         return HeldPattern(command.request, *(getattr(pattern, n) for n in PATTERN_FIELDS))
 
@@ -97,7 +108,7 @@ class ScriptedBoard:
 
     def read(self, timeout):
         if self.gone:
-            raise SourceError("the board has gone away", where=self.name)
+            raise SourceError("the board has been disconnected", where=self.name)
         if self._queue:
             return self._queue.popleft()
         self.clock.time += timeout
@@ -105,7 +116,7 @@ class ScriptedBoard:
 
     def write(self, data):
         if self.gone:
-            raise SourceError("the board has gone away", where=self.name)
+            raise SourceError("the board has been disconnected", where=self.name)
         for payload in self._deframer.feed(data):
             command = decode_payload(payload, 0.0)
             self.commands.append(command)

@@ -19,6 +19,7 @@ from source.boards import (
     twin_transport,
 )
 from tomoskin.core import SourceError, WireError
+from tomoskin.pattern import Pattern, Scan
 from tomoskin.source import Link, ScanSettings, Timing
 from tomoskin.wire import (
     OLDER,
@@ -46,7 +47,7 @@ def test_the_order_of_the_handshake(clock):
     info = link.connect()
     assert board.names == SET_UP
     assert info.channels == 8
-    scan, pattern, chosen = board.commands[2:5]
+    scan, pattern, chosen = board.commands[3:6]
     start = board.commands[-1]
     assert chosen.format is Format.SIXTEEN
     assert scan.configuration == pattern.configuration == start.configuration == link.configuration
@@ -146,11 +147,11 @@ def test_answers_to_other_requests_are_not_taken(clock):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"major": 0}, "the board speaks 0.1: its firmware is older"),
-        ({"major": 2}, "the board speaks 2.1: this host is older"),
-        ({"minor": 7, "schema_hash": 1}, "the board speaks 1.7: this host is older"),
+        ({"major": 0}, "the board speaks 0.2: the board's firmware is older"),
+        ({"major": 2}, "the board speaks 2.2: this tomoskin is older"),
+        ({"minor": 7, "schema_hash": 1}, "the board speaks 1.7: this tomoskin is older"),
         ({"schema_hash": 0xABC}, "different schemas .board 00000abc"),
-        ({"minor": 0, "schema_hash": 0xABC}, "both call a protocol 1.0 .* .board 00000abc"),
+        ({"minor": 0, "schema_hash": 0xABC}, "both speak protocol 1.0, .* .board 00000abc"),
     ],
 )
 @pytest.mark.parametrize("where", ["hello", "info"])
@@ -166,13 +167,13 @@ def test_a_drifted_board_is_refused_with_who_is_older(clock, change, said, where
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"channels": 4}, "needs 8 electrodes, the board offers 4"),
+        ({"channels": 4}, "needs 8 electrodes, but the board has at most 4"),
         ({"max_drives": 7}, "needs 8 drives"),
         ({"max_samples": 47}, "needs 48 samples"),
         ({"max_oversampling": 2}, "needs 4 conversions"),
         ({"adc_bits": 8}, "the board's converter has 8"),
         ({"adc_bits": 13}, "the board's converter has 13 .*multiple of 8"),
-        ({"current": 200_000}, "limiter is set to 200 mA, the skin may carry 100 mA"),
+        ({"current": 200_000}, "limiter is set to 200 mA, but this skin allows at most 100 mA"),
     ],
 )
 def test_a_board_that_cannot_do_the_scan(clock, change, said):
@@ -202,7 +203,7 @@ def test_a_board_that_holds_something_else_is_refused(clock, kind, change, said)
         return replace(held(command), **change) if bent else held(command)
 
     board.held = forgetful
-    with pytest.raises(SourceError, match=f"does not hold what was sent: {said}"):
+    with pytest.raises(SourceError, match=f"did not store what was sent: it has {said}"):
         linked(board, clock).connect()
     assert "Start" not in board.names
 
@@ -254,6 +255,39 @@ def test_a_refusal_is_told_in_words(clock):
         linked(board, clock).connect()
 
 
+@pytest.mark.parametrize(
+    ("field", "said"),
+    [
+        (3, r"settling of 200 µs is out of range \(.* at most 100,000\)"),
+        (6, r"prescaler of 64 is out of range \(.* 16, 32, 64 or 128\)"),
+        (99, r"a value is out of range.* \(99\)"),
+    ],
+)
+def test_a_value_out_of_range_is_named_with_its_limit(clock, field, said):
+    board = ScriptedBoard(clock)
+    answer = board.answer
+
+    def narrow(command):
+        if isinstance(command, SetScan):
+            return [Ack(command.request, 0x85, Result.BAD_VALUE, field)]
+        return answer(command)
+
+    board.answer = narrow
+    with pytest.raises(SourceError, match=f"refused SetScan: {said}"):
+        linked(board, clock).connect()
+    assert "Start" not in board.names
+
+
+def test_a_mega_refuses_32_electrodes_before_anything_is_set(clock):
+    board = ScriptedBoard(clock)
+    board.answer = lambda command: [replace(BOARD.info(command.request), channels=16)]
+    link = Link(board, Scan.of(Pattern.adjacent(32)), SETTINGS, clock=clock.now)
+    said = r"needs 32 electrodes, but the board has at most 16 .*or a Pico, which has up to 32"
+    with pytest.raises(SourceError, match=said):
+        link.connect()
+    assert board.names == ["GetInfo"]
+
+
 def test_a_board_that_resets_during_set_up_is_set_up_anew(clock):
     board = ScriptedBoard(clock)
     answer, resets = board.answer, []
@@ -267,7 +301,7 @@ def test_a_board_that_resets_during_set_up_is_set_up_anew(clock):
     board.answer = shaky
     linked(board, clock).connect()
     assert board.names == [
-        *("GetInfo", "Stop", "SetScan"),
+        *("GetInfo", "Stop", "GetBoard", "SetScan"),
         *SET_UP,
     ]
 
@@ -276,7 +310,7 @@ def test_a_board_that_resets_for_ever_is_given_up(clock):
     board = ScriptedBoard(clock)
     answer = board.answer
     board.answer = lambda c: [HELLO] if isinstance(c, Start) else answer(c)
-    with pytest.raises(SourceError, match="resets again and again"):
+    with pytest.raises(SourceError, match="resets repeatedly"):
         linked(board, clock).connect()
 
 

@@ -36,5 +36,5 @@ def test_an_unknown_source_is_refused_with_those_known():
 def test_options():
     assert read_options("", ("a",), "x") == {}
     assert read_options("seed=3, fast", ("seed", "fast"), "x") == {"seed": "3", "fast": ""}
-    with pytest.raises(SourceError, match='x: expected options seed, fast, got "slow"'):
+    with pytest.raises(SourceError, match='x: expected an option among seed, fast, got "slow"'):
         read_options("slow", ("seed", "fast"), "x")

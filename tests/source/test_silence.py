@@ -12,13 +12,13 @@ MEGA = "Arduino Mega 2560"
 @pytest.mark.parametrize(
     ("heard", "bootloader", "board", "rate", "says"),
     [
-        (b"", b"", "", BAUD, "likely the wrong port.*ports here"),
+        (b"", b"", "", BAUD, "probably the wrong port.*ports here"),
         (
             b"",
             b"",
             MEGA,
             BAUD,
-            r"from it \(Arduino Mega 2560\): likely it is not",
+            r"\(Arduino Mega 2560\) sends nothing: it probably has no firmware",
         ),
         (b"", BOOTLOADER, MEGA, BAUD, r"in its bootloader.*tomoskin firmware flash /dev/ttyACM0\)"),
         (b"\x1b[2Jtemp 21.5\r\ntemp 21.6\r\n", b"", MEGA, BAUD, r'\("\[2Jtemp 21.5 temp 21.6"\)'),
@@ -27,9 +27,9 @@ MEGA = "Arduino Mega 2560"
             b"",
             MEGA,
             115_200,
-            "115,200 Bd .*the wrong rate.*leave baud= away",
+            "115,200 Bd .*the rate is probably wrong.*leave out baud=",
         ),
-        (NOISE, b"", MEGA, BAUD, "likely another program's.*,baud=RATE"),
+        (NOISE, b"", MEGA, BAUD, "probably another program.*,baud=RATE"),
     ],
 )
 def test_the_likeliest_cause_and_what_to_do(heard, bootloader, board, rate, says):

@@ -110,11 +110,11 @@ def test_faults_come_and_go_in_their_order():
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ((1.0, "melt", 0), r"fault at 1.0 s: expected cut, .* got \"melt\""),
+        ((1.0, "melt", 0), r"fault at 1.0 s: expected a kind among cut, .* got \"melt\""),
         ((math.nan, "cut", 0), "finite time"),
-        ((1.0, "cut", -1), "an electrode, got -1"),
-        ((1.0, "short", 2, 2), r"two electrodes, got \(2, 2\)"),
-        ((1.0, "short", 2), "two electrodes"),
+        ((1.0, "cut", -1), "an electrode from 0, got -1"),
+        ((1.0, "short", 2, 2), r"two different electrodes from 0, got \(2, 2\)"),
+        ((1.0, "short", 2), "two different electrodes"),
     ],
 )
 def test_impossible_faults(values, said):

@@ -152,7 +152,9 @@ def test_no_force_no_dent():
 
 def test_faces_that_overlap_are_named():
     probes = [Probe(Circle(0.01), x, 0, 1.0) for x in (-0.02, 0.0, 0.005)]
-    with pytest.raises(GeometryError, match="press 1 and press 2: the faces overlap"):
+    with pytest.raises(
+        GeometryError, match="press 1 and press 2: the faces of the two probes overlap"
+    ):
         solve_contact(probes, FOAM, grid())
 
 

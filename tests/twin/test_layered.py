@@ -125,13 +125,16 @@ def test_a_twin_feels_it_as_compression():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"x": math.nan}, "expected a place"),
+        ({"x": math.nan}, "expected a finite position"),
         ({"diameter": 0.0}, "diameter and a depth above 0"),
         ({"depth": -1e-3}, "diameter and a depth above 0"),
         ({"modulus": 0.0}, "modulus above 0"),
-        ({"room": 1.5}, "room from 0 to 1"),
-        ({"x": 47e-3}, "inclusion 0: it sticks out"),
-        ({"depth": 25e-3}, "inclusion 0: it reaches 35 mm down in a body of 30 mm"),
+        ({"room": 1.5}, "fraction from 0 to 1 as room"),
+        ({"x": 47e-3}, "inclusion 0: it extends beyond"),
+        (
+            {"depth": 25e-3},
+            "inclusion 0: it extends to a depth of 35 mm, but the body is 30 mm thick",
+        ),
     ],
 )
 def test_impossible_inclusions_are_refused(change, said):

@@ -13,11 +13,11 @@ from tomoskin.twin.probe import check_on_skin
 @pytest.mark.parametrize(
     ("values", "error", "said"),
     [
-        ((math.nan, 0, 1, 0.01), GeometryError, "finite place"),
-        ((0, math.inf, 1, 0.01), GeometryError, "finite place"),
+        ((math.nan, 0, 1, 0.01), GeometryError, "finite position"),
+        ((0, math.inf, 1, 0.01), GeometryError, "finite position"),
         ((0, 0, 1, 0.0), GeometryError, "expected radius of 1 µm or more"),
         ((0, 0, 1, math.nan), GeometryError, "expected radius of 1 µm or more"),
-        ((0, 0, -0.1, 0.01), ModelError, "push, not pull"),
+        ((0, 0, -0.1, 0.01), ModelError, "can only push"),
         ((0, 0, math.nan, 0.01), ModelError, "force of 0 N or more"),
     ],
 )
@@ -51,7 +51,7 @@ def test_a_press_is_a_flat_round_probe():
         (lambda: Face(((0, 0), (0.01, 0.01), (0.01, 0), (0, 0.01))), "cross"),
         (lambda: Face(((0, 0), (0.01, 0.0))), "at least 3"),
         (lambda: Face(((0, 0), (0.01, 0.0), (0.02, 0.0))), "area|touch|cross|side"),
-        (lambda: Probe(Circle(0.01), 0, math.nan, 1), "finite place"),
+        (lambda: Probe(Circle(0.01), 0, math.nan, 1), "finite position"),
         (lambda: Probe(Circle(0.01), 0, 0, 1, math.inf), "finite angle"),
     ],
 )
@@ -61,7 +61,7 @@ def test_impossible_shapes_and_places(make, said):
 
 
 def test_impossible_forces():
-    with pytest.raises(ModelError, match="push, not pull"):
+    with pytest.raises(ModelError, match="can only push"):
         Probe(Circle(0.01), 0, 0, -1.0)
     with pytest.raises(ModelError, match="finite drag"):
         Probe(Circle(0.01), 0, 0, 1.0, 0.0, (0.0, math.nan))

@@ -131,7 +131,7 @@ def test_a_script_of_nothing_is_an_idle_skin() -> None:
             'hold = "2 s"',
             'hold = "2 s"\nprofile = [["1 s", "0 N"]]',
             '1 "a" force',
-            "cannot stand beside profile",
+            "cannot be combined with profile",
         ),
         (
             'hold = "2 s"',
@@ -161,7 +161,7 @@ def test_a_script_of_nothing_is_an_idle_skin() -> None:
             'force = "3 N"\nhold = "2 s"',
             'profile = [["1 s", "4 N"]]',
             '1 "a" profile',
-            "expected 0 N last, got 4 N",
+            "expected 0 N in the last row, got 4 N",
         ),
         (
             'radius = "15 mm"',
@@ -210,9 +210,9 @@ def test_a_script_that_cannot_be_meant(text: str, where: str, what: str) -> None
         (
             changed('["10 mm", "-20 mm"]', '["90 mm", "60 mm"]'),
             (
-                '[[press]] 1 "a" at: expected a place on the skin (x from -100 to 100 mm, y',
+                '[[press]] 1 "a" at: expected a position on the skin (x from -100 to 100 mm, y',
                 "got (90.0 mm, 60.0 mm)",
-                "(the middle of a probe must stand inside the outline)",
+                "(the middle of a probe must be inside the outline)",
             ),
         ),
         (
@@ -232,7 +232,7 @@ def test_a_script_that_cannot_be_meant(text: str, where: str, what: str) -> None
             (
                 "hold: a stage of 5 ms",
                 "a frame of this skin, 56 ms",
-                "make it longer, or [readout]",
+                "make it longer, or shorten [readout]",
             ),
         ),
     ],
@@ -258,7 +258,7 @@ def test_an_error_says_where_what_was_expected_and_found_and_what_to_do(
             "expected an electrode other than 2, got 2",
         ),
         ('kind = "los"', "kind", 'or "temperature", got "los"'),
-        ('kind = "reboot"\nend = "2 s"', "end", "goes with kind"),
+        ('kind = "reboot"\nend = "2 s"', "end", "needs kind"),
         ('kind = "loss"\nend = "2 s"\nprobability = 1.5', "probability", "0 to 0.999, got 1.5"),
         ('kind = "noise"\nend = "2 s"', "lsb", "is missing"),
         ('kind = "temperature"\nkelvin = "warm"', "kelvin", "expected a number"),
@@ -278,8 +278,8 @@ def test_a_board_that_reads_before_it_has_settled() -> None:
         check_script(script(), short)
     assert str(caught.value) == (
         f"{short.source}: [readout] settling: expected at least 51 us, got 22 us: the textile "
-        "board settles with a time constant of 11 us, and 14 % of each sample would be the drive "
-        "before (make it longer, or choose another preset)"
+        "board settles with a time constant of 11 us, and 14 % of each sample would come from the "
+        "drive before (make it longer, or choose another preset)"
     )
     check_script(script(head=HEAD + 'preset = "ideal"\n'), short)
 

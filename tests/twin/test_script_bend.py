@@ -52,7 +52,7 @@ def test_joints_stretches_and_profiles():
         (HINGE.replace("hold", "profile").replace('"2 s"', '[["1 s", "9 deg"]]'), "angle|nothing"),
         (
             '[[bend]]\nlength = "60 mm"\nstart = "0 s"\nprofile = [["1 s", "9 deg"]]\n',
-            "nothing left",
+            "0 in the last row",
         ),
         (HINGE.replace("60 deg", "-170 deg").replace("60 mm", "5 mm"), "folds"),
         (HINGE.replace("60 deg", "200 deg"), "at most 180"),

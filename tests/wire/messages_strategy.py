@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from tomoskin.core import Frame
-from tomoskin.wire import ENUMS, RECORDS, SCHEMA, Drive, PackedFrame
+from tomoskin.wire import ENUMS, RECORDS, SCHEMA, ChoppedFrame, Drive, PackedFrame
 
 BITS = {"u8": 8, "u16": 16, "u32": 32, "u64": 64}
 
@@ -32,8 +32,10 @@ def _field(field):
 
 def _message(spec):
     fields = {field.name: _field(field) for field in spec.fields}
-    if spec.name in {"FRAME", "FRAME_PACKED"}:
+    if spec.name.startswith("FRAME"):
         fields["host_time"] = st.just(0.0)
+    if spec.name == "FRAME_CHOPPED":
+        fields["samples"] = fields["samples"].map(lambda counts: counts[: len(counts) // 2 * 2])
     return st.builds(RECORDS[spec.name], **fields)
 
 
@@ -44,11 +46,17 @@ def messages(to_device=None):
 
 
 def same(one, other):
-    """Equality that looks into the samples of a frame, packed or not."""
-    one, other = (m.frame if isinstance(m, PackedFrame) else m for m in (one, other))
+    """Equality that looks into the samples of a frame, however it was sent."""
+    one, other = (m.frame if isinstance(m, PackedFrame | ChoppedFrame) else m for m in (one, other))
     if isinstance(one, Frame) and isinstance(other, Frame):
         names = ("sequence", "ticks", "configuration", "flags", "drops", "host_time")
-        return all(getattr(one, n) == getattr(other, n) for n in names) and np.array_equal(
-            one.samples, other.samples
+        return (
+            all(getattr(one, n) == getattr(other, n) for n in names)
+            and np.array_equal(one.samples, other.samples)
+            and np.array_equal(_sums(one), _sums(other))
         )
     return type(one) is type(other) and one == other
+
+
+def _sums(frame):
+    return [] if frame.sums is None else [1, *frame.sums.tolist()]

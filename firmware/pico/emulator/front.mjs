@@ -22,6 +22,7 @@ export class Front {
     this.watch = watch;
     this.complain = complain;
     this.source = this.sink = NONE;
+    this.pair = [NONE, NONE];
     this.opened = -Infinity;
     this.since = 0;
   }
@@ -81,12 +82,15 @@ export class Front {
   #connect(source, sink) {
     const was = this.source !== NONE || this.sink !== NONE;
     const is = source !== NONE || sink !== NONE;
-    this.source = source;
-    this.sink = sink;
     const now = this.now();
     if (was && !is) {
       this.opened = now;
-      this.watch.ended(now - this.since);
+      this.watch.ended(now - this.since, ...this.pair);
+    }
+    this.source = source;
+    this.sink = sink;
+    if (source !== NONE && sink !== NONE) {
+      this.pair = [source, sink]; // the two enables do not go at once
     }
     if (!was && is) {
       this.watch.began(now - this.opened);

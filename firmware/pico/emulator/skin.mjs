@@ -4,7 +4,10 @@ import { openSync, readSync } from 'node:fs';
 const MOST = 32;
 const MAGIC = 0x31306e696b736f74n;
 const HEAD = 72;
-const SIZE = HEAD + 8 * MOST * MOST;
+const FAULTS = HEAD + 8 * MOST * MOST; // those of a Mega's board, and:
+const READING = FAULTS + 4 * 4 + 2 * MOST; // 1 + the channel that is read instead; 0: its own
+const POTENTIALS = READING + MOST;
+const SIZE = POTENTIALS + 8 * MOST;
 
 export class Skin {
   /** The skin in the file at `path`; without one, each electrode at the end of 1 + e ohm. */
@@ -39,7 +42,8 @@ export class Skin {
   }
 
   /** One conversion; -1 for a source, sink or channel that is none. */
-  code(source, sink, channel) {
+  code(source, sink, addressed) {
+    const channel = (this.view.getUint8(READING + addressed) || addressed + 1) - 1;
     const [gain, offset, reference, levels, noise] = [2, 3, 4, 5, 6].map((k) => this.#figure(k));
     const volts = gain * this.#volts(source, sink, channel) + offset;
     const exact = (volts * levels) / reference + (noise > 0 ? noise * this.#chance() : 0);
@@ -48,6 +52,11 @@ export class Skin {
 
   #figure(number) {
     return this.view.getFloat64(16 + 8 * number, true);
+  }
+
+  /** V that an electrode has by itself. */
+  #potential(electrode) {
+    return this.view.getFloat64(POTENTIALS + 8 * electrode, true);
   }
 
   #resistance(row, column) {
@@ -65,7 +74,8 @@ export class Skin {
     const atSink = r(source, sink) - r(sink, sink);
     const load = r(source, source) - r(sink, source) - atSink;
     const amperes = Math.min(this.#figure(0), load > 0 ? this.#figure(1) / load : Infinity);
-    return amperes * (r(source, channel) - r(sink, channel) - atSink);
+    const own = this.#potential(channel) - this.#potential(sink);
+    return amperes * (r(source, channel) - r(sink, channel) - atSink) + own;
   }
 
   /** Nearly normal: twelve uniform numbers (Irwin and Hall), always the same ones. */

@@ -7,6 +7,7 @@ export class Watch {
     this.path = path;
     this.seen = { longestOn: 0, shortestOff: null, resets: 0, drives: 0, serial: '', stalled: false };
     this.instants = new Map();
+    this.net = new Array(32).fill(0); // of pairs, by the lower channel: ns from the other one to it
   }
 
   began(off) {
@@ -17,8 +18,12 @@ export class Watch {
     }
   }
 
-  ended(on) {
+  /** A drive ends that was on for so many ns. */
+  ended(on, source, sink) {
     this.seen.longestOn = Math.max(this.seen.longestOn, on);
+    if (source >= 0 && sink >= 0) {
+      this.net[Math.min(source, sink)] += source > sink ? on : -on;
+    }
   }
 
   /** A conversion began `after` ns into its drive, the `ordinal`th since the channel's turn. */
@@ -52,7 +57,8 @@ export class Watch {
     }
     const connected = front.source >= 0 || front.sink >= 0;
     const on = connected ? now - front.since : 0;
-    const seen = { ...this.seen, now, busy, connected, jitter: this.jitter };
+    const { net, jitter } = this;
+    const seen = { ...this.seen, now, busy, connected, jitter, net };
     seen.longestOn = Math.max(seen.longestOn, on);
     seen.instants = this.instants.size;
     writeFileSync(`${this.path}.new`, JSON.stringify(seen));

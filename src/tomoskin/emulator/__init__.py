@@ -15,6 +15,7 @@ from tomoskin.emulator.pico import (
     build_uf2,
     find_boot_drive,
     pico_image,
+    settings_uf2,
     write_uf2,
 )
 from tomoskin.emulator.process import (
@@ -54,6 +55,7 @@ __all__ = [
     "read_identity",
     "say_identity",
     "sense_resistor",
+    "settings_uf2",
     "write_firmware",
     "write_identity",
     "write_uf2",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import subprocess
 import sys
 import tty
@@ -13,9 +14,11 @@ from typing import IO
 
 from tomoskin.core import SourceError, StrPath, written
 from tomoskin.emulator.program import BUILD, FOLDER, IMAGES, make_firmware
-from tomoskin.emulator.uf2 import check_boot, pack_uf2, unpack_uf2
+from tomoskin.emulator.uf2 import FLASH, PAGE, check_boot, pack_uf2, unpack_uf2
 
 ADC_BITS = 12
+CHANNELS = (8, 16, 32)
+"""That the firmware is built for; what is emulated has the most."""
 
 _EMULATOR = FOLDER / "pico" / "emulator" / "main.mjs"
 _SET_UP = FOLDER.parent / "scripts" / "pico.py"
@@ -24,6 +27,8 @@ _PACKAGES = "make gcc-arm-none-eabi libnewlib-arm-none-eabi"
 _MOUNTS = ("/media", "/run/media", "/Volumes", "/mnt")
 _ABOUT, _WRITTEN = "INFO_UF2.TXT", "tomoskin.uf2"
 _LONGEST = 300.0
+_SETTINGS = 0x1FF000
+"""Of the flash's last sector: ``firmware/pico/flash.c``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +62,7 @@ class PicoPrograms:
         return process, name if process.stdout.readline() else ""
 
 
-def build_uf2(channels: int = 16) -> Path:
+def build_uf2(channels: int) -> Path:
     """The firmware of a Pico with ``channels``, built if it is not up to date; SourceError."""
     data = pico_image(channels)
     uf2 = BUILD / f"tomoskin-pico-{channels}.uf2"
@@ -89,7 +94,13 @@ def build_pico_programs() -> PicoPrograms:
     SourceError
         When this is no checkout, the compiler or Node is missing, or the build fails.
     """
-    return PicoPrograms(build_uf2(), _find_node())
+    return PicoPrograms(build_uf2(CHANNELS[-1]), _find_node())
+
+
+def settings_uf2(current: float) -> bytes:
+    """The UF2 that says what a Pico's current limiter is set to, A; its firmware stays."""
+    page = struct.pack("<I", round(current * 1e6)).ljust(PAGE, b"\xff")
+    return pack_uf2(page, FLASH + _SETTINGS)
 
 
 def write_uf2(uf2: bytes, drive: StrPath) -> None:

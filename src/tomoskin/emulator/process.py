@@ -21,7 +21,8 @@ _SEQUENCE = struct.Struct("<I")
 _SEQUENCE_AT = 8
 _FAULTS_AT = _HEAD.size + 8 * MOST_ELECTRODES**2
 _FAULTS = struct.Struct(f"<4I{MOST_ELECTRODES}s{MOST_ELECTRODES}s{MOST_ELECTRODES}s")
-_SIZE = _FAULTS_AT + _FAULTS.size
+_POTENTIALS_AT = _FAULTS_AT + _FAULTS.size
+_SIZE = _POTENTIALS_AT + 8 * MOST_ELECTRODES
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +44,7 @@ class Front:
 
 @dataclass(frozen=True, slots=True)
 class BoardFaults:
-    """What is wrong with an emulated Mega's board; the Pico's emulator does not know it.
+    """What is wrong with an emulated board; the Pico's emulator knows ``reading`` alone.
 
     ``high_open``, ``low_open``: channels whose switch never connects them to the current, or to
     ground; ``high_stuck``, ``low_stuck``: always; of the stuck ones the lowest counts, on one side.
@@ -77,8 +78,12 @@ class SkinMemory:
         front: Front,
         resistance: FloatArray,
         faults: BoardFaults | None = None,
+        potentials: FloatArray | None = None,
     ) -> None:
-        """Make the file; ``resistance`` as in :meth:`write`; without ``faults``, none."""
+        """Make the file; ``resistance`` as in :meth:`write`; without ``faults``, none.
+
+        ``potentials`` (n,) V that each electrode has by itself, such as a thermoelectric voltage.
+        """
         self.path = Path(path)
         self._n = len(resistance)
         if self._n > MOST_ELECTRODES:
@@ -90,7 +95,10 @@ class SkinMemory:
             self._map = mmap.mmap(file.fileno(), _SIZE)
         self._sequence = 0
         _HEAD.pack_into(self._map, 0, _MAGIC, 0, self._n, *astuple(front))
-        self._map[_FAULTS_AT:_SIZE] = (faults or BoardFaults()).pack()
+        self._map[_FAULTS_AT:_POTENTIALS_AT] = (faults or BoardFaults()).pack()
+        if potentials is not None:
+            data = potentials.astype("<f8").tobytes()
+            self._map[_POTENTIALS_AT : _POTENTIALS_AT + len(data)] = data
         self.write(resistance)
 
     def write(self, resistance: FloatArray) -> None:

@@ -19,6 +19,9 @@ FOLDER = Path(__file__).resolve().parents[3] / "firmware"
 IMAGES = Path(__file__).parent / "images"
 """Where a wheel has the firmware, built: ``tomoskin-8.hex`` for a board with 8 channels."""
 
+CHANNELS = (8, 16)
+"""That the firmware is built for; what is emulated has the most."""
+
 BUILD = FOLDER.parent / "build" / "firmware"
 _PACKAGES = "make gcc gcc-avr avr-libc libsimavr-dev libelf-dev"
 _NEEDED = ("make", "cc", "avr-gcc", "avr-size")
@@ -49,7 +52,7 @@ class Programs:
         return process, process.stdout.readline().decode().strip()
 
 
-def build_elf(channels: int = 16) -> Path:
+def build_elf(channels: int = CHANNELS[-1]) -> Path:
     """The firmware of a board with ``channels``, built if it is not up to date; SourceError."""
     make_firmware(_NEEDED, _PACKAGES, "avr", f"CHANNELS={channels}")
     return BUILD / f"tomoskin-{channels}.elf"

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tomoskin.core import FloatArray
+from tomoskin.emulator import pico, program
 from tomoskin.emulator.pico import build_pico_programs
 from tomoskin.emulator.process import (
     BoardFaults,
@@ -31,16 +32,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class BoardKind:
-    """A board that is emulated: its name for people, its converter, and how its parts are built."""
+    """A board: its name for people, its converter, the channels that its firmware is built for, and
+    how the parts of its emulator are."""
 
     text: str
     adc_bits: int
+    channels: tuple[int, ...]
     build: Callable[[], BoardPrograms]
 
 
 BOARDS = {
-    "mega": BoardKind("Arduino Mega 2560", 10, build_programs),
-    "pico": BoardKind("Raspberry Pi Pico", 12, build_pico_programs),
+    "mega": BoardKind("Arduino Mega 2560", 10, program.CHANNELS, build_programs),
+    "pico": BoardKind("Raspberry Pi Pico", pico.ADC_BITS, pico.CHANNELS, build_pico_programs),
 }
 """By the name that options and commands give."""
 

@@ -63,6 +63,11 @@ class EmulatorTransport:
         self._age()
         return self._open.read(timeout)
 
+    @property
+    def waited(self) -> float:
+        """How long the first byte of the last read had waited here, s."""
+        return self._open.waited
+
     def write(self, data: bytes) -> None:
         """Send ``data``."""
         self._open.write(data)

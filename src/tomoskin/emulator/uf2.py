@@ -16,16 +16,19 @@ _HEAD = struct.Struct("<8I")
 _MAGIC = (0x0A324655, 0x9E5D5157)
 _END = struct.pack("<I", 0x0AB16F30)
 _HAS_FAMILY = 0x2000
-_BLOCK, _PAYLOAD = 512, 256
+_BLOCK = 512
+PAGE = 256
+"""Bytes of flash in a block."""
+
 _STAGE = 252
 """Bytes of the boot's second stage; its checksum follows."""
 
 
 def pack_uf2(image: bytes, address: int = FLASH) -> bytes:
     """The UF2 that puts ``image`` at ``address``."""
-    pages = [image[at : at + _PAYLOAD] for at in range(0, len(image), _PAYLOAD)]
+    pages = [image[at : at + PAGE] for at in range(0, len(image), PAGE)]
     return b"".join(
-        _HEAD.pack(*_MAGIC, _HAS_FAMILY, address + _PAYLOAD * k, _PAYLOAD, k, len(pages), RP2040)
+        _HEAD.pack(*_MAGIC, _HAS_FAMILY, address + PAGE * k, PAGE, k, len(pages), RP2040)
         + page.ljust(_BLOCK - _HEAD.size - len(_END), b"\0")
         + _END
         for k, page in enumerate(pages)
@@ -36,9 +39,10 @@ def unpack_uf2(data: bytes, where: str) -> dict[int, bytes]:
     """Pages of 256 bytes by address. Raises SourceError for what a Pico would not take."""
     if not data or len(data) % _BLOCK:
         raise _bad(where, f"expected blocks of {_BLOCK} bytes, found {len(data)} bytes")
-    pages = {}
+    pages: dict[int, bytes] = {}
+    numbers, total = set(), 0
     for at in range(0, len(data), _BLOCK):
-        first, second, flags, address, size, _, _, family = _HEAD.unpack_from(data, at)
+        first, second, flags, address, size, number, total, family = _HEAD.unpack_from(data, at)
         if (first, second) != _MAGIC or data[at + _BLOCK - 4 : at + _BLOCK] != _END:
             raise _bad(where, f"expected the marks of UF2 at byte {at}, found others")
         if not flags & _HAS_FAMILY or family != RP2040:
@@ -48,9 +52,16 @@ def unpack_uf2(data: bytes, where: str) -> dict[int, bytes]:
                 where=where,
                 hint="this UF2 is for another board: tomoskin firmware build --board pico",
             )
-        if size != _PAYLOAD:
-            raise _bad(where, f"expected {_PAYLOAD} bytes in a block, found {size}")
-        pages[address] = data[at + _HEAD.size : at + _HEAD.size + _PAYLOAD]
+        if size != PAGE:
+            raise _bad(where, f"expected {PAGE} bytes in a block, found {size}")
+        if number in numbers or address in pages:
+            raise _bad(where, f"expected each block once, found block {number} again")
+        numbers.add(number)
+        pages[address] = data[at + _HEAD.size : at + _HEAD.size + PAGE]
+    missing = sorted(set(range(total)) - numbers)
+    if missing or len(numbers) > total:
+        what = f"block {missing[0]} is missing" if missing else "it says fewer"
+        raise _bad(where, f"expected {total} blocks, found {len(numbers)}: {what}")
     return pages
 
 

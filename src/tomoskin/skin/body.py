@@ -47,13 +47,13 @@ class SurfaceSection(Section, section="surface"):
 
     shape: str = key(
         Choice(("flat", "cylinder", "cap", "saddle", "arm", "file")),
-        "flat; wrapped on a cylinder; drawn over a sphere; hung over a saddle, as a "
-        "chair's back; wrapped around a limb with a joint; on the surface of a file, for "
-        "which `tomoskin skin lay` writes the skin.",
+        "flat; wrapped around a cylinder; on a sphere; on a saddle, such as a chair's back; "
+        "wrapped around a limb with a joint; or on the surface of a file. `tomoskin skin "
+        "lay` writes the skin of a file.",
         default="flat",
     )
     radius: float | None = key(
-        _SIZE, "Of cylinder, sphere or limb.", shape=("cylinder", "cap", "arm")
+        _SIZE, "Radius of the cylinder, sphere or limb.", shape=("cylinder", "cap", "arm")
     )
     axis: float = key(
         _ANGLE,
@@ -61,8 +61,12 @@ class SurfaceSection(Section, section="surface"):
         default="90 deg",
         shape="cylinder",
     )
-    radius_x: float | None = key(_SIZE, "How a saddle bends away to the sides.", shape="saddle")
-    radius_y: float | None = key(_SIZE, "How a saddle bends forward along y.", shape="saddle")
+    radius_x: float | None = key(
+        _SIZE, "Radius of curvature of a saddle along x, where it bends away.", shape="saddle"
+    )
+    radius_y: float | None = key(
+        _SIZE, "Radius of curvature of a saddle along y, where it bends forward.", shape="saddle"
+    )
     bend: float = key(
         Quantity("angle", "deg", -170, 170),
         "Angle of the limb's joint; positive stretches the sheet at x = 0.",
@@ -78,7 +82,7 @@ class SurfaceSection(Section, section="surface"):
         shape="file",
     )
     unit: str = key(
-        Choice(("mm", "cm", "m")), "Of the file's coordinates.", default="mm", shape="file"
+        Choice(("mm", "cm", "m")), "Unit of the file's coordinates.", default="mm", shape="file"
     )
 
 
@@ -144,6 +148,18 @@ class DriveSection(Section, section="drive"):
         needs="drive",
     )
     current: float = key(Quantity("current", "mA", 0.001, 1000), "Driven current.")
+    mode: str | None = key(
+        Choice(("direct", "chopped")),
+        "direct: from source to sink. chopped: each pair is driven one way and then the other, "
+        "for skins and contacts that polarise; the board reads what turns with the current.",
+        default=None,
+    )
+    chop_frequency: float = key(
+        Quantity("frequency", "kHz", 0.01, 5),
+        "Of the alternation; settling and the board bound it.",
+        default="0.2 kHz",
+        mode="chopped",
+    )
     polarity: str | None = key(
         Choice(("normal", "reversed")),
         "reversed: voltages come with the opposite sign, as from swapped amplifier inputs; "

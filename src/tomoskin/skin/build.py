@@ -40,6 +40,7 @@ from tomoskin.skin.body import (
     ReadoutSettings,
     SurfaceSection,
 )
+from tomoskin.skin.kept_mesh import kept_mesh
 from tomoskin.skin.processing import (
     InverseSettings,
     MeshSettings,
@@ -139,12 +140,15 @@ def check_readout(readout: ReadoutSettings, source: str) -> None:
 
 @lru_cache(maxsize=16)
 def flat_mesh(outline: OutlineSection, electrodes: ElectrodesSection, mesh: MeshSettings) -> Mesh:
-    """The sheet of these sections, laid flat; equal skins of a process share it.
+    """The sheet of these sections, laid flat; equal skins of a process share it, and it is kept on
+    disk.
 
     Raises GeometryError when the electrodes cannot be resolved with so few cells.
     """
     rim = _outline(outline)
-    return triangulate(rim, _arcs(rim, electrodes), mesh.cells)
+    arcs = _arcs(rim, electrodes)
+    wanted = f"{outline!r} {electrodes!r} {mesh.cells}"
+    return kept_mesh(wanted, lambda: triangulate(rim, arcs, mesh.cells))
 
 
 def _outline(given: OutlineSection) -> Outline:

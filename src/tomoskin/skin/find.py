@@ -43,7 +43,7 @@ def _missing(path: Path) -> SkinError:
     close = get_close_matches(str(path), names, n=1)
     guess = f'did you mean "{close[0]}"? ' if close else ""
     return SkinError(
-        "no such file, and no built-in skin of that name",
+        "there is no such file, and no built-in skin of that name",
         where=str(path),
         hint=f"{guess}built-in skins: {', '.join(names)}",
     )

@@ -260,10 +260,12 @@ def load_of(
     least = (1 - sum(memory.play)) * _promptness(memory, dt) - _brittleness(memory, dt)
     if not least > 0:
         raise ModelError(
-            "a rise of this material's response may be a load or a release: its breakdown "
-            f"outweighs what follows the load by {-least:.3g} per unit of load",
+            "this material's response rises both under load and on release, so no load can be "
+            "read from it. Its breakdown exceeds the part that follows the load by "
+            f"{-least:.3g} per unit of load",
             where=_WHERE,
-            hint="read it with the breakdown left out, and wait for that to go",
+            hint="leave the breakdown out of the model, and read the load after the breakdown has "
+            "ended",
         )
     width, lagging = memory.half_widths, state.lagging[:, 0]
     bends = np.sort(np.concatenate([state.load, lagging - width, lagging + width]), axis=0)

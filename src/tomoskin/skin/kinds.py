@@ -146,7 +146,7 @@ class Quantity(ValueKind[float]):
         if isinstance(value, int | float) and not isinstance(value, bool):
             example = f'"{show(value)} {self.unit}"'
             raise ValueError(
-                f"expected {self.expected}, got {show(value)} without a unit; {example}?"
+                f"expected {self.expected}, got {show(value)} without a unit; write it as {example}"
             )
         if not isinstance(value, str):
             return None

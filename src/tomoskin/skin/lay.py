@@ -116,9 +116,10 @@ def _check_sizes(surface: FloatArray, electrodes: FloatArray, file: str, unit: s
         )
     if between < _APART * extent:
         raise GeometryError(
-            f"lie within {1e3 * between:.4g} mm, the surface extends over {1e3 * extent:.4g} mm",
+            f"the electrodes lie within {1e3 * between:.4g} mm, but the surface extends over "
+            f"{1e3 * extent:.4g} mm",
             where="electrodes",
-            hint="places are in the file's own coordinates and unit",
+            hint="give their positions in the coordinates and the unit of the surface's file",
         )
 
 

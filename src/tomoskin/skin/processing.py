@@ -12,7 +12,11 @@ _IN_IMAGE = ("method", ("image",))
 class MeshSettings(Section, section="mesh"):
     """The triangles that the image is made of."""
 
-    cells: int = key(Whole(50, 100_000), "Wanted number, met within 10 %.", default=1500)
+    cells: int = key(
+        Whole(50, 100_000),
+        "Wanted number of triangles; the mesh has this number within 10 %.",
+        default=1500,
+    )
 
 
 class InverseSettings(Section, section="inverse"):
@@ -26,21 +30,21 @@ class InverseSettings(Section, section="inverse"):
     )
     prior: str = key(
         Choice(("identity", "laplace", "gaussian", "noser", "exponential", "matern")),
-        "What is held to be likely.",
+        "Prior: the changes of conductivity that are assumed to be likely.",
         default="noser",
         method=_ONE_STEP,
     )
     exponent: float = key(
         Number(0, 2),
-        "With noser: the power of a cell's sensitivity that weighs it down.",
+        "For noser: the power of a cell's sensitivity by which its change is penalised.",
         default=0.5,
         effective=("prior", ("noser",)),
         method=_ONE_STEP,
     )
     correlation_length: float | None = key(
         Quantity("length", "mm", 0.1, 5000),
-        "With exponential and matern: how far a change is the same; without it a tenth of "
-        "the sheet's extent.",
+        "For exponential and matern: the distance over which changes are similar. Default: a "
+        "tenth of the sheet's extent.",
         default=None,
         effective=("prior", ("exponential", "matern")),
         method=_ONE_STEP,
@@ -53,7 +57,7 @@ class InverseSettings(Section, section="inverse"):
     )
     noise_figure: float = key(
         Number(0.1, 100),
-        "How much noisier the image may be than the voltages, signal for signal.",
+        "Ratio of the signal-to-noise ratio of the voltages to that of the image.",
         default=1.0,
         method="greit",
     )
@@ -62,8 +66,8 @@ class InverseSettings(Section, section="inverse"):
     )
     time_constant: float = key(
         Quantity("time", "s", 0, 3600),
-        "How long an image lasts: each rests on the frames before it too, the more the "
-        "longer this is (Kalman filter). 0 s: on its own frame alone.",
+        "Time constant of the filter over frames (Kalman filter): a longer one has less noise "
+        "and more delay. 0 s: each image uses its own frame alone.",
         default="0 s",
         method=_ONE_STEP,
     )
@@ -74,14 +78,14 @@ class SignalSettings(Section, section="signal"):
 
     baseline: str = key(
         Choice(("follow", "hold")),
-        "follow: the reference follows the skin's drift while nothing touches, and holds "
-        "under a touch. hold: it stays as it was taken.",
+        "follow: the reference follows the skin's drift while nothing touches, and stays fixed "
+        "under a touch. hold: it stays the same until the next one is taken.",
         default="follow",
     )
     common_modes: str = key(
         Choice(("projected", "kept")),
-        "projected: a change of all voltages in proportion, as temperature makes it, and "
-        "directions of drift learnt while idle do not show in the image. kept: they do.",
+        "projected: proportional changes of all voltages, as from temperature, and directions of "
+        "drift learnt while idle do not show in the image. kept: they show.",
         default="projected",
     )
 
@@ -92,18 +96,19 @@ class TouchSettings(Section, section="touch"):
     method: str = key(
         Choice(("fit", "image")),
         "fit: position, size and strength of up to five touches, fitted to the voltages, with "
-        "honest deviations. image: the thesis's regions of the image, by gamma1 to position.",
+        "standard deviations. image: the thesis's regions of the image, set by gamma1 to "
+        "position.",
         default="fit",
     )
     gamma1: float = key(
         Number(0.1, 0.99),
-        "First threshold, as a part of the extreme value; 0.6 to 0.7 is usual.",
+        "First threshold, as a fraction of the extreme value; 0.6 to 0.7 is usual.",
         default=0.65,
         effective=_IN_IMAGE,
     )
     gamma2: float = key(
         Number(0.1, 1),
-        "Second threshold, after smoothing, as a part of the first.",
+        "Second threshold, after smoothing, as a fraction of the first.",
         default=0.9,
         effective=_IN_IMAGE,
     )
@@ -129,11 +134,11 @@ class TouchSettings(Section, section="touch"):
         default="centroid",
         effective=_IN_IMAGE,
     )
-    max_touches: int = key(Whole(1, 50), "Most touches reported at once.", default=8)
+    max_touches: int = key(Whole(1, 50), "Largest number of touches reported at once.", default=8)
     slide_lag: float = key(
         Quantity("length", "mm", 0, 100),
-        "How far behind a finger that slides the sheet responds, as friction drags it along; "
-        "touches that slide are reported so much ahead. 0 mm: as the sheet responds.",
+        "Distance by which the sheet's response lags behind a sliding finger, because friction "
+        "drags the sheet along. Sliding touches are reported ahead by this distance.",
         default="0 mm",
     )
 
@@ -143,6 +148,13 @@ class TwinChoice(Section, section="twin"):
 
     preset: str = key(
         Choice(("ideal", "textile", "hydrogel", "tank")),
-        "Material and board: without vices and memory, or as measured or assumed.",
+        "Material and board: ideal has no errors and no memory; the others have measured or "
+        "assumed ones.",
         default="ideal",
+    )
+    electrodes: str | None = key(
+        Choice(("ideal", "polarising")),
+        "polarising: they charge under current, as on a gel, and their contacts warm and cool; "
+        "an alternating drive does not see it.",
+        default=None,
     )

@@ -61,12 +61,12 @@ class Key:
         ``given`` are the section's keys as written, ``filled`` has the defaults before this one.
         """
         if self.unless and self.unless in given:
-            return f"cannot stand beside {self.unless}"
+            return f"cannot be combined with {self.unless}"
         if self.when:
             other, allowed = self.when
             if filled.get(other) not in allowed:
                 kinds = " or ".join(f'"{value}"' for value in allowed)
-                return f"goes with {other} = {kinds}, got {other} = {show(filled.get(other))}"
+                return f"needs {other} = {kinds}, got {other} = {show(filled.get(other))}"
         return ""
 
     def read(self, value: object, where: str) -> Any:
@@ -142,9 +142,11 @@ class Section:
             place, conflict = f"{where} {key.name}", key.conflict(given, filled)
             if key.name in given:
                 if conflict:
-                    raise SkinError(conflict, where=place, hint="leave one of them out")
+                    raise SkinError(
+                        conflict, where=place, hint="remove this key, or change the other one"
+                    )
                 if key.needs and key.needs not in given:
-                    raise SkinError(f"needs {key.needs} beside it", where=place)
+                    raise SkinError(f"needs the key {key.needs} as well", where=place)
                 filled[key.name] = given[key.name]
             elif key.required and not conflict:
                 raise SkinError(f"is missing; expected {key.kind.expected}", where=place)
@@ -175,14 +177,20 @@ def toml_tables(text: str, source: str, version: int) -> dict[str, Any]:
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also numbers or nesting beyond all bounds
-        hint = "numbers have decimal points" if _COMMA.search(text) else ""
+        hint = "numbers need a decimal point, not a comma" if _COMMA.search(text) else ""
         raise SkinError(f"is not valid TOML: {error}", where=source, hint=hint) from None
     where = f"{source}: format"
     if "format" not in tables:
-        raise SkinError("is missing", where=where, hint=f"begin the file with format = {version}")
+        raise SkinError(
+            "is missing", where=where, hint=f"begin the file with the line format = {version}"
+        )
     given = tables.pop("format")
     if given != version or isinstance(given, bool):
-        raise SkinError(f"expected {version}, got {show(given)}", where=where)
+        raise SkinError(
+            f"expected {version}, got {show(given)}",
+            where=where,
+            hint=f"this tomoskin reads files of format {version}",
+        )
     return tables
 
 

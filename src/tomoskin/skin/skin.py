@@ -147,6 +147,12 @@ class Skin:
         return -1.0 if self._sections.drive.polarity == "reversed" else 1.0
 
     @property
+    def chop_frequency(self) -> float:
+        """Of an alternating drive, Hz; 0 where the drive is direct."""
+        drive = self._sections.drive
+        return drive.chop_frequency if drive.mode == "chopped" else 0.0
+
+    @property
     def is_flat(self) -> bool:
         """Whether the sheet lies flat, on no surface."""
         return self._sections.surface.shape == "flat"

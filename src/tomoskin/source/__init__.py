@@ -3,6 +3,7 @@
 from typing import Any
 
 from tomoskin._moved import moved
+from tomoskin.source.chopping import choose_periods, chop_limit
 from tomoskin.source.command_queue import FrameCounters, SequenceFilter
 from tomoskin.source.configuration import Configuration
 from tomoskin.source.exchange import Exchange
@@ -35,6 +36,8 @@ __all__ = [
     "Stage",
     "Timing",
     "Transport",
+    "choose_periods",
+    "chop_limit",
     "conversion_time",
     "list_ports",
     "open_source",

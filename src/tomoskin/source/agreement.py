@@ -9,7 +9,22 @@ from typing import Protocol, runtime_checkable
 from tomoskin.core import SourceError, WireError
 from tomoskin.pattern import Scan
 from tomoskin.source.settings import ScanSettings
-from tomoskin.wire import OLDER, SCHEMA, Command, Counters, HeldPattern, HeldScan, Hello, Info
+from tomoskin.wire import (
+    OLDER,
+    SCHEMA,
+    Command,
+    Counters,
+    HeldMode,
+    HeldPattern,
+    HeldScan,
+    Hello,
+    Info,
+)
+
+BOARDS_SINCE = 2
+"""The minor version in which boards say their name, and drive alternately."""
+
+_MEGA_CHANNELS, _PICO_CHANNELS = 16, 32
 
 RATES = (1_000_000, 500_000, 250_000)
 """Rates that the ATmega's clock divides into exactly, fastest first, Bd."""
@@ -56,7 +71,7 @@ class LineQuality:
         self._messages, self._corrupt = counters.messages, counters.corrupt
 
 
-_UPDATE_BOARD = "flash the firmware that belongs to this tomoskin"
+_UPDATE_BOARD = "flash the firmware of this tomoskin: tomoskin firmware flash"
 _UPDATE_HOST = "update tomoskin on this computer, or flash an older firmware"
 
 
@@ -69,59 +84,88 @@ def check_version(board: Hello | Info, where: str) -> None:
     hashes = {**OLDER, ours: SCHEMA.hash}
     if hashes.get(theirs) == board.schema_hash:
         return
-    spoken = f"expected protocol {ours[0]}.{ours[1]}, the board speaks {theirs[0]}.{theirs[1]}: "
+    spoken = (
+        f"expected protocol {ours[0]}.{ours[1]}, but the board speaks {theirs[0]}.{theirs[1]}: "
+    )
     if theirs in hashes:
         raise WireError(
-            f"board and host both call a protocol {theirs[0]}.{theirs[1]} but mean different "
+            f"board and host both speak protocol {theirs[0]}.{theirs[1]}, but from different "
             f"schemas (board {board.schema_hash:08x}, host {hashes[theirs]:08x})",
             where=where,
-            hint=f"one is a development build: {_UPDATE_BOARD}",
+            hint=f"one of them is a development build: {_UPDATE_BOARD}",
         )
     if theirs < ours:
-        raise WireError(spoken + "its firmware is older", where=where, hint=_UPDATE_BOARD)
-    raise WireError(spoken + "this host is older", where=where, hint=_UPDATE_HOST)
+        raise WireError(spoken + "the board's firmware is older", where=where, hint=_UPDATE_BOARD)
+    raise WireError(spoken + "this tomoskin is older", where=where, hint=_UPDATE_HOST)
 
 
 def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSettings:
     """What to set on this board for what is ``asked``; SourceError says what it lacks."""
+    _check_size(info, scan, asked, where)
     settings = asked.on_board(info.adc_bits)
     if settings is None:
         raise SourceError(
-            f"the skin file says that {asked.oversampling} conversions of {asked.adc_bits} bits "
-            f"are summed, the board's converter has {info.adc_bits}",
+            f"the skin file sums {asked.oversampling} conversions of {asked.adc_bits} bits, but "
+            f"the board's converter has {info.adc_bits} bits",
             where=where,
-            hint="correct the skin file: every voltage would be wrong"
+            hint="correct [readout] adc_bits in the skin file, or every voltage is wrong"
             if info.adc_bits < asked.adc_bits
-            else f"set oversampling to a multiple of {1 << info.adc_bits - asked.adc_bits}",
+            else (
+                f"set [readout] oversampling to a multiple of {1 << info.adc_bits - asked.adc_bits}"
+            ),
         )
-    channels = 1 + int(max(scan.drives.max(), scan.sample_electrode.max()))
-    needs = (
-        (channels, info.channels, "electrodes", "use a skin with fewer electrodes"),
-        (len(scan.drives), info.max_drives, "drives", "use a shorter pattern"),
-        (scan.n_samples, info.max_samples, "samples in a frame", "use a shorter pattern"),
-        (settings.oversampling, info.max_oversampling, "conversions summed", "sum fewer"),
+    _check_enough(
+        settings.oversampling, info.max_oversampling, "conversions summed", "sum fewer", where
     )
-    for needed, offered, what, hint in needs:
-        if needed > offered:
-            raise SourceError(
-                f"the skin needs {needed} {what}, the board offers {offered}",
-                where=where,
-                hint=hint,
-            )
+    if settings.chop_frequency and info.minor < BOARDS_SINCE:
+        raise SourceError(
+            f"the skin is driven alternately, which boards do from protocol 1.{BOARDS_SINCE} on; "
+            f"this one speaks {info.major}.{info.minor}",
+            where=where,
+            hint=f'{_UPDATE_BOARD}, or set [drive] mode = "direct"',
+        )
     if info.current > round(settings.current_limit * 1e6):
         raise SourceError(
-            f"the board's current limiter is set to {info.current / 1e3:g} mA, the skin may carry "
-            f"{settings.current_limit * 1e3:g} mA",
+            f"the board's current limiter is set to {info.current / 1e3:g} mA, but this skin "
+            f"allows at most {settings.current_limit * 1e3:g} mA",
             where=where,
-            hint="turn the limiter down before you connect the skin",
+            hint="lower the limiter before you connect the skin",
         )
     return settings
 
 
-def check_held(held: HeldScan | HeldPattern, sent: Sequence[Command], where: str) -> None:
+def _check_size(info: Info, scan: Scan, asked: ScanSettings, where: str) -> None:
+    channels = 1 + int(max(scan.drives.max(), scan.sample_electrode.max()))
+    fewer = "use a skin with fewer electrodes"
+    if channels > _MEGA_CHANNELS:
+        fewer += f", or a Pico, which has up to {_PICO_CHANNELS}"
+    values, of_frame = scan.n_samples, "samples in a frame"
+    if asked.chop_frequency:
+        values, of_frame = 2 * scan.n_samples, "values, two for each sample, in a frame"
+    for needed, offered, what, hint in (
+        (channels, info.channels, "electrodes", fewer),
+        (len(scan.drives), info.max_drives, "drives", "use a shorter pattern"),
+        (values, info.max_samples, of_frame, "use a shorter pattern"),
+    ):
+        _check_enough(needed, offered, what, hint, where)
+
+
+def _check_enough(needed: int, offered: int, what: str, hint: str, where: str) -> None:
+    if needed > offered:
+        raise SourceError(
+            f"the skin needs {needed} {what}, but the board has at most {offered}",
+            where=where,
+            hint=hint,
+        )
+
+
+def check_held(
+    held: HeldScan | HeldPattern | HeldMode, sent: Sequence[Command], where: str
+) -> None:
     """Raise SourceError unless the board holds what ``sent`` has set; it names what differs.
 
-    ``sent`` are the commands behind this answer: SET_SCAN and SET_FORMAT, or one SET_PATTERN.
+    ``sent`` are the commands behind this answer: SET_SCAN and SET_FORMAT, one SET_PATTERN, or
+    SET_MODE.
     """
     names = [field.name for field in fields(held) if field.name != "request"]
     for name in names:
@@ -129,7 +173,8 @@ def check_held(held: HeldScan | HeldPattern, sent: Sequence[Command], where: str
         held_value = getattr(held, name)
         if expected != held_value:
             raise SourceError(
-                f"the board does not hold what was sent: {name} {held_value}, expected {expected}",
+                f"the board did not store what was sent: it has {name} {held_value}, "
+                f"expected {expected}",
                 where=where,
-                hint="nothing is driven; start again, and flash the firmware if it comes back",
+                hint="no current flows; start again, and flash the firmware if this happens again",
             )

@@ -85,13 +85,13 @@ class SequenceFilter:
         wanted = self._configuration
         if frame.configuration != wanted.identity:
             return (
-                f"frames of configuration {frame.configuration:04x} are left out: "
-                f"this scan is {wanted.identity:04x}"
+                f"frames of configuration {frame.configuration:04x} are left out: this scan has "
+                f"configuration {wanted.identity:04x}"
             )
         if len(frame.samples) != wanted.n_samples:
             return (
-                f"frames with {len(frame.samples)} samples are left out: "
-                f"this scan has {wanted.n_samples}"
+                f"frames with {len(frame.samples)} samples are left out: this scan has "
+                f"{wanted.n_samples} samples"
             )
         return ""
 
@@ -170,7 +170,8 @@ class CommandQueue:
             raise SourceError(
                 f"no answer to {type(pending.command).__name__} after {pending.tries} tries",
                 where=self._where,
-                hint="is it a tomoskin board, powered, at this rate?",
+                hint="check that it is a tomoskin board, that it has power, and that the rate is "
+                "right",
             )
         if isinstance(pending.command, SetBaud):  # it may have gone back: do it again
             pending.command = self._numbered(pending.command)

@@ -11,10 +11,13 @@ from tomoskin.wire import (
     SCHEMA,
     Command,
     Drive,
+    DriveMode,
     Format,
+    GetMode,
     GetPattern,
     GetScan,
     SetFormat,
+    SetMode,
     SetPattern,
     SetScan,
     Start,
@@ -40,6 +43,8 @@ class Configuration:
     format: SetFormat
     n_samples: int
     scan_time: float
+    mode: SetMode | None = None
+    """None: the drive is direct, as SET_SCAN leaves it."""
 
     def commands(self, minor: int) -> tuple[Command, ...]:
         """What sets it on a board of protocol 1.``minor``, reads it back, and starts it."""
@@ -47,10 +52,14 @@ class Configuration:
         if minor < _FORMATS_SINCE:
             return (self.scan, *self.patterns, start)
         read_back = (GetPattern(0, pattern.first) for pattern in self.patterns)
-        return (self.scan, *self.patterns, self.format, GetScan(0), *read_back, start)
+        mode, held = ((self.mode,), (GetMode(0),)) if self.mode else ((), ())
+        settings = (self.scan, *self.patterns, self.format, *mode)
+        return (*settings, GetScan(0), *read_back, *held, start)
 
     def behind(self, question: Command) -> tuple[Command, ...]:
-        """The commands that set what a GET_SCAN or GET_PATTERN asks for."""
+        """The commands that set what a GET_SCAN, GET_PATTERN or GET_MODE asks for."""
+        if isinstance(question, GetMode):
+            return (self.mode,) if self.mode else ()
         if isinstance(question, GetPattern):
             return tuple(pattern for pattern in self.patterns if pattern.first == question.first)
         return (self.scan, self.format)
@@ -63,6 +72,10 @@ class Configuration:
             scan=replace(self.scan, oversampling=fitted.oversampling),
             format=replace(self.format, format=packing),
         )
+
+    def with_periods(self, periods: int) -> Self:
+        """The same alternating drive, with so many periods a drive; the identity stays."""
+        return replace(self, mode=self.mode and replace(self.mode, periods=periods))
 
     @classmethod
     def of(cls, scan: Scan, settings: ScanSettings) -> Self:
@@ -79,6 +92,8 @@ class Configuration:
         )
         chunks = _chunks(scan)
         content = encode_payload(announce) + b"".join(encode_payload(chunk) for chunk in chunks)
+        mode = _mode(settings)
+        content += encode_payload(mode) if mode else b""
         identity = crc16(content) or 1
         return cls(
             identity,
@@ -87,13 +102,27 @@ class Configuration:
             # a sample of one conversion is shorter on the line when it is packed
             SetFormat(0, identity, Format.PACKED if settings.packs else Format.SIXTEEN),
             scan.n_samples,
-            scan_time(
-                len(scan.drives),
-                scan.n_samples * settings.oversampling,
-                settings.settling + settings.dead_time,
-                settings.prescaler,
-            ),
+            _longest(scan, settings),
+            mode and replace(mode, configuration=identity),
         )
+
+
+def _mode(settings: ScanSettings) -> SetMode | None:
+    if not settings.chop_frequency:
+        return None
+    return SetMode(0, 0, DriveMode.CHOPPED, settings.chop_frequency, 0)
+
+
+def _longest(scan: Scan, settings: ScanSettings) -> float:
+    """s that a scan takes; alternately driven, with as many periods as a board may choose."""
+    if settings.chop_frequency:
+        return len(scan.drives) * (settings.oversampling // 2) / settings.chop_frequency
+    return scan_time(
+        len(scan.drives),
+        scan.n_samples * settings.oversampling,
+        settings.settling + settings.dead_time,
+        settings.prescaler,
+    )
 
 
 def _chunks(scan: Scan) -> list[SetPattern]:

@@ -14,8 +14,8 @@ from tomoskin.source.agreement import LineQuality, Rated
 from tomoskin.source.command_queue import FrameCounters
 from tomoskin.source.protocol_session import ProtocolSession, Stage
 from tomoskin.source.settings import ScanSettings, Timing
-from tomoskin.source.transport import Diagnosable, Played, Transport
-from tomoskin.wire import Ack, Counters, Decoder, Info
+from tomoskin.source.transport import Diagnosable, Fetched, Played, Transport
+from tomoskin.wire import Ack, Counters, Decoder, Info, SetMode
 
 _HEARD = 256
 """So many of the first bytes tell what speaks where no board does."""
@@ -55,6 +55,7 @@ class Link:
         self._timing = timing or Timing()
         self._decoder = Decoder()
         self._quality = LineQuality()
+        self._fetched = transport if isinstance(transport, Fetched) else None
         self._rated = transport if isinstance(transport, Rated) else None
         self._first_rate = self._rated.rate if self._rated else 0
         self._session = ProtocolSession(scan, settings, self._timing, self._clock(), transport.name)
@@ -73,9 +74,24 @@ class Link:
         return self._session.info
 
     @property
+    def board_name(self) -> str:
+        """What the board calls itself; empty before protocol 1.2."""
+        return self._session.board.text if self._session.board else ""
+
+    @property
+    def mode(self) -> SetMode | None:
+        """The alternating drive as it was set on the board; None where the drive is direct."""
+        return self._session.mode
+
+    @property
     def configuration(self) -> int:
         """Identity of this scan's configuration."""
         return self._session.configuration.identity
+
+    @property
+    def waited(self) -> float:
+        """How long the first byte of the last read had waited on this host, s."""
+        return self._fetched.waited if self._fetched else 0.0
 
     @property
     def counters(self) -> Counters:
@@ -131,7 +147,13 @@ class Link:
     def stop(self) -> None:
         """Stop the board, as far as it can still be reached; the transport stays open."""
         with contextlib.suppress(SourceError):  # gone already: its heartbeat stops it
-            self._stop_board()
+            request = self._session.stop(self._clock())
+            self._flush()
+            end = self._clock() + self._timing.goodbye
+            while (now := self._clock()) < end:
+                for message in self._decoder.feed(self.transport.read(end - now), now):
+                    if isinstance(message, Ack) and message.request == request:
+                        return
 
     def __enter__(self) -> Self:
         """The link itself."""
@@ -178,15 +200,6 @@ class Link:
             return []
         slower = self._quality.slower(self.counters, transport.rate)
         return [] if slower is None else [self._session.fall_back(slower, now)]
-
-    def _stop_board(self) -> None:
-        request = self._session.stop(self._clock())
-        self._flush()
-        end = self._clock() + self._timing.goodbye
-        while (now := self._clock()) < end:
-            for message in self._decoder.feed(self.transport.read(end - now), now):
-                if isinstance(message, Ack) and message.request == request:
-                    return
 
     def _flush(self) -> None:
         data = self._session.commands.take()

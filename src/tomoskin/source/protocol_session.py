@@ -4,19 +4,27 @@ from __future__ import annotations
 
 from enum import Enum, auto
 
+import numpy as np
+
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.pattern import Scan
-from tomoskin.source.agreement import check_held, check_version, fit_board
+from tomoskin.source.agreement import BOARDS_SINCE, check_held, check_version, fit_board
+from tomoskin.source.chopping import choose_periods
 from tomoskin.source.command_queue import CommandQueue, SequenceFilter
 from tomoskin.source.configuration import Configuration
 from tomoskin.source.settings import ScanSettings, Timing
 from tomoskin.wire import (
     SCHEMA,
     Ack,
+    BoardLimits,
+    Command,
     Fault,
+    GetBoard,
     GetInfo,
+    GetMode,
     GetPattern,
     GetScan,
+    HeldMode,
     HeldPattern,
     HeldScan,
     Hello,
@@ -25,9 +33,17 @@ from tomoskin.wire import (
     Ping,
     Result,
     SetBaud,
+    SetMode,
     Stop,
     type_byte,
 )
+
+_ANSWERED: dict[type[Message], type[Command]] = {
+    HeldScan: GetScan,
+    HeldPattern: GetPattern,
+    HeldMode: GetMode,
+}
+"""What each answer of what a board holds was asked by."""
 
 
 class Stage(Enum):
@@ -50,8 +66,8 @@ class ProtocolSession:
         What is to be sent to the board.
     frames
         The frames that pass, and counts of those that do not.
-    stage, info
-        How far it has come, and what the board said of itself.
+    stage, info, board
+        How far it has come, and what the board said of itself; ``board`` from protocol 1.2 on.
     is_silent
         Whether a board that scans has sent no frame for too long.
 
@@ -74,11 +90,19 @@ class ProtocolSession:
         self.commands = CommandQueue(timing, now, where)
         self.stage = Stage.WAITING
         self.info: Info | None = None
+        self.board: BoardLimits | None = None
+        self._met: tuple[Info, ScanSettings] | None = None
         self.is_silent = False
+        self._overdue = False
         self._silence = max(timing.silence, 4 * self.configuration.scan_time)
         self._since = self._last_frame = now
         self._resets = 0
         self._rate: int | None = None
+
+    @property
+    def mode(self) -> SetMode | None:
+        """What sets the alternating drive on this board; None where the drive is direct."""
+        return self._on_board.mode
 
     def take_rate(self) -> int | None:
         """The serial rate that the board has just changed to, once."""
@@ -89,11 +113,14 @@ class ProtocolSession:
         """Set the board up again at a slower ``rate``, Bd: the line damages what it carries."""
         self._set_up(now, at=rate)
         return Event(
-            now, "rate", f"the line damages messages: the board is set up again at {rate:,} Bd"
+            now,
+            "rate",
+            f"messages arrive damaged: the board is set up again at the slower rate of {rate:,} Bd",
         )
 
     def receive(self, message: Message, now: float) -> list[Frame | Event]:
         """Act on a message from the board."""
+        self._overdue = False
         match message:
             case Frame():
                 return self._frame(message, now)
@@ -101,7 +128,9 @@ class ProtocolSession:
                 return self._hello(message, now)
             case Info():
                 self._info(message, now)
-            case HeldScan() | HeldPattern():
+            case BoardLimits():
+                self._limits(message, now)
+            case HeldScan() | HeldPattern() | HeldMode():
                 return self._held(message, now)
             case Ack():
                 return self._ack(message, now)
@@ -121,8 +150,11 @@ class ProtocolSession:
             self.commands.send(Ping(0), now)
         if self.is_silent or now < self._last_frame + self._silence:
             return []
+        if not self._overdue:  # a busy host may not have read yet what has come
+            self._overdue = True
+            return []
         self.is_silent = True
-        text = f"no frame for {now - self._last_frame:.1f} s: is the board powered and connected?"
+        text = f"no frame for {now - self._last_frame:.1f} s: check the board's power and cable"
         return [Event(now, "silent", text)]
 
     def deadline(self) -> float:
@@ -142,7 +174,7 @@ class ProtocolSession:
 
     def _set_up(self, now: float, at: int | None = None) -> None:
         self.stage = Stage.SETTING_UP
-        self.info = None
+        self.info = self.board = self._met = None
         self.frames.close()
         change = () if at is None else (Stop(0), SetBaud(0, at))
         self.commands.restart((*change, GetInfo(0), Stop(0)), now)
@@ -157,7 +189,8 @@ class ProtocolSession:
         self.stage, self._last_frame, self.is_silent = Stage.RUNNING, now, False
         self.frames.open()
         assert self.info is not None
-        return [Event(now, "connected", _introduction(self.info, self.configuration))]
+        text = _introduction(self.info, self.board, self.configuration)
+        return [Event(now, "connected", text)]
 
     def _frame(self, frame: Frame, now: float) -> list[Frame | Event]:
         if self.stage is Stage.WAITING:
@@ -168,7 +201,7 @@ class ProtocolSession:
         quiet, was_silent = now - self._last_frame, self.is_silent
         self._last_frame, self.is_silent = now, False
         if was_silent:
-            passed.insert(0, Event(now, "resumed", f"frames again after {quiet:.1f} s"))
+            passed.insert(0, Event(now, "resumed", f"frames arrive again after {quiet:.1f} s"))
         return passed
 
     def _hello(self, hello: Hello, now: float) -> list[Frame | Event]:
@@ -179,12 +212,12 @@ class ProtocolSession:
         self._resets = 0 if was_running else self._resets + 1
         if self._resets > self._timing.tries:
             raise SourceError(
-                "the board resets again and again while it is set up",
+                "the board resets repeatedly while it is set up",
                 where=self._where,
-                hint="is its supply strong enough?",
+                hint="check that its power supply is strong enough",
             )
         self._set_up(now)
-        text = "the board has been reset or has missed the heartbeat: it is set up again"
+        text = "the board was reset or missed the heartbeat: it is set up again"
         return [Event(now, "reset", text)] if was_running else []
 
     def _info(self, info: Info, now: float) -> None:
@@ -193,14 +226,34 @@ class ProtocolSession:
             check_version(info, self._where)
             fitted = fit_board(info, self._scan, self._settings, self._where)
             self._on_board = self.configuration.on_board(fitted)
-            self.info = info
-            self.commands.add(self._on_board.commands(info.minor))
+            if info.minor < BOARDS_SINCE:
+                self._set(info)
+            else:
+                self._met = info, fitted
+                self.commands.add((GetBoard(0),))
             self._answered(now)
 
-    def _held(self, held: HeldScan | HeldPattern, now: float) -> list[Frame | Event]:
+    def _limits(self, board: BoardLimits, now: float) -> None:
         pending = self.commands.pending
-        question = GetScan if isinstance(held, HeldScan) else GetPattern
-        if not isinstance(pending, question) or held.request != pending.request:
+        asked = isinstance(pending, GetBoard) and board.request == pending.request
+        if not asked or self._met is None:
+            return
+        info, fitted = self._met
+        channels = int(np.bincount(self._scan.sample_drive).max())
+        periods = choose_periods(board, fitted, channels, info.tick_rate, self._where)
+        self._on_board = self._on_board.with_periods(periods)
+        self.board = board
+        self._set(info)
+        self._answered(now)
+
+    def _set(self, info: Info) -> None:
+        """The board has said all that is asked of it: what sets it."""
+        self.info = info
+        self.commands.add(self._on_board.commands(info.minor))
+
+    def _held(self, held: HeldScan | HeldPattern | HeldMode, now: float) -> list[Frame | Event]:
+        pending = self.commands.pending
+        if not isinstance(pending, _ANSWERED[type(held)]) or held.request != pending.request:
             return []
         check_held(held, self._on_board.behind(pending), self._where)
         return self._answered(now)
@@ -216,20 +269,34 @@ class ProtocolSession:
             return []
         if ack.command != type_byte(type(pending)):
             return []
-        if ack.result is Result.OK and isinstance(pending, GetScan | GetPattern):
+        if ack.result is Result.OK and isinstance(pending, _QUESTIONS):
             return []  # no answer to a question
         if ack.result is not Result.OK:
-            sentence = SCHEMA.enums["result"].sentence(ack.result)
             raise SourceError(
-                f"the board refused {type(pending).__name__}: {sentence} ({ack.detail})",
+                f"the board refused {type(pending).__name__}: {_reason(ack, pending)}",
                 where=self._where,
             )
         return self._answered(now)
 
 
-def _introduction(info: Info, configuration: Configuration) -> str:
+_QUESTIONS = (GetBoard, *_ANSWERED.values())
+
+
+def _reason(ack: Ack, refused: Command) -> str:
+    """Why: the field of a value that is out of range by its name, with what the protocol allows."""
+    number = type_byte(type(refused))
+    message = next(message for message in SCHEMA.messages if message.type == number)
+    if ack.result is not Result.BAD_VALUE or ack.detail >= len(message.fields):
+        return f"{SCHEMA.enums['result'].sentence(ack.result)} ({ack.detail})"
+    field = message.fields[ack.detail]
+    value = f"{getattr(refused, field.name)} {field.unit}".strip()
+    return f"{field.name} of {value} is out of range ({field.text})"
+
+
+def _introduction(info: Info, board: BoardLimits | None, configuration: Configuration) -> str:
     firmware = ".".join(map(str, info.firmware))
+    name = f"{board.text} " if board else ""
     return (
-        f"board {info.unique_id.hex()}, firmware {firmware}, "
+        f"board {name}{info.unique_id.hex()}, firmware {firmware}, "
         f"{info.channels} channels, scans configuration {configuration.identity:04x}"
     )

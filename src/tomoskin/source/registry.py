@@ -47,6 +47,8 @@ def read_options(argument: str, known: tuple[str, ...], where: str) -> dict[str,
     for item in filter(None, (part.strip() for part in argument.split(","))):
         key, _, value = item.partition("=")
         if key not in known:
-            raise SourceError(f'expected options {", ".join(known)}, got "{key}"', where=where)
+            raise SourceError(
+                f'expected an option among {", ".join(known)}, got "{key}"', where=where
+            )
         options[key] = value
     return options

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tomoskin.core import SourceError
+from tomoskin.source.read_ahead import ReadAhead
 from tomoskin.source.registry import read_options
 from tomoskin.source.silence import BAUD, PICO, SIGN_ON, SIGN_ON_RATE, Silence, is_bootloader
 
@@ -85,12 +86,16 @@ def only_board() -> str:
     raise SourceError(
         f"expected one board, found {len(candidates)}",
         where=f"serial:{AUTO}",
-        hint=f"name its port, such as serial:/dev/ttyACM0; {say_ports()}",
+        hint=f"give the board's port, such as serial:/dev/ttyACM0; {say_ports()}",
     )
 
 
+_CHECK = "check cable and power"
 _WRITE_TIMEOUT = 1.0
 _CHUNK = 65536
+_FETCH = 0.5
+"""s that the reader's thread waits for bytes, unless it is ended before."""
+
 _ASKED = 0.3
 """A bootloader answers within so many s."""
 
@@ -106,16 +111,25 @@ class SerialTransport:
         self._closed = False
         try:
             self._serial: Serial = serial.Serial(
-                port, baud, timeout=0, write_timeout=_WRITE_TIMEOUT, exclusive=True
+                port, baud, timeout=_FETCH, write_timeout=_WRITE_TIMEOUT, exclusive=True
             )
         except (OSError, ValueError) as error:
             raise _refusal(port, error) from None
+        self._ahead = ReadAhead(self._fetch, self._serial.cancel_read)
 
     def read(self, timeout: float) -> bytes:
         """What has come, waiting at most ``timeout`` s for the first byte."""
+        if self._closed:
+            raise SourceError("the port is closed", where=self.name, hint=_CHECK)
+        return self._ahead.read(timeout)
+
+    @property
+    def waited(self) -> float:
+        """How long the first byte of the last read had waited here, s."""
+        return self._ahead.waited
+
+    def _fetch(self) -> bytes:
         try:
-            if self._serial.timeout != timeout:
-                self._serial.timeout = timeout
             first: bytes = self._serial.read(1)
             if not first:
                 return b""
@@ -164,11 +178,12 @@ class SerialTransport:
         """Close the port."""
         if not self._closed:
             self._closed = True
+            self._ahead.close()
             self._serial.close()
 
     def _gone(self, error: Exception) -> SourceError:
-        reason = "the port is closed" if self._closed else "the board has gone away"
-        return SourceError(f"{reason}: {error}", where=self.name, hint="check cable and power")
+        reason = "the port is closed" if self._closed else "the board has been disconnected"
+        return SourceError(f"{reason}: {error}", where=self.name, hint=_CHECK)
 
 
 def open_serial(argument: str, skin: Skin) -> SerialTransport:  # noqa: ARG001 - a source's signature
@@ -177,7 +192,7 @@ def open_serial(argument: str, skin: Skin) -> SerialTransport:  # noqa: ARG001 -
     port = only_board() if port == AUTO else port
     if not port:
         raise SourceError(
-            "expected a port, such as serial:/dev/ttyACM0, or serial:auto",
+            "expected a port, such as serial:/dev/ttyACM0, or serial:auto; got none",
             where="serial",
             hint=say_ports(),
         )
@@ -196,10 +211,12 @@ def _refusal(port: str, error: Exception) -> SourceError:
         return SourceError("there is no such port", where=where, hint=say_ports())
     if number == errno.EACCES:
         return SourceError(
-            "no permission to use the port",
+            "you have no permission to use the port",
             where=where,
-            hint="on Linux add yourself to the group that owns it, often dialout",
+            hint="on Linux, add yourself to the group that owns it, often dialout",
         )
     if number in (errno.EBUSY, errno.EAGAIN):
-        return SourceError("another program is using the port", where=where, hint="close it first")
+        return SourceError(
+            "another program is using the port", where=where, hint="close the other program first"
+        )
     return SourceError(f"the port cannot be opened: {error}", where=where)

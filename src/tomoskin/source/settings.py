@@ -52,6 +52,8 @@ class ScanSettings:
         needs 5 µs to come back from its end stop.
     prescaler
         Converter clock divider; 64 is 250 kHz at 16 MHz.
+    chop_frequency
+        Of an alternating drive, Hz; 0: the drive is direct.
     """
 
     oversampling: int
@@ -60,6 +62,7 @@ class ScanSettings:
     adc_bits: int
     dead_time: float = 5e-6
     prescaler: int = 64
+    chop_frequency: int = 0
 
     def __post_init__(self) -> None:
         """Check what every board would refuse."""
@@ -69,7 +72,7 @@ class ScanSettings:
             raise SourceError(
                 f"{self.oversampling} conversions of {self.adc_bits} bits do not fit a sample of "
                 "16 bits",
-                hint="sum fewer",
+                hint="lower the oversampling",
             )
         if not 0 <= self.settling <= 0.1:
             raise SourceError(f"expected a settling time from 0 to 0.1 s, got {self.settling} s")
@@ -105,6 +108,7 @@ class ScanSettings:
             settling=skin.readout.settling,
             current_limit=skin.current,
             adc_bits=skin.readout.adc_bits,
+            chop_frequency=round(skin.chop_frequency),
         )
 
 

@@ -57,23 +57,32 @@ class Silence:
         target = "--board pico" if self.board == PICO else self.port
         flash = f"tomoskin firmware flash {target}"
         if is_bootloader(self.bootloader):
-            text, hint = "the board is in its bootloader: it has no firmware", flash
+            text, hint = "the board is in its bootloader and has no firmware", flash
         elif is_text(self.heard):
             letters = (chr(byte) if 32 <= byte < 127 else " " for byte in self.heard)
             shown = " ".join("".join(letters).split())[:_SHOWN]
-            text = f'something else speaks there ("{shown}"): another program, or the wrong port'
+            text = f'another program or device answers ("{shown}"), or this is the wrong port'
             hint = f"{flash}, or {self.ports}"
         elif self.heard and self.rate != BAUD:
-            text = f"what comes at {self.rate:,} Bd is no message: likely the wrong rate"
-            hint = f"the firmware starts with {BAUD:,} Bd: leave baud= away"
+            text = (
+                f"the bytes that arrive at {self.rate:,} Bd are not messages: the rate is "
+                "probably wrong"
+            )
+            hint = f"leave out baud=: the firmware starts with {BAUD:,} Bd"
         elif self.heard:
-            text = f"what comes at {self.rate:,} Bd is no message: likely another program's"
+            text = (
+                f"the bytes that arrive at {self.rate:,} Bd are not messages: probably another "
+                "program runs on the board"
+            )
             hint = f"{flash}; firmware of another rate needs serial:{self.port},baud=RATE"
         elif self.board:
-            text = f"nothing comes from it ({self.board}): likely it is not flashed"
-            hint = f"{flash}; is it powered?"
+            text = f"the board ({self.board}) sends nothing: it probably has no firmware"
+            hint = f"{flash}; check also that it has power"
         else:
-            text, hint = "nothing comes from it: likely the wrong port, or no power", self.ports
+            text, hint = (
+                ("nothing arrives: this is probably the wrong port, or the board has no power"),
+                self.ports,
+            )
         return SourceError(text, where=f"serial:{self.port}", hint=hint)
 
 

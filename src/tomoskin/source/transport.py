@@ -43,6 +43,15 @@ class Diagnosable(Protocol):
 
 
 @runtime_checkable
+class Fetched(Protocol):
+    """A transport whose bytes are fetched while nobody reads, so that they may have waited."""
+
+    @property
+    def waited(self) -> float:
+        """How long the first byte of the last read had waited, s."""
+
+
+@runtime_checkable
 class Played(Protocol):
     """A transport that plays a recording: it has a time of its own, and can be sought in."""
 

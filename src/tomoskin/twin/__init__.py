@@ -1,7 +1,7 @@
 """A skin without hardware: probes → dents → conductivity → potentials → counts → bytes."""
 
 from tomoskin.twin.bend import BendSettings, Bent, Deformation, Pose, Stretched, strain_of
-from tomoskin.twin.board import Board
+from tomoskin.twin.board import Board, HeldScanning
 from tomoskin.twin.circuit import ElectronicsSettings, Lines, line_potentials
 from tomoskin.twin.contact import ContactSettings, Dented, Grid, solve_contact
 from tomoskin.twin.course import ScriptedBend, bent, bent_truth, pressed
@@ -15,7 +15,14 @@ from tomoskin.twin.material import MaterialSettings, MaterialState, advance, con
 from tomoskin.twin.population import COMMON_PRESSES, Population
 from tomoskin.twin.presets import PRESETS, TwinSettings
 from tomoskin.twin.probe import Contact, Press, Probe
-from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, sample_table, table_of
+from tomoskin.twin.scanning import (
+    Analogue,
+    SampleTable,
+    ScanClock,
+    chopped_table,
+    sample_table,
+    table_of,
+)
 from tomoskin.twin.script import Script
 from tomoskin.twin.script_check import check_script, check_settling
 from tomoskin.twin.shape import FACES, Circle, Face, Finger, Shape, Square
@@ -47,6 +54,7 @@ __all__ = [
     "FaultyLine",
     "Finger",
     "Grid",
+    "HeldScanning",
     "Inclusion",
     "Layered",
     "Line",
@@ -82,6 +90,7 @@ __all__ = [
     "bent_truth",
     "check_script",
     "check_settling",
+    "chopped_table",
     "conductivity",
     "convert",
     "disturbed",

@@ -34,7 +34,7 @@ class BendSettings:
     height: float = parameter(
         3e-3,
         "m",
-        "Height of the conductive layer above the surface that keeps its length.",
+        "Height of the conductive layer above the surface whose length does not change.",
         "thickness of the foam, which is glued to the body that bends",
     )
 
@@ -137,8 +137,9 @@ def layer_metric(surface: Surface, uv: FloatArray, height: float) -> FloatArray:
     shape = np.linalg.solve(metric, second)
     if (1.0 - height * np.linalg.eigvals(shape).real <= 0.05).any():
         raise GeometryError(
-            f"a layer {1e3 * height:.3g} mm above the surface folds where that is so hollow",
-            hint="bend it less, or over a greater length",
+            f"the layer {1e3 * height:.3g} mm above the surface folds, because the surface "
+            "is too hollow there",
+            hint="bend the sheet less, or over a greater length",
         )
     return np.asarray(metric - 2 * height * second + height**2 * (second @ shape))
 

@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tomoskin.source import PRESCALERS
+from tomoskin.source import PRESCALERS, ScanSettings, chop_limit
+from tomoskin.twin.scanning import LIMITS
 from tomoskin.wire import (
     SCHEMA,
     Ack,
+    BoardLimits,
     Drive,
+    DriveMode,
     Format,
+    GetMode,
     GetPattern,
     GetScan,
+    HeldMode,
     HeldPattern,
     HeldScan,
     Info,
@@ -20,6 +25,7 @@ from tomoskin.wire import (
     Reset,
     Result,
     SetFormat,
+    SetMode,
     SetPattern,
     SetScan,
     type_byte,
@@ -45,8 +51,9 @@ class Board:
     tick_rate: float
     max_drives: int = 128
     max_samples: int = 2000
-    firmware: tuple[int, int, int] = (1, 1, 0)
+    firmware: tuple[int, int, int] = (1, 2, 0)
     unique_id: bytes = b"twin\0\0\0\0"
+    limits: BoardLimits = LIMITS
 
     def info(self, request: int) -> Info:
         """The answer to GET_INFO."""
@@ -106,16 +113,45 @@ class Board:
         fits = scan.oversampling == 1 and self.adc_bits == 10
         return OK if command.format is Format.SIXTEEN or fits else (Result.BAD_VALUE, 2)
 
+    def check_mode(self, command: SetMode, scan: SetScan | None) -> Verdict:
+        """Whether a SET_MODE fits the announced scan and this board."""
+        if scan is None or command.configuration != scan.configuration:
+            return Result.WRONG_CONFIGURATION, 0
+        periods, frequency = command.periods, command.frequency
+        if command.mode is DriveMode.DIRECT:
+            wrong = 3 if frequency else 4 if periods else None
+            return OK if wrong is None else (Result.BAD_VALUE, wrong)
+        if frequency < self.limits.min_chop:
+            return Result.BAD_VALUE, 3
+        if frequency > self.limits.max_chop:
+            return Result.CHOP_TOO_FAST, self.limits.max_chop
+        shared = periods and scan.oversampling % (2 * periods) == 0
+        return OK if shared else (Result.BAD_VALUE, 4)
+
     def check_start(
-        self, configuration: int, scan: SetScan | None, drives: Sequence[Drive | None]
+        self,
+        configuration: int,
+        scan: SetScan | None,
+        drives: Sequence[Drive | None],
+        mode: SetMode | None = None,
     ) -> Verdict:
-        """Whether the scan that START names is complete."""
+        """Whether the scan that START names is complete, and not too fast."""
         if scan is None or configuration != scan.configuration:
             return Result.WRONG_CONFIGURATION, 0
         if None in drives:
             return Result.INCOMPLETE, list(drives).index(None)
-        samples = sum(drive.mask.bit_count() for drive in drives if drive)
-        return OK if samples <= self.max_samples else (Result.TOO_MANY_SAMPLES, self.max_samples)
+        channels = [drive.mask.bit_count() for drive in drives if drive]
+        most = self.max_samples // (2 if mode else 1)
+        if sum(channels) > most:
+            return Result.TOO_MANY_SAMPLES, most
+        if mode is None:
+            return OK
+        settings = ScanSettings(
+            scan.oversampling, scan.settling / 1e6, self.current, self.adc_bits,
+            scan.dead_time / 1e6, scan.prescaler,
+        )  # fmt: skip
+        limit = chop_limit(self.limits, settings, mode.periods, max(channels), self.tick_rate)
+        return OK if mode.frequency <= limit else (Result.CHOP_TOO_FAST, limit)
 
 
 class HeldScanning:
@@ -125,15 +161,17 @@ class HeldScanning:
         self._board = board
         self.scan: SetScan | None = None
         self.format = Format.SIXTEEN
+        self.mode: SetMode | None = None
+        """None: the drive is direct."""
         self.drives: list[Drive | None] = []
 
-    def set(self, command: SetScan | SetPattern | SetFormat) -> Verdict:
+    def set(self, command: SetScan | SetPattern | SetFormat | SetMode) -> Verdict:
         """Take over what the board accepts."""
         match command:
             case SetScan():
                 verdict = self._board.check_scan(command)
                 if verdict == OK:
-                    self.scan, self.format = command, Format.SIXTEEN
+                    self.scan, self.format, self.mode = command, Format.SIXTEEN, None
                     self.drives = [None] * command.n_drives
             case SetPattern():
                 verdict = self._board.check_drives(command, self.scan)
@@ -144,9 +182,13 @@ class HeldScanning:
                 verdict = self._board.check_format(command, self.scan)
                 if verdict == OK:
                     self.format = command.format
+            case SetMode():
+                verdict = self._board.check_mode(command, self.scan)
+                if verdict == OK:
+                    self.mode = command if command.mode is DriveMode.CHOPPED else None
         return verdict
 
-    def answer(self, command: GetScan | GetPattern) -> Message:
+    def answer(self, command: GetScan | GetPattern | GetMode) -> Message:
         """What is held, for a host that reads it back."""
         scan, request = self.scan, command.request
         if scan is None:
@@ -156,6 +198,9 @@ class HeldScanning:
                 request, scan.configuration, scan.n_drives, scan.settling, scan.dead_time,
                 scan.oversampling, scan.prescaler, scan.current_limit, self.format,
             )  # fmt: skip
+        if isinstance(command, GetMode):
+            mode = self.mode or SetMode(0, 0, DriveMode.DIRECT, 0, 0)
+            return HeldMode(request, scan.configuration, mode.mode, mode.frequency, mode.periods)
         if command.first >= scan.n_drives:
             return Ack(request, type_byte(GetPattern), Result.BAD_VALUE, 1)
         some = self.drives[command.first : command.first + _DRIVES_OF_PATTERN]

@@ -23,41 +23,59 @@ class ElectronicsSettings:
     noise: float = parameter(
         0.7, "LSB", "Standard deviation of one conversion before it is rounded.", "assumed"
     )
-    compliance: float = parameter(
-        math.inf, "V", "Most that the current source drives its load with.", "ideal"
+    compliance: float = parameter(math.inf, "V", "Maximum voltage of the current source.", "ideal")
+    output_resistance: float = parameter(
+        math.inf, "Ω", "Resistance across the current source.", "ideal"
     )
-    output_resistance: float = parameter(math.inf, "Ω", "Across the current source.", "ideal")
-    switch_resistance: float = parameter(0.0, "Ω", "Of each switch, when on.", "ideal")
+    switch_resistance: float = parameter(
+        0.0, "Ω", "Resistance of each switch when it is on.", "ideal"
+    )
     contact_sd: float = parameter(
         0.0, "Ω", "Standard deviation of each contact's resistance over time.", "ideal"
     )
-    contact_time: float = parameter(10.0, "s", "Correlation time of that.", "assumed")
+    contact_time: float = parameter(
+        10.0, "s", "Correlation time of the contacts' resistance.", "assumed"
+    )
     rejection: float = parameter(math.inf, "dB", "Common-mode rejection of the amplifier.", "ideal")
     gain_sd: float = parameter(0.0, "", "Relative deviation of the channels' gains.", "ideal")
     offset_sd: float = parameter(
         0.0, "V", "Deviation of the channels' offsets, at the input.", "ideal"
     )
-    low_rail: float = parameter(-math.inf, "V", "Least output of the amplifier.", "ideal")
-    high_rail: float = parameter(math.inf, "V", "Largest output of the amplifier.", "ideal")
+    low_rail: float = parameter(-math.inf, "V", "Lowest output of the amplifier.", "ideal")
+    high_rail: float = parameter(math.inf, "V", "Highest output of the amplifier.", "ideal")
     time_constant: float = parameter(
-        0.0, "s", "With which a channel settles after a switch of the drive.", "ideal"
+        0.0, "s", "Time constant with which a channel settles after a switch of the drive.", "ideal"
     )
     crosstalk: float = parameter(
-        0.0, "", "Part of a neighbouring channel's potential that is read too.", "ideal"
+        0.0, "", "Fraction of a neighbouring channel's potential that is read as well.", "ideal"
     )
     hum: float = parameter(0.0, "V", "Amplitude of the mains at the inputs.", "ideal")
-    hum_frequency: float = parameter(50.0, "Hz", "Of the mains.", "Europe; 60 in America")
+    hum_frequency: float = parameter(50.0, "Hz", "Frequency of the mains.", "Europe; 60 in America")
     nonlinearity: float = parameter(
-        0.0, "LSB", "Largest bow of the converter's line, in the middle of its range.", "ideal"
+        0.0,
+        "LSB",
+        "Largest deviation of the converter from a straight line, in the middle of its range.",
+        "ideal",
     )
+
+    double_layer: float = parameter(
+        math.inf, "F", "Capacitance between an electrode and what conducts by ions.", "ideal"
+    )
+    leak: float = parameter(
+        100e3, "Ω", "Across the double layer; with it the time constant of polarisation.", "assumed"
+    )
+    thermal_sd: float = parameter(
+        0.0, "V", "Standard deviation of each contact's thermoelectric voltage over time.", "ideal"
+    )
+    thermal_time: float = parameter(60.0, "s", "Correlation time of that.", "assumed")
 
     def __post_init__(self) -> None:
         """Check the numbers."""
         check_numbers(
             self,
-            above="contact_time hum_frequency",
+            above="contact_time hum_frequency leak thermal_time",
             least="noise switch_resistance contact_sd gain_sd offset_sd time_constant crosstalk "
-            "hum nonlinearity",
+            "hum nonlinearity thermal_sd",
         )
 
 

@@ -27,13 +27,13 @@ class ContactSettings:
 
     foundation: str = parameter("winkler", "", "Model of the body under the sheet.", "")
     modulus: float = parameter(
-        5e3, "Pa", "Modulus of that body in compression.", "soft polyurethane foam, assumed"
+        5e3, "Pa", "Compressive modulus of that body.", "soft polyurethane foam, assumed"
     )
     thickness: float = parameter(3e-3, "m", "Its thickness.", "thin foam, assumed")
     lock: float = parameter(
-        0.4, "", "Compression at which it is squeezed solid (inf: never).", "assumed"
+        0.4, "", "Compression at which the body is squeezed solid (inf: never).", "assumed"
     )
-    poisson: float = parameter(0.0, "", "Its Poisson ratio.", "open foam: about 0, assumed")
+    poisson: float = parameter(0.0, "", "Poisson ratio of the body.", "open foam: about 0, assumed")
     tension: float = parameter(60.0, "N/m", "Tension of the sheet.", "assumed")
     stiffness: float = parameter(
         150.0, "N/m", "Young's modulus of the sheet times thickness.", "stretchy knit, assumed"
@@ -171,7 +171,10 @@ def solve_contact(probes: Sequence[Probe], settings: ContactSettings, grid: Grid
     for number, (nodes, height) in enumerate(faces):
         if (owner[nodes] >= 0).any():
             other = int(owner[nodes].max())
-            raise GeometryError("the faces overlap", where=f"press {other} and press {number}")
+            raise GeometryError(
+                "the faces of the two probes overlap: move them apart",
+                where=f"press {other} and press {number}",
+            )
         owner[nodes], gap[nodes] = number, height
     nodes = np.flatnonzero(owner >= 0)
     problem = _Problem(
@@ -227,7 +230,8 @@ def _balance(problem: _Problem) -> FloatArray:
         if np.abs(pressure - before).sum() <= _TOLERANCE * scale * len(pressure):
             return pressure
     raise ModelError(
-        f"the contact did not settle in {_ROUNDS} rounds", hint="use a coarser or a smaller grid"
+        f"the contact did not converge in {_ROUNDS} iterations",
+        hint="use a coarser or a smaller grid",
     )
 
 
@@ -245,7 +249,7 @@ def _faces(probes: Sequence[Probe], grid: Grid) -> list[tuple[IntArray, FloatArr
         nodes = np.flatnonzero(np.isfinite(gap))
         if not len(nodes):
             raise GeometryError(
-                f"its face covers no node of a grid of {grid.step * 1e3:.3g} mm",
+                f"its face covers no node of the grid with steps of {grid.step * 1e3:.3g} mm",
                 where=f"press {number}",
                 hint="use a finer grid",
             )

@@ -22,7 +22,7 @@ Rows = tuple[tuple[float, ...], ...]
 Friction = Mapping[str, float]
 """Coefficient of friction of a probe that slides, and of one that rolls."""
 
-NO_FRAME = "no frame would show it: make it longer, or [readout] settling of the skin shorter"
+NO_FRAME = "no frame would show it: make it longer, or shorten [readout] settling of the skin"
 """What to do about a stage that is shorter than a frame."""
 
 _ON_PATH = 200
@@ -104,10 +104,11 @@ class ScriptedPress:
             corners = 1e3 * outline.polyline(outline.length / 64)
             (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
             raise ScriptError(
-                f"expected a place on the skin (x from {left:.0f} to {right:.0f} mm, y from "
-                f"{low:.0f} to {high:.0f} mm), got ({x:.1f} mm, {y:.1f} mm), which is off the skin",
+                f"expected a position on the skin (x from {left:.0f} to {right:.0f} mm, y from "
+                f"{low:.0f} to {high:.0f} mm), got ({x:.1f} mm, {y:.1f} mm), which is off the "
+                "skin",
                 where=f"{self.where} {'path' if times[first] else 'at'}",
-                hint="the middle of a probe must stand inside the outline",
+                hint="the middle of a probe must be inside the outline",
             )
 
     @cached_property
@@ -147,9 +148,10 @@ class ScriptedBend:
             rows = given.profile or ()
             if not rows[0][0] > 0 or rows[-1][1] != 0.0:
                 raise ScriptError(
-                    "expected times above 0 s, and nothing left in the last row",
+                    f"expected times above 0 s, and 0 in the last row, got {rows[0][0]:g} s "
+                    f"and {rows[-1][1]:g}",
                     where=f"{where} profile",
-                    hint="it begins with nothing at 0 s by itself",
+                    hint="the profile begins with 0 at 0 s by itself",
                 )
             course = ((0.0, 0.0), *rows)
         made = cls(given, course, where)

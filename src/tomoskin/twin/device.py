@@ -2,33 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tomoskin.core import Frame
 from tomoskin.source import conversion_time
 from tomoskin.twin.board import OK, Board, HeldScanning, Verdict
-from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, sample_table
+from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, chopped_table, sample_table
 from tomoskin.wire import (
     SCHEMA,
     Ack,
+    ChoppedFrame,
     Command,
     Deframer,
     Fault,
     FaultCode,
     Format,
     FrameFlag,
+    GetBoard,
     GetInfo,
+    GetMode,
     GetPattern,
     GetScan,
     Hello,
     Message,
     PackedFrame,
-    Ping,
     Result,
     SafeOff,
     SetBaud,
     SetFormat,
     SetHeartbeat,
+    SetMode,
     SetPattern,
     SetScan,
     Start,
@@ -113,14 +116,20 @@ class TwinDevice:
             self._say(Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash))
             self._next_hello = max(self._next_hello + _HELLO_INTERVAL, now)
         if self._scanning and now >= self._scanning.due:
-            frame = self._frame(self._scanning, now)
-            self._say(PackedFrame.of(frame) if self._held.format is Format.PACKED else frame)
+            self._say(self._sent(self._frame(self._scanning, now)))
         data = bytes(self._out)
         self._out.clear()
         return data
 
+    def _sent(self, frame: Frame) -> Message:
+        """The message that a frame goes in."""
+        if frame.sums is not None:
+            return ChoppedFrame.of(frame)
+        return PackedFrame.of(frame) if self._held.format is Format.PACKED else frame
+
     def _frame(self, scanning: _Scanning, now: float) -> Frame:
-        samples = self._analogue.sample(scanning.table, scanning.device_time)
+        counts = self._analogue.sample(scanning.table, scanning.device_time)
+        samples, sums = scanning.table.readings(counts)
         frame = Frame(
             sequence=scanning.sequence,
             ticks=round(scanning.device_time * self._board.tick_rate),
@@ -129,6 +138,7 @@ class TwinDevice:
             flags=int(FrameFlag.FIRST) if scanning.sequence == 0 else 0,
             drops=0,
             samples=samples,
+            sums=sums,
         )
         # A computer that is too slow for the scan makes the twin scan later, never skip.
         next_due = scanning.due + scanning.period * self._pace
@@ -156,7 +166,9 @@ class TwinDevice:
         identity = (command.request, crc16(payload))
         if isinstance(command, GetInfo):
             self._last_reply = encode(self._board.info(command.request))
-        elif isinstance(command, GetScan | GetPattern):
+        elif isinstance(command, GetBoard):
+            self._last_reply = encode(replace(self._board.limits, request=command.request))
+        elif isinstance(command, GetScan | GetPattern | GetMode):
             self._last_reply = encode(self._held.answer(command))
         elif identity != self._last:
             result, detail = self._run(command, now)
@@ -176,26 +188,34 @@ class TwinDevice:
                 if not low <= command.interval <= high:
                     return Result.BAD_VALUE, 1
                 self._heartbeat = command.interval / 1e3
-            case SetScan() | SetPattern() | SetFormat() | Start() | SetBaud() if self._scanning:
+            case SetScan() | SetPattern() | SetFormat() | SetMode() | Start() | SetBaud() if (
+                self._scanning
+            ):
                 return Result.BUSY, 0
-            case SetScan() | SetPattern() | SetFormat():
+            case SetScan() | SetPattern() | SetFormat() | SetMode():
                 return self._held.set(command)
             case Start():
                 return self._start(command, now)
-            case SetBaud() | Ping() | GetInfo() | GetScan() | GetPattern():
+            case _:
                 pass
         return OK
 
     def _start(self, command: Start, now: float) -> Verdict:
         held = self._held
-        verdict = self._board.check_start(command.configuration, held.scan, held.drives)
+        verdict = self._board.check_start(command.configuration, held.scan, held.drives, held.mode)
         if verdict != OK or held.scan is None:
             return verdict
         scan, drives = held.scan, [drive for drive in held.drives if drive]
         times = ScanClock(
             scan.dead_time * 1e-6, scan.settling * 1e-6, conversion_time(scan.prescaler)
         )
-        table = sample_table(drives, scan.oversampling, times)
+        table = (
+            sample_table(drives, scan.oversampling, times)
+            if held.mode is None
+            else chopped_table(
+                drives, scan.oversampling, times, held.mode.frequency, held.mode.periods
+            )
+        )
         period = table.seconds
         self._scanning = _Scanning(
             table, scan.configuration, period, now + period * self._pace, now - self._power_on

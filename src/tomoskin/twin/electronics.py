@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.twin.bend import Pose
 from tomoskin.twin.circuit import ElectronicsSettings, Lines, line_potentials, settling
+from tomoskin.twin.electrodes import Electrodes
 from tomoskin.twin.faults import Faults, check_electrodes
 from tomoskin.twin.probe import Contact
 from tomoskin.twin.scanning import SampleTable
@@ -70,15 +71,15 @@ class TwinElectronics:
         """``current`` A."""
         self.sheet, self._readout, self._current = sheet, readout, current
         self.settings = electronics
-        channels, self._random, self._contacts = (
-            np.random.default_rng(part) for part in np.random.SeedSequence(seed).spawn(3)
-        )
+        *parts, chance = np.random.SeedSequence(seed).spawn(4)
+        channels, self._random, self._contacts = map(np.random.default_rng, parts)
         n = sheet.n_electrodes
         self._gain = 1.0 + electronics.gain_sd * channels.standard_normal(n)
         self._offset = electronics.offset_sd * channels.standard_normal(n)
         self._hum = electronics.hum * (1 + 0.2 * channels.standard_normal(n))
         self._phase = channels.uniform(0, 2 * np.pi) + 0.2 * channels.standard_normal(n)
         self._faults = Faults()
+        self._electrodes = Electrodes(n, current, electronics, chance)
         self._contact = electronics.contact_sd * self._contacts.standard_normal(n)
         self._time: float | None = None
         self._aged = 0.0
@@ -107,7 +108,8 @@ class TwinElectronics:
 
     def renew(self, chance: np.random.SeedSequence) -> None:
         """Begin anew at no time, with noise and contacts from ``chance``; the channels stay."""
-        noise, contacts = chance.spawn(2)
+        noise, contacts, electrodes = chance.spawn(3)
+        self._electrodes.renew(electrodes)
         self._random = np.random.default_rng(noise)
         self._contacts = np.random.default_rng(contacts)
         n = len(self._contact)
@@ -181,6 +183,8 @@ class TwinElectronics:
             turn = 2 * np.pi * settings.hum_frequency * time + self._phase
             volts = volts + (self._hum * np.sin(turn))[channel] * cosine
             volts += (self._hum * np.cos(turn))[channel] * sine
+        if not self._electrodes.silent:
+            volts = volts + self._electrodes.read(table, time)
         volts = self._gain[channel] * (volts + self._offset[channel])
         stuck = lines.stuck[drive, channel]
         if stuck.any():

@@ -57,13 +57,16 @@ class FaultEvent:
         """Check the values."""
         where = f"fault at {self.time} s"
         if self.kind not in KINDS:
-            raise ModelError(f'expected {", ".join(KINDS)}, got "{self.kind}"', where=where)
+            raise ModelError(
+                f'expected a kind among {", ".join(KINDS)}, got "{self.kind}"', where=where
+            )
         if not math.isfinite(self.time):
-            raise ModelError("expected a finite time", where=where)
+            raise ModelError(f"expected a finite time, got {self.time}", where=where)
         pair = self.kind in ("short", "unshort")
         if self.electrode < 0 or (pair and (self.other < 0 or self.other == self.electrode)):
             raise ModelError(
-                f"expected {'two electrodes' if pair else 'an electrode'}, got "
+                "expected "
+                f"{'two different electrodes from 0' if pair else 'an electrode from 0'}, got "
                 f"{(self.electrode, self.other) if pair else self.electrode}",
                 where=where,
             )

@@ -58,7 +58,9 @@ class Inclusion:
     def __post_init__(self) -> None:
         """Check the numbers."""
         if not (math.isfinite(self.x) and math.isfinite(self.y)):
-            raise GeometryError(f"expected a place, got {self.x}, {self.y}", where="inclusion")
+            raise GeometryError(
+                f"expected a finite position, got {self.x}, {self.y}", where="inclusion"
+            )
         if not (0 < self.diameter < math.inf and 0 < self.depth < math.inf):
             raise GeometryError(
                 f"expected a diameter and a depth above 0 m, got {self.diameter} and {self.depth}",
@@ -66,8 +68,8 @@ class Inclusion:
             )
         if not (self.modulus > 0 and 0 <= self.room <= 1):
             raise ModelError(
-                f"expected a modulus above 0 and a room from 0 to 1, "
-                f"got {self.modulus} Pa and {self.room}",
+                "expected a modulus above 0 and a fraction from 0 to 1 as room, got "
+                f"{self.modulus} Pa and {self.room}",
                 where="inclusion",
             )
 
@@ -103,17 +105,17 @@ class Layered:
         for number, one in enumerate(self.inclusions):
             where = f"inclusion {number}"
             if max(abs(one.x), abs(one.y)) + one.diameter / 2 > self.side / 2:
-                raise GeometryError("it sticks out of the body's side", where=where)
+                raise GeometryError("it extends beyond the side of the body", where=where)
             if one.depth + one.diameter >= thickness:
                 raise GeometryError(
-                    f"it reaches {1e3 * (one.depth + one.diameter):.4g} mm down in a body of "
-                    f"{1e3 * thickness:.4g} mm",
+                    f"it extends to a depth of {1e3 * (one.depth + one.diameter):.4g} mm, but "
+                    f"the body is {1e3 * thickness:.4g} mm thick",
                     where=where,
                 )
             for other in self.inclusions[:number]:
                 apart = math.hypot(one.x - other.x, one.y - other.y)
                 if apart < (one.diameter + other.diameter) / 2:
-                    raise GeometryError("it overlaps another one", where=where)
+                    raise GeometryError("it overlaps another inclusion", where=where)
 
     @property
     def grid(self) -> Grid:

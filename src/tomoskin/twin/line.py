@@ -20,7 +20,10 @@ class LineSettings:
         0.0, "", "Probability that a byte arrives with one bit flipped.", "ideal"
     )
     hold: float = parameter(
-        0.0, "", "Probability that what has arrived is held back until the next read.", "ideal"
+        0.0,
+        "",
+        "Probability that bytes that have arrived are delayed until the next read.",
+        "ideal",
     )
 
     def __post_init__(self) -> None:

@@ -32,20 +32,31 @@ class MaterialSettings:
         10.0, "", "Relative rise of resistance per mean strain in the plane.", "assumed"
     )
     gauge_across: float = parameter(
-        0.0, "", "The same for the strain's deviator: conduction differs by direction.", "assumed"
+        0.0,
+        "",
+        "The same for the deviator of the strain: conductivity then differs by direction.",
+        "assumed",
     )
     compression: float = parameter(
-        0.0, "", "Relative rise of conductivity per compression of what lies under it.", "assumed"
+        0.0,
+        "",
+        "Relative rise of conductivity per compression of the layer under the sheet.",
+        "assumed",
     )
     thickness: float = parameter(
-        3e-3, "m", "What a depth is divided by to give that compression.", "assumed"
+        3e-3, "m", "Thickness by which a depth is divided to give that compression.", "assumed"
     )
     creep: tuple[float, ...] = parameter(
-        (), "", "Parts of the response that come late (Prony series).", "assumed"
+        (), "", "Fractions of the response that come late (Prony series).", "assumed"
     )
-    creep_times: tuple[float, ...] = parameter((), "s", "Time constants of these parts.", "assumed")
+    creep_times: tuple[float, ...] = parameter(
+        (), "s", "Time constants of these fractions.", "assumed"
+    )
     play: tuple[float, ...] = parameter(
-        (), "", "Parts of the response that lag behind by a play (Prandtl, Ishlinskii).", "assumed"
+        (),
+        "",
+        "Fractions of the response that lag behind by a play (Prandtl, Ishlinskii).",
+        "assumed",
     )
     play_widths: tuple[float, ...] = parameter((), "", "Half widths of these plays.", "assumed")
     temperature_coefficient: float = parameter(
@@ -54,20 +65,22 @@ class MaterialSettings:
     temperature_sd: float = parameter(
         0.0, "K", "Standard deviation of the sheet's temperature over time.", "assumed"
     )
-    temperature_time: float = parameter(600.0, "s", "Correlation time of that.", "assumed")
+    temperature_time: float = parameter(
+        600.0, "s", "Correlation time of the temperature.", "assumed"
+    )
     spread: float = parameter(
         0.0, "", "Standard deviation of the logarithm of conductivity over the sheet.", "assumed"
     )
-    spread_length: float = parameter(20e-3, "m", "Correlation length of that.", "assumed")
+    spread_length: float = parameter(20e-3, "m", "Correlation length of that logarithm.", "assumed")
     wear: float = parameter(
         0.0, "", "Relative loss of conductivity per strain, summed over all loading.", "assumed"
     )
 
     breakdown: tuple[float, ...] = parameter(
-        (), "", "Responses to motion of the load, either way: contacts break.", "assumed"
+        (), "", "Responses to motion of the load, in both directions: contacts break.", "assumed"
     )
     breakdown_times: tuple[float, ...] = parameter(
-        (), "s", "Time constants with which they form again.", "assumed"
+        (), "s", "Time constants with which the contacts form again.", "assumed"
     )
 
     def __post_init__(self) -> None:

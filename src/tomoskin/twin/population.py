@@ -40,7 +40,7 @@ class Population(PressesSection):
             others = [name for name in tables if name != cls.section]
             if others or cls.section not in tables:
                 raise ScriptError(
-                    "expected the section [presses] alone",
+                    f"expected only the section [presses], got {', '.join(tables) or 'none'}",
                     where=f"{source}: [{others[0]}]" if others else source,
                     hint="labelled frames have no timeline: leave --presses out to run one",
                 )
@@ -70,10 +70,10 @@ class Population(PressesSection):
             if self._has_room(outline, position, others):
                 return position
         raise ScriptError(
-            f"found no place {1e3 * self.margin:g} mm from the rim and {1e3 * self.apart:g} mm "
-            f"from {len(others)} other probes",
+            f"found no position {1e3 * self.margin:g} mm from the rim and "
+            f"{1e3 * self.apart:g} mm from {len(others)} other probes",
             where="[presses] margin, apart",
-            hint="ask for fewer, or let them be closer",
+            hint="use fewer presses, or smaller distances",
         )
 
     def _has_room(self, outline: Outline, position: FloatArray, others: FloatArray) -> bool:

@@ -58,6 +58,12 @@ class TwinSettings:
             seed=seed, contact=contact, material=material, electronics=electronics, bend=bend
         )
 
+    def with_electrodes(self, kind: str | None) -> Self:
+        """These settings with electrodes of that kind of a skin file; None: as they are."""
+        if kind != "polarising":
+            return self
+        return replace(self, electronics=replace(self.electronics, **POLARISING))
+
     def with_noise(self, noise: float) -> Self:
         """These settings with another noise of one conversion, LSB."""
         return replace(self, electronics=replace(self.electronics, noise=noise))
@@ -82,6 +88,13 @@ BOARD = ElectronicsSettings(
     nonlinearity=0.5,
 )
 """The board of docs/hardware.md: IRLML6344 and IRLML9301, INA118, an ATmega2560's converter."""
+
+POLARISING = {"double_layer": 100e-6, "leak": 100e3, "thermal_sd": 20e-6, "thermal_time": 60.0}
+"""Electrodes on ions. 0.5 cm² of a metal has 10 µF (Bard & Faulkner, Electrochemical Methods, 2001,
+ch. 13: 10 to 40 µF/cm² where it is smooth), a rough one some ten times as much. The leak is
+assumed: with it an electrode forgets in 10 s. Contacts of copper and solder give 1 to 3 µV/K
+(Keithley, Low Level Measurements Handbook, 7th ed., table 3-1): 20 µV for 10 K, over a minute,
+which is assumed."""
 
 SOURCES = {
     "noise": "converter assumed; the amplifier's (ngspice deck noise) is a fortieth of it",

@@ -126,7 +126,7 @@ def check_on_skin(contacts: Sequence[Contact], outline: Outline) -> None:
 
 def _check_place(x: float, y: float) -> None:
     if not (math.isfinite(x) and math.isfinite(y)):
-        raise GeometryError(f"expected a finite place, got ({x}, {y})", where="press")
+        raise GeometryError(f"expected a finite position, got ({x}, {y})", where="press")
 
 
 def _check_force(force: float) -> None:
@@ -134,5 +134,5 @@ def _check_force(force: float) -> None:
         raise ModelError(
             f"expected a force of 0 N or more, got {force}",
             where="press",
-            hint="a probe can push, not pull",
+            hint="a probe can only push",
         )

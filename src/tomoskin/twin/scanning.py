@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -11,22 +12,46 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.pattern import Scan
-from tomoskin.source import ScanSettings
-from tomoskin.wire import Drive
+from tomoskin.source import ScanSettings, choose_periods
+from tomoskin.wire import BoardLimits, Drive
+
+LIMITS = BoardLimits(
+    request=0,
+    name=b"simulated board".ljust(24, b"\0"),
+    min_chop=10,
+    max_chop=5000,
+    half=0,
+    sample=0,
+    conversion=0,
+    clock=813,
+)
+"""What the twin's board says of itself: as fast as its converter, of 13 clocks at 16 MHz."""
+
+TICK_RATE = 250e3
+"""Hz, of every board's clock."""
+
+_ZERO = 0x8000
+"""What stands for no difference in a frame of an alternating drive."""
 
 
 @dataclass(frozen=True, slots=True)
 class ScanClock:
-    """Times of a scan, s: all off between two drives, wait after each switch, one conversion."""
+    """Times of a scan, s: all off between two drives, wait after each switch, one conversion.
+
+    ``on``: of each direction of an alternating drive; 0: until everything has been read.
+    """
 
     dead_time: float = 0.0
     settling: float = 0.0
     conversion: float = 0.0
+    on: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class SampleTable:
     """The samples of a scan, in order; electrodes from 0.
+
+    An alternating drive stands for as many drives as it has directions, one after the other.
 
     Attributes
     ----------
@@ -44,6 +69,8 @@ class SampleTable:
         (n_drives,) s for which each drive is on.
     conversion
         s.
+    directions
+        That each drive of the board consists of; 1: the drive is direct.
     """
 
     drives: IntArray
@@ -54,6 +81,31 @@ class SampleTable:
     time: FloatArray
     length: FloatArray
     conversion: float
+    directions: int = 1
+
+    def readings(
+        self, counts: NDArray[np.uint16]
+    ) -> tuple[NDArray[np.uint16], NDArray[np.uint16] | None]:
+        """Samples and sums of a frame, as the board makes them of (n_samples,) ``counts``."""
+        if self.directions == 1:
+            return counts, None
+        difference, total = self.demodulated(counts.astype(np.float64))
+        return (difference + _ZERO).astype(np.uint16), total.astype(np.uint16)
+
+    def demodulated(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Of an alternating drive and (n_samples,) values: for each sample of the frame those with
+        the current from source to sink less, and plus, those with the current the other way."""
+        place, sign = self._demodulation
+        difference = np.bincount(place, weights=sign * values)
+        return np.asarray(difference), np.asarray(np.bincount(place, weights=values))
+
+    @cached_property
+    def _demodulation(self) -> tuple[IntArray, IntArray]:
+        """(n_samples,) sample of the frame that each belongs to, and 1 or −1 by its direction."""
+        whole, direction = np.divmod(self.drive, self.directions)
+        key = whole * (int(self.channel.max(initial=0)) + 1) + self.channel
+        place = np.unique(key, return_inverse=True)[1]
+        return np.asarray(place), np.where(direction % 2, -1, 1)
 
     @property
     def source(self) -> IntArray:
@@ -103,6 +155,7 @@ def sample_table(
     drive, channel, place = np.array(rows, dtype=np.int64).reshape(-1, 3).T
     each = oversampling * clock.conversion
     length = clock.settling + np.bincount(drive, minlength=len(drives)) * each
+    length = np.maximum(length, clock.on)
     switched = np.cumsum(clock.dead_time + length) - length
     since = clock.settling + place * each
     return SampleTable(
@@ -117,6 +170,23 @@ def sample_table(
     )
 
 
+def chopped_table(
+    drives: Sequence[Drive], oversampling: int, clock: ScanClock, frequency: float, periods: int
+) -> SampleTable:
+    """The samples of an alternating scan: ``periods`` of each drive at ``frequency`` Hz.
+
+    ``oversampling`` is shared between all directions of a drive.
+    """
+    directions = 2 * periods
+    each = [
+        Drive(drive.sink, drive.source, drive.mask) if number % 2 else drive
+        for drive in drives
+        for number in range(directions)
+    ]
+    clock = replace(clock, on=0.5 / frequency - clock.dead_time)
+    return replace(sample_table(each, oversampling // directions, clock), directions=directions)
+
+
 def table_of(scan: Scan, settings: ScanSettings) -> SampleTable:
     """The samples of a host's ``scan``, as the board would take them."""
     drives = [
@@ -124,4 +194,8 @@ def table_of(scan: Scan, settings: ScanSettings) -> SampleTable:
         for (source, sink), mask in zip(scan.drives.tolist(), scan.masks.tolist(), strict=True)
     ]
     clock = ScanClock(settings.dead_time, settings.settling, settings.conversion)
-    return sample_table(drives, settings.oversampling, clock)
+    if not settings.chop_frequency:
+        return sample_table(drives, settings.oversampling, clock)
+    channels = int(np.bincount(scan.sample_drive).max())
+    periods = choose_periods(LIMITS, settings, channels, TICK_RATE, "twin")
+    return chopped_table(drives, settings.oversampling, clock, settings.chop_frequency, periods)

@@ -77,7 +77,7 @@ class Script:
                 raise ScriptError(
                     "describes labelled frames, not a timeline",
                     where=f"{source}: {PressesSection.heading}",
-                    hint="say how many frames: --presses N",
+                    hint="give the number of frames: --presses N",
                 )
             head = ScriptSection.read(tables.get("script", {}), f"{source}: [script]")
             presses = tuple(_press(s, w) for s, w in _each(PressSection, tables, source))
@@ -120,7 +120,7 @@ def _each(section: type[S], tables: Mapping[str, Any], source: str) -> Iterator[
         raise ScriptError(
             f"expected a list of tables, got {show(given)}",
             where=f"{source}: [{section.section}]",
-            hint=f"write {section.heading}, as there may be several",
+            hint=f"write {section.heading}, because there may be several",
         )
     for number, table in enumerate(given, start=1):
         title = table.get("id") if isinstance(table, Mapping) else None
@@ -136,7 +136,7 @@ def _press(given: PressSection, where: str) -> ScriptedPress:
         force, key = _course((0.0, 0.0), given.profile, f"{where} profile"), "profile"
         if force[-1][1] != 0.0:
             raise ScriptError(
-                f"expected 0 N last, got {force[-1][1]:g} N",
+                f"expected 0 N in the last row, got {force[-1][1]:g} N",
                 where=f"{where} profile",
                 hint="add a row with the time at which the probe has left the sheet",
             )
@@ -180,7 +180,7 @@ def _fault(given: FaultSection, where: str) -> ScriptedFault:
         raise ScriptError(
             f"expected an electrode other than {given.electrode}, got {given.other}",
             where=f"{where} other",
-            hint="an electrode always touches itself",
+            hint="an electrode is always connected to itself",
         )
     return ScriptedFault(
         kind=given.kind,

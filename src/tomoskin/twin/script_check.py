@@ -39,7 +39,7 @@ def check_script(script: Script, skin: Skin) -> None:
             f"expected at least one frame of this skin, {1e3 * scan.scan_time:.3g} ms, "
             f"got {1e3 * script.duration:g} ms",
             where=f"{script.source}: [script] duration",
-            hint="make it longer, or [readout] settling of the skin shorter",
+            hint="make it longer, or shorten [readout] settling of the skin",
         )
     check_stages(script.presses, scan.scan_time)
     _check_faults(script, skin, scan.scan_time)
@@ -74,9 +74,9 @@ def check_settling(skin: Skin, preset: str) -> None:
     if waits < least:
         rest = math.exp(-waits / tau)
         raise ScriptError(
-            f"expected at least {1e6 * least:.0f} us, got {1e6 * waits:.0f} us: the {preset} "
-            f"board settles with a time constant of {1e6 * tau:.0f} us, and {100 * rest:.0f} % of "
-            "each sample would be the drive before",
+            f"expected at least {1e6 * least:.0f} us, got {1e6 * waits:.0f} us: the "
+            f"{preset} board settles with a time constant of {1e6 * tau:.0f} us, and "
+            f"{100 * rest:.0f} % of each sample would come from the drive before",
             where=f"{skin.source}: [readout] settling",
             hint="make it longer, or choose another preset",
         )
@@ -115,7 +115,7 @@ def _check_ends(script: Script) -> None:
     for press in script.presses:
         if press.end > script.duration + _ROUNDING:
             raise ScriptError(
-                f"lasts until {press.end:g} s, the script until {script.duration:g} s",
+                f"lasts until {press.end:g} s, but the script ends at {script.duration:g} s",
                 where=f"{press.where} {press.force_key}",
                 hint="raise [script] duration",
             )

@@ -45,55 +45,72 @@ def _course(**values: Quantity | Number) -> Table:
 
 
 class ScriptSection(Section, section="script"):
-    """The whole. Time 0 is the end of the lead-in; all other times count from there."""
+    """The whole script. Time 0 is the end of the lead-in. All other times count from there."""
 
-    name: str = key(Text(), "One line for people.", default="")
-    duration: float = key(Quantity("time", "s", 0.01, 86400), "From time 0 to the end.")
+    name: str = key(Text(), "A title of one line, for people.", default="")
+    duration: float = key(
+        Quantity("time", "s", 0.01, 86400), "The length of the simulation, from time 0."
+    )
     lead_in: float = key(_LASTS, "Idle time before time 0, for the reference.", default="1 s")
-    seed: int = key(Whole(0, 2**31 - 1), "Of all noise; --seed wins over it.", default=0)
+    seed: int = key(
+        Whole(0, 2**31 - 1), "Seed of all noise. The option --seed replaces it.", default=0
+    )
     preset: str | None = key(_PRESET, _PRESET_MEANING, default=None)
 
 
 class PressSection(Section, section="press", many=True):
-    """A probe pressed on the sheet. It stands from `start` on for as long as its force lasts."""
+    """A probe that presses on the sheet, from `start` until its force has ended."""
 
-    id: str = key(Text(), "Name; two presses at once must differ in it.")
+    id: str = key(Text(), "Its name. Presses that overlap in time need different names.")
     shape: str = key(
-        Choice(("circle", "square", "finger", "polygon")), "Face of the probe.", default="circle"
+        Choice(("circle", "square", "finger", "polygon")),
+        "Shape of the probe's face.",
+        default="circle",
     )
-    radius: float | None = key(_SIZE, "Of the circle.", shape="circle")
-    side: float | None = key(_SIZE, "Of the square.", shape="square")
-    length: float = key(_SIZE, "Of the fingertip.", default="22 mm", shape="finger")
-    width: float = key(_SIZE, "Of the fingertip.", default="16 mm", shape="finger")
+    radius: float | None = key(_SIZE, "Radius of the circle.", shape="circle")
+    side: float | None = key(_SIZE, "Side of the square.", shape="square")
+    length: float = key(_SIZE, "Length of the fingertip.", default="22 mm", shape="finger")
+    width: float = key(_SIZE, "Width of the fingertip.", default="16 mm", shape="finger")
     vertices: Course | None = key(
-        Table(_POINT, 3), "Corners around the middle of the probe.", shape="polygon"
+        Table(_POINT, 3), "Corners, relative to the middle of the probe.", shape="polygon"
     )
     crown: float | None = key(
         Quantity("length", "mm", 1, 100_000),
-        "Radius of curvature of a face that is not flat; that of a ball is its radius.",
+        "Radius of curvature of a face that is not flat. For a ball it is the ball's radius.",
         default=None,
         shape=("circle", "square", "polygon"),
     )
-    angle: float = key(_ANGLE, "By which the face is turned, counter-clockwise.", default="0 deg")
-    at: tuple[Any, ...] = key(_POINT, "Where its middle stands first.")
+    angle: float = key(_ANGLE, "Rotation of the face, counter-clockwise.", default="0 deg")
+    at: tuple[Any, ...] = key(_POINT, "First position of its middle.")
     path: Course | None = key(
         _course(x=_LENGTH, y=_LENGTH),
-        "Sliding: positions of the middle at times since `start`, from `at` on in straight lines.",
+        "Later positions of its middle, at times since `start`. It moves in straight lines.",
         default=None,
     )
     motion: str = key(
         Choice(("slide", "roll")),
-        "How it follows its path: by its friction it drags the sheet along.",
+        "How the probe follows its path. Its friction drags the sheet along.",
         default="slide",
     )
-    start: float = key(_TIME, "When it touches the sheet.")
-    force: float | None = key(_FORCE, "Force while it is held.", unless="profile")
-    rise: float = key(_LASTS, "From 0 to the force, evenly.", default="200 ms", unless="profile")
-    hold: float | None = key(_LASTS, "At the force.", unless="profile")
-    fall: float = key(_LASTS, "From the force to 0, evenly.", default="200 ms", unless="profile")
+    start: float = key(_TIME, "When the probe touches the sheet.")
+    force: float | None = key(_FORCE, "Force during `hold`.", unless="profile")
+    rise: float = key(
+        _LASTS,
+        "Time from 0 N to the force, at a constant rate.",
+        default="200 ms",
+        unless="profile",
+    )
+    hold: float | None = key(_LASTS, "Time at the force.", unless="profile")
+    fall: float = key(
+        _LASTS,
+        "Time from the force to 0 N, at a constant rate.",
+        default="200 ms",
+        unless="profile",
+    )
     profile: Course | None = key(
         _course(force=_FORCE),
-        "Instead of these: force at times since `start`, from 0 N to 0 N in straight lines.",
+        "Instead of `force`, `rise`, `hold` and `fall`: force at times since `start`, linear "
+        "between the rows. It begins and ends at 0 N.",
         default=None,
     )
 
@@ -101,60 +118,76 @@ class PressSection(Section, section="press", many=True):
 class _Bending(Section):
     """When a sheet is bent or stretched."""
 
-    start: float = key(_TIME, "When it begins.")
+    start: float = key(_TIME, "Time at which it begins.")
     rise: float = key(
-        _LASTS, "Until all of it is reached, evenly.", default="1 s", unless="profile"
+        _LASTS,
+        "Time until the whole bend or stretch, at a constant rate.",
+        default="1 s",
+        unless="profile",
     )
-    hold: float | None = key(_LASTS, "For which it stays.", unless="profile")
-    fall: float = key(_LASTS, "Until none is left, evenly.", default="1 s", unless="profile")
+    hold: float | None = key(_LASTS, "Time at the whole bend or stretch.", unless="profile")
+    fall: float = key(
+        _LASTS,
+        "Time until none of it is left, at a constant rate.",
+        default="1 s",
+        unless="profile",
+    )
 
 
 class BendSection(_Bending, section="bend", many=True):
-    """The sheet is bent, and is straight again at the end. Several at once add up."""
+    """A bend of the sheet. At its end the sheet is straight again. Several at once add up."""
 
     kind: str = key(
         Choice(("hinge", "joint")),
-        "hinge: along a strip, flat on both sides. joint: around a limb with a joint, as "
-        "[surface] of a skin does.",
+        "A hinge bends the sheet along a strip. Both sides of the strip stay flat. A joint bends "
+        "it around a limb with a joint, as `[surface]` of a skin does.",
         default="hinge",
     )
     length: float = key(
         _LIMB,
-        "Width of the strip, or length of the limb's middle line over which it bends.",
+        "Width of the strip of a hinge. For a joint: length of the limb's middle line that bends.",
     )
     axis: float = key(
         _ANGLE,
-        "Direction of the strip, from x counter-clockwise.",
+        "Direction of the strip, counter-clockwise from x.",
         default="90 deg",
         kind="hinge",
     )
     offset: float = key(
         _LENGTH,
-        "Of the strip's middle line from the middle of the sheet, to the right as seen along "
-        "the axis.",
+        "Distance of the strip's middle line from the middle of the sheet. It counts to the right "
+        "as seen along the axis.",
         default="0 mm",
         kind="hinge",
     )
-    radius: float | None = key(_LIMB, "Of the limb.", kind="joint")
+    radius: float | None = key(_LIMB, "Radius of the limb.", kind="joint")
     angle: float | None = key(
-        _ANGLE, "How far; positive where the front becomes convex.", unless="profile"
+        _ANGLE,
+        "Angle of the bend. It is positive where the front becomes convex.",
+        unless="profile",
     )
     profile: Course | None = key(
         _course(angle=_ANGLE),
-        "Instead of these: angle at times since `start`, from 0 to 0 deg in straight lines.",
+        "Instead of `rise`, `hold`, `fall` and `angle`: angle at times since `start`, linear "
+        "between the rows. It begins and ends at 0 deg.",
         default=None,
     )
 
 
 class StretchSection(_Bending, section="stretch", many=True):
-    """The sheet is stretched evenly, and is as long as it was at the end."""
+    """An even stretch of the sheet. At its end the sheet has its original length again."""
 
-    strain: float | None = key(_STRAIN, "Relative elongation: 0.05 is 5 %.", unless="profile")
-    across: float = key(Number(-1, 1), "Elongation across the axis, per that along it.", default=0)
-    axis: float = key(_ANGLE, "Direction, from x counter-clockwise.", default="0 deg")
+    strain: float | None = key(_STRAIN, "Relative elongation. 0.05 is 5 %.", unless="profile")
+    across: float = key(
+        Number(-1, 1), "Elongation across the axis, as a multiple of that along it.", default=0
+    )
+    axis: float = key(
+        _ANGLE, "Direction of the stretch, counter-clockwise from x.", default="0 deg"
+    )
     profile: Course | None = key(
         _course(strain=_STRAIN),
-        "Instead of these: elongation at times since `start`, from 0 to 0 in straight lines.",
+        "Instead of `rise`, `hold`, `fall` and `strain`: elongation at times since `start`, linear "
+        "between the rows. It begins and ends at 0.",
         default=None,
     )
 
@@ -163,57 +196,63 @@ _LASTING = ("cut", "short", "rail", "noise", "loss", "corruption", "delay")
 
 
 class FaultSection(Section, section="fault", many=True):
-    """Something that goes wrong: a wire is `cut`, two electrodes touch (`short`), a channel stands
-    at its `rail`, the converter is noisy (`noise`), bytes are lost (`loss`), altered
-    (`corruption`) or late (`delay`), the board loses its power (`reboot`), it gets warmer
-    (`temperature`)."""
+    """A fault. An electrode's wire is broken (`cut`). Two electrodes touch (`short`). A channel
+    stands at its `rail`. The converter is noisier (`noise`). Bytes are lost (`loss`), altered
+    (`corruption`) or late (`delay`). The board loses its power (`reboot`). The sheet gets warmer
+    or colder (`temperature`)."""
 
-    kind: str = key(Choice((*_LASTING, "reboot", "temperature")), "Which.")
+    kind: str = key(Choice((*_LASTING, "reboot", "temperature")), "Kind of the fault.")
     start: float = key(_TIME, "When it begins.")
-    end: float | None = key(_TIME, "When it is mended.", kind=_LASTING)
-    electrode: int | None = key(_ELECTRODE, "Whose, counted from 0.", kind=("cut", "short", "rail"))
-    other: int | None = key(_ELECTRODE, "The one that it touches.", kind="short")
-    lsb: float | None = key(Number(0, 1000), "Standard deviation of one conversion.", kind="noise")
+    end: float | None = key(_TIME, "When it ends.", kind=_LASTING)
+    electrode: int | None = key(
+        _ELECTRODE, "Its electrode, counted from 0.", kind=("cut", "short", "rail")
+    )
+    other: int | None = key(_ELECTRODE, "The electrode that it touches.", kind="short")
+    lsb: float | None = key(
+        Number(0, 1000), "Standard deviation of one conversion, LSB.", kind="noise"
+    )
     probability: float | None = key(
         Number(0, 0.999),
-        "Of each byte; for a delay, of each read.",
+        "Probability for each byte. For a delay: for each read.",
         kind=("loss", "corruption", "delay"),
     )
     kelvin: float | None = key(
-        Number(-100, 100), "Step of the sheet's temperature.", kind="temperature"
+        Number(-100, 100), "Step of the sheet's temperature, K.", kind="temperature"
     )
 
 
 class MarkSection(Section, section="mark", many=True):
     """A note in the recording."""
 
-    at: float = key(_TIME, "When.")
-    text: str = key(Text(), "What.")
+    at: float = key(_TIME, "Time of the note.")
+    text: str = key(Text(), "The note itself.")
 
 
 class PressesSection(Section, section="presses"):
-    """Instead of a timeline: what labelled frames are drawn from, each frame on its own
-    (`--presses N`). Ranges are drawn from evenly."""
+    """Distribution of labelled frames (`--presses N`), instead of a timeline. Every frame is drawn
+    independently. Every value of a range is equally likely."""
 
-    count: tuple[int, int] = key(OneOrSpan(Whole(0, 8)), "Presses at once.", default=1)
+    count: tuple[int, int] = key(OneOrSpan(Whole(0, 8)), "Number of presses at once.", default=1)
     shapes: tuple[str, ...] = key(
         Words(Choice(("circle", "square", "finger"))),
-        "Faces, one as likely as another.",
+        "Shapes of the faces. All are equally likely.",
         default="circle",
     )
     size: tuple[float, float] = key(
         OneOrSpan(_SIZE),
-        "Radius of a circle, half the side of a square or the length of a fingertip; "
-        "rounded to 0.5 mm.",
+        "Radius of a circle, half the side of a square, or length of a fingertip. It is rounded "
+        "to 0.5 mm.",
     )
     force: tuple[float, float] = key(OneOrSpan(_FORCE), "Force of each press.")
     hold: float = key(
         Quantity("time", "s", 0.01, 3600),
-        "How long it has been pressed: the sheet creeps.",
+        "How long the sheet has been pressed. It creeps meanwhile.",
         default="1 s",
     )
-    margin: float = key(_GAP, "The middle of a probe stays that far from the rim.", default="5 mm")
-    apart: float = key(_GAP, "The middles of two probes stay that far apart.", default="40 mm")
+    margin: float = key(_GAP, "Smallest distance of a probe's middle from the rim.", default="5 mm")
+    apart: float = key(
+        _GAP, "Smallest distance between the middles of two probes.", default="40 mm"
+    )
     preset: str | None = key(_PRESET, _PRESET_MEANING, default=None)
 
 

@@ -115,6 +115,7 @@ class _Lab:
     def __init__(self, plan: SetPlan) -> None:
         self.skin = Skin.from_toml(plan.skin, source="skin of the set")
         settings = TwinSettings.preset(plan.preset, plan.seed)
+        settings = settings.with_electrodes(self.skin.twin.electrodes)
         self._sheet = TwinSkin.of(self.skin, settings)
         self._board = TwinElectronics(
             self._sheet, self.skin.readout, self.skin.current, settings.electronics, plan.seed
@@ -140,8 +141,8 @@ class _Lab:
         for number, probes in enumerate(presses, start=1):
             sheet.renew()
             sheet.set_presses(probes)
-            samples = board.sample(self._table, number * hold)  # lets the sheet go on by hold
-            frame = Frame(number, 0, number * hold, 1, 0, 0, samples)
+            counts = board.sample(self._table, number * hold)  # lets the sheet go on by hold
+            frame = Frame(number, 0, number * hold, 1, 0, 0, *self._table.readings(counts))
             rows.append(self._readout(frame).values)
         return np.stack(rows)
 

@@ -74,6 +74,7 @@ def make_electronics(skin: Skin, settings: TwinSettings) -> TwinElectronics:
 
     For scripts that need the counts only: ``set_presses`` on its ``sheet``, then ``sample``.
     """
+    settings = settings.with_electrodes(skin.twin.electrodes)
     sheet = TwinSkin.of(skin, settings)
     return TwinElectronics(sheet, skin.readout, skin.current, settings.electronics, settings.seed)
 

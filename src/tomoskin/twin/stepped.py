@@ -100,6 +100,7 @@ class SteppedSkin:
 
     def _frame(self) -> Frame:
         time = self._steps * self.period
+        samples, sums = self._table.readings(self._board.sample(self._table, time))
         self._steps += 1
         return Frame(
             sequence=self._steps % 2**32,
@@ -108,5 +109,6 @@ class SteppedSkin:
             configuration=0,
             flags=0,
             drops=0,
-            samples=self._board.sample(self._table, time),
+            samples=samples,
+            sums=sums,
         )

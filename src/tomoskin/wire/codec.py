@@ -5,22 +5,31 @@ from __future__ import annotations
 import dataclasses
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeGuard
 
 import numpy as np
 
 from tomoskin.core import Frame, WireError
 from tomoskin.wire.framing import enclose
-from tomoskin.wire.messages import ENUMS, RECORDS, STRUCTS, Command, Message, PackedFrame
+from tomoskin.wire.messages import (
+    ENUMS,
+    RECORDS,
+    STRUCTS,
+    ChoppedFrame,
+    Command,
+    Message,
+    PackedFrame,
+)
 from tomoskin.wire.packing import packed_size_fits
 from tomoskin.wire.schema import SCALARS, SCHEMA, FieldSpec, MessageSpec, Schema, StructSpec
 
 _DTYPES = {"u8": "<u1", "u16": "<u2"}
 """Of the samples of a frame."""
 
-_HOST_FIELD = "host_time"
-"""The one field of a record that is not on the wire: the host's own time of reading."""
+_NOT_SENT = ("host_time", "sums")
+"""Fields of a frame that are not on the wire as such: the host's own time of reading, and what
+:class:`ChoppedFrame` has among its samples."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +52,7 @@ class Layout:
 def _layout(spec: MessageSpec, structs: dict[str, StructSpec]) -> Layout:
     record = RECORDS[spec.name]
     names = tuple(field.name for field in spec.fields)
-    own = tuple(f.name for f in dataclasses.fields(record) if f.name != _HOST_FIELD)
+    own = tuple(f.name for f in dataclasses.fields(record) if f.name not in _NOT_SENT)
     if own != names:
         raise WireError(f"expected the schema's fields {names}, got {own}", where=record.__name__)
     fixed = [field for field in spec.fields if not field.is_tail]
@@ -124,7 +133,7 @@ def _pack_tail(layout: Layout, items: Any) -> bytes:
 def decode_payload(payload: bytes, host_time: float) -> Message | None:
     """The message in a payload whose checksum was right; None when it is not of this schema.
 
-    Packed frames come out as frames.
+    Packed and chopped frames come out as frames.
     """
     layout = _BY_TYPE.get(payload[0]) if payload else None
     if layout is None or not _fits(layout, len(payload)):
@@ -137,10 +146,8 @@ def decode_payload(payload: bytes, host_time: float) -> Message | None:
         return None
     if layout.tail is None:
         return layout.record(*values[1:])
-    if layout.record is Frame:
-        return _frame(values, payload, layout.head.size, host_time)
-    if layout.record is PackedFrame:
-        return _packed_frame(values, payload, layout.head.size, host_time)
+    if layout.record in _FRAMES:
+        return _FRAMES[layout.record](values, payload, layout.head.size, host_time)
     record = layout.tail_record
     assert record is not None
     items = tuple(record(*item) for item in layout.tail.iter_unpack(payload[layout.head.size :]))
@@ -164,6 +171,21 @@ def _packed_frame(values: list[Any], payload: bytes, size: int, host_time: float
     sequence, ticks, configuration, flags, drops = values[1:]
     packed = np.frombuffer(payload, dtype=np.uint8, offset=size)
     return PackedFrame(sequence, ticks, host_time, configuration, flags, drops, packed).frame
+
+
+def _chopped_frame(values: list[Any], payload: bytes, size: int, host_time: float) -> Frame | None:
+    frame = _frame(values, payload, size, host_time)
+    if len(frame.samples) % 2:
+        return None
+    return replace(frame, samples=frame.samples[::2], sums=frame.samples[1::2])
+
+
+_FRAMES: dict[type[Message], Callable[[list[Any], bytes, int, float], Frame | None]] = {
+    Frame: _frame,
+    PackedFrame: _packed_frame,
+    ChoppedFrame: _chopped_frame,
+}
+"""How the samples of each kind of frame are read."""
 
 
 def is_command(message: Message) -> TypeGuard[Command]:

@@ -28,6 +28,7 @@ class Result(IntEnum):
     INCOMPLETE = 9
     BUSY = 10
     CURRENT_TOO_HIGH = 11
+    CHOP_TOO_FAST = 12
 
 
 class FaultCode(IntEnum):
@@ -57,6 +58,13 @@ class Format(IntEnum):
 
     SIXTEEN = 0
     PACKED = 1
+
+
+class DriveMode(IntEnum):
+    """How a pair of electrodes is driven."""
+
+    DIRECT = 0
+    CHOPPED = 1
 
 
 class FrameFlag(IntFlag):
@@ -179,6 +187,73 @@ class PackedFrame:
 
 
 @dataclass(frozen=True, slots=True)
+class ChoppedFrame:
+    """A frame of the alternating drive as it is sent: ``samples`` (2 n,) of uint16, for each sample
+    difference and sum. Decoders make frames of it."""
+
+    sequence: int
+    ticks: int
+    host_time: float
+    configuration: int
+    flags: int
+    drops: int
+    samples: NDArray[np.uint16]
+
+    @classmethod
+    def of(cls, frame: Frame) -> Self:
+        """Of a frame with sums."""
+        assert frame.sums is not None
+        both = np.column_stack([frame.samples, frame.sums]).astype(np.uint16).ravel()
+        return cls(
+            frame.sequence, frame.ticks, frame.host_time, frame.configuration, frame.flags,
+            frame.drops, both,
+        )  # fmt: skip
+
+    @property
+    def frame(self) -> Frame:
+        """The frame that it stands for."""
+        return Frame(
+            self.sequence, self.ticks, self.host_time, self.configuration, self.flags,
+            self.drops, self.samples[::2], self.samples[1::2],
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class BoardLimits:
+    """Which board it is, and the bounds of its alternating drive.
+
+    ``name``: 24 bytes of UTF-8, filled up with zeros; ``min_chop``, ``max_chop`` Hz; what half a
+    period takes, ns: ``half`` once, ``sample`` for each channel, ``conversion`` and ``clock`` times
+    the prescaler for each conversion.
+    """
+
+    request: int
+    name: bytes
+    min_chop: int
+    max_chop: int
+    half: int
+    sample: int
+    conversion: int
+    clock: int
+
+    @property
+    def text(self) -> str:
+        """The name, for people."""
+        return self.name.rstrip(b"\0").decode(errors="replace")
+
+
+@dataclass(frozen=True, slots=True)
+class HeldMode:
+    """What the board holds of SET_MODE."""
+
+    request: int
+    configuration: int
+    mode: DriveMode
+    frequency: int
+    periods: int
+
+
+@dataclass(frozen=True, slots=True)
 class GetInfo:
     """Ask for :class:`Info`."""
 
@@ -278,13 +353,41 @@ class SetFormat:
     format: Format
 
 
+@dataclass(frozen=True, slots=True)
+class GetBoard:
+    """Ask for :class:`BoardLimits`."""
+
+    request: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetMode:
+    """How pairs are driven: ``frequency`` Hz and ``periods`` of the alternating drive."""
+
+    request: int
+    configuration: int
+    mode: DriveMode
+    frequency: int
+    periods: int
+
+
+@dataclass(frozen=True, slots=True)
+class GetMode:
+    """Ask for :class:`HeldMode`."""
+
+    request: int
+
+
 Command = (
     GetInfo | Ping | Stop | SafeOff | SetScan | SetPattern | Start | SetBaud | SetHeartbeat
-    | GetScan | GetPattern | SetFormat
+    | GetScan | GetPattern | SetFormat | GetBoard | SetMode | GetMode
 )  # fmt: skip
 """Messages to the device."""
 
-Report = Hello | Info | Ack | Fault | HeldScan | HeldPattern | Frame | PackedFrame
+Report = (
+    Hello | Info | Ack | Fault | HeldScan | HeldPattern | BoardLimits | HeldMode
+    | Frame | PackedFrame | ChoppedFrame
+)  # fmt: skip
 """Messages from the device."""
 
 Message = Command | Report
@@ -296,8 +399,11 @@ RECORDS: dict[str, type[Message]] = {
     "FAULT": Fault,
     "SCAN": HeldScan,
     "PATTERN": HeldPattern,
+    "BOARD": BoardLimits,
+    "MODE": HeldMode,
     "FRAME": Frame,
     "FRAME_PACKED": PackedFrame,
+    "FRAME_CHOPPED": ChoppedFrame,
     "GET_INFO": GetInfo,
     "PING": Ping,
     "STOP": Stop,
@@ -310,6 +416,9 @@ RECORDS: dict[str, type[Message]] = {
     "GET_SCAN": GetScan,
     "GET_PATTERN": GetPattern,
     "SET_FORMAT": SetFormat,
+    "GET_BOARD": GetBoard,
+    "SET_MODE": SetMode,
+    "GET_MODE": GetMode,
 }
 """Record of each message of the schema."""
 
@@ -321,6 +430,7 @@ ENUMS: dict[str, type[IntEnum] | type[IntFlag]] = {
     "fault": FaultCode,
     "reset": Reset,
     "format": Format,
+    "drive_mode": DriveMode,
     "flag": FrameFlag,
 }
 """Python side of each enumeration."""
