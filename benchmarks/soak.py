@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from report import Report
+from served import served
 from tomoskin.core import Frame, SourceError
 from tomoskin.pattern import Scan
-from tomoskin.pipeline import colour_limit, prepare
+from tomoskin.pipeline import prepare
 from tomoskin.recording import session_info
 from tomoskin.run import Runner, commands
-from tomoskin.server import AccessPolicy, Hub, Server, application, listen
 from tomoskin.skin import Skin
 from tomoskin.source import Configuration, ScanSettings
 from tomoskin.twin import (
@@ -207,25 +207,15 @@ def soak(minutes: float, folder: Path) -> Outcome:
 @contextmanager
 def sleeping_page(runner: Runner) -> Iterator[None]:
     """The server, with a page that opens and then reads nothing."""
-    listener = listen("127.0.0.1", 0)
-    port = listener.getsockname()[1]
-    policy = AccessPolicy(port)
-    server = Server.of(application(Hub(runner, limit=colour_limit(runner.prepared)), policy))
-    thread = threading.Thread(target=server.run_on, args=(listener,))
-    thread.start()
-    with socket.socket() as page:
+    with socket.socket() as page, served(runner) as policy:
         page.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        page.connect(("127.0.0.1", port))
+        page.connect(("127.0.0.1", policy.port))
         page.sendall(
-            f"GET /ws?token={policy.token} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
+            f"GET /ws?token={policy.token} HTTP/1.1\r\nHost: 127.0.0.1:{policy.port}\r\n"
             "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
             "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
         )
-        try:
-            yield
-        finally:
-            server.stop()
-            thread.join()
+        yield
 
 
 def frame_rate(skin: Skin) -> float:

@@ -6,9 +6,8 @@ DATA is a folder of the challenge's files (ref.mat and data1.mat, data2.mat, …
 the same arrays. Level n leaves out what touches the first 2(n − 1) electrodes. Prints the score of
 each sample and level where there is a truth, beside a linear method and a picture of water only.
 
-The tank (Räsänen et al., 23 cm across, 32 electrodes) has its own faults, which are measured on
-water: each channel lets some of the common voltage through, and each electrode has its contact
-impedance. Redundant rows tell the noise. :class:`tomoskin.inverse.ShapeImaging` finds the regions.
+The tank (Räsänen et al., 23 cm, 32 electrodes) has faults, which are measured on water: channels
+let some of the common voltage through, and each electrode has its contact impedance.
 """
 
 from __future__ import annotations
@@ -35,6 +34,7 @@ from tomoskin.inverse import (
     AbsoluteImaging,
     Matern,
     Observation,
+    Segmented,
     ShapeImaging,
     SimilarityWindows,
     homogeneous,
@@ -67,8 +67,8 @@ REFERENCE_NOISE, REFERENCE_TOUCHED = 5e-3, 0.17
 """What the model leaves unexplained of water, V, and where a driven electrode is read."""
 
 NOISE, OF_CHANGE, OF_VOLTAGE = 2.4e-3, 0.14, 0.032
-"""The same of a change: V, a part of the change and a part of the reference's voltage. Four times
-what the true targets leave unexplained, for that is alike in many rows."""
+"""The same of a change: V, parts of the change and of the reference's voltage; four times what the
+true targets leave, which is alike in many rows."""
 
 
 # The challenge's score.
@@ -198,10 +198,18 @@ def segment(
     keep
         (n·k,) bool, rows that count; without it, all.
     """
-    water, sigma, observation = observed(*checked(u, u_ref, inj, mpat, keep))
-    found = ShapeImaging(water, LENGTH, drift=DRIFT)(observation, sigma)
-    places, inside = pixels(PIXELS)
-    labels = np.zeros((PIXELS, PIXELS), np.uint8)
+    return labelled(regions(*checked(u, u_ref, inj, mpat, keep)))
+
+
+def regions(readout: Readout, u: FloatArray, u_ref: FloatArray) -> Segmented:
+    """What was found in the tank, and where that is sure."""
+    water, sigma, observation = observed(readout, u, u_ref)
+    return ShapeImaging(water, LENGTH, drift=DRIFT)(observation, sigma)
+
+
+def labelled(found: Segmented) -> Labels:
+    """Labels (256, 256), without specks."""
+    labels, (places, inside) = np.zeros((PIXELS, PIXELS), np.uint8), pixels(PIXELS)
     labels[inside] = found.at(places)
     return without_specks(labels)
 
@@ -213,8 +221,7 @@ def observed(
     water, leak, sigma = calibrate(readout, u_ref)
     rows, change = readout.rows(leak), u - u_ref
     noise = np.sqrt(NOISE**2 + (OF_CHANGE * change) ** 2 + (OF_VOLTAGE * u_ref) ** 2)
-    # the change is measured, the model's own water stands for the reference
-    expected = rows @ water.solve(sigma).voltages
+    expected = rows @ water.solve(sigma).voltages  # of water: the change alone is measured
     return water, sigma, Observation.of(expected + change, noise, rows)
 
 

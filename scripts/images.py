@@ -12,12 +12,11 @@ from pathlib import Path
 
 from page import digest_of
 
-CHANNELS = (8, 16)
 BOARDS = (
-    ("avr-gcc", "image", "tomoskin-{}.hex"),
-    ("arm-none-eabi-gcc", "pico", "tomoskin-pico-{}.bin"),
+    ("avr-gcc", "image", "tomoskin-{}.hex", (8, 16)),
+    ("arm-none-eabi-gcc", "pico", "tomoskin-pico-{}.bin", (8, 16, 32)),
 )
-"""Compiler, target of firmware/Makefile, and what it makes, by channels."""
+"""Compiler, target of firmware/Makefile, what it makes by channels, and the channels."""
 
 
 class ImageError(Exception):
@@ -45,9 +44,9 @@ def build(root: Path) -> None:
         return
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
-    absent = [compiler for compiler, _, _ in BOARDS if shutil.which(compiler) is None]
-    for compiler, target, name in BOARDS:
-        for channels in CHANNELS if compiler not in absent else ():
+    absent = [compiler for compiler, *_ in BOARDS if shutil.which(compiler) is None]
+    for compiler, target, name, sizes in BOARDS:
+        for channels in sizes if compiler not in absent else ():
             _make(firmware, target, channels)
             shutil.copy(root / "build" / "firmware" / name.format(channels), folder)
     if absent:

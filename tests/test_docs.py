@@ -140,4 +140,6 @@ def test_every_example_is_in_the_gallery() -> None:
     assert [name for name in scripts if f"examples/{name}" not in page] == []
     figures = list((DOCS / "images" / "gallery").glob("*.webp"))
     assert [file.name for file in figures if f"gallery/{file.name}" not in page] == []
-    assert [file.name for file in figures if file.stat().st_size > 60_000] == []
+    # ANMF: a frame of an animated WebP
+    most = {file: 200_000 if b"ANMF" in file.read_bytes() else 60_000 for file in figures}
+    assert [file.name for file in figures if file.stat().st_size > most[file]] == []

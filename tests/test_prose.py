@@ -12,10 +12,11 @@ from typing import Any
 import pytest
 from typer.main import get_command
 
+from messages import messages, messages_in
 from prose import DOCS, PAGES, ROOT, Sentence, helps, sentences, sentences_of
 from tomoskin.cli.app import app
 
-MOST_WORDS, MOST_WORDS_OF_HELP = 40, 26
+MOST_WORDS, MOST_WORDS_OF_HELP, MOST_WORDS_OF_MESSAGE = 40, 26, 30
 OLD_WORDS_YET = ("docs/glossary.md",)
 """The page that lists the words of its last table."""
 
@@ -34,6 +35,22 @@ def glossary() -> list[str]:
     table = page.partition("## Not these words")[2]
     rows = re.findall(r"^\| (.+?) \| .+ \|$", table, re.MULTILINE)[1:]
     return [word.strip() for row in rows for word in row.split(",") if "---" not in word]
+
+
+NOT_IN_MESSAGES = (
+    *("told", "tells", "goes on", "stands", "asked for", "is to be", "written over", "look at"),
+    *("blamed", "wavers", "is no", "are no"),
+)
+"""Beside the glossary's: old habits of our messages. "There is no" is English."""
+
+_GOT = re.compile(r"\b(?:got|found|but|missing|is too few|holds?)\b")
+
+
+@cache
+def said() -> tuple[Sentence, ...]:
+    """Sentences of errors, hints, events and settings; files' schemas have lines."""
+    found = ((where, text) for where, text in messages() if "\n" not in text.strip())
+    return tuple(sentence for where, text in found for sentence in sentences_of(text, where))
 
 
 @cache
@@ -64,8 +81,28 @@ def test_a_word_that_the_glossary_replaces_is_not_used(word: str) -> None:
     assert [s for s in read() if s.where not in OLD_WORDS_YET and pattern.search(s.text)] == []
 
 
+def old_words(found: tuple[Sentence, ...]) -> list[Sentence]:
+    """Messages with a word that the glossary replaces, or an old habit."""
+    words = "|".join(map(re.escape, (*glossary(), *NOT_IN_MESSAGES)))
+    pattern = re.compile(rf"(?<!there )\b(?:{words})\b", re.IGNORECASE)
+    return [sentence for sentence in found if pattern.search(sentence.text)]
+
+
+def without_found(found: tuple[Sentence, ...]) -> list[Sentence]:
+    """Messages that say what was expected, but not what was found."""
+    expecting = (s for s in found if re.match(r"(row …: )?expected ", s.text))
+    return [s for s in expecting if not _GOT.search(s.text)]
+
+
+def test_messages_are_short_plain_and_say_what_was_found() -> None:
+    assert len(said()) > 1500
+    assert long_ones(MOST_WORDS_OF_MESSAGE, said()) == []
+    assert old_words(said()) == []
+    assert without_found(said()) == []
+
+
 def test_the_spelling_is_british() -> None:
-    found = [s for s in read() if AMERICAN.search(_without_names(s.text))]
+    found = [s for s in (*read(), *said()) if AMERICAN.search(_without_names(s.text))]
     assert found == []
 
 
@@ -144,4 +181,8 @@ def test_planted_mistakes_are_found() -> None:
     (one, two) = sentences_of(f"Short. Then a [{long}](x.md) `code that counts not`.", "x")
     assert (len(one.words), len(two.words)) == (1, 43)
     assert AMERICAN.search("the colors of a normalized image")
+    bad = 'raise E(f"expected {n} rows")\nx.say("kind", "nobody has told it")\n"""Told anew."""'
+    planted = tuple(Sentence(str(line), text) for line, text in messages_in(bad))
+    assert [s.text for s in old_words(planted)] == ["nobody has told it"]
+    assert [s.text for s in without_found(planted)] == ["expected … rows"]
     assert not AMERICAN.search(_without_names("`color` in Regularization Tools"))

@@ -75,7 +75,7 @@ def test_the_firmware_of_both_boards_is_in_both(wheel: list[str], sdist: list[st
     if shutil.which("arm-none-eabi-gcc") is None:
         missing("the Pico's firmware in a wheel (Debian: apt-get install gcc-arm-none-eabi)")
     images = {f"{IMAGES}tomoskin-{channels}.hex" for channels in (8, 16)}
-    images |= {f"{IMAGES}tomoskin-pico-{channels}.bin" for channels in (8, 16)}
+    images |= {f"{IMAGES}tomoskin-pico-{channels}.bin" for channels in (8, 16, 32)}
     assert images <= set(wheel)
     assert {f"src/{name}" for name in images} <= set(sdist)
     with zipfile.ZipFile(built[1]) as archive:

@@ -1,6 +1,6 @@
 //! How many touches a frame holds: one more as long as the evidence for it grows.
 //!
-//! As `Search` in tomoskin/touch/fit/search.py, of which it does what needs no exact model.
+//! As `ForwardSelection` in tomoskin/touch/fit/selection.py, of which it does what needs no exact model.
 
 use std::f64::consts::TAU;
 

@@ -9,7 +9,7 @@ import pytest
 
 from calibration.labelled import RADIUS, ROWS, Floats, held, places, presses
 from tomoskin import Locator, Pattern, Skin
-from tomoskin.calibration import Presses
+from tomoskin.calibration import LeftOut, Presses
 from tomoskin.calibration.locator.maps import ResponseMaps
 from tomoskin.calibration.locator.posterior import GridLikelihood, moments, pooled
 from tomoskin.calibration.locator.process import Basis, Likeness
@@ -38,9 +38,9 @@ def test_presses_of_one_force_are_known_from_soft_and_hard_ones(n: int) -> None:
     """By their sizes, wherever they are, or by their labels: what is promised holds for these."""
     dv, xy = presses(n, 0)
     force = np.where(np.arange(n) % 2, 1.0, 3.0)
-    assert Locator.fit(dv, xy).one_force
-    assert not Locator.fit(dv * force[:, None], xy).one_force
-    assert not Locator.fit(dv, xy, strength=force).one_force
+    assert LeftOut.of(Locator.fit(dv, xy)).one_force
+    assert not LeftOut.of(Locator.fit(dv * force[:, None], xy)).one_force
+    assert not LeftOut.of(Locator.fit(dv, xy, strength=force)).one_force
 
 
 def test_more_presses_make_it_better() -> None:

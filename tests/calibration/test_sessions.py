@@ -72,7 +72,7 @@ def test_what_has_changed_is_said(locator: Locator) -> None:
     assert "times as large as in the calibration" in words
     assert "gains have changed" in words
     same = SessionAlignment.of(locator, presses(120, 6)[0])
-    assert same.findings == ("the session is as the calibration was",)
+    assert same.findings == ("the session agrees with the calibration",)
     assert locator.in_session(presses(120, 6)[0]) is locator
 
 
@@ -98,7 +98,7 @@ def test_touches_on_a_part_of_the_skin_are_not_spread_over_all_of_it(locator: Lo
     dv, xy = today(900, 5)
     part = (xy[:, 0] > 0.3 * RADIUS) & (xy[:, 1] > 0)
     alignment = SessionAlignment.of(locator, dv[part])
-    assert "touch all of the skin" in alignment.findings[-1]
+    assert "touch the whole skin" in alignment.findings[-1]
     assert not alignment.holds
     assert locator.in_session(dv[part]) is locator
 

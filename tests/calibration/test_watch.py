@@ -8,6 +8,7 @@ import pytest
 from calibration.labelled import RADIUS, ROWS, Floats, presses
 from tomoskin import Locator
 from tomoskin.calibration import Watch
+from tomoskin.calibration.locator.health import BROKEN, STRANGE
 from tomoskin.core import DataError
 
 JUMPED = [3, 8, 21, 30, 35, 38]
@@ -78,3 +79,33 @@ def test_where_most_rows_are_off_none_is_blamed(locator: Locator) -> None:
 def test_frames_of_another_pattern_are_refused(locator: Locator) -> None:
     with pytest.raises(DataError, match="shape"):
         Watch(locator)(np.ones((2, ROWS + 1)))
+
+
+def test_live_rows_are_left_out_only_where_frames_do_not_fit_with_them(locator: Locator) -> None:
+    """What a sheet remembers doubles a row here and there; a broken wire does more."""
+    for times, excluded in ((2, []), (-20, [3, 8])):
+        dv, _ = presses(60, 5)
+        dv[:, [3, 8]] *= times
+        watch = Watch(locator, BROKEN)
+        watch(dv)
+        assert watch.jumped.tolist() == excluded
+        assert watch.health.broken is bool(excluded)
+    assert "2 rows have jumped" in watch.health.findings[0]
+    assert watch.health.strangeness < STRANGE, "without them the frames fit again"
+
+
+def test_a_touch_that_comes_or_goes_says_nothing_of_the_calibration(locator: Locator) -> None:
+    watch = Watch(locator)
+    dv, _ = jumped(60)
+    np.testing.assert_allclose(watch(dv, settled=False)[0], locator.predict(dv)[0])
+    assert watch.health.presses == 0
+    assert "touch 5 spots" in watch.health.findings[0]
+
+
+def test_another_gain_of_every_channel_is_said(locator: Locator) -> None:
+    dv, _ = presses(60, 5)
+    gains = np.exp(1.2 * np.random.default_rng(4).normal(size=dv.shape[1]))
+    watch = Watch(locator, BROKEN)
+    watch(dv * gains)
+    assert not watch.health.well
+    assert any("times worse than its own presses" in text for text in watch.health.findings)

@@ -130,7 +130,7 @@ def test_a_wired_skin_answers_as_the_wires_do() -> None:
         ),
         (
             ChannelMapping.as_drawn(8).swapped(2, 3),
-            "E3 at the place of E4, E4 at the place of E3",
+            "E3 at the position of E4, E4 at the position of E3",
         ),
     ],
 )
@@ -153,7 +153,7 @@ def test_what_cannot_be_is_refused() -> None:
         solve_channel_mapping(dv, 1e3 * xy, SKIN)
     with pytest.raises(DataError, match="40 rows"):
         solve_channel_mapping(dv[:, :8], xy, SKIN)
-    with pytest.raises(DataError, match="change something"):
+    with pytest.raises(DataError, match="change the voltages"):
         solve_channel_mapping(np.zeros((3, 40)), xy, SKIN)
     with pytest.raises(DataError, match="xy of shape"):
         solve_channel_mapping(dv, xy[:2], SKIN)

@@ -82,7 +82,7 @@ def test_without_a_recording_the_noise_is_predicted(tomoskin: Command) -> None:
     lines = {line.split()[0]: line for line in text.splitlines()[2:]}
     assert list(lines) == list(RULES)
     assert float(lines["light-touch"].split()[1]) > 0.01
-    assert "no frames of a touched skin" in lines["gcv"]
+    assert "no frame of a touched skin" in lines["gcv"]
 
 
 def test_the_picture_of_rules_without_a_recording(tomoskin: Command, tmp_path: Path) -> None:
@@ -95,7 +95,7 @@ def test_the_picture_of_rules_without_a_recording(tomoskin: Command, tmp_path: P
     ("arguments", "message"),
     [
         (("--rule", "elbow"), "expected a rule among light-touch"),
-        (("--rule", "gcv"), "there are no frames of a touched skin"),
+        (("--rule", "gcv"), "there is no frame of a touched skin"),
         (("--recording", "none.npz"), "none.npz"),
     ],
 )
@@ -141,4 +141,4 @@ def test_labels_that_are_missing(tomoskin: Command, recording: Path, tmp_path: P
     np.savez(bare, **arrays)
     code, _, err = tomoskin("image", bare, "--alpha", "labelled")
     assert code == 1
-    assert "no frame says where" in err
+    assert "no frame has a label that says where" in err

@@ -42,7 +42,7 @@ def test_a_wrong_reading_ends_it_with_where_to_look() -> None:
     done = CliRunner().invoke(app, ["check"], input="\n".join([*wrong, ""]))
     assert done.exit_code == 1
     assert "2.5V: 2.7 V, expected 2.49 to 2.51 V: U2, U3" in done.stdout
-    assert "begin again" in done.stderr
+    assert "start again" in done.stderr
     assert "a board" not in done.stdout
 
 

@@ -29,7 +29,7 @@ def test_a_map_and_a_comparison(tomoskin: Run, tmp_path: Path) -> None:
     assert (code, err) == (0, "")
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert "textile-disc-8: a press of radius 15 mm" in out
-    assert "the same sheet otherwise" in out
+    assert "the same sheet with another design" in out
     assert "8 electrodes, skip:3: " in out
 
 
@@ -43,7 +43,7 @@ def test_without_matplotlib_it_says_so_before_the_work(
     monkeypatch.setattr("tomoskin.touch.resolution_bounds", work)
     code, out, err = tomoskin("design", "--out", tmp_path / "map.png", "--electrodes", "")
     assert (code, out) == (1, "")
-    assert "matplotlib writes it, and is not installed" in err
+    assert "needs matplotlib to write it, which is not installed" in err
     assert f"{sys.executable} -m pip install" in err
 
 
@@ -57,7 +57,7 @@ def test_a_map_that_cannot_be_written_does_not_cost_the_table(
     code, out, err = tomoskin("design", "--out", tmp_path / "map.png", "--electrodes", "")
     assert code == 1
     assert "No space left" in err
-    assert "its place is missed by" in out
+    assert "the RMS error of its position is at least" in out
 
 
 def test_for_programs(tomoskin: Run) -> None:

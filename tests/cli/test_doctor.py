@@ -22,7 +22,7 @@ def test_doctor(tomoskin):
         found.setdefault(finding["name"], []).append(finding)
     assert found["python"][0]["ok"]
     assert "twin" in found["sources"][0]["text"]
-    assert len(found["skin"]) == 4
+    assert len(found["skin"]) == 5
     assert all(skin["ok"] for skin in found["skin"])
     assert len(found["sink"]) >= 5
     assert all(sink["ok"] for sink in found["sink"])  # none of them is needed

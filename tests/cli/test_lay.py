@@ -43,13 +43,13 @@ def test_it_writes_a_skin_file(tomoskin, surface: Path) -> None:
         ({"unit": "m"}, None, "millimetres"),
         ({}, "1,2\n", "places.csv, line 1: expected three numbers"),
         ({}, "1;2;3\n", "line 1: expected three numbers"),
-        ({}, "\n", "is empty"),
-        ({}, "-50,0,0\n50,0,0\n0,50,0\n0,0,99\n", "electrode 3: lies 99 mm off the surface"),
+        ({}, "\n", "is an empty file"),
+        ({}, "-50,0,0\n50,0,0\n0,50,0\n0,0,99\n", "electrode 3: is 99 mm away from the surface"),
         ({}, "-50,0,0\n50,0,0\n0,50,0\n", "expected at least 4 electrodes, got 3"),
         (
             {},
             "-.1,0,0\n.1,0,0\n0,.1,0\n0,-.1,0\n",
-            "lie within 0.2 mm, the surface extends over 200",
+            "lie within 0.2 mm, but the surface extends over 200",
         ),
     ],
 )

@@ -92,7 +92,7 @@ def test_a_port_in_use_is_one_sentence(refused):
     assert (code, out) == (1, "")
     assert errors == (
         f"tomoskin: port {port}: the port is in use, perhaps by another tomoskin "
-        "(choose another with --port, or any free one with --port 0)\n"
+        "(choose another with --port, or a free one with --port 0)\n"
     )
 
 
@@ -156,7 +156,7 @@ def test_it_replays_with_the_skin_in_the_file(start, refused, tmp_path):
     assert end(process, signal.SIGTERM)[0] == 0
     code, _, errors = refused("--port", "0", "--source", f"replay:{path}", "--skin", "tank-16")
     assert code == 1
-    assert "leave --skin out" in errors
+    assert "leave out --skin" in errors
     code, _, errors = refused("--port", "0", "--source", "replay:none.mcap")
     assert code == 1
     assert "there is no such file" in errors

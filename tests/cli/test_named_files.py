@@ -184,7 +184,7 @@ def test_an_input_stays_as_it_is(tomoskin: Run, broken: dict[str, Path], case: C
     mine = broken[case.reads]
     code, _, err = tomoskin(*case.line(broken, mine, *force(case)))
     assert (code, mine.read_bytes()) == (2, b"\x00 broken")
-    assert "read here and never written over" in err
+    assert "and an input is never overwritten" in err
     assert err.count("\n") == 1
 
 
@@ -197,7 +197,7 @@ def test_a_recording_stays_as_it_is(
     recording.write_bytes(MAGIC)
     code, _, err = tomoskin(*case.line(broken, recording, *force(case)))
     assert (code, recording.read_bytes()) == (2, MAGIC)
-    assert "recordings are never written over" in err
+    assert "a recording is never overwritten" in err
 
 
 @pytest.mark.parametrize("case", BOTH)
@@ -279,7 +279,7 @@ def test_a_skin_that_is_named_is_an_input(
     with pytest.raises(SystemExit) as end:
         import_module("tomoskin.cli").main(words)
     assert end.value.code
-    assert "read here and never written over" in capfd.readouterr().err
+    assert "and an input is never overwritten" in capfd.readouterr().err
 
 
 def test_two_outputs_are_two_files(

@@ -31,7 +31,7 @@ def test_skins_are_placed_in_one_command_each(tomoskin, arm):
     words = ("skin", "place", arm, "fore", "--out", out, "--skin", "textile-disc-8")
     code, said, err = tomoskin(*words, "--at", "10/0/30/0/90/0")
     assert code == 0, err
-    assert "fore on fore; 1 skins" in said
+    assert "fore on fore, 1 skins in all" in said
     assert tomoskin(*words, "--name", "palm")[0] == 0
     mesh = ("skin", "place", arm, "upper", "--out", out, "--on-mesh")
     assert tomoskin(*mesh)[0] == 0
@@ -70,7 +70,7 @@ def test_one_that_cannot_be_added_leaves_the_file_as_it_was(tomoskin, arm):
     assert tomoskin(*words)[0] == 0
     before = out.read_text()
     code, _, err = tomoskin(*words)
-    assert (code, "two skins have the name fore" in err) == (1, True)
+    assert (code, "two skins have the same name fore" in err) == (1, True)
     assert out.read_text() == before
 
 
@@ -135,7 +135,7 @@ def test_a_robot_file_says_all(tomoskin, arm):
     out = arm.with_name("robot.toml")
     assert tomoskin("skin", "place", arm, "fore", "--out", out)[0] == 0
     code, _, err = tomoskin("live", "--robot", out, "--skin", "textile-disc-8")
-    assert (code, "the robot file says" in err) == (2, True)
+    assert (code, "the robot file names them" in err) == (2, True)
 
 
 @pytest.mark.parametrize(
@@ -143,14 +143,14 @@ def test_a_robot_file_says_all(tomoskin, arm):
     [
         ("--skin left=textile-disc-8 --skin textile-disc-8", "expected NAME=SKIN"),
         ("--skin textile-disc-8 --skin textile-disc-8", "expected NAME=SKIN"),
-        ("--skin a=textile-disc-8 --skin a=textile-disc-8", "two skins have the name a"),
+        ("--skin a=textile-disc-8 --skin a=textile-disc-8", "two skins have the same name a"),
         ("--skin Left=textile-disc-8", 'skin 1 "Left": expected a name of small letters'),
         ("--skin a=textile-disc-8 --skin b=textile-disc-8 --source twin", "one for each --skin: 2"),
         ("--source twin --source twin", "one for each --skin: 1; got 2"),
-        ("--skin a=textile-disc-8 --calibration {c}", "cannot say of which skin"),
+        ("--skin a=textile-disc-8 --calibration {c}", "does not say to which skin it belongs"),
         ("--skin a=textile-disc-9", "textile-disc-8"),
         ("--skin a=textile-disc-8 --source serial:/dev/x --skin b=textile-disc-8 "
-         "--source serial:/dev/x", "two skins have the source serial:/dev/x"),
+         "--source serial:/dev/x", "two skins have the same source serial:/dev/x"),
     ],
 )  # fmt: skip
 @pytest.mark.usefixtures("built_page")

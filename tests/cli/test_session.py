@@ -57,7 +57,7 @@ def test_info_counts_touches_as_image_does(tomoskin, tmp_path):
     assert re.search(r"touches +1\n +touch   4    0.20 to   0.20 s  x  \+100.0 mm", out)
     assert re.search(r"presses +1 on the twin", out)
     _, out, _ = tomoskin("session", "info", write_frames(tmp_path / "few.mcap", 3))
-    assert "none recorded: tomoskin image looks for them" in out
+    assert "none recorded: tomoskin image finds them" in out
 
 
 def test_repair_mends_a_cut_file_and_leaves_it_alone(tomoskin, recorded, tmp_path):
@@ -66,10 +66,10 @@ def test_repair_mends_a_cut_file_and_leaves_it_alone(tomoskin, recorded, tmp_pat
     before = cut.read_bytes()
     code, _, errors = tomoskin("session", "info", cut)
     assert code == 0
-    assert "was not ended" in errors
+    assert "is incomplete" in errors
     code, _, errors = tomoskin("image", cut, "--frames", "0:2")
     assert code == 0
-    assert "tomoskin session repair ends it" in errors
+    assert "tomoskin session repair completes it" in errors
     code, out, _ = tomoskin("session", "repair", cut)
     assert code == 0
     assert "recovered" in out
@@ -104,7 +104,7 @@ def test_a_session_imaged_with_another_skin_is_said(tomoskin, recorded, tmp_path
     code, out, errors = tomoskin("image", recorded, "--frames", "0:2", "--skin", file)
     assert code == 0
     assert "model by 1.000" in out
-    assert "was recorded on textile-disc-8; other has another outline, electrodes, mat" in errors
+    assert "was recorded on textile-disc-8, but other has another" in errors
     assert "times its size: check the skin, its current and its sheet resistance" in errors
     code, out, errors = tomoskin("image", recorded, "--frames", "0:2", "--skin", "textile-disc-8")
     assert (code, errors) == (0, "")
@@ -150,7 +150,7 @@ def test_an_empty_file_is_called_so(tomoskin, tmp_path, command):
     path.touch()
     code, _, errors = tomoskin(*command, path)
     assert code == 1
-    assert errors == f"tomoskin: {path}: is empty, a file without content\n"
+    assert errors == f"tomoskin: {path}: is an empty file\n"
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "nan"])
@@ -189,7 +189,7 @@ def test_import_keeps_what_is_whole_and_lists_the_rest(tomoskin, data_dir, tmp_p
     code, out, errors = tomoskin("session", "import", log, tmp_path / "log.npz")
     assert code == 0
     assert "145 frames of 208 rows" in out
-    assert "lines left out, parts of torn frames" in errors
+    assert "lines left out, parts of incomplete frames" in errors
     assert len(read_recording(tmp_path / "log.npz")) == 145
     assert tomoskin("session", "import", log, tmp_path / "log.doc")[0] == 2
 
@@ -211,7 +211,7 @@ def test_what_is_written_is_said(tomoskin, recorded, tmp_path):
     code, _, err = tomoskin("session", "info", table)
     assert (code, "session import" in err) == (1, True)
     code, _, err = tomoskin("session", "export", recorded, tmp_path / "none" / "x.csv")
-    assert (code, "make the folder first" in err) == (2, True)
+    assert (code, "create the folder first" in err) == (2, True)
 
 
 def test_a_file_whose_name_is_no_text_is_told(recorded, tmp_path, monkeypatch):

@@ -80,7 +80,7 @@ def test_a_set_is_the_same_whoever_makes_it_and_goes_on(tomoskin, tmp_path):
     assert (two / parts[1]).read_bytes() == torn
     code, _, error = tomoskin("simulate", "--presses", n, "--seed", 4, "--out", one)
     assert code == 2
-    assert "is of another set" in error
+    assert "belongs to another set" in error
     assert tomoskin(*common, "--out", single, "--processes", 1)[0] == 0
     recording = read_recording(single)
     assert len(recording) == n
@@ -120,11 +120,12 @@ def test_ctrl_c(tomoskin, script, tmp_path, monkeypatch):
         code, _, error = tomoskin("simulate", "--script", script, "--out", out)
         assert (code, error) == (
             1,
-            f"tomoskin: stopped; {out} holds what was simulated until then, and says so\n",
+            f"tomoskin: stopped; {out} holds the simulation until then, "
+            "and says that it was stopped\n",
         )
         code, _, error = tomoskin(*drawn)
         assert code == 1
-        assert "the same command goes on where this one was stopped" in error
+        assert "the same command continues from here" in error
     with SessionReader(out) as session:
         assert [note.text for note in session.notes()][-1].startswith("stopped after")
     assert tomoskin(*drawn)[0] == 0

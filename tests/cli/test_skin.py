@@ -8,7 +8,13 @@ from tomoskin.skin import Skin
 def test_list(tomoskin):
     code, out, _ = tomoskin("skin", "list")
     assert code == 0
-    for name in ("textile-disc-8", "textile-disc-16", "textile-square-16", "tank-16"):
+    for name in (
+        "textile-disc-8",
+        "textile-disc-16",
+        "textile-disc-32",
+        "textile-square-16",
+        "tank-16",
+    ):
         assert name in out
 
 

@@ -85,7 +85,15 @@ def test_a_command_that_is_nearly_one_is_named(tomoskin) -> None:
     assert "'image'" in err
 
 
-def test_firmware_is_of_eight_or_sixteen_channels(tomoskin) -> None:
-    code, _, err = tomoskin("firmware", "build", "--channels", "7")
+@pytest.mark.parametrize(
+    ("board", "channels", "said"),
+    [
+        ("mega", 7, "expected 8 or 16 channels (Arduino Mega 2560), got 7"),
+        ("mega", 32, "got 32; a Pico has up to 32: --board pico"),
+        ("pico", 64, "expected 8, 16 or 32 channels (Raspberry Pi Pico), got 64"),
+    ],
+)
+def test_firmware_is_of_the_channels_that_a_board_has(tomoskin, board, channels, said) -> None:
+    code, _, err = tomoskin("firmware", "build", "--board", board, "--channels", str(channels))
     assert code == 2
-    assert "expected 8 or 16, got 7" in err
+    assert said in " ".join(err.replace("│", " ").split())

@@ -50,7 +50,7 @@ def test_ranges_of_frames_teach_states(tomoskin: Run, tmp_path: Path) -> None:
     code, out, err = tomoskin("states", asked, "--calibration", c, "--out", table, "--ask", 2)
     assert (code, err) == (0, "")
     assert re.search(r"frames    0 to +\d+  idle  \d+ % or more\nframes +\d+ to +\d+  ", out)
-    assert "labels tell most at frames" in out
+    assert "labels would help most at frames" in out
     with table.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     expected = [("idle", "bend", "touch")[k // 20] for k in range(60)]
@@ -82,9 +82,9 @@ def test_flags_and_another_session(tomoskin: Run, tmp_path: Path, flagged: Path)
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ((), "says no states"),
+        ((), "holds no states"),
         (("--state", "idle=0:10"), 'two states, got only "idle"'),
-        (("--state", "idle=0:10", "--state", "touch=5:20"), "already idle"),
+        (("--state", "idle=0:10", "--state", "touch=5:20"), "already have the label idle"),
         (("--state", "idle=0:99", "--state", "touch=5:20"), "within 0:30"),
     ],
 )
@@ -109,7 +109,7 @@ def test_another_skin_or_another_file_is_refused(
     assert tomoskin("states", flagged, "--calibration", c, *skin)[0] == 0
     code, _, err = tomoskin("states", flagged, "--calibration", c, "--skin", "textile-disc-16")
     assert code == 1
-    assert 'learnt on "textile-disc-8", asked for on "textile-disc-16"' in err
+    assert 'learnt on "textile-disc-8" and is used on "textile-disc-16"' in err
     code, _, err = tomoskin("states", flagged, "--calibration", flagged)
     assert code == 1
     assert "not a calibration of states" in err

@@ -36,9 +36,7 @@ def test_a_new_file_in_a_folder_that_is_there(tmp_path: Path, mine: Path) -> Non
 
 def test_what_is_there_is_written_over_only_when_that_was_said(mine: Path) -> None:
     said = refusal(Output(mine, name="--out"))
-    assert said == (
-        f"--out {mine}: exists already (choose another name, or write over it: --force)"
-    )
+    assert said == (f"--out {mine}: exists already (choose another name, or overwrite it: --force)")
     check_outputs([Output(mine)], overwrite=True)
 
 
@@ -63,7 +61,7 @@ def test_an_input_is_never_written_over(
         case "dots":
             other = tmp_path / "sub" / ".." / "mine.npz"
     said = refusal(Output(other), inputs=(tmp_path / "none", mine), overwrite=True)
-    assert "read here and never written over" in said
+    assert "and an input is never overwritten" in said
     assert refusal(Output(mine), inputs=(other,), overwrite=True)
 
 
@@ -98,7 +96,7 @@ def test_a_recording_is_never_written_over(tmp_path: Path, name: str, overwrite:
     link = tmp_path / "link.csv"
     link.symlink_to(path)
     for named in (path, link) if path.read_bytes() != b"torn" else (path,):
-        assert "recordings are never written over" in refusal(Output(named), overwrite=overwrite)
+        assert "a recording is never overwritten" in refusal(Output(named), overwrite=overwrite)
 
 
 def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
@@ -119,17 +117,17 @@ def test_the_folder_is_there_and_may_be_written_in(
 ) -> None:
     deep = tmp_path / "a" / "b" / "x.csv"
     assert "there is no folder" in refusal(Output(deep))
-    assert "make the folder first" in refusal(Output(deep))
+    assert "create the folder first" in refusal(Output(deep))
     check_outputs([Output(deep, makes_folders=True)])
-    assert "is no folder" in refusal(Output(mine / "x.csv"))
-    assert "is no folder" in refusal(Output(mine / "sub" / "x.csv", makes_folders=True))
+    assert "is not a folder" in refusal(Output(mine / "x.csv"))
+    assert "is not a folder" in refusal(Output(mine / "sub" / "x.csv", makes_folders=True))
     (tmp_path / "lost").symlink_to(tmp_path / "gone" / "x.csv")
     assert "there is no folder" in refusal(Output(tmp_path / "lost"))
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
-    assert "cannot be looked at" in refusal(Output(tmp_path / "loop"))
-    assert "cannot be looked at" in refusal(Output(tmp_path / f"{'x' * 300}.csv"))
+    assert "cannot be read" in refusal(Output(tmp_path / "loop"))
+    assert "cannot be read" in refusal(Output(tmp_path / f"{'x' * 300}.csv"))
     monkeypatch.setattr(os, "access", lambda path, mode: mode & os.X_OK == 0)  # noqa: ARG005
-    assert "nothing may be written in" in refusal(Output(tmp_path / "x.csv"))
+    assert "you have no permission to write in" in refusal(Output(tmp_path / "x.csv"))
     monkeypatch.setattr(os, "access", lambda path, mode: False)  # noqa: ARG005
     assert "write-protected" in refusal(Output(mine), overwrite=True)
 
@@ -141,5 +139,5 @@ def test_where_the_folder_that_we_are_in_is_gone(
     gone.mkdir()
     monkeypatch.chdir(gone)
     gone.rmdir()
-    assert "x.csv: cannot be looked at" in refusal(Output(Path("x.csv")))
+    assert "x.csv: cannot be read" in refusal(Output(Path("x.csv")))
     check_outputs([Output(tmp_path / "x.csv")])

@@ -150,7 +150,7 @@ def test_a_function_writes_over_what_it_is_told_to(tmp_path: Path, whole: Path, 
     made = path.read_bytes()
     assert made != b"mine"
     path.write_bytes(whole.read_bytes())
-    with pytest.raises(OutputError, match="recordings are never written over"):
+    with pytest.raises(OutputError, match="a recording is never overwritten"):
         write(path, whole, overwrite=True)
     assert path.read_bytes() == whole.read_bytes()
     assert list(tmp_path.iterdir()) == [path]

@@ -10,7 +10,7 @@ import pytest
 
 from tomoskin.mesh import simplex_measure
 
-BODIES = ["fig62_palpation", "fig64_face", "soft_volume"]
+BODIES = ["fig62_palpation", "fig64_chopped", "fig64_face", "soft_volume"]
 
 
 @pytest.mark.slow

@@ -160,7 +160,7 @@ def test_a_figure_is_written_over_only_when_that_is_said(imported, tmp_path, mon
                 example.main(["--out", str(tmp_path), *more])
             assert end.value.code == 2
     said = capsys.readouterr().err
-    assert "exists already (choose another name, or write over it: --force)" in said
+    assert "exists already (choose another name, or overwrite it: --force)" in said
     assert "expected a name that ends in .mcap (a recording), got frames.npz" in said
     assert mine.read_bytes() == b"mine"
     example.main(["--out", str(tmp_path), "--force"])

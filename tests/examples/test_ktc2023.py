@@ -192,7 +192,7 @@ def test_files_of_the_challenge(ktc: Any, tmp_path: Path) -> None:
     assert result.scores[0] > max(result.scores[1:])
     assert figure.read_bytes().startswith(b"\x89PNG")
     data = tmp_path / "data1.mat"
-    for refused, said in ((figure, "--force"), (data, "read here and never written over")):
+    for refused, said in ((figure, "--force"), (data, "an input is never overwritten")):
         with pytest.raises(OutputError, match=said):
             ktc.main([*arguments[:-1], str(refused)])
 

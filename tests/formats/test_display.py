@@ -119,7 +119,7 @@ def test_a_volume_is_refused() -> None:
 
 
 def test_an_image_of_another_mesh_is_refused() -> None:
-    with pytest.raises(DataError, match="lives on mesh"):
+    with pytest.raises(DataError, match="belongs to mesh"):
         plot(Image(np.zeros(len(mesh().cells)), "S", "other"), mesh())
 
 

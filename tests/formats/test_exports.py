@@ -210,4 +210,4 @@ def test_exports_say_that_the_file_is_torn(tomoskin, whole, tmp_path):
     cut.write_bytes(whole.read_bytes()[:-3000])
     code, _, errors = tomoskin("session", "export", cut, tmp_path / "x.npz")
     assert code == 0
-    assert "was not ended" in errors
+    assert "is incomplete" in errors

@@ -280,7 +280,7 @@ def test_of_a_dirty_log_whole_frames_are_kept_and_the_rest_is_listed(data_dir, t
     counted = sum(int(note.split()[0]) for note in got.notes)
     marks = sum(line.rstrip(",").endswith(",A") for line in text.splitlines())
     assert 16 * len(got) + counted + marks == lines
-    assert any("torn frames: " in note for note in got.notes)
+    assert any("incomplete frames: " in note for note in got.notes)
     assert (np.diff(got.time) > 0).all()
     (tmp_path / "log.csv").write_bytes(raw)
     same = read_recording(tmp_path / "log.csv")
@@ -362,7 +362,7 @@ def test_open_eit_by_two_terminals(tmp_path):
 def test_a_decimal_comma_is_refused_with_its_line(tmp_path):
     path = tmp_path / "komma.txt"
     path.write_text(open_eit_line(np.arange(40) + 0.5).replace(".", ","))
-    with pytest.raises(DataError, match=r"line 1 holds 80.*decimal point"):
+    with pytest.raises(DataError, match=r"got 80 in line 1.*decimal point"):
         read_recording(path)
     table = tmp_path / "komma.csv"
     table.write_text("time_s;v_1_0_2_3\n0,5;1,5\n")
@@ -376,7 +376,7 @@ def test_a_decimal_comma_is_refused_with_its_line(tmp_path):
 def test_a_return_inside_a_line_of_a_table_is_refused(tmp_path):
     table = tmp_path / "x.csv"
     table.write_bytes(b"time_s,v_1_0_2_3\n0,1.5\n1,1\r.5\n")
-    with pytest.raises(DataError, match=r"x\.csv, line 3: is no table"):
+    with pytest.raises(DataError, match=r"x\.csv, line 3: is not a table"):
         read_recording(table)
 
 
@@ -401,7 +401,8 @@ def test_eit_kit_logs(tmp_path, n):
     assert np.array_equal(got.voltages, frames[1:, place])
     assert np.array_equal(got.reference, frames[0, place])
     assert any(
-        note.startswith(f"{n * n - 9 + 1} lines left out, parts of torn") for note in got.notes
+        note.startswith(f"{n * n - 9 + 1} lines left out, parts of incomplete")
+        for note in got.notes
     )
 
 
@@ -470,12 +471,12 @@ def test_the_interchange_table(tmp_path):
     ("text", "said"),
     [
         ("v_1_0_2_3,colour\n1,2\n", 'line 1.*got "colour"'),
-        ("v_1_0_2_3,dv_1_0_2_3\n1,2\n", "not both"),
+        ("v_1_0_2_3,dv_1_0_2_3\n1,2\n", "got dv and v"),
         ("v_1_0_2_3\nmany\n", 'line 2.*v_1_0_2_3, got "many"'),
         ("v_1_0_2_3,v_1_0_2_3\n1,1\n", "each once"),
         ("v_1_0_2_3\n", "empty"),
         ("nothing,known\n1,2\n", "known text log"),
-        ("", "is empty"),
+        ("", "is an empty file"),
     ],
 )
 def test_tables_that_cannot_be_meant(tmp_path, text, said):

@@ -21,6 +21,12 @@ def test_it_settles_within_two_conversions_after_the_multiplexer():
     assert results.shared()["settling"] > 50e-6  # of the Mega's amplifier, which is slower
 
 
+@pytest.mark.parametrize("gap", [40e-9, -40e-9])
+def test_a_tree_for_32_electrodes_settles_within_two_conversions_too(gap):
+    assert front_end.settling_of_tree(0.06, gap) < 4e-6
+    assert front_end.cost(32) > front_end.cost(16) + 20
+
+
 def test_its_current_holds():
     found = front_end.drive()
     assert found["current_error"] < 0.005

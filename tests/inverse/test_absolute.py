@@ -172,11 +172,11 @@ def test_record_explains_itself() -> None:
     model = ForwardModel(coarse(300), pattern(), 0.01)
     short = AbsoluteImaging(model, alpha=1.0, steps=2)(seen())
     assert not short.converged
-    assert "stopped: made the 2 steps that it may" in str(short)
+    assert "stopped: reached the limit of 2 steps" in str(short)
     assert len(short.steps) == 3
     done = AbsoluteImaging(model, alpha=30.0)(seen())
     assert done.converged
-    assert "of the objective" in done.reason
+    assert "of its value" in done.reason
     assert f"of {done.n_values} values" in str(done)
 
 
@@ -273,7 +273,7 @@ def test_a_descent_reaches_the_minimum_and_says_so() -> None:
 
 def test_where_no_step_helps_it_stops() -> None:
     found = bowl(-1.0, 1e-9)
-    assert found.reason == "no step lowers the objective any more"
+    assert found.reason == "no step lowers the objective any further"
     assert found.converged
     assert len(found.steps) == 1
 

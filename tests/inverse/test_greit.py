@@ -143,7 +143,7 @@ def test_rows_left_out_do_not_count() -> None:
         ({"count": 5}, "expected 10 to [0-9]+ training targets, got 5"),
         ({"count": 10**6}, "training targets, got 1000000"),
         ({"noise": np.ones(3)}, r"expected noise of shape \(40,\), got \(3,\)"),
-        ({"noise": 0.0}, "expected noise above 0"),
+        ({"noise": 0.0}, "expected finite noise above 0"),
         ({"difference": "relative"}, 'expected difference "plain"'),
         ({"conductivity": -1.0}, "positive finite conductivity"),
     ],

@@ -47,7 +47,7 @@ def test_a_row_that_is_railed_in_one_frame_is_left_out_of_that_one(changes: Floa
     railed = np.zeros(changes.shape, bool)
     railed[3, [5, 6]] = True
     found = image_series(OPERATOR, changes, PATTERN, railed)
-    assert found.report == "1 frames lack other rows"
+    assert found.report == "1 frames lack further rows"
     assert np.array_equal(found.left_out, railed)
     assert mismatch(found.values[3], OPERATOR.without([5, 6])(changes[3]).values) < 1e-10
     assert mismatch(found.values[2], OPERATOR(changes[2]).values) < 1e-12
@@ -59,14 +59,16 @@ def test_a_frame_that_lacks_too_much_gives_no_image(changes: FloatArray) -> None
     found = image_series(OPERATOR, changes, PATTERN)
     assert found.frames.tolist() == [0, 1, 3, 4, 5, 6, 7, 8, 9]
     assert found.report == (
-        "1 frames lack other rows; 1 frames lack too many rows and give no image"
+        "1 frames lack further rows; 1 frames lack too many rows and give no image"
     )
     assert mismatch(found.image(3).values, OPERATOR.without(range(10))(changes[4]).values) < 1e-9
 
 
 def test_no_frame_with_rows_enough(changes: FloatArray) -> None:
     changes[:, :11] = np.nan
-    with pytest.raises(DataError, match=r"no frame has 75% of its rows; most lack row 0: source"):
+    with pytest.raises(
+        DataError, match=r"no frame has 75% of its rows; most frames lack row 0: source"
+    ):
         image_series(OPERATOR, changes, PATTERN)
 
 

@@ -161,8 +161,12 @@ def test_targets_are_what_a_full_solve_gives() -> None:
     ("settings", "error", "message"),
     [
         ({"places": [(0.0, 0.0), (0.2, 0.0)]}, DataError, "target 1: lies outside the sheet"),
-        ({"places": [0.0, 0.0]}, DataError, r"expected places \(n, 2\), got shape \(2,\)"),
-        ({"places": [(np.nan, 0.0)]}, DataError, "finite places"),
+        (
+            {"places": [0.0, 0.0]},
+            DataError,
+            r"expected positions of shape \(n, 2\), got shape \(2,\)",
+        ),
+        ({"places": [(np.nan, 0.0)]}, DataError, "finite positions"),
         ({"radius": 0.0}, ModelError, "radius above 0 m, got 0.0"),
         ({"radius": np.nan}, ModelError, "radius above 0 m"),
         ({"contrast": -1.0}, ModelError, "contrast above -1 and not 0"),
@@ -239,5 +243,5 @@ def test_places_along_a_line() -> None:
     line = along(mesh, (0.08, 0.0), 5)
     assert line[0] == pytest.approx(mesh.volumes @ mesh.centroids / mesh.volumes.sum())
     assert line[-1].tolist() == [0.08, 0.0]
-    with pytest.raises(DataError, match="at least 1 place"):
+    with pytest.raises(DataError, match="at least 1 target"):
         along(mesh, (0.08, 0.0), 0)

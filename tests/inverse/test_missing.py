@@ -113,7 +113,7 @@ def test_a_row_that_does_not_exist(row: int) -> None:
 
 
 def test_no_row_left() -> None:
-    with pytest.raises(DataError, match="no row is left"):
+    with pytest.raises(DataError, match="at least one row that is not left out"):
         operator("noser").without(range(PATTERN.n_meas))
-    with pytest.raises(DataError, match="no row is left"):
+    with pytest.raises(DataError, match="at least one row that is not left out"):
         operator("laplace").without(range(20)).without(range(20, 40))

@@ -231,7 +231,7 @@ def test_voltages_of_no_such_sheet(wrong: str) -> None:
         ("float", np.ones(40), "labels: expected a whole number"),
         ("negative", np.ones(40), "labels: expected regions from 0, got -1"),
         ("gap", np.ones(40), "labels: region 1 has no cell"),
-        ("many", np.ones(40), "40 voltages cannot tell"),
+        ("many", np.ones(40), "40 voltages are too few to estimate"),
     ],
 )
 def test_impossible_regions(given_labels: Any, data: FloatArray, message: str) -> None:

@@ -62,7 +62,7 @@ def test_a_row_that_does_not_count_is_as_if_it_were_not_there() -> None:
         (np.ones(3), [1.0, 0.0, 1.0], None, r"row 1: expected noise above 0, got 0.0"),
         (np.ones(3), [1.0, np.nan, 1.0], None, r"row 1: expected noise above 0, got nan"),
         ([1.0, np.nan, np.inf], 1.0, None, r"rows \[1, 2\] are not"),
-        (np.ones(3), np.inf, None, "no row counts"),
+        (np.ones(3), np.inf, None, "at least one row with finite noise"),
         (["a", "b"], 1.0, None, "values: expected real numbers, got <U1"),
         (np.ones(2) + 1j, 1.0, None, "values: expected real numbers, got complex128"),
         ([[1.0], [1.0, 2.0]], 1.0, None, "values: expected rows of equal length"),

@@ -242,6 +242,6 @@ def test_a_voltage_that_is_zero_by_symmetry_cannot_be_normalised_by() -> None:
     square = Mesh(np.array(points, float), cells, tuple(np.array([side]) for side in sides))
     pattern = Pattern.from_tables([[0, 2], [0, 2]], [[1, 3], [0, 2]])
     model = ForwardModel(square, pattern, 0.1)
-    with pytest.raises(ModelError, match=r"row 0: .*cannot be normalised"):
+    with pytest.raises(ModelError, match=r"row 0: .*too little to divide by"):
         OneStep(model, alpha=0.1, difference="normalised")
     assert OneStep(model, alpha=0.1).matrix.shape == (4, 2)

@@ -171,7 +171,7 @@ def test_noise_figure_is_taken_where_it_falls_not_where_it_rises_again() -> None
     assert choice.alpha < s.alphas[8 * turn]
     got = noise_figure(s.operator(choice.alpha).matrix, volumes, change)
     assert got == pytest.approx(target, rel=1e-4)
-    with pytest.raises(ModelError, match=r"stays above .*larger noise figure, or choose another"):
+    with pytest.raises(ModelError, match=r"stays above .*larger noise figure, or another"):
         by_noise_figure(s, Evidence(), 0.9 * min(figures))
 
 
@@ -189,7 +189,7 @@ def test_a_figure_that_only_rises_to_the_level_is_not_taken() -> None:
 def test_discrepancy_where_noise_is_all_there_is_or_far_too_small() -> None:
     frames, _ = touches()
     n = len(frames[0])
-    with pytest.raises(ModelError, match=r"stays below 1.*hardly more than noise"):
+    with pytest.raises(ModelError, match=r"stays below 1.*little more than noise"):
         choose(spectrum(), "discrepancy", Evidence(np.full(n, 1.0), frames))
     with pytest.raises(ModelError, match=r"stays above 1.*does not explain"):
         choose(spectrum(), "discrepancy", Evidence(np.full(n, 1e-9), frames))
@@ -261,22 +261,26 @@ def test_frames_that_are_zero_and_presses_without_a_place_do_not_count() -> None
 @pytest.mark.parametrize(
     ("rule", "changes", "message"),
     [
-        ("light-touch", {"noise": None}, "the noise is not known"),
+        ("light-touch", {"noise": None}, "the noise of the measurements is missing"),
         ("light-touch", {"noise": np.zeros(208)}, "expected noise above 0"),
         ("light-touch", {"noise": np.full(208, -1.0)}, "expected noise above 0"),
         ("light-touch", {"noise": np.r_[np.ones(207), np.nan]}, "noise, row 207: .* got nan"),
         ("light-touch", {"noise": np.ones(40)}, r"noise of shape \(208,\), got \(40,\)"),
-        ("discrepancy", {"noise": None}, "the noise is not known"),
-        ("gcv", {"frames": None}, "no frames of a touched skin"),
-        ("gcv", {"frames": np.zeros((0, 208))}, "no frames of a touched skin"),
+        ("discrepancy", {"noise": None}, "the noise of the measurements is missing"),
+        ("gcv", {"frames": None}, "no frame of a touched skin"),
+        ("gcv", {"frames": np.zeros((0, 208))}, "no frame of a touched skin"),
         ("gcv", {"frames": np.zeros((2, 208))}, "are all zero"),
         ("l-curve", {"frames": np.ones((2, 40))}, r"frames of shape \(n, 208\), got \(2, 40\)"),
         ("likelihood", {"frames": np.full((1, 208), np.inf)}, "data, row 0: .* got inf"),
         ("gcv", {"frames": np.ones((1, 208), complex)}, "expected real difference data"),
-        ("labelled", {"places": None}, "no frame says where"),
-        ("labelled", {"places": np.zeros((3, 2))}, r"expected places \(24, 2\), got \(3, 2\)"),
-        ("labelled", {"places": np.full((24, 2), np.nan)}, "two labelled presses at least, got 0"),
-        ("labelled", {"locate": None}, "nothing says how touches are found"),
+        ("labelled", {"places": None}, "no frame has a label that says where"),
+        (
+            "labelled",
+            {"places": np.zeros((3, 2))},
+            r"expected positions of shape \(24, 2\), got \(3, 2\)",
+        ),
+        ("labelled", {"places": np.full((24, 2), np.nan)}, "at least two labelled presses, got 0"),
+        ("labelled", {"locate": None}, "the method that finds touches"),
     ],
 )
 def test_evidence_that_is_missing_or_wrong(

@@ -139,5 +139,5 @@ def test_a_free_image_that_the_data_do_not_see() -> None:
     p = problem("laplace")
     mean = p.jacobian.mean(axis=1, keepdims=True)
     blind = replace(p, jacobian=p.jacobian - mean)
-    with pytest.raises(ModelError, match="do not tell an image"):
+    with pytest.raises(ModelError, match="do not determine an image"):
         Spectrum.of(blind)

@@ -106,5 +106,5 @@ def test_refused(values: Any, truth: Any, message: str) -> None:
 
 def test_an_image_of_another_mesh_is_refused() -> None:
     line = np.linspace(0, 1, 3)
-    with pytest.raises(DataError, match="lives on mesh"):
+    with pytest.raises(DataError, match="belongs to mesh"):
         ThesisMetrics.of(image(np.ones(N)), box(line, line, line))

@@ -122,7 +122,7 @@ def test_every_step_lowers_the_objective(prior: SharpPrior) -> None:
     objective = [step.objective for step in found.steps]
     assert found.converged
     assert (np.diff(objective) < 0).all()
-    assert "stopped: the last step gained" in str(found)
+    assert "stopped: the last step lowered" in str(found)
 
 
 @pytest.mark.parametrize("alpha", [0.0, -1.0, np.nan])

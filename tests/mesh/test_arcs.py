@@ -36,7 +36,7 @@ def test_neighbours_with_room_between_them_are_accepted() -> None:
         ([(0.0, 0.02), (0.1, 0.12), (0.01, 0.03)], "electrode 2", "overlaps electrode 0 by 10 mm"),
         ([(0.1, 0.3), (0.15, 0.16)], "electrode 1", "overlaps electrode 0"),
         ([(0.01, 0.02), (-0.03, 0.015)], "electrode 1", "overlaps electrode 0 by 5 mm"),
-        ([(0.0, 0.02), (0.02, 0.03)], "electrode 1", "stands 0 mm from electrode 0"),
+        ([(0.0, 0.02), (0.02, 0.03)], "electrode 1", "is 0 mm from electrode 0"),
         ([(0.0, 0.02), (0.02005, 0.03)], "electrode 1", "expected at least 1%"),
         ([(0.1, 0.2), (0.1, 0.2)], "electrode 1", "overlaps electrode 0"),
     ],

@@ -153,7 +153,7 @@ def three_wings() -> Table:
     ("broken", "words"),
     [
         (moebius, "one side only"),
-        (folded_through, "cells .* runs through itself near"),
+        (folded_through, "cells .* intersects itself near"),
         (tetrahedron, "closed"),
         (ring, "more than one rim"),
         (holed_torus, "handle"),
@@ -168,7 +168,7 @@ def test_what_is_no_sheet_is_refused(broken: object, words: str) -> None:
 
 def test_a_place_off_the_surface_is_named() -> None:
     draped = Draped.of(*on(Cap(0.1)))
-    with pytest.raises(GeometryError, match=r"place 1: lies 50.* mm off the surface"):
+    with pytest.raises(GeometryError, match=r"place 1: is 50.* mm away from the surface"):
         draped.place(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.05]]))
-    with pytest.raises(GeometryError, match="places"):
+    with pytest.raises(GeometryError, match="positions"):
         draped.place(np.zeros((2, 2)))

@@ -318,7 +318,7 @@ def test_a_degenerate_cell_is_named(tmp_path: Path) -> None:
         (lambda _: np.zeros(3, dtype=int), "one whole number for each"),
         (lambda x: np.zeros(len(x)), "one whole number for each"),
         (Places([[0.0, 0.0, 0.0], [9.0, 0, 0]], 0.05), r"within 50 mm; the nearest is 885\d mm"),
-        (Places([[0.0, 0.0]], 0.02), "places of 3 coordinates"),
+        (Places([[0.0, 0.0]], 0.02), "positions with 3 coordinates"),
         (Places([[0.0, 0.0, 0.0]], -1.0), "radius above 0"),
     ],
 )

@@ -106,7 +106,7 @@ def test_an_image_of_another_mesh_is_refused() -> None:
     mesh = disc(8, 150)
     other = Mesh(1.01 * mesh.points, mesh.cells, mesh.electrodes)
     image = Image(np.zeros(len(mesh.cells)), "S", mesh.identity)
-    with pytest.raises(DataError, match=r"the image lives on mesh \w+, the pixels on"):
+    with pytest.raises(DataError, match=r"the image belongs to mesh \w+, the pixels to"):
         image.on_pixels(other.pixels(10))
 
 

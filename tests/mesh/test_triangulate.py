@@ -239,7 +239,7 @@ def test_a_sliver_is_refused_before_its_rim_has_nodes_without_number(
     """Each turn of the splitting would double them, up to 2⁶⁰."""
     monkeypatch.setattr("tomoskin.mesh.boundary._MOST_NODES", 2000)
     sliver = Polygon(np.array([(0.0, 0.0), (0.3, 0.0), (0.3, 1e-6)]))
-    with pytest.raises(GeometryError, match="too near to itself"):
+    with pytest.raises(GeometryError, match="too close to each other"):
         triangulate(sliver, [ElectrodeArc(0.05, 0.06), ElectrodeArc(0.1, 0.11)], 660)
 
 

@@ -75,5 +75,5 @@ def test_a_lost_source_is_left_for_another(prepared, idle):
 
 
 def test_nothing_is_changed_in_what_does_not_run(runner, prepared, board):
-    with pytest.raises(SourceError, match="not running"):
+    with pytest.raises(SourceError, match="the run has ended"):
         runner.ask(commands.Change(prepared, lambda: board))

@@ -158,7 +158,7 @@ def test_untouched_frames_that_lack_rows_are_not_averaged() -> None:
     found = reconstruct(prepared, recording(prepared.pattern, idle[[0, 2]]), idle)
     assert np.abs(found.images).max() < 1e-9
     idle[:, [4, 5, 6]] = np.where(np.eye(3, dtype=bool), np.nan, idle[:, [4, 5, 6]])
-    with pytest.raises(DataError, match="no untouched frame has finite values in every row"):
+    with pytest.raises(DataError, match="no untouched frame has finite values in all rows"):
         reconstruct(prepared, recording(prepared.pattern, idle[[0, 2]]), idle)
 
 

@@ -134,7 +134,7 @@ def test_too_many_rows_at_a_rail_give_no_picture(push, idle, touched):
     assert not result.has_image
     assert not result.image.values.any()
     assert result.touches == ()
-    assert "no picture" in result.problem
+    assert "no image" in result.problem
 
 
 def test_a_row_at_a_rail_in_the_reference_stays_out(push, idle, touched):
@@ -163,7 +163,7 @@ def test_a_reference_of_nothing_but_rails_is_said(push, idle, touched):
     for _ in range(30):  # until alpha has been tuned
         result = push(touched)
     assert not result.has_image
-    assert "too little is left" in result.problem
+    assert "too few rows are left" in result.problem
 
 
 def test_memory_does_not_grow(push, idle, touched):

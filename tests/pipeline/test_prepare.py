@@ -23,7 +23,7 @@ MOVED = Mesh(1.01 * PREPARED.mesh.points, PREPARED.mesh.cells, PREPARED.mesh.ele
 
 def test_an_operator_of_another_mesh_with_as_many_cells() -> None:
     other = OneStep(ForwardModel(MOVED, PREPARED.pattern, 0.01), alpha=0.1)
-    with pytest.raises(ModelError, match=f"operator is of mesh {MOVED.identity}, the skin of"):
+    with pytest.raises(ModelError, match=f"operator belongs to mesh {MOVED.identity}, the skin to"):
         replace(PREPARED, operator=other)
 
 
@@ -35,7 +35,7 @@ def test_an_operator_of_another_pattern_with_as_many_rows() -> None:
 
 
 def test_a_segmenter_of_another_mesh() -> None:
-    with pytest.raises(ModelError, match=f"the segmenter of mesh {MOVED.identity}"):
+    with pytest.raises(ModelError, match=f"the segmenter to mesh {MOVED.identity}"):
         replace(PREPARED, segmenter=Segmenter(MOVED, PREPARED.skin.touch))
 
 
@@ -54,5 +54,5 @@ def test_a_rule_cannot_choose_the_alpha_of_a_method_without_one() -> None:
     prepared = prepare(Skin.load("tank-16").altered({"mesh": {"cells": 600}}))
     with pytest.raises(ModelError, match=r'method "one-step".*"greit"'):
         tuned_by_rule(prepared, "gcv", Evidence())
-    with pytest.raises(SkinError, match=r"goes with method"):
+    with pytest.raises(SkinError, match=r"needs method"):
         prepared.skin.altered({"inverse": {"alpha": 0.1}})

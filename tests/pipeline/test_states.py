@@ -120,7 +120,7 @@ def test_rows_that_are_lost_or_left_out_do_not_count(prepared, states):
 
 
 def test_states_of_another_skin_are_refused(states):
-    with pytest.raises(DataError, match="is of another scan: learnt on"):
+    with pytest.raises(DataError, match="belongs to another scan: it was learnt on"):
         prepare(Skin.load("textile-disc-16")).calibrated(states)
 
 
@@ -130,7 +130,8 @@ def test_on_the_command_line_states_of_another_skin_are_refused(run, states, tmp
     with pytest.raises(SystemExit) as end:
         main(["image", str(run[0]), "--states", str(tmp_path / "c.npz")])
     assert end.value.code == 1
-    assert "the calibration of states is of another skin: learnt on" in capfd.readouterr().err
+    err = capfd.readouterr().err
+    assert "the calibration of states belongs to another skin: it was learnt on" in err
 
 
 def test_the_command_line_tells_them(run, states, tmp_path, capfd):

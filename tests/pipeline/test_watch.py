@@ -82,7 +82,7 @@ def test_a_touch_goes_on_when_electrodes_are_cut_off(feed, sixteen, resting, tou
     assert all(len(result.touches) == 1 and away(result.touches[0]) < 0.012 for result in results)
     assert len({result.touches[0].id for result in results}) == 1
     assert f"E{CUT + 1} is open: no current" in results[-1].problem
-    assert "picture is made without" in results[-1].problem
+    assert "image is made without" in results[-1].problem
     quiet = [feed(without(sixteen, resting, *cut)) for _ in range(20)]
     assert not any(result.touches for result in quiet[8:])
     assert feed(resting, 30).problem is None
@@ -93,7 +93,7 @@ def test_when_too_many_electrodes_are_gone_it_says_so(feed, sixteen, touched):
     result = feed(without(sixteen, touched, 0, 3, 6, 9, 12), 3)
     assert not result.has_image
     assert not result.touches
-    assert "too little is left for a picture" in result.problem
+    assert "too few rows are left for an image" in result.problem
 
 
 def test_a_change_of_all_voltages_alike_is_no_touch(feed, sixteen, resting):

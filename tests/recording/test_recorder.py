@@ -202,7 +202,7 @@ def test_a_file_that_is_taken_away_ends_the_recording(tmp_path, said, start):
     path = tmp_path / "x.mcap"
     record(start(path), 50)
     path.unlink()
-    assert "has been removed" in said.wait_for("recording-stopped")
+    assert "was removed" in said.wait_for("recording-stopped")
 
 
 def test_a_slow_disk_loses_messages_but_delays_nobody(tmp_path, said, start, monkeypatch):

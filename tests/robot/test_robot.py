@@ -101,11 +101,11 @@ def test_a_moved_surface_is_the_surface_moved():
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('name = "right"', 'name = "left"', "two skins have the name left"),
+        ('name = "right"', 'name = "left"', "two skins have the same name left"),
         ('name = "right"', 'name = "Right arm"', "small letters"),
-        ('source = "twin:seed=1"', 'source = "twin:seed=1"\nboard = "0102"', "the board 0102"),
+        ('source = "twin:seed=1"', 'source = "twin:seed=1"\nboard = "0102"', "the same board 0102"),
         ('link = "fore"', 'link = "four"', 'no link "four".*did you mean "fore"'),
-        ('link = "fore"', "", "needs link"),
+        ('link = "fore"', "", "needs the key link"),
         ('"arm.urdf"', '"leg.urdf"', "no such file|cannot be read"),
         ('board = "0102"', 'board = "x1"', "hexadecimal"),
         ('board = "0102"', 'bord = "0102"', 'did you mean "board"'),
@@ -155,7 +155,7 @@ def test_a_skin_is_added_to_a_file_or_a_new_one(files):
         ("hand", "fore"),
         ("palm", "upper"),
     ]
-    with pytest.raises(SkinError, match=r"of the URDF arm\.urdf"):
+    with pytest.raises(SkinError, match=r"to the URDF arm\.urdf"):
         add_skin(path, given, "leg.urdf")
     with pytest.raises(SkinError, match="unknown key"):
         add_skin(path, given | {"lnk": "fore"})

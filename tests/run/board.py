@@ -27,7 +27,7 @@ from tomoskin.wire import (
     type_byte,
 )
 
-((VERSION, HASH),) = OLDER.items()
+VERSION, HASH = min(OLDER.items())
 """Of the first protocol: then nothing is read back that it would have to hold."""
 
 AS_TAKEN = {"baseline": "hold", "common_modes": "kept"}
@@ -114,7 +114,7 @@ class Board:
 
     def _check(self):
         if self.lost:
-            raise SourceError("the device has gone away", where=self.name)
+            raise SourceError("the device has been disconnected", where=self.name)
 
     def _answer(self, command):
         if isinstance(command, GetInfo):

@@ -101,7 +101,7 @@ def test_a_change_that_waits_gives_way_to_a_newer_one(runner, prepared, board):
     second, third = (runner.submit(commands.Change(prepared, lambda: board)) for _ in range(2))
     gate.set()
     first.result(PATIENCE)
-    with pytest.raises(SourceError, match="something else has been chosen"):
+    with pytest.raises(SourceError, match="replaced by a newer choice"):
         second.result(PATIENCE)
     third.result(PATIENCE)
 
@@ -109,8 +109,8 @@ def test_a_change_that_waits_gives_way_to_a_newer_one(runner, prepared, board):
 def test_what_the_source_cannot_do_is_said(runner):
     runner.start()
     for command, words in (
-        (commands.Seek(1.0), "is no replay"),
-        (SetTwin((), None), "cannot be broken"),
+        (commands.Seek(1.0), "is not a replay"),
+        (SetTwin((), None), "cannot simulate faults"),
         (SetPose(), "cannot be bent"),
     ):
         with pytest.raises(WireError, match=words):

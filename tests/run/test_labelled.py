@@ -134,13 +134,13 @@ def test_ctrl_c_before_a_cluster(plan, whole, tmp_path, scheduler):
 def test_what_a_worker_of_a_cluster_cannot_do_is_said_here(scheduler, monkeypatch):
     monkeypatch.setattr(tomoskin.twin.population, "_TRIES", 5)
     crowd = SetPlan(SKIN, CROWD, "textile", 1, 7)
-    with pytest.raises(ScriptError, match="found no place 5 mm from the rim and 100 mm from"):
+    with pytest.raises(ScriptError, match="found no position 5 mm from the rim and 100 mm from"):
         list(on_cluster(scheduler)(crowd, [0]))
 
 
 def test_what_a_process_cannot_do_is_said_here():
     crowd = SetPlan(SKIN, CROWD, "textile", 1, 7)
-    with pytest.raises(ScriptError, match="found no place 5 mm from the rim and 100 mm from"):
+    with pytest.raises(ScriptError, match="found no position 5 mm from the rim and 100 mm from"):
         list(in_processes(1)(crowd, [0]))
 
 

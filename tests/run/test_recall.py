@@ -107,7 +107,7 @@ def test_a_damaged_file_is_said_and_replaced(prepared, samples, memory, once):
     (path,) = memory.folder.iterdir()
     path.write_bytes(path.read_bytes()[:300])
     happened, newest, _ = run_of(prepared, Numbered(samples, seed=1), memory)
-    assert "lost" in happened["not-recalled"]
+    assert "cannot be used" in happened["not-recalled"]
     assert newest.ready
     happened, _, _ = run_of(prepared, Numbered(samples, seed=2), memory)
     assert "recalled" in happened

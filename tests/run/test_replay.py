@@ -409,7 +409,7 @@ def test_a_held_picture_is_held_in_the_replay_too(prepared, tmp_path):
 
 
 def test_another_skin_is_refused(run):
-    with pytest.raises(SourceError, match=r"recorded by another scan .* \(leave --skin out"):
+    with pytest.raises(SourceError, match=r"recorded with another scan .* \(leave out --skin"):
         open_replay(str(run), Skin.load("textile-disc-16"))
 
 
@@ -426,7 +426,7 @@ def test_what_stands_behind_a_file(tmp_path, name, rest, speed, loop):
 
 @pytest.mark.parametrize("speed", ["@0", "@-1", "@fast", "@nan", "@1,twice", "@", ",twice"])
 def test_an_impossible_speed_is_refused(run, prepared, speed):
-    with pytest.raises((SourceError, DataError), match=r"expected perhaps @SPEED|no such file"):
+    with pytest.raises((SourceError, DataError), match=r"expected @SPEED|no such file"):
         open_replay(f"{run}{speed}", prepared.skin)
 
 

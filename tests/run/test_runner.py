@@ -338,7 +338,7 @@ def test_a_recording_has_its_path_while_its_first_messages_are_made(prepared, tm
     ("change", "words"),
     [
         (lambda idle: idle // 8, "check the skin, its current and its sheet resistance"),
-        (lambda idle: np.roll(idle, len(idle) // 2 + 3), "check the skin and the electrodes'"),
+        (lambda idle: np.roll(idle, len(idle) // 2 + 3), "check the skin and the order of"),
     ],
 )
 def test_a_reference_that_is_not_the_skins_is_said(prepared, idle, change, words):

@@ -97,7 +97,7 @@ def test_how_they_are_is_said(runner, sinks, gate):
     reports = {report.name: report for report in runner.status().sinks}
     assert reports["good"].well
     assert not reports["dead"].well
-    assert reports["dead"].text.startswith("is away: the peer is gone")
+    assert reports["dead"].text.startswith("is not reachable: the peer is gone")
     site = Site(runner)
     try:
         with site.client() as client:
@@ -107,7 +107,7 @@ def test_how_they_are_is_said(runner, sinks, gate):
     finally:
         site.stop()
     assert [sink["name"] for sink in told["sinks"]] == list(sinks)
-    assert told["sinks"][1]["text"].startswith("is away")
+    assert told["sinks"][1]["text"].startswith("is not reachable")
     gate.set()
 
 

@@ -143,12 +143,12 @@ def test_a_token_file_that_others_can_read_or_that_holds_no_token_is_refused(tmp
     load_token(path)
     if os.name == "posix":
         path.chmod(0o644)
-        with pytest.raises(DataError, match="others may read"):
+        with pytest.raises(DataError, match="other users of this machine can read"):
             load_token(path)
         path.chmod(0o600)
     for text in ("short", "a b" * 20, "é" * 40, ""):
         path.write_text(text)
         with pytest.raises(DataError):
             load_token(path)
-    with pytest.raises(DataError, match="cannot be made"):
+    with pytest.raises(DataError, match="cannot be created"):
         load_token(tmp_path / "none" / "token")

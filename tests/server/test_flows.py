@@ -183,7 +183,7 @@ def test_malformed_and_oversized_requests_leave_the_connection(flows):
         page.told("error")
     for source in ("serial:/dev/null", "replay:/etc/passwd", "twin:seed=1", "tcp:evil.example"):
         page.ask("connect", source=source)
-        assert "sources that are listed" in page.told("error")["message"]
+        assert "one of the listed sources" in page.told("error")["message"]
     assert site.runner.status().source.startswith("twin")
     page.ask("files")
     page.told("files")
@@ -215,7 +215,7 @@ def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
     with SessionReader(path) as session:
         start, length = start_time(session), end_time(session) - start_time(session)
         channels = session.device()["channels"]
-    assert 0 <= float(rows[0]["elapsed_s"]) < length
+    assert -0.05 <= float(rows[0]["elapsed_s"]) < length  # the device's clock, fitted
     assert float(rows[0]["time_s"]) - float(rows[0]["elapsed_s"]) == pytest.approx(start, abs=1e-5)
     page.ask("open", name="run.mcap")
     assert page.told("scene")["source"] == "textile-disc-8 on replay:run.mcap"
@@ -224,14 +224,14 @@ def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
     told = page.told("files")
     assert told["playing"] == "run.mcap"
     page.ask("rename", name="run.mcap", to="other")
-    assert "is being played" in page.told("error")["message"]
+    assert "is playing" in page.told("error")["message"]
     page.ask("delete", name="run.mcap")
-    assert "is being played" in page.told("error")["message"]
+    assert "is playing" in page.told("error")["message"]
     page.ask("sources")
     assert page.told("sources")["board"]["channels"] == channels, "those that were recorded"
     assert {f["name"] for f in told["files"]} >= {"run.mcap", "run.npz", "run-touches.csv"}
     page.ask("flow_begin", kind="touch")
-    assert "a recording cannot be pressed" in page.told("error")["message"]
+    assert "presses need a live source" in page.told("error")["message"]
     page.ask("live")
     assert page.told("scene")["source"] == "twin of textile-disc-8"
     assert page.told("state")["replay"] is None
@@ -246,7 +246,7 @@ def test_a_session_is_renamed_annotated_and_deleted(flows, tmp_path):
     page.ask("annotate", name="run.mcap", text=" the left hand\nsoftly ")
     page.told("files", lambda m: "the left hand\nsoftly\n" in [f["notes"] for f in m["files"]])
     page.ask("rename", name="run.mcap", to="taken")
-    assert "taken.mcap: is there already" in page.told("error")["message"]
+    assert "taken.mcap: exists already" in page.told("error")["message"]
     page.ask("rename", name="run.mcap", to="left")
     named = page.told("files", lambda m: "left.mcap" in [f["name"] for f in m["files"]])
     assert {f["name"]: f["notes"] for f in named["files"]}["left.mcap"].startswith("the left hand")
@@ -303,6 +303,7 @@ def test_a_listed_source_is_connected_and_says_what_it_is(flows):
     page.ask("sources")
     board = page.told("sources")["board"]
     assert board["firmware"].count(".") == 2
+    assert board["name"] == "simulated board"
     assert board["channels"] >= 8
 
 
@@ -320,7 +321,7 @@ def taught(prepared, tmp_path_factory):
         page.ask("flow_begin", kind="touch")
         told = press_dots(site, page, 10)
         page.ask("flow_keep", name="finger")
-        page.told("flow", lambda m: m["kind"] is None and m["calibration"] == "finger.npz")
+        page.told("calibrations", lambda m: m["touch"] == "finger.npz")
         until(lambda: TOUCH.name in runner.prepared.calibrations)
         runner.ask(commands.Record(folder / "run.mcap"))
         runner.ask(commands.HoldPresses(page, (Press(*told["presses"][0], FORCE, RADIUS),)))
@@ -375,10 +376,10 @@ def test_a_calibration_of_the_folder_is_switched_on_and_off(taught, prepared):
     with flowing(prepared, folder) as (site, page):
         until = Watch(site.runner).until
         page.ask("calibration", name="finger.npz")
-        page.told("flow", lambda m: m["calibration"] == "finger.npz")
+        page.told("calibrations", lambda m: m["touch"] == "finger.npz")
         until(lambda: TOUCH.name in site.runner.prepared.calibrations)
         page.ask("calibration", name=None)
-        page.told("flow", lambda m: m["calibration"] is None)
+        page.told("calibrations", lambda m: m["touch"] is None)
         until(lambda: TOUCH.name not in site.runner.prepared.calibrations)
         page.ask("calibration", name="none.npz")
         assert "no such file" in page.told("error")["message"]
@@ -391,7 +392,7 @@ def test_a_press_is_taken_back_and_the_flow_left(flows):
     page.ask("flow_undo")
     assert "no press" in page.told("error")["message"]
     page.ask("flow_keep", name="early")
-    assert "no press has been recorded" in page.told("error")["message"]
+    assert "there are no presses to save" in page.told("error")["message"]
     page.ask("flow_begin", kind="touch")
     first = press_dots(site, page, 1)["presses"][0]
     page.ask("flow_keep", name="early")

@@ -1,4 +1,4 @@
-"""Every flow once in real Chromium: line of time, sessions, set-up, wires, touch, a server anew."""
+"""Flows once in real Chromium: line of time, sessions, set-up, a server anew."""
 
 from __future__ import annotations
 
@@ -10,10 +10,8 @@ import pytest
 from server.looks import look_in_both
 from server.serving import Site
 from server.watching import Watched
-from tomoskin.calibration import TOUCH
 from tomoskin.run import Runner
 from tomoskin.server import load_token, serve_requests
-from tomoskin.skin import Skin
 from tomoskin.source import open_source
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
@@ -36,29 +34,6 @@ def site(prepared, folder):
 
 def looks_right(opened, name):
     assert look_in_both(opened.page, name) == {}
-
-
-def press_dot(opened, done):
-    """Press with the pointer where the dot is; until the press is taken."""
-    opened.test_id("phase").filter(has_text="where the dot is").wait_for()
-    box = opened.page.locator(".target .core").bounding_box()
-    opened.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    opened.page.mouse.down()
-    opened.test_id("taken").filter(has_text=f"{done + 1} press").wait_for()
-    opened.page.mouse.up()
-
-
-def guided(opened, kind, count):
-    opened.test_id("open-setup").click()
-    opened.test_id(f"step-{kind}").click()
-    opened.test_id("flow-begin").click()
-    for _ in range(20):
-        opened.page.keyboard.press("+")
-    for done in range(count):
-        press_dot(opened, done)
-    opened.page.wait_for_function(
-        "() => !document.querySelector('[data-testid=flow-keep]').disabled"
-    )
 
 
 def test_a_recording_is_marked_listed_exported_played_and_left(opened, folder):
@@ -207,28 +182,6 @@ def test_the_board_says_what_it_is_and_is_connected_anew(opened):
     opened.test_id("reference-words").filter(has_text="keep hands off").wait_for()
     opened.test_id("reference-words").filter(has_text="ago").wait_for()
     looks_right(opened, "board")
-
-
-def test_touch_is_taught_by_pressing_dots(opened, folder):
-    guided(opened, "touch", 6)
-    opened.test_id("flow-text").filter(has_text="Median error").wait_for()
-    looks_right(opened, "touch")
-    opened.test_id("flow-keep").click()
-    opened.test_id("calibration").filter(has_text="touch.npz").wait_for()
-    assert len(TOUCH.read(folder / "touch.npz").model.presses) == 6
-    opened.press(0.03, 0.03)
-    looks_right(opened, "calibrated")
-    opened.page.mouse.up()
-    opened.lifted()
-
-
-def test_the_wires_are_found_by_pressing_dots(opened, folder):
-    guided(opened, "wiring", 3)
-    opened.test_id("flow-text").filter(has_text="as the skin file says").wait_for()
-    looks_right(opened, "wiring")
-    opened.test_id("flow-keep").click()
-    opened.test_id("flow-begin").wait_for()
-    assert Skin.load(folder / "wired.toml").n_electrodes == 8
 
 
 def test_a_page_finds_a_server_that_was_started_again_with_its_token(

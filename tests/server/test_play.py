@@ -142,7 +142,7 @@ def test_only_a_replay_can_be_steered(prepared, idle):
         assert page.told("state")["replay"] is None
         for kind, asked in (("seek", {"at_s": 1}), ("step", {}), ("loop", {"on": True})):
             page.ask(kind, **asked)
-            assert "is no replay" in page.told("error")["message"]
+            assert "is not a replay" in page.told("error")["message"]
 
 
 def test_a_note_is_told_and_recorded_at_the_picture_that_was_shown(prepared, idle, tmp_path):

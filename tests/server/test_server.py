@@ -285,7 +285,7 @@ def test_a_lost_source_is_said_on_the_page(site, board):
         assert board.sought.acquire(timeout=PATIENCE)
         while not (problem := first(page, "state")["problem"]):
             pass
-        assert "gone" in problem
+        assert "disconnected" in problem
 
 
 def test_what_happened_before_is_told_to_a_new_page(site):
@@ -484,5 +484,5 @@ def test_a_recording_that_cannot_begin_is_said_on_the_page(site, tmp_path, monke
         ask(socket, type="record", on=True)
         while (event := first(socket, "event"))["kind"] != "recording-stopped":
             pass
-    assert "nothing is recorded" in event["text"]
+    assert "the recording did not start" in event["text"]
     assert site.runner.status().running

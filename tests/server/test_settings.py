@@ -150,9 +150,9 @@ def test_undo_and_redo(office):
         ({"touch": {"gamma1": 2}}, "touch", "gamma1", "expected a number from 0.1 to 0.99, got 2"),
         ({"inverse": {"alpha": "much"}}, "inverse", "alpha", 'got "much"'),
         ({"outline": {"shape": "rectangle"}}, "outline", "width", "is missing"),
-        ({"surface": {"file": "/etc/passwd"}}, "surface", "file", "cannot be set from a page"),
+        ({"surface": {"file": "/etc/passwd"}}, "surface", "file", "cannot be changed on the page"),
         ({"drive": {"pattern": "skip:99"}}, "drive", None, "expected k from 0 to 6"),
-        ({"mesh": {"cells": 600}}, None, None, "cannot be set to another sheet"),
+        ({"mesh": {"cells": 600}}, None, None, "cannot change its sheet"),
         ({"colour": {"hue": 1}}, None, None, "unknown section"),
     ],
 )
@@ -263,7 +263,7 @@ def test_saving_replaces_neither_a_recording_nor_what_a_link_leads_to(office, tm
     beyond.write_text("mine")
     (tmp_path / "link.toml").symlink_to(beyond)
     (tmp_path / "run.toml").write_bytes(MAGIC)
-    for name, said in (("link", "is a link"), ("run", "recordings are never written over")):
+    for name, said in (("link", "is a link"), ("run", "a recording is never overwritten")):
         office.ask({"type": "save_skin", "name": name, "replace": True})
         message = office.page.last("settings_error")["message"]
         assert said in message

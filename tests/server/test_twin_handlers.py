@@ -83,7 +83,7 @@ def test_a_board_is_not_broken(runner):
     runner.start()
     hub = Hub(runner, limit=1.0)
     TwinHandlers(hub)
-    with pytest.raises(WireError, match="cannot be broken"):
+    with pytest.raises(WireError, match="cannot simulate faults"):
         hub.obey(Heard(), asked(cut=[1]))
 
 
@@ -211,11 +211,11 @@ def test_a_circle_is_a_press():
 @pytest.mark.parametrize(
     ("fields", "says"),
     [
-        ({"shape": "polygon"}, "expected vertices with a polygon"),
-        ({"vertices": CORNERS}, "expected vertices with a polygon"),
+        ({"shape": "polygon"}, "expected vertices for a polygon"),
+        ({"vertices": CORNERS}, "expected vertices for a polygon"),
         ({"shape": "polygon", "vertices": CORNERS[:2]}, "vertices"),
         ({"shape": "polygon", "vertices": [[0, 0], [1e-2, 1e-2], [1e-2, 0], [0, 1e-2]]}, "cross"),
-        ({"shape": "polygon", "vertices": [[0, 0], [0.05, 0.031], [0.05, 0.0311]]}, "slimmer"),
+        ({"shape": "polygon", "vertices": [[0, 0], [0.05, 0.031], [0.05, 0.0311]]}, "narrower"),
     ],
 )
 def test_faces_that_cannot_press(twin, fields, says):

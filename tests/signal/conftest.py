@@ -73,3 +73,9 @@ def disc() -> Disc:
 @pytest.fixture
 def watched(disc: Disc) -> Watched:
     return Watched(disc)
+
+
+@pytest.fixture
+def watch() -> type[Watched]:
+    """For a test that makes its own."""
+    return Watched

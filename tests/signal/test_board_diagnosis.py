@@ -82,8 +82,8 @@ def test_a_wrong_sense_resistor_is_named() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda column: np.full_like(column, 1023), "E4 stands still at 100%"),
-        (lambda column: column / 35, "E4 stands still"),
+        (lambda column: np.full_like(column, 1023), "E4 stays at 100%"),
+        (lambda column: column / 35, "E4 stays at"),
         (lambda column: column * 0.5, "E4 is 0.5 times"),
         (lambda column: column + 60, "E4 is +60 counts off"),
     ],

@@ -49,7 +49,7 @@ def test_another_number_of_rows(kind: str) -> None:
 def test_a_silent_row_cannot_be_normalised() -> None:
     reference = np.array([1.0, 0.0, 0.0])
     assert difference(VALUES, reference, "plain").shape == VALUES.shape
-    with pytest.raises(DataError, match="cannot be normalised") as caught:
+    with pytest.raises(DataError, match="cannot be normalised by it") as caught:
         difference(VALUES, reference, "normalised")
     assert caught.value.where == "row 1"
 

@@ -83,9 +83,9 @@ def test_where_no_current_of_a_file_fits_the_sheet_is_named() -> None:
         material={"sheet_resistance": "1000 kohm/sq"},
         electrodes={"contact_impedance": "200000 ohm*m"},
     )
-    assert "less resistance" in (Headroom.of_skin(skin).problem or "")
+    assert "lower resistance" in (Headroom.of_skin(skin).problem or "")
 
 
 def test_an_offset_below_the_converter_is_named() -> None:
     skin = skin_of("textile-disc-8", readout={"offset": "-4 V"})
-    assert "an offset fits" in (Headroom.of_skin(skin).problem or "")
+    assert "use an offset" in (Headroom.of_skin(skin).problem or "")

@@ -85,7 +85,7 @@ def test_a_short(watched, disc):
     for _ in range(3):
         health = watched.push(shorted)
     assert states(health) == {8: "short", 9: "short"}
-    assert "E9 does under every drive" in health.electrodes[9].text
+    assert "E9 under every drive" in health.electrodes[9].text
 
 
 def test_a_channel_that_stands_still(watched, disc):

@@ -77,4 +77,4 @@ def test_a_bag_holds_the_touches_of_a_session(bag, tomoskin):
     with bag[1].open("rb") as file:
         assert make_reader(file, validate_crcs=True).get_header().profile == "ros2"
     code, _, errors = tomoskin("session", "info", bag[1])
-    assert (code, "no session of tomoskin" in errors) == (1, True)
+    assert (code, "not a session of tomoskin" in errors) == (1, True)

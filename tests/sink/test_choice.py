@@ -39,7 +39,7 @@ def test_names_say_where_results_go_but_no_password(spec, name):
     ("spec", "said"),
     [
         ("", "there is no sink"),
-        ("kafka", "known are foxglove, lsl, mqtt, rerun, ros2, zenoh"),
+        ("kafka", "sinks: foxglove, lsl, mqtt, rerun, ros2, zenoh"),
         ("foxglove:port", "expected a port"),
         ("foxglove:70000", "expected a port"),
         ("foxglove:0", "expected a port"),

@@ -130,7 +130,7 @@ def test_beginnings_and_ends_are_sent_at_once_the_rest_now_and_then(broker, hear
 
 def test_a_wrong_password_is_said(broker, stream):
     sink = make_sink(broker.url.replace("secret", "guess"))
-    with pytest.raises(SinkError, match="refuses"):
+    with pytest.raises(SinkError, match="refused"):
         sink.open(stream)
     sink.close()
 

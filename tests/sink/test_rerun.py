@@ -131,7 +131,7 @@ def test_a_viewer_that_is_not_there_is_said(whole, monkeypatch):
     sink = open_rerun(f"127.0.0.1:{free_port()}")
     sink.open(whole)
     sink.publish(moment_at(0.25, TOUCH))
-    with pytest.raises(SinkError, match="no viewer has taken it"):
+    with pytest.raises(SinkError, match="no viewer accepted the connection"):
         sink.close()
     sink.close()
 

@@ -108,7 +108,7 @@ def test_a_sink_that_hangs_delays_nobody_and_is_left_to_itself(running, news, mo
     worker.put(EVENT)
     report = sink_report(worker)
     assert not report.well
-    assert report.text.startswith("does not answer")
+    assert report.text.startswith("has not answered")
     assert report.left_out == 12 + 1
     assert news.kinds().count("sink-behind") == 1
     worker.end()
@@ -149,7 +149,7 @@ def test_a_sink_that_raises_is_closed_and_opened_again(running, news, monkeypatc
     news.until(lambda: sink.items)
     assert sink.calls == ["open", "close", "open"]
     away = next(text for kind, text in news.said if kind == "sink-away")
-    assert away == "shelf is away: peer is gone"
+    assert away == "shelf is not reachable: peer is gone"
     assert away in caplog.text
 
 
@@ -175,11 +175,14 @@ def test_while_it_is_away_that_is_its_state(running, news, monkeypatch):
         Shelf(news, opens=[SinkError("no broker there", where="shelf", hint="start it")])
     )
     report = sink_report(worker)
-    assert (report.well, report.text) == (False, "is away: no broker there (start it)")
+    assert (report.well, report.text) == (False, "is not reachable: no broker there (start it)")
     for number in range(MOST_WAITING + 3):
         worker.put(result_at(number))
     left_out = MOST_WAITING + 3
-    assert sink_report(worker).text == f"is away: no broker there (start it), {left_out} left out"
+    assert (
+        sink_report(worker).text
+        == f"is not reachable: no broker there (start it), {left_out} left out"
+    )
     assert news.kinds() == ["sink-away"]
 
 

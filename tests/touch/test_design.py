@@ -120,7 +120,7 @@ def test_variants_are_on_the_same_sheet() -> None:
         ({"depth": 1.0}, "depth between"),
         ({"false_alarm": 0.0}, "false alarm between"),
         ({"found": 1.5}, "found between"),
-        ({"found": 0.1, "false_alarm": 0.5}, "more often"),
+        ({"found": 0.1, "false_alarm": 0.5}, "above the probability"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(given: dict[str, float], words: str) -> None:

@@ -40,6 +40,15 @@ export interface Touch {
   readonly several: number;
 }
 
+export type ForceState = "none" | "calibrated" | "uncalibrated";
+
+/** What the forces of touches rest on: on a calibration only where every one does. */
+export function forceStateOf(touches: readonly Touch[]): ForceState {
+  const forces = touches.map(({ force }) => force).filter((force) => force !== null);
+  if (!forces.length) return "none";
+  return forces.every(({ calibrated }) => calibrated) ? "calibrated" : "uncalibrated";
+}
+
 export interface Truth {
   readonly x: number;
   readonly y: number;

@@ -1,6 +1,8 @@
-/** The strength and way of each touch over the last seconds: a few fixed slots, one touch in each. */
+/** Strength, force and way of each touch over the last seconds: a few fixed slots, one touch in each. */
 
 import type { Touch } from "./decode";
+
+type Column = (number | null)[];
 
 export const SPAN = 10;
 export const SLOTS = 8;
@@ -13,12 +15,18 @@ interface Slot {
   seen: number;
 }
 
+const emptyColumns = (): Column[] => Array.from({ length: SLOTS }, () => []);
+
 export class History {
   readonly times: number[] = [];
-  readonly columns: (number | null)[][] = Array.from({ length: SLOTS }, () => []);
+  readonly columns = emptyColumns();
   /** x and y of each slot's touch, m. */
-  readonly xs: (number | null)[][] = Array.from({ length: SLOTS }, () => []);
-  readonly ys: (number | null)[][] = Array.from({ length: SLOTS }, () => []);
+  readonly xs = emptyColumns();
+  readonly ys = emptyColumns();
+  /** Its force and the ends of the interval, N. */
+  readonly forces = emptyColumns();
+  readonly lows = emptyColumns();
+  readonly highs = emptyColumns();
   private readonly slots: Slot[] = Array.from({ length: SLOTS }, () => ({ id: null, seen: 0 }));
 
   /** Add one frame's touches at a time in seconds; time running backwards starts afresh. */
@@ -35,6 +43,9 @@ export class History {
       this.columns[slot][at] = Math.abs(touch.peak);
       this.xs[slot][at] = touch.x;
       this.ys[slot][at] = touch.y;
+      this.forces[slot][at] = touch.force?.newtons ?? null;
+      this.lows[slot][at] = touch.force?.low ?? null;
+      this.highs[slot][at] = touch.force?.high ?? null;
     }
   }
 
@@ -57,8 +68,8 @@ export class History {
     return trail.reverse();
   }
 
-  private all(): (number | null)[][] {
-    return [...this.columns, ...this.xs, ...this.ys];
+  private all(): Column[] {
+    return [this.columns, this.xs, this.ys, this.forces, this.lows, this.highs].flat();
   }
 
   /** Drop what is older than the span; call now and then, not per frame. */

@@ -17,6 +17,8 @@ export interface Probe extends Sizes {
   readonly face: Face;
   /** By which the face is turned, rad. */
   readonly angle: number;
+  /** Whether the force grows while a press is held; a weight's does not. */
+  readonly grows: boolean;
 }
 
 export interface Held extends Press {
@@ -41,7 +43,7 @@ const FULL_FORCE_AFTER = 2;
 const FORCE_STEPS = 20;
 
 export const emptyHand = (sizes: Sizes): Hand => ({
-  probe: { face: CIRCLE, angle: 0, ...sizes },
+  probe: { face: CIRCLE, angle: 0, grows: true, ...sizes },
   held: [],
 });
 
@@ -63,8 +65,8 @@ export function press(hand: Hand, pointer: number, x: number, y: number, keep: b
   if (under && keep) return lifted(hand, under);
   if (under) return changed(hand, (other) => (other === under ? { ...other, pointer } : other));
   if (hand.held.length >= MAX_PRESSES) return hand;
-  const { force, radius, face, angle } = hand.probe;
-  const fresh: Held = { x, y, force, radius, face, angle, pointer, kept: keep, growing: true };
+  const { force, radius, face, angle, grows } = hand.probe;
+  const fresh: Held = { x, y, force, radius, face, angle, pointer, kept: keep, growing: grows };
   return { ...hand, held: [...hand.held, fresh] };
 }
 

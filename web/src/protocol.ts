@@ -82,6 +82,14 @@ export interface StateReading {
   readonly unknown: boolean;
 }
 
+/** How far today's frames are from what the calibration of touch was learnt on, in words. */
+export interface CalibrationHealth {
+  readonly well: boolean;
+  /** Whether someone must act. */
+  readonly broken: boolean;
+  readonly findings: readonly string[];
+}
+
 export interface Status {
   readonly type: "state";
   readonly running: boolean;
@@ -112,6 +120,8 @@ export interface Status {
   readonly replay: Replay | null;
   /** Which of the states that were learnt the newest frame shows; null where none were. */
   readonly state: StateReading | null;
+  /** Null where no calibration of touch is in use, or nothing has touched the skin yet. */
+  readonly calibration: CalibrationHealth | null;
   readonly noise_v: number | null;
   /** Weight of the prior in the pictures, and the rule that chose it ("hand": the skin file). */
   readonly alpha: number;

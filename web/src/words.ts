@@ -53,7 +53,7 @@ function stateOf(status: Status, old: boolean): readonly [word: string, remark: 
 
 /** What someone must act on; the server's own sentence first. */
 function warningsOf(status: Status, age: number | null): Warning[] {
-  const { baseline, paused, problem, replay, running, sick } = status;
+  const { baseline, calibration, paused, problem, replay, running, sick } = status;
   const found = problem ? [warning(problem)] : [];
   if (!running && !replay?.ended && !problem) found.push(warning("No frames come from the source"));
   if (running && !paused && !replay?.ended && age !== null && age > OLD) {
@@ -62,6 +62,9 @@ function warningsOf(status: Status, age: number | null): Warning[] {
   for (const { electrode, state, reason } of sick) {
     const name = `E${electrode + 1} is ${state}`;
     if (!problem?.includes(name)) found.push(warning(`${name}: ${reason}`));
+  }
+  if (calibration?.broken) {
+    found.push(...calibration.findings.map((text) => warning(text, "The calibration does not fit any more")));
   }
   if (baseline?.stale) found.push(warning(`The reference is stale: ${baseline.stale}`));
   return found;

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import type { Touch } from "../src/decode";
+import { forceStateOf, type Touch } from "../src/decode";
 import { History, SLOTS } from "../src/history";
 import { groupByDrive, spread } from "../src/panels/rows";
 
@@ -25,6 +25,17 @@ describe("rows by drive", () => {
   });
 });
 
+describe("what strengths are shown in", () => {
+  const touch = (force: Touch["force"]) => ({ force }) as Touch;
+  const force = (calibrated: boolean) => ({ newtons: 1, low: 0.5, high: 2, calibrated });
+
+  it("is calibrated only where every force is", () => {
+    expect(forceStateOf([touch(null)])).toBe("none");
+    expect(forceStateOf([touch(force(true)), touch(force(true))])).toBe("calibrated");
+    expect(forceStateOf([touch(force(true)), touch(force(false))])).toBe("uncalibrated");
+  });
+});
+
 describe("history", () => {
   const touch = (id: number, peak: number) => ({ id, peak }) as Touch;
 
@@ -35,6 +46,15 @@ describe("history", () => {
     expect(history.columns[0]).toEqual([2, 3]);
     expect(history.columns[1]).toEqual([null, 1]);
     expect([history.idOf(0), history.idOf(1)]).toEqual([4, 9]);
+  });
+
+  it("keeps forces with their intervals beside, and nothing where there is none", () => {
+    const history = new History();
+    const force = { newtons: 4, low: 3, high: 6, calibrated: true };
+    history.add(0, [{ ...touch(4, -2), force }, touch(5, 1)]);
+    history.add(1, []);
+    expect([history.forces[0], history.lows[0], history.highs[0]]).toEqual([[4, null], [3, null], [6, null]]);
+    expect(history.forces[1]).toEqual([null, null]);
   });
 
   it("forgets what is older than the span, and reuses its slot", () => {

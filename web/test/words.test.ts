@@ -20,6 +20,7 @@ const status: Status = {
   sick: [],
   replay: null,
   state: null,
+  calibration: null,
   noise_v: 1e-5,
   alpha: 0.0509,
   rule: "light-touch",
@@ -40,6 +41,15 @@ describe("the headline", () => {
     expect(words({ paused: true }, 60)).toMatchObject({ word: "Paused", warnings: [] });
     expect(words({ recording: "run.mcap" }).word).toBe("Recording");
     expect(headline({ phase: "connecting" }, null, null, 0, null).word).toBe("Connecting");
+  });
+
+  it("says what a calibration says that does not fit any more", () => {
+    const calibration = { well: false, broken: false, findings: ["1.7 times worse"] };
+    expect(texts({ calibration })).toEqual([]);
+    const other = { well: false, broken: true, findings: ["2 rows have jumped"] };
+    expect(words({ calibration: other }).warnings).toEqual([
+      { text: "2 rows have jumped", brief: "The calibration does not fit any more" },
+    ]);
   });
 
   it("counts the reference", () => {

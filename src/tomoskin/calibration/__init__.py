@@ -27,9 +27,11 @@ from tomoskin.calibration.kind import (
     TouchFit,
     silent,
 )
+from tomoskin.calibration.locator.health import CalibrationHealth
+from tomoskin.calibration.locator.left_out import LeftOut
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
-from tomoskin.calibration.locator.rubbing import Rubbing
+from tomoskin.calibration.locator.rubbing import Rubbing, quiet_electrodes
 from tomoskin.calibration.locator.session import SessionAlignment
 from tomoskin.calibration.locator.watch import Watch
 from tomoskin.calibration.several import Several
@@ -38,6 +40,8 @@ from tomoskin.calibration.weighing.identify import MaterialFit, identify
 from tomoskin.calibration.weighing.measured import ForceProcess
 from tomoskin.calibration.weighing.model import ForceModel, LabelRemark, PressedSpots
 from tomoskin.calibration.weighing.presses import WeighedPresses
+from tomoskin.calibration.weighing.report import ForceReport, least_known
+from tomoskin.calibration.weighing.weights import NEWTONS, Weight
 from tomoskin.core import DataError, StrPath, load_arrays
 
 KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, BENDS, CLASSES)
@@ -61,6 +65,7 @@ __all__ = [
     "CLASSES",
     "FORCE",
     "KINDS",
+    "NEWTONS",
     "TOUCH",
     "Alignment",
     "Answers",
@@ -70,6 +75,7 @@ __all__ = [
     "BendReader",
     "BendReading",
     "Calibration",
+    "CalibrationHealth",
     "ChannelMapping",
     "ClassReading",
     "Classifier",
@@ -79,11 +85,13 @@ __all__ = [
     "Examples",
     "ForceModel",
     "ForceProcess",
+    "ForceReport",
     "FrameClassifier",
     "FrameView",
     "JointReference",
     "Kind",
     "LabelRemark",
+    "LeftOut",
     "Locator",
     "MappingAnswer",
     "MaterialFit",
@@ -95,9 +103,12 @@ __all__ = [
     "TouchFit",
     "Watch",
     "WeighedPresses",
+    "Weight",
     "against_rest",
     "identify",
+    "least_known",
     "load_calibration",
+    "quiet_electrodes",
     "ring_of",
     "solve_channel_mapping",
 ]

@@ -61,7 +61,10 @@ def _unpack(arrays: Arrays, pattern: Pattern, where: str, _progress: Progress) -
             real_numbers(arrays, key, where) for key in ("dv", *_LABELS, "covariance")
         )
         if covariance.shape != (pattern.n_meas,) * 2 or dv.shape[1:] != (pattern.n_meas,):
-            raise DataError(f"expected {pattern.n_meas} rows of dv and covariance")
+            raise DataError(
+                f"expected {pattern.n_meas} rows of dv and covariance, "
+                f"got shapes {dv.shape} and {covariance.shape}"
+            )
         return BendModel.learn(BendExamples.of(dv, *labels), covariance)
 
 

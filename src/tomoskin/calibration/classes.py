@@ -125,7 +125,7 @@ def _unpack(arrays: Arrays, pattern: Pattern, where: str, _progress: Progress) -
     with located(where):
         examples = _examples(arrays, where)
         if examples.dv.shape[1] != pattern.n_meas:
-            raise DataError(f"expected {pattern.n_meas} rows of dv")
+            raise DataError(f"expected {pattern.n_meas} rows of dv, got {examples.dv.shape[1]}")
         identities = (pattern.identity, str(arrays.get("skin", "")))
         return FrameClassifier.of(Classifier.learn(examples, identities))
 
@@ -138,7 +138,10 @@ def _examples(arrays: Arrays, where: str) -> Examples:
     )
     session = real_numbers(arrays, "session", where)
     if session.shape != (len(examples),) or not np.isin(session, range(1000)).all():
-        raise DataError(f"expected a session from 0 for each of {len(examples)} frames")
+        raise DataError(
+            f"expected a session from 0 to 999 for each of {len(examples)} frames, "
+            f"got shape {session.shape}"
+        )
     return replace(examples, session=session.astype(np.int64))
 
 

@@ -62,10 +62,17 @@ def _pack(model: ForceModel) -> Arrays:
 def _unpack(arrays: Arrays, _pattern: Pattern, where: str, _progress: Progress) -> ForceModel:
     xy, *columns = (real_numbers(arrays, key, where) for key in ("xy_m", *_COLUMNS))
     if xy.shape[1:] != (2,) or any(column.shape != xy.shape[:1] for column in columns):
-        raise DataError(f"expected {', '.join(_COLUMNS)} of each of {len(xy)} touches", where=where)
+        raise DataError(
+            f"expected xy_m and {', '.join(_COLUMNS)} of each touch, got shapes "
+            f"{', '.join(str(column.shape) for column in (xy, *columns))}",
+            where=where,
+        )
     conductivity, unit = (real_numbers(arrays, key, where) for key in ("conductivity_s", "unit_m"))
     if conductivity.shape or unit.shape or not (conductivity > 0 and unit > 0):
-        raise DataError("expected a conductivity and a unit above 0", where=where)
+        raise DataError(
+            f"expected a conductivity and a unit above 0, got {conductivity} and {unit}",
+            where=where,
+        )
     area, peak, snr, force, press, time = columns
     with located(where):
         _check_touches(xy, area, peak)
@@ -82,7 +89,7 @@ def _unpack(arrays: Arrays, _pattern: Pattern, where: str, _progress: Progress) 
 
 def _check_touches(*columns: FloatArray) -> None:
     if not all(np.isfinite(column).all() for column in columns):
-        raise DataError("expected finite xy_m, area_m2 and peak_s of every touch")
+        raise DataError("expected finite xy_m, area_m2 and peak_s of every touch, got others")
 
 
 def _detection(x: float, y: float, area: float, peak: float, snr: float) -> Detection:
@@ -95,8 +102,8 @@ def _check(calibration: Calibration[ForceModel], skin: Skin) -> None:
     model = calibration.model
     if skin.touch.method != model.method:
         raise DataError(
-            f'the calibration of forces is of touches found by "{model.method}", those of this '
-            f'skin are found by "{skin.touch.method}"',
+            f'the calibration of forces needs touches found by method "{model.method}", but this '
+            f'skin\'s method is "{skin.touch.method}"',
             where="[touch] method",
             hint=f'set method = "{model.method}" in the skin file, or calibrate again: '
             "tomoskin calibrate force",

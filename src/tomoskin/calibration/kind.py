@@ -278,12 +278,12 @@ class Calibration(Generic[M]):
 
     def mismatch(self, what: str, skin: Skin) -> DataError:
         """That it was learnt on another ``what`` than that of ``skin``, by their names."""
-        mine = f'"{self.skin_name}"' if self.skin_name else "a skin that it does not name"
-        other = f'"{skin.name}"' + (", set otherwise" if skin.name == self.skin_name else "")
+        mine = f'"{self.skin_name}"' if self.skin_name else "a skin without a name"
+        other = f'"{skin.name}"' + (", with other settings" if skin.name == self.skin_name else "")
         return DataError(
-            f"the calibration of {self.kind.subject} is of another {what}: "
-            f"learnt on {mine}, asked for on {other}",
-            hint=f"calibrate this one: tomoskin calibrate {self.kind.command}",
+            f"the calibration of {self.kind.subject} belongs to another {what}: it was learnt on "
+            f"{mine} and is used on {other}",
+            hint=f"calibrate this skin: tomoskin calibrate {self.kind.command}",
         )
 
     def with_model(self, model: M) -> Self:

@@ -23,8 +23,10 @@ from tomoskin.calibration.kind import (
     Progress,
     located,
 )
+from tomoskin.calibration.locator.health import BROKEN, CalibrationHealth
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
+from tomoskin.calibration.locator.watch import Watch
 from tomoskin.core import Arrays, DataError, Detection, FloatArray, IntArray, real_numbers
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
@@ -33,26 +35,40 @@ from tomoskin.touch import Region
 _ALL = 0.999
 """Part of a measurement that is taken for all of it."""
 
+_STANDS, _STEADY = 0.7, 0.1
+"""A touch stands, as presses do that are learnt from, at this part of the most that it has been,
+and while it changes by less than the second from one frame to the next."""
+
+_EVERY = 4
+"""Of the frames in which it stands so many are one from which something is concluded."""
+
 _SAME_SHAPE = 1e-4
 """Outlines within so many metres of each other are one."""
 
 
 class LocatedTouch(Applied):
-    """The image tells that there is a touch, labelled presses where: of one touch at a time."""
+    """The image tells that there is a touch, labelled presses where: of one touch at a time.
+
+    Measurements that have jumped since the presses are left out where frames do not fit with them.
+    """
 
     def __init__(self, locator: Locator) -> None:
-        self._locator = locator
+        self._watch = Watch(locator, BROKEN)
+        self._size = self._most = 0.0
+        self._stood = 0
 
     def locate(self, view: FrameView, detections: list[Detection]) -> list[Detection]:
         """The strongest detection, at the position that the presses tell."""
         if not detections:
+            self._size = self._most = 0.0
+            self._stood = 0
             return []
         # The presses were learnt with all that is in them: nothing is taken out here either.
         differences = view.differences
         dv = np.where(_excluded(differences.nuisance), np.nan, differences.change)
         if not np.isfinite(dv).any():
             return []
-        (position,), (covariance,) = self._locator.predict(dv)
+        (position,), (covariance,) = self._watch(dv, settled=self._settled(dv))
         sd_x, sd_y = np.sqrt(np.diag(covariance)).tolist()
         return [
             replace(
@@ -65,6 +81,22 @@ class LocatedTouch(Applied):
                 bias=0.0,
             )
         ]
+
+    def _settled(self, dv: FloatArray) -> bool:
+        """Whether the touch of the newest frame neither comes nor goes, now and then."""
+        before, self._size = self._size, float(np.sqrt(np.nanmean(dv**2)))
+        self._most = max(self._most, self._size)
+        steady = abs(self._size - before) < _STEADY * self._size
+        stands = steady and self._size > _STANDS * self._most
+        self._stood += stands
+        return stands and self._stood % _EVERY == 1
+
+    def read(
+        self, view: FrameView, detections: list[Detection], *, touched: bool
+    ) -> CalibrationHealth:
+        """How the last touches fit the presses."""
+        del view, detections, touched
+        return self._watch.health
 
 
 def _pack(locator: Locator) -> Arrays:
@@ -87,7 +119,7 @@ def _unpack(arrays: Arrays, pattern: Pattern, where: str, progress: Progress) ->
     )
     dv = real_numbers(arrays, "dv", where)
     if dv.shape[1:] != (pattern.n_meas,):
-        raise DataError(f"expected {pattern.n_meas} rows of dv", where=where)
+        raise DataError(f"expected {pattern.n_meas} rows of dv, got shape {dv.shape}", where=where)
     with located(where):
         presses = Presses.of(dv, real_numbers(arrays, "xy_m", where), strength, spread)
         region = Region.checked(real_numbers(arrays, "outline_m", where))

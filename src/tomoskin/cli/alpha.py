@@ -27,15 +27,15 @@ def alpha(
     skin: SkinArgument,
     recording: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Frames that the criteria may look at."),
+        typer.Option(metavar="FILE", help="Frames that the criteria use."),
         Reads(),
     ] = None,
     reference: ReferenceOption = None,
     frames: FramesOption = None,
-    rule: Annotated[str | None, typer.Option(help="Only this criterion.")] = None,
+    rule: Annotated[str | None, typer.Option(help="Show this criterion only.")] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="X.png", help="Where the curves are drawn."),
+        typer.Option(metavar="X.png", help="File for the picture of the curves."),
         Writes(FIGURE),
     ] = None,
     force: ForceFlag = False,

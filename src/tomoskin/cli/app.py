@@ -26,20 +26,20 @@ DEBUG = "TOMOSKIN_DEBUG"
 """Environment variable: set it to see the traceback of an error."""
 
 COMMANDS = {
-    "live": "Show a skin live on a page; without options, the twin of a textile disc.",
+    "live": "Show a skin live on a page; the default is the twin of a textile disc.",
     "record": "Record a session without a page: raw bytes, frames, touches and images.",
-    "image": "Reconstruct a recording: images, and the touches in them.",
-    "calibrate": "Learn from labelled presses, weights, states or bends.",
-    "locate": "Locate touches by a calibration: one a frame, or with --several up to two.",
-    "states": "Classify each frame by a calibration, or call it unknown.",
-    "design": "Say what a skin can resolve before it is built.",
-    "simulate": "Run a script on the twin into a session file, or draw labelled frames.",
+    "image": "Reconstruct a recording: images and touches.",
+    "calibrate": "Learn a calibration from labelled presses, weights, states or bends.",
+    "locate": "Locate touches with a calibration: one per frame, or up to two with --several.",
+    "states": "Classify each frame with a calibration, or call it unknown.",
+    "design": "Predict what a skin can resolve before it is built.",
+    "simulate": "Run a script on the twin into a session file, or simulate labelled frames.",
     "bench": "Measure speed on this machine.",
-    "session": "Inspect, repair and convert recorded sessions.",
-    "skin": "List, show, check and lay skins, and place them on a robot.",
+    "session": "Show, repair and convert recorded sessions.",
+    "skin": "List, show and check skins, lay them on surfaces, and place them on a robot.",
     "firmware": "Build, flash and emulate the board's firmware.",
-    "board": "Check a board that has just been built, before a skin is connected.",
-    "doctor": "Look at this installation: versions, page, sources, sinks, skins, ports.",
+    "board": "Check a newly built board before a skin is connected.",
+    "doctor": "Check this installation: versions, page, sources, sinks, skins, ports.",
 }
 """What each command does: a function NAME of the module ``tomoskin.cli.NAME``, or its ``app``."""
 

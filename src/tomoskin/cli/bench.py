@@ -26,31 +26,37 @@ _FOLDER = Path(__file__).parents[3] / "benchmarks"
 
 def bench(
     name: Annotated[
-        str, typer.Argument(metavar="NAME", help="Name of one part; see --list.", show_default=True)
+        str,
+        typer.Argument(
+            metavar="NAME", help="Name of one benchmark; --list shows the names.", show_default=True
+        ),
     ] = "whole",
     data: Annotated[
         Path | None,
-        typer.Option(help="Folder of public recordings, for those that need it."),
+        typer.Option(help="Folder of public recordings, for benchmarks that need it."),
         Reads(),
     ] = None,
     cores: Annotated[
         int | None,
         typer.Option(
-            min=1, help="Processor cores to use: by default 1, or what the benchmark asks for."
+            min=1,
+            help="Number of processor cores. Default: 1, or the number that the benchmark needs.",
         ),
     ] = None,
     into: Annotated[
         Path | None,
-        typer.Option(help="Markdown file in which the part of that name is replaced."),
-        Otherwise("a part between two marks is replaced, which is what it is for"),
+        typer.Option(help="Markdown file in which the section of that name is replaced."),
+        Otherwise("only the section between its two marks is replaced"),
     ] = None,
-    list_: Annotated[bool, typer.Option("--list", help="List them, and measure nothing.")] = False,
+    list_: Annotated[
+        bool, typer.Option("--list", help="List the benchmarks, and measure nothing.")
+    ] = False,
     json: JsonFlag = False,
 ) -> None:
     """Run one benchmark and show its tables.
 
-    Without a name, all parts in one table: two to three minutes. Single parts take from seconds to
-    an hour.
+    Without a name it runs all parts and shows one table, in two to three minutes. A single part
+    takes from seconds to an hour.
     """
     from threadpoolctl import threadpool_limits
 
@@ -82,7 +88,7 @@ def _benchmarks() -> dict[str, str]:
         raise DataError(
             "the benchmarks are not part of the installed package",
             where="tomoskin bench",
-            hint="run it from a checkout of the source",
+            hint="run it from a checkout of the source code",
         )
     summaries = {}
     for path in sorted(_FOLDER.glob("*.py")):

@@ -31,16 +31,18 @@ def check(
     source: Annotated[
         str, typer.Option(help="serial:PORT, serial:auto, or emulator to try the procedure.")
     ] = "serial:auto",
-    channels: Annotated[int, typer.Option(min=4, max=16, help="8 or 16, as the board has.")] = 8,
+    channels: Annotated[
+        int, typer.Option(min=4, max=16, help="Number of the board's channels: 8 or 16.")
+    ] = 8,
     current: Annotated[
-        str, typer.Option(metavar="CURRENT", help="What the sense resistor is for.")
+        str, typer.Option(metavar="CURRENT", help="Current that the sense resistor is made for.")
     ] = "100 mA",
     meter: Annotated[
-        bool, typer.Option(help="Ask for the multimeter's readings first; Enter leaves one out.")
+        bool, typer.Option(help="Ask for the multimeter's readings first; Enter skips one.")
     ] = True,
     json: JsonFlag = False,
 ) -> None:
-    """Walk through the first power-up: readings of a multimeter, then all that the board can tell.
+    """Check the first power-up: readings of a multimeter, then what the board itself measures.
 
     The second part needs a ring of resistors at the terminals, 1 Ω each at 100 mA (0.1 V over the
     current). One lies between neighbours, two in parallel from E1 to E2, three from E2 to E3.
@@ -90,7 +92,7 @@ def _readings(current: float) -> Iterator[CheckFinding]:
             stage, ok, text if ok else f"{text}, expected {step.expected}: {step.otherwise}"
         )
         if not ok:
-            typer.echo("Switch off, find the cause, then begin again.", err=True)
+            typer.echo("Switch off, find the cause, then start again.", err=True)
             raise typer.Exit(1)
 
 

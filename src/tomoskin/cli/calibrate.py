@@ -50,7 +50,8 @@ def touch(
         Path | None,
         typer.Option(
             metavar="OLD.npz",
-            help="Calibration that these presses are added to: ten or twenty align it to today.",
+            help="Older calibration that these presses extend: ten or twenty presses align it to "
+            "today.",
         ),
         Reads(),
     ] = None,
@@ -58,8 +59,8 @@ def touch(
         bool,
         typer.Option(
             "--unlabelled",
-            help="With --onto: frames without a label are touches too, all over the skin; they "
-            "align the old calibration to today, and labels are not needed.",
+            help="With --onto: frames without a label are touches too, all over the skin. They "
+            "align the old calibration to today, and labels are optional.",
         ),
     ] = False,
     reference: ReferenceOption = None,
@@ -76,8 +77,8 @@ def touch(
     say_notes(data)
     if unlabelled and not onto:
         raise DataError(
-            "--unlabelled aligns an older calibration, and none is given",
-            hint="name it: --onto OLD.npz",
+            "--unlabelled aligns an older calibration, but none is given",
+            hint="add --onto OLD.npz",
         )
     learn, pattern = (
         _onto(onto, skin, recording, aligns=unlabelled)
@@ -94,9 +95,9 @@ def touch(
     facts = _findings(calibration, frames.tolist() if learnt else [])
     if facts["is_guess"]:
         remark(
-            f"{recording}: the frames hardly tell where they were pressed: presses left out are "
-            f"missed by {facts['mean_mm']:.0f} mm, and by {facts['guessed_mm']:.0f} mm if the "
-            "answer is always their middle; look at --reference and the labels, or press harder"
+            f"{recording}: the data hardly depend on the position. Presses left out have a mean "
+            f"error of {facts['mean_mm']:.0f} mm, and of {facts['guessed_mm']:.0f} mm if the "
+            "answer is always their middle. Check --reference and the labels, or press harder"
         )
     if json:
         emit(facts)
@@ -171,7 +172,9 @@ def _what_of(name: str | None, path: Path, data: Recording) -> tuple[Skin | None
 def _findings(calibration: Calibration[Locator], frames: list[int]) -> dict[str, Any]:
     import numpy as np
 
-    locator = calibration.model
+    from tomoskin.calibration import LeftOut
+
+    locator, left_out = calibration.model, LeftOut.of(calibration.model)
     older = len(locator.presses) - len(frames)
     errors = 1e3 * locator.errors
     x, y = (1e3 * locator.next_place()).tolist()
@@ -180,11 +183,11 @@ def _findings(calibration: Calibration[Locator], frames: list[int]) -> dict[str,
         "mean_mm": float(errors.mean()),
         "median_mm": float(np.median(errors)),
         "p95_mm": float(np.percentile(errors, 95)),
-        "guessed_mm": 1e3 * locator.guessed,
-        "is_guess": locator.is_guess,
+        "guessed_mm": 1e3 * left_out.guessed,
+        "is_guess": left_out.is_guess,
         "held_by_90_percent_ellipses": locator.held,
-        "one_force": locator.one_force,
-        "drift": locator.drift,
+        "one_force": left_out.one_force,
+        "drift": left_out.drift,
         "next_press_mm": [x, y],
         "remarks": [
             {"frame": frames[r.row - older] if r.row >= older else None, "reason": r.reason}
@@ -195,25 +198,26 @@ def _findings(calibration: Calibration[Locator], frames: list[int]) -> dict[str,
 
 def _say(facts: dict[str, Any]) -> None:
     typer.echo(
-        f"{facts['presses']} presses; left out of the learning they are missed by "
-        f"{facts['mean_mm']:.1f} mm (median {facts['median_mm']:.1f}, 95 % {facts['p95_mm']:.1f}), "
-        f"and their 90 % ellipses hold {100 * facts['held_by_90_percent_ellipses']:.0f} %"
+        f"{facts['presses']} presses; each press left out in turn, the mean error is "
+        f"{facts['mean_mm']:.1f} mm (median {facts['median_mm']:.1f}, 95 % "
+        f"{facts['p95_mm']:.1f}), and {100 * facts['held_by_90_percent_ellipses']:.0f} % lie "
+        "within their 90 % ellipses"
     )
     if facts["one_force"]:
         typer.echo(
-            "all were about equally hard: this holds for such presses, softer and harder ones are "
-            "missed farther; add some of both with --onto"
+            "all presses were about equally hard: softer and harder ones have larger errors; add "
+            "some of both with --onto"
         )
     for doubtful in facts["remarks"][:_SHOWN]:
         frame = doubtful["frame"]
         who = "an older press" if frame is None else f"frame {frame:>4}"
-        typer.echo(f"{who}  doubtful: {doubtful['reason']}")
+        typer.echo(f"{who}  uncertain: {doubtful['reason']}")
     if len(facts["remarks"]) > _SHOWN:
-        typer.echo(f"… and {len(facts['remarks']) - _SHOWN} more: --json lists them all")
+        typer.echo(f"… and {len(facts['remarks']) - _SHOWN} more: --json lists all")
     if facts["drift"] > _DRIFTED:
         typer.echo(
-            f"the last presses are missed {facts['drift']:.1f} times as far as usual: "
+            f"the errors of the last presses are {facts['drift']:.1f} times as large as usual: "
             "the skin has changed; press it again"
         )
     x, y = facts["next_press_mm"]
-    typer.echo(f"the next press tells most at x {x:+.0f} mm, y {y:+.0f} mm")
+    typer.echo(f"the next press is most useful at x {x:+.0f} mm, y {y:+.0f} mm")

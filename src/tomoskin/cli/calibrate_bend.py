@@ -24,27 +24,27 @@ _ALONG_Y = 90.0
 def calibrate_bend(
     recording: Annotated[
         Path,
-        typer.Argument(metavar="INPUT", help="Frames of known bends, nothing touching."),
+        typer.Argument(metavar="INPUT", help="Frames of known bends, without touches."),
         Reads(),
     ],
     out: CalibrationOut,
     skin: Annotated[
-        str | None, typer.Option(help="Built-in name or path; without it that of the session.")
+        str | None, typer.Option(help="Built-in name or path. Default: the session's skin.")
     ] = None,
     bend: Annotated[
         list[str] | None,
         typer.Option(
             metavar="DEG[@AXIS]=A:B",
-            help="Label: frames A to B-1 are bent by this angle, about an axis in this direction "
-            f"from x (default {_ALONG_Y:.0f}). May be repeated. Without it the session's own "
-            "truth counts.",
+            help="Label: frames A to B-1 are bent by this angle about an axis in this direction "
+            f"from x (default {_ALONG_Y:.0f}). Can be repeated. Default: the session's own "
+            "truth.",
         ),
     ] = None,
     reference: ReferenceOption = None,
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Learn the bends of a skin: touches are then separated from them, and angles are read."""
+    """Learn the bends of a skin: touches are then separated from them, and angles estimated."""
     import numpy as np
 
     from tomoskin.calibration import BENDS, BendExamples, BendModel
@@ -60,7 +60,7 @@ def calibrate_bend(
     say_notes(data)
     idle = idle_frames(data, reference, prepared.pattern)
     if idle is None or isinstance(idle, str):
-        raise DataError("expected voltages and untouched frames", where=str(recording))
+        raise DataError("expected voltages with untouched frames, got none", where=str(recording))
     straight = Reference.of(np.asarray(idle, dtype=np.float64))
     frames, angle, axis = _from_options(bend, len(data)) if bend else _from_truth(recording, data)
     examples = BendExamples.of(data.voltages[frames] - straight.mean, angle, axis,
@@ -79,13 +79,15 @@ def calibrate_bend(
         emit(facts)
         return
     typer.echo(
-        f"{facts['frames']} frames, {facts['directions']} directions; left out of the learning, "
-        f"angles are missed by {facts['error_deg']:.2f}°"
+        f"{facts['frames']} frames, {facts['directions']} directions; in cross-validation "
+        f"the RMS error of an angle is {facts['error_deg']:.2f}°"
     )
     if model.remembers:
-        typer.echo("what the sheet remembers counts: play frames in their order")
+        typer.echo("the sheet's memory is part of the calibration: process frames in their order")
     if not examples.turns:
-        typer.echo("axes are told from three directions on; here the axis is taken as given")
+        typer.echo(
+            "the axis of a bend is estimated from three directions on; here the given axis is used"
+        )
 
 
 def _from_options(given: list[str], n: int) -> tuple[list[int], FloatArray, FloatArray]:
@@ -107,7 +109,7 @@ def _from_options(given: list[str], n: int) -> tuple[list[int], FloatArray, Floa
         if not (colon and 0 <= start < stop <= n and all(map(math.isfinite, value))):
             raise DataError(f"expected frames within 0:{n}, got {span}", where=f"--bend {name}")
         if any(k in rows for k in range(start, stop)):
-            raise DataError(f"frames of {span} are already bent", where=f"--bend {name}")
+            raise DataError(f"frames of {span} already have a label", where=f"--bend {name}")
         rows |= dict.fromkeys(range(start, stop), value)
     frames = sorted(rows)
     angle, axis_of = np.radians([rows[k] for k in frames]).T
@@ -122,7 +124,11 @@ def _from_truth(path: Path, data: Recording) -> tuple[list[int], FloatArray, Flo
     from tomoskin.recording import SessionReader
 
     if not is_session(path):
-        raise DataError("says no angles", where=str(path), hint="--bend 0=0:20 --bend 30=40:60")
+        raise DataError(
+            "holds no angles of bends",
+            where=str(path),
+            hint="give them: --bend 0=0:20 --bend 30=40:60",
+        )
     with SessionReader(path) as session:
         truth = list(session.truth())
     at = np.searchsorted([item.host_time for item in truth], data.time, side="right") - 1
@@ -136,6 +142,10 @@ def _from_truth(path: Path, data: Recording) -> tuple[list[int], FloatArray, Flo
             frames.append(frame)
             rows.append((float(bend["angle"]), float(bend["axis"])))
     if not frames:
-        raise DataError("holds no truth of bends", where=str(path), hint="--bend 30=40:60")
+        raise DataError(
+            "holds no angles of bends that the twin made",
+            where=str(path),
+            hint="give them: --bend 0=0:20 --bend 30=40:60",
+        )
     angle, axis = np.array(rows).T
     return frames, angle, axis

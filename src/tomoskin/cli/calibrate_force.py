@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,7 +20,7 @@ from tomoskin.core import DataError, FloatArray
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tomoskin.calibration import Calibration, ForceModel, WeighedPresses
+    from tomoskin.calibration import ForceReport, WeighedPresses
     from tomoskin.core import Detection, Touch
     from tomoskin.pipeline import Reconstruction
 
@@ -32,13 +33,10 @@ class Unit(StrEnum):
     KG = "kg"
 
 
-_NEWTONS = {Unit.N: 1.0, Unit.G: 9.80665e-3, Unit.KG: 9.80665}
-
-
 def calibrate_force(
     recording: Annotated[
         Path,
-        typer.Argument(metavar="INPUT", help="Frames, with the force in some of them."),
+        typer.Argument(metavar="INPUT", help="Frames; some have a label with their force."),
         Reads(),
     ],
     out: CalibrationOut,
@@ -47,8 +45,8 @@ def calibrate_force(
         list[str] | None,
         typer.Option(
             metavar="FORCE=A:B",
-            help="Label: this weight pressed in frames A to B-1. May be repeated. Without it the "
-            "file's own force_n counts.",
+            help="Label: this weight pressed in frames A to B-1. Can be repeated. Default: "
+            "force_n of the file.",
         ),
     ] = None,
     unit: Annotated[Unit, typer.Option(help="Unit of the forces.")] = Unit.N,
@@ -57,14 +55,14 @@ def calibrate_force(
     json: JsonFlag = False,
 ) -> None:
     """Learn the force of touches from presses with known weights, all by the same tip."""
-    from tomoskin.calibration import FORCE, ForceModel
+    from tomoskin.calibration import FORCE, NEWTONS, ForceModel, ForceReport
     from tomoskin.cli.choices import skin_for_file
     from tomoskin.formats import read_recording
     from tomoskin.pipeline import prepare, reconstruct
 
     chosen = skin_for_file(skin, recording)
     data = read_recording(recording)
-    newtons = _NEWTONS[unit] * _labels(recording, len(data), weight or [])
+    newtons = NEWTONS[unit.value] * _labels(recording, len(data), weight or [])
     with Bar("preparing"):
         prepared = prepare(chosen)
     data = data.in_order_of(prepared.pattern)
@@ -75,12 +73,12 @@ def calibrate_force(
     presses = _weighed(recording, result, newtons, data.time)
     with Bar("learning"):
         model = ForceModel.fit(presses, chosen)
-    calibration = FORCE.of(model, prepared.pattern, chosen)
-    calibration.write(out, overwrite=force)
+    FORCE.of(model, prepared.pattern, chosen).write(out, overwrite=force)
+    report = ForceReport.of(model)
     if json:
-        emit(_findings(calibration))
+        emit(_findings(report))
     else:
-        _say(_findings(calibration))
+        _say(report)
 
 
 def _labels(path: Path, n: int, given: Sequence[str]) -> FloatArray:
@@ -98,9 +96,9 @@ def _labels(path: Path, n: int, given: Sequence[str]) -> FloatArray:
     arrays = {} if is_session(path) or path.suffix.lower() != ".npz" else load_arrays(path)
     if "force_n" not in arrays:
         raise DataError(
-            "says no forces: expected force_n (n_frames,), NaN where nothing was weighed",
+            "holds no forces: expected force_n (n_frames,), NaN where no weight was applied",
             where=str(path),
-            hint="or --weight 4.9=40:60 --weight 9.8=80:100",
+            hint="add force_n, or --weight 4.9=40:60 --weight 9.8=80:100",
         )
     labels = real_numbers(arrays, "force_n", str(path))
     if labels.shape != (n,):
@@ -139,7 +137,7 @@ def _weighed(
     if without or several:
         remark(
             f"{path}: of the frames with a force, {without} show no touch and {several} show "
-            "several; these were left out"
+            "several touches; these were left out"
         )
     detections, *labels = zip(*rows, strict=True) if rows else ((), (), (), ())
     return WeighedPresses.of(detections, *(np.array(column) for column in labels))
@@ -152,32 +150,17 @@ def _goes_on(before: Touch, touch: Touch) -> bool:
     return before.id == touch.id and bool(apart**2 <= now.area / np.pi)
 
 
-def _findings(calibration: Calibration[ForceModel]) -> dict[str, Any]:
-    model = calibration.model
-    rows = model.presses.labelled
-    errors = np.abs(model.errors)
-    force = model.presses.force[rows]
-    return {
-        "touches": len(rows),
-        "presses": len(np.unique(model.presses.press[rows])),
-        "from_n": float(force.min()),
-        "to_n": float(force.max()),
-        "mean_error": float(errors.mean()),
-        "median_error": float(np.median(errors)),
-        "held_by_90_percent_intervals": model.held,
-        "memory": bool(model.memory.play),
-        "remarks": [{"press": r.press, "reason": r.reason} for r in model.remarks],
-    }
+def _findings(report: ForceReport) -> dict[str, Any]:
+    facts = asdict(report)
+    return {**facts, "held_by_90_percent_intervals": facts.pop("held")}
 
 
-def _say(facts: dict[str, Any]) -> None:
+def _say(report: ForceReport) -> None:
+    typer.echo(report.text)
     typer.echo(
-        f"{facts['touches']} touches of {facts['presses']} presses, {facts['from_n']:.2g} to "
-        f"{facts['to_n']:.2g} N; left out of the learning their forces are missed by "
-        f"{100 * facts['mean_error']:.0f} % (median {100 * facts['median_error']:.0f} %), and "
-        f"their 90 % intervals hold {100 * facts['held_by_90_percent_intervals']:.0f} %"
+        "forces are valid for the tip that pressed: a tip of another size changes the sheet "
+        "differently"
     )
-    typer.echo("forces hold for the tip that pressed: another size changes the sheet otherwise")
-    for doubtful in facts["remarks"]:
-        who = "" if doubtful["press"] is None else f"press {doubtful['press']:>4}  doubtful: "
-        typer.echo(f"{who}{doubtful['reason']}")
+    for doubtful in report.remarks:
+        who = "" if doubtful.press is None else f"press {doubtful.press:>4}  uncertain: "
+        typer.echo(f"{who}{doubtful.reason}")

@@ -31,9 +31,9 @@ def calibrate_rub(
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Learn where a touch is from one finger that rubs all of the skin, without labels.
+    """Learn where a touch is from one finger that rubs the whole skin, without labels.
 
-    The skin file says where the electrodes are. Frames with a label are used as such: five help.
+    The skin file says where the electrodes are. Five frames with a label improve the result.
     """
     from tomoskin.calibration import TOUCH, Rubbing
     from tomoskin.formats import read_recording
@@ -54,11 +54,10 @@ def calibrate_rub(
     for finding in found.findings:
         remark(finding)
     TOUCH.of(locator, pattern, rubbed).write(out, overwrite=force)
-    facts = _facts(found, len(frames))
     if json:
-        emit(facts)
+        emit(_facts(found, len(frames)))
     else:
-        typer.echo(_line(facts))
+        typer.echo(f"{len(frames)} frames with a touch, {found.text}")
 
 
 def _touched(data: Recording, dv: FloatArray, reference: str | None, pattern: Pattern) -> IntArray:
@@ -77,23 +76,10 @@ def _touched(data: Recording, dv: FloatArray, reference: str | None, pattern: Pa
 
 
 def _facts(found: Rubbing, touched: int) -> dict[str, Any]:
-    import numpy as np
-
-    spread = found.presses.spreads
-    deviation = np.sqrt(np.trace(spread, axis1=1, axis2=2) / 2)
     return {
         "touched_frames": touched,
         "used": len(found.presses),
-        "labelled": int((deviation == 0).sum()),
-        "deviation_mm": 1e3 * float(np.median(deviation[deviation > 0])),
+        "labelled": found.labelled,
+        "deviation_mm": 1e3 * found.deviation,
         "alike": found.alike,
     }
-
-
-def _line(facts: dict[str, Any]) -> str:
-    return (
-        f"{facts['touched_frames']} frames with a touch, {facts['used']} used, "
-        f"{facts['labelled']} of them labelled; positions are uncertain by about "
-        f"{facts['deviation_mm']:.1f} mm in each direction, and a few labelled presses make them "
-        "better"
-    )

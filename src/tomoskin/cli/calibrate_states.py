@@ -49,9 +49,9 @@ def marked(path: Path, dv: FloatArray, given: list[str], codes: Codes | None) ->
         return Examples.of(codes, dv, codes.flags_of(labels))
     if codes is None:
         raise DataError(
-            "says no states: expected state (n_frames,) or flags (n_frames, f)",
+            "holds no states: expected state (n_frames,) or flags (n_frames, f)",
             where=str(path),
-            hint="or --state idle=0:40 --state touch=40:80",
+            hint="add one of them, or --state idle=0:40 --state touch=40:80",
         )
     return Examples.of(codes, dv, np.full((len(dv), len(codes.names)), np.nan))
 
@@ -74,7 +74,7 @@ _HARDLY = 0.5
 def calibrate_states(
     recording: Annotated[
         Path,
-        typer.Argument(metavar="INPUT", help="Frames, with the state of some of them."),
+        typer.Argument(metavar="INPUT", help="Frames; some have a label with their state."),
         Reads(),
     ],
     out: CalibrationOut,
@@ -83,16 +83,16 @@ def calibrate_states(
         list[str] | None,
         typer.Option(
             metavar="NAME=A:B",
-            help="Label: frames A to B-1 show this state. May be repeated. Without it the file's "
-            "own state or flags count.",
+            help="Label: frames A to B-1 show this state. Can be repeated. Default: state or "
+            "flags of the file.",
         ),
     ] = None,
     onto: Annotated[
         Path | None,
         typer.Option(
             metavar="OLD.npz",
-            help="Calibration of another session: these frames, labelled or not, fit it to this "
-            "one.",
+            help="Calibration of another session. These frames, labelled or not, align it to "
+            "this one.",
         ),
         Reads(),
     ] = None,
@@ -108,7 +108,7 @@ def calibrate_states(
 
     data = read_recording(recording)
     say_notes(data)
-    with Bar("learning the older ones"):
+    with Bar("learning from the older calibration"):
         old = CLASSES.read(onto) if onto else None
     chosen, pattern = _what_of(skin, recording, old)
     pattern = pattern or Pattern.from_tables(data.drive, data.measure)
@@ -175,10 +175,10 @@ def _report(made: Calibration[FrameClassifier], n_frames: int, fitted: bool, *, 
     typer.echo(f"{len(codes.names)} {kind}: {', '.join(codes.names)}")
     share = f"{100 * classifier.right:.0f} % of the labelled frames"
     typer.echo(
-        f"{n_labelled} of {n_frames} frames labelled; left out of the learning, {share} are right"
+        f"{n_labelled} of {n_frames} frames labelled; in cross-validation, {share} are right"
     )
     if classifier.right < _HARDLY:
-        typer.echo("the labels hardly follow from the data: are they of these frames?")
+        typer.echo("the labels hardly depend on the data: check that they belong to these frames")
     if fitted and classifier.alignment is not None:
         typer.echo(classifier.alignment.text)
 

@@ -26,7 +26,9 @@ def calibrate_wiring(
     recording: LabelledArgument,
     out: Annotated[
         Path,
-        typer.Option(metavar="WIRED.toml", help="Where the skin file as it is wired goes."),
+        typer.Option(
+            metavar="WIRED.toml", help="New skin file with the channel mapping that was found."
+        ),
         Writes(SKIN),
     ],
     skin: SkinOption = None,
@@ -116,24 +118,27 @@ def _say(facts: dict[str, Any]) -> None:
     )
     if facts["polarity"] == "not known":
         typer.echo(
-            "the polarity cannot be told: give untouched frames, or [touch] sign in the skin file"
+            "the polarity is not known: give untouched frames, or set [touch] sign in the skin file"
         )
     for remark in facts["remarks"]:
         x, y = remark["looks_like_mm"]
         typer.echo(
-            f"frame {remark['frame']:>4}  doubtful: looks like a press at x {x:+.0f} mm, "
-            f"y {y:+.0f} mm"
+            f"frame {remark['frame']:>4}  uncertain: fits a press at x {x:+.0f} mm, y "
+            f"{y:+.0f} mm better"
         )
 
 
 def _why(answer: MappingAnswer) -> str:
     if answer.doubtful:
-        return "too many of these presses look as if they were elsewhere: are the labels right?"
+        return "too many of these presses fit other positions better: check the labels"
     if answer.unexplained > 1 - answer.probability - answer.unexplained:
-        return "no wiring explains these presses well enough to be sure"
-    return f"these presses cannot tell: the likeliest wiring has {answer.probability:.2f}"
+        return "no channel mapping explains these presses well enough"
+    return (
+        "these presses do not decide it: the most likely channel mapping has a probability of "
+        f"{answer.probability:.2f}"
+    )
 
 
 def _next(facts: dict[str, Any]) -> str:
     x, y = facts["next_press_mm"]
-    return f"a further press tells most at x {x:+.0f} mm, y {y:+.0f} mm"
+    return f"a further press is most useful at x {x:+.0f} mm, y {y:+.0f} mm"

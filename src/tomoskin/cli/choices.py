@@ -52,7 +52,9 @@ def skin_for_file(skin: str | None, path: Path) -> Skin:
     with SessionReader(path) as session:
         own = session.skin
     if chosen is not None and (others := _sheet_differences(own, chosen)):
-        remark(f"{path} was recorded on {own.name}; {chosen.name} has another {', '.join(others)}")
+        remark(
+            f"{path} was recorded on {own.name}, but {chosen.name} has another {', '.join(others)}"
+        )
     return chosen or own
 
 
@@ -83,7 +85,7 @@ def with_alpha(skin: Skin, given: str | None) -> tuple[Skin, str | None]:
         if not 1e-9 <= alpha <= 1e9:
             rules = ", ".join(RULES)
             raise typer.BadParameter(
-                f'expected a number above 0, auto or a rule among {rules}; got "{given}"',
+                f'expected a number above 0, auto, or a rule among {rules}; got "{given}"',
                 param_hint="--alpha",
             )
     return skin.altered({"inverse": {"alpha": alpha}}), None
@@ -155,7 +157,7 @@ def with_calibrations(prepared: Prepared, paths: Iterable[Path] | None, skin: Sk
             raise DataError(
                 f"is a calibration of {kind.subject}, and so is {named[kind.name]}",
                 where=str(path),
-                hint="name one of them",
+                hint="give only one of them",
             )
         named[kind.name] = path
         if kind.own_settings:

@@ -38,24 +38,24 @@ def design(
     skin: NamedSkinOption = DEFAULT_SKIN,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="MAP.png", help="Where the map of the skin goes."),
+        typer.Option(metavar="MAP.png", help="File for the map of the skin."),
         Writes(FIGURE),
     ] = None,
     radius: Annotated[
         str | None,
-        typer.Option(
-            metavar='"15 mm"', help="Radius of the press; without it, 7.5 % of the sheet."
-        ),
+        typer.Option(metavar='"15 mm"', help="Radius of the press. Default: 7.5 % of the sheet."),
     ] = None,
     depth: Annotated[
         float, typer.Option(help="Part of the conductivity that the press takes away.")
     ] = 0.25,
     false_alarm: Annotated[
-        float, typer.Option(help="Chance of a false alarm at a position, in a frame.")
+        float, typer.Option(help="Probability of a false alarm at a position, in a frame.")
     ] = 1e-4,
-    found: Annotated[float, typer.Option(help="Chance that a press is found in a frame.")] = 0.95,
+    found: Annotated[
+        float, typer.Option(help="Probability that a press is detected in a frame.")
+    ] = 0.95,
     electrodes: Annotated[
-        str, typer.Option(metavar="N,N", help='Numbers of electrodes to compare; "" for none.')
+        str, typer.Option(metavar="N,N", help='Numbers of electrodes to compare; "" compares none.')
     ] = _ELECTRODES,
     patterns: Annotated[
         str, typer.Option(metavar="NAME,NAME", help="Patterns to compare, named as in a skin file.")
@@ -65,8 +65,8 @@ def design(
 ) -> None:
     """Bound what a skin can resolve, and compare it with variants.
 
-    Bounds the error of a press's position, and the faintest press, by the skin's own read-out. No
-    method can do better without more knowledge (Cramér–Rao).
+    The bounds are for the position of a press and for the faintest press, with the skin's own
+    read-out. No method can do better without more knowledge (Cramér–Rao).
     """
     from tomoskin.formats import write_promise
     from tomoskin.skin import Skin
@@ -106,8 +106,8 @@ def _check_size(radius: float | None, skin: Skin) -> None:
     most = float((high - low)[:2].min()) / 2
     if radius is not None and radius >= most:
         raise DataError(
-            f"expected a radius below {1e3 * most:.0f} mm, half of the sheet, "
-            f"got {1e3 * radius:.0f} mm",
+            f"expected a radius below {1e3 * most:.0f} mm, half of the sheet, got "
+            f"{1e3 * radius:.0f} mm",
             where="--radius",
         )
 
@@ -115,7 +115,7 @@ def _check_size(radius: float | None, skin: Skin) -> None:
 def _counts(text: str) -> list[int]:
     parts = [part.strip() for part in text.split(",") if part.strip()]
     if not all(part.isdigit() for part in parts):
-        raise typer.BadParameter(f'expected numbers such as 8,16, got "{text}"')
+        raise typer.BadParameter(f'expected whole numbers such as 8,16, got "{text}"')
     return [int(part) for part in parts]
 
 
@@ -156,17 +156,19 @@ def _lines(document: dict[str, Any]) -> Iterator[str | Table]:
     press = document["press"]
     yield (
         f"{document['skin']}: a press of radius {1e3 * press['radius_m']:.0f} mm that takes "
-        f"{100 * press['depth']:.0f} % of the conductivity, one frame, within 85 % of the way out:"
+        f"{100 * press['depth']:.0f} % of the conductivity, in one frame, within 85 % of the way "
+        "to the rim:"
     )
     yield (
-        f"its place is missed by {1e3 * document['least_m']:.2g} mm at best, "
-        f"{1e3 * document['median_m']:.2g} mm in the median, "
+        f"the RMS error of its position is at least {1e3 * document['least_m']:.2g} mm at the "
+        f"best position, {1e3 * document['median_m']:.2g} mm in the median, "
         f"{1e3 * document['p95_m']:.2g} mm at the 95th percentile"
     )
     yield (
-        f"noticed (found {100 * document['found']:g} % of the time, "
-        f"{document['false_alarm']:g} false alarms) from {100 * document['faintest_median']:.2g} % "
-        f"on in the median, {100 * document['faintest_p95']:.2g} % at the 95th percentile"
+        f"it is detected (found {100 * document['found']:g} % of the time, "
+        f"{document['false_alarm']:g} false alarms) from "
+        f"{100 * document['faintest_median']:.2g} % on in the median, "
+        f"{100 * document['faintest_p95']:.2g} % at the 95th percentile"
     )
     shown = [
         (
@@ -178,7 +180,7 @@ def _lines(document: dict[str, Any]) -> Iterator[str | Table]:
         if "fault" not in row
     ]
     if shown:
-        yield from tables("the same sheet otherwise", _HEADINGS, shown)
+        yield from tables("the same sheet with another design", _HEADINGS, shown)
     for row in document["compared"]:
         if (words := row.get("fault") or row.get("saturated")) is not None:
             yield f"{row['electrodes']} electrodes, {row['pattern']}: {words}"

@@ -64,7 +64,7 @@ def _sources() -> Iterator[Finding]:
     from tomoskin.source import list_ports, source_names
 
     names = ", ".join(source_names())
-    yield Finding("sources", bool(names), names or "none; install tomoskin again (make live)")
+    yield Finding("sources", bool(names), names or "none: install tomoskin again (make live)")
     ports = ", ".join(map(str, list_ports()))
     yield Finding("serial", True, ports or "no serial port is connected")
 

@@ -16,12 +16,6 @@ from tomoskin.cli.output import Bar
 app = group("firmware")
 
 
-def _checked_channels(channels: int) -> int:
-    if channels not in (8, 16):
-        raise typer.BadParameter(f"expected 8 or 16, got {channels}")
-    return channels
-
-
 def _eight_bytes(name: str | None) -> str | None:
     if name is not None and not (name.isascii() and name.isprintable() and 0 < len(name) <= 8):
         raise typer.BadParameter(f'expected 1 to 8 ASCII characters, got "{name}"')
@@ -29,9 +23,8 @@ def _eight_bytes(name: str | None) -> str | None:
 
 
 Channels = Annotated[
-    int, typer.Option(help="8 or 16, as the board has.", callback=_checked_channels)
+    int, typer.Option(help="Number of the board's channels: 8 or 16, on a Pico also 32.")
 ]
-Port = Annotated[str, typer.Argument(help="Such as /dev/ttyACM0.")]
 
 
 def _checked_board(board: str) -> str:
@@ -48,11 +41,22 @@ Board = Annotated[
 ]
 
 
+def _check_channels(channels: int, board: str) -> None:
+    from tomoskin.emulator import BOARDS
+
+    kind = BOARDS[board]
+    if channels not in kind.channels:
+        wanted = ", ".join(map(str, kind.channels[:-1])) + f" or {kind.channels[-1]}"
+        other = "; a Pico has up to 32: --board pico" if channels == 32 else ""
+        raise typer.BadParameter(f"expected {wanted} channels ({kind.text}), got {channels}{other}")
+
+
 @app.command()
 def build(channels: Channels = 8, board: Board = "mega") -> None:
     """Build the firmware of a board: the ELF of an ATmega2560, the UF2 of a Pico."""
     from tomoskin.emulator import build_elf, build_uf2
 
+    _check_channels(channels, board)
     with Bar("building"):
         made = build_uf2(channels) if board == "pico" else build_elf(channels)
     typer.echo(str(made))
@@ -63,7 +67,8 @@ def flash(
     port: Annotated[
         str | None,
         typer.Argument(
-            help="Such as /dev/ttyACM0; of a Pico its boot drive, found where none is named."
+            help="Port of the board, such as /dev/ttyACM0. For a Pico, its boot drive; without it "
+            "the drive is searched for."
         ),
     ] = None,
     channels: Channels = 8,
@@ -72,8 +77,9 @@ def flash(
     """Write the firmware to a board: to a Mega with avrdude, to a Pico's boot drive as UF2."""
     from tomoskin.emulator import find_boot_drive, pico_image, write_firmware, write_uf2
 
+    _check_channels(channels, board)
     if board == "mega" and port is None:
-        raise typer.BadParameter("expected the port of the board, such as /dev/ttyACM0")
+        raise typer.BadParameter("expected the port of the board, such as /dev/ttyACM0, got none")
     with Bar("writing"):
         if board == "mega":
             assert port is not None
@@ -82,37 +88,45 @@ def flash(
             drive = find_boot_drive() if port is None else Path(port)
             write_uf2(pico_image(channels), drive)
             port = str(drive)
-    after = "next is tomoskin firmware configure" if board == "mega" else "the Pico starts it"
+    after = (
+        "next: tomoskin firmware configure" if board == "mega" else ("the Pico starts it by itself")
+    )
     typer.echo(f"{port}: firmware for {channels} channels; {after}")
 
 
 @app.command()
 def configure(
-    port: Port,
+    port: Annotated[
+        str,
+        typer.Argument(help="Such as /dev/ttyACM0; to write to a Pico its boot drive: see flash."),
+    ],
     current: Annotated[
         str | None,
-        typer.Option(metavar="CURRENT", help='What the sense resistor gives, measured: "100 mA".'),
+        typer.Option(
+            metavar="CURRENT", help='Measured current of the sense resistor, such as "100 mA".'
+        ),
     ] = None,
     name: Annotated[
         str | None,
         typer.Option(
             "--id",
             metavar="NAME",
-            help="Name of this board, of at most 8 characters.",
+            help="Name of this board, at most 8 characters.",
             callback=_eight_bytes,
         ),
     ] = None,
     skin: Annotated[
-        str | None, typer.Option(help="Built-in name or path: no current above its own.")
+        str | None,
+        typer.Option(help="Built-in name or path. A current above that of this skin is refused."),
     ] = None,
+    board: Board = "mega",
 ) -> None:
     """Write a board's current and id into its EEPROM and read them back; without either, show
-    them."""
+    them. Of a Pico the current alone is written, to its flash."""
     from tomoskin.emulator import (
         check_current,
         read_identity,
         say_identity,
-        sense_resistor,
         write_identity,
     )
     from tomoskin.skin import Skin
@@ -121,6 +135,9 @@ def configure(
     of_skin = Skin.load(skin).current if skin else None
     if asked is not None:
         check_current(asked, of_skin)
+    if board == "pico":
+        _configure_pico(Path(port), asked, name)
+        return
     held = read_identity(port)
     if asked is None and name is None:
         typer.echo(f"{port}: {say_identity(held)}")
@@ -130,8 +147,30 @@ def configure(
     with Bar("writing"):
         write_identity(port, identity)
     typer.echo(f"{port}: {say_identity(identity)}, read back from the firmware")
-    ohms = f"{sense_resistor(identity.current):.4g} Ω"
-    typer.echo(f"the firmware cannot measure it: the sense resistor must be {ohms} in all")
+    _say_resistor(identity.current)
+
+
+def _configure_pico(drive: Path, current: float | None, name: str | None) -> None:
+    from tomoskin.emulator import settings_uf2, write_uf2
+
+    if name is not None:
+        raise typer.BadParameter("the id of a Pico is its flash chip's, and cannot be changed")
+    if current is None:
+        raise typer.BadParameter(
+            "expected --current; tomoskin firmware configure PORT shows what a Pico holds"
+        )
+    write_uf2(settings_uf2(current), drive)
+    typer.echo(f"{drive}: {current * 1e3:g} mA; the Pico starts again with it")
+    _say_resistor(current)
+
+
+def _say_resistor(current: float) -> None:
+    from tomoskin.emulator import sense_resistor
+
+    ohms = f"{sense_resistor(current):.4g} Ω"
+    typer.echo(
+        f"the firmware cannot measure the current: the sense resistor must have {ohms} in total"
+    )
 
 
 @app.command()

@@ -28,7 +28,7 @@ def labels_of_frames(given: Sequence[str], n: int, option: str, label: str) -> l
         taken = sorted({labels[k] for k in range(start, stop)} - {"", name})
         if taken:
             raise DataError(
-                f"frames of {span} are already {taken[0]}",
+                f"frames of {span} already have the label {taken[0]}",
                 where=f"{option} {name}",
                 hint=f"give each frame one {label}",
             )

@@ -66,7 +66,7 @@ def image(
     calibration: CalibrationsOption = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="X.png|.npz|.vtu", help="Where the images go."),
+        typer.Option(metavar="X.png|.npz|.vtu", help="File for the images."),
         Writes(IMAGES),
     ] = None,
     touches: TouchesOut = None,
@@ -124,7 +124,7 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
         yield ", ".join(f"{name}: {count} frames" for name, count in Counter(names).items())
     yield from span_lines(spans, result.unit)
     if spans:
-        yield "times are from the first frame on; --touches X.csv writes each frame of each touch"
+        yield "times count from the first frame; --touches X.csv writes each touch in each frame"
 
 
 def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
@@ -141,13 +141,13 @@ def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
     named = [f"{frame} ({_rows(count)})" for frame, count in counted if count]
     if named:
         remark(
-            f"{source}: {len(named)} frames hold rows that are not finite, and were "
-            f"imaged without these: {_listed(named)}"
+            f"{source}: {len(named)} frames hold values that are not finite; these rows were "
+            f"left out: {_listed(named)}"
         )
     if len(result.left_out):
         remark(
-            f"{source}: {len(result.left_out)} frames hold too many values that are not "
-            f"finite and were left out: {_listed(result.left_out.tolist())}"
+            f"{source}: {len(result.left_out)} frames hold too many values that are not finite "
+            f"and were left out: {_listed(result.left_out.tolist())}"
         )
     if (doubt := result.model_agreement.doubt(volts=is_session(source))) is not None:
         remark(f"{source}: {doubt}")
@@ -266,9 +266,9 @@ def _vtu(
 
     if len(result.frames) > _MOST_FIELDS:
         raise DataError(
-            f"a .vtu file takes {_MOST_FIELDS} frames, got {len(result.frames)}",
+            f"a .vtu file holds at most {_MOST_FIELDS} frames, got {len(result.frames)}",
             where=str(path),
-            hint="choose some with --frames A:B",
+            hint="choose fewer frames with --frames A:B",
         )
     images, _ = display.applied(result.images, prepared.mesh, result.unit)
     names = [f"frame_{frame:06d}" for frame in result.frames.tolist()]

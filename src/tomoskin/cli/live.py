@@ -32,7 +32,8 @@ def live(
     robot: Annotated[
         Path | None,
         typer.Option(
-            metavar="ROBOT.toml", help="All skins of a robot file, instead of --skin and --source."
+            metavar="ROBOT.toml",
+            help="Robot file: run all its skins, instead of --skin and --source.",
         ),
         Reads(),
     ] = None,
@@ -46,21 +47,20 @@ def live(
     calibration: CalibrationsOption = None,
     folder: Annotated[
         Path,
-        typer.Option(exists=True, file_okay=False, help="Folder of the page's files."),
-        Otherwise("what the page writes gets a name that is free"),
+        typer.Option(exists=True, file_okay=False, help="Folder for the page's files."),
+        Otherwise("what the page writes gets a free name"),
     ] = Path(),
     token_file: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="File that keeps the token, so that open pages find a server that was started "
-            "again.",
+            help="File that keeps the token. Open pages then find the server after a restart.",
         ),
-        Otherwise("made where there is none, else only read"),
+        Otherwise("created where there is none, else only read"),
     ] = None,
     sink: SinkOption = None,
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Port of the page; 0 takes a free one.")
+        int, typer.Option(min=0, max=65535, help="Port of the page; 0 chooses a free one.")
     ] = 8765,
     host: Annotated[
         str, typer.Option(help="Address to listen on; 0.0.0.0 lets other machines reach the page.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,27 +15,25 @@ from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.recording import changes, say_notes
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import Calibration, Locator
+    from tomoskin.calibration import Calibration, CalibrationHealth, Locator
     from tomoskin.core import FloatArray, Touch
     from tomoskin.signal import Recording
 
 _BLOCK = 256
 _SHOWN = 20
-_STRANGE = 1.5
-"""How many times worse than its own presses frames may fit a calibration unsaid."""
 
 
 def locate(
     recording: RecordingArgument,
     calibration: Annotated[
-        Path, typer.Option(metavar="C.npz", help="From tomoskin calibrate touch."), Reads()
+        Path, typer.Option(metavar="C.npz", help="File from tomoskin calibrate touch."), Reads()
     ],
     touches: TouchesOut = None,
     force: ForceFlag = False,
     skin: SameSkinOption = None,
     reference: ReferenceOption = None,
     several: Annotated[
-        bool, typer.Option("--several", help="Two touches where the frame shows them; slower.")
+        bool, typer.Option("--several", help="Locate two touches where a frame shows two; slower.")
     ] = False,
     json: JsonFlag = False,
 ) -> None:
@@ -54,11 +53,11 @@ def locate(
     frames = np.flatnonzero(np.isfinite(dv[:, loaded.model.features.rows]).any(axis=1))
     if len(frames) < len(dv):
         typer.echo(
-            f"tomoskin: {recording}: {len(dv) - len(frames)} frames hold no finite value "
-            "and were left out",
+            f"tomoskin: {recording}: {len(dv) - len(frames)} frames hold no finite value and "
+            "were left out",
             err=True,
         )
-    _say_strange(loaded.model, dv[frames])
+    _say_health(_strangeness(loaded.model, dv[frames]))
     located = list((_several if several else _single)(loaded, dv[frames]))
     if touches is not None:
         rows = zip(frames.tolist(), located, strict=True)
@@ -67,16 +66,19 @@ def locate(
     _report(data, frames.tolist(), located, json=json)
 
 
-def _say_strange(locator: Locator, dv: FloatArray) -> None:
-    """Say where the frames fit the calibration worse than its own presses do."""
+def _strangeness(locator: Locator, dv: FloatArray) -> CalibrationHealth:
     import numpy as np
 
-    if len(dv) and (times := float(np.median(locator.strangeness(dv)))) > _STRANGE:
-        remark(
-            f"frames fit the calibration {times:.1f} times worse than its own presses do: the "
-            "skin, its electrodes or its gains have changed. Ellipses are widened. Touch the skin "
-            "all over and align it: tomoskin calibrate touch --onto C.npz --unlabelled"
-        )
+    from tomoskin.calibration import CalibrationHealth
+
+    strange = float(np.median(locator.strangeness(dv))) if len(dv) else np.nan
+    return CalibrationHealth(len(dv), strange)
+
+
+def _say_health(health: CalibrationHealth) -> None:
+    """Say what speaks against the calibration."""
+    for finding in () if health.well else health.findings:
+        remark(finding)
 
 
 def _check_skin(loaded: Calibration[Locator], name: str | None, path: Path) -> None:
@@ -118,14 +120,7 @@ def _single(loaded: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touc
             nothing = np.empty(0, dtype=np.int64)
             detection = Detection(x, y, sd_x, sd_y, area=np.nan, peak=float(peak), cells=nothing)
             yield (Touch(id=1, kind="touch", since=0.0, detection=detection),)
-    if len(watch.jumped):
-        jumped = "; ".join(loaded.pattern.row_text(row) for row in watch.jumped[:_SHOWN].tolist())
-        typer.echo(
-            f"tomoskin: {len(watch.jumped)} rows have jumped since the calibration and are left "
-            f"out at the end: {jumped}; presses of today mend that: "
-            "tomoskin calibrate touch --onto",
-            err=True,
-        )
+    _say_health(replace(watch.health, presses=0))  # strangeness has been said of all frames
 
 
 def _report(
@@ -157,4 +152,4 @@ def _report(
             f"y {1e3 * r.y:+7.1f} ± {1e3 * r.sd_y:4.1f} mm  strength {r.peak:.2f}{close}"
         )
     if len(rows) > _SHOWN:
-        typer.echo(f"… and {len(rows) - _SHOWN} touches more: --touches writes them all")
+        typer.echo(f"… and {len(rows) - _SHOWN} more touches: --touches writes all")

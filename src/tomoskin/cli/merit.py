@@ -35,11 +35,11 @@ def merit(
     ] = 1,
     greit: Annotated[
         float | None,
-        typer.Option(metavar="FIGURE", help="Also show a GREIT operator of that noise figure."),
+        typer.Option(metavar="FIGURE", help="Also show a GREIT operator of this noise figure."),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="X.png|.csv", help="Where curves or table go."),
+        typer.Option(metavar="X.png|.csv", help="File for the curves or the table."),
         Writes(FIGURE | TABLE),
     ] = None,
     force: ForceFlag = False,
@@ -50,7 +50,7 @@ def merit(
     from tomoskin.pipeline import prepare
     from tomoskin.skin import Skin
 
-    with Bar("working out figures"):
+    with Bar("computing the figures of merit"):
         figures = _figures(prepare(Skin.load(skin)), towards, greit)
     if out is not None:
         write = write_merit_table if out.suffix.lower() in TABLE else write_merit

@@ -26,7 +26,7 @@ Given = Mapping[str, Any]
 ForceFlag = Annotated[
     bool,
     typer.Option(
-        "--force", help="Write over files that are there; inputs and recordings stay as they are."
+        "--force", help="Overwrite files that exist. Inputs and recordings are never overwritten."
     ),
 ]
 """The --force option of every command that writes anything but recordings."""
@@ -107,7 +107,8 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             path for name, value in given.items() if name not in written for path in _files(value)
         ]
         overwrite = given.get("force", False)
-        check_outputs(outputs, inputs, overwrite=overwrite, consent="--force")
+        consent = "--force" if "force" in given else ""
+        check_outputs(outputs, inputs, overwrite=overwrite, consent=consent)
         _check_packages(outputs)
         command(**given)
 
@@ -121,7 +122,7 @@ def _check_packages(outputs: Iterable[Output]) -> None:
         package, extra = _PACKAGES.get(output.path.suffix.lower(), ("", ""))
         if package and find_spec(package) is None:
             raise DataError(
-                f"{package} writes it, and is not installed",
+                f"needs {package} to write it, which is not installed",
                 where=f"{output.name} {output.path}".strip(),
                 hint=install_hint(extra),
             )

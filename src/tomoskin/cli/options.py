@@ -20,21 +20,22 @@ SkinArgument = Annotated[str, typer.Argument(metavar="SKIN", help=f"{_SKIN}.")]
 NamedSkinOption = Annotated[str, typer.Option(help=f"{_SKIN}.")]
 SkinOption = Annotated[
     str | None,
-    typer.Option(help=f"{_SKIN}; without it that of the session, else {DEFAULT_SKIN}."),
+    typer.Option(help=f"{_SKIN}. Default: the session's skin, else {DEFAULT_SKIN}."),
 ]
 SkinsOption = Annotated[
     list[str] | None,
     typer.Option(
         metavar="[NAME=]SKIN",
-        help=f"{_SKIN}; without it that of the session, else {DEFAULT_SKIN}. With a name, once "
-        "for each of several skins.",
+        help=f"{_SKIN}. Default: the session's skin, else {DEFAULT_SKIN}. For several skins, "
+        "repeat it with a name for each.",
     ),
 ]
 KnownSkinOption = Annotated[
-    str | None, typer.Option(help=f"{_SKIN}; without it the rows are taken as they are.")
+    str | None, typer.Option(help=f"{_SKIN}. Default: the rows as they are in the file.")
 ]
 SameSkinOption = Annotated[
-    str | None, typer.Option(help=f"{_SKIN}: refused unless calibrated on it.")
+    str | None,
+    typer.Option(help=f"{_SKIN}. The command stops if the calibration belongs to another skin."),
 ]
 
 # What is read.
@@ -43,24 +44,25 @@ RecordingArgument = Annotated[
     Path, typer.Argument(metavar="INPUT", help="Recording or .npz file."), Reads()
 ]
 LabelledArgument = Annotated[
-    Path, typer.Argument(metavar="INPUT", help="Frames with labels: one touch each."), Reads()
+    Path, typer.Argument(metavar="INPUT", help="Frames with labels, one touch in each."), Reads()
 ]
-_SOURCE = "Where frames come from: twin, serial:PORT, replay:FILE@SPEED, …"
+_SOURCE = "Source of the frames: twin, serial:PORT, replay:FILE@SPEED, …"
 SourceOption = Annotated[str, typer.Option(help=_SOURCE)]
 SourcesOption = Annotated[
     list[str] | None,
-    typer.Option(help=f"{_SOURCE} Once for each skin, in their order; without it twins."),
+    typer.Option(help=f"{_SOURCE} Repeat it for several skins, in their order. Default: twins."),
 ]
 ReferenceOption = Annotated[
     str | None,
     typer.Option(
         metavar="first:N|frame:K|previous|FILE",
-        help="Untouched frames, or previous: each frame against the one before. Without it the "
-        "file's own reference, else its first frame (of a session those that the run took).",
+        help="Untouched frames; or previous: each frame is compared with the one before. "
+        "Default: the file's own reference, else its first frame. For a session: the frames "
+        "of the run's reference.",
     ),
 ]
 FramesOption = Annotated[
-    str | None, typer.Option(metavar="A:B", help="Only frames A to B-1 (from 0).")
+    str | None, typer.Option(metavar="A:B", help="Only frames A to B-1, counted from 0.")
 ]
 CalibrationsOption = Annotated[
     list[Path] | None,
@@ -70,8 +72,8 @@ CalibrationsOption = Annotated[
         "--states",
         "--newtons",
         metavar="C.npz",
-        help="From tomoskin calibrate, of any kind: positions and forces of touches, bends or "
-        "states are read in each frame; once for each kind.",
+        help="File from tomoskin calibrate, of any kind: positions, forces, bends or states are "
+        "estimated in each frame. Once for each kind.",
     ),
     Reads(),
 ]
@@ -82,32 +84,33 @@ AlphaOption = Annotated[
     str | None,
     typer.Option(
         metavar="NUMBER|auto|RULE",
-        help="Weight of the prior instead of the skin's; RULE as listed by `skin alpha`.",
+        help="Weight of the prior instead of the skin's; `skin alpha` lists the values of RULE.",
     ),
 ]
 TimeConstantOption = Annotated[
     str | None,
     typer.Option(
         metavar="TIME",
-        help='Time constant of the images, such as "0.2 s", instead of the skin\'s; "0 s": each '
-        "frame by itself.",
+        help='Time constant of the images, such as "0.2 s", instead of the skin\'s. With "0 s" '
+        "each image uses its own frame alone.",
     ),
 ]
 
 # How images are shown.
 
 PercentFlag = Annotated[
-    bool, typer.Option("--percent", help="Show changes as a part of the skin's own conductivity.")
+    bool, typer.Option("--percent", help="Show changes in per cent of the skin's own conductivity.")
 ]
 LimitOption = Annotated[
     float | None,
-    typer.Option(metavar="X", help="End of the colour scale, in S or per cent as shown."),
+    typer.Option(metavar="X", help="End of the colour scale, in the unit shown: S or per cent."),
 ]
 SmoothOption = Annotated[
     str | None,
     typer.Option(
         metavar="LENGTH",
-        help='Average over discs of this radius, such as "8 mm"; for the eye, not for touches.',
+        help='Average over discs of this radius, such as "8 mm". It changes the picture, not the '
+        "touches.",
     ),
 ]
 
@@ -115,12 +118,12 @@ SmoothOption = Annotated[
 
 CalibrationOut = Annotated[
     Path,
-    typer.Option(metavar="C.npz", help="Where the calibration goes."),
+    typer.Option(metavar="C.npz", help="File for the calibration."),
     Writes(CALIBRATION),
 ]
 TouchesOut = Annotated[
     Path | None,
-    typer.Option(metavar="X.csv", help="Where the touches go."),
+    typer.Option(metavar="X.csv", help="File for the touches."),
     Writes(TABLE),
 ]
 SinkOption = Annotated[

@@ -36,9 +36,9 @@ def record(
     source: SourceOption = "twin",
     seconds: Annotated[
         float | None,
-        typer.Option(help="How long to record; without it until Ctrl-C or a replay's end."),
+        typer.Option(help="How long to record. Default: until Ctrl-C or the end of a replay."),
     ] = None,
-    frames: Annotated[int | None, typer.Option(min=1, help="How many frames to record.")] = None,
+    frames: Annotated[int | None, typer.Option(min=1, help="Number of frames to record.")] = None,
     sink: SinkOption = None,
     json: JsonFlag = False,
 ) -> None:
@@ -65,7 +65,7 @@ def record(
             remark(doubt)
     status = runner.status()
     if not status.frames:
-        raise DataError("no frame came until the end: none is in it", where=str(file))
+        raise DataError("no frame arrived, so the recording holds none", where=str(file))
     size = file.stat().st_size
     document = {"file": str(file), "bytes": size, "frames": status.frames, "lost": status.gaps,
                 "dropped": status.dropped, "corrupt": status.corrupt}  # fmt: skip

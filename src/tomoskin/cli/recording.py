@@ -34,7 +34,7 @@ def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Idl
             raise DataError(
                 "holds differences, which need no reference",
                 where=recording.source,
-                hint="leave --reference out",
+                hint="leave out --reference",
             )
         return None
     if spec == "previous":
@@ -51,7 +51,7 @@ def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Idl
         )
     other = read_recording(Path(given))
     if other.is_change:
-        raise DataError("holds differences, not an untouched skin", where=other.source)
+        raise DataError("holds differences, not voltages of the untouched skin", where=other.source)
     return other.in_order_of(pattern).voltages
 
 
@@ -68,7 +68,7 @@ def span_lines(spans: Sequence[Span], unit: str = "") -> Iterator[str]:
         where = f"x {1e3 * span.x:+7.1f} mm  y {1e3 * span.y:+7.1f} mm"
         yield f"touch {span.id:>3}  {when}  {where}  strength {span.peak:+.3g} {unit}".rstrip()
     if len(spans) > _SHOWN:
-        yield f"… and {len(spans) - _SHOWN} touches more"
+        yield f"… and {len(spans) - _SHOWN} more touches"
 
 
 def _frames_of(recording: Recording, kind: str, number: int) -> NDArray[Any]:
@@ -108,11 +108,17 @@ def changes(recording: Recording, reference: str | None, pattern: Pattern) -> Fl
 
     idle = idle_frames(recording, reference, pattern)
     if isinstance(idle, str):
-        raise DataError("expected untouched frames", where="--reference", hint="first:N or a file")
+        raise DataError(
+            f"expected untouched frames, got {reference}",
+            where="--reference",
+            hint="give first:N or a file",
+        )
     values = recording.voltages if idle is None else recording.voltages - idle.mean(axis=0)
     if np.iscomplexobj(values):
         raise DataError(
-            "holds complex voltages", where=recording.source, hint="calibrate on their magnitudes"
+            "holds complex voltages",
+            where=recording.source,
+            hint="calibrate with their magnitudes instead",
         )
     return np.asarray(values, dtype=np.float64)
 
@@ -130,8 +136,8 @@ def labels(recording: Recording) -> FloatArray:
 
     if recording.labels is None or not np.isfinite(recording.labels).all(axis=1).any():
         raise DataError(
-            "holds no labels: expected xy_m (n_frames, 2), the place of each press",
+            "holds no labels: expected xy_m (n_frames, 2), the position of each press",
             where=recording.source,
-            hint="docs/touch.md says how to make them",
+            hint="docs/touch.md shows how to make them",
         )
     return recording.labels

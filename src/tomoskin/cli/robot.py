@@ -49,18 +49,23 @@ def chosen_robot(
 
     if file is not None:
         if skins or sources or calibrations:
-            raise typer.BadParameter("the robot file says skins, sources and calibrations")
+            raise typer.BadParameter(
+                "--skin, --source and --calibration cannot be combined with --robot: "
+                "the robot file names them"
+            )
         return Robot.load(file)
     if sources and len(sources) != max(1, len(skins)):
         raise typer.BadParameter(
-            f"expected none, or one for each --skin: {max(1, len(skins))}; got {len(sources)}",
+            f"expected no --source, or one for each --skin: {max(1, len(skins))}; got "
+            f"{len(sources)}",
             param_hint="--source",
         )
     if len(skins) < 2 and not any(map(_NAMED.match, skins)):
         return None
     if calibrations:
         raise typer.BadParameter(
-            "cannot say of which skin: name them in a robot file", param_hint="--calibration"
+            "does not say to which skin it belongs: name the calibrations in a robot file",
+            param_hint="--calibration",
         )
     twins = [f"twin:seed={number}" for number in range(1, len(skins) + 1)]
     given = [
@@ -150,27 +155,32 @@ def place(
     link: Annotated[str, typer.Argument(help="Link that the skin lies on.")],
     out: Annotated[
         Path,
-        typer.Option(metavar="ROBOT.toml", help="The robot file: one is added to, or made."),
-        Otherwise("a skin is added to what it holds"),
+        typer.Option(
+            metavar="ROBOT.toml",
+            help="Robot file: the skin is added to it, or a new file is created.",
+        ),
+        Otherwise("the skin is added to the file"),
     ] = Path("robot.toml"),
     skin: Annotated[str, typer.Option(help="Built-in name or path.")] = "textile-disc-16",
     name: Annotated[
-        str | None, typer.Option(help="Of the skin on the robot; without it the link's.")
+        str | None,
+        typer.Option(help="Name of the skin on the robot. Default: the name of the link."),
     ] = None,
     source: Annotated[
-        str | None, typer.Option(help="serial:PORT, replay:FILE, …; without it a twin.")
+        str | None,
+        typer.Option(help="Source of its frames: serial:PORT, replay:FILE, … Default: a twin."),
     ] = None,
     at: Annotated[
         str | None,
         typer.Option(
             metavar="X/Y/Z[/ROLL/PITCH/YAW]",
-            help="Of the skin's frame in the link's, mm and degrees.",
+            help="Pose of the skin's frame in the link's frame, in mm and degrees.",
         ),
     ] = None,
     on_mesh: Annotated[
         bool,
         typer.Option(
-            "--on-mesh", help="The skin's surface file has the coordinates of the link's mesh."
+            "--on-mesh", help="The skin's surface file uses the coordinates of the link's mesh."
         ),
     ] = False,
 ) -> None:
@@ -200,7 +210,9 @@ def place(
         else:
             write_text(out, before, overwrite=True)
         raise
-    typer.echo(f"{out}: {given['name']} on {link}; {count} skins, tomoskin live --robot {out}")
+    typer.echo(
+        f"{out}: {given['name']} on {link}, {count} skins in all; next: tomoskin live --robot {out}"
+    )
 
 
 def _from(file: str, out: Path) -> str:
@@ -221,9 +233,11 @@ def _pose(urdf: Any, link: str, at: str | None, *, on_mesh: bool) -> dict[str, l
 
     if on_mesh:
         if at is not None:
-            raise typer.BadParameter("--at and --on-mesh cannot both be", param_hint="--at")
+            raise typer.BadParameter("--at and --on-mesh cannot be combined", param_hint="--at")
         if link not in urdf.meshes:
-            raise SkinError(f'link "{link}" has no mesh', where=urdf.source, hint="say --at")
+            raise SkinError(
+                f'link "{link}" has no mesh', where=urdf.source, hint="give the pose with --at"
+            )
         numbers = [*(1e3 * urdf.meshes[link].position), *urdf.meshes[link].degrees()]
     else:
         try:

@@ -26,9 +26,7 @@ _A_YEAR = 3.15e7
 _NO_CLOCK = 0.01
 """No clock of a board is so far off."""
 
-_File = Annotated[
-    Path, typer.Argument(metavar="FILE", help="A session, such as run.mcap."), Reads()
-]
+_File = Annotated[Path, typer.Argument(metavar="FILE", help="Session, such as run.mcap."), Reads()]
 
 EXPORTS = {
     ".csv": "a table of voltages",
@@ -72,7 +70,7 @@ def _exported(out: Path | None, _: Given, called: str) -> list[Output]:
 
 @app.command()
 def info(file: _File, json: JsonFlag = False) -> None:
-    """Say what a session holds: duration, rate, gaps, drops, skin, touches."""
+    """Show what a session holds: duration, rate, gaps, drops, skin, touches."""
     from tomoskin.recording import session_info
 
     with Bar("reading") as bar:
@@ -88,12 +86,12 @@ def repair(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="NEW.mcap", help="New file; without it FILE with .repaired in its name."
+            metavar="NEW.mcap", help="New file. Default: the file's name with .repaired in it."
         ),
         Writes(RECORDING, _mended),
     ] = None,
     skin: Annotated[
-        str | None, typer.Option(help="Built-in name or path, where the file's own is lost.")
+        str | None, typer.Option(help="Built-in name or path, for a file that has lost its skin.")
     ] = None,
     json: JsonFlag = False,
 ) -> None:
@@ -105,18 +103,18 @@ def repair(
     with Bar("repairing") as bar:
         repaired = repair(file, target, skin=Skin.load(skin) if skin else None, advance=bar)
     frames = repaired.messages.get("/frames", 0)
-    line = f"{target}: {repaired.chunks} chunks, {frames} frames recovered; {file} is untouched"
+    line = f"{target}: {repaired.chunks} chunks, {frames} frames recovered; {file} is unchanged"
     tell(asdict(repaired), [line, *_losses(repaired)], json=json)
 
 
 @app.command()
 def split(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A recording of several skins."), Reads()
+        Path, typer.Argument(metavar="FILE", help="Recording of several skins."), Reads()
     ],
     json: JsonFlag = False,
 ) -> None:
-    """Make a session file of each skin in the recording of a robot: FILE-NAME.mcap."""
+    """Split the recording of a robot into a session file for each skin: FILE-NAME.mcap."""
     from tomoskin.recording import split, split_targets
 
     with Bar("splitting") as bar:
@@ -139,15 +137,15 @@ def export(
     ],
     touches: Annotated[
         Path | None,
-        typer.Option(metavar="X.csv", help="Where the recorded touches go."),
+        typer.Option(metavar="X.csv", help="File for the recorded touches."),
         Writes(TABLE),
     ] = None,
     every: Annotated[
-        float, typer.Option(min=1e-3, help="Seconds between two images, where there are images.")
+        float, typer.Option(min=1e-3, help="Seconds between two images, for formats with images.")
     ] = 0.1,
     force: ForceFlag = False,
 ) -> None:
-    """Convert a session: voltages, or the images that they give again."""
+    """Convert a session to tables, images or the format of another program."""
     from tomoskin.formats import WRITERS, Export, omitted
     from tomoskin.recording import SessionReader
     from tomoskin.sink import write_bag, write_rerun
@@ -171,7 +169,9 @@ def export(
 @app.command("import")
 def import_recording(
     file: Annotated[
-        Path, typer.Argument(metavar="INPUT", help="Any recording that can be read."), Reads()
+        Path,
+        typer.Argument(metavar="INPUT", help="Recording in any format that tomoskin reads."),
+        Reads(),
     ],
     out: Annotated[
         Path,
@@ -209,7 +209,8 @@ def _lines(info: SessionInfo) -> list[tuple[str, str]]:
         lines.append(("files inside", ", ".join(info.attached)))
     if info.device:
         board, firmware = info.device.get("unique_id"), info.device.get("firmware")
-        lines.append(("board", f"{board}, firmware {firmware}"))
+        name = f"{info.device['name']} " if "name" in info.device else ""
+        lines.append(("board", f"{name}{board}, firmware {firmware}"))
     if info.clock:
         rate, residual = info.clock.tick_rate, 1e3 * info.clock.residual
         nominal = info.device.get("tick_rate")
@@ -225,20 +226,24 @@ def _lines(info: SessionInfo) -> list[tuple[str, str]]:
 
 def _touches(info: SessionInfo) -> list[tuple[str, str]]:
     if not (info.touches or info.messages["/image"]):
-        return [("touches", "none recorded: tomoskin image looks for them")]
+        return [("touches", "none recorded: tomoskin image finds them")]
     return [("touches", str(info.touches)), *(("", line) for line in span_lines(info.spans))]
 
 
 def _drift(part: float) -> str:
     """Of the board's clock against ours; the twin's may run much faster than time."""
     if abs(part) > _NO_CLOCK:
-        return f"{1 + part:.3g} times as fast as it says: not in real time"
+        return f"{1 + part:.3g} times the nominal rate: not in real time"
     return f"{1e6 * part:+.1f} ppm"
 
 
 def _losses(repaired: Repaired) -> list[str]:
     if not repaired.lost:
-        return ["nothing is lost" if repaired.ended else "nothing is lost but the open chunk's end"]
+        return [
+            "nothing is lost"
+            if repaired.ended
+            else ("nothing is lost except the end of the open chunk")
+        ]
     return [_loss(lost) for lost in repaired.lost]
 
 

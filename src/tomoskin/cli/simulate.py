@@ -40,12 +40,12 @@ def simulate(
     skin: NamedSkinOption = DEFAULT_SKIN,
     script: Annotated[
         Path | None,
-        typer.Option(metavar="X.toml", help="Script of what happens (docs/simulate.md)."),
+        typer.Option(metavar="X.toml", help="Script of the presses and faults (docs/simulate.md)."),
         Reads(),
     ] = None,
     out: Annotated[
         Path,
-        typer.Option(help="Session file; with --presses a folder, or FILE.npz."),
+        typer.Option(help="Session file; with --presses a folder or FILE.npz."),
         Writes(RECORDING | ONE_FILE, _simulated),
     ],
     presses: Annotated[
@@ -53,22 +53,27 @@ def simulate(
         typer.Option(
             min=1,
             metavar="N",
-            help="Make N labelled frames of random presses instead of a recording.",
+            help="Simulate N labelled frames of random presses instead of a recording.",
         ),
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option(min=0, help="The same seed gives the same data; it overrides the script's."),
+        typer.Option(
+            min=0,
+            help="Seed of all noise; it overrides the script's. The same seed gives the same data.",
+        ),
     ] = None,
     processes: Annotated[
         int | None,
         typer.Option(
-            min=1, help="For --presses: how many processes; by default one per processor."
+            min=1, help="With --presses: number of processes. Default: one for each processor."
         ),
     ] = None,
     cluster: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="For --presses: a Dask scheduler, tcp://HOST:8786."),
+        typer.Option(
+            metavar="ADDRESS", help="With --presses: address of a Dask scheduler, tcp://HOST:8786."
+        ),
     ] = None,
     force: ForceFlag = False,
     json: JsonFlag = False,
@@ -85,9 +90,13 @@ def simulate(
         _labelled(plan, out, workers, overwrite=force, json=json)
         return
     if script is None:
-        raise typer.BadParameter("give a script, or --presses N", param_hint="--script")
+        raise typer.BadParameter(
+            "expected --script FILE or --presses N, got neither", param_hint="--script"
+        )
     if processes is not None or cluster is not None:
-        raise typer.BadParameter("goes with --presses", param_hint="--processes, --cluster")
+        raise typer.BadParameter(
+            "has an effect only with --presses", param_hint="--processes, --cluster"
+        )
     _timeline(chosen, script, out, seed, json=json)
 
 
@@ -102,7 +111,7 @@ def _timeline(skin: Skin, script: Path, out: Path, seed: int | None, *, json: bo
         with Bar("simulating") as bar:
             made = run(read, skin, out, seed=seed, advance=bar)
     except KeyboardInterrupt:
-        remark(f"stopped; {out} holds what was simulated until then, and says so")
+        remark(f"stopped; {out} holds the simulation until then, and says that it was stopped")
         raise typer.Exit(1) from None
     took = time.monotonic() - begun
     document = {
@@ -134,12 +143,12 @@ def _labelled(plan: SetPlan, out: Path, workers: Workers, *, overwrite: bool, js
         with Bar("drawing presses") as bar:
             made = make_set(plan, out, workers, bar, overwrite=overwrite)
     except KeyboardInterrupt:
-        remark("stopped; the same command goes on where this one was stopped")
+        remark("stopped; the same command continues from here")
         raise typer.Exit(1) from None
     took = time.monotonic() - begun
     files = [str(file) for file in made.files]
     document = {"frames": n, "made": made.made, "found": made.found, "files": files}
-    before = f"; {made.found} of {plan.n_shards} parts were there already" if made.found else ""
+    before = f"; {made.found} of {plan.n_shards} parts existed already" if made.found else ""
     tell(document, [f"{out}: {n} labelled frames in {took:.1f} s{before}"], json=json)
 
 
@@ -148,7 +157,7 @@ def _workers(processes: int | None, cluster: str | None) -> Workers:
 
     if cluster is not None:
         if processes is not None:
-            raise typer.BadParameter("goes without --cluster", param_hint="--processes")
+            raise typer.BadParameter("cannot be combined with --cluster", param_hint="--processes")
         return on_cluster(cluster)
     n = processes or processors()
     return in_this_process if n == 1 else in_processes(n)

@@ -37,7 +37,7 @@ def list_skins(json: JsonFlag = False) -> None:
 
 @app.command()
 def show(name: SkinArgument, json: JsonFlag = False) -> None:
-    """Show a skin as the file that would make it."""
+    """Print the skin file of a skin."""
     from tomoskin.skin import Skin
 
     skin = Skin.load(name)
@@ -47,7 +47,7 @@ def show(name: SkinArgument, json: JsonFlag = False) -> None:
 
 @app.command()
 def check(file: SkinArgument, json: JsonFlag = False) -> None:
-    """Check a skin file, mesh it, and compare the voltages that it expects with the board's."""
+    """Check a skin file, mesh it, and compare the expected voltages with the board's limits."""
     from tomoskin.core import SkinError
     from tomoskin.mesh import quality
     from tomoskin.signal import Headroom
@@ -77,15 +77,18 @@ def lay(
     surface: Annotated[Path, typer.Argument(help="A .stl, .obj or .ply file."), Reads()],
     electrodes: Annotated[
         Path,
-        typer.Option(metavar="CSV", help="x,y,z of each electrode, E1 first, in the file's unit."),
+        typer.Option(
+            metavar="CSV",
+            help="Text file with x,y,z of each electrode, E1 first, in the unit of SURFACE.",
+        ),
         Reads(),
     ],
     out: Annotated[
-        Path, typer.Option(metavar="X.toml", help="Where the skin file goes."), Writes(SKIN)
+        Path, typer.Option(metavar="X.toml", help="File for the new skin."), Writes(SKIN)
     ],
-    unit: Annotated[str, typer.Option(help="Unit of the file: mm, cm or m.")] = "mm",
+    unit: Annotated[str, typer.Option(help="Unit of SURFACE: mm, cm or m.")] = "mm",
     like: Annotated[
-        str, typer.Option(metavar="SKIN", help="Skin to take material, contacts and drive from.")
+        str, typer.Option(metavar="SKIN", help="Skin whose material, contacts and drive are used.")
     ] = "textile-disc-16",
     force: ForceFlag = False,
 ) -> None:
@@ -130,7 +133,7 @@ def _positions(path: Path) -> FloatArray:
         if line.strip() and not (number == 1 and fields[:3] == ["x", "y", "z"]):
             rows.append(_numbers(fields, f"{path}, line {number}"))
     if not rows:
-        raise DataError("expected lines x,y,z, got none", where=str(path))
+        raise DataError("expected lines x,y,z, got an empty file", where=str(path))
     return np.array(rows)
 
 
@@ -143,6 +146,6 @@ def _numbers(fields: list[str], where: str) -> list[float]:
         raise DataError(
             f'expected three numbers x,y,z, got "{",".join(fields)}"',
             where=where,
-            hint="decimal points, commas between",
+            hint="use decimal points, with commas between the numbers",
         ) from None
     return [x, y, z]

@@ -25,18 +25,19 @@ _SHOWN = 20
 def states(
     recording: RecordingArgument,
     calibration: Annotated[
-        Path, typer.Option(metavar="C.npz", help="From tomoskin calibrate states."), Reads()
+        Path, typer.Option(metavar="C.npz", help="File from tomoskin calibrate states."), Reads()
     ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="X.csv", help="Where the table goes."),
+        typer.Option(metavar="X.csv", help="File for the table."),
         Writes(TABLE),
     ] = None,
     force: ForceFlag = False,
     skin: SameSkinOption = None,
     reference: ReferenceOption = None,
     ask: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Name the N frames whose label would help most.")
+        int,
+        typer.Option(min=0, metavar="N", help="Name the N frames whose labels would help most."),
     ] = 0,
     json: JsonFlag = False,
 ) -> None:
@@ -107,7 +108,7 @@ def _say(answers: Answers, asked: list[int]) -> None:
         text = f"unknown (nearest: {label})" if rejected else f"{label}  {100 * sure:.0f} % or more"
         typer.echo(f"frames {first:>4} to {last:>4}  {text}")
     if len(runs) > _SHOWN:
-        typer.echo(f"… and {len(rows) - runs[_SHOWN][0][0]} frames more: --out writes them all")
-    typer.echo(f"{int(answers.rejected.sum())} of {len(rows)} frames are of no known state")
+        typer.echo(f"… and {len(rows) - runs[_SHOWN][0][0]} more frames: --out writes all")
+    typer.echo(f"{int(answers.rejected.sum())} of {len(rows)} frames show an unknown state")
     if asked:
-        typer.echo(f"labels tell most at frames {', '.join(map(str, asked))}")
+        typer.echo(f"labels would help most at frames {', '.join(map(str, asked))}")

@@ -95,7 +95,9 @@ class Archive(Arrays):
             if not (len(file.getbuffer()) if isinstance(file, io.BytesIO) else file.stat().st_size):
                 raise DataError(EMPTY, where=where) from error
             raise DataError(
-                f"is not a whole .npz archive: {error}", where=where, hint="copy it again"
+                f"is not a whole .npz archive: {error}",
+                where=where,
+                hint="name a .npz file; if it is one, copy it again",
             ) from error
         except _UNREADABLE as error:
             raise DataError(f"holds an array that cannot be read: {error}", where=where) from error
@@ -138,5 +140,5 @@ def _size(archive: zipfile.ZipFile, name: str) -> int:
     if dtype.hasobject:
         return held
     if count < 0 or count * dtype.itemsize > held - begun:
-        raise ValueError(f"{name} claims the shape {shape}, and holds {held} bytes")
+        raise ValueError(f"{name} has the shape {shape} in its header but holds {held} bytes")
     return int(count * max(dtype.itemsize, _IN_MEMORY.get(dtype.kind, 0)))

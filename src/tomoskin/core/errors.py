@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-EMPTY = "is empty, a file without content"
+EMPTY = "is an empty file"
 """What is wrong with such a file, whatever it should hold."""
 
 

@@ -65,7 +65,7 @@ def check_outputs(
     overwrite
         Files that are there may be replaced.
     consent
-        How a person says so, for the message.
+        How a person says so, for the message; "" where it cannot be said.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def real_path(path: Path) -> Path:
     try:
         return Path(os.path.realpath(path))
     except OSError as error:
-        message = f"cannot be looked at: {error.strerror}"
+        message = f"cannot be read: {error.strerror}"
         raise OutputError(message, where=str(path), hint="choose another folder") from error
 
 
@@ -115,7 +115,7 @@ Fault = tuple[str, str] | None
 def _fault_of_others(output: Output, before: Sequence[Output], inputs: Sequence[Path]) -> Fault:
     for path in inputs:
         if is_same_file(output.path, path):
-            return f"is the same file as {path}, which is read here and never written over", _ELSE
+            return f"is also the input {path}, and an input is never overwritten", _ELSE
     for other in before:
         if is_same_file(output.path, other.path):
             named = f"{other.name} {other.path}".strip()
@@ -130,14 +130,14 @@ def _fault_of_what_is_there(path: Path, overwrite: bool, consent: str) -> Fault:
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
-        return f"cannot be looked at: {error.strerror}", _ELSE
+        return f"cannot be read: {error.strerror}", _ELSE
     if not stat.S_ISREG(mode):
         kind = "folder" if stat.S_ISDIR(mode) else "device or pipe"
         return f"expected the name of a file, got a {kind}", "name a file"
     if is_recording:
-        return "exists already, and recordings are never written over", _ELSE
+        return "exists already, and a recording is never overwritten", _ELSE
     if not overwrite:
-        return "exists already", f"{_ELSE}, or write over it: {consent}"
+        return "exists already", f"{_ELSE}, or overwrite it: {consent}" if consent else _ELSE
     writable = os.access(path, os.W_OK)
     return None if writable else ("exists already and is write-protected", _ELSE)
 
@@ -155,11 +155,13 @@ def _fault_of_folder(output: Output) -> Fault:
     while output.makes_folders and not folder.exists() and folder != folder.parent:
         folder = folder.parent
     if not folder.exists():
-        return f"cannot be written: there is no folder {folder}", "make the folder first"
+        return f"cannot be written: there is no folder {folder}", "create the folder first"
     if not folder.is_dir():
-        return f"cannot be written: {folder} is no folder", "name a file in a folder"
+        return f"cannot be written: {folder} is not a folder", "give the name of a file in a folder"
     if not os.access(folder, os.W_OK | os.X_OK):
-        return f"cannot be written: nothing may be written in {folder}", "choose another folder"
+        return (
+            f"cannot be written: you have no permission to write in the folder {folder}"
+        ), "choose another folder"
     return None
 
 

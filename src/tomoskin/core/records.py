@@ -38,7 +38,10 @@ class Frame:
     drops
         Frames that the device itself has dropped since START.
     samples
-        (n_samples,) raw counts in scan order, each the sum over the oversampling.
+        (n_samples,) raw counts in scan order, each the sum over the oversampling; of an alternating
+        drive those in one direction less those in the other, plus 32,768.
+    sums
+        (n_samples,) of an alternating drive those in both directions together; else None.
     """
 
     sequence: int
@@ -48,6 +51,7 @@ class Frame:
     flags: int
     drops: int
     samples: NDArray[np.uint16]
+    sums: NDArray[np.uint16] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +59,8 @@ class Voltages:
     """One frame in volts, in the order of the pattern's rows.
 
     ``values`` is (n_meas,) V; ``railed`` is (n_meas,) bool, True where a sample that the row
-    is made of stood at a rail of the converter.
+    is made of stood at a rail of the converter; ``own`` is (n_electrodes,) V that each electrode
+    shows whatever the current does, against their mean, where the drive alternates.
     """
 
     values: FloatArray
@@ -63,6 +68,7 @@ class Voltages:
     sequence: int
     ticks: int
     host_time: float
+    own: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,7 +142,7 @@ class Image:
         """
         if pixels.mesh_id != self.mesh_id:
             raise DataError(
-                f"the image lives on mesh {self.mesh_id}, the pixels on {pixels.mesh_id}",
+                f"the image belongs to mesh {self.mesh_id}, the pixels to mesh {pixels.mesh_id}",
                 hint="make the pixels from the mesh that the image was made on",
             )
         return pixels.spread(self.values)

@@ -35,7 +35,8 @@ def whole_number(arrays: Arrays, key: str, where: str, most: int = 1 << 31) -> i
     """Array ``key`` as one whole number, at most ``most``."""
     value = real_numbers(arrays, key, where)
     if value.shape or value != np.round(value) or not abs(value) <= most:
-        raise DataError(f"expected one whole number as {key}, at most {most}", where=where)
+        got = f"shape {value.shape}" if value.shape else f"{value:g}"
+        raise DataError(f"expected one whole number up to {most} as {key}, got {got}", where=where)
     return int(value)
 
 

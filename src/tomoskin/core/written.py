@@ -44,7 +44,7 @@ def written(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
         raise DataError(
             f"cannot be written: {error.strerror or error}",
             where=str(path),
-            hint="look at the disk",
+            hint="check that the disk is connected and has space",
         ) from error
 
 

@@ -31,8 +31,8 @@ def write_promise(
     figure = new_figure(path, 11.0, 4.7)
     left, right = figure.subplots(1, 2)
     maps = (
-        (left, _MM * found.rms, "least rms error of the place (mm)"),
-        (right, 100 * found.faintest, "faintest press that is noticed (% of the conductivity)"),
+        (left, _MM * found.rms, "least RMS error of the position (mm)"),
+        (right, 100 * found.faintest, "faintest press that is detected (% of the conductivity)"),
     )
     for ax, values, label in maps:
         drawn = _draw(ax, skin, found, values)

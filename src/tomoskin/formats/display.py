@@ -52,7 +52,9 @@ class Display:
     def shown(self, image: Image, mesh: Mesh) -> Image:
         """``image`` as it is to be seen. Raises DataError when it is of another mesh."""
         if image.mesh_id != mesh.identity:
-            raise DataError(f"the image lives on mesh {image.mesh_id}, not on {mesh.identity}")
+            raise DataError(
+                f"the image belongs to mesh {image.mesh_id}, not to mesh {mesh.identity}"
+            )
         values, unit = self.applied(image.values, mesh, image.unit)
         return Image(values, unit, image.mesh_id)
 

@@ -51,9 +51,9 @@ def is_done(path: StrPath, identity: str, *, overwrite: bool = False) -> bool:
         return found == identity
     if found != _DAMAGED and not overwrite:
         raise OutputError(
-            f"is of another set: expected {identity}, got {found or 'no part of a set'}",
+            f"belongs to another set: expected {identity}, got {found or 'no part of a set'}",
             where=str(path),
-            hint="choose another folder, or remove what is there",
+            hint="choose another folder, or remove the files in it",
         )
     return False
 

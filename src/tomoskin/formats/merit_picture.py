@@ -15,7 +15,7 @@ _FIGURES = (
     ("amplitude", "amplitude response", 1.0),
     ("position_error", "position error (mm, inwards above 0)", 1e3),
     ("offset", "distance from the target (mm)", 1e3),
-    ("resolution", "resolution (part of the extent)", 1.0),
+    ("resolution", "resolution (fraction of the extent)", 1.0),
     ("deformation", "shape deformation", 1.0),
     ("ringing", "ringing", 1.0),
 )

@@ -126,7 +126,7 @@ class _Sheet:
             raise DataError(
                 "a volume cannot be drawn as a sheet",
                 where=name,
-                hint="take a slice with mesh.pixels(z=…), or write a .vtu file",
+                hint="draw a slice with mesh.pixels(z=…), or write a .vtu file",
             )
         factor, label = (100.0, "%") if unit == "relative" else (1.0, unit)
         greatest = max(float(np.abs(p.values).max()) for p in panels)

@@ -94,6 +94,7 @@ def _from_arrays(arrays: Arrays, path: Path) -> Recording:
         f"expected an interchange file (voltages or dv, drive, measure), got the keys "
         f"{', '.join(sorted(arrays)) or 'of an empty archive'}",
         where=str(path),
+        hint="docs/interchange.md lists what can be read",
     )
 
 
@@ -117,7 +118,7 @@ def _from_text(head: bytes, path: Path) -> Recording:
         )
     if head.startswith(_PICKLE):
         raise DataError(
-            "looks like a pickle, which could run any program and is never read",
+            "looks like a pickle; tomoskin never reads pickles, because they can run any program",
             where=str(path),
             hint="save plain arrays as .npz",
         )
@@ -126,7 +127,7 @@ def _from_text(head: bytes, path: Path) -> Recording:
         if detects(first):
             return parse(text_lines(path), str(path))
     raise DataError(
-        "is not a whole .npz archive, a session, a MATLAB file or a known text log",
+        "is not a complete .npz archive, a session, a MATLAB file or a known text log",
         where=str(path),
         hint="docs/interchange.md lists what can be read",
     )

@@ -163,7 +163,7 @@ def omitted(session: SessionReader, ending: str) -> tuple[str, ...]:
     if ending not in _TABLES:
         return ()
     name = session.skin.name
-    skin = f"the skin (--skin {name if name in Skin.names() else 'names its file'})"
+    skin = f"the skin (--skin {name if name in Skin.names() else 'with its file'})"
     counts = message_counts(session)
     beside = [words for topic, words in _BESIDE.items() if counts[topic]]
     return skin, *beside, *(name for name in session.attachments() if name not in OWN_FILES)

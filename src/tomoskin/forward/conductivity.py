@@ -53,7 +53,9 @@ def numbers(value: ArrayLike, name: str) -> NDArray[Any]:
     try:
         raw = np.asarray(value)
     except ValueError as error:
-        raise ModelError(f"expected rows of equal length as {name}") from error
+        raise ModelError(
+            f"expected rows of equal length as {name}, got different lengths"
+        ) from error
     if raw.dtype.kind not in "biufc":
         raise ModelError(f"expected numbers as {name}, got {raw.dtype}")
     return raw

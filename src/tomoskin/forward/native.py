@@ -104,4 +104,4 @@ class Native:
             (self.core.standing(np.eye(2)[:1], np.ones((4, 2)), np.eye(2)[:1], 0.0), 0.5),
         ]
         if not all(np.allclose(*pair) for pair in right):
-            raise ModelError("its results are wrong")
+            raise ModelError("its results differ from those of scipy")

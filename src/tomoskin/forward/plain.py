@@ -133,7 +133,7 @@ class PlainPatches:
         """See the protocol."""
         touches, base = Touches(starts, cells, conductivity), self._base
         if touches.fault(len(base.cells)) is not None:
-            raise ValueError("a cell or conductivity that cannot be")
+            raise ValueError("a cell or conductivity is out of range")
         shape = (len(touches), *base.grounded.shape)
         kind = np.result_type(base.fields, conductivity)
         grounded, lost = np.empty(shape, kind), np.zeros(shape, kind)

@@ -68,7 +68,7 @@ class Touches:
             if outside.any():
                 bad = cells[np.argmax(outside)]
                 return ModelError(
-                    f"expected cells from 0 to {n_cells - 1}", where=f"{touch}cell {bad}"
+                    f"expected cells from 0 to {n_cells - 1}, got {bad}", where=f"{touch}cell {bad}"
                 )
             good = np.isfinite(sigma) & (sigma.real > 0)
             if not good.all():
@@ -81,7 +81,9 @@ class Touches:
             twice = order[1:] == order[:-1]
             if twice.any():
                 bad = order[np.argmax(twice)]
-                return ModelError("expected each cell once", where=f"{touch}cell {bad}")
+                return ModelError(
+                    "expected each cell once, got it twice", where=f"{touch}cell {bad}"
+                )
         return None
 
 

@@ -26,8 +26,6 @@ from tomoskin.inverse.linear.operator import Operator
 from tomoskin.inverse.linear.problem import LinearProblem, noise_weights
 from tomoskin.inverse.linear.spectrum import Assembly, Spectrum
 from tomoskin.inverse.linear.temporal import Smoothed, Smoother, Steady, Temporal
-from tomoskin.inverse.posterior.decision import SimilarityWindows, most_similar
-from tomoskin.inverse.posterior.shape_sampling import ShapePosterior, ShapeSampling
 from tomoskin.inverse.priors.named import (
     PRIORS,
     Identity,
@@ -50,6 +48,7 @@ from tomoskin.inverse.resolution import (
     resolved,
     sensitivity,
 )
+from tomoskin.inverse.similarity import SimilarityWindows
 from tomoskin.inverse.thesis_metrics import ThesisMetrics
 
 __all__ = [
@@ -85,8 +84,6 @@ __all__ = [
     "Regions",
     "Segmented",
     "ShapeImaging",
-    "ShapePosterior",
-    "ShapeSampling",
     "SharpDifference",
     "SharpImage",
     "SharpPrior",
@@ -109,7 +106,6 @@ __all__ = [
     "figures",
     "homogeneous",
     "image_series",
-    "most_similar",
     "named_prior",
     "noise_figure",
     "noise_weights",

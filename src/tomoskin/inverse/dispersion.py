@@ -91,8 +91,8 @@ class Regions:
             if np.abs(step).max() < _DONE * np.abs(gamma).max():
                 return cls(gamma, *_spread(jacobian, residual))
         raise ModelError(
-            "no admittivities fit the voltages: the steps do not settle",
-            hint="start nearer, take fewer regions, or check the model",
+            "no admittivities fit the voltages: the iteration does not converge",
+            hint="start nearer to the solution, use fewer regions, or check the model",
         )
 
 
@@ -160,9 +160,12 @@ def _data(voltages: NDArray[Any], model: ForwardModel, n_regions: int) -> NDArra
     if data.shape != (n,):
         raise DataError(f"expected voltages of shape ({n},), got {data.shape}")
     if not np.isfinite(data).all():
-        raise DataError(f"expected finite voltages; rows {np.flatnonzero(~np.isfinite(data))}")
+        raise DataError(
+            f"expected finite voltages, but rows {np.flatnonzero(~np.isfinite(data))} are not "
+            "finite"
+        )
     if n_regions > n:
-        raise DataError(f"{n} voltages cannot tell {n_regions} regions")
+        raise DataError(f"{n} voltages are too few to estimate {n_regions} regions")
     return data
 
 
@@ -326,7 +329,7 @@ def _weight(sd: ArrayLike | None, gamma: ComplexArray) -> FloatArray:
     if deviation.shape != gamma.shape:
         raise DataError(f"expected {len(gamma)} deviations, got shape {deviation.shape}")
     if not (np.isfinite(deviation) & (deviation > 0)).all():
-        raise DataError("expected deviations above 0")
+        raise DataError(f"expected deviations above 0, got {deviation.min():g}")
     return np.asarray(1.0 / deviation)
 
 
@@ -338,11 +341,13 @@ def _checked(frequency: ArrayLike, admittivity: ArrayLike) -> tuple[FloatArray, 
     if len(f) < LEAST:
         raise _too_few(len(f))
     if not (np.isfinite(f) & (f > 0)).all():
-        raise DataError("expected frequencies above 0 Hz")
+        raise DataError(f"expected frequencies above 0 Hz, got {f.min():g} Hz")
     if len(np.unique(f)) < len(f):
-        raise DataError("expected each frequency once")
+        raise DataError("expected each frequency once, got some of them twice")
     if not np.isfinite(gamma).all() or not (gamma.real > 0).all():
-        raise DataError("expected finite admittivities with a conductivity above 0")
+        raise DataError(
+            f"expected finite admittivities with a conductivity above 0, got {gamma.tolist()}"
+        )
     return f, gamma
 
 
@@ -350,5 +355,5 @@ def _too_few(count: int) -> DataError:
     return DataError(
         f"expected at least {LEAST} frequencies for the four parameters of a Cole model, "
         f"got {count}",
-        hint="measure at more, spread over the dispersion",
+        hint="measure at more frequencies, spread over the dispersion",
     )

@@ -127,4 +127,4 @@ def check_frequencies(models: Mapping[float, ForwardModel]) -> None:
         if not (np.isfinite(frequency) and frequency > 0):
             raise ModelError(f"expected frequencies above 0 Hz, got {frequency}")
     if len({(m.mesh.identity, m.pattern.identity) for m in models.values()}) > 1:
-        raise ModelError("expected one mesh and one pattern for all frequencies")
+        raise ModelError("expected one mesh and one pattern for all frequencies, got several")

@@ -76,11 +76,13 @@ def _error(mesh: Mesh, cells: IntArray, truth: ArrayLike) -> float:
 
 def _checked(image: Image, mesh: Mesh) -> FloatArray:
     if image.mesh_id != mesh.identity:
-        raise DataError(f"the image lives on mesh {image.mesh_id}, not on {mesh.identity}")
+        raise DataError(f"the image belongs to mesh {image.mesh_id}, not to mesh {mesh.identity}")
     if np.iscomplexobj(image.values):
-        raise DataError("expected a real image", hint="take its real or imaginary part")
+        raise DataError(
+            "expected a real image, got a complex one", hint="take its real or imaginary part"
+        )
     if not np.isfinite(image.values).all():
-        raise DataError("expected finite values in the image")
+        raise DataError("expected finite values in the image, got others")
     if not image.values.any():
         raise DataError("the image shows no change, so it has no metrics")
     return image.values

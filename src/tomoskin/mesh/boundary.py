@@ -54,7 +54,9 @@ def check_arcs(outline: Outline, arcs: Sequence[ElectrodeArc]) -> None:
 
 def _check_width(outline: Outline, arc: ElectrodeArc, where: str) -> None:
     if not (math.isfinite(arc.start) and math.isfinite(arc.end)):
-        raise GeometryError("expected finite arclengths", where=where)
+        raise GeometryError(
+            f"expected finite arclengths, got {arc.start} to {arc.end} m", where=where
+        )
     width = arc.width(outline)
     if not width > 1e-6 * outline.length:
         raise GeometryError(f"expected a width above 0 mm, got {width * 1e3:g} mm", where=where)
@@ -76,9 +78,8 @@ def _check_gap(outline: Outline, arcs: Sequence[ElectrodeArc], this: int, follow
         state = f"overlaps electrode {low} by {-gap * 1e3:.3g} mm"
         if gap > -1e-9 * outline.length:
             state = (
-                f"stands {max(gap, 0.0) * 1e3:.3g} mm from electrode {low}; "
-                f"expected at least {MIN_GAP:.0%} of the narrower one's width "
-                f"({smallest * 1e3:.3g} mm)"
+                f"is {max(gap, 0.0) * 1e3:.3g} mm from electrode {low}; expected at least "
+                f"{MIN_GAP:.0%} of the narrower one's width ({smallest * 1e3:.3g} mm)"
             )
         raise GeometryError(
             state, where=f"electrode {high}", hint="make them narrower or fewer, or move them"
@@ -230,7 +231,7 @@ def _split_encroached(
             break
     worst = rim.points[int(np.argmax(rim.lengths * bad))] * 1e3
     raise GeometryError(
-        "the outline comes too near to itself to be meshed",
+        "two parts of the outline are too close to each other for a mesh",
         where=f"near ({worst[0]:.4g}, {worst[1]:.4g}) mm",
     )
 

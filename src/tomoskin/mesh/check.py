@@ -46,7 +46,10 @@ def _check_shapes(points: FloatArray, cells: IntArray) -> None:
         )
     finite = np.isfinite(points).all(axis=1)
     if not finite.all():
-        raise GeometryError("expected finite coordinates", where=f"point {int(np.argmin(finite))}")
+        bad = int(np.argmin(finite))
+        raise GeometryError(
+            f"expected finite coordinates, got {points[bad].tolist()}", where=f"point {bad}"
+        )
 
 
 def _check_indices(points: FloatArray, cells: IntArray, electrodes: tuple[IntArray, ...]) -> None:
@@ -64,7 +67,7 @@ def _check_indices(points: FloatArray, cells: IntArray, electrodes: tuple[IntArr
     used[cells] = True
     if not used.all():
         raise GeometryError(
-            "belongs to no cell", where=f"point {int(np.argmin(used))}", hint="remove it"
+            "belongs to no cell", where=f"point {int(np.argmin(used))}", hint="remove this point"
         )
 
 
@@ -90,7 +93,7 @@ def _check_facets(cells: IntArray, pairs: IntArray, boundary: IntArray) -> None:
     raise GeometryError(
         f"expected a facet in one or two cells, got {unique[worst].tolist()} in {len(shared)}",
         where=f"cells {', '.join(map(str, shared))}",
-        hint="cells overlap, or one stands twice",
+        hint="cells overlap, or one is listed twice",
     )
 
 
@@ -100,7 +103,9 @@ def _check_connected(n: int, pairs: IntArray) -> None:
     if pieces > 1:
         stray = int(np.argmax(label != np.bincount(label).argmax()))
         raise GeometryError(
-            f"the mesh is in {pieces} pieces", where=f"cell {stray}", hint="join or remove them"
+            f"the mesh is in {pieces} pieces",
+            where=f"cell {stray}",
+            hint="join the pieces, or remove all but one",
         )
 
 

@@ -101,7 +101,7 @@ def _nearest(centroids: FloatArray, places: Places) -> IntArray:
     wanted = np.atleast_2d(np.asarray(places.points, dtype=np.float64))
     if wanted.shape[1] != centroids.shape[1]:
         raise GeometryError(
-            f"expected places of {centroids.shape[1]} coordinates, got shape {wanted.shape}"
+            f"expected positions with {centroids.shape[1]} coordinates, got shape {wanted.shape}"
         )
     if not places.radius > 0:
         raise GeometryError(f"expected a radius above 0 m, got {places.radius:g} m")

@@ -51,9 +51,9 @@ class Cap(Surface):
         reach = float(np.linalg.norm(rows_of(uv), axis=1).max())
         if reach >= 0.95 * math.pi * self.radius:
             raise GeometryError(
-                f"a sphere of {1e3 * self.radius:.4g} mm is covered after "
-                f"{1e3 * math.pi * self.radius:.4g} mm; the sheet reaches {1e3 * reach:.4g} mm "
-                "from its middle",
+                f"a sphere of radius {1e3 * self.radius:.4g} mm is covered at "
+                f"{1e3 * math.pi * self.radius:.4g} mm from the middle, but the sheet extends "
+                f"{1e3 * reach:.4g} mm from its middle",
                 hint="take a larger radius",
             )
 

@@ -111,15 +111,15 @@ class Draped(Surface):
         """
         wanted = np.atleast_2d(np.asarray(xyz, dtype=np.float64))
         if wanted.shape[1] != 3:
-            raise GeometryError(f"expected places (n, 3), got shape {wanted.shape}")
+            raise GeometryError(f"expected positions of shape (n, 3), got shape {wanted.shape}")
         flat, gap = self._nearest(wanted)
         reach = _ON * float(np.median(self._edges))
         if (gap > reach).any():
             first = int(np.argmax(gap > reach))
             raise GeometryError(
-                f"lies {1e3 * gap[first]:.4g} mm off the surface",
+                f"is {1e3 * gap[first]:.4g} mm away from the surface",
                 where=f"{name} {first}",
-                hint="places are in the file's own coordinates and unit",
+                hint="give positions in the coordinates and the unit of the surface's file",
             )
         return flat
 

@@ -143,7 +143,10 @@ def extrude_mesh(flat: Mesh, planes: Sequence[float]) -> Mesh:
     """
     z = np.array(planes, dtype=np.float64)
     if flat.cells.shape[1] != 3 or flat.points.shape[1] != 2:
-        raise GeometryError("expected triangles in the plane", hint="points of 2 coordinates")
+        raise GeometryError(
+            f"expected triangles in the plane, got points of {flat.points.shape[1]} coordinates "
+            f"and cells of {flat.cells.shape[1]} corners"
+        )
     if z.ndim != 1 or len(z) < 2 or not (np.isfinite(z).all() and (np.diff(z) > 0).all()):
         raise GeometryError(f"expected at least 2 ascending heights, got {z.tolist()}")
     body = Body(flat.points, flat.cells, z)
@@ -173,9 +176,9 @@ class Body:
         for number, facets in enumerate(electrodes):
             if not len(facets):
                 raise GeometryError(
-                    "no facet lies inside it",
+                    "no facet lies inside this electrode",
                     where=f"electrode {number}",
-                    hint="make it larger, or ask for more cells",
+                    hint="make the electrode larger, or use more cells",
                 )
         n = len(self.flat)
         points = np.column_stack(

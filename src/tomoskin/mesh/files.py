@@ -52,7 +52,7 @@ def parsed(file: Path) -> Any:
     except Exception as error:  # a parser meets damage in any way
         detail = f": {error}" if str(error) else ""
         raise GeometryError(
-            f"is no {file.suffix} file that can be read{detail}", where=str(file)
+            f"cannot be read as a {file.suffix} file{detail}", where=str(file)
         ) from error
 
 
@@ -103,7 +103,8 @@ def points_of(raw: Any, cells: IntArray, scale: float) -> FloatArray:
         raise GeometryError(f"expected points of 2 or 3 coordinates, got shape {points.shape}")
     if cells.min() < 0 or cells.max() >= len(points):
         raise GeometryError(
-            f"cells refer to points {cells.min()} to {cells.max()}, the file has {len(points)}"
+            f"cells refer to points {cells.min()} to {cells.max()}, but the file has "
+            f"{len(points)} points"
         )
     extent = np.ptp(points[np.unique(cells)], axis=0)
     if extent.max() > TOO_LARGE:

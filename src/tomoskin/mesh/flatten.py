@@ -62,7 +62,7 @@ def rim_of(cells: IntArray) -> IntArray:
     free = sides[~np.isin(forth, back)]
     if not len(free):
         raise GeometryError(
-            "the surface is closed: it has no rim for electrodes", hint="cut it open"
+            "the surface is closed: it has no rim for electrodes", hint="cut it open along a line"
         )
     ahead = dict(zip(free[:, 0].tolist(), free[:, 1].tolist(), strict=True))
     if len(ahead) < len(free):
@@ -76,7 +76,7 @@ def rim_of(cells: IntArray) -> IntArray:
         )
     edges = (len(sides) + len(free)) // 2
     if len(np.unique(cells)) - edges + len(cells) != 1:
-        raise GeometryError("the surface has a handle: it cannot be laid flat")
+        raise GeometryError("the surface has a handle and cannot be laid flat")
     return np.array(walk)
 
 
@@ -93,7 +93,10 @@ def same_turn(cells: IntArray) -> IntArray:
         came = before[cell]
         sign[cell] = sign[came] * beside[cell, came]
     if (sign[pairs[:, 0]] * sign[pairs[:, 1]] != turns).any():
-        raise GeometryError("the surface has one side only", hint="a Möbius strip has no front")
+        raise GeometryError(
+            "the surface has one side only, as a Möbius strip has",
+            hint="a Möbius strip has no front",
+        )
     out = cells.copy()
     out[sign < 0] = out[sign < 0][:, ::-1]
     return out

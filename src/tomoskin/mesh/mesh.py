@@ -208,7 +208,9 @@ def _frozen(value: object, dtype: DTypeLike, where: str) -> NDArray[Any]:
     try:
         raw = np.array(value)
     except ValueError as error:
-        raise GeometryError("expected rows of equal length", where=where) from error
+        raise GeometryError(
+            "expected rows of equal length, got different lengths", where=where
+        ) from error
     if raw.ndim != 2:
         raise GeometryError(f"expected a table with two axes, got shape {raw.shape}", where=where)
     if raw.dtype.kind not in "iuf":
@@ -216,6 +218,6 @@ def _frozen(value: object, dtype: DTypeLike, where: str) -> NDArray[Any]:
     with np.errstate(invalid="ignore"):
         array = raw.astype(dtype)
     if array.dtype.kind == "i" and not np.array_equal(array, raw):
-        raise GeometryError("expected whole numbers", where=where)
+        raise GeometryError("expected whole numbers, got fractions", where=where)
     array.flags.writeable = False
     return array

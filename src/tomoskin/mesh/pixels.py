@@ -63,7 +63,7 @@ def _checked_height(points: FloatArray, cells: IntArray, height: float | None) -
     flat = cells.shape[1] == 3
     if flat and points.shape[1] == 3:
         raise GeometryError(
-            "a curved sheet has no pixels in the plane", hint="draw its cells, or unroll it first"
+            "a curved sheet has no pixels in the plane", hint="draw its cells, or flatten it first"
         )
     if flat and height is not None:
         raise GeometryError(f"expected no height for a sheet in the plane, got {height:g} m")
@@ -72,7 +72,7 @@ def _checked_height(points: FloatArray, cells: IntArray, height: float | None) -
     low, high = points[:, 2].min(), points[:, 2].max()
     if height is None:
         raise GeometryError(
-            "expected the height of a slice through the volume", hint="pass z, in m"
+            "expected the height of a slice through the volume, got none", hint="pass z, in m"
         )
     if not low <= height <= high:
         raise GeometryError(f"expected a height from {low:g} to {high:g} m, got {height:g} m")
@@ -86,7 +86,7 @@ def _raster(points: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
         raise GeometryError(f"expected a pixel size above 0 m, got {step:g} m")
     exact = (high - low) / step
     if exact[0] * exact[1] > MOST_PIXELS:
-        raise GeometryError(f"a pixel of {step:g} m makes more than {MOST_PIXELS} of them")
+        raise GeometryError(f"pixels of {step:g} m would be more than {MOST_PIXELS} pixels in all")
     n = np.maximum(1, np.ceil(exact - 1e-9)).astype(int)
     start = (low + high) / 2 - step * (n - 1) / 2
     x, y = (start[axis] + step * np.arange(n[axis]) for axis in (0, 1))

@@ -178,7 +178,10 @@ def _check_table(vertices: FloatArray) -> None:
         )
     finite = np.isfinite(vertices).all(axis=1)
     if not finite.all():
-        raise GeometryError("expected finite coordinates", where=f"vertex {np.argmin(finite)}")
+        bad = int(np.argmin(finite))
+        raise GeometryError(
+            f"expected finite coordinates, got {vertices[bad].tolist()}", where=f"vertex {bad}"
+        )
 
 
 def _check_repeats(vertices: FloatArray, size: float) -> None:

@@ -75,17 +75,17 @@ def laid_on(mesh: Mesh, surface: Surface) -> Mesh:
         When the mesh is not a flat sheet, does not fit on the surface, or is too coarse for it.
     """
     if mesh.dimension != 2 or mesh.points.shape[1] != 2:
-        raise GeometryError("expected a flat sheet of triangles")
+        raise GeometryError("expected a flat sheet of triangles, got a volume or a curved sheet")
     surface.check(mesh.points)
     metric = _of_lengths(mesh, surface)
     torn = np.flatnonzero(~(np.linalg.det(metric) > 0))
     if len(torn):
         x, y = 1e3 * mesh.centroids[torn[0]]
         raise GeometryError(
-            "the surface is so rough that the sides of the sheet's triangles do not meet on it, "
-            f"{len(torn)} times, first near ({x:.4g}, {y:.4g}) mm of the sheet",
+            f"the surface is too rough for the sheet: {len(torn)} triangles cannot be laid on "
+            f"it, the first near ({x:.4g}, {y:.4g}) mm of the sheet",
             where=f"cell {torn[0]}",
-            hint="smooth it, mend its folds, or take more cells",
+            hint="smooth the surface, repair its folds, or use more cells",
         )
     flat = np.abs(metric - np.eye(2)).max() < _ISOMETRIC
     return replace(mesh, metric=None if flat else metric)

@@ -133,9 +133,9 @@ def check_crossings(points: FloatArray, cells: IntArray) -> None:
                 a, b = pairs[int(np.argmax(cut))]
                 middle = ", ".join(f"{1e3 * x:.4g}" for x in points[cells[a]].mean(axis=0))
                 raise GeometryError(
-                    f"the surface runs through itself near ({middle}) mm",
+                    f"the surface intersects itself near ({middle}) mm",
                     where=f"cells {min(a, b)} and {max(a, b)}",
-                    hint="mend it in a mesh program: remove self-intersections",
+                    hint="repair it in a mesh program: remove self-intersections",
                 )
 
 

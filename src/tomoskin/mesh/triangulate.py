@@ -76,7 +76,7 @@ def triangulate(
                 break  # the wanted number is out of reach: let cells grow faster
             target *= cells / len(table)
     raise GeometryError(
-        f"{cells} cells cannot resolve this outline and its electrodes",
+        f"{cells} cells are too few for this outline and its electrodes",
         hint=f"ask for {1.5 * max(fewest, cells):.0f} cells or more",
     )
 

@@ -81,9 +81,10 @@ class Arm(Surface):
         positive("joint", self.joint)
         if abs(self.angle) * self.radius >= 0.95 * self.joint:
             raise GeometryError(
-                f"a limb of {1e3 * self.radius:.4g} mm folds when it bends by "
+                f"a limb of radius {1e3 * self.radius:.4g} mm folds when it bends by "
                 f"{math.degrees(self.angle):.4g}° over {1e3 * self.joint:.4g} mm",
-                hint=f"expected less than {math.degrees(0.95 * self.joint / self.radius):.4g}°",
+                hint=f"bend it by less than {math.degrees(0.95 * self.joint / self.radius):.4g}°, "
+                "or over a greater length",
             )
 
     def point(self, uv: ArrayLike) -> FloatArray:
@@ -168,7 +169,7 @@ class Hinge(Surface):
         beyond = float(np.abs(across).max()) > self.length / 2 * (1 + _ROUNDING)
         if beyond and abs(self.angle) > math.pi * (1 + _ROUNDING):
             raise GeometryError(
-                f"expected at most 180° where the sheet goes on beyond the strip that bends, got "
+                "expected at most 180° where the sheet extends beyond the bent strip, got "
                 f"{math.degrees(self.angle):.4g}°",
                 hint="bend it over a greater length",
             )
@@ -214,7 +215,7 @@ def _check_seam(extent: float, radius: float) -> None:
     around = 2 * math.pi * radius
     if extent > around * (1 + _ROUNDING):
         raise GeometryError(
-            f"the sheet is {1e3 * extent:.4g} mm wide and overlaps itself: a radius of "
-            f"{1e3 * radius:.4g} mm is {1e3 * around:.4g} mm around",
+            f"the sheet is {1e3 * extent:.4g} mm wide and overlaps itself: a cylinder of radius "
+            f"{1e3 * radius:.4g} mm has a circumference of {1e3 * around:.4g} mm",
             hint="take a larger radius, a narrower sheet, or another direction of the axis",
         )

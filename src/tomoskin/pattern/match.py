@@ -54,7 +54,10 @@ def match_rows(pattern: Pattern, drive: ArrayLike, measure: ArrayLike) -> RowMat
     found = [_find(table, d, m) for d, m in _rows(pattern)]
     missing = [row for row, hit in enumerate(found) if hit is None]
     if missing:
-        raise PatternError(_describe(pattern, missing), hint="is it the right skin and pattern?")
+        raise PatternError(
+            _describe(pattern, missing),
+            hint="name the skin of this recording with --skin, and use the same pattern",
+        )
     hits = [hit for hit in found if hit is not None]
     rows = np.array([row for row, _ in hits], dtype=np.int64)
     unused = np.setdiff1d(np.arange(foreign.n_meas), rows)

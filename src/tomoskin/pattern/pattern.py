@@ -223,7 +223,7 @@ def _table(value: ArrayLike, name: str) -> IntArray:
     if raw.ndim != 2 or raw.shape[1] != 2 or not len(raw):
         raise PatternError(f"expected a {name} table of shape (rows, 2), got {raw.shape}")
     if raw.dtype.kind not in "iu" and not np.array_equal(raw, np.round(raw)):
-        raise PatternError(f"expected whole electrode numbers in the {name} table")
+        raise PatternError(f"expected whole electrode numbers in the {name} table, got others")
     return raw.astype(np.int64)
 
 

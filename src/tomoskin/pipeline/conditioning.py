@@ -162,6 +162,7 @@ class Followed:
             unusable=without_reference,
             scan=scan,
             rank=_rank(prepared),
+            most_own=prepared.readout.own_voltage.large if prepared.skin.chop_frequency else np.inf,
         )
         drift = Drift(prepared, reference)
         return cls(prepared, monitor, _baseline(prepared, reference), drift)
@@ -216,7 +217,9 @@ class Followed:
         mean = baseline.mean
         if measured.excluded.any():
             values = np.where(np.isfinite(values), values, mean)
-        health = self._monitor.push(values, measured.excluded, measured.time, measured.samples)
+        health = self._monitor.push(
+            values, measured.excluded, measured.time, measured.samples, measured.own
+        )
         self._values, self._health = values, health
         subspace = self._nuisance(health)
         self._excluded = health.lost
@@ -231,7 +234,7 @@ class Followed:
             return Conditioned(None, n_excluded, health)
         times = _gain_of(values, mean, self._excluded)
         if times is not None and self._prepared.skin.signal.common_modes != "projected":
-            return Conditioned(None, n_excluded, health, f"{_gain_text(times)}; nothing is shown")
+            return Conditioned(None, n_excluded, health, f"{_gain_text(times)}; no image is shown")
         dv = subspace.nuisance(difference(values, mean, self._prepared.operator.difference))
         differences = Differences(
             dv=dv,
@@ -356,7 +359,7 @@ def _gain_of(values: FloatArray, mean: FloatArray, excluded: NDArray[np.bool_]) 
 
 def _gain_text(times: float) -> str:
     return (
-        f"all voltages are {times:.1f} times those of the reference: look at current, supply and "
+        f"all voltages are {times:.1f} times those of the reference: check current, supply and "
         "gain, and take a new reference"
     )
 

@@ -127,7 +127,7 @@ class Following:
         try:
             image, view, detections = self._found(measured.time, conditioned.differences)
         except ModelError as error:  # the next frame may be well
-            problem = f"nothing could be found in this frame: {error}"
+            problem = f"no touch can be found in this frame: {error}"
             failed = replace(conditioned, differences=None, problem=problem)
             return self._without_touches(measured, failed)
         touches = self._tracker.update(detections, measured.time, measured.host_time)

@@ -47,14 +47,16 @@ class ModelAgreement:
     def text(self) -> str:
         """How well they agree."""
         return (
-            f"the reference agrees with the skin's model by {self.cosine:.3f} (1 = proportional), "
-            f"at {self.size:.3g} times its size"
+            f"the reference agrees with the skin's model by {self.cosine:.3f} (1 = "
+            f"proportional), at {self.size:.3g} times its size"
         )
 
     def doubt(self, *, volts: bool) -> str | None:
         """What to look at, in a sentence, or None; ``volts``: whether the size can be meant."""
+        if math.isnan(self.cosine):  # there is no reference yet
+            return None
         if self.cosine < DOUBTED:
-            return f"{self.text}: check the skin and the electrodes' order"
+            return f"{self.text}: check the skin and the order of the electrodes"
         if volts and not 1 / _MOST_SIZE < self.size < _MOST_SIZE:
             return f"{self.text}: check the skin, its current and its sheet resistance"
         return None

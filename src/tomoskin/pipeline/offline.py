@@ -172,7 +172,7 @@ def _check_times(time: FloatArray, idle: Idle, source: str) -> None:
     """Raises DataError where a filter over the frames makes no sense."""
     if isinstance(idle, str):
         raise DataError(
-            "each frame against the one before it cannot be filtered over frames too",
+            "differences to the previous frame cannot be filtered over frames as well",
             where=source,
             hint='choose another --reference, or --time-constant "0 s"',
         )
@@ -180,7 +180,7 @@ def _check_times(time: FloatArray, idle: Idle, source: str) -> None:
     if len(back) or not np.isfinite(time).all():
         at = int(back[0]) + 1 if len(back) else 0
         raise DataError(
-            f"expected times that go on, for a filter over frames; got {time[at]:g} s",
-            where=f"{source}, frame {at} of those that can be used",
-            hint='give time_s, or --time-constant "0 s"',
+            f"expected increasing times for a filter over frames, got {time[at]:g} s",
+            where=f"{source}, usable frame {at}",
+            hint='give the times as time_s, or use --time-constant "0 s"',
         )

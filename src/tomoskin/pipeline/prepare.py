@@ -76,7 +76,7 @@ class Prepared:
         for stage, mesh in (("skin", self.mesh), ("segmenter", self.segmenter.mesh)):
             if mesh.identity != made_for:
                 raise ModelError(
-                    f"the operator is of mesh {made_for}, the {stage} of mesh {mesh.identity}"
+                    f"the operator belongs to mesh {made_for}, the {stage} to mesh {mesh.identity}"
                 )
 
     def with_alpha(self, choice: AlphaChoice, spectrum: Spectrum, operator: Operator) -> Prepared:

@@ -173,9 +173,9 @@ def _complete(idle: NDArray[Any], source: str) -> NDArray[Any]:
     complete = np.isfinite(idle).all(axis=1)
     if not complete.any():
         raise DataError(
-            "no untouched frame has finite values in every row that the others have",
+            "no untouched frame has finite values in all rows that the other frames have",
             where=source,
-            hint="name other frames with --reference",
+            hint="choose other frames with --reference",
         )
     return np.asarray(idle[complete])
 
@@ -210,7 +210,9 @@ def _against_the_one_before(left: _Left) -> RecordedFrames:
     steps = Consecutive(left.prepared.operator.difference)
     found = [steps.push(frame) for frame in np.where(left.missing, mean, values)]
     if len(found) < 2:
-        raise DataError("expected two frames at least", where=left.recording.source)
+        raise DataError(
+            f"expected at least two frames, got {len(found)}", where=left.recording.source
+        )
     missing = left.missing[1:] | left.missing[:-1]
     return left.frames_of(missing, np.array(found[1:]), None, agreement)
 
@@ -235,14 +237,14 @@ def _agreement(reference: FloatArray, model: FloatArray, source: str) -> ModelAg
     cosine = agreement.cosine
     if cosine <= -REFUSED:
         raise DataError(
-            f"the voltages are those of this skin with the sign reversed (agreement {cosine:.2f})",
+            f"the voltages fit this skin with the sign reversed (agreement {cosine:.2f})",
             where=source,
-            hint="exchange source and sink, or plus and minus, in its tables",
+            hint="swap source and sink, or plus and minus, in the file's tables",
         )
     if cosine < REFUSED:
         raise DataError(
-            f"does not look like this skin: its reference agrees with the model by {cosine:.2f}, "
-            "expected close to 1",
+            "the recording does not fit this skin: its reference agrees with the model by "
+            f"{cosine:.2f}, expected close to 1",
             where=source,
             hint="check --skin, the order of the electrodes and --reference",
         )
@@ -284,8 +286,8 @@ def dead_rows(
     if len(rows) > MOST_EXCLUDED * pattern.n_meas:
         listed = "; ".join(pattern.row_text(row) for row in rows[:_LISTED])
         raise DataError(
-            f"{len(rows)} of {pattern.n_meas} rows hold no finite values, too many to leave out: "
-            f"{listed}; …",
+            f"{len(rows)} of {pattern.n_meas} rows hold no finite values, which is too many to "
+            f"leave out: {listed}; …",
             where=source,
         )
     return rows

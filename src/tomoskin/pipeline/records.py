@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.calibration import BENDS, CLASSES, BendReading, ClassReading
+from tomoskin.calibration import BENDS, CLASSES, TOUCH, BendReading, CalibrationHealth, ClassReading
 from tomoskin.core import FloatArray, Image, Touch, Voltages
 from tomoskin.pipeline.model_agreement import NO_AGREEMENT, ModelAgreement
 from tomoskin.signal import BaselineState, Health
@@ -33,6 +33,9 @@ class Measured:
         The frame's number.
     samples
         What the board sent, where there is a board.
+    own
+        (n_electrodes,) V that each electrode shows whatever the current does; None where the drive
+        does not alternate.
     """
 
     values: FloatArray
@@ -41,13 +44,17 @@ class Measured:
     host_time: float
     sequence: int = 0
     samples: NDArray[np.uint16] | None = None
+    own: FloatArray | None = None
 
     @classmethod
     def of(cls, voltages: Voltages, samples: NDArray[np.uint16], tick_rate: float) -> Self:
         """From a board's frame, whose clock runs at ``tick_rate`` Hz."""
         excluded = voltages.railed | ~np.isfinite(voltages.values)
         time = voltages.ticks / tick_rate
-        return cls(voltages.values, excluded, time, voltages.host_time, voltages.sequence, samples)
+        return cls(
+            voltages.values, excluded, time, voltages.host_time, voltages.sequence, samples,
+            voltages.own,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,6 +138,11 @@ class FrameResult:
         return self.readings.get(CLASSES.name)
 
     @property
+    def calibration(self) -> CalibrationHealth | None:
+        """How touches fit the calibration that locates them; None where none does."""
+        return self.readings.get(TOUCH.name)
+
+    @property
     def problem(self) -> str | None:
         """What is wrong with the picture, in a sentence, or None."""
         if self.health is not None and self.health.sick:
@@ -141,19 +153,19 @@ class FrameResult:
         rows = f"{self.left_out} of {len(self.voltages)} rows"
         if not self.has_image:
             return (
-                f"{rows} are at a rail of the converter or without a reference: no picture is "
-                "shown; look at the electrodes and the gain"
+                f"{rows} are at a rail of the converter or without a reference, so no image is "
+                "shown: check the electrodes and the gain"
             )
         return (
-            f"{rows} are at a rail of the converter or without a reference, and the picture is "
-            "made without them"
+            f"{rows} are at a rail of the converter or without a reference: the image is made "
+            "without them"
         )
 
     def _sick(self, health: Health) -> str:
         """Which electrodes, why, and what becomes of the picture."""
         if not self.has_image:
-            return f"{health.text}; too little is left for a picture: look at the electrodes"
-        return f"{health.text}; the picture is made without {self.left_out} rows"
+            return f"{health.text}; too few rows are left for an image: check the electrodes"
+        return f"{health.text}; the image is made without {self.left_out} rows"
 
 
 @dataclass(frozen=True, slots=True)

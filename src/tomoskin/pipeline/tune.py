@@ -105,10 +105,10 @@ def tuned_by_rule(prepared: Prepared, rule: str, evidence: Evidence) -> Prepared
     """
     if prepared.skin.inverse.method != "one-step":
         raise ModelError(
-            f'rules choose the alpha of method "one-step", and the skin\'s is '
+            'a rule can choose alpha only for method "one-step", but the skin\'s method is '
             f'"{prepared.skin.inverse.method}"',
             where=prepared.skin.name,
-            hint="leave the rule out, or change the method in the skin's [inverse]",
+            hint="leave out the rule, or change the method in the skin's [inverse]",
         )
     spectrum = Spectrum.of(prepared.problem)
     choice = choose(spectrum, rule, evidence)

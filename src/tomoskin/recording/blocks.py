@@ -60,14 +60,16 @@ class Rows:
         pattern = session.skin.pattern()
         return cls(pattern, Readout.of(Scan.of(pattern), session.skin.readout))
 
-    def voltages(self, samples: NDArray[np.uint16]) -> FloatArray:
-        """(n, n_meas) V of (n, n_samples) counts, as the read-out gives them frame by frame."""
-        plus, minus = self.readout.scan.plus, self.readout.scan.minus
-        counts = samples.astype(np.float64)
-        at_rail = (counts <= self.readout.low) | (counts >= self.readout.high)
-        volts = (counts[:, plus] - counts[:, minus]) * self.readout.volts_per_count
-        volts[at_rail[:, plus] | at_rail[:, minus]] = np.nan
-        return np.asarray(volts)
+    def voltages(
+        self, samples: NDArray[np.uint16], sums: NDArray[np.uint16] | None = None
+    ) -> FloatArray:
+        """(n, n_meas) V of (n, n_samples) counts, as the read-out gives them frame by frame.
+
+        NaN where a sample stood at a rail; ``sums``, if any, as in a frame.
+        """
+        volts, railed = self.readout.rows(samples, sums)
+        volts[railed] = np.nan
+        return volts
 
 
 def all_blocks(session: SessionReader, rows: Rows, advance: Advance = no_report) -> Iterator[Block]:
@@ -152,6 +154,8 @@ def _blocks(session: SessionReader, rows: Rows) -> Iterator[Block]:
 def _block(items: list[ScannedFrame], rows: Rows) -> Block:
     frames = [item.frame for _, _, item in items]
     samples = np.stack([frame.samples for frame in frames])
+    given = [frame.sums for frame in frames if frame.sums is not None]
+    sums = np.stack(given) if len(given) == len(frames) else None
     return Block(
         number=np.array([number for number, _, _ in items]),
         time=np.array([time for _, time, _ in items]),
@@ -160,5 +164,5 @@ def _block(items: list[ScannedFrame], rows: Rows) -> Block:
         ticks=np.array([frame.ticks for frame in frames], dtype=np.uint64),
         mark=np.array([int(item.mark) for _, _, item in items]),
         samples=samples,
-        voltages=rows.voltages(samples),
+        voltages=rows.voltages(samples, sums),
     )

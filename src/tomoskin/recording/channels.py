@@ -28,6 +28,7 @@ uint16 drops          # frames that the device dropped since START
 uint8 flags           # the device's
 uint8 mark            # 1 a reference begins, 2 held, 4 skipped, 8 source opened, 16 from earlier
 uint16[] samples      # counts in scan order, each the sum over the oversampling
+uint16[] sums         # of an alternating drive: samples are differences of its directions + 32768
 """
 
 _NUMBER = {"type": "number"}

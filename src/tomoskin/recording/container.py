@@ -108,7 +108,7 @@ class ContainerWriter:
     def message(self, channel: int, log_time: int, data: bytes) -> None:
         """Add one message; the chunk is written when it is long enough."""
         if self._broken:
-            raise OSError("it could not be written before")
+            raise OSError("an earlier write failed")
         records = self._records
         index = self._indexes.get(channel)
         if index is None:
@@ -190,7 +190,7 @@ class ContainerWriter:
     def _write(self, data: bytes | bytearray) -> int:
         """Write all of ``data`` or nothing; where it begins."""
         if self._broken:
-            raise OSError("it could not be written before")
+            raise OSError("an earlier write failed")
         place = self.size
         try:
             rest = memoryview(data)

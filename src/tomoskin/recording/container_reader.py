@@ -26,10 +26,10 @@ from tomoskin.recording.mcap_records import (
     messages_in,
 )
 
-MEND = "tomoskin session repair recovers what is whole"
+MEND = "tomoskin session repair recovers all whole chunks"
 """What to do about a damaged file."""
 
-_END = "tomoskin session repair ends it"
+_END = "tomoskin session repair completes it"
 
 _FOOTER_BYTES = len(encode(Footer(0, 0, 0)))
 
@@ -130,7 +130,8 @@ class ContainerReader:
             chunk = decode_chunk(self._record(offset))
         if chunk.compression:
             raise DataError(
-                f"its chunks are compressed ({chunk.compression}); those of a session are not",
+                f"its chunks are compressed ({chunk.compression}), but tomoskin reads only "
+                "uncompressed ones",
                 where=f"{self.where}, byte {offset}",
                 hint="decompress it first: mcap decompress",
             )
@@ -145,15 +146,15 @@ class ContainerReader:
             raise DataError(
                 "is not an MCAP file",
                 where=self.where,
-                hint="recordings of other programs: tomoskin session import",
+                hint="convert recordings of other programs first: tomoskin session import",
             )
         end = self.size - _FOOTER_BYTES - len(MAGIC)
         tail = self._read(end, _FOOTER_BYTES + len(MAGIC))
         try:
             footer = decode(Footer, tail.removesuffix(MAGIC))
         except ValueError:
-            stop = "the program or the computer stopped while it was written"
-            self.torn = f"was not ended: {stop} ({_END})"
+            stop = "the program or the computer stopped during the recording"
+            self.torn = f"is incomplete: {stop} ({_END})"
             return
         self._end, start = end, footer.summary_start
         if not start:
@@ -180,17 +181,17 @@ class ContainerReader:
                 return
             place = after
         if place < self._end < self.size:
-            raise self._damage(place, "a record is cut")
+            raise self._damage(place, "a record is cut off")
         if place < self._end:
-            cut = f"a record is cut at byte {place} of {self.size}"
-            self.torn = f"was not ended: {cut} ({_END})"
+            cut = f"a record is cut off at byte {place} of {self.size}"
+            self.torn = f"is incomplete: {cut} ({_END})"
 
     def _record(self, offset: int) -> bytes:
         """A whole record; ValueError where it would go beyond the end."""
         head = self._read(offset, PREFIX.size)
         length = PREFIX.unpack(head)[1] if len(head) == PREFIX.size else self.size
         if length > min(LARGEST, self.size - offset - PREFIX.size):
-            raise ValueError(f"a record of {length} bytes goes beyond the end")
+            raise ValueError(f"a record of {length} bytes extends beyond the end of the file")
         return self._read(offset, PREFIX.size + length)
 
     def _read(self, place: int, length: int) -> bytes:

@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntFlag
 from typing import Any
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import DataError, Detection, Event, Force, Frame, Touch
 
 _CDR = b"\x00\x01\x00\x00"
 _FRAME = struct.Struct("<4sdQIHHBBxxI")
+_COUNT = struct.Struct("<I")
 _RAW = struct.Struct("<4sdI")
 _HOST_TIME = struct.Struct("<4xd")
 
@@ -57,7 +59,14 @@ def encode_frame(frame: Frame, mark: Mark) -> bytes:
         mark,
         len(frame.samples),
     )
-    return head + frame.samples.astype("<u2", copy=False).tobytes()
+    samples = frame.samples.astype("<u2", copy=False).tobytes()
+    sums = b"" if frame.sums is None else frame.sums.astype("<u2", copy=False).tobytes()
+    return head + samples + bytes(_gap(frame)) + _COUNT.pack(len(sums) // 2) + sums
+
+
+def _gap(frame: Frame) -> int:
+    """Bytes that bring the next count to a multiple of four."""
+    return 2 * (len(frame.samples) % 2)
 
 
 def decode_frame(data: bytes | memoryview, where: str) -> MarkedFrame:
@@ -65,11 +74,21 @@ def decode_frame(data: bytes | memoryview, where: str) -> MarkedFrame:
     if len(data) < _FRAME.size:
         raise _wrong("a frame", data, where)
     cdr, host_time, ticks, sequence, configuration, drops, flags, mark, n = _FRAME.unpack_from(data)
-    if cdr != _CDR or len(data) != _FRAME.size + 2 * n:
+    end = _FRAME.size + 2 * n
+    if cdr != _CDR or len(data) < end:
         raise _wrong("a frame", data, where)
     samples = np.frombuffer(data, "<u2", n, _FRAME.size)
     frame = Frame(sequence, ticks, host_time, configuration, flags, drops, samples)
-    return MarkedFrame(frame, Mark(mark))
+    sums = None if len(data) == end else _sums(data, end + _gap(frame), where)
+    return MarkedFrame(replace(frame, sums=sums), Mark(mark))
+
+
+def _sums(data: bytes | memoryview, at: int, where: str) -> NDArray[np.uint16] | None:
+    """The sums, whose number stands at ``at``; files of before protocol 1.2 have none."""
+    n = _COUNT.unpack_from(data, at)[0] if len(data) >= at + _COUNT.size else -1
+    if len(data) != at + _COUNT.size + 2 * n:
+        raise _wrong("a frame", data, where)
+    return np.frombuffer(data, "<u2", n, at + _COUNT.size) if n else None
 
 
 def encode_raw(host_time: float, data: bytes) -> bytes:

@@ -79,7 +79,7 @@ class Summary:
                 if any(number in channels for number, _ in on_channels):
                     yield offset
         if place != len(index):
-            raise ValueError("the index of the chunks does not add up")
+            raise ValueError("the index of the chunks is inconsistent")
 
 
 def encode(*records: McapRecord) -> bytes:
@@ -107,7 +107,7 @@ def decode(kind: type[Record], data: bytes) -> Record:
     """
     record = _read(kind, data)
     if encode(record) != data:
-        raise ValueError(f"the {kind.__name__} does not add up")
+        raise ValueError(f"the {kind.__name__} is inconsistent")
     return record
 
 
@@ -119,9 +119,11 @@ def decode_chunk(data: bytes) -> Chunk:
     if chunk.compression:
         return chunk
     if len(chunk.data) != chunk.uncompressed_size:
-        raise ValueError(f"a chunk of {chunk.uncompressed_size} bytes holds {len(chunk.data)}")
+        raise ValueError(
+            f"a chunk of {chunk.uncompressed_size} bytes holds {len(chunk.data)} bytes"
+        )
     if zlib.crc32(chunk.data) != chunk.uncompressed_crc:
-        raise ValueError("the CRC of a chunk differs")
+        raise ValueError("the CRC of a chunk is wrong")
     return chunk
 
 
@@ -132,7 +134,7 @@ def decode_summary(footer: Footer, data: bytes) -> Summary | None:
     """
     start = footer.summary_start
     if footer.summary_crc not in (0, zlib.crc32(encode(footer)[:-_CRC_BYTES], zlib.crc32(data))):
-        raise ValueError("the CRC of the index differs")
+        raise ValueError("the CRC of the index is wrong")
     groups = {}
     for group in _decode_all(SummaryOffset, data[footer.summary_offset_start - start :]):
         begin = group.group_start - start
@@ -164,7 +166,7 @@ def messages_in(chunk: Chunk, offset: int) -> Iterator[LoggedMessage]:
             yield LoggedMessage(channel, log_time, data[begin:after], offset)
         place = after
     if place != end:
-        raise ValueError("the records of a chunk do not add up")
+        raise ValueError("the records of a chunk are inconsistent")
 
 
 def _decode_all(kind: type[Record], data: bytes) -> Iterator[Record]:
@@ -182,5 +184,5 @@ def _read(kind: type[Record], data: bytes) -> Record:
     try:
         record: Record = reader.read(ReadDataStream(io.BytesIO(data[PREFIX.size :])))
     except (McapError, struct.error, OverflowError) as error:
-        raise ValueError(f"the {kind.__name__} is cut") from error
+        raise ValueError(f"the {kind.__name__} is cut off") from error
     return record

@@ -20,10 +20,10 @@ _SECOND = 1_000_000_000
 """An open chunk is written once it spans so many ns, however short it is."""
 
 _ADVICE: dict[type[OSError], str] = {
-    FileNotFoundError: "make the folder first",
+    FileNotFoundError: "create the folder first",
     IsADirectoryError: "name a file",
-    NotADirectoryError: "name a file in a folder",
-    PermissionError: "choose another place",
+    NotADirectoryError: "give the name of a file in a folder",
+    PermissionError: "choose another folder",
 }
 
 
@@ -93,7 +93,7 @@ class MessageLog:
             self._file.flush()
         self._flushed = self.log_time(self._now)
         if not self._file.is_linked:
-            raise DataError("has been removed while it was written", where=str(self.path))
+            raise DataError("was removed during the recording", where=str(self.path))
 
     def close(self) -> None:
         """End the file with its index; a second call does nothing."""
@@ -122,5 +122,5 @@ def errors_of(path: StrPath) -> Iterator[None]:
         raise DataError(
             f"cannot be read or written: {error.strerror or error}",
             where=str(path),
-            hint=_ADVICE.get(type(error), "look at the disk"),
+            hint=_ADVICE.get(type(error), "check that the disk is connected and has space"),
         ) from error

@@ -38,10 +38,11 @@ class RawRead:
 
 @dataclass(frozen=True, slots=True)
 class BoardInfo:
-    """What the board says that it is."""
+    """What the board says that it is, and what it calls itself."""
 
     host_time: float
     info: Info
+    name: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +95,7 @@ class Recorder:
     """
 
     kind = "recording"
-    slow, ready = "the disk is too slow, messages are lost", ""
+    slow, ready = "the disk is too slow, and messages are lost", ""
 
     def __init__(
         self,
@@ -170,7 +171,7 @@ class Recorder:
             case Truth():
                 session.truth(item.host_time, item.presses, item.bends)
             case BoardInfo():
-                session.device(item.host_time, item.info)
+                session.device(item.host_time, item.info, item.name)
             case RunSettings():
                 session.settings(item.host_time, item.values)
 

@@ -125,7 +125,9 @@ def repair(
                 for stop in _copy(stretches(file, size), mended, result):
                     advance(stop, size)
             if not result.chunks:
-                raise DataError("holds no whole chunk: nothing can be recovered", where=str(source))
+                raise DataError(
+                    "holds no whole chunk, so nothing can be recovered", where=str(source)
+                )
     return result
 
 
@@ -170,10 +172,12 @@ def _front(
         elif isinstance(record, Chunk):
             epoch = min(epoch, _earliest_epoch(record))
     if SKINS in about:
-        hint = f"tomoskin session split {where} keeps what is whole, in one file a skin"
+        hint = (
+            f"tomoskin session split {where} recovers all whole chunks, in one file for each skin"
+        )
         raise DataError("holds the sessions of several skins", where=where, hint=hint)
     if not is_session:
-        raise DataError("holds no part of a session: nothing can be recovered", where=where)
+        raise DataError("holds no part of a session, so nothing can be recovered", where=where)
     skin = skin or _skin_of(attachments.get(SKIN_FILE), about, where)
     data = skin.to_toml().encode()
     attachments[SKIN_FILE] = Attachment(0, 0, SKIN_FILE, "application/toml", data)
@@ -192,7 +196,9 @@ def _skin_of(attachment: Attachment | None, about: Mapping[str, str], where: str
         if skin.identity == about.get("skin_identity"):
             return skin
     raise DataError(
-        "its skin is lost, so nothing is saved", where=where, hint="name the skin: --skin"
+        "its skin is lost, so nothing can be recovered without it",
+        where=where,
+        hint="give the skin: --skin",
     )
 
 

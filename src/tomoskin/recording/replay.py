@@ -221,7 +221,9 @@ def parse_replay(argument: str) -> tuple[Path, float, bool]:
     """File, speed and whether to begin again, of what stands behind ``replay:``."""
     matches = [m for tail in _TAILS if (m := re.fullmatch(f"(.+?){tail}", argument, re.DOTALL))]
     if not matches:
-        raise SourceError("expected a session file, such as replay:run.mcap", where="replay")
+        raise SourceError(
+            "expected a session file, such as replay:run.mcap; got none", where="replay"
+        )
     # what is called so is meant, whatever is in its name
     match = next((m for m in matches if Path(m[1]).exists()), matches[-1])
     path, words = match[1], match.groupdict()
@@ -229,8 +231,8 @@ def parse_replay(argument: str) -> tuple[Path, float, bool]:
     speed = math.inf if text == "max" else _number(text)
     if not speed > 0 or option != "loop":
         raise SourceError(
-            "expected perhaps @SPEED, above 0 or max, then perhaps ,loop; "
-            f'got "{argument.removeprefix(path)}"',
+            "expected @SPEED (above 0, or max), ,loop or both behind the file, got "
+            f'"{argument.removeprefix(path)}"',
             where=f"replay:{path}",
             hint="for example replay:run.mcap,loop or replay:run.mcap@2,loop",
         )
@@ -262,10 +264,10 @@ def _stamp_of(
     same_skin = skin.body == session.skin.body
     if not same_skin or len(first.frame.samples) != configuration.n_samples:
         raise SourceError(
-            f"was recorded by another scan ({first.frame.configuration:04x}) than that of "
+            f"was recorded with another scan ({first.frame.configuration:04x}) than that of "
             f"{skin.name} ({configuration.identity:04x})",
             where=where,
-            hint="leave --skin out: the recording holds its own",
+            hint="leave out --skin: the recording holds its own skin",
         )
 
     def stamp(item: MarkedFrame) -> MarkedFrame:

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from tomoskin.twin import Board, HeldScanning
 from tomoskin.wire import (
-    OLDER,
     SCHEMA,
     Ack,
+    BoardLimits,
+    Command,
     Deframer,
+    GetBoard,
     GetInfo,
+    GetMode,
+    GetPattern,
+    GetScan,
     Hello,
-    Info,
-    Reset,
+    Message,
     Result,
+    SetFormat,
+    SetMode,
+    SetPattern,
+    SetScan,
     Start,
     Stop,
     decode_payload,
@@ -25,9 +35,7 @@ from tomoskin.wire import (
 if TYPE_CHECKING:
     from tomoskin.skin import Skin
 
-
-((_VERSION, _HASH),) = OLDER.items()
-"""It speaks the oldest protocol: what it cannot be asked need not be made up."""
+_MOST = 2**16 - 1
 
 
 class ReplayBoard:
@@ -38,23 +46,18 @@ class ReplayBoard:
 
     def __init__(self, skin: Skin, device: dict[str, Any]) -> None:
         """``device`` is what the session holds of the board, perhaps nothing."""
-        self._skin, self._device = skin, device
+        self._board = _board(skin, device)
+        self._held = HeldScanning(self._board)
         self._deframer = Deframer(SCHEMA.to_device_bytes)
-        self._out = bytearray(encode(Hello(*_VERSION, _HASH)))
+        self._out = bytearray(encode(Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash)))
         self.scanning = False
 
     def obey(self, data: bytes) -> None:
         """Act on commands."""
         for payload in self._deframer.feed(data):
             command = decode_payload(payload, 0.0)
-            if command is None or not is_command(command):
-                continue
-            if isinstance(command, Start | Stop):
-                self.scanning = isinstance(command, Start)
-            if isinstance(command, GetInfo):
-                self._out += encode(self._info(command.request))
-            else:
-                self._out += encode(Ack(command.request, type_byte(type(command)), Result.OK, 0))
+            if command is not None and is_command(command):
+                self._out += encode(self._answer(command))
 
     def answer(self) -> bytes:
         """What it has to say, once."""
@@ -62,38 +65,47 @@ class ReplayBoard:
         self._out.clear()
         return data
 
-    @property
-    def _channels(self) -> int:
-        """Of the board that was recorded; never fewer than the skin has electrodes."""
-        recorded = self._device.get("channels")
-        return max(recorded if isinstance(recorded, int) else 0, self._skin.n_electrodes)
-
-    def _info(self, request: int) -> Info:
-        skin = self._skin
-        return Info(
-            request=request,
-            major=_VERSION[0],
-            minor=_VERSION[1],
-            schema_hash=_HASH,
-            firmware=_version(self._device.get("firmware")),
-            reset=Reset.UNKNOWN,
-            channels=self._channels,
-            adc_bits=skin.readout.adc_bits,
-            max_oversampling=64,
-            max_drives=2**16 - 1,
-            max_samples=2**16 - 1,
-            tick_rate=round(self._device.get("tick_rate", skin.readout.tick_rate)),
-            current=round(skin.current * 1e6),
-            max_baud=0,
-            unique_id=_identity(self._device.get("unique_id")),
-        )
+    def _answer(self, command: Command) -> Message:
+        match command:
+            case GetInfo():
+                return self._board.info(command.request)
+            case GetBoard():
+                return replace(self._board.limits, request=command.request)
+            case GetScan() | GetPattern() | GetMode():
+                return self._held.answer(command)
+            case SetScan() | SetPattern() | SetFormat() | SetMode():
+                self._held.set(command)
+            case Start() | Stop():
+                self.scanning = isinstance(command, Start)
+        return Ack(command.request, type_byte(type(command)), Result.OK, 0)
 
 
-def _version(text: Any) -> bytes:
+def _board(skin: Skin, device: dict[str, Any]) -> Board:
+    """A board that is what was recorded, and has room for any scan.
+
+    It has never fewer channels than the skin has electrodes.
+    """
+    channels = device.get("channels")
+    name = str(device.get("name") or "").encode()[:24]
+    return Board(
+        channels=max(channels if isinstance(channels, int) else 0, skin.n_electrodes),
+        adc_bits=skin.readout.adc_bits,
+        current=skin.current,
+        tick_rate=round(device.get("tick_rate", skin.readout.tick_rate)),
+        max_drives=_MOST,
+        max_samples=_MOST,
+        firmware=_version(device.get("firmware")),
+        unique_id=_identity(device.get("unique_id")),
+        limits=BoardLimits(0, name.ljust(24, b"\0"), 0, _MOST, 0, 0, 0, 0),
+    )
+
+
+def _version(text: Any) -> tuple[int, int, int]:
     """Three numbers of "1.2.3"; zeros where it says no such."""
     parts = str(text or "").split(".")
     is_version = len(parts) == 3 and all(part.isdigit() and int(part) < 256 for part in parts)
-    return bytes(map(int, parts)) if is_version else bytes(3)
+    major, minor, patch = map(int, parts) if is_version else (0, 0, 0)
+    return major, minor, patch
 
 
 def _identity(text: Any) -> bytes:

@@ -42,7 +42,7 @@ def scanned_frames(session: SessionReader, scan: Scan) -> Iterator[ScannedFrame]
         number += 1
     if session.container.summary and read != (expected := indexed_frames(session)):
         raise DataError(
-            f"is damaged: {expected} frames were written, {read} are there",
+            f"is damaged: {expected} frames were written, but only {read} can be read",
             where=str(session.path),
         )
 

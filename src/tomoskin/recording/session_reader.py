@@ -171,7 +171,7 @@ def end_time(session: SessionReader) -> float | None:
 def _epoch(container: ContainerReader) -> float:
     about = container.description(ABOUT)
     if about is None:
-        raise DataError("is an MCAP file, but no session of tomoskin", where=container.where)
+        raise DataError("is an MCAP file, but not a session of tomoskin", where=container.where)
     if SKINS in about:
         raise DataError(
             f"holds the sessions of several skins: {about[SKINS]}",
@@ -182,11 +182,13 @@ def _epoch(container: ContainerReader) -> float:
         raise DataError(
             f"expected a session of format {FORMAT}, got {about.get('format')}",
             where=container.where,
-            hint="it was written by another version of tomoskin",
+            hint="it was written by another version of tomoskin: use that version",
         )
     epoch = epoch_of(about)
     if epoch is None:
-        raise DataError("does not say when its clock began", where=container.where, hint=MEND)
+        raise DataError(
+            "does not hold the start time of its clock", where=container.where, hint=MEND
+        )
     return epoch
 
 
@@ -207,7 +209,7 @@ def _skin(container: ContainerReader) -> Skin:
                 return Skin.from_toml(attachment.data.decode(), source=where)
             except (SkinError, UnicodeDecodeError) as error:
                 raise DataError(
-                    f"holds a skin that is none: {error}", where=container.where
+                    f"holds a skin that cannot be read: {error}", where=container.where
                 ) from error
     but = f"; it {container.torn}" if container.torn else ""
     raise DataError(f"holds no skin{but}", where=container.where)
@@ -235,7 +237,7 @@ def _document(session: SessionReader, message: LoggedMessage) -> dict[str, Any]:
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         topic = channels.TOPICS[message.channel]
         raise DataError(
-            f"a message of {topic} is not understood: {error}", where=_place(session, message)
+            f"a message of {topic} cannot be decoded: {error}", where=_place(session, message)
         ) from error
 
 

@@ -178,14 +178,16 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         content = log_message(Event(host_time, "note", text), self._log.log_time(host_time))
         self._document(channels.NOTES, host_time, content)
 
-    def device(self, host_time: float, info: Info) -> None:
-        """What the board says that it is."""
+    def device(self, host_time: float, info: Info, name: str = "") -> None:
+        """What the board says that it is, and what it calls itself, if anything."""
         content = {"host_time": host_time} | dataclasses.asdict(info)
         content |= {
             "firmware": ".".join(map(str, info.firmware)),
             "unique_id": info.unique_id.hex(),
             "reset": info.reset.name,
         }
+        if name:
+            content["name"] = name
         del content["request"]
         self._document(channels.DEVICE, host_time, content)
 

@@ -25,7 +25,7 @@ def split_names(source: StrPath) -> tuple[str, ...]:
         (r.metadata for r in _about(source) if isinstance(r, Metadata) and r.name == ABOUT), {}
     )
     if SKINS not in about:
-        raise DataError("is no recording of several skins", where=str(source))
+        raise DataError("is not a recording of several skins", where=str(source))
     return tuple(about[SKINS].split())
 
 

@@ -14,7 +14,7 @@ def name_of(element: Element, where: str) -> str:
     """Its name; SkinError where it has none."""
     name = element.get("name") or ""
     if not name:
-        raise SkinError(f"a <{element.tag}> has no name", where=where)
+        raise SkinError(f"a <{element.tag}> element has no name", where=where)
     return name
 
 

@@ -23,6 +23,7 @@ from tomoskin.skin import (
     key,
     literal,
     read_text,
+    show,
 )
 from tomoskin.skin import toml_tables as tables_of
 
@@ -38,35 +39,38 @@ _ANGLE = Quantity("angle", "deg", -360, 360)
 _XYZ = Row({"x": _LENGTH, "y": _LENGTH, "z": _LENGTH})
 _RPY = Row({"roll": _ANGLE, "pitch": _ANGLE, "yaw": _ANGLE})
 _FILE = Text(1000)
-_OLDER = "As `calibration`, in older files."
+_OLDER = "The same as `calibration`, for older files."
 
 
 class RobotSection(Section, section="robot"):
-    """The whole."""
+    """The robot itself."""
 
-    name: str = key(Text(64), "One line for people.", default="robot")
-    urdf: str | None = key(_FILE, "Its links; a path from this file.", default=None)
+    name: str = key(Text(64), "A title of one line, for people.", default="robot")
+    urdf: str | None = key(
+        _FILE, "The URDF with its links. The path is relative to this file.", default=None
+    )
 
 
 class SkinSection(Section, section="skin", many=True):
-    """A skin, its board, and where its frame lies on a link. Paths are from this file."""
+    """A skin, its board, and its position on a link. Paths are relative to this file."""
 
-    name: str = key(Text(32), "Of small letters, digits and `_`; stands before its topics.")
-    skin: str = key(_FILE, "Built-in name or path.")
-    source: str = key(_FILE, "As `--source`: where its frames come from.", default="twin")
+    name: str = key(Text(32), "Small letters, digits and `_`. Its topics begin with this name.")
+    skin: str = key(_FILE, "The skin: a built-in name, or the path of a skin file.")
+    source: str = key(_FILE, "The source of its frames, as for `--source`.", default="twin")
     board: str | None = key(
-        Text(32), "Its board's unique id, as the page's set-up shows it: another is said.",
+        Text(32),
+        "Unique id of its board, as the page's set-up shows it. Another board is reported.",
         default=None,
-    )  # fmt: skip
-    link: str | None = key(Text(200), "Link of the URDF that it lies on.", default=None)
+    )
+    link: str | None = key(Text(200), "Link of the URDF that the skin lies on.", default=None)
     position: tuple[float, ...] | None = key(
-        _XYZ, "Of the skin's frame, in the link's.", default=None, needs="link"
+        _XYZ, "Position of the skin's frame in the link's frame.", default=None, needs="link"
     )
     angles: tuple[float, ...] | None = key(
-        _RPY, "About the link's fixed x, y and z, as a URDF has them.", default=None, needs="link"
+        _RPY, "Angles about the link's fixed x, y and z, as in a URDF.", default=None, needs="link"
     )
     calibration: tuple[str, ...] = key(
-        OneOrMore(_FILE), "From `tomoskin calibrate`, of any kind, one of each.", default=None
+        OneOrMore(_FILE), "Files from `tomoskin calibrate`, one of each kind.", default=None
     )
     force: tuple[str, ...] = key(OneOrMore(_FILE), _OLDER, default=None)
     bend: tuple[str, ...] = key(OneOrMore(_FILE), _OLDER, default=None)
@@ -136,7 +140,9 @@ class Robot:
         urdf = None if robot.urdf is None else Urdf.read(folder / robot.urdf)
         skins = tuple(_placed(given, where, folder, urdf) for given, where in _each(tables, source))
         if not 0 < len(skins) <= MOST_SKINS:
-            raise SkinError(f"expected 1 to {MOST_SKINS} [[skin]], got {len(skins)}", where=source)
+            raise SkinError(
+                f"expected 1 to {MOST_SKINS} sections [[skin]], got {len(skins)}", where=source
+            )
         _check_different(skins, source)
         return cls(source, robot.name, skins, urdf)
 
@@ -155,7 +161,7 @@ def add_skin(path: Path, given: Mapping[str, Any], urdf: str | None = None) -> s
         tables = tables_of(text, str(path), FORMAT)
         known = tables.get("robot", {}).get("urdf")
         if urdf is not None and known != urdf:
-            raise SkinError(f"is of the URDF {known}, not of {urdf}", where=str(path))
+            raise SkinError(f"belongs to the URDF {known}, not to {urdf}", where=str(path))
     else:
         lines = [f"format = {FORMAT}", "", "[robot]"]
         text = "\n".join(lines + ([] if urdf is None else [f"urdf = {literal(urdf)}"]))
@@ -167,7 +173,9 @@ def add_skin(path: Path, given: Mapping[str, Any], urdf: str | None = None) -> s
 def _each(tables: Mapping[str, Any], source: str) -> list[tuple[SkinSection, str]]:
     given = tables.get("skin", [])
     if not isinstance(given, list):
-        raise SkinError("expected a list of tables", where=source, hint="write [[skin]]")
+        raise SkinError(
+            f"expected a list of tables, got {show(given)}", where=source, hint="write [[skin]]"
+        )
     found = []
     for number, table in enumerate(given, 1):
         title = table.get("name") if isinstance(table, Mapping) else None
@@ -212,4 +220,4 @@ def _check_different(skins: tuple[PlacedSkin, ...], source: str) -> None:
     ):
         twice = sorted({value for value in values if values.count(value) > 1})
         if twice:
-            raise SkinError(f"two skins have the {what} {twice[0]}", where=source)
+            raise SkinError(f"two skins have the same {what} {twice[0]}", where=source)

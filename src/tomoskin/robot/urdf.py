@@ -76,11 +76,17 @@ class Urdf:
         text = read_text(path, "a URDF", _LARGEST)
         where = str(path)
         if "<!ENTITY" in text:
-            raise SkinError("declares entities, which no URDF needs", where=where)
+            raise SkinError(
+                "declares XML entities, which a URDF does not need",
+                where=where,
+                hint="remove <!ENTITY …>",
+            )
         try:
             root = ElementTree.fromstring(text)
         except ElementTree.ParseError as error:
-            raise SkinError(f"is not valid XML: {error}", where=where) from None
+            raise SkinError(
+                f"is not valid XML, so it is not a URDF: {error}", where=where
+            ) from None
         if root.tag != "robot":
             hint = "expand xacro first: xacro ROBOT.xacro > ROBOT.urdf"
             raise SkinError(f"expected <robot>, got <{root.tag}>", where=where, hint=hint)
@@ -134,7 +140,9 @@ class Urdf:
 
     def _check(self, joints: list[UrdfJoint]) -> None:
         if len(set(self.links)) < len(self.links) or len(self.joints) < len(joints):
-            raise SkinError("names a link twice, or holds one by two joints", where=self.source)
+            raise SkinError(
+                "names a link twice, or gives one link two parent joints", where=self.source
+            )
         for joint in joints:
             for end in (joint.parent, joint.child):
                 self.check_link(end, f'{self.source}: joint "{joint.name}"')
@@ -143,7 +151,7 @@ class Urdf:
             for _ in joints:
                 link = self.joints[link].parent if link in self.joints else ""
             if link in self.joints:
-                raise SkinError(f'the joints before link "{start}" are a ring', where=self.source)
+                raise SkinError(f'the joints before link "{start}" form a ring', where=self.source)
 
 
 def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:

@@ -46,11 +46,12 @@ class CheckFinding:
 
 @dataclass(frozen=True, eq=False)
 class _Readings:
-    """(n_drives, n) mean and standard deviation of one conversion, counts."""
+    """(n_drives, n) mean and standard deviation of one conversion, counts; who answered."""
 
     mean: FloatArray
     sd: FloatArray
     info: Info
+    name: str
 
 
 def check_board(
@@ -69,7 +70,7 @@ def check_board(
     onward, back = ring.scans()
     settings = ScanSettings(4, _LATE, current, BITS)
     first = _measure(transport, onward, settings, frames, Timing())
-    yield _identity(first.info, n, current)
+    yield _identity(first, n, current)
     second = _measure(transport, back, settings, frames, _AT_ONCE)
     scale = CountScale.of(GAIN, REFERENCE, BITS)
     found = diagnose(
@@ -113,7 +114,7 @@ def _measure(
                 raise SourceError(
                     f"expected {frames} frames within {_PATIENCE:.0f} s, got {len(got)}",
                     where=transport.name,
-                    hint="is the line damaged? tomoskin record says how many frames are lost",
+                    hint="check the cable; tomoskin record shows how many frames are lost",
                 )
             items = link.poll(0.1)
             got += [item.samples for item in items if isinstance(item, Frame)]
@@ -123,20 +124,26 @@ def _measure(
     shape = scan.drives.shape[0], -1
     mean = samples.mean(axis=0).reshape(shape) / settings.oversampling
     sd = samples.std(axis=0, ddof=1).reshape(shape) / np.sqrt(settings.oversampling)
-    return _Readings(mean, sd, info)
+    return _Readings(mean, sd, info, link.board_name)
 
 
 _PATIENCE = 60.0
 
 
-def _identity(info: Info, n: int, current: float) -> CheckFinding:
+def _identity(readings: _Readings, n: int, current: float) -> CheckFinding:
     """Whether the firmware is of a board like this."""
+    info = readings.info
     firmware = ".".join(map(str, info.firmware))
     said = f"firmware {firmware}, {info.channels} channels, {info.current / 1e3:g} mA"
+    said = f"{readings.name}, {said}" if readings.name else said
     if info.channels < n:
-        return CheckFinding("handshake", False, f"{said}: flash it for {n} channels")
+        return CheckFinding(
+            "handshake",
+            False,
+            f"{said}: expected {n} channels; flash the firmware for {n} channels",
+        )
     if info.current != round(current * 1e6):
-        hint = f'expected {current * 1e3:g} mA: tomoskin firmware configure PORT --current "…"'
+        hint = f'but expected {current * 1e3:g} mA: tomoskin firmware configure PORT --current "…"'
         return CheckFinding("handshake", False, f"{said}, {hint}")
     return CheckFinding("handshake", True, said)
 
@@ -154,7 +161,7 @@ def _noise(sd: FloatArray) -> CheckFinding:
 def _settling(early: _Readings, late: _Readings) -> CheckFinding:
     off = np.abs(early.mean - late.mean).max(axis=0)
     worst = int(off.argmax())
-    text = f"after {_EARLY * 1e6:.0f} µs within {off[worst]:.1f} counts of what it is after 2 ms"
+    text = f"after {_EARLY * 1e6:.0f} µs within {off[worst]:.1f} counts of the value after 2 ms"
     ok = bool(off[worst] < _UNSETTLED)
     look = f"; on E{worst + 1}: C{100 * (worst + 1) + 1}, C{100 * (worst + 1) + 3}"
     return CheckFinding("settling", ok, text if ok else text + look)

@@ -131,7 +131,7 @@ class Trial:
         self._quiet = 0 if result.touches else self._quiet + 1
         if result.touches:
             self.problem = (
-                f"touched since the start, by the reference of {self._since}: if nothing touches "
-                "it, take a new reference"
+                f"touched since the start, according to the reference of {self._since}: if "
+                "nothing touches the skin, take a new reference"
             )
         return True if self._quiet >= REFERENCE_FRAMES else None

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 
-from tomoskin.core import DataError, Event, Frame, ModelError, WireError
+from tomoskin.core import DataError, Event, Frame
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
 from tomoskin.recording import BoardInfo, Mark, MarkedFrame, RawRead, Truth, advance
-from tomoskin.run.commands import DirectCommand, Note, ReplayCommand
 from tomoskin.run.counters import Latency, Losses
-from tomoskin.run.marker import Marker, play, replay_status
+from tomoskin.run.marker import Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.recall import Recall
 from tomoskin.run.status import Status
 from tomoskin.run.twin_control import TwinControl, described
-from tomoskin.run.twin_requests import SetPose, SetTwin
 from tomoskin.source import Link, ScanSettings, Transport
 from tomoskin.twin import Contact
 from tomoskin.wire import Info
@@ -62,6 +60,7 @@ class Flow:
         self.newest: Snapshot | None = None
         self.source = ""
         self.board: Info | None = None
+        self.board_name = ""
         self.pipeline, self.marker, self.twin = Pipeline(prepared), Marker(), TwinControl()
         self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered)
         self.latency = Latency()
@@ -69,7 +68,7 @@ class Flow:
         self._recall = Recall(audience.memory)
         self._settings = ScanSettings.of(prepared.skin)
         self._losses, self._earlier, self._skipped = Losses(), Losses(), 0
-        self._drops, self._polled = 0, 0.0
+        self._drops, self._polled, self._waited = 0, 0.0, 0.0
         self._standstill: str | None = None
         self._saturated: str | None = None
         self._ended = False
@@ -128,34 +127,10 @@ class Flow:
                 if why not in before:
                     self.out.say("press-refused", f"a press is left out: {why}")
 
-    def do(self, command: DirectCommand) -> None:
-        """Carry out what any thread may do.
-
-        Raises
-        ------
-        WireError
-            For what the source cannot do or does not have.
-        GeometryError
-            For a shape that its sheet cannot take.
-        """
-        match command:
-            case Note():
-                newest = self.newest
-                host_time = newest.result.host_time if newest else self._clock()
-                self.out.put(Event(host_time, "note", command.text))
-            case SetTwin():
-                self._break(command)
-            case SetPose():
-                if not self.twin.bendable:
-                    raise WireError(f"{self.source} cannot be bent from here")
-                self.twin.set_pose(command, self.prepared.skin.surface)
-            case _:
-                self._play(command)
-
     def take(self, link: Link, items: Sequence[object]) -> None:
         """What one read of the link brought: frames and events."""
-        self._polled = self._clock()
-        self._note_board(link.info)
+        self._polled, self._waited = self._clock(), link.waited
+        self._note_board(link.info, link.board_name)
         frames = [item for item in items if isinstance(item, Frame)]
         self._drops = frames[-1].drops if frames else self._drops
         self._losses = Losses.of(link, self._drops)
@@ -196,6 +171,7 @@ class Flow:
             electrodes=result.health.sick if result and result.health else (),
             bend=result.bend if result and result.ready else None,
             state=result.state if result and result.ready else None,
+            calibration=result.calibration if result and result.ready else None,
             problem=trouble
             or self._standstill
             or self._saturated
@@ -203,6 +179,7 @@ class Flow:
             or self._recall.problem
             or _doubt(self.prepared, reference),
             board=self.board,
+            board_name=self.board_name,
         )
 
     def remember(self) -> None:
@@ -210,30 +187,17 @@ class Flow:
         if self._recall.is_due(self._clock(), at_end=True):
             self._recall.keep(self.prepared, self.out)
 
-    def _note_board(self, info: Info | None) -> None:
+    def _note_board(self, info: Info | None, name: str) -> None:
         if info is self.board:
             return
-        self.board = info
+        self.board, self.board_name = info, name
         if info is None:
             return
-        self.out.put(BoardInfo(self._clock(), info))
+        self.out.put(BoardInfo(self._clock(), info, name))
         if info.tick_rate:
             self.pipeline.tick_rate = info.tick_rate
         if self.marker.replay is None:
             self._recall.meet(info, self)
-
-    def _break(self, command: SetTwin) -> None:
-        if not self.twin.breakable:
-            raise WireError(f"{self.source} cannot be broken from here")
-        try:
-            self.twin.set_harm(command)
-        except ModelError as error:
-            raise WireError(str(error)) from None
-
-    def _play(self, command: ReplayCommand) -> None:
-        if self.marker.replay is None:
-            raise WireError(f"{self.source} is no replay")
-        play(self.marker.replay, command)
 
     def _end(self) -> None:
         """A replay has ended when its last frames have been processed, not when they were read."""
@@ -262,7 +226,7 @@ class Flow:
         # the times in a replay are the recording's
         read, begun = self._polled if self.marker.replay else frame.host_time, self._clock()
         self.latency.add_frame(frame, read, self.pipeline.tick_rate)
-        self.latency.add("decode", begun - read)
+        self.latency.add("decode", begun - read + self._waited)
         try:
             result = advance(self.pipeline, frame, mark)
         except DataError as error:
@@ -272,9 +236,9 @@ class Flow:
         if result is None:
             return
         ready = self._clock()
-        self.latency.add_age(ready - read)
+        self.latency.add_age(ready - read + self._waited)
         self.latency.add("reconstruct", ready - begun)
-        self.newest = Snapshot(result, self.twin.truth, ready - read, ready)
+        self.newest = Snapshot(result, self.twin.truth, ready - read + self._waited, ready)
         self._recall.see(result, self)
         self.out.put(result)
 

@@ -19,7 +19,7 @@ from tomoskin.source import Transport
 
 _POLL = 0.05
 _WAITING = "waiting for the board to answer"
-_WARMING = "preparing the fit of touches; the first time for a skin this takes some seconds"
+_WARMING = "preparing to fit touches; for a new skin this takes some seconds"
 _FIRST_DELAY, _LONGEST_DELAY = 0.25, 5.0
 
 _log = logging.getLogger(__name__)
@@ -73,10 +73,10 @@ class Loop:
                     transport = self._next()
         except Exception as error:
             _log.exception("the live thread ended")
-            self.trouble = f"internal error, {type(error).__name__}: {error}; start again"
+            self.trouble = f"internal error, {type(error).__name__}: {error}; start tomoskin again"
             self.flow.out.say("internal", self.trouble)
         finally:
-            self._refuse("it is not running")
+            self._refuse("the run has ended")
             self.commands.end()
 
     def _warm_up(self) -> None:
@@ -162,8 +162,8 @@ class Loop:
 
     def _ask_change(self, change: commands.Change) -> Future[None]:
         if not self.commands.taken:
-            raise SourceError("it is not running")
-        self._refuse("something else has been chosen meanwhile")
+            raise SourceError("the run has ended")
+        self._refuse("it was replaced by a newer choice")
         future: Future[None] = Future()
         self._change = change, future
         return future

@@ -58,7 +58,7 @@ class EventLog:
 class Subscriber(Consumer):
     """A function that is given each result."""
 
-    kind, slow = "subscriber", "does not keep up, and results are left out"
+    kind, slow = "subscriber", "is too slow, and results are left out"
 
     def __init__(self, name: str, call: Callable[[FrameResult], None]) -> None:
         self.name, self._call = name, call

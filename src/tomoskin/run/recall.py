@@ -41,7 +41,7 @@ class Recall:
         """A board has said what it is: the first one, the same again, or another."""
         before, self._board = self._board, board
         if before is not None and before.unique_id != board.unique_id:
-            flow.out.say("other-board", "another board answers: its own reference is taken")
+            flow.out.say("other-board", "another board answers: a new reference is taken")
             flow.marker.take_reference()
         if before is not None and before.unique_id == board.unique_id:
             return
@@ -53,7 +53,10 @@ class Recall:
         try:
             found = self._memory.recall(board, flow.prepared, now)
         except TomoskinError as error:
-            flow.out.say("not-recalled", f"what was kept of the board is lost: {error}")
+            flow.out.say(
+                "not-recalled",
+                f"the saved reference and calibrations of this board cannot be used: {error}",
+            )
             return
         if found is not None:
             self._begin(found, flow)
@@ -67,8 +70,8 @@ class Recall:
             if holds is False:
                 flow.out.say(
                     "reference-renewed",
-                    "the skin does not read as it did when this board was stopped: a new "
-                    "reference is taken, leave it alone for a moment",
+                    "the skin has changed since this board's last run: a new reference is taken; "
+                    "do not touch the skin",
                 )
                 flow.marker.take_reference()
         if self.is_due(result.host_time):
@@ -91,7 +94,11 @@ class Recall:
         try:
             self._memory.keep(self._board, prepared, out.recordings.untouched)
         except TomoskinError as error:
-            out.say("not-kept", f"the next start will know nothing of this board: {error}")
+            out.say(
+                "not-kept",
+                "reference and calibrations of this board could not be saved for the next start: "
+                f"{error}",
+            )
 
     def _begin(self, found: Remembered, flow: Flow) -> None:
         """Go on where the last run of the board ended."""
@@ -102,7 +109,10 @@ class Recall:
                 prepared = prepared.calibrated(calibration)
             flow.adopt(prepared)
         elif missing:
-            flow.out.say("not-recalled", "a recording is under way: calibrations stay as they are")
+            flow.out.say(
+                "not-recalled",
+                "the board's saved calibrations are not used, because a recording is running",
+            )
         for number, frame in enumerate(found.frames):
             mark = Mark.EARLIER | (Mark.NONE if number else Mark.REFERENCE)
             flow.out.put(MarkedFrame(frame, mark))
@@ -111,4 +121,4 @@ class Recall:
         self._trial = Trial(found.kept)
         names = ", ".join(c.kind.name for c in missing)
         what = f"reference and calibrations ({names})" if names else "reference"
-        flow.out.say("recalled", f"the board's {what} of its last run")
+        flow.out.say("recalled", f"the board's {what} from its last run are in use again")

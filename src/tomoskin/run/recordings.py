@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 
 from tomoskin.core import Frame
@@ -222,7 +223,7 @@ class Recordings:
         for frame, mark in frames:
             worker.put(MarkedFrame(frame, mark | Mark.EARLIER))
         if self._info is not None:
-            worker.put(BoardInfo(now, self._info.info))
+            worker.put(replace(self._info, host_time=now))
         self._again = frames if again else ()
         self._current, self._awaiting = worker, None  # in this order: `path` is read meanwhile
         self._say("recording", f"recording to {worker.consumer.path}")

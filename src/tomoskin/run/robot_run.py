@@ -81,7 +81,9 @@ class RobotRun:
                 runner.start()
             except SourceError as error:
                 errors.append(error)
-                runner.say("source-lost", f"it is sought on: {error}")
+                runner.say(
+                    "source-lost", f"the source cannot be opened, and tomoskin tries again: {error}"
+                )
                 runner.start_without_source()
         if len(errors) == len(self.runners):
             self.stop()
@@ -169,9 +171,7 @@ class RobotRun:
                     runner.say("clock-step", _STEPPED.format(step))
 
 
-_STEPPED = (
-    "the time of the day was set by {:+.1f} s: messages go on by the clock as it was at the start"
-)
+_STEPPED = "the clock of this computer was set by {:+.1f} s: messages keep the time of the start"
 
 
 def board_problems(found: Mapping[str, str], wanted: Mapping[str, str | None]) -> dict[str, str]:
@@ -184,11 +184,12 @@ def board_problems(found: Mapping[str, str], wanted: Mapping[str, str | None]) -
         others = [o for o, n in found.items() if n == number and o != name and n.strip("0")]
         if wanted.get(name) not in (None, number):
             problems[name] = (
-                f"board {number} answers, expected {wanted[name]}: are two cables exchanged?"
+                f"board {number} answers, expected {wanted[name]}: check whether two "
+                "cables are swapped"
             )
         elif others:
             problems[name] = (
-                f"its board {number} has the same number as that of {', '.join(others)}: "
-                "give one another (tomoskin firmware configure PORT --id NAME)"
+                f"its board {number} has the same id as that of {', '.join(others)}: give it "
+                "another (tomoskin firmware configure PORT --id NAME)"
             )
     return problems

@@ -13,6 +13,7 @@ from tomoskin.robot import Place
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.commands import Command, DirectCommand, Opener
 from tomoskin.run.counters import Latency
+from tomoskin.run.direct import do
 from tomoskin.run.flow import Snapshot
 from tomoskin.run.loop import Loop
 from tomoskin.run.marker import ReplaySource
@@ -109,7 +110,7 @@ class Runner:
             return self._loop.commands.put(command)
         future: Future[None] = Future()
         try:
-            self._loop.flow.do(command)
+            do(self._loop.flow, command)
         except Exception as error:  # it is for whoever takes the result
             future.set_exception(error)
         else:

@@ -47,14 +47,14 @@ def check_safe_off(transport: Transport, scan: Scan, settings: ScanSettings) -> 
     _accepted(_asked(board, start), start, transport)
     _asked(board, Stop(0))
     late = any(isinstance(m, Frame) for m in board.listen(4 * configuration.scan_time))
-    yield "stop", "frames go on after STOP" if late else "", "no frame after STOP"
+    yield "stop", "frames continue after STOP" if late else "", "no frame after STOP"
     _accepted(_asked(board, start), start, transport)
     heard = board.listen(5e-3 * _HEARTBEAT)
     silent = any(isinstance(m, Fault) and m.code is FaultCode.HOST_SILENT for m in heard)
     yield (
         "silence",
-        "" if silent else f"the board goes on {_HEARTBEAT} ms after its host fell silent",
-        f"off {_HEARTBEAT} ms after its host fell silent",
+        "" if silent else f"frames continue {_HEARTBEAT} ms after the last message of the host",
+        f"no frame {_HEARTBEAT} ms after the last message of the host",
     )
     _asked(board, SetHeartbeat(0, _USUAL))
     _asked(board, SafeOff(0))
@@ -63,7 +63,7 @@ def check_safe_off(transport: Transport, scan: Scan, settings: ScanSettings) -> 
     yield (
         "safe off",
         "" if forgotten else "START is accepted after SAFE_OFF",
-        "nothing starts after SAFE_OFF until it is set anew",
+        "nothing starts after SAFE_OFF until the board is set up again",
     )
 
 
@@ -73,7 +73,7 @@ def _asked(board: Exchange, command: Command) -> Ack:
         raise SourceError(
             f"no answer to {type(command).__name__} for {_ANSWER * _TRIES:g} s",
             where=board.transport.name,
-            hint="start the check again; a board that often falls silent has a weak supply",
+            hint="start the check again; a board that often stops answering may have a weak supply",
         )
     return answer
 

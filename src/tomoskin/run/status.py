@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from tomoskin.calibration import BendReading, ClassReading
+from tomoskin.calibration import BendReading, CalibrationHealth, ClassReading
 from tomoskin.inverse import AlphaChoice
 from tomoskin.pipeline import ReferenceState
 from tomoskin.run.counters import StageLatency
@@ -72,10 +72,14 @@ class Status:
         How the sheet is bent; None where its bends were not learnt.
     state
         Which of the states that were learnt it shows; None where none were.
+    calibration
+        How touches fit the calibration that locates them; None where none does.
     problem
         What someone should see to, in one sentence, or None.
     board
         What the board says that it is, once it has.
+    board_name
+        What it calls itself; empty before protocol 1.2.
     """
 
     source: str
@@ -100,7 +104,9 @@ class Status:
     replay: ReplayStatus | None = None
     bend: BendReading | None = None
     state: ClassReading | None = None
+    calibration: CalibrationHealth | None = None
     board: Info | None = None
+    board_name: str = ""
 
     @property
     def text(self) -> str:

@@ -58,7 +58,7 @@ def _surface(bend: BendRequest, rest: Surface) -> Surface:
     if isinstance(rest, Arm):
         return Arm(rest.radius, rest.angle + bend.angle, rest.joint)
     raise WireError(
-        "only a sheet that lies flat or on a limb with a joint can be bent from here; this one can "
+        "only a flat sheet, or one on a limb with a joint, can be bent on the page; this one can "
         "be stretched"
     )
 

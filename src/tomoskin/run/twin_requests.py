@@ -51,7 +51,9 @@ class PressRequest(StrictRequest, frozen=True):
         Raises WireError where corners are missing, GeometryError where they make no polygon.
         """
         if (self.shape == "polygon") != (self.vertices is not None):
-            raise WireError(f"expected vertices with a polygon, and only there; got {self.shape}")
+            raise WireError(
+                f"expected vertices for a polygon and for no other shape, got {self.shape}"
+            )
         if self.vertices is not None:
             face: Shape = _wide(Face(self.vertices))
             return Probe(face, self.x, self.y, self.force, self.angle)
@@ -65,7 +67,7 @@ def _wide(face: Face) -> Face:
     """``face``; WireError where it is too slim to be pressed."""
     step = 2 * (face.extent + _MARGIN) / _NODES
     if np.count_nonzero(np.isfinite(face.gap(Grid(2 * _NODES, step).points))) < _LEAST:
-        raise WireError(f"expected a polygon some {2e3 * step:.0f} mm wide, got a slimmer one")
+        raise WireError(f"expected a polygon at least {2e3 * step:.0f} mm wide, got a narrower one")
     return face
 
 

@@ -140,7 +140,7 @@ def load_token(path: StrPath) -> str:
     except FileExistsError:
         return _read_token(path)
     except OSError as error:
-        raise DataError(f"cannot be made: {error.strerror}", where=str(path)) from None
+        raise DataError(f"cannot be created: {error.strerror}", where=str(path)) from None
     with os.fdopen(handle, "w") as file:
         token = secrets.token_urlsafe(32)
         file.write(token + "\n")
@@ -173,23 +173,25 @@ def _read_token(path: Path) -> str:
         mode = path.stat().st_mode
         text = path.read_text(encoding="ascii").strip()
     except (OSError, UnicodeDecodeError):
-        raise DataError("cannot be read", where=str(path)) from None
+        raise DataError("cannot be read as a token file", where=str(path)) from None
     if os.name == "posix" and mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise DataError(
-            "others may read this file, and with it control the page",
+            "other users of this machine can read this file and with it control the page",
             where=str(path),
             hint=f"chmod 600 {path}",
         )
     if not _TOKEN.fullmatch(text):
         raise DataError(
-            "holds no token of this program", where=str(path), hint="name a file that is not there"
+            "holds no token of tomoskin",
+            where=str(path),
+            hint="give the name of a new file, and tomoskin creates it",
         )
     return text
 
 
-_STRANGE_HOST = "This server does not answer under that name.\n"
+_STRANGE_HOST = "This server does not answer to that host name.\n"
 _NO_TOKEN = "Open the address that tomoskin printed.\n"
-_READ_ONLY = "Only GET is answered here.\n"
+_READ_ONLY = "This server answers only GET.\n"
 
 
 class AccessControl:

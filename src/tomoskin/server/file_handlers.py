@@ -99,9 +99,9 @@ class FileHandlers:
         """Raise DataError where the session is in use."""
         self._check_ended(name)
         if name == self._playing():
-            raise DataError("is being played: go back to live first", where=name)
+            raise DataError("is playing: go back to live first", where=name)
         if name == self._exporting:
-            raise DataError("is being exported: wait for it", where=name)
+            raise DataError("is being exported: wait until it has ended", where=name)
 
     def _open(self, page: Listener, request: OpenSession) -> None:
         def work() -> None:
@@ -114,7 +114,7 @@ class FileHandlers:
 
     def _export(self, page: Listener, request: ExportSession) -> None:
         if self._exporting is not None:
-            raise WireError(f"{self._exporting} is being exported: wait for it")
+            raise WireError(f"{self._exporting} is being exported: wait until it has ended")
         self._exporting, self._share = request.name, 0.0
 
         def work() -> Path:

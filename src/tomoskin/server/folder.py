@@ -82,7 +82,9 @@ class Folder:
                 kind = KINDS[path.suffix]
                 entries.append(FileEntry(path.name, kind, about.st_size, about.st_mtime))
         except OSError as error:
-            raise DataError(f"cannot be read: {error.strerror}", where="the folder") from error
+            raise DataError(
+                f"cannot be read: {error.strerror}", where="the session folder"
+            ) from error
         newest = sorted(entries, key=lambda file: -file.written)
         listed = tuple(replace(file, notes=self._notes(file)) for file in newest[:MOST_FILES])
         return Listing(listed, others + len(newest[MOST_FILES:]))
@@ -105,7 +107,9 @@ class Folder:
         self.existing(name, SESSION)
         path = self._notes_path(name)
         if path.is_symlink():
-            raise DataError("is a link, and what it leads to is left alone", where=path.name)
+            raise DataError(
+                "is a link; tomoskin does not write through links: remove it first", where=path.name
+            )
         if text.strip():
             write_text(path, text.strip() + "\n", overwrite=True)
         else:
@@ -121,7 +125,7 @@ class Folder:
         moves = [(path, new)] + ([(old, self._notes_path(new.name))] if old.is_file() else [])
         for _, target in moves:
             if target.exists() or target.is_symlink():
-                raise DataError("is there already: choose another name", where=target.name)
+                raise DataError("exists already: choose another name", where=target.name)
         try:
             for source, target in moves:
                 source.rename(target)
@@ -163,7 +167,7 @@ class Folder:
     @staticmethod
     def _check(name: str) -> str:
         if not _is_offered(name):
-            raise DataError("expected the name of a file, without a folder", where=repr(name)[:80])
+            raise DataError(f"expected the name of a file, without a folder, got {repr(name)[:80]}")
         return name
 
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from tomoskin.calibration import Locator, MappingAnswer, ring_of, solve_channel_mapping
+from tomoskin.calibration import LeftOut, Locator, MappingAnswer, ring_of, solve_channel_mapping
 from tomoskin.core import FloatArray
 from tomoskin.pipeline import Prepared
+from tomoskin.server.guided_flow import Estimate
 from tomoskin.touch import Region
 
 Phase = Literal["rest", "press", "hold", "release"]
@@ -40,8 +41,16 @@ noises, where these are larger."""
 _RELEASED = 0.4
 """A press is over when this part of it is left."""
 
-_OFTEN = 0.02
+OFTEN = 0.02
 """Frames are taken no more often than this, s: a hand is not faster."""
+
+_LEAST = 0.5
+"""Noise is never taken for less than this part of what the read-out predicts."""
+
+
+def least_noise(prepared: Prepared) -> float:
+    """V that the noise of a measurement is never taken to be below."""
+    return _LEAST * prepared.readout.noise
 
 
 class Taker:
@@ -72,7 +81,7 @@ class Taker:
 
     def push(self, host_time: float, voltages: FloatArray) -> FloatArray | None:
         """Take a frame (n_meas,) V; (n_meas,) V, the change, when a press has stood still."""
-        if 0 <= host_time - self._last < _OFTEN:
+        if 0 <= host_time - self._last < OFTEN:
             return None
         self._last = host_time
         if self.phase == "rest":
@@ -147,21 +156,6 @@ class GuidedPress:
     effort: Effort | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """What presses tell so far.
-
-    ``text`` in words; ``place`` (2,) m where a further press tells most, None where that is not
-    known; ``ready``: it can be kept; ``figures`` for a page; ``answer`` what is kept.
-    """
-
-    text: str
-    place: FloatArray | None = None
-    ready: bool = False
-    figures: dict[str, Any] = field(default_factory=dict)
-    answer: Locator | MappingAnswer | None = None
-
-
 def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estimate:
     """A locator of the presses, and by how much it misses them. Raises DataError."""
     if len(presses) < _FEWEST_TOUCH:
@@ -172,10 +166,14 @@ def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estima
     errors = 1e3 * locator.errors
     doubted = sorted({remark.row for remark in locator.remarks})
     text = f"Median error {_by_effort(presses, errors)} (each press left out in turn)"
-    if locator.one_force:
-        text += ", but all presses were about equally hard: expect larger errors for others"
-    if locator.is_guess:
-        text += "; the mean of all presses is as good: press harder"
+    left_out = LeftOut.of(locator)
+    if left_out.one_force:
+        text += (
+            ", but all presses were about equally hard: expect larger errors for softer and "
+            "harder ones"
+        )
+    if left_out.is_guess:
+        text += "; the mean of all positions is as good an estimate: press harder"
     elif len(presses) < _FIRST:
         text += ". Ten presses are a start, fifty are good"
     figures = {
@@ -225,13 +223,13 @@ def estimate_wiring(
     )
 
 
-def _in_words(solution: MappingAnswer, figures: dict[str, Any]) -> str:
+def _in_words(solution: MappingAnswer, figures: dict[str, object]) -> str:
     if solution.sure:
         return f"Sure: {figures['wiring']}"
     if solution.doubtful:
-        return "Many presses seem to be elsewhere. Was each made on its dot?"
+        return "Many presses fit other positions better. Was each press on its dot?"
     if solution.unexplained > 1 - solution.probability - solution.unexplained:
-        return "No wiring explains these presses well. Press on the dot, and harder"
+        return "No channel mapping explains these presses well. Press on the dot, and harder"
     return f"Not sure yet: {figures['wiring']}, or {figures['runner_up']}. The next dot decides"
 
 
@@ -244,11 +242,16 @@ class Dots:
         self._places = region.metres(_INSIDE * region.grid)
         self._filled = region.metres(_FILLED * region.grid)
 
+    @property
+    def places(self) -> FloatArray:
+        """(n, 2) m where a dot may be."""
+        return self._places
+
     def next(
-        self, presses: Sequence[GuidedPress], estimate: Estimate | None
+        self, places: Sequence[tuple[float, float]], estimate: Estimate | None
     ) -> tuple[float, float]:
-        """(x, y) m of the next dot."""
-        pressed = np.array([press.place for press in presses]).reshape(-1, 2)
+        """(x, y) m of the next dot, after presses at ``places``."""
+        pressed = np.array(places).reshape(-1, 2)
         if estimate is not None and estimate.place is not None:
             near = np.argmin(np.linalg.norm(self._places - estimate.place, axis=1))
             place = self._places[near]

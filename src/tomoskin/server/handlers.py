@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tomoskin.server.calibration_handlers import CalibrationHandlers
 from tomoskin.server.file_handlers import FileHandlers
 from tomoskin.server.guide_handlers import GuideHandlers
 from tomoskin.server.hub import Hub
@@ -17,4 +18,4 @@ def serve_requests(hub: Hub, source: str) -> None:
     switch = SourceSwitch(hub, source)
     FileHandlers(hub, switch)
     SourceHandlers(hub, switch)
-    GuideHandlers(hub)
+    GuideHandlers(hub, CalibrationHandlers(hub))

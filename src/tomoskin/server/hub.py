@@ -112,7 +112,7 @@ class Hub:
         """Do what a page asks. Raises WireError where that cannot be."""
         handler = self._handlers.get(type(request))
         if handler is None:
-            raise WireError(f"{type(request).__name__} is not answered here")
+            raise WireError(f"{type(request).__name__} is not possible on this page")
         handler(page, request)
 
     def tell(self, texts: Sequence[str]) -> None:
@@ -156,7 +156,7 @@ class Hub:
         try:
             timeline = await asyncio.to_thread(read_timeline, path)
         except DataError as error:
-            self.runner.say("no-timeline", f"what happened in the recording is not known: {error}")
+            self.runner.say("no-timeline", f"the events of the recording cannot be shown: {error}")
             return
         self._timeline = page_messages.timeline(timeline)
         self.tell([self._timeline])

@@ -123,7 +123,7 @@ class Overview:
             case SetRecording():
                 self._tasks.run(page, self._recording(on=request.on), lambda _: self._tell())
             case _:
-                raise WireError("ask it on the page of one skin")
+                raise WireError("this is possible only on the page of one skin")
 
     def _recording(self, *, on: bool) -> Callable[[], None]:
         def record() -> None:

@@ -77,7 +77,7 @@ class Page:
         """Serve until either side ends it."""
         await self._socket.accept()
         if not self._host.join(self):
-            await self._socket.close(_TRY_AGAIN_LATER, "too many pages are open")
+            await self._socket.close(_TRY_AGAIN_LATER, "too many pages are open: close one")
             return
         reason = ""
         tasks = {asyncio.create_task(self._read()), asyncio.create_task(self._write())}
@@ -131,7 +131,7 @@ def _reason(done: set[asyncio.Task[None]]) -> str:
     for task in done:
         error = task.exception()
         if isinstance(error, TimeoutError):
-            return f"a page that took nothing for {PATIENCE:.0f} s was let go"
+            return f"a page that received nothing for {PATIENCE:.0f} s was disconnected"
         if error is not None:
             raise error
     return ""

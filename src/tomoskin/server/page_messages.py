@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin import __version__
-from tomoskin.calibration import BendReading, ClassReading
+from tomoskin.calibration import BendReading, CalibrationHealth, ClassReading
 from tomoskin.core import Event, FloatArray, IntArray, encode_json
 from tomoskin.pipeline import Prepared
 from tomoskin.recording import Timeline
@@ -115,8 +115,12 @@ def stages(status: Status) -> list[dict[str, Any]]:
 
 
 def readings(status: Status) -> dict[str, Any]:
-    """How the newest frame is bent and which state it shows; null where that was not learnt."""
-    return {"bend": _bend(status.bend), "state": _state(status.state)}
+    """What calibrations say of the newest frame, or of themselves; null where there are none."""
+    return {
+        "bend": _bend(status.bend),
+        "state": _state(status.state),
+        "calibration": _calibration(status.calibration),
+    }
 
 
 def _baseline(now: BaselineState | None) -> dict[str, Any] | None:
@@ -141,6 +145,21 @@ def _bend(now: BendReading | None) -> dict[str, Any] | None:
 def _state(now: ClassReading | None) -> dict[str, Any] | None:
     """Which state the newest frame shows, as ``tomoskin image --json`` tells it."""
     return None if now is None else asdict(now)
+
+
+def _calibration(now: CalibrationHealth | None) -> dict[str, Any] | None:
+    """How touches fit the calibration that locates them, in words for people."""
+    if now is None:
+        return None
+    return {
+        "well": now.well,
+        "broken": now.broken,
+        "findings": [as_on_bench(text) for text in now.findings],
+    }
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{as_on_bench(text[1:])}."
 
 
 def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:

@@ -25,7 +25,10 @@ Stem = Annotated[str, Meta(pattern=rf"^{STEM}\Z")]
 
 Format = Literal["touches", "csv", "npz", "mat", "h5", "parquet", "png", "gif"]
 
-FlowKind = Literal["touch", "wiring"]
+FlowKind = Literal["touch", "wiring", "force", "rub"]
+
+Calibrated = Literal["touch", "force"]
+"""What a calibration that a page can choose is of."""
 
 Value = str | int | float | list[Any] | None
 """A value as a skin file writes it; null takes the key out."""
@@ -138,13 +141,42 @@ class Connect(StrictRequest, frozen=True, tag="connect"):
 
 
 class BeginFlow(StrictRequest, frozen=True, tag="flow_begin"):
-    """Ask for presses where the dot is: to learn touch, or to find the wiring."""
+    """Ask for presses: where the dot is, to learn touch or to find the wiring; with known weights,
+    to learn forces; everywhere, to learn touch without labels."""
 
     kind: FlowKind
 
 
 class UndoPress(StrictRequest, frozen=True, tag="flow_undo"):
     """Take the last press back."""
+
+
+class DeletePress(StrictRequest, frozen=True, tag="flow_delete"):
+    """Take one press back, by its number from 0 on."""
+
+    number: Annotated[int, Meta(ge=0, le=10_000)]
+
+
+class SetWeight(StrictRequest, frozen=True, tag="flow_weight"):
+    """What lies on the skin, or comes next; ``sure``: an unusual weight is meant as it is said."""
+
+    value: Annotated[float, Meta(gt=0, le=1e6)]
+    unit: Literal["N", "g", "kg"]
+    sure: bool = False
+
+
+class AskPoint(StrictRequest, frozen=True, tag="flow_point"):
+    """Ask for a press at a known position beside the rubbing, or go on without."""
+
+    on: bool
+
+
+class LearnFlow(StrictRequest, frozen=True, tag="flow_learn"):
+    """Learn from what was rubbed so far."""
+
+
+class StopLearning(StrictRequest, frozen=True, tag="flow_stop"):
+    """End that."""
 
 
 class EndFlow(StrictRequest, frozen=True, tag="flow_end"):
@@ -158,9 +190,10 @@ class KeepFlow(StrictRequest, frozen=True, tag="flow_keep"):
 
 
 class UseCalibration(StrictRequest, frozen=True, tag="calibration"):
-    """Places of touches by a calibration of the folder; null: by the picture again."""
+    """Use a calibration of the folder; null: none of those ``of`` touch, or of force."""
 
     name: FileName | None
+    of: Calibrated = "touch"
 
 
 RunRequest = (
@@ -189,6 +222,11 @@ FlowRequest = (
     | Connect
     | BeginFlow
     | UndoPress
+    | DeletePress
+    | SetWeight
+    | AskPoint
+    | LearnFlow
+    | StopLearning
     | EndFlow
     | KeepFlow
     | UseCalibration
@@ -212,4 +250,6 @@ def decode_request(data: str | bytes) -> Request:
     try:
         return _DECODER.decode(data)
     except (msgspec.DecodeError, UnicodeError) as error:
-        raise WireError(f"a message that is not understood: {error}") from None
+        raise WireError(
+            f"the message of the page is not understood (reload the page): {error}"
+        ) from None

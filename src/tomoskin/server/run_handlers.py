@@ -55,7 +55,7 @@ async def _record(runner: Runner, folder: Path, *, on: bool) -> None:
     try:
         await asyncio.wrap_future(runner.submit(begin if on else commands.StopRecording()))
     except DataError as error:
-        runner.say("recording-stopped", f"nothing is recorded: {error}")
+        runner.say("recording-stopped", f"the recording did not start: {error}")
 
 
 def _on_skin(request: SetPresses, skin: Skin) -> tuple[Contact, ...]:

@@ -51,7 +51,7 @@ def check_page(static: StrPath = STATIC) -> None:
     static = Path(static)
     if not (static / "index.html").is_file():
         raise ServerError(
-            "the page has not been built", where="page", hint='"make live" builds and starts it'
+            "the page has not been built", where="page", hint='build and start it with "make live"'
         )
 
 
@@ -228,12 +228,18 @@ def _refused(error: OSError, host: str, port: int) -> ServerError:
         return ServerError(
             "the port is in use, perhaps by another tomoskin",
             where=f"port {port}",
-            hint="choose another with --port, or any free one with --port 0",
+            hint="choose another with --port, or a free one with --port 0",
         )
     if error.errno == errno.EACCES:
         return ServerError(
-            "this port needs rights that you do not have",
+            "you have no permission to use this port",
             where=f"port {port}",
             hint="choose one above 1023 with --port",
+        )
+    if error.errno == errno.EADDRNOTAVAIL:
+        return ServerError(
+            "is not an address of this machine",
+            where=f"host {host}",
+            hint="choose one of its own with --host, such as 127.0.0.1",
         )
     return ServerError(f"{error.strerror}", where=f"host {host}")

@@ -88,7 +88,7 @@ def table_of(name: str, n_electrodes: int) -> str:
     if pattern.n_meas > MOST_ROWS:
         raise PatternError(
             f"expected a pattern of at most {MOST_ROWS} rows to edit, got {pattern.n_meas}",
-            hint="choose it by its name, or begin with a smaller one",
+            hint="choose it by its name, or begin with a smaller pattern",
         )
     rows = {"drive": pattern.drive.tolist(), "measure": pattern.measure.tolist()}
     return text_of(type="pattern", name=name, **rows)
@@ -104,7 +104,9 @@ def altered(skin: Skin, changes: Changes) -> Skin:
     """
     for section, key in ((s, k) for s, keys in changes.items() for k in keys):
         if (section, key) in LOCKED:
-            raise SkinError("cannot be set from a page", where=f"[{section}] {key}")
+            raise SkinError(
+                "cannot be changed on the page: edit the skin file", where=f"[{section}] {key}"
+            )
     return skin.altered({name: _tidy(skin, name, keys) for name, keys in changes.items()})
 
 

@@ -202,9 +202,11 @@ class SettingsHandlers:
         if skin.body == self._hub.runner.prepared.skin.body:
             return
         if self._hub.runner.replay is not None:
-            raise SourceError("a recording keeps the sheet and the scan that it was made with")
+            raise SourceError(
+                "a recording keeps its sheet and its scan: go back to live to change them"
+            )
         if self._hub.opener is None:
-            raise SourceError("the source cannot be set to another sheet or scan while it runs")
+            raise SourceError("this source cannot change its sheet or scan while it runs")
 
     def _go(self, page: Listener, skin: Skin) -> None:
         self._asked = skin
@@ -269,7 +271,7 @@ class SettingsHandlers:
             runner.ask(commands.Adopt(prepared))
             return scaled
         if opener is None:
-            raise SourceError("the source cannot be set to another sheet or scan while it runs")
+            raise SourceError("this source cannot change its sheet or scan while it runs")
         reach("source")
         _change(runner, prepared, partial(opener, skin))
         self._took = time.monotonic() - start
@@ -320,9 +322,12 @@ def _change(runner: Runner, prepared: Prepared, open_source: commands.Opener) ->
 def _save(path: Path, skin: Skin, *, replace: bool) -> None:
     if "file" in skin.document["surface"]:
         raise SkinError(
-            "a skin on a scanned surface cannot be saved here: its file names another one"
+            "a skin on a scanned surface cannot be saved here, because it needs its surface "
+            "file: edit its skin file"
         )
     if path.is_symlink():
-        raise SkinError("is a link, and what it leads to is left alone", hint="choose another name")
+        raise SkinError(
+            "is a link, and tomoskin does not write through links", hint="choose another name"
+        )
     check_outputs([Output(path)], overwrite=replace, consent="save again")
     write_text(path, skin.to_toml(), overwrite=replace)

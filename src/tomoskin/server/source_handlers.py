@@ -72,7 +72,7 @@ class SourceSwitch:
     def connect(self, spec: str) -> None:
         """Go on with one of :meth:`offers`. Raises SourceError."""
         if spec not in {offer.id for offer in self.offers()}:
-            raise SourceError("expected one of the sources that are listed", where=spec[:80])
+            raise SourceError("expected one of the listed sources, got another", where=spec[:80])
         prepared = self._live.prepared if self._live else self._hub.runner.prepared
         self._go(_Live(spec, prepared))
 
@@ -128,15 +128,16 @@ class SourceHandlers:
             sources=[asdict(offer) for offer in offers],
             current=self._switch.spec,
             host_protocol=f"{SCHEMA.major}.{SCHEMA.minor}",
-            board=_board(status.board),
+            board=_board(status.board, status.board_name),
             problem=status.problem and as_on_bench(status.problem),
         )
 
 
-def _board(info: Any) -> dict[str, Any] | None:
+def _board(info: Any, name: str) -> dict[str, Any] | None:
     if info is None:
         return None
     return {
+        "name": name,
         "firmware": ".".join(map(str, info.firmware)),
         "protocol": f"{info.major}.{info.minor}",
         "channels": info.channels,

@@ -49,7 +49,7 @@ class TwinHandlers:
     def _pose(self, page: Listener, request: SetPose) -> None:
         """Raise WireError where the source has no sheet to bend."""
         if not self._hub.runner.twin.bendable:
-            raise WireError(f"{self._hub.runner.status().source} cannot be bent from here")
+            raise WireError(f"{self._hub.runner.status().source} cannot be bent on the page")
         self._newest = request
         self._hub.tasks.keep(self._bring(page, request))
 

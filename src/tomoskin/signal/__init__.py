@@ -22,7 +22,7 @@ from tomoskin.signal.load_ring import LoadRing
 from tomoskin.signal.monitor import Monitor
 from tomoskin.signal.nuisance import NuisanceSubspace
 from tomoskin.signal.power_up import STAGES, MeterStep, meter_steps
-from tomoskin.signal.readout import FIGURES, BoardFigures, Readout
+from tomoskin.signal.readout import FIGURES, BoardFigures, Readout, directions
 from tomoskin.signal.recording import Recording, frame_times
 from tomoskin.signal.reference import Reference
 from tomoskin.signal.scatter import Scatter
@@ -55,6 +55,7 @@ __all__ = [
     "diagnose",
     "difference",
     "difference_noise",
+    "directions",
     "frame_times",
     "in_phase",
     "meter_steps",

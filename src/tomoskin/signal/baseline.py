@@ -67,7 +67,7 @@ class BaselineState:
         if self.doubt < _DOUBT:
             return None
         return (
-            f"held under a touch for {self.held:.0f} s, the reference may have drifted by "
+            f"a touch has held the reference for {self.held:.0f} s, and it may have drifted by "
             f"{self.doubt:.0f} times the noise: lift the touch, or take a new reference"
         )
 

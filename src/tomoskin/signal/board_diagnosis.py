@@ -172,8 +172,8 @@ def _of_an_amplifier(e: int, gain: float, offset: float, level: float) -> str:
     name, part = f"E{e + 1}", 100 * (e + 1)
     if abs(gain) < _AFFINE_GAIN:
         return (
-            f"the reading of {name} stands still at {level:.0%} of its range: "
-            f"U{part + 1}, U{part + 2}, its header's pin"
+            f"the reading of {name} stays at {level:.0%} of its range: U{part + 1}, U{part + 2}, "
+            "its header's pin"
         )
     if abs(gain - 1) < _AFFINE_GAIN:
         return f"the reading of {name} is {offset:+.0f} counts off: U{part + 1}, D{part + 2}"

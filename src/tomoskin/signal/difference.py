@@ -38,9 +38,9 @@ def difference(values: FloatArray, reference: FloatArray, kind: str) -> FloatArr
         return np.asarray(change)
     if not reference.all():
         raise DataError(
-            "the reference is zero, so its difference cannot be normalised",
+            "the reference is zero, so the difference cannot be normalised by it",
             where=f"row {int(np.argmin(reference != 0))}",
-            hint='set difference = "plain" in [inverse], or look at that electrode',
+            hint='set difference = "plain" in [inverse], or check that electrode',
         )
     return np.asarray(change / np.abs(reference))
 
@@ -80,7 +80,9 @@ class Consecutive:
         """
         finite = np.isfinite(values)
         if not finite.all():
-            raise DataError(f"expected finite voltages; rows {np.flatnonzero(~finite)} are not")
+            raise DataError(
+                f"expected finite voltages, but rows {np.flatnonzero(~finite)} are not finite"
+            )
         change = None if self._last is None else difference(values, self._last, self.kind)
         self._last = np.array(values)
         return change

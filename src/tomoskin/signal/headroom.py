@@ -101,8 +101,8 @@ class Headroom:
             return None
         count = np.count_nonzero(self.saturated)
         return (
-            f"{count} of {len(self.saturated)} measurements saturate by the skin's model, "
-            f"{self.text}: {self._remedy}"
+            f"{count} of {len(self.saturated)} measurements saturate according to the skin's "
+            f"model, {self.text}: {self._remedy}"
         )
 
     @property
@@ -111,7 +111,7 @@ class Headroom:
         low, high = self.readable
         least, most = self.samples.min(), self.samples.max()
         if least < low or high <= 0:
-            return "an offset fits that puts 0 V at the inputs within the converter's range"
+            return "use an offset that puts 0 V at the inputs within the converter's range"
         supply = min(1.0, _ROOM * FIGURES.compliance / float(self.drive.max()))
         both = min(supply, _ROOM * high / float(most))
         choices = []
@@ -122,7 +122,7 @@ class Headroom:
             choices.append(f"{gain} fits")
         elif both < supply and self.current * supply >= _LEAST_CURRENT:
             choices.append(f"{_down(1e3 * self.current * supply)} mA with {gain}")
-        return ", or ".join(choices) or "only a sheet or contacts of less resistance fit"
+        return ", or ".join(choices) or "use a sheet or contacts of lower resistance"
 
 
 def _volts(value: float) -> str:

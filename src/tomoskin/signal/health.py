@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray
 from tomoskin.pattern import Pattern
 
-STATES = ("good", "open", "short", "railed", "stuck", "noisy", "inconsistent")
+STATES = ("good", "open", "short", "railed", "stuck", "noisy", "inconsistent", "offset")
 """States of an electrode. open: no current and no reading; railed: cannot be read, but drives;
-inconsistent: violates reciprocity."""
+inconsistent: violates reciprocity; offset: has a voltage of its own, which an alternating drive
+takes out, so that it is used as before."""
 
 _ALL = 0.9
 """An electrode explains bad rows when at least this part of its own are bad: the rest may look

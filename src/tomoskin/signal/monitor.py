@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.pattern import Pattern, Scan
+from tomoskin.signal.equal_readings import EqualReadings
 from tomoskin.signal.evidence import Groups, Reciprocity, sign_limit, unchanged
 from tomoskin.signal.health import ElectrodeHealth, Health, Mask, Roles
 from tomoskin.signal.reference import Reference
@@ -43,6 +44,9 @@ _FROZEN = 1e-9
 _FLOATING = ("open", "railed", "stuck")
 """States in which a reading is an unknown number, the same for all rows of its drive."""
 
+_ALIKE = 16
+"""Looks between two at whether electrodes read the same."""
+
 _OFFSET = 170
 """Looks over which the reciprocity error at rest is followed."""
 
@@ -64,6 +68,8 @@ class Monitor:
         The samples that rows are made of; without it samples are not looked at.
     rank
         (n_electrodes,) rank of each electrode along the rim; None for their order.
+    most_own
+        V that an electrode may show whatever the current does, before it is called offset.
     """
 
     def __init__(
@@ -75,6 +81,7 @@ class Monitor:
         unusable: Mask,
         scan: Scan | None = None,
         rank: IntArray | None = None,
+        most_own: float = np.inf,
     ) -> None:
         n = pattern.n_electrodes
         self._roles = Roles.of(pattern)
@@ -95,11 +102,14 @@ class Monitor:
         self._squared = np.ones(len(self._rest))
         self._shift = np.zeros(len(self._rest))
         self._members = _averages(scan, n)
+        self._equal = None if scan is None else EqualReadings.of(scan, n)
+        self._unreached: dict[int, ElectrodeHealth] = {}
         self._pairs_left = bool(self._paired.any())
         self._looks, self._wavers = 0, dict[int, ElectrodeHealth]()
         self._still = np.zeros(n)
         self._last: FloatArray | None = None
         self._last_samples: NDArray[np.uint16] | None = None
+        self._most_own = most_own
         self._blamed, self._cleared = np.zeros(n, int), np.zeros(n, int)
         self._good = tuple(ElectrodeHealth(e) for e in range(n))
         self._sick: dict[int, ElectrodeHealth] = {}
@@ -115,18 +125,26 @@ class Monitor:
         railed: Mask,
         time: float,
         samples: NDArray[np.uint16] | None = None,
+        own: FloatArray | None = None,
     ) -> Health:
-        """Health of the frame with ``values`` (n_meas,) V, ``railed`` rows and ``samples``."""
+        """Health of the frame with ``values`` (n_meas,) V, ``railed`` rows and ``samples``.
+
+        ``own`` (n_electrodes,) V that does not turn with the current, where the drive alternates.
+        """
         off = railed | self._unusable
         bad = off | (self._sign * values < -self._limit)
         dead = self._groups.dead(values, off)
         loud = self._loud(values, off)
         stuck = self._stuck(samples)
-        if not (self._sick or loud or stuck or bad.any() or dead.any()):
+        offset = self._offset(own)
+        if samples is not None and self._equal is not None and self._looks % _ALIKE == 1:
+            self._unreached = self._equal(samples, values, self._reciprocity)
+        seen = self._sick or self._unreached or offset or loud or stuck
+        if not (seen or bad.any() or dead.any()):
             self._blamed[:] = 0
             self._silent = self._unusable
             return self._well
-        return self._judged(bad, railed, dead, loud | stuck, time)
+        return self._judged(bad, railed, dead, offset | loud | stuck, time)
 
     def _judged(
         self, bad: Mask, railed: Mask, dead: Mask, more: dict[int, ElectrodeHealth], time: float
@@ -136,9 +154,15 @@ class Monitor:
         key = (bad.tobytes(), dead.tobytes())
         if key != self._explained_key:
             self._explained_key, self._explained = key, self._explain(bad, railed, dead)
-        causes = more | self._explained
+        driven = {  # two that touch each other make the drive between them silent
+            electrode: health
+            for electrode, health in self._unreached.items()
+            if not self._silent[self._roles.drives[electrode]].any()
+        }
+        causes = more | self._explained | driven
         self._debounce(causes, time)
-        states = {e: h.state for e, h in (causes | self._sick).items()}
+        blamed = (causes | self._sick).items()
+        states = {e: h.state for e, h in blamed if h.state != "offset"}
         if (key, states) != self._masked_for:
             self._masked_for = (key, states)
             self._masks = _masks(self._pattern, self._roles, bad, states, self._unusable)
@@ -171,7 +195,7 @@ class Monitor:
 
     def _reason(self, electrode: int, state: str, railed: Mask) -> str:
         reads, drives = self._roles.reads[electrode], self._roles.drives[electrode]
-        at_rail = f"{int((reads & railed).sum())} of {int(reads.sum())} readings stand at a rail"
+        at_rail = f"{int((reads & railed).sum())} of {int(reads.sum())} readings are at a rail"
         if state == "railed":
             return at_rail
         return f"no current in any of its {int(drives.sum())} driven rows, and {at_rail}"
@@ -209,12 +233,29 @@ class Monitor:
         steady = float(self._reciprocity.mean[electrode] @ np.minimum(self._shift**2, 25.0))
         times = f"{np.sqrt(1 + excess):.1f} times the noise"
         if steady <= _STEADY * excess:
-            return ElectrodeHealth(electrode, "noisy", f"it wavers by {times} at rest")
+            return ElectrodeHealth(
+                electrode, "noisy", f"its reciprocity error fluctuates by {times} at rest"
+            )
         if excess <= _BIASED:
             return None
         return ElectrodeHealth(
-            electrode, "inconsistent", f"driving and reading it disagree by {times} at rest"
+            electrode, "inconsistent", f"its reciprocity error is {times} at rest"
         )
+
+    def _offset(self, own: FloatArray | None) -> dict[int, ElectrodeHealth]:
+        """Electrodes with a voltage of their own that takes up much of the converter's range."""
+        if own is None:
+            return {}
+        away = own - np.median(own)
+        return {
+            e: ElectrodeHealth(
+                e,
+                "offset",
+                f"it shows {1e3 * away[e]:+.1f} mV whatever the current does: its contact "
+                "polarises or has another temperature; the alternating drive takes that out",
+            )
+            for e in np.flatnonzero(np.abs(away) > self._most_own).tolist()
+        }
 
     def _stuck(self, samples: NDArray[np.uint16] | None) -> dict[int, ElectrodeHealth]:
         """Electrodes whose samples stand still while the others' go on."""
@@ -260,7 +301,7 @@ def _masks(
 
 
 def _short_text(other: int) -> str:
-    return f"it reads as E{other + 1} does under every drive; take a new reference"
+    return f"it reads the same as E{other + 1} under every drive; take a new reference"
 
 
 def _noise_of(reference: Reference, model: FloatArray) -> FloatArray:

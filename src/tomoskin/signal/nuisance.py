@@ -43,7 +43,8 @@ class NuisanceSubspace:
             factor = cho_factor(basis.T @ carried, check_finite=False)
         except LinAlgError as error:
             raise DataError(
-                f"too little is left of {len(basis)} rows without {basis.shape[1]} directions"
+                f"expected more than {basis.shape[1]} rows after {basis.shape[1]} directions "
+                f"are projected out, got {len(basis)}"
             ) from error
         return cls(basis, cho_solve(factor, carried.T, check_finite=False))
 

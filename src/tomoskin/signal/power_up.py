@@ -58,9 +58,11 @@ def meter_steps(current: float) -> tuple[MeterStep, ...]:
             "1 kΩ between E1 and E2, across it",
             -0.001,
             0.001,
-            "a gate does not rest: Q101 to Q103, Q201 to Q203; the same for other pairs",
+            "a gate is not off at rest: Q101 to Q103, Q201 to Q203; the same for other pairs",
         ),
-        MeterStep("supply", "SENSE", 11.7, 12.2, "U21, U22: the source has nowhere to go"),
+        MeterStep(
+            "supply", "SENSE", 11.7, 12.2, "U21, U22: the source has no path for its current"
+        ),
         MeterStep("Arduino", "+5V", 4.75, 5.25, "USB, header J61"),
         MeterStep("Arduino", "-5V", -5.05, -4.6, "U1, C2, C3"),
         MeterStep("Arduino", "2.5V", 2.49, 2.51, "U2, U3"),

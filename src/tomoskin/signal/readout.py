@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.resources import files
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tomoskin.core import DataError, Frame, Voltages
+from tomoskin.core import DataError, FloatArray, Frame, Voltages
 from tomoskin.pattern import Scan
+from tomoskin.signal.own_voltage import OwnVoltage
 from tomoskin.skin import ReadoutSettings
 
 
@@ -75,7 +78,8 @@ class Readout:
     volts_per_count
         Skin voltage per count of the summed readings, V.
     low, high
-        A sample at or beyond these summed counts stood at a rail.
+        A sample at or beyond these summed counts stood at a rail; of an alternating drive, half of
+        them in either direction.
     noise
         Standard deviation of a row that the converter alone causes, V.
     rounding
@@ -110,18 +114,54 @@ class Readout:
         DataError
             When the frame has another number of samples than the scan.
         """
-        samples = frame.samples.astype(np.float64)
-        if len(samples) != self.scan.n_samples:
+        if len(frame.samples) != self.scan.n_samples:
             raise DataError(
-                f"expected {self.scan.n_samples} samples, got {len(samples)}",
+                f"expected {self.scan.n_samples} samples, got {len(frame.samples)}",
                 where=f"frame {frame.sequence}",
             )
-        plus, minus = self.scan.plus, self.scan.minus
-        at_rail = (samples <= self.low) | (samples >= self.high)
+        values, railed = self.rows(frame.samples, frame.sums)
         return Voltages(
-            values=(samples[plus] - samples[minus]) * self.volts_per_count,
-            railed=at_rail[plus] | at_rail[minus],
+            values=values,
+            railed=railed,
             sequence=frame.sequence,
             ticks=frame.ticks,
             host_time=frame.host_time,
+            own=None if frame.sums is None else self.own_voltage(frame.sums),
         )
+
+    @cached_property
+    def own_voltage(self) -> OwnVoltage:
+        """What electrodes show that does not turn with the current."""
+        return OwnVoltage.of(self.scan, self.volts_per_count, self.high)
+
+    def rows(
+        self, samples: NDArray[np.uint16], sums: NDArray[np.uint16] | None = None
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """(..., n_meas) V, and whether a sample of it stood at a rail, of (..., n_samples) counts.
+
+        With ``sums``, of an alternating drive.
+        """
+        counts = samples.astype(np.float64)
+        plus, minus = self.scan.plus, self.scan.minus
+        at_rail = (
+            self._at_rail(counts, 1)
+            if sums is None
+            else np.any([self._at_rail(part, 2) for part in directions(samples, sums)], axis=0)
+        )
+        volts = (counts[..., plus] - counts[..., minus]) * self.volts_per_count
+        return np.asarray(volts), np.asarray(at_rail[..., plus] | at_rail[..., minus])
+
+    def _at_rail(self, counts: FloatArray, parts: int) -> NDArray[np.bool_]:
+        return np.asarray((parts * counts <= self.low) | (parts * counts >= self.high))
+
+
+def directions(
+    samples: NDArray[np.uint16], sums: NDArray[np.uint16]
+) -> tuple[FloatArray, FloatArray]:
+    """Counts with the current from source to sink, and from sink to source; shapes as given."""
+    difference = samples.astype(np.float64) - _NO_DIFFERENCE
+    return (sums + difference) / 2, (sums - difference) / 2
+
+
+_NO_DIFFERENCE = 0x8000
+"""What stands for no difference between the directions of an alternating drive."""

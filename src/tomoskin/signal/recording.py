@@ -166,7 +166,7 @@ def _absurd(key: str, absurd: NDArray[np.bool_], most: float) -> str:
         frames = np.flatnonzero(absurd.reshape(len(absurd), -1).any(axis=1)).tolist()
         listed = ", ".join(map(str, frames[:_LISTED]))
         where = f" (frames {listed}{', …' if len(frames) > _LISTED else ''})"
-    return f"{count} absurd values of {key}{where}, beyond {most:.2g}, were excluded"
+    return f"{count} values of {key}{where} are beyond {most:.2g} and were excluded"
 
 
 def _check(got: tuple[int, ...], expected: tuple[int, ...], key: str, source: str) -> None:

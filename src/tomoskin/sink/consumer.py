@@ -36,7 +36,7 @@ def make_sink(spec: str) -> Sink:
     entries = tuple(entry_points(group=GROUP, name=name))
     if not entries:
         raise SinkError(
-            f'there is no sink "{name}"', hint=f"known are {', '.join(sink_names()) or 'none'}"
+            f'there is no sink "{name}"', hint=f"sinks: {', '.join(sink_names()) or 'none'}"
         )
     sink: Sink = entries[0].load()(argument)
     return sink
@@ -54,7 +54,7 @@ def needed(module: str, extra: str) -> Any:
         return importlib.import_module(module)
     except (ImportError, OSError, RuntimeError) as error:
         raise SinkError(
-            f"needs {module.partition('.')[0]}: {error}",
+            f"needs the package {module.partition('.')[0]}: {error}",
             where=f"sink {extra}",
             hint=install_hint(extra),
         ) from error
@@ -119,7 +119,7 @@ class SinkConsumer(Consumer):
     """
 
     kind = "sink"
-    slow, ready = "does not keep up, and results are left out", "takes results"
+    slow, ready = "is too slow, and results are left out", "takes results"
 
     def __init__(self, sink: Sink, stream: Stream, say: Say) -> None:
         self.name = sink.name
@@ -157,7 +157,7 @@ class SinkConsumer(Consumer):
 
     def handle_failure(self, error: Exception) -> float:
         """Say so once; it is opened again after a pause that doubles."""
-        before, self.trouble = self.trouble, f"is away: {_why(error)}"
+        before, self.trouble = self.trouble, f"is not reachable: {_why(error)}"
         if self.trouble != before:
             text = f"{self.name} {self.trouble}"
             _log.warning("%s", text)
@@ -187,7 +187,7 @@ def sink_report(worker: Worker[SinkConsumer]) -> SinkReport:
     consumer = worker.consumer
     text = consumer.trouble or f"{worker.taken} sent"
     if (silent := worker.silent) > _LONG:
-        text = f"does not answer for {silent:.0f} s, {text}"
+        text = f"has not answered for {silent:.0f} s, {text}"
     if worker.left_out:
         text += f", {worker.left_out} left out"
     well = not consumer.trouble and silent <= _LONG

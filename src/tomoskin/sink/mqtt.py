@@ -103,9 +103,9 @@ class _Answer:
     def check(self, where: str) -> None:
         """Wait for it."""
         if not self._came.wait(_PATIENCE):
-            raise SinkError(f"no answer within {_PATIENCE:.0f} s", where=where)
+            raise SinkError(f"the broker did not answer within {_PATIENCE:.0f} s", where=where)
         if self._refused:
-            raise SinkError(f"the broker refuses: {self._refused}", where=where)
+            raise SinkError(f"the broker refused the connection: {self._refused}", where=where)
 
 
 def open_mqtt(argument: str) -> MqttSink:

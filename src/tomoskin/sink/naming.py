@@ -47,7 +47,10 @@ class Naming:
                     hint=f"for example {key}=left_arm",
                 )
         if "at" in options and "parent" not in options:
-            raise SinkError("expected parent=… beside at=…: at which link is it?", where=where)
+            raise SinkError(
+                "expected parent=… together with at=…, got at=… alone",
+                where=where,
+            )
         mount = None
         if "parent" in options:
             mount = _mount(options["parent"], options.get("at", ""), where)

@@ -145,7 +145,9 @@ class RerunSink:
         try:
             recording.flush(timeout_sec=_PATIENCE)
         except RuntimeError as error:
-            raise SinkError(f"no viewer has taken it: {error}", where=self.name) from error
+            raise SinkError(
+                f"no viewer accepted the connection: {error}", where=self.name
+            ) from error
         finally:
             recording.disconnect()
 
@@ -196,7 +198,7 @@ def _recording(rerun: Any, stream: Stream) -> Any:
     Those of a robot's skins have one identity in a process: a viewer shows them as one.
     """
     if stream.corners is None and stream.points is not None:
-        raise SinkError("Rerun shows sheets, and this skin is a body", where=_WHERE)
+        raise SinkError("Rerun shows sheets, but this skin is a body", where=_WHERE)
     if stream.place is None:
         recording = rerun.RecordingStream(f"tomoskin {stream.skin}")
     else:

@@ -61,7 +61,7 @@ class Ros2Sink:
             raise SinkError(
                 f"cannot join domain {self._domain}: {error}",
                 where=self.name,
-                hint="CYCLONEDDS_URI names the network interface that it is to use",
+                hint="set CYCLONEDDS_URI to choose the network interface",
             ) from error
         self._view = RosView(stream, naming)
 

@@ -15,7 +15,7 @@ from tomoskin.recording import event_of
 from tomoskin.robot import Place
 from tomoskin.touch import TouchEvent
 
-NO_REFERENCE = "the untouched skin has not been measured yet: leave it alone for a moment"
+NO_REFERENCE = "the reference has not been taken yet: do not touch the skin for a moment"
 
 HEARTBEAT = 1.0
 """Seconds, by host time, after which touches are sent though nothing has changed."""

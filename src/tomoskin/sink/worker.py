@@ -167,7 +167,7 @@ class Worker(Generic[C]):
         left = (self._deadline or 0.0) + _PATIENCE - time.monotonic()
         self._thread.join(None if math.isinf(left) else max(left, 0.0))
         if self._thread.is_alive():
-            self._tell("stuck", "does not answer, and is left to itself")
+            self._tell("stuck", "does not answer, and tomoskin no longer waits for it")
 
     @property
     def silent(self) -> float:

@@ -76,7 +76,10 @@ class Demand:
             if not 0 < value < 1:
                 raise ModelError(f"expected a {name} between 0 and 1, got {value:g}")
         if self.ratio <= 0:
-            raise ModelError("expected presses to be found more often than false alarms are")
+            raise ModelError(
+                "expected a probability of detection above the probability of a false alarm, "
+                f"got {self.found:g} and {self.false_alarm:g}"
+            )
 
     @property
     def ratio(self) -> float:

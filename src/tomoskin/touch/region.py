@@ -52,7 +52,8 @@ class Region:
             hull = ConvexHull(xy)
         except (QhullError, ValueError) as error:
             raise DataError(
-                f"expected presses that are spread over the skin, got {len(xy)} on one line",
+                f"expected presses that are spread over the skin, but all {len(xy)} lie on "
+                "one line",
                 where="xy",
             ) from error
         corners = xy[hull.vertices]
@@ -65,7 +66,10 @@ class Region:
         good = outline.ndim == 2 and outline.shape[1:] == (2,) and len(outline) >= 3
         good = good and bool((np.abs(outline) <= cls.FARTHEST).all())
         if not good or not abs(_area(outline)) > 0:
-            raise DataError("expected an outline of at least three corners around an area")
+            raise DataError(
+                "expected an outline of at least three corners around an area, "
+                f"got shape {outline.shape}"
+            )
         return cls(outline)
 
     @cached_property

@@ -11,7 +11,7 @@ from tomoskin.core import FloatArray
 from tomoskin.touch.fit import EXHAUSTIVE, LIVE
 from tomoskin.touch.fit.native import NativeSolver
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
-from tomoskin.touch.fit.search import Search
+from tomoskin.touch.fit.selection import ForwardSelection
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
 from touch.fit.scene import noise, whitener
 from touch.fit.test_finder import data, model, press
@@ -140,7 +140,7 @@ def test_one_call_finds_what_the_search_step_by_step_does() -> None:
     three = np.concatenate([TWO, press(0.0, -0.06)])
     for spots, before in ((TWO[:0], TWO[:0]), (TWO, TWO[:1]), (three, TWO), (TWO[:1], TWO)):
         frame = problem(native, spots, 0.01)
-        search = Search(frame, model().candidates.matched(frame.seen), **kept)
+        search = ForwardSelection(frame, model().candidates.matched(frame.seen), **kept)
         answer = native.searched(search.question, before)
         assert answer is not None
         other = search.found(before)

@@ -4,7 +4,7 @@ import { signal, useSignal } from "@preact/signals";
 import { addDrawer, whenOpened } from "../drawers";
 import { send, status } from "../state";
 import { bytes, day } from "./format";
-import { askFiles, exported, files, flow, type FoundFile } from "./model";
+import { askFiles, calibrations, exported, files, type FoundFile } from "./model";
 
 const FORMATS: readonly (readonly [string, string])[] = [
   ["touches", "Touches (CSV)"],
@@ -157,13 +157,14 @@ function Session({ file }: { file: FoundFile }) {
 }
 
 function Other({ file }: { file: FoundFile }) {
-  const calibration = flow.value.calibration === file.name;
+  const { touch, force } = calibrations.value;
+  const gives = file.name === touch ? "positions" : file.name === force ? "forces" : null;
   return (
-    <li class={exported.value === file.name || calibration ? "current" : ""}>
+    <li class={exported.value === file.name || gives ? "current" : ""}>
       <div>
         <strong>{file.name}</strong>
         <span class="small">
-          {calibration ? "gives the positions of touches" : `${file.kind}, ${bytes(file.size)}`}
+          {gives ? `gives the ${gives} of touches` : `${file.kind}, ${bytes(file.size)}`}
         </span>
       </div>
       <div class="does">

@@ -1,30 +1,36 @@
-/** The drawer that sets a skin up: the board, the reference, the wires, the touch. */
+/** The drawer that sets a skin up: the board, the reference, the wires, the touch, the force. */
 
 import { signal } from "@preact/signals";
 import { takeReference } from "../commands";
 import { addDrawer, whenOpened } from "../drawers";
 import { duration, millimetres } from "../format";
 import { send, status } from "../state";
-import { askFiles, askSources, files, flow, type FlowKind, type Phase, sources } from "./model";
+import { InUse } from "./Calibrations";
+import { Keep, Leave } from "./Keep";
+import { askFiles, askSources, flow, type FlowKind, type Phase, sources } from "./model";
+import { Rub } from "./Rub";
+import { Weigh } from "./Weigh";
 
-type Step = "board" | FlowKind;
+type Step = "board" | "wiring" | "touch" | "force";
 const STEPS: readonly (readonly [Step, string])[] = [
   ["board", "1 Board"],
   ["wiring", "2 Wiring"],
   ["touch", "3 Touch"],
+  ["force", "4 Force"],
 ];
 const step = signal<Step>("board");
-const names: Readonly<Record<FlowKind, ReturnType<typeof signal<string>>>> = {
-  wiring: signal("wired"),
-  touch: signal("touch"),
-};
-
 function Identity() {
   const found = sources.value;
   const board = found?.board;
   if (!found || !board) return <p class="hint">The board has not reported what it is yet.</p>;
   return (
     <dl class="identity" data-testid="board">
+      {board.name !== "" && (
+        <>
+          <dt>Board</dt>
+          <dd>{board.name}</dd>
+        </>
+      )}
       <dt>Firmware</dt>
       <dd>{board.firmware}</dd>
       <dt>Protocol</dt>
@@ -105,14 +111,42 @@ function Board() {
   );
 }
 
-const TEACHING: Readonly<Record<FlowKind, string>> = {
-  wiring:
-    "This finds which wire ends at which electrode. Press the skin where the dot is, a few times. The answer is saved as a skin file.",
-  touch:
-    "This teaches the skin where a touch is. Press where the dot is, softly and hard in turn, ten times or more. Positions then come from these presses, each with its uncertainty.",
+interface Teaching {
+  readonly kind: FlowKind;
+  readonly text: string;
+  readonly begin: string;
+}
+
+const TEACHING: Readonly<Record<Exclude<Step, "board">, readonly Teaching[]>> = {
+  wiring: [
+    {
+      kind: "wiring",
+      text: "This finds which wire ends at which electrode. Press the skin where the dot is, a few times. The answer is saved as a skin file.",
+      begin: "Begin",
+    },
+  ],
+  touch: [
+    {
+      kind: "touch",
+      text: "This teaches the skin where a touch is. Press where the dot is, softly and hard in turn, ten times or more. Positions then come from these presses, each with its uncertainty.",
+      begin: "Begin",
+    },
+    {
+      kind: "rub",
+      text: "Or rub all of the skin with one finger for a minute: no position need be known.",
+      begin: "Rub the skin",
+    },
+  ],
+  force: [
+    {
+      kind: "force",
+      text: "This teaches the skin what touches weigh. Lay known weights on it, one at a time, ten times or more, light and heavy, at many spots. Use one tip for all: a larger one changes the sheet otherwise.",
+      begin: "Begin",
+    },
+  ],
 };
 
-const PHASES: Readonly<Record<Phase, string>> = {
+const PHASES: Partial<Record<Phase, string>> = {
   rest: "Hands off",
   press: "Press where the dot is",
   hold: "Hold still",
@@ -120,10 +154,9 @@ const PHASES: Readonly<Record<Phase, string>> = {
 };
 
 function Going({ kind }: { kind: FlowKind }) {
-  const { phase = "rest", effort, presses = [], text, ready, thinking, figures } = flow.value;
+  const { phase = "rest", effort, presses = [], text, thinking, figures } = flow.value;
   const taken = `${presses.length} press${presses.length === 1 ? "" : "es"} recorded`;
   const doubtful = figures?.doubtful ?? [];
-  const name = names[kind];
   return (
     <>
       <p class="lead" role="status" data-testid="phase">
@@ -162,89 +195,43 @@ function Going({ kind }: { kind: FlowKind }) {
         >
           Undo the last press
         </button>
-        <button type="button" data-testid="flow-end" onClick={() => send({ type: "flow_end" })}>
-          Leave
-        </button>
+        <Leave />
       </div>
-      <form
-        class="row"
-        onSubmit={(event) => {
-          event.preventDefault();
-          send({ type: "flow_keep", name: name.value });
-        }}
-      >
-        <label class="unseen" for="keep-name">
-          Name of the file
-        </label>
-        <input
-          id="keep-name"
-          type="text"
-          pattern="[A-Za-z0-9][A-Za-z0-9_\-]{0,63}"
-          required
-          value={name.value}
-          onInput={({ currentTarget }) => (name.value = currentTarget.value)}
-        />
-        <button type="submit" class="main" data-testid="flow-keep" disabled={!ready}>
-          Save and use
-        </button>
-      </form>
+      <Keep kind={kind} />
     </>
   );
 }
 
-function Guided({ kind }: { kind: FlowKind }) {
-  if (flow.value.kind === kind) return <Going kind={kind} />;
+/** The flow that goes on, where it belongs to this step. */
+function Guided({ kinds }: { kinds: readonly Teaching[] }) {
+  const kind = flow.value.kind;
+  if (kind === "force" && kinds[0].kind === kind) return <Weigh />;
+  if (kind === "rub" && kinds.some((each) => each.kind === kind)) return <Rub />;
+  if (kind && kinds.some((each) => each.kind === kind)) return <Going kind={kind} />;
   return (
     <>
-      <p>{TEACHING[kind]}</p>
-      <button
-        type="button"
-        class="main"
-        data-testid="flow-begin"
-        disabled={status.value?.replay != null}
-        onClick={() => send({ type: "flow_begin", kind })}
-      >
-        Begin
-      </button>
-      {status.value?.replay && <p class="hint">A recording cannot be pressed: go back to live first.</p>}
-    </>
-  );
-}
-
-function Calibration() {
-  const known = flow.value.calibration;
-  const kept = (files.value?.files ?? []).filter(({ name }) => name.endsWith(".npz"));
-  if (flow.value.kind === "touch") return null;
-  return (
-    <>
-      <h3>In use</h3>
-      <p data-testid="calibration">
-        {known === null
-          ? "Positions of touches come from the voltages and the model of the skin."
-          : `Positions of touches come from ${known || "the calibration that tomoskin was started with"}.`}
-      </p>
-      {(kept.length > 0 || known !== null) && (
-        <label class="row">
-          <span>Calibration</span>
-          <select
-            value={known ?? ""}
-            onChange={({ currentTarget: { value } }) =>
-              send({ type: "calibration", name: value || null })
-            }
+      {kinds.map(({ kind, text, begin }) => (
+        <div key={kind} class="teaches">
+          <p>{text}</p>
+          <button
+            type="button"
+            class={kind === kinds[0].kind ? "main" : ""}
+            data-testid={kind === kinds[0].kind ? "flow-begin" : `flow-begin-${kind}`}
+            disabled={status.value?.replay != null}
+            onClick={() => send({ type: "flow_begin", kind })}
           >
-            <option value="">none</option>
-            {kept.map(({ name }) => (
-              <option key={name}>{name}</option>
-            ))}
-          </select>
-        </label>
-      )}
+            {begin}
+          </button>
+        </div>
+      ))}
+      {status.value?.replay && <p class="hint">Presses need a live source: go back to live first.</p>}
     </>
   );
 }
 
 function View() {
   const shown = step.value;
+  const going = flow.value.kind === "rub" ? "touch" : flow.value.kind;
   return (
     <div class="flow">
       <div class="steps" role="group" aria-label="Steps">
@@ -260,13 +247,13 @@ function View() {
           </button>
         ))}
       </div>
-      {shown === "board" ? <Board /> : <Guided kind={shown} />}
-      {shown === "touch" && <Calibration />}
+      {shown === "board" ? <Board /> : <Guided kinds={TEACHING[shown]} />}
+      {(shown === "touch" || shown === "force") && going !== shown && <InUse of={shown} />}
     </div>
   );
 }
 
-addDrawer({ id: "setup", label: "Set up", key: "U", title: "Board, reference, wiring, touch", View });
+addDrawer({ id: "setup", label: "Set up", key: "U", title: "Board, reference, wiring, touch, force", View });
 
 const OFTEN = 2000;
 let timer = 0;

@@ -1,31 +1,59 @@
-/** The dot on the sheet where to press next, and the presses that were taken. */
+/** On the sheet: the dot where to press next, the presses that were taken, the map of a rubbed skin. */
 
 import { toPixels, type View } from "../sheet/view";
-import { dot, flow, type Phase } from "./model";
+import { dot, flow, type Phase, type Rubbed } from "./model";
 
 const WORDS: Readonly<Record<Phase, string>> = {
   rest: "Hands off",
   press: "Press here",
   hold: "Hold",
   release: "Let go",
+  several: "Only one",
+  name: "",
+  rub: "",
 };
 
+function word(): string {
+  const { kind, phase = "rest", effort } = flow.value;
+  if (phase === "press" && kind === "force") return "Here next";
+  if (phase === "hold" && kind === "force") return "";
+  return phase === "press" && effort ? `Press ${effort}` : WORDS[phase];
+}
+
+/** Where the skin has been rubbed: full where it has, rings where it has not. */
+function Covered({ view, rubbed }: { view: View; rubbed: Rubbed }) {
+  const { places, covered } = rubbed;
+  return (
+    <g data-testid="covered" class="covered">
+      {covered.map((count, k) => {
+        const [x, y] = toPixels(view, places[2 * k], places[2 * k + 1]);
+        return <circle key={k} class={count > 0 ? "full" : ""} cx={x} cy={y} r={3} />;
+      })}
+    </g>
+  );
+}
+
 export function Target({ view }: { view: View }) {
+  const { phase = "rest", presses = [], rubbed } = flow.value;
   const place = dot.value;
-  if (!place) return null;
-  const [x, y] = toPixels(view, ...place);
-  const { phase = "rest", effort, presses = [] } = flow.value;
+  if (!place && !rubbed) return null;
+  const [x, y] = place ? toPixels(view, ...place) : [0, 0];
   return (
     <svg class={`target ${phase}`} width={view.width} height={view.height} aria-hidden="true" data-testid="dot">
+      {rubbed && <Covered view={view} rubbed={rubbed} />}
       {presses.map((press, k) => {
         const [px, py] = toPixels(view, ...press);
         return <circle key={k} class="taken" cx={px} cy={py} r={4} />;
       })}
-      <circle class="ring" cx={x} cy={y} r={20} />
-      <circle class="core" cx={x} cy={y} r={7} />
-      <text x={x} y={y + 40}>
-        {phase === "press" && effort ? `Press ${effort}` : WORDS[phase]}
-      </text>
+      {place && (
+        <>
+          <circle class="ring" cx={x} cy={y} r={20} />
+          <circle class="core" cx={x} cy={y} r={7} />
+          <text x={x} y={y + 40}>
+            {word()}
+          </text>
+        </>
+      )}
     </svg>
   );
 }

@@ -33,6 +33,8 @@ interface Sources {
   readonly current: string;
   readonly host_protocol: string;
   readonly board: {
+    /** What it calls itself; empty before protocol 1.2. */
+    readonly name: string;
     readonly firmware: string;
     readonly protocol: string;
     readonly channels: number;
@@ -43,14 +45,36 @@ interface Sources {
   readonly problem: string | null;
 }
 
-export type FlowKind = "touch" | "wiring";
-export type Phase = "rest" | "press" | "hold" | "release";
+export type FlowKind = "touch" | "wiring" | "force" | "rub";
+export type Phase = "rest" | "press" | "hold" | "release" | "several" | "name" | "rub";
+export type Unit = "N" | "g" | "kg";
+
+export interface Weight {
+  readonly value: number;
+  readonly unit: Unit;
+  readonly newtons: number;
+  readonly text: string;
+}
+
+/** What was rubbed so far. */
+export interface Rubbed {
+  readonly touches: number;
+  /** So many can be learnt from. */
+  readonly needed: number;
+  /** What is missing, in words. */
+  readonly text: string;
+  readonly enough: boolean;
+  /** x, y of each position of the map, m, flat; how many touches lay near it, and how near, m. */
+  readonly places: readonly number[];
+  readonly covered: readonly number[];
+  readonly near_m: number;
+}
 
 export interface Flow {
   readonly type: "flow";
   readonly kind: FlowKind | null;
   readonly phase?: Phase;
-  readonly dot?: readonly [number, number];
+  readonly dot?: readonly [number, number] | null;
   /** How to press it; null where that does not matter. */
   readonly effort?: "softly" | "hard" | null;
   readonly presses?: readonly (readonly [number, number])[];
@@ -63,9 +87,28 @@ export interface Flow {
     readonly doubtful?: readonly number[];
     readonly probability?: number;
     readonly wiring?: string;
+    /** Relative error of each force, its press left out. */
+    readonly errors?: readonly number[];
+    /** What is wrong, in words. */
+    readonly remarks?: readonly string[];
   };
-  /** Where places of touches come from: a file, "" where its name is not known; null: the picture. */
-  readonly calibration: string | null;
+  /** Of weights: what each was, what lies there or comes next, and what was probably mistaken. */
+  readonly weights?: readonly string[];
+  readonly weight?: Weight | null;
+  readonly asked?: Weight | null;
+  readonly meant?: Weight | null;
+  readonly rubbed?: Rubbed;
+  /** How far learning is, in words. */
+  readonly stage?: string;
+}
+
+/** Files of the calibrations in use; "" where the name is not known; null: none. */
+interface Calibrations {
+  readonly type: "calibrations";
+  readonly touch: string | null;
+  readonly force: string | null;
+  /** The largest force that was learnt from, N; null: none was. */
+  readonly force_most_n: number | null;
 }
 
 export interface Timeline {
@@ -90,7 +133,8 @@ export interface Tick {
 
 export const files = signal<Files | null>(null);
 export const sources = signal<Sources | null>(null);
-export const flow = signal<Flow>({ type: "flow", kind: null, calibration: null });
+export const flow = signal<Flow>({ type: "flow", kind: null });
+export const calibrations = signal<Calibrations>({ type: "calibrations", touch: null, force: null, force_most_n: null });
 export const timeline = signal<Timeline | null>(null);
 /** Notes and gaps since the recording began or the replay was opened, and its touches. */
 export const marks = signal<readonly Tick[]>([]);
@@ -102,6 +146,7 @@ export const exported = signal<string | null>(null);
 onMessage<Files>("files", (message) => (files.value = message));
 onMessage<Sources>("sources", (message) => (sources.value = message));
 onMessage<Flow>("flow", (message) => (flow.value = message));
+onMessage<Calibrations>("calibrations", (message) => (calibrations.value = message));
 onMessage<Timeline>("timeline", (message) => (timeline.value = message));
 onMessage<{ readonly type: "exported"; readonly name: string }>("exported", ({ name }) => {
   exported.value = name;

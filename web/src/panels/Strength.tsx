@@ -1,11 +1,13 @@
-/** The strength of each touch over the last ten seconds, each line named at its end. */
+/** The force of each touch over the last ten seconds with its interval, or its change of the sheet;
+ * each line named at its end. */
 
 import { computed } from "@preact/signals";
 import type uPlot from "uplot";
-import { inScale, niceAbove, scaleFor } from "../format";
+import { inScale, niceAbove, type Scale, scaleFor } from "../format";
 import { SLOTS, SPAN } from "../history";
 import { history, limit, link, newest, scene, shown } from "../state";
 import { theme } from "../theme";
+import { asChange, forceState, inNewtons, mostNewtons } from "./forces";
 import { axis, Plot, type Plan } from "./Plot";
 
 /** Names of more times would run into one another, px. */
@@ -14,9 +16,14 @@ const NARROW = 320;
 /** A touch is stronger than the image of it, by about so much at first. */
 const HEADROOM = 5;
 
-/** The end of the ordinate: it follows the colour scale, and moves for nothing else. */
-const top = computed(() => niceAbove(HEADROOM * limit.value));
-const scale = computed(() => scaleFor(top.value, scene.value?.unit ?? "S"));
+/** The end of the ordinate: it follows the colour scale or the calibration, and moves for nothing else. */
+const top = computed(() => (inNewtons.value ? mostNewtons.value : niceAbove(HEADROOM * limit.value)));
+const scale = computed<Scale>(() =>
+  inNewtons.value
+    ? { factor: 1, unit: "N", decimals: top.value < 5 ? 1 : 0 }
+    : scaleFor(top.value, scene.value?.unit ?? "S"),
+);
+const lines = computed(() => (inNewtons.value ? history.forces : history.columns));
 
 /** The touch's number where its line ends. */
 function nameLines(plot: uPlot): void {
@@ -30,7 +37,7 @@ function nameLines(plot: uPlot): void {
   ctx.textBaseline = "middle";
   const last = history.times.length - 1;
   const x = plot.bbox.left + plot.bbox.width + 7 * density;
-  const ends = history.columns.flatMap((column, slot) => {
+  const ends = lines.peek().flatMap((column, slot) => {
     const value = column[last] ?? null;
     if (value === null) return [];
     return { text: String(history.idOf(slot)), y: plot.valToPos(Math.min(value, top.peek()), "y", true) };
@@ -72,30 +79,66 @@ function plan(): Plan | null {
         width: 2,
         points: { show: false },
       })),
+      ...Array.from({ length: inNewtons.value ? 2 * SLOTS : 0 }, () => ({
+        width: 0,
+        points: { show: false },
+      })),
     ],
+    bands: intervals(colours.accent),
     hooks: { draw: [nameLines] },
   };
+}
+
+/** Between the ends of each force's interval, which stand behind all lines. */
+function intervals(colour: string): uPlot.Band[] {
+  if (!inNewtons.value) return [];
+  return Array.from({ length: SLOTS }, (_, slot) => {
+    const low = 1 + SLOTS + slot;
+    return { series: [low + SLOTS, low] as [number, number], fill: `${colour}40` };
+  });
 }
 
 function data(): uPlot.AlignedData {
   void shown.value;
   const end = newest.frame?.hostTime ?? 0;
   const most = top.value;
+  const ends = inNewtons.value ? [...history.lows, ...history.highs] : [];
   // What exceeds the end runs along the upper edge rather than out of sight.
-  const columns = history.columns.map((column) =>
+  const columns = [...lines.value, ...ends].map((column) =>
     column.map((value) => (value === null ? null : Math.min(value, most))),
   );
   return [history.times.map((time) => time - end), ...columns];
 }
 
+function Title() {
+  const { unit } = scale.value;
+  if (forceState.value === "none") return <>Strength, {unit}</>;
+  const state = forceState.value === "uncalibrated" ? ", uncalibrated" : "";
+  return (
+    <button
+      type="button"
+      class="quiet"
+      data-testid="strength-unit"
+      aria-pressed={asChange.value}
+      title={asChange.value ? "Show newtons" : "Show the change of conductivity"}
+      onClick={() => (asChange.value = !asChange.value)}
+    >
+      {asChange.value ? `Strength, ${unit}` : `Force, ${unit}${state}`}
+    </button>
+  );
+}
+
 export function Strength() {
+  const what = inNewtons.value ? "Force" : "Strength";
   return (
     <section
       class={`panel${link.value.phase === "lost" ? " stale" : ""}`}
       aria-labelledby="strength-title"
     >
-      <h2 id="strength-title">Strength, {scale.value.unit}</h2>
-      <Plot label="Strength of each touch over the last ten seconds" plan={plan} data={data} />
+      <h2 id="strength-title">
+        <Title />
+      </h2>
+      <Plot label={`${what} of each touch over the last ten seconds`} plan={plan} data={data} />
     </section>
   );
 }

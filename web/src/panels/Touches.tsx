@@ -1,11 +1,12 @@
 /** The touches as a short list in large figures, and, quietly, as words for a screen reader. */
 
-import { signal, useComputed, useSignal, useSignalEffect } from "@preact/signals";
+import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import type { Force, Touch } from "../decode";
 import { fixed, inScale, millimetres, scaleFor, type Scale } from "../format";
 import { fingers } from "../screen";
 import { limit, link, scene, shown, status } from "../state";
 import { stateInWords } from "../words";
+import { asChange, forceState } from "./forces";
 
 const ROWS = 4;
 
@@ -20,9 +21,6 @@ function tooClose(touch: Touch): string | undefined {
   if (touch.several > 1) return `${touch.several} touches, too close to separate`;
   return touch.several ? "may be several touches, too close to separate" : undefined;
 }
-
-/** Whether the change of conductivity is shown where forces are known too. */
-const asChange = signal(false);
 
 /** A force with its interval, in words. */
 function forceInWords({ newtons, low, high, calibrated }: Force): string {
@@ -61,7 +59,7 @@ function StrengthTitle({ forces, scale }: { forces: boolean; scale: Scale }) {
       title={asChange.value ? "Show newtons" : "Show the change of conductivity"}
       onClick={() => (asChange.value = !asChange.value)}
     >
-      {asChange.value ? change : "force, N"}
+      {asChange.value ? change : forceState.value === "uncalibrated" ? "~force, N" : "force, N"}
     </button>
   );
 }

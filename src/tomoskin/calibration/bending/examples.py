@@ -53,15 +53,20 @@ class BendExamples:
             shapes = ", ".join(str(a.shape) for a in (data, *one))
             raise DataError(f"expected (n, n_meas) frames and (n,) labels, got {shapes}")
         if not all(np.isfinite(a).all() for a in (data, *one)):
-            raise DataError("expected finite frames, angles, axes and times")
+            raise DataError(
+                "expected finite frames, angles, axes and times, got values that are not finite"
+            )
         if not (np.diff(one[2]) > 0).all():
-            raise DataError("expected frames in the order of their times")
+            raise DataError(
+                "expected frames in the order of their times, got a time that does not increase"
+            )
         bent = np.abs(one[0]) > _SAME
         if np.count_nonzero(bent) < _LEAST or len(np.unique(one[0])) < 3:
             raise DataError(
-                f"expected at least {_LEAST} bent frames at two angles and the straight sheet, got "
-                f"{np.count_nonzero(bent)} at {len(np.unique(one[0][bent]))}",
-                hint="bend it to a few known angles, and back",
+                f"expected the straight sheet and at least {_LEAST} bent frames at two or more "
+                f"angles, got {np.count_nonzero(bent)} bent frames at "
+                f"{len(np.unique(one[0][bent]))} angles",
+                hint="bend the skin to a few known angles, and back",
             )
         return cls(data, *one)
 

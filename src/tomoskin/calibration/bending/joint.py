@@ -59,7 +59,10 @@ class JointReference:
         order = np.argsort(a, kind="stable")
         groups = np.split(order, np.flatnonzero(np.diff(a[order]) > _SAME) + 1)
         if len(groups) < 2:
-            raise DataError("expected frames at two angles at least", hint="move the joint")
+            raise DataError(
+                "expected frames at two or more angles of the joint, got one",
+                hint="move the joint and record again",
+            )
         means = np.array([v[g].mean(axis=0) for g in groups])
         left = np.concatenate([v[g] - v[g].mean(axis=0) for g in groups])
         degrees = max(len(v) - len(groups), 1)
@@ -85,7 +88,7 @@ class JointReference:
                 f"expected an angle from {np.degrees(low):.1f}° to {np.degrees(high):.1f}°, got "
                 f"{np.degrees(angle):.1f}°",
                 where="joint",
-                hint="record references at that angle too",
+                hint="record references at that angle as well",
             )
         held = float(np.clip(angle, low, high))
         return Reference(np.asarray(self._course(held)), self.noise, self.n_frames)

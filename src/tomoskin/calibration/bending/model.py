@@ -147,8 +147,8 @@ class BendModel:
         count = min(int(np.count_nonzero(singular > _ABOVE * edge)), _MOST)
         if count == 0:
             raise DataError(
-                "the bends do not show above the noise",
-                hint="bend it farther, or check that the frames are those of the angles",
+                "the changes by the bends are not larger than the noise",
+                hint="bend the skin farther, or check that the angles belong to these frames",
             )
         directions = np.linalg.pinv(whiten.matrix) @ rows[:count].T
         z = whitened @ rows[:count].T

@@ -77,7 +77,7 @@ class ChannelMapping:
         if steps:
             said.append(f"turned by {steps} electrode{'s' if steps > 1 else ''}")
         odd = [k for k, place in enumerate(self.electrodes) if place != base.electrodes[k]]
-        said += [f"E{k + 1} at the place of E{self.electrodes[k] + 1}" for k in odd]
+        said += [f"E{k + 1} at the position of E{self.electrodes[k] + 1}" for k in odd]
         if self.reversed:
             said.append("polarity reversed")
         return ", ".join(said) or "as the skin file says"

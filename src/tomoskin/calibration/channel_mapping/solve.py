@@ -159,7 +159,9 @@ def _checked(presses: Presses, skin: Skin) -> Presses:
         raise DataError(f"expected {skin.pattern().n_meas} rows of dv, got {presses.dv.shape[1]}")
     silent = np.flatnonzero(np.nansum(np.abs(presses.dv), axis=1) == 0)
     if len(silent):
-        raise DataError("expected presses that change something", where=f"press {silent[0]}")
+        raise DataError(
+            "expected presses that change the voltages, got no change", where=f"press {silent[0]}"
+        )
     return presses
 
 

@@ -58,14 +58,14 @@ class Alignment:
     @property
     def text(self) -> str:
         """For people: what was seen, and what would mend it."""
-        size = f"changes are {self.grown:.2g} times as large as in the session learnt from"
+        size = f"changes are {self.grown:.2g} times as large as in the session of the calibration"
         if self.holds:
             part = f"about {100 * self.reliability:.0f} % of its frames should be right"
             return f"the session is aligned: {size}; {part}"
         why = "; ".join(self.reasons)
         return (
-            f"the session cannot be aligned: {why}; {size}. Its frames are called unknown: "
-            "label ten of them (--ask 10 names the frames), or learn again"
+            f"the session cannot be aligned: {why}; {size}. Its frames count as unknown: label "
+            "ten of them (--ask 10 names the frames), or calibrate again"
         )
 
 
@@ -85,7 +85,7 @@ def aligned(
         reasons = _doubts(prior, fitted, rest)
     reliability = _reliability(prior, fitted, len(x), int(labelled.sum()))
     if reliability < _RELIABLE:
-        reasons = (*reasons, f"of {len(x)} such frames only {reliability:.0%} would be right")
+        reasons = (*reasons, f"only {reliability:.0%} of {len(x)} such frames would be right")
     return fitted, Alignment(not reasons, reliability, _size(fitted) / _size(prior), reasons)
 
 
@@ -130,7 +130,7 @@ def _doubts(prior: Mixture, fitted: Mixture, rest: FloatArray | None) -> tuple[s
     if rest is not None and shows(fitted, rest) != 0:
         doubts.append("an untouched frame would have flags set")
     if len(prior.templates) > 2 and _margin(_cosines(fitted, prior)) < _MARGIN:
-        doubts.append("its responses do not tell which is which")
+        doubts.append("its responses do not distinguish the states")
     return tuple(doubts)
 
 
@@ -194,7 +194,7 @@ def _contradictions(free: Mixture, x: FloatArray, numbers: IntArray) -> tuple[st
     wrong = (said > 0.5) != (free.table[numbers[labelled]] > 0.5)
     beyond = (wrong - np.minimum(said, 1 - said)).mean(axis=0)
     lost = int((beyond > _CONTRADICTED).sum())
-    return (f"{lost} of {len(beyond)} flags do not fit the labels given",) if lost else ()
+    return (f"{lost} of {len(beyond)} flags contradict the labels",) if lost else ()
 
 
 def _reliability(prior: Mixture, fitted: Mixture, n: int, labels: int) -> float:

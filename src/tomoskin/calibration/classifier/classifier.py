@@ -224,8 +224,8 @@ class Classifier:
         for name, mine, other in pairs:
             if mine and other and mine != other:
                 raise DataError(
-                    f"the calibration is of {name} {mine}, the data are of {name} {other}",
-                    hint="calibrate this one: tomoskin calibrate states",
+                    f"the calibration is for {name} {mine}, but the data are of {name} {other}",
+                    hint=f"calibrate this {name}: tomoskin calibrate states",
                 )
 
 

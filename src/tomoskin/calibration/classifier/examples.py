@@ -177,14 +177,17 @@ class Examples:
         flags = self.flags[self.labelled]
         counts = np.stack([flags.sum(axis=0), (1 - flags).sum(axis=0)])
         if not len(flags):
-            raise DataError("expected labelled frames, got none", hint="ten of each are a start")
+            raise DataError(
+                "expected labelled frames, got none",
+                hint="label frames of each state: ten of each are a start",
+            )
         if counts.min() < _FEWEST:
             which, flag = np.unravel_index(np.argmin(counts), counts.shape)
             word = "without" if which else "with"
             raise DataError(
                 f"expected at least {_FEWEST} labelled frames {word} {self.codes.names[flag]}, "
                 f"got {int(counts.min())}",
-                hint="ten of each are a start",
+                hint="label more frames: ten of each are a start",
             )
         return self
 

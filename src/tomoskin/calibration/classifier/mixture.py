@@ -78,7 +78,9 @@ def _noise(examples: Examples) -> FloatArray:
     deviation = np.sqrt(total / max(count, 1))
     alive = deviation[deviation > 0]
     if not len(alive):
-        raise DataError("expected frames that differ from each other: no row ever changes")
+        raise DataError(
+            "expected frames that differ from each other, got frames that are all the same"
+        )
     return np.asarray(np.maximum(deviation, _QUIETEST * np.median(alive)))
 
 

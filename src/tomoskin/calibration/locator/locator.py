@@ -15,7 +15,6 @@ from tomoskin.calibration.locator.presses import (
     Features,
     Presses,
     Strength,
-    equally_hard,
     frames,
     mean_about,
 )
@@ -46,10 +45,6 @@ _GROWN = 1.25
 
 _CHANGED = 2.5
 """How many times as far as usual new presses are missed on a skin that has changed (medians)."""
-
-_GUESS, _GUESS_OF_FEW = 0.75, 2.5
-"""Part of a guess's error above which nothing was learnt; less by the second over the number of
-presses. Noise gives 0.5 to 0.85 with 8 presses, 0.8 to 0.92 with 10, 0.93 to 0.99 from 20 on."""
 
 
 _WIDEST = 1.0
@@ -298,31 +293,6 @@ class Locator:
             * np.linalg.norm(self.stacking.left_out - self.region.scaled(self.presses.xy), axis=1)
         )
 
-    @property
-    def guessed(self) -> float:
-        """Mean m by which presses are missed when the middle of the others is the answer."""
-        xy = self.presses.xy
-        away = np.linalg.norm(xy - xy.mean(axis=0), axis=1)
-        return float(away.mean() * len(xy) / max(len(xy) - 1, 1))
-
-    @property
-    def is_guess(self) -> bool:
-        """Whether :attr:`errors` are about as large as :attr:`guessed`: noise gives such ones."""
-        limit = _GUESS - _GUESS_OF_FEW / len(self.presses)
-        return bool(self.errors.mean() > limit * self.guessed)
-
-    @property
-    def drift(self) -> float:
-        """How many times as far as usual the last eighth of the presses is missed (medians)."""
-        errors = self.errors
-        return float(np.median(errors[-max(len(errors) // 8, 5) :]) / np.median(errors))
-
-    @property
-    def one_force(self) -> bool:
-        """Whether all presses were about equally hard: ``errors`` and covariances then tell of
-        such presses alone, and softer or harder ones are missed farther."""
-        return equally_hard(self.presses, self.region.scaled(self.presses.xy))
-
     def next_place(self) -> FloatArray:
         """(2,) m where the next labelled press tells most: the maps are least certain there."""
         return self.region.metres(self.estimates.least_known)
@@ -336,6 +306,6 @@ class Locator:
         for name, mine, other in pairs:
             if mine and other and mine != other:
                 raise DataError(
-                    f"the calibration is of {name} {mine}, the data are of {name} {other}",
-                    hint="calibrate this one: tomoskin calibrate touch",
+                    f"the calibration is for {name} {mine}, but the data are of {name} {other}",
+                    hint=f"calibrate this {name}: tomoskin calibrate touch",
                 )

@@ -61,7 +61,7 @@ class Presses:
         if len(presses) < _FEWEST:
             raise DataError(
                 f"expected at least {_FEWEST} labelled presses, got {len(presses)}",
-                hint="ten are a start, fifty are good",
+                hint="label more presses: ten are a start, fifty are good",
             )
         return presses
 
@@ -72,7 +72,8 @@ class Presses:
         if labels.shape != (len(data), 2):
             raise DataError(f"expected xy of shape ({len(data)}, 2), got {labels.shape}")
         wrong = ~(np.abs(labels) <= Region.FARTHEST).all(axis=1)
-        _name(np.flatnonzero(wrong), "have labels that are no position", "labels are in metres")
+        bad = np.flatnonzero(wrong)
+        _name(bad, "have labels that are not a position", "give labels in metres")
         if strength is None:
             return cls(data, labels)
         force = np.asarray(strength, dtype=np.float64)
@@ -87,7 +88,11 @@ class Presses:
     def within(self, region: Region) -> Self:
         """These presses; DataError, with the rows, where labels lie outside the region."""
         outside = np.flatnonzero(region.beyond(self.xy) > _BESIDE * region.unit)
-        _name(outside, "have labels outside the skin", "labels are in metres, from its origin")
+        _name(
+            outside,
+            "have labels outside the skin",
+            "give labels in metres, measured from the origin of the skin",
+        )
         return self
 
     def and_then(self, other: Self) -> Self:
@@ -174,7 +179,7 @@ class Features:
         rows = np.flatnonzero(_changing(dv))
         if not len(rows):
             raise DataError(
-                f"expected data that change from press to press, got {len(dv)} equal presses"
+                f"expected data that change from press to press, got {len(dv)} identical presses"
             )
         used = dv[:, rows]
         scale = _scales(np.abs(used))
@@ -194,7 +199,7 @@ class Features:
         holes = ~np.isfinite(squashed)
         if holes.all(axis=1).any():
             row = int(np.argmax(holes.all(axis=1)))
-            raise DataError("holds no finite value that is used", where=f"frame {row}")
+            raise DataError("holds no finite value in a row that is used", where=f"frame {row}")
         for frame in np.flatnonzero(holes.any(axis=1)):
             self._fill(squashed[frame], holes[frame])
         return np.asarray(squashed)

@@ -19,7 +19,7 @@ from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
 from tomoskin.touch import Region
 
-_FEWEST, _MOST = 150, 800
+FEWEST, _MOST = 150, 800
 """Touches that are needed, and that are used: spread evenly over those that were made."""
 
 _ALIGNED, _UNSURE = 0.15, 1.2
@@ -100,18 +100,18 @@ class Rubbing:
         table = pattern or skin.pattern()
         if table.n_electrodes != skin.pattern().n_electrodes:
             raise DataError(
-                f"the pattern has {table.n_electrodes} electrodes, the skin "
+                f"the pattern has {table.n_electrodes} electrodes, but the skin has "
                 f"{skin.pattern().n_electrodes}",
-                hint="name the skin that was rubbed: --skin",
+                hint="give the skin that was rubbed: --skin",
             )
         data = frames(dv, table.n_meas)
         labels = np.full((len(data), 2), np.nan) if xy is None else np.asarray(xy, dtype=float)
         if labels.shape != (len(data), 2):
             raise DataError(f"expected xy of shape ({len(data)}, 2), got {labels.shape}")
-        if len(data) < _FEWEST:
+        if len(data) < FEWEST:
             raise DataError(
-                f"expected at least {_FEWEST} touches, got {len(data)}",
-                hint="rub all of the skin with one finger for a minute",
+                f"expected at least {FEWEST} touches, got {len(data)}",
+                hint="rub the whole skin with one finger for a minute",
             )
         with threadpool_limits(1):
             return cls._of(data, labels, skin, table)
@@ -141,7 +141,7 @@ class Rubbing:
             Presses.of(dv, position, spread=spread),
             region.unit * fit.disagreement,
             alone.alike,
-            _quiet(np.abs(dv), pattern),
+            quiet_electrodes(dv, pattern),
             tuple(chosen[far & labelled].tolist()),
         )
 
@@ -156,21 +156,39 @@ class Rubbing:
         found = []
         if self.alike < _ALIKE:
             found.append(
-                "the changes are not as this skin's electrodes should see them: another pattern, "
-                "another skin, or wires that are swapped (tomoskin calibrate wiring)"
+                "the voltages do not change as this skin's model predicts: the pattern or the "
+                "skin may be another one, or wires may be swapped (tomoskin calibrate wiring)"
             )
         if self.quiet:
             names = ", ".join(f"E{e + 1}" for e in self.quiet)
-            found.append(
-                f"touches seem not to have come near {names}: rub all of the skin, out to its rim"
-            )
+            found.append(f"probably no touch came near {names}: rub the whole skin, out to its rim")
         if self.contradicted:
             shown = ", ".join(map(str, self.contradicted[:10]))
             found.append(
-                f"labels of frames {shown} contradict where the touches are found without labels: "
-                "look at the labels, and at [electrodes] first and order of the skin file"
+                f"the labels of frames {shown} contradict the positions found without labels: "
+                "check the labels, and [electrodes] first and order in the skin file"
             )
         return tuple(found)
+
+    @property
+    def labelled(self) -> int:
+        """How many of the touches that are used had a label."""
+        return int((~self.presses.spreads.any(axis=(1, 2))).sum())
+
+    @property
+    def deviation(self) -> float:
+        """m by which positions that were found are uncertain in each direction (median)."""
+        size = np.sqrt(np.trace(self.presses.spreads, axis1=1, axis2=2) / 2)
+        return float(np.median(size[size > 0]))
+
+    @property
+    def text(self) -> str:
+        """What was found, in a sentence."""
+        return (
+            f"{len(self.presses)} touches used, {self.labelled} of them labelled; positions are "
+            f"uncertain by about {1e3 * self.deviation:.1f} mm in each direction, and a few "
+            "labelled presses make them better"
+        )
 
     def locator(self, progress: Progress = silent) -> Locator:
         """A locator that has learnt from the touches. Raises DataError where they do not hold."""
@@ -185,11 +203,13 @@ def _evenly(n: int, given: IntArray) -> IntArray:
     return np.union1d(given, np.linspace(0, n - 1, min(n, _MOST)).astype(int))
 
 
-def _quiet(sizes: FloatArray, pattern: Pattern) -> tuple[int, ...]:
-    """Electrodes whose measurements hardly ever answer more strongly than usual.
+def quiet_electrodes(dv: FloatArray, pattern: Pattern) -> tuple[int, ...]:
+    """Electrodes that no touch of ``dv`` (n, n_meas) seems to have come near.
 
-    Neither by themselves nor as a part of the frame: the gain of an electrode does not matter.
+    Their measurements hardly ever answer more strongly than usual, neither by themselves nor as a
+    part of the frame: the gain of an electrode does not matter.
     """
+    sizes = np.abs(dv)
     activity = np.column_stack(
         [
             np.nanmean(sizes[:, (pattern.measure == electrode).any(axis=1)], axis=1)

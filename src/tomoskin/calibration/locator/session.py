@@ -121,7 +121,7 @@ class SessionAlignment:
         if len(data) < _FEWEST:
             raise DataError(
                 f"expected at least {_FEWEST} touches of the session, got {len(data)}",
-                hint="touch everywhere, or press ten known positions",
+                hint="touch the whole skin, or press ten known positions",
             )
         with threadpool_limits(1):
             return cls._of(locator, data, labels)
@@ -168,7 +168,7 @@ class SessionAlignment:
     def findings(self) -> tuple[str, ...]:
         """What differs from the calibration, and what would mend it, in words."""
         if not self.needed:
-            return ("the session is as the calibration was",)
+            return ("the session agrees with the calibration",)
         found = []
         middle = float(np.median(self.gains))
         uneven = float(np.exp(np.abs(np.log(self.gains / middle)).mean()))
@@ -177,12 +177,14 @@ class SessionAlignment:
         if uneven > _GAIN:
             found.append(f"the channels' gains have changed by a factor of {uneven:.2g}, unevenly")
         if self.noise > _NOISE:
-            found.append(f"what the maps leave has grown {self.noise:.2g} times in variance")
+            found.append(
+                f"the variance that the maps do not explain is {self.noise:.2g} times as large"
+            )
         if self.covered <= _COVERED:
-            found.append(f"touches cover {self.covered:.0%} of the sheet: touch all of it")
+            found.append(f"touches cover {self.covered:.0%} of the sheet: touch the whole sheet")
         if not self.holds:
             found.append(
-                "the session cannot be aligned with the calibration: touch all of the skin, press "
+                "the session cannot be aligned with the calibration: touch the whole skin, press "
                 "ten known positions as well, or calibrate again"
             )
         return tuple(found)

@@ -275,6 +275,6 @@ def outliers(
     length = np.linalg.norm(error, axis=1)
     rows = np.flatnonzero((squared_lengths(error, covariance) > _UNLIKELY) & (length > _FAR))
     return [
-        Remark(row, f"the others say that it was {1e3 * unit * length[row]:.0f} mm away")
+        Remark(row, f"according to the other presses it was {1e3 * unit * length[row]:.0f} mm away")
         for row in rows.tolist()
     ]

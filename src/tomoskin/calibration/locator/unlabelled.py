@@ -11,7 +11,7 @@ from scipy.special import ndtri
 
 from tomoskin.calibration.locator.process import Basis, Likeness, squared_distances
 from tomoskin.calibration.locator.topographic import TopographicMap, balanced
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray, IntArray, reach
 from tomoskin.forward import ForwardModel
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
@@ -177,6 +177,7 @@ def _fitted(  # noqa: PLR0917
     weights = _named(weights, named)
     trust = alike**2 / max(1 - alike**2, _LEAST)
     for keep, freedom in _annealed():
+        reach()
         surface = replace(surface, power=freedom / k)
         surface = surface.renewed(features, weights * count, kept, trust * keep, _NOISE_FLOOR)
         weights = _named(balanced(surface.posterior(features)), named)

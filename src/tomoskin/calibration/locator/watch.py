@@ -7,6 +7,7 @@ from collections import deque
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tomoskin.calibration.locator.health import CalibrationHealth
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import frames
 from tomoskin.core import FloatArray, IntArray
@@ -35,10 +36,18 @@ class Watch:
     presses as it never was in the calibration is left out, as a missing value is, until it agrees
     again. Neither labels nor frames to come are used. The rows' own spread is that of the left-out
     presses (median absolute deviation).
+
+    Parameters
+    ----------
+    locator
+        What answers.
+    strange
+        Rows are left out only while frames with all rows fit so many times worse than the
+        calibration's own presses: what a sheet remembers moves some rows as well, and by little.
     """
 
-    def __init__(self, locator: Locator) -> None:
-        self._locator = locator
+    def __init__(self, locator: Locator, strange: float = 0.0) -> None:
+        self._locator, self._least = locator, strange
         estimates = locator.stacking.left_out
         off = np.abs(self._surprise(locator.presses.dv, estimates))
         self._usual = np.median(off, axis=0) + np.finfo(float).tiny
@@ -46,6 +55,7 @@ class Watch:
         usual = [np.ones(off.shape[1])] * _PRESSES
         self._off: deque[FloatArray] = deque(usual, maxlen=_PRESSES)
         self._last: FloatArray | None = None
+        self._fits: deque[list[tuple[float, float]]] = deque(maxlen=_PRESSES)
         self._jumped = np.zeros(off.shape[1], dtype=np.bool_)
 
     @property
@@ -53,29 +63,55 @@ class Watch:
         """Rows of the pattern that are left out now."""
         return np.asarray(self._locator.features.rows[self._jumped])
 
-    def __call__(self, dv: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    @property
+    def health(self) -> CalibrationHealth:
+        """How the last presses fit the calibration."""
+        pattern = self._locator.pattern
+        return CalibrationHealth(
+            len(self._fits),
+            self._fit(0),
+            tuple(pattern.row_text(row) if pattern else f"row {row}" for row in self.jumped),
+        )
+
+    def __call__(self, dv: ArrayLike, *, settled: bool = True) -> tuple[FloatArray, FloatArray]:
         """Places (n, 2) m and covariances (n, 2, 2) m² of the next frames (n, n_meas).
 
-        Raises DataError as :meth:`Locator.predict` does.
+        ``settled``: whether the touch stands as the presses of the calibration did. While it comes
+        and goes nothing is concluded from it. Raises DataError as :meth:`Locator.predict` does.
         """
-        answers = [self._next(frame) for frame in frames(dv, self._locator.presses.dv.shape[1])]
+        answers = [
+            self._next(frame, settled=settled)
+            for frame in frames(dv, self._locator.presses.dv.shape[1])
+        ]
         positions, covariances = zip(*answers, strict=True)
         return np.concatenate(positions), np.concatenate(covariances)
 
-    def _next(self, frame: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _next(self, frame: FloatArray, *, settled: bool) -> tuple[FloatArray, FloatArray]:
         answer = self._locator.predict(self._kept(frame))
+        if not settled:
+            return answer
         place = self._locator.region.scaled(answer[0])
         off = self._clipped(np.abs(self._surprise(frame[None], place)))[0]
         if self._last is not None and np.linalg.norm(place[0] - self._last) < _APART:
             self._off.pop()
         else:
             self._last = place[0]
+            self._fits.append([])
+        both = self._locator.strangeness(np.stack([self._kept(frame), frame]))
+        self._fits[-1].append((float(both[0]), float(both[1])))
         self._off.append(off)
         jumped = np.mean(self._off, axis=0) > self._limit
+        jumped &= self._fit(1) >= self._least
         if jumped.mean() > _MOST or (jumped == self._jumped).all():
             return answer
         self._jumped = jumped
         return self._locator.predict(self._kept(frame))
+
+    def _fit(self, which: int) -> float:
+        """How strange the last presses are, without the rows that have jumped (0) or with all (1);
+        medians of each, and over them."""
+        each = [np.median([pair[which] for pair in press]) for press in self._fits]
+        return float(np.median(each)) if each else np.nan
 
     def _kept(self, frame: FloatArray) -> FloatArray:
         """The frame without the rows that have jumped, unless nothing is left then."""

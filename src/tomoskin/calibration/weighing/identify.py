@@ -153,9 +153,10 @@ def _named(
     gauge = float(plays.sum())
     if not gauge > 0:
         raise DataError(
-            "the response does not rise with the load, so that there is nothing to remember",
+            "the response does not rise with the load, so no memory of the material can be "
+            "identified",
             where=_WHERE,
-            hint="turn the sign of the response, and look at its value without load",
+            hint="change the sign of the response, and check its value without load",
         )
     parts = (plays[1:] / gauge, creep, broken / gauge)
     sizes = (grid.play_widths, grid.creep_times, grid.breakdown_times)
@@ -173,8 +174,8 @@ def _checked(
     t, x, y = (np.asarray(values, dtype=np.float64) for values in (time, load, answer))
     if t.ndim != 1 or not t.shape == x.shape == y.shape or len(t) < _FEWEST:
         raise DataError(
-            f"expected time, load and response of one length, {_FEWEST} or more, got shapes "
-            f"{t.shape}, {x.shape}, {y.shape}",
+            f"expected time, load and response of the same length, at least {_FEWEST}, got "
+            f"shapes {t.shape}, {x.shape}, {y.shape}",
             where=_WHERE,
         )
     for name, values in (("time", t), ("load", x), ("response", y)):
@@ -183,7 +184,7 @@ def _checked(
             raise DataError(f"the {name} is not finite at value {wrong[0]}", where=_WHERE)
     if (np.diff(t) < 0).any():
         back = int(np.argmax(np.diff(t) < 0)) + 1
-        raise DataError(f"the time goes back at value {back}", where=_WHERE)
+        raise DataError(f"the time decreases at value {back}", where=_WHERE)
     if np.ptp(x) == 0:
-        raise DataError("the load never changes: there is nothing to learn from", where=_WHERE)
+        raise DataError("the load never changes, so nothing can be learnt", where=_WHERE)
     return t, x, y

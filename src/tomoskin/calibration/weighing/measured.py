@@ -121,12 +121,15 @@ class ForceProcess:
         newtons = np.asarray(force, dtype=np.float64)
         if rest.shape != pressed.shape or newtons.shape != (len(rest),) or len(rest) < _FEWEST:
             raise DataError(
-                f"expected {_FEWEST} or more presses, before, during and force of each; got shapes "
+                f"expected before, during and force of at least {_FEWEST} presses, got shapes "
                 f"{rest.shape}, {pressed.shape}, {newtons.shape}",
                 where=_WHERE,
             )
         if not np.isfinite(newtons).all() or np.ptp(newtons) == 0:
-            raise DataError("expected forces that are finite and not all equal", where=_WHERE)
+            raise DataError(
+                f"expected finite forces that differ, got {newtons.min():g} to {newtons.max():g} N",
+                where=_WHERE,
+            )
         blocks = {
             name: FeatureBlock.of(data, _COMPONENTS[name], is_change=name == "change")
             for name, data in _named(rest, pressed).items()

@@ -11,19 +11,14 @@ from typing import Self
 import numpy as np
 
 from tomoskin.calibration.weighing.curve import ForceCurve, basis
+from tomoskin.calibration.weighing.memory import SHALLOW, averaged_memory, without_memory
 from tomoskin.calibration.weighing.presses import WeighedPresses, check_rising
 from tomoskin.core import DataError, Detection, FloatArray, Force, IntArray
 from tomoskin.skin import MaterialMemory, MemoryState, Skin, advanced, load_of
 from tomoskin.touch import Region
 
-_PLAYS, _WIDTHS = (0.1, 0.25, 0.4), (0.05, 0.1, 0.2, 0.4)
-"""Plays that are tried: parts, and half widths over the usual depth."""
-
 _DEEPEST = 0.999
 """Part of the conductivity that a touch may take away: all of it has no logarithm."""
-
-_SHALLOW = 1e-3
-"""Depth, over the usual one, below which a touch is not told from none."""
 
 _SCALES = (0.8, 1.6)
 _LONELY = 0.15
@@ -33,7 +28,6 @@ _FAR_OFF = 4.0
 """A label so many half intervals from what the others say contradicts them."""
 
 _MOST_SPOTS = 32
-_STEP = 1e-3
 
 
 @dataclass(frozen=True)
@@ -116,7 +110,7 @@ class ForceModel:
     ) -> Self:
         """Learn curve and memory from presses on a sheet of ``conductivity`` S, ``unit`` m.
 
-        The memory is the one of several plays, or of none, at which the labels are likeliest.
+        The memory is a mean over several plays and creeps, weighted by the labels' evidence.
 
         Raises
         ------
@@ -129,14 +123,17 @@ class ForceModel:
         if not (depth[rows] > 0).all():
             row = int(rows[np.argmin(depth[rows])])
             raise DataError(
-                f"touch {row}, under {presses.force[row]:.3g} N, makes the sheet conduct better",
+                f"touch {row}, with {presses.force[row]:.3g} N, increases the conductivity "
+                "of the sheet",
                 where="force labels",
-                hint="calibrate with presses that were found as touches",
+                hint="calibrate with frames in which the press is found as a touch",
             )
         check_rising(depth[rows], presses.force[rows])
         terms = basis(presses.xy, np.log(_radius(presses.area) / radius), unit)
         usual = float(np.median(depth[rows]))
-        memory, free = _likeliest(presses, depth, usual, terms)
+        memory = averaged_memory(presses, depth, usual, terms)
+        free = without_memory(memory, depth[:, None], presses.press, presses.time)[:, 0]
+        free = np.maximum(free, SHALLOW * usual)
         curve = ForceCurve.of(terms[rows], free[rows], presses.force[rows])
         left_out = _left_out(presses, terms, free)
         scale = _scale(left_out, presses.force[rows])
@@ -160,7 +157,7 @@ class ForceModel:
             released = self._released(spots, np.arange(len(spots)), dt)
             return [], PressedSpots(spots.xy, time, released)
         xy, area, peak, snr = _columns(detections)
-        least = _SHALLOW * self.depth
+        least = SHALLOW * self.depth
         depth = np.maximum(depth_of(peak, area, self.conductivity, self.radius), least)
         under, rest = _goes_on(spots.xy, xy, 0.5 * self.radius)
         before = spots.memory
@@ -195,6 +192,11 @@ class ForceModel:
         return np.asarray(self.left_out[:, 0] / force - 1)
 
     @property
+    def most(self) -> float:
+        """The largest force that it was learnt from, N."""
+        return float(np.nanmax(self.presses.force))
+
+    @property
     def held(self) -> float:
         """Part of the labels within their own intervals, each press left out."""
         force = self.presses.force[self.presses.labelled]
@@ -223,44 +225,6 @@ def depth_of(peak: FloatArray, area: FloatArray, conductivity: float, radius: fl
     return np.asarray(-np.log1p(part) * np.asarray(area) / (np.pi * radius**2))
 
 
-def without_memory(
-    memory: MaterialMemory, depth: FloatArray, press: IntArray, time: FloatArray
-) -> FloatArray:
-    """(n, k) depths that touches of ``depth`` (n, k) would have had without their past, press by
-    press; each column by itself."""
-    free = np.array(depth)
-    for number in np.unique(press):
-        rows = np.flatnonzero(press == number)
-        state = MemoryState.fresh(memory, depth.shape[1])
-        before = time[rows[0]]
-        for row in rows.tolist():
-            free[row], state = load_of(state, memory, depth[row], time[row] - before)
-            before = time[row]
-    return free
-
-
-def _likeliest(
-    presses: WeighedPresses, depth: FloatArray, usual: float, terms: FloatArray
-) -> tuple[MaterialMemory, FloatArray]:
-    """The memory at which the labels are likeliest, and depths without it."""
-    rows, press, time = presses.labelled, presses.press, presses.time
-    tried = [MaterialMemory()] + [
-        MaterialMemory(play=(part,), play_widths=(width * usual,))
-        for part in _PLAYS
-        for width in _WIDTHS
-    ]
-    best = (-np.inf, tried[0], depth)
-    for memory in tried:
-        both = without_memory(memory, depth[:, None] * (1, 1 + _STEP), press, time)
-        free, more = np.maximum(both, _SHALLOW * usual).T
-        slope = np.maximum(more - free, 1e-6 * free) / (_STEP * free)
-        curve = ForceCurve.of(terms[rows], free[rows], presses.force[rows])
-        value = curve.evidence + float(np.log(slope[rows]).sum())
-        if value > best[0]:
-            best = (value, memory, free)
-    return best[1], best[2]
-
-
 def _left_out(presses: WeighedPresses, terms: FloatArray, free: FloatArray) -> FloatArray:
     """(n_labelled, 3) force and interval of each label from the other presses."""
     rows = presses.labelled
@@ -270,7 +234,7 @@ def _left_out(presses: WeighedPresses, terms: FloatArray, free: FloatArray) -> F
         others, own = rows[~mine], rows[mine]
         if not len(others):
             raise DataError(
-                "all forces are of one press",
+                "expected labelled forces of at least two presses, got one press",
                 where="force labels",
                 hint="lift the tip between two presses, or give the presses their own numbers",
             )
@@ -305,8 +269,8 @@ def _remarks(presses: WeighedPresses, left_out: FloatArray, unit: float) -> tupl
     remarks = [
         LabelRemark(
             int(presses.press[row]),
-            f"{presses.force[row]:.3g} N contradicts the others, which say {middle:.2g} N "
-            f"({low:.2g} to {high:.2g})",
+            f"the label {presses.force[row]:.3g} N contradicts the other presses, which give "
+            f"{middle:.2g} N ({low:.2g} to {high:.2g})",
         )
         for row, (middle, low, high), away in zip(
             rows.tolist(), left_out.tolist(), _half_intervals(left_out, force), strict=True
@@ -318,14 +282,14 @@ def _remarks(presses: WeighedPresses, left_out: FloatArray, unit: float) -> tupl
     if apart < _LONELY * unit:
         remarks.append(LabelRemark(
             None,
-            f"all presses lie within {2e3 * apart:.0f} mm: forces hold there; elsewhere the skin "
-            "may answer otherwise, and intervals are wider: press at other spots too",
+            f"all presses lie within {2e3 * apart:.0f} mm: elsewhere forces are less certain, "
+            "and their intervals are wider; press at other positions too",
         ))  # fmt: skip
     if np.ptp(np.log(force)) < np.log(1.5):
         remarks.append(LabelRemark(
             None,
-            f"all forces lie from {force.min():.3g} to {force.max():.3g} N: what others do is "
-            "guessed; use a lighter and a heavier weight too",
+            f"all forces lie from {force.min():.3g} to {force.max():.3g} N: other forces are "
+            "extrapolated; use a lighter and a heavier weight too",
         ))  # fmt: skip
     return tuple(remarks)
 

@@ -13,7 +13,7 @@ from tomoskin.core import DataError, Detection, FloatArray, IntArray
 
 _WHERE = "force labels"
 FEWEST = 5
-_MOST_NEWTONS = 100.0
+MOST_NEWTONS = 100.0
 """A finger presses with 0.1 to 50 N; a sheet that bears more is not what this is for."""
 
 _GRAMS = 1e3 / 9.80665
@@ -78,14 +78,16 @@ class WeighedPresses:
                 where=_WHERE,
             )
         if not np.isfinite(times).all() or np.isinf(newtons).any():
-            raise DataError("expected finite times and forces", where=_WHERE)
+            raise DataError(
+                "expected finite times and forces, got values that are not finite", where=_WHERE
+            )
         order = np.lexsort((np.arange(n), number))
         back = (np.diff(times[order]) < 0) & (np.diff(number[order]) == 0)
         if back.any():
             raise DataError(
-                f"the time goes back within press {number[order][int(np.argmax(back))]}",
+                f"the time decreases within press {number[order][int(np.argmax(back))]}",
                 where=_WHERE,
-                hint="give the touches of each press in the order in which they were made",
+                hint="give the touches of each press in the order of their times",
             )
         _check_newtons(newtons[np.isfinite(newtons)])
         rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections]).reshape(n, 5)
@@ -116,23 +118,23 @@ def _check_newtons(force: FloatArray) -> None:
         raise DataError(
             f"expected at least {FEWEST} touches under a known force, got {len(force)}",
             where=_WHERE,
-            hint="ten presses with some weights are a start, twenty are good",
+            hint="label more touches: ten presses with some weights are a start, twenty are good",
         )
     wrong = force <= 0
     if wrong.any():
         raise DataError(
             f"expected forces above 0 N, got {force[int(np.argmax(wrong))]:g}",
             where=_WHERE,
-            hint="leave out the label where nothing lies on the skin",
+            hint="leave out the label where no weight lies on the skin",
         )
     usual = float(np.median(force))
-    if force.max() > _MOST_NEWTONS:
+    if force.max() > MOST_NEWTONS:
         grams = f"{force.min():.3g} to {force.max():.3g}"
         raise DataError(
-            f"expected newtons, got {grams}: a touch has 0.1 to 50 N, so that these look like "
-            f"grams ({usual:.3g} g press with {usual / _GRAMS:.2g} N)",
+            f"expected newtons, got {grams}: a touch has 0.1 to 50 N, so these values are "
+            f"probably grams (a press of {usual:.3g} g has {usual / _GRAMS:.2g} N)",
             where=_WHERE,
-            hint="1 N is the weight of 102 g: --unit g converts",
+            hint="convert from grams with --unit g: 1 N is the weight of 102 g",
         )
 
 
@@ -144,8 +146,9 @@ def check_rising(depth: FloatArray, force: FloatArray) -> None:
     together = float(np.corrcoef(deeper, heavier)[0, 1])
     if together < _RISES:
         raise DataError(
-            "the weights contradict: touches under larger forces do not change the sheet more "
-            f"(rank correlation {together:+.2f}, expected well above {_RISES})",
+            "the weights contradict the data: larger forces do not cause larger changes (rank "
+            f"correlation {together:+.2f}, expected well above {_RISES})",
             where=_WHERE,
-            hint="look whether labels and presses are in the same order, and use one tip for all",
+            hint="check that labels and presses are in the same order, and use one tip for all "
+            "presses",
         )

@@ -62,7 +62,7 @@ def write_lerobot(path: StrPath, session: SessionReader, every: float, advance: 
         import pyarrow.parquet as pq
     except ImportError as error:
         raise DataError(
-            "LeRobot's format needs pyarrow",
+            "the LeRobot format needs pyarrow",
             where=str(path),
             hint=install_hint("parquet"),
         ) from error
@@ -88,7 +88,7 @@ def _rate(every: float, path: StrPath) -> int:
         raise DataError(
             f"expected a whole number of rows a second, got one every {every:g} s",
             where=str(path),
-            hint="for example --every 0.1",
+            hint="choose another --every, for example --every 0.1",
         )
     return rate
 
@@ -236,5 +236,5 @@ def _folder(path: Path) -> Iterator[Path]:
         raise DataError(
             f"cannot be written: {error.strerror or error}",
             where=str(path),
-            hint="look at the disk",
+            hint="check that the disk is connected and has space",
         ) from error

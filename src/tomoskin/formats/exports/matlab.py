@@ -39,9 +39,9 @@ def write_matlab(
     values = recording.voltages[:, order].T
     if values.nbytes > _LARGEST:
         raise DataError(
-            f"{values.shape[1]} frames are more than a MATLAB v5 file takes (2 GiB)",
+            f"{values.shape[1]} frames are too many for a MATLAB v5 file (2 GiB)",
             where=str(path),
-            hint="export a part, or to .h5, which MATLAB reads too",
+            hint="export fewer frames, or to .h5, which MATLAB also reads",
         )
     stimulation = np.empty((1, len(drives)), dtype=_STIMULATION)  # a structure array
     for number, pair in enumerate(drives):

@@ -83,7 +83,7 @@ def _encoded(command: list[str], first: NDArray[np.uint8], rest: Pictures) -> st
     if not process.returncode:
         return ""
     text = errors.decode(errors="replace").strip().splitlines()
-    return text[-1] if text else f"ffmpeg ended with {process.returncode}"
+    return text[-1] if text else f"ffmpeg ended with the code {process.returncode}"
 
 
 def _feed(process: Any, first: NDArray[np.uint8], rest: Pictures) -> None:

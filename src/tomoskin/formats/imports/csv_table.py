@@ -54,7 +54,10 @@ def parse(lines: Iterable[str], source: str) -> Recording:
         )
     kinds = {match[1] for match in matches if match}
     if len(kinds) != 1:
-        raise DataError("expected columns of v or of dv, not both", where=f"{source}, line 1")
+        raise DataError(
+            f"expected columns of v or of dv, got {' and '.join(sorted(kinds)) or 'neither'}",
+            where=f"{source}, line 1",
+        )
     table = np.asarray(_values(rows, header, source)).reshape(-1, len(header))
     used = [number for number, match in enumerate(matches) if match]
     electrodes = np.array([[int(part) for part in m.groups()[1:]] for m in matches if m])
@@ -83,16 +86,18 @@ def _idle(marks: FloatArray, source: str) -> int:
     """Number of idle frames: at the beginning."""
     idle = int(np.count_nonzero(marks == 1))
     if not ((marks[:idle] == 1).all() and (marks[idle:] == 0).all()):
-        raise DataError("expected idle 1 in the first frames, then 0", where=source)
+        raise DataError(
+            "expected idle 1 in the first frames, then 0, got another order", where=source
+        )
     return max(1, idle)
 
 
 def _check_separator(header: list[str], source: str) -> None:
     if any(";" in name or "\t" in name for name in header):
         raise DataError(
-            "expected commas between columns and decimal points in numbers",
+            "expected commas between columns and decimal points in numbers, got semicolons or tabs",
             where=f"{source}, line 1",
-            hint="export it for English: 1.5, not 1,5",
+            hint="export it with decimal points: 1.5, not 1,5",
         )
 
 
@@ -102,7 +107,9 @@ def _rows(lines: Iterable[str], source: str) -> Iterator[list[str]]:
     try:
         yield from rows
     except csv.Error as error:
-        raise DataError(f"is no table: {error}", where=f"{source}, line {rows.line_num}") from error
+        raise DataError(
+            f"is not a table: {error}", where=f"{source}, line {rows.line_num}"
+        ) from error
 
 
 def _values(rows: Iterator[list[str]], header: list[str], source: str) -> array[float]:
@@ -115,7 +122,7 @@ def _values(rows: Iterator[list[str]], header: list[str], source: str) -> array[
             raise DataError(
                 f"expected {len(header)} fields, got {len(row)}",
                 where=f"{source}, line {number}",
-                hint="a decimal comma makes two fields of one",
+                hint="a decimal comma splits a field in two",
             )
         where = f"{source}, line {number}"
         values.extend(_number(text, name, where) for text, name in zip(row, header, strict=True))

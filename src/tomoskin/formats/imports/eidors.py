@@ -104,7 +104,9 @@ def _flat_rows(variables: Mapping[str, Any], source: str) -> tuple[IntArray, Int
     is_number = (index == np.round(index)) & (index >= 1) & (index <= len(drives))
     if len(index) != len(measure) or not is_number.all():
         raise DataError(
-            f"expected meas_stim of {len(measure)} drives from 1 to {len(drives)}", where=source
+            f"expected meas_stim of {len(measure)} drives from 1 to {len(drives)}, "
+            f"got {len(index)} values, not all of them such drives",
+            where=source,
         )
     return drives[index.astype(int) - 1], measure
 

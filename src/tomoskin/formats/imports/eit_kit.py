@@ -48,7 +48,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     n_values = len(complete[0].values) if complete else 0
     for block in blocks:
         if len(block.values) != n_values or not n_values:
-            skipped.add(block.line, "parts of torn frames", 1 + len(block.values))
+            skipped.add(block.line, "parts of incomplete frames", 1 + len(block.values))
     kept = [block for block in complete if len(block.values) == n_values]
     frames = [block.values for block in kept if not block.is_origin]
     if not frames:

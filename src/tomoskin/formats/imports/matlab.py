@@ -44,10 +44,10 @@ def load_matlab(path: Path) -> dict[str, Any]:
     except DataError:
         raise
     except MemoryError as error:
-        raise DataError("does not fit into memory", where=where) from error
+        raise DataError("is too large for the memory of this machine", where=where) from error
     except Exception as error:
         # scipy raises whatever its parser meets in a damaged file
-        raise DataError(f"is damaged or no MATLAB file: {error}", where=where) from error
+        raise DataError(f"is damaged, or not a MATLAB file: {error}", where=where) from error
     return {key: value for key, value in found.items() if not key.startswith("__")}
 
 

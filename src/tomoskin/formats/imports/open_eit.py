@@ -56,11 +56,11 @@ def parse(lines: Iterable[str], source: str) -> Recording:
             frames.append(values)
         else:
             skipped.add(number, "another number of values")
-            odd = odd or f"line {number} holds {len(values)}"
+            odd = odd or f"{len(values)} in line {number}"
     if not frames:
         counts = ", ".join(map(str, sorted({_TWO_TERMINAL, *_SCANS})))
         raise DataError(
-            f"expected frames of {counts} values, {odd or 'none is there'}",
+            f"expected frames of {counts} values, got {odd or 'none'}",
             where=source,
             hint="numbers must have a decimal point, not a comma",
         )

@@ -71,7 +71,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
                 _drop(rows, skipped)
                 rows = None
         elif rows is None:
-            skipped.add(number, "parts of torn frames")
+            skipped.add(number, "parts of incomplete frames")
         elif rows and not 0 < row.board_time - rows[-1].board_time < _LONGEST_STEP:
             _drop([*rows, row], skipped)
             rows = None
@@ -82,7 +82,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
                 rows = None
     _drop(rows, skipped)
     if not frames:
-        raise DataError(f"holds no whole frame of {_N} lines", where=source)
+        raise DataError(f"holds no complete frame of {_N} lines", where=source)
     return _recording(frames, skipped, source)
 
 
@@ -113,4 +113,4 @@ def _row(number: int, line: str) -> _Row | None:
 
 def _drop(rows: list[_Row] | None, skipped: Skipped) -> None:
     if rows:
-        skipped.add(rows[0].line, "parts of torn frames", len(rows))
+        skipped.add(rows[0].line, "parts of incomplete frames", len(rows))

@@ -57,7 +57,7 @@ def pairs_of(patterns: NDArray[Any], what: str, source: str) -> IntArray:
         raise DataError(
             f"expected one electrode against one other, got a pattern on {used}",
             where=f"{source}, {what} {row}",
-            hint="such patterns cannot be imaged here",
+            hint="tomoskin cannot reconstruct images from such patterns",
         )
     return np.column_stack([signs.argmax(axis=1), signs.argmin(axis=1)])
 
@@ -88,7 +88,7 @@ def without_repeats(recording: Recording) -> Recording:
     repeats = len(rows) - len(first)
     if not repeats:
         return recording
-    note = f"{repeats} of {len(rows)} rows measure what others do and are left out"
+    note = f"{repeats} of {len(rows)} rows repeat a measurement and are left out"
     reference = recording.reference
     return replace(
         recording,

@@ -71,7 +71,8 @@ class Evidence:
         """
         if self.noise is None:
             raise DataError(
-                "the noise is not known", hint="give idle frames, two at least, as the reference"
+                "the noise of the measurements is missing",
+                hint="give two or more idle frames as the reference",
             )
         noise = np.asarray(self.noise, dtype=np.float64)
         if noise.shape != (n_meas,):
@@ -80,7 +81,7 @@ class Evidence:
         if not ((noise >= 0).all() and noise.any()):
             raise DataError(
                 f"expected noise above 0, got {noise.min():g} to {noise.max():g}",
-                hint="idle frames that are all the same tell no noise",
+                hint="the idle frames are all the same, so they show no noise: record new ones",
             )
         return noise
 
@@ -95,7 +96,7 @@ class Evidence:
     def _checked(self, n_meas: int) -> FloatArray:
         if self.frames is None or not len(self.frames):
             raise DataError(
-                "there are no frames of a touched skin", hint="give a recording with touches"
+                "there is no frame of a touched skin", hint="give a recording with touches"
             )
         if np.iscomplexobj(self.frames):
             raise DataError("expected real difference data, got complex")
@@ -115,14 +116,17 @@ class Evidence:
         frames = self._checked(n_meas)
         if self.places is None:
             raise DataError(
-                "no frame says where the skin was touched", hint="give a recording with xy_m"
+                "no frame has a label that says where the skin was touched",
+                hint="give a recording with the array xy_m",
             )
         if self.places.shape != (len(frames), 2):
-            raise DataError(f"expected places ({len(frames)}, 2), got {self.places.shape}")
+            raise DataError(
+                f"expected positions of shape ({len(frames)}, 2), got {self.places.shape}"
+            )
         labelled = np.isfinite(self.places).all(axis=1) & frames.any(axis=1)
         if np.count_nonzero(labelled) < 2:
             raise DataError(
-                f"expected two labelled presses at least, got {np.count_nonzero(labelled)}"
+                f"expected at least two labelled presses, got {np.count_nonzero(labelled)}"
             )
         return frames[labelled], self.places[labelled]
 

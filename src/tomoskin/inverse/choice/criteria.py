@@ -143,8 +143,8 @@ def discrepancy(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
         return float(np.sqrt(np.mean(spectrum.residual(alpha, frames) ** 2))) / level
 
     hints = (
-        "the model does not explain these frames to within their noise; choose another rule",
-        "there is hardly more than noise in these frames; give some with touches",
+        "the model does not explain these frames to within their noise: choose another rule",
+        "these frames hold little more than noise: give frames with touches",
     )
     reason = f"the residual of {_frames(frames)} is as large as the noise"
     explanation = Explanation("discrepancy", reason, "residual / noise")
@@ -173,8 +173,8 @@ def by_noise_figure(spectrum: Spectrum, evidence: Evidence, target: float = TARG
 
     reason = f"the noise figure is {target:g} for a contrast in the middle"
     hints = (
-        "aim at a larger noise figure, or choose another rule",
-        "aim at a smaller noise figure, or choose another rule",
+        "choose a larger noise figure, or another rule",
+        "choose a smaller noise figure, or another rule",
     )
     explanation = Explanation("noise-figure", reason, "noise figure")
     return crossing(spectrum, figure, Level(target, "falling", hints), explanation)
@@ -197,7 +197,10 @@ def labelled(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
     """
     frames, positions = evidence.labelled(len(spectrum.values))
     if evidence.locate is None:
-        raise DataError("nothing says how touches are found in an image", where="rule labelled")
+        raise DataError(
+            "the rule needs the method that finds touches in an image, and none was given",
+            where="rule labelled",
+        )
     alphas = spectrum.alphas[:: _step(spectrum)]
     errors = np.array([_errors(spectrum, a, frames, positions, evidence.locate) for a in alphas])
     chosen, held_out = _folded(errors)

@@ -72,7 +72,7 @@ class LightTouch:
         covariance = self.spectrum.noise_coefficients(noise)
         error = self.blur + self.spectrum.energies(self.alphas, covariance) / self.size
         at = int(error.argmin())
-        label = "expected square error of a light touch's image"
+        label = "mean square error of a light touch's image"
         return AlphaChoice(
             _least_between(self.alphas, error, at),
             "light-touch",

@@ -48,10 +48,10 @@ def noise_figure(
         raise DataError(f"expected noise of shape {signal.shape}, got {sd.shape}")
     sd = np.broadcast_to(sd, signal.shape)
     if not (np.isfinite(sd).all() and (sd >= 0).all() and sd.any()):
-        raise DataError("expected noise above 0")
+        raise DataError(f"expected finite noise above 0, got {sd.min():g} to {sd.max():g}")
     image = np.abs(volumes * (matrix @ signal)).mean()
     if not (signal.any() and image > 0):
-        raise DataError("the target makes no signal, or no image")
+        raise DataError("the target causes no signal, or no image")
     spread = np.einsum("cm,cm,m->c", matrix, matrix, sd**2, optimize=True)
     image_noise = np.sqrt((volumes**2 * spread).mean())
     return float((np.abs(signal).mean() / np.sqrt((sd**2).mean())) / (image / image_noise))

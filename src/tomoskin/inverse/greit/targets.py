@@ -113,7 +113,10 @@ class Targets:
         table = _checked(places, model.mesh, radius, contrast, difference)
         state = model.at(conductivity)
         if state.conductivity.ndim > 1 or np.iscomplexobj(state.voltages):
-            raise ModelError("expected a real conductivity per cell and a real contact impedance")
+            raise ModelError(
+                "expected a real conductivity per cell and a real contact impedance, "
+                "got tensors or complex values"
+            )
         shares = list(Balls(model.mesh).each(table, radius))
         _refuse_empty(shares)
         sigma, content = state.conductivity, model.mesh.volumes
@@ -146,7 +149,7 @@ def _refuse_empty(shares: list[tuple[IntArray, FloatArray]]) -> None:
 def along(mesh: Mesh, end: ArrayLike, count: int) -> FloatArray:
     """(count, d) positions from the sheet's centroid towards ``end`` (d,) m, both included."""
     if count < 1:
-        raise DataError(f"expected at least 1 place, got {count}")
+        raise DataError(f"expected at least 1 target, got {count}")
     start = centre_of(mesh)
     return np.asarray(start + np.linspace(0, 1, count)[:, None] * (np.asarray(end) - start))
 
@@ -162,9 +165,9 @@ def _checked(
     table = np.asarray(positions, dtype=np.float64)
     d = mesh.points.shape[1]
     if table.ndim != 2 or table.shape[1] != d or not len(table):
-        raise DataError(f"expected places (n, {d}), got shape {table.shape}")
+        raise DataError(f"expected positions of shape (n, {d}), got shape {table.shape}")
     if not np.isfinite(table).all():
-        raise DataError("expected finite places")
+        raise DataError("expected finite positions, got values that are not finite")
     if not (np.isfinite(radius) and radius > 0):
         raise ModelError(f"expected a radius above 0 m, got {radius}")
     if not (np.isfinite(contrast) and contrast > -1 and contrast != 0):

@@ -127,7 +127,7 @@ class Trainer:
             raise ModelError(f"expected noise of shape ({len(data)},), got {sd.shape}")
         sd = np.broadcast_to(sd, (len(data),))
         if not (np.isfinite(sd).all() and (sd > 0).all()):
-            raise ModelError("expected noise above 0")
+            raise ModelError(f"expected finite noise above 0, got {sd.min():g} to {sd.max():g}")
         scaled = sd * np.sqrt((data**2).sum() / (sd**2).sum())
         extra, goal = desired.on(mesh, training.places)
         near = _near(extra, goal)

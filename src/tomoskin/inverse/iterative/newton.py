@@ -123,17 +123,20 @@ def descend(
     """
     here = _Here(begin.unknowns, begin.force, goal.forward.at(begin.unknowns))
     steps = [here.step(goal, 0.0)]
-    reason, converged = f"made the {most} steps that it may", False
+    reason, converged = f"reached the limit of {most} steps", False
     for _ in range(most):
         moved = _moved(here, goal, reach)
         if moved is None:
-            reason, converged = "no step lowers the objective any more", True
+            reason, converged = "no step lowers the objective any further", True
             break
         here, step = moved
         gain = 1.0 - step.objective / steps[-1].objective
         steps.append(step)
         if gain < tolerance:
-            reason, converged = f"the last step gained {gain:.1e} of the objective", True
+            reason, converged = (
+                (f"the last step lowered the objective by {gain:.1e} of its value"),
+                True,
+            )
             break
     return Descent(here.unknowns, here.force, (*begin.steps, *steps), reason, converged)
 
@@ -183,7 +186,7 @@ def minimiser(
     try:
         factor = cho_factor(system, lower=True, overwrite_a=True, check_finite=False)
     except LinAlgError as error:
-        raise ModelError("the step has no answer: the values are not finite") from error
+        raise ModelError("the step cannot be computed: its values are not finite") from error
     free = penalty.free
     if not free.shape[1]:
         dual = cho_solve(factor, rhs, check_finite=False)

@@ -60,11 +60,11 @@ class Observation:
         bad = np.flatnonzero(counts & ~np.isfinite(taken)).tolist()
         if bad:
             raise DataError(
-                f"expected finite values; rows {bad} are not",
-                hint="give rows that do not count infinite noise",
+                f"expected finite values, but rows {bad} are not finite",
+                hint="give an infinite noise to the rows that do not count",
             )
         if not counts.any():
-            raise DataError("no row counts")
+            raise DataError("expected at least one row with finite noise, got none")
         if combine is not None and (combine.ndim != 2 or len(combine) != len(taken)):
             raise DataError(f"expected combine of shape ({len(taken)}, n), got {combine.shape}")
         return cls(taken, deviation, combine)
@@ -115,7 +115,9 @@ def _real(value: ArrayLike, name: str) -> FloatArray:
     try:
         raw = np.asarray(value)
     except ValueError as error:
-        raise DataError("expected rows of equal length", where=name) from error
+        raise DataError(
+            "expected rows of equal length, got different lengths", where=name
+        ) from error
     if raw.dtype.kind not in "biuf":
         raise DataError(f"expected real numbers, got {raw.dtype}", where=name)
     return raw.astype(np.float64)

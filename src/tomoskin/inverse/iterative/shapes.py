@@ -4,11 +4,12 @@ A level set of a smooth random field: where the field is below −1 the medium c
 above +1 far more, between them as the background (two interfaces of one field, as in the
 thresholded fields of Iglesias, Lu & Stuart 2016). The field is found by Gauss–Newton through the
 complete forward model; its edges are soft at first, so that distant cells feel them, then sharper.
+At the end, the normal law that touches the field's posterior says how probable each label is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -16,14 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
-from scipy.special import expit
+from scipy.special import expit, ndtr
 
 from tomoskin.core import FloatArray, IntArray, ModelError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse.iterative.absolute import Absolute, Quadratic, medium
 from tomoskin.inverse.iterative.newton import Goal, descend
 from tomoskin.inverse.iterative.observation import Observation
-from tomoskin.inverse.iterative.unknowns import BACKGROUND_SPREAD, Contacts, Joint, others
+from tomoskin.inverse.iterative.unknowns import (
+    BACKGROUND_SPREAD,
+    Contacts,
+    Joint,
+    ModelPoint,
+    others,
+)
 from tomoskin.inverse.priors.penalty import Diagonal
 from tomoskin.inverse.priors.smooth import matern_correlation
 from tomoskin.mesh import Mesh
@@ -85,9 +92,13 @@ class RandomField:
         places, none = mesh.centroids[pivots], np.zeros(len(pivots))
         return cls(basis, places, basis[pivots], correlation, scale, none)
 
-    def centred(self, mesh: Mesh) -> Self:
-        """The field less its mean over ``mesh``, for images that stand on a background."""
-        mean = mesh.volumes @ self.basis / mesh.volumes.sum()
+    def centred(self, mesh: Mesh, cells: NDArray[np.bool_] | None = None) -> Self:
+        """The field less its mean over ``cells`` of ``mesh``, for images on a background.
+
+        Without ``cells``, over all of them.
+        """
+        area = mesh.volumes if cells is None else mesh.volumes * cells
+        mean = area @ self.basis / area.sum()
         return replace(self, basis=self.basis - mean, mean=self.mean + mean)
 
     @property
@@ -127,12 +138,18 @@ BACKGROUND, LESS, MORE = 0, 1, 2
 SOFTNESS = (0.6, 0.4, 0.3, 0.2, 0.2, 0.15, 0.15, 0.1, 0.1, 0.1)
 """Width of the edges in the field's unit, step by step."""
 
+CENTRED = (0.4, 0.7)
+"""Parts of the steps after which the field's mean is that over the background found so far."""
+
 CONTRAST = 100.0
 """Ratio of the conductivities that counts as far less or far more: beyond it voltages hardly
 change."""
 
 _MOST_POINTS = 8192
 """Points that are labelled at a time."""
+
+_LEAST_VARIANCE = 1e-12
+"""Of the field at a point: rounding may leave less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,11 +196,15 @@ class Segmented:
         Conductivity per cell, background, contacts and how they were found.
     field, latent
         The random field, and its numbers (k,).
+    covariance
+        (k, k) of these numbers given the data: of the normal law that touches their posterior
+        where the edges are softest, since sharp ones hide what a new region would change.
     """
 
     found: Absolute
     field: RandomField
     latent: FloatArray
+    covariance: FloatArray
 
     @property
     def cells(self) -> NDArray[np.uint8]:
@@ -192,11 +213,28 @@ class Segmented:
 
     def at(self, points: FloatArray) -> NDArray[np.uint8]:
         """(n,) labels at ``points`` (n, d) m of the medium, finer than the cells."""
-        labels = np.empty(len(points), np.uint8)
-        for start in range(0, len(points), _MOST_POINTS):
-            part = slice(start, start + _MOST_POINTS)
-            labels[part] = _labels(self.field.at(points[part]) @ self.latent)
-        return labels
+        return np.concatenate([_labels(basis @ self.latent) for basis in self._bases(points)])
+
+    def probability(self, points: FloatArray) -> FloatArray:
+        """(n, 3) of BACKGROUND, LESS and MORE at ``points`` (n, d) m, given the data."""
+        return np.concatenate([self._probability(basis) for basis in self._bases(points)])
+
+    def entropy(self, points: FloatArray) -> FloatArray:
+        """(n,) bits at ``points`` (n, d) m: 0 where the data tell the label, at most log₂ 3."""
+        p = self.probability(points)
+        return np.asarray(-(p * np.log2(np.where(p > 0, p, 1.0))).sum(axis=1))
+
+    def _probability(self, basis: FloatArray) -> FloatArray:
+        mean = basis @ self.latent
+        variance = ((basis @ self.covariance) * basis).sum(axis=1)
+        deviation = np.sqrt(np.maximum(variance, _LEAST_VARIANCE))
+        less, more = ndtr((-1.0 - mean) / deviation), ndtr((mean - 1.0) / deviation)
+        return np.stack([np.maximum(1.0 - less - more, 0.0), less, more], axis=1)
+
+    def _bases(self, points: FloatArray) -> Iterator[FloatArray]:
+        """The field's basis at ``points``, some at a time."""
+        for start in range(0, max(len(points), 1), _MOST_POINTS):
+            yield self.field.at(points[start : start + _MOST_POINTS])
 
 
 def _labels(level: FloatArray) -> NDArray[np.uint8]:
@@ -259,13 +297,33 @@ class ShapeImaging:
         of this pattern.
         """
         data = observation.whitened(self.model.pattern.n_meas)
-        phases = [Phases(self.field, softness, self.most) for softness in self.softness]
-        unknowns, descent = medium(self.model, data, phases[0], self.contacts, background)
+        field, last = self.field, len(self.softness)
+        softest = Phases(field, self.softness[0], self.most)
+        unknowns, descent = medium(self.model, data, softest, self.contacts, background)
         rest = others(unknowns.n_contacts, self.drift)
-        cost = Quadratic(Joint(Diagonal(np.ones(self.field.size)), 1.0, rest))
-        for phase in phases:
-            unknowns = replace(unknowns, image=phase)
+        cost = Quadratic(Joint(Diagonal(np.ones(field.size)), 1.0, rest))
+        again = {round(part * last) for part in CENTRED}
+        for step, softness in enumerate(self.softness):
+            if step in again:
+                field = self._centred(field, descent.unknowns[: field.size])
+            unknowns = replace(unknowns, image=Phases(field, softness, self.most))
             goal = Goal(unknowns, cost, data.target)
             descent = descend(goal, descent, most=1, tolerance=0.0)
         point = unknowns.at(descent.unknowns)
-        return Segmented(Absolute.of(point, descent), self.field, point.latent)
+        softest = replace(softest, field=field)
+        covariance = _covariance(point, softest, rest)
+        return Segmented(Absolute.of(point, descent), field, point.latent, covariance)
+
+    def _centred(self, field: RandomField, latent: FloatArray) -> RandomField:
+        """Its mean is that of the background: large regions of a kind would lift all the rest."""
+        background = np.abs(field.basis @ latent) < 1.0
+        return field.centred(self.model.mesh, background) if background.any() else field
+
+
+def _covariance(point: ModelPoint, softest: Phases, rest: Diagonal) -> FloatArray:
+    """(k, k) of the latent image at ``point``, whatever background and contacts are."""
+    jacobian, k = point.jacobian, softest.size
+    jacobian[:, :k] = softest.chain(point.latent, point.by_contrast)
+    precision = jacobian.T @ jacobian
+    precision[np.diag_indices_from(precision)] += np.append(np.ones(k), rest.matrix)
+    return np.asarray(np.linalg.inv(precision)[:k, :k])

@@ -69,7 +69,9 @@ class SharpDifference:
             raise ModelError(f"expected alpha above 0, got {alpha}")
         state = model.at(conductivity)
         if state.conductivity.ndim > 1 or np.iscomplexobj(state.conductivity):
-            raise ModelError("expected one real conductivity per cell")
+            raise ModelError(
+                "expected one real conductivity per cell, got tensors or complex values"
+            )
         self.model = model
         self.prior = prior
         self.alpha = alpha

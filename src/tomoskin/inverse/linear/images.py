@@ -60,7 +60,7 @@ class ImageSeries:
             parts.append(f"rows left out: {listed}{f'; and {more} more' if more > 0 else ''}")
         others = np.delete(self.left_out, self.dropped, axis=1)[self.frames].any(axis=1)
         if others.any():
-            parts.append(f"{int(others.sum())} frames lack other rows")
+            parts.append(f"{int(others.sum())} frames lack further rows")
         none = len(self.left_out) - len(self.frames)
         if none:
             parts.append(f"{none} frames lack too many rows and give no image")
@@ -94,7 +94,7 @@ def image_series(
     frames = np.flatnonzero(excluded.mean(axis=1) <= MOST_EXCLUDED)
     if not len(frames):
         raise DataError(
-            f"no frame has {1 - MOST_EXCLUDED:.0%} of its rows; most lack "
+            f"no frame has {1 - MOST_EXCLUDED:.0%} of its rows; most frames lack "
             + "; ".join(pattern.row_text(row) for row in dropped[:_LISTED])
         )
     fewer = operator.without(dropped)

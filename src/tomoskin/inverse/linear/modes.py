@@ -105,6 +105,6 @@ class Modes:
 
 def _foreign() -> ModelError:
     return ModelError(
-        "expected an operator that solves the linear problem with all of its rows",
-        hint="take a OneStep; fill rows that are missing instead of leaving them out",
+        "expected an operator that solves the linear problem with all of its rows, got another one",
+        hint="use OneStep, and fill missing rows instead of leaving them out",
     )

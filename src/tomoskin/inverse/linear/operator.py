@@ -65,7 +65,7 @@ def _solved(precision: NDArray[Any], missing: NDArray[np.bool_], rhs: NDArray[An
         return np.asarray(cho_solve(cho_factor(block, check_finite=False), rhs))
     except LinAlgError as error:
         raise DataError(
-            f"too few rows are left without {np.flatnonzero(missing).tolist()}",
+            f"too few rows remain without rows {np.flatnonzero(missing).tolist()}",
         ) from error
 
 
@@ -160,7 +160,7 @@ class Operator:
         finite = np.isfinite(counted)
         if not finite.all():
             bad = np.flatnonzero(~finite).tolist()
-            raise DataError(f"expected finite difference data; rows {bad} are not")
+            raise DataError(f"expected finite difference data, but rows {bad} are not finite")
         return counted
 
     def accept(self, pattern: Pattern) -> None:
@@ -177,7 +177,7 @@ class Operator:
                 f"expected data of pattern {own.identity} ({own.n_meas} rows on "
                 f"{own.n_electrodes} electrodes), got {pattern.identity} ({pattern.n_meas} rows "
                 f"on {pattern.n_electrodes})",
-                hint="bring the recording's rows in the order of the operator's pattern",
+                hint="reorder the recording's rows to the operator's pattern",
             )
 
     def without(self, rows: Sequence[int] | NDArray[Any]) -> Operator:
@@ -201,7 +201,7 @@ class Operator:
             return self
         left_out = self.left_out | lost
         if left_out.all():
-            raise DataError("no row is left")
+            raise DataError("expected at least one row that is not left out, got none")
         matrix, precision = downdated(self.matrix, self.precision, lost, left_out)
         return Operator(
             self.model,

@@ -132,7 +132,7 @@ class LinearProblem:
         """
         kept = np.delete(np.arange(len(self.weights)), rows)
         if not len(kept):
-            raise DataError("no row is left")
+            raise DataError("expected at least one row that is not left out, got none")
         full = self.model
         pattern = Pattern.from_tables(
             full.pattern.drive[kept], full.pattern.measure[kept], full.pattern.n_electrodes
@@ -218,7 +218,7 @@ def _data_model(
 def _refuse_zeros(size: FloatArray) -> None:
     if size.min() < _ZERO * size.max():
         raise ModelError(
-            f"the model expects {size.min():.1e} V, which cannot be normalised by",
+            f"the model predicts only {size.min():.1e} V, too little to divide by",
             where=f"row {int(size.argmin())}",
             hint='choose difference "plain", or a pattern without such rows',
         )

@@ -197,8 +197,8 @@ def _free_part(
     least = np.abs(np.diag(upper)).min()
     if least <= _UNSEEN * np.linalg.norm(jacobian) * np.linalg.norm(free):
         raise ModelError(
-            "the data do not tell an image that the prior leaves free",
-            hint="choose another prior, or a pattern that sees all of the mesh",
+            "the data do not determine an image that the prior leaves free",
+            hint="choose another prior, or a pattern that is sensitive to the whole mesh",
         )
     return basis[:, :k], basis[:, k:], upper[:k]
 

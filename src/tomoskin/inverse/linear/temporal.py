@@ -142,7 +142,7 @@ def advance(
     if time <= last.time:
         raise DataError(
             f"expected frames in order of time, got {time:g} s after {last.time:g} s",
-            hint="leave repeated frames out, or reset the filter",
+            hint="leave out repeated frames, or reset the filter",
         )
     kept = _kept(time - last.time, time_constant)
     expected = kept**2 * last.variance + (1.0 - kept**2)

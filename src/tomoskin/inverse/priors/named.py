@@ -238,4 +238,4 @@ def _check_finite(values: FloatArray, cells: NDArray[Any]) -> None:
     finite = np.isfinite(values)
     if not finite.all():
         cell = int(cells[np.argwhere(~finite)[0, 0]])
-        raise ModelError("expected finite numbers", where=f"prior, cell {cell}")
+        raise ModelError("expected finite numbers, got others", where=f"prior, cell {cell}")

@@ -63,7 +63,10 @@ class Diagonal:
         """Refuse an entry that is not positive."""
         if not (self.matrix > 0).all():
             cell = int(np.argmin(self.matrix > 0))
-            raise ModelError("expected a positive diagonal", where=f"prior, cell {cell}")
+            raise ModelError(
+                f"expected a positive diagonal, got {self.matrix[cell]}",
+                where=f"prior, cell {cell}",
+            )
 
     @property
     def free(self) -> FloatArray:

@@ -223,16 +223,15 @@ class Excess:
         if self.level > _SAID**2:
             return (
                 f"the voltages change by {np.sqrt(self.level):.0f} times the noise of the idle "
-                "skin in a way that no touch explains: look at cables and supply, or take a new "
-                "reference"
+                "skin, and no touch explains it: check cables and supply, or take a new reference"
             )
         times = np.sqrt(1 + self.variance / np.maximum(usual, np.finfo(float).tiny))
         worst = int(times.argmax())
         if times[worst] < _SAID:
             return None
         return (
-            f"{channels.names[worst]} wavers by {times[worst]:.0f} times the noise of the idle "
-            "skin, and counts for less: look at its cable and contact"
+            f"{channels.names[worst]} fluctuates by {times[worst]:.0f} times the noise of the "
+            "idle skin and gets less weight: check its cable and contact"
         )
 
     def after(self, squares: FloatArray, gauge: Gauge) -> Excess:

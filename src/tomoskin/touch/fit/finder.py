@@ -24,7 +24,8 @@ from tomoskin.touch.fit.noise import ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
-from tomoskin.touch.fit.search import Search, SpotDetections, joined
+from tomoskin.touch.fit.search import SpotDetections, joined, search
+from tomoskin.touch.fit.selection import ForwardSelection
 from tomoskin.touch.fit.sheet import fitting_sheet
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
 from tomoskin.touch.fit.spot import N_PARAMETERS, Response, depth_of
@@ -278,8 +279,9 @@ class SpotFinder:
         return detected, matched
 
     def _sought(self, problem: Problem, matched: Matched) -> SpotDetections:
-        search = Search(problem, matched, self._settings.snr, self._most, self._pace, self._deficit)
-        return search(self._expected)
+        least, pace = self._settings.snr, self._pace
+        selection = ForwardSelection(problem, matched, least, self._most, pace, self._deficit)
+        return search(selection, self._expected)
 
     def _left(self, seen: WhitenedTable) -> FloatArray:
         """(q, c) whitened directions of residual responses; those of the last frame where nothing

@@ -41,7 +41,10 @@ class Whitener:
         """
         noise = np.asarray(noise, dtype=np.float64)
         if not np.isfinite(noise).all() or noise.ndim not in (1, 2) or not np.any(noise > 0):
-            raise ModelError("expected finite noise above 0, (n_meas,) V or (n_meas, n_meas) V²")
+            raise ModelError(
+                "expected finite noise above 0, (n_meas,) V or (n_meas, n_meas) V², "
+                f"got shape {noise.shape}"
+            )
         covariance = np.diag(noise**2) if noise.ndim == 1 else (noise + noise.T) / 2
         size = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         scale = np.where(size > 0, size, 1.0)

@@ -271,8 +271,11 @@ class Solver(Protocol):
         ...
 
     def searched(self, question: Question, before: FloatArray) -> Answer | None:
-        """What :class:`tomoskin.touch.fit.search.Search` finds in a frame before which there were
-        touches ``before`` (k, 4), in one call; None where this solver has none for that pace."""
+        """What :class:`~tomoskin.touch.fit.selection.ForwardSelection` finds, in one call.
+
+        ``before`` (k, 4) are the touches of the last frame. None where this solver cannot do it at
+        that pace.
+        """
         ...
 
 

@@ -107,7 +107,9 @@ def spots_of(
     places = np.asarray(places, dtype=np.float64)
     radius = np.broadcast_to(np.asarray(radius, dtype=np.float64), places.shape[:1])
     if places.ndim != 2 or places.shape[1] != 2 or not (radius > 0).all():
-        raise ModelError(f"expected places (n, 2) and radii above 0, got {places.shape}, {radius}")
+        raise ModelError(
+            f"expected positions (n, 2) and radii above 0, got {places.shape}, {radius}"
+        )
     content = FILLING * radius**2 * depth
     return np.column_stack([places, np.log(radius), content])
 
@@ -187,7 +189,7 @@ class Spots:
     def __init__(self, mesh: Mesh) -> None:
         if mesh.dimension != 2 or mesh.points.shape[1] != 2:
             raise ModelError(
-                "expected a sheet with flat coordinates: touches are fitted in the plane",
+                "expected a sheet with flat coordinates, got a volume or a curved sheet",
                 hint='set method = "image" in [touch]',
             )
         corners = mesh.points[mesh.cells]
@@ -256,7 +258,7 @@ class Response:
     def __init__(self, state: State) -> None:
         """Prepare a flat sheet with a scalar conductivity; ModelError for another one."""
         if state.conductivity.ndim != 1 or np.iscomplexobj(state.conductivity):
-            raise ModelError("expected a real scalar conductivity to fit touches on")
+            raise ModelError("expected a real scalar conductivity to fit touches, got another one")
         self.state = state
         self.spots = Spots(state.model.mesh)
 

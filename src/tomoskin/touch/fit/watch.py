@@ -149,8 +149,8 @@ class FrameWatch:
         if self._lifted is not None:
             x, y = 1e3 * self._lifted
             return (
-                f"near {x:.0f}, {y:.0f} mm the skin reads as if a press had been lifted that stood "
-                "when the reference was taken: take a new one while nothing touches"
+                f"near {x:.0f}, {y:.0f} mm a press was probably on the skin when the reference "
+                "was taken, and has been lifted since: take a new reference while nothing touches"
             )
         if len(self._before):  # what they do not explain is their model's as a rule
             return None

@@ -1,0 +1,303 @@
+"""The flow in which one finger rubs all of the skin, and touch is learnt without labels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tomoskin.calibration import TOUCH, Locator, Rubbing, quiet_electrodes
+from tomoskin.core import DataError, FloatArray, WireError, reach
+from tomoskin.pipeline import FrameResult, Prepared
+from tomoskin.run import Runner
+from tomoskin.server.folder import Folder
+from tomoskin.server.guided_flow import Estimate, GuidedFlow, keep_calibration
+from tomoskin.server.guided_presses import OFTEN, Dots, Taker, least_noise
+from tomoskin.server.requests import AskPoint, LearnFlow, StopLearning, UndoPress
+from tomoskin.touch import Region
+
+_FEWEST, _GOOD = 150, 400
+"""Touches from which it can be learnt, and that are good."""
+
+_MOST = 3000
+"""Touches that are kept; of more, every second is forgotten."""
+
+_NEW, _STANDS_OUT = 0.15, 3.0
+"""Part of itself, and of the noise of a frame, by which a touch must differ from the last one to
+tell something new."""
+
+_PLACES, _FINGER = 250, 0.12
+"""Positions of the map, and radius of what a touch covers of it, in radii of the skin."""
+
+_COVERED = 0.9
+"""Part of the map that must be covered."""
+
+_SEVERAL = 0.2
+"""Part of the frames with several touches from which it is said."""
+
+_PERIOD = 0.25
+"""Seconds between two looks of the pages."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rubbed:
+    """Touches so far.
+
+    Attributes
+    ----------
+    dv
+        (n, n_meas) V by which each differs from the untouched skin.
+    covered
+        (k,) how many of them lie near each position of the map.
+    several
+        Frames that showed several touches.
+    frames
+        Frames that showed any.
+    quiet
+        Electrodes that none came near.
+    """
+
+    dv: FloatArray
+    covered: FloatArray
+    several: int = 0
+    frames: int = 0
+    quiet: tuple[int, ...] = ()
+
+    @property
+    def part(self) -> float:
+        """Part of the map that is covered."""
+        return float((self.covered > 0).mean())
+
+    @property
+    def enough(self) -> bool:
+        """Whether it can be learnt from without a gap."""
+        return len(self.dv) >= _FEWEST and self.part >= _COVERED and not self.quiet
+
+    @property
+    def gap(self) -> tuple[str, ...]:
+        """That much of the skin was not touched, in words; nothing where that is not so."""
+        if self.part >= _COVERED:
+            return ()
+        return (
+            f"only {100 * self.part:.0f} % of the skin was touched: positions elsewhere are not "
+            "learnt, and those that are found may be anywhere",
+        )
+
+    @property
+    def text(self) -> str:
+        """What is missing, in words."""
+        said = []
+        if self.frames > _FEWEST / 3 and self.several > _SEVERAL * self.frames:
+            said.append(
+                f"{100 * self.several / self.frames:.0f} % of the frames show several touches and "
+                "are left out: rub with one finger of one hand, and more slowly."
+            )
+        if len(self.dv) < _FEWEST:
+            said.append(f"{_FEWEST - len(self.dv)} more to learn from.")
+        elif self.part < _COVERED:
+            said.append(
+                f"{100 * self.part:.0f} % of the skin is touched: go on where the map is empty."
+            )
+        elif self.quiet:
+            names = ", ".join(f"E{electrode + 1}" for electrode in self.quiet)
+            said.append(f"No touch has come near {names} yet: rub out to the rim.")
+        elif len(self.dv) < _GOOD:
+            said.append(f"Enough to learn from. {_GOOD} are better: a minute of rubbing.")
+        else:
+            said.append("Enough.")
+        return " ".join(said)
+
+
+class RubbedTouches:
+    """Collects touches from frames; belongs to the thread that sees these."""
+
+    def __init__(self, prepared: Prepared) -> None:
+        region = Region.of(prepared.skin)
+        self._pattern = prepared.pattern
+        self.places = region.metres(region.lattice(_PLACES))
+        self.near = _FINGER * region.unit
+        self._dv: list[FloatArray] = []
+        self._covered = np.zeros(len(self.places))
+        self._several = self._frames = 0
+        self._last = -np.inf
+
+    def push(self, result: FrameResult) -> None:
+        """Take a frame, where it shows one touch that is not the last one again."""
+        if 0 <= result.host_time - self._last < OFTEN or not result.touches:
+            return
+        self._last = result.host_time
+        self._frames += 1
+        if len(result.touches) > 1 or result.touches[0].merged:
+            self._several += 1
+            return
+        dv = result.voltages - result.reference
+        if result.health is not None:
+            dv = np.where(result.health.lost, np.nan, dv)
+        noise = result.baseline.noise if result.baseline else 0.0
+        least = max(_NEW * _rms(dv), _STANDS_OUT * noise)
+        if self._dv and _rms(dv - self._dv[-1]) < least:
+            return
+        self._dv.append(dv)
+        if len(self._dv) > _MOST:
+            del self._dv[::2]
+        touch = result.touches[0].detection
+        apart = np.linalg.norm(self.places - (touch.x, touch.y), axis=1)
+        self._covered = self._covered + (apart < self.near)
+
+    def now(self) -> Rubbed:
+        """What there is."""
+        dv = np.array(self._dv).reshape(-1, self._pattern.n_meas)
+        some = dv[:: max(1, len(dv) // _GOOD)]
+        quiet = quiet_electrodes(some, self._pattern) if len(dv) >= _FEWEST else ()
+        return Rubbed(dv, self._covered, self._several, self._frames, quiet)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What was rubbed, the phase of a press at a known position, and its change (n_meas,) V."""
+
+    rubbed: Rubbed
+    phase: str
+    dv: FloatArray | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """A press at a known position m, and its change (n_meas,) V."""
+
+    xy: tuple[float, float]
+    dv: FloatArray = field(repr=False)
+
+
+class RubFlow(GuidedFlow):
+    """What was rubbed so far; see :class:`GuidedFlow`. It learns when it is asked to.
+
+    Attributes
+    ----------
+    rubbed, points
+        Touches everywhere, and presses at known positions.
+    """
+
+    def __init__(self, prepared: Prepared) -> None:
+        super().__init__("rub", prepared)
+        self._touches = RubbedTouches(prepared)
+        self.rubbed = self._touches.now()
+        self.points: list[_Point] = []
+        self.answers = {
+            AskPoint: lambda request: self._ask(on=request.on),
+            UndoPress: lambda _: self._undo(),
+            LearnFlow: lambda _: self._learn(),
+            StopLearning: lambda _: self._stop(),
+        }
+        self._taker: Taker | None = None
+        self._phase = "rub"
+        self._dots = Dots(prepared)
+        self._dot: tuple[float, float] | None = None
+        self._examples: tuple[Any, ...] = ()
+        self._told = -np.inf
+
+    def see(self, result: FrameResult) -> _Seen | None:
+        """See :class:`GuidedFlow`."""
+        taker, dv, phase = self._taker, None, "rub"
+        if taker is None:
+            self._touches.push(result)
+        else:
+            dv, phase = taker.push(result.host_time, result.voltages), taker.phase
+        due = not 0 <= result.host_time - self._told < _PERIOD
+        if dv is None and phase == self._phase and not due:
+            return None
+        self._told = result.host_time
+        return _Seen(self._touches.now(), phase, dv)
+
+    def take(self, seen: _Seen) -> bool:
+        """Touches have come, or a press at the dot."""
+        self.rubbed, self._phase = seen.rubbed, seen.phase
+        if seen.dv is not None and self._dot is not None:
+            self.points.append(_Point(self._dot, seen.dv))
+            self._dot = self._next_dot()
+        return False
+
+    def _next_dot(self) -> tuple[float, float]:
+        return self._dots.next([point.xy for point in self.points], None)
+
+    def _ask(self, *, on: bool) -> bool:
+        self._taker = Taker(least_noise(self.prepared)) if on else None
+        self._dot = self._next_dot() if on else None
+        return False
+
+    def _undo(self) -> bool:
+        if not self.points:
+            raise WireError("there is no press to undo")
+        self.points.pop()
+        self._dot = self._next_dot() if self._taker is not None else None
+        return False
+
+    def _learn(self) -> bool:
+        if len(self.rubbed.dv) < _FEWEST:
+            raise WireError(f"{_FEWEST - len(self.rubbed.dv)} more touches are needed")
+        self._examples = (self.rubbed, tuple(self.points))
+        self.estimate = None
+        return True
+
+    def _stop(self) -> bool:
+        self.stop()
+        return False
+
+    def examples(self) -> tuple[Any, ...]:
+        """What was there when it was asked to learn."""
+        return self._examples
+
+    def estimate_from(self, examples: tuple[Any, ...]) -> Estimate:
+        """See :class:`GuidedFlow`."""
+        rubbed, points = examples
+        self.stage = "finding where the touches were"
+        dv = np.concatenate([[point.dv for point in points], rubbed.dv]) if points else rubbed.dv
+        xy = np.full((len(dv), 2), np.nan)
+        for number, point in enumerate(points):
+            xy[number] = point.xy
+        found = Rubbing.of(dv, self.prepared.skin, xy)
+        if not found.holds:
+            raise DataError("; ".join(found.findings))
+
+        def learnt(done: float, total: float) -> None:
+            self.stage = f"learning, {100 * done / total:.0f} %"
+            reach()
+
+        return Estimate(
+            f"{found.text}.",
+            ready=True,
+            figures={
+                "deviation_mm": 1e3 * found.deviation,
+                "remarks": [*rubbed.gap, *found.findings],
+            },
+            answer=found.locator(learnt),
+        )
+
+    def details(self) -> dict[str, Any]:
+        """See :class:`GuidedFlow`."""
+        rubbed = self.rubbed
+        return {
+            "phase": self._phase,
+            "dot": self._dot,
+            "presses": [point.xy for point in self.points],
+            "stage": self.stage,
+            "rubbed": {
+                "touches": len(rubbed.dv),
+                "needed": _FEWEST,
+                "text": rubbed.text,
+                "enough": rubbed.enough,
+                "places": self._touches.places.ravel().tolist(),
+                "covered": rubbed.covered.tolist(),
+                "near_m": self._touches.near,
+            },
+        }
+
+    def keep(self, answer: Locator, folder: Folder, name: str, runner: Runner) -> str:
+        """See :class:`GuidedFlow`."""
+        calibration = TOUCH.of(answer, self.prepared.pattern, self.prepared.skin)
+        return keep_calibration(calibration, folder, name, runner)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.nanmean(values**2)))

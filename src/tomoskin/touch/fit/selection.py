@@ -1,0 +1,192 @@
+"""Touches chosen one after the other: a further one as long as the evidence for it grows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tomoskin.core import FloatArray
+from tomoskin.touch.fit.candidates import Matched, limits_of
+from tomoskin.touch.fit.joint_starts import JointStarts
+from tomoskin.touch.fit.pace import Pace
+from tomoskin.touch.fit.refine import Deficit, Fit, Problem, Question, Rules
+from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS
+
+HELD = 0.6
+"""Part of the ratio at which a touch begins above which one that is there stays."""
+
+_MISSHAPEN = 0.02
+"""A wrong profile leaves up to this part of what a touch changes: no evidence of another one."""
+
+_SURE = 2.0
+"""Times the ratio at which a touch begins: half the square of that is more than what a simpler
+explanation of the frame is worth."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForwardSelection:
+    """Forward selection of the touches of one frame, with steps back where one is in the way.
+
+    Attributes
+    ----------
+    problem
+        The frame.
+    matched
+        Candidates for its noise.
+    least
+        Likelihood ratio, in deviations, at which a touch begins.
+    most
+        Touches that are looked for at most.
+    pace
+        How much is tried.
+    deficit
+        What the table lacked of the last frame's touches.
+    """
+
+    problem: Problem
+    matched: Matched
+    least: float
+    most: int
+    pace: Pace
+    deficit: Deficit
+
+    @property
+    def question(self) -> Question:
+        """The same for a solver that searches in one call."""
+        matched = self.matched
+        candidates = matched.spots, matched.signatures, matched.squares
+        rules = Rules(self.least, HELD, _SURE, _MISSHAPEN)
+        limits = limits_of(self.problem.sign)
+        return Question(self.problem, candidates, limits, rules, self.pace, self.most, self.deficit)
+
+    def remember(self, fit: Fit, ratios: tuple[FloatArray, FloatArray]) -> None:
+        """Keep what :meth:`standing_out` would compute of ``fit``."""
+        self._looked_at.append((fit.residual, ratios))
+
+    def found(self, before: FloatArray) -> Fit:
+        """The fit of the touches, before the exact model is asked for the last time."""
+        kept = self._pruned(self.refined(before))
+        tries = self.pace.tries - (len(before) - len(kept.spots) if len(kept.spots) else 0)
+        fit, tried = self._more(kept, tries)
+        if tries > tried == 0:
+            fit = self._fewer(fit)
+        if len(before) and self._is_astray(fit, before, in_vain=tried > 0 and fit is kept):
+            fresh, _ = self._more(self.problem.nothing(), self.pace.tries)
+            fit = max(fresh, fit, key=self.problem.evidence)
+        return fit
+
+    def _is_astray(self, fit: Fit, before: FloatArray, *, in_vain: bool) -> bool:
+        """Whether what was there may keep the frame from being understood: another touch stands
+        out and does not fit ``in_vain``, or, at leisure, anything has changed."""
+        if not self.pace.restart:
+            return in_vain
+        return len(fit.spots) != len(before) or not fit.settled
+
+    def refined(self, before: FloatArray) -> Fit:
+        """The fit that begins with the touches ``before`` (k, 4)."""
+        if not len(before):
+            return self.problem.nothing()
+        problem, spots = self.problem, before[: self.most]
+        fit = problem.refined(spots, self.deficit, self.pace.warm)
+        return problem.corrected(fit, self.pace.rounds, self.pace.near, self.pace.tolerance)
+
+    def _pruned(self, fit: Fit) -> Fit:
+        """Without the spots that have faded."""
+        while len(fit.spots):
+            ratio = self.ratios(fit)
+            weakest = int(ratio.argmin())
+            if ratio[weakest] >= HELD * self.least:
+                return fit
+            fit = self.refined(np.delete(fit.spots, weakest, axis=0))
+        return fit
+
+    def _fewer(self, fit: Fit) -> Fit:
+        """Without the weakest of several spots, where that explains the frame as well."""
+        if len(fit.spots) < 2:
+            return fit
+        ratio = self.ratios(fit)
+        weakest = int(ratio.argmin())
+        if ratio[weakest] >= (1.0 if fit.settled else _SURE) * self.least:
+            return fit
+        return max(
+            fit, self.refined(np.delete(fit.spots, weakest, axis=0)), key=self.problem.evidence
+        )
+
+    def _more(self, fit: Fit, tries: int) -> tuple[Fit, int]:
+        """With further spots, while they are worth it; and how many of ``tries`` were tried."""
+        for tried in range(min(tries, self.most - len(fit.spots))):
+            ratio, content = self.standing_out(fit)
+            best = int(ratio.argmax())
+            if ratio[best] < self.threshold(fit, self.pace.look if len(fit.spots) else HELD):
+                return fit, tried
+            fresh = _starts(fit, self.matched.spot(best, content))
+            more = self._best(fresh, fit.deficit, self._joint_starts(len(fit.spots) + 1))
+            worth = self.ratios(more).min() >= self.threshold(fit, 1.0)
+            gain = self.problem.evidence(more) - self.problem.evidence(fit)
+            if not worth or gain <= self.pace.rare:
+                return fit, tried + 1
+            fit = more
+        return fit, tries
+
+    def threshold(self, fit: Fit, part: float) -> float:
+        """Deviations for that ``part`` of a touch; a wrong profile adds to the noise."""
+        misshapen = _MISSHAPEN * float(np.linalg.norm(fit.predicted))
+        return part * self.least * float(np.hypot(1.0, misshapen / self.least))
+
+    def standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
+        """Likelihood ratios (n,) and contents (n,) of the candidates beside ``fit``."""
+        if not self._looked_at or self._looked_at[-1][0] is not fit.residual:
+            ratios = self.matched.ratios(self.problem.solver, fit, self.problem.sign)
+            self.remember(fit, ratios)
+        return self._looked_at[-1][1]
+
+    @cached_property
+    def _looked_at(self) -> list[tuple[FloatArray, tuple[FloatArray, FloatArray]]]:
+        """What candidates are to the residuals that have been looked at, the newest last."""
+        return []
+
+    def _joint_starts(self, count: int) -> list[FloatArray]:
+        """Sets of so many spots whatever has been found."""
+        if count < 2 or not self.pace.joint:
+            return []
+        return self._joint.sets(count, self.pace.joint)
+
+    @cached_property
+    def _joint(self) -> JointStarts:
+        problem = self.problem
+        return JointStarts.of(self.matched, problem.data, problem.prior, problem.sign)
+
+    def _best(self, starts: list[FloatArray], deficit: Deficit, joint: list[FloatArray]) -> Fit:
+        """The most evident of those that come out best after a glance."""
+        problem, pace = self.problem, self.pace
+        none = Deficit.none(len(deficit.change))
+        fits = [problem.refined(start, deficit, pace.glance) for start in starts]
+        fits += [problem.refined(start, none, pace.glance) for start in joint]
+        fits.sort(key=lambda fit: fit.cost)
+        settled = [
+            fit if fit.settled else problem.refined(fit.spots, fit.deficit, pace.cold)
+            for fit in fits[: pace.finalists]
+        ]
+        exact = [problem.corrected(fit, pace.rounds, pace.near, pace.tolerance) for fit in settled]
+        return max(exact, key=self.problem.evidence)
+
+    def ratios(self, fit: Fit) -> FloatArray:
+        """(k,) deviations of the noise and of residual responses by which each stands out."""
+        return np.asarray(np.sqrt(self.problem.solver.standing(self.problem.left, fit)))
+
+
+def _starts(fit: Fit, fresh: FloatArray) -> list[FloatArray]:
+    """The new spot beside the others; or instead of half of the nearest."""
+    starts = [np.concatenate([fit.spots, fresh[None]])]
+    if len(fit.spots):
+        near = int(np.linalg.norm(fit.spots[:, :2] - fresh[:2], axis=1).argmin())
+        away = fresh[:2] - fit.spots[near, :2]
+        halves = np.tile(fit.spots[near], (2, 1))
+        reach = 0.7 * np.exp(fit.spots[near, LOG_RADIUS]) / max(np.linalg.norm(away), 1e-9)
+        halves[:, :2] += np.outer([-reach, reach], away)
+        halves[:, CONTENT] /= 2
+        halves[:, LOG_RADIUS] -= 0.3
+        starts.append(np.concatenate([np.delete(fit.spots, near, axis=0), halves]))
+    return starts

@@ -1,0 +1,199 @@
+"""The flows in which someone presses the skin, each once in real Chromium, on a twin in a hurry."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from run.board import Board, pressed, samples_of
+from server.looks import look_in_both
+from server.serving import Site
+from server.watching import Watched
+from tomoskin.calibration import FORCE, TOUCH
+from tomoskin.run import Runner, commands
+from tomoskin.server import serve_requests
+from tomoskin.skin import Skin
+from tomoskin.source import open_source
+
+pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("learnt")
+
+
+@pytest.fixture(scope="module")
+def site(prepared, folder):
+    runner = Runner(prepared, lambda: open_source("twin:fast", prepared.skin))
+    runner.start()
+    site = Site(runner, folder=folder, take=lambda hub: serve_requests(hub, "twin"))
+    yield site
+    site.stop()
+    runner.stop()
+
+
+@pytest.fixture(autouse=True)
+def as_it_was(site, prepared):
+    """What a test has learnt serves no other."""
+    yield
+    site.runner.ask(commands.Change(prepared))
+
+
+def looks_right(opened, name):
+    assert look_in_both(opened.page, name) == {}
+
+
+def press_dot(opened, done):
+    """Press with the pointer where the dot is; until the press is taken."""
+    opened.test_id("phase").filter(has_text="where the dot is").wait_for()
+    box = opened.page.locator(".target .core").bounding_box()
+    opened.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    opened.page.mouse.down()
+    opened.test_id("taken").filter(has_text=f"{done + 1} press").wait_for()
+    opened.page.mouse.up()
+
+
+def guided(opened, kind, count):
+    opened.test_id("open-setup").click()
+    opened.test_id(f"step-{kind}").click()
+    opened.test_id("flow-begin").click()
+    for _ in range(20):
+        opened.page.keyboard.press("+")
+    for done in range(count):
+        press_dot(opened, done)
+    opened.page.wait_for_function(
+        "() => !document.querySelector('[data-testid=flow-keep]').disabled"
+    )
+
+
+def test_touch_is_taught_by_pressing_dots(opened, folder):
+    guided(opened, "touch", 6)
+    opened.test_id("flow-text").filter(has_text="Median error").wait_for()
+    looks_right(opened, "touch")
+    opened.test_id("flow-keep").click()
+    opened.test_id("calibration").filter(has_text="touch.npz").wait_for()
+    assert len(TOUCH.read(folder / "touch.npz").model.presses) == 6
+    opened.press(0.03, 0.03)
+    looks_right(opened, "calibrated")
+    opened.page.mouse.up()
+    opened.lifted()
+
+
+def test_the_wires_are_found_by_pressing_dots(opened, folder):
+    guided(opened, "wiring", 3)
+    opened.test_id("flow-text").filter(has_text="as the skin file says").wait_for()
+    looks_right(opened, "wiring")
+    opened.test_id("flow-keep").click()
+    opened.test_id("flow-begin").wait_for()
+    assert Skin.load(folder / "wired.toml").n_electrodes == 8
+
+
+def lay(opened, newtons, place, done):
+    """Say a weight and lay it on with the pointer; until it is taken."""
+    opened.test_id("weight").fill(f"{newtons:g}")
+    opened.page.keyboard.press("Enter")
+    opened.test_id("weight-now").filter(has_text=f"{newtons:g} N").wait_for()
+    opened.test_id("phase").filter(has_text="Put the weight on").wait_for()
+    opened.move(*place)
+    opened.page.mouse.down()
+    opened.test_id("taken").filter(has_text=f"{done + 1} placement").wait_for()
+    opened.page.mouse.up()
+
+
+def test_weights_are_laid_on_and_forces_are_shown(opened, folder):
+    opened.test_id("open-setup").click()
+    opened.test_id("step-force").click()
+    opened.test_id("flow-begin").click()
+    opened.test_id("weight-unit").select_option("N")
+    opened.test_id("weight").fill("200")
+    opened.page.keyboard.press("Enter")
+    opened.test_id("flow-asked").filter(has_text="Did you mean 200 g (1.96 N)?").wait_for()
+    places = [(0.03, 0.03), (-0.04, 0.02), (0.0, -0.05), (-0.02, -0.02), (0.04, -0.03)]
+    for done, (newtons, place) in enumerate(zip((2, 8, 4, 6, 3), places, strict=True)):
+        lay(opened, newtons, place, done)
+    opened.test_id("flow-text").filter(has_text="forces are missed by").wait_for()
+    looks_right(opened, "force")
+    opened.test_id("flow-keep").click()
+    opened.test_id("calibration").filter(has_text="force.npz").wait_for()
+    learnt = FORCE.read(folder / "force.npz").model.presses
+    assert learnt.force[learnt.labelled].tolist() == [2, 8, 4, 6, 3]
+    opened.press(0.03, 0.03)
+    opened.test_id("force").wait_for()
+    looks_right(opened, "forces")
+    opened.test_id("strength-unit").filter(has_text="Force, N").press("Enter")
+    opened.test_id("strength-unit").filter(has_text="Strength, S").wait_for()
+    assert opened.test_id("force").count() == 0, "the list and the chart show the same"
+    opened.page.mouse.up()
+    opened.page.get_by_label("Calibration").select_option("")
+    opened.test_id("calibration").filter(has_text="No weights").wait_for()
+
+
+LAPS, REACH, STEP = 4.5, 0.085, 0.008
+"""Of a spiral, m: so far out, and so far on in each frame, a third of a metre a second."""
+
+
+def spiral():
+    """x + iy m of a finger that rubs a disc."""
+    n = round(np.pi * LAPS * REACH / STEP)
+    part = np.sqrt(np.arange(1, n) / n)
+    return REACH * part * np.exp(2j * np.pi * LAPS * part)
+
+
+class RubbedBoard(Board):
+    """Once it is ``rubbed`` a finger goes about on it, out to the rim and in again."""
+
+    def __init__(self, prepared):
+        super().__init__(free=samples_of(prepared), period=0.025)
+        self.rubbed = False
+        out = [samples_of(prepared, pressed(prepared, z.real, z.imag)) for z in spiral()]
+        self._slides = itertools.cycle(out + out[::-1])
+
+    def read(self, timeout):
+        if self.rubbed:
+            self.free = next(self._slides)
+        return super().read(timeout)
+
+
+@pytest.fixture
+def rubbed(browser, prepared, folder):
+    """(board, page) of a skin that waits to be rubbed."""
+    board = RubbedBoard(prepared)
+    runner = Runner(prepared, lambda: board)
+    runner.start()
+    site = Site(runner, folder=folder, take=lambda hub: serve_requests(hub, "twin"))
+    watched = Watched(browser, site, prepared.mesh)
+    watched.open()
+    yield board, watched
+    watched.context.close()
+    site.stop()
+    runner.stop()
+    assert watched.wrong == []
+
+
+def test_a_rubbed_skin_is_learnt_and_used(rubbed, folder):
+    board, opened = rubbed
+    opened.test_id("open-setup").click()
+    opened.test_id("step-touch").click()
+    opened.test_id("flow-begin-rub").click()
+    opened.test_id("taken").filter(has_text="150 more to learn from").wait_for()
+    assert opened.test_id("flow-learn").is_disabled()
+    board.rubbed = True
+    opened.page.wait_for_function(
+        "() => !document.querySelector('[data-testid=flow-learn]').disabled"
+    )
+    covered = "[data-testid=covered] circle"
+    assert (
+        opened.page.locator(f"{covered}.full").count() > 0.7 * opened.page.locator(covered).count()
+    )
+    opened.test_id("flow-learn").click()
+    opened.test_id("flow-stop").click()
+    opened.test_id("flow-learn").click()
+    opened.test_id("flow-text").filter(has_text="uncertain by about").wait_for()
+    looks_right(opened, "rubbed")
+    opened.test_id("flow-keep").click()
+    opened.test_id("calibration").filter(has_text="rubbed.npz").wait_for()
+    opened.test_id("calibration-health").wait_for()
+    assert len(TOUCH.read(folder / "rubbed.npz").model.presses) >= 150

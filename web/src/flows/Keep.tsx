@@ -1,0 +1,62 @@
+/** What ends every flow: leaving it, or a name for what was learnt. */
+
+import { signal } from "@preact/signals";
+import { send } from "../state";
+import { flow, type FlowKind } from "./model";
+
+const names: Readonly<Record<FlowKind, ReturnType<typeof signal<string>>>> = {
+  wiring: signal("wired"),
+  touch: signal("touch"),
+  rub: signal("rubbed"),
+  force: signal("force"),
+};
+
+export function Leave() {
+  return (
+    <button type="button" data-testid="flow-end" onClick={() => send({ type: "flow_end" })}>
+      Leave
+    </button>
+  );
+}
+
+export function Keep({ kind }: { kind: FlowKind }) {
+  const name = names[kind];
+  return (
+    <form
+      class="row"
+      onSubmit={(event) => {
+        event.preventDefault();
+        send({ type: "flow_keep", name: name.value });
+      }}
+    >
+      <label class="unseen" for="keep-name">
+        Name of the file
+      </label>
+      <input
+        id="keep-name"
+        type="text"
+        pattern="[A-Za-z0-9][A-Za-z0-9_\-]{0,63}"
+        required
+        value={name.value}
+        onInput={({ currentTarget }) => (name.value = currentTarget.value)}
+      />
+      <button type="submit" class="main" data-testid="flow-keep" disabled={!flow.value.ready}>
+        Save and use
+      </button>
+    </form>
+  );
+}
+
+/** What is wrong with what was pressed, in words. */
+export function Remarks() {
+  const remarks = flow.value.figures?.remarks ?? [];
+  return (
+    <>
+      {remarks.map((remark) => (
+        <p key={remark} class="wrong" data-testid="flow-remark">
+          {remark}
+        </p>
+      ))}
+    </>
+  );
+}
