@@ -10,7 +10,7 @@ import pytest
 
 from recording.runs import INFO, SCAN, SKIN, TOUCH, frame_of, put
 from tomoskin.formats import Export, read_recording, write_touches
-from tomoskin.recording import SessionReader, SessionWriter
+from tomoskin.recording import Mark, SessionReader, SessionWriter
 from tomoskin.recording.blocks import no_report
 
 
@@ -63,3 +63,17 @@ def test_recorded_touches_stand_at_the_same_frames_and_times(session: Path) -> N
     elapsed = [float(row.pop("elapsed_s")) for row in rows]
     assert rows == [first, first | {"frame": "", "time_s": "5.500000"}, last]
     assert elapsed == pytest.approx([0.03, 0.5, 1.01], abs=1e-6), "since the first frame"
+
+
+def test_a_first_frame_that_was_read_late_is_the_beginning_all_the_same(tmp_path: Path) -> None:
+    """The recording begins with earlier frames; the host reads its own first one 0.3 s late."""
+    path = tmp_path / "late.mcap"
+    with SessionWriter(path, SKIN) as writer:
+        writer.device(5.0, INFO)
+        for number, late in enumerate((0.0, 0.0, 0.3, 0.29)):
+            frame = replace(frame_of(number), host_time=5.0 + 0.01 * number + late)
+            put(writer, frame, Mark.EARLIER if number < 2 else Mark.NONE)
+            if number >= 2:
+                writer.touches(frame.host_time, number, (TOUCH,))
+    rows = exported(path, "touches")
+    assert [float(row["elapsed_s"]) for row in rows] == pytest.approx([0.0, 0.01], abs=1e-6)

@@ -25,12 +25,12 @@ from tomoskin.recording import (
     Advance,
     SessionReader,
     as_recorded,
+    first_scan,
     indexed_frames,
     message_counts,
     recording_of,
     replayed,
     scanned_touches,
-    start_time,
 )
 from tomoskin.skin import Skin
 from tomoskin.touch import has_forces
@@ -108,7 +108,7 @@ class Export:
         """Write a table of the recorded touches."""
         rows, surface = list(scanned_touches(self.session)), self.session.skin.surface
         forces = has_forces(rows)
-        begun = start_time(self.session)
+        begun = first_scan(self.session)
         write_touches(path, rows, surface, forces=forces, begun=begun, overwrite=self.overwrite)
 
     def _panels(self, prepared: Prepared) -> Iterator[Panel]:

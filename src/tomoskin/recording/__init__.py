@@ -42,7 +42,7 @@ from tomoskin.recording.repair import Lost, Repaired, repair
 from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.recording.replayed import advance, as_recorded, recorded_calibrations, replayed
 from tomoskin.recording.robot_log import LogPart, RobotLog
-from tomoskin.recording.scanned import idle_count, scanned_touches
+from tomoskin.recording.scanned import first_scan, idle_count, scanned_touches
 from tomoskin.recording.session import Session
 from tomoskin.recording.session_reader import (
     SessionReader,
@@ -90,6 +90,7 @@ __all__ = [
     "end_time",
     "errors_of",
     "event_of",
+    "first_scan",
     "grid_message",
     "idle_count",
     "indexed_frames",

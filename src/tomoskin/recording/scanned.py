@@ -73,6 +73,15 @@ def scanned_touches(session: SessionReader) -> Iterator[TouchedFrame]:
         yield *numbers.get(key, (None, touched.host_time)), touched.touches
 
 
+def first_scan(session: SessionReader) -> float:
+    """Time of the recording's own first frame, on the clock of :func:`scanned_frames`; 0 without.
+
+    The host's time of that frame differs by how late the host read it.
+    """
+    frames = scanned_frames(session, Scan.of(session.skin.pattern()))
+    return next((frame.time for frame in frames if not frame.item.mark & Mark.EARLIER), 0.0)
+
+
 def idle_count(session: SessionReader, scan: Scan) -> int:
     """Frames of the first reference where the recording begins with it; 1 where it does not."""
     first = next(scanned_frames(session, scan), None)
