@@ -112,7 +112,7 @@ def _rows(
             frames: list[Frame] = []
             while len(frames) < count:
                 frames += [item for item in link.poll(0.05) if isinstance(item, Frame)]
-            mode = link.mode
+            mode = link.configuration.mode
         board.close()
         memory.close()
     assert not board.last_words, board.last_words

@@ -133,6 +133,7 @@ def test_it_records_from_the_first_byte_to_the_end(start, tmp_path):
     assert started["type"] == "listening"
     assert str(started["port"]) in started["address"]
     while session_info(path).frames < 30:
+        assert process.poll() is None, process.communicate()
         threading.Event().wait(0.05)
     code, out, errors = end(process, signal.SIGTERM)
     assert code == 0

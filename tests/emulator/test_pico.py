@@ -326,7 +326,7 @@ def test_a_multiplexer_that_does_not_reach_an_electrode_is_named(
     board = BoardProcess(pico, memory.path, skin.current, "-f")
     runner = Runner(prepare(skin), lambda: SerialTransport(board.port))
     came = threading.Event()
-    with runner.watch(came.set):
+    with runner.audience.watch(came.set):
         runner.start()
         try:
             while not (sick := runner.status().electrodes):

@@ -92,7 +92,7 @@ def test_unplugged_and_plugged_in_again_the_session_goes_on(
     options = ("-s", str(tmp_path / "skin"), str(programs.elf))
     came = threading.Semaphore(0)
     runner = Runner(prepare(skin), lambda: open_source(f"serial:{port}", skin))
-    with runner.watch(came.release):
+    with runner.audience.watch(came.release):
         with running(programs.emulator, port, *options) as board:
             runner.start()
             runner.ask(commands.Record(path))

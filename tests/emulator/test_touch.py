@@ -38,7 +38,7 @@ def test_a_press_is_found_where_it_is(
     monkeypatch.setattr("tomoskin.emulator.source.programs_of", lambda _: programs)
     skin = Skin.load(name)
     runner, came = Runner(prepare(skin), lambda: open_emulator("seed=1", skin)), threading.Event()
-    with runner.watch(came.set):
+    with runner.audience.watch(came.set):
         runner.start()
         try:
             before = _wait(runner, came, lambda result: result.ready)

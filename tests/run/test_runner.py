@@ -37,7 +37,7 @@ class Watch:
             self._news.notify_all()
 
     def until(self, true):
-        with self._runner.watch(self), self._news:
+        with self._runner.audience.watch(self), self._news:
             assert self._news.wait_for(true, PATIENCE)
 
 

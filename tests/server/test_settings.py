@@ -287,7 +287,7 @@ def test_a_recording_ends_and_what_it_holds_replays_to_the_bit(prepared, board, 
     runner.start()
     with (
         contextlib.closing(_Stopped(runner)),
-        runner.watch(lambda: seen.append(runner.newest.result)),
+        runner.audience.watch(lambda: seen.append(runner.newest.result)),
     ):
         until = Watch(runner).until
         until(lambda: len(seen) > 60)

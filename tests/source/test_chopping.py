@@ -51,7 +51,7 @@ def test_the_mode_is_set_and_read_back_before_start(clock):
     ]
     mode = next(command for command in board.commands if isinstance(command, SetMode))
     assert (mode.mode, mode.frequency, mode.periods) == (DriveMode.CHOPPED, 500, 1)
-    assert mode.configuration == link.configuration
+    assert mode.configuration == link.configuration.identity
     assert link.board_name == "simulated board"
 
 

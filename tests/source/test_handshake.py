@@ -50,7 +50,12 @@ def test_the_order_of_the_handshake(clock):
     scan, pattern, chosen = board.commands[3:6]
     start = board.commands[-1]
     assert chosen.format is Format.SIXTEEN
-    assert scan.configuration == pattern.configuration == start.configuration == link.configuration
+    assert (
+        scan.configuration
+        == pattern.configuration
+        == start.configuration
+        == link.configuration.identity
+    )
     assert (scan.n_drives, scan.settling, scan.dead_time) == (8, 200, 5)
     assert (scan.oversampling, scan.prescaler, scan.current_limit) == (4, 64, 100_000)
     assert [(d.source, d.sink) for d in pattern.drives] == [((k + 1) % 8, k) for k in range(8)]
@@ -84,7 +89,8 @@ def test_a_board_that_is_already_scanning_is_taken_over(clock):
     second = linked(transport, clock, oversampling=1)
     items = poll_until(second, frames)
     assert frames(items)[0].sequence == 0
-    assert frames(items)[0].configuration == second.configuration != first.configuration
+    assert frames(items)[0].configuration == second.configuration.identity
+    assert second.configuration.identity != first.configuration.identity
 
 
 def test_a_long_pattern_goes_in_chunks_that_fit(clock):

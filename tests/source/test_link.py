@@ -108,7 +108,9 @@ def test_frames_behind_the_sequence_are_stale(link, board):
 @pytest.mark.parametrize("kind", ["configuration", "samples"])
 def test_foreign_frames_never_pass_and_are_said_once(link, board, kind):
     if kind == "configuration":
-        foreign = [frame_of(link, n, configuration=link.configuration ^ 1) for n in range(5)]
+        foreign = [
+            frame_of(link, n, configuration=link.configuration.identity ^ 1) for n in range(5)
+        ]
     else:
         foreign = [frame_of(link, n, samples=np.zeros(47, np.uint16)) for n in range(5)]
     board.say(frame_of(link, 0), *foreign, frame_of(link, 1), foreign[0])

@@ -146,15 +146,19 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
 
     def touches(self, host_time: float, sequence: int, touches: Sequence[Touch]) -> None:
         """Touches of the frame ``sequence``; none is worth saying when there were some before."""
-        self._document(channels.TOUCHES, host_time, touches_message(host_time, sequence, touches))
+        _put_json(
+            self._log, channels.TOUCHES, host_time, touches_message(host_time, sequence, touches)
+        )
 
     def image(
         self, host_time: float, image: Image, pixels: PixelMap, touches: Sequence[Touch] = ()
     ) -> None:
         """One image for tools that show it, with its touches; the frames give it exactly."""
         log_time = self._log.log_time(host_time)
-        self._document(channels.IMAGE, host_time, grid_message(image, pixels, host_time, log_time))
-        self._document(channels.SCENE, host_time, scene_message(touches, log_time))
+        _put_json(
+            self._log, channels.IMAGE, host_time, grid_message(image, pixels, host_time, log_time)
+        )
+        _put_json(self._log, channels.SCENE, host_time, scene_message(touches, log_time))
 
     def truth(self, host_time: float, presses: Sequence[Any], bends: Sequence[Any] = ()) -> None:
         """What presses on the twin, and how it is bent, from ``host_time`` on.
@@ -166,17 +170,17 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         content = {"host_time": host_time, "presses": [plain_values(press) for press in presses]}
         if bends:
             content["bends"] = [plain_values(bend) for bend in bends]
-        self._document(channels.TRUTH, host_time, content)
+        _put_json(self._log, channels.TRUTH, host_time, content)
 
     def event(self, event: Event) -> None:
         """Something that happened."""
         content = log_message(event, self._log.log_time(event.host_time))
-        self._document(channels.EVENTS, event.host_time, content)
+        _put_json(self._log, channels.EVENTS, event.host_time, content)
 
     def note(self, host_time: float, text: str) -> None:
         """A person's remark at ``host_time``."""
         content = log_message(Event(host_time, "note", text), self._log.log_time(host_time))
-        self._document(channels.NOTES, host_time, content)
+        _put_json(self._log, channels.NOTES, host_time, content)
 
     def device(self, host_time: float, info: Info, name: str = "") -> None:
         """What the board says that it is, and what it calls itself, if anything."""
@@ -189,15 +193,20 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         if name:
             content["name"] = name
         del content["request"]
-        self._document(channels.DEVICE, host_time, content)
+        _put_json(self._log, channels.DEVICE, host_time, content)
 
     def clock(self, host_time: float, fit: Any) -> None:
         """A fit of the device's clock to the host's: a mapping or record, see the schema."""
-        self._document(channels.CLOCK, host_time, {"host_time": host_time} | plain_values(fit))
+        _put_json(
+            self._log, channels.CLOCK, host_time, {"host_time": host_time} | plain_values(fit)
+        )
 
     def settings(self, host_time: float, settings: Mapping[str, Any]) -> None:
         """How the run was set: plain values by name."""
-        self._document(channels.SETTINGS, host_time, {"host_time": host_time} | dict(settings))
+        _put_json(
+            self._log, channels.SETTINGS, host_time, {"host_time": host_time} | dict(settings)
+        )
 
-    def _document(self, channel: int, host_time: float, content: Mapping[str, Any]) -> None:
-        self._log.put(channel, host_time, encode_json(content))
+
+def _put_json(log: Log, channel: int, host_time: float, content: Mapping[str, Any]) -> None:
+    log.put(channel, host_time, encode_json(content))

@@ -111,7 +111,10 @@ class Audience:
 
     @contextlib.contextmanager
     def watch(self, call: Callable[[], None]) -> Iterator[None]:
-        """While the block lasts, ``call`` is called at each result; after it never again."""
+        """While the block lasts, ``call`` is called from the run's thread at each result.
+
+        It must return at once. After the block it is not called again.
+        """
         with self._lock:
             self._calls.append(call)
         try:
@@ -122,7 +125,10 @@ class Audience:
 
     @contextlib.contextmanager
     def subscribe(self, name: str, call: Callable[[FrameResult], None]) -> Iterator[None]:
-        """While the block lasts, ``call`` is given each result, in a thread of its own."""
+        """While the block lasts, ``call`` is given each result, in a thread of its own.
+
+        When it is slow the oldest results are left out.
+        """
         worker = Worker(Subscriber(name, call), Capacity(MOST_WAITING, "newest", 0.0), self.say)
         worker.start()
         with self._lock:

@@ -144,7 +144,7 @@ class RobotRun:
         """While the block lasts, ``call`` is called at each result of any skin."""
         stack = ExitStack()
         for runner in self.runners.values():
-            stack.enter_context(runner.watch(call))
+            stack.enter_context(runner.audience.watch(call))
         return stack
 
     def _close_log(self) -> None:
@@ -158,7 +158,7 @@ class RobotRun:
         """What no run can see by itself."""
         begun = epoch()
         while not self._ended.wait(_OFTEN):
-            boards = {name: r.board for name, r in self.runners.items()}
+            boards = {name: r.status().board for name, r in self.runners.items()}
             ids = {name: board.unique_id.hex() for name, board in boards.items() if board}
             problems = board_problems(ids, self._boards)
             for name, text in problems.items():

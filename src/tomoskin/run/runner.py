@@ -6,9 +6,8 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from contextlib import AbstractContextManager
 
-from tomoskin.pipeline import FrameResult, Prepared
+from tomoskin.pipeline import Prepared
 from tomoskin.robot import Place
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.commands import Command, DirectCommand, Opener
@@ -24,7 +23,6 @@ from tomoskin.run.twin_control import TwinControl
 from tomoskin.signal import Reference
 from tomoskin.sink import Sink
 from tomoskin.source import Transport
-from tomoskin.wire import Info
 
 
 class Runner:
@@ -50,6 +48,9 @@ class Runner:
 
     Attributes
     ----------
+    audience
+        Who is told of each result: see :meth:`~tomoskin.run.publisher.Audience.watch` and
+        :meth:`~tomoskin.run.publisher.Audience.subscribe`; from any thread.
     events
         What happened, the newest kept.
     """
@@ -65,9 +66,9 @@ class Runner:
         turns: Turns | None = None,
         memory: BoardMemory | None = None,
     ) -> None:
-        self._audience = Audience(clock, tuple(sinks), place, turns, memory)
-        self.events = self._audience.events
-        self._loop = Loop(prepared, open_transport, self._audience)
+        self.audience = Audience(clock, tuple(sinks), place, turns, memory)
+        self.events = self.audience.events
+        self._loop = Loop(prepared, open_transport, self.audience)
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
@@ -131,30 +132,9 @@ class Runner:
         """Publish an event of this moment."""
         self._loop.flow.out.say(kind, text)
 
-    def watch(self, call: Callable[[], None]) -> AbstractContextManager[None]:
-        """While the block lasts, ``call`` is called from the run's thread at each result.
-
-        It must return at once. After the block it is not called again.
-        """
-        return self._audience.watch(call)
-
-    def subscribe(
-        self, name: str, call: Callable[[FrameResult], None]
-    ) -> AbstractContextManager[None]:
-        """While the block lasts, ``call`` is given each result, from a thread of its own.
-
-        When it is slow the oldest results are left out.
-        """
-        return self._audience.subscribe(name, call)
-
     def status(self) -> Status:
         """How it is doing now."""
         return self._loop.flow.status(self._loop.trouble)
-
-    @property
-    def board(self) -> Info | None:
-        """What the board says that it is, once it has."""
-        return self._loop.flow.board
 
     @property
     def prepared(self) -> Prepared:

@@ -10,6 +10,7 @@ from typing import TypeVar
 from tomoskin.core import DataError, WireError
 from tomoskin.formats import WRITERS, Export
 from tomoskin.recording import SessionReader
+from tomoskin.run import Runner
 from tomoskin.server.folder import SESSION, Folder, Listing
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_messages import text_of
@@ -31,13 +32,46 @@ _EVERY = 0.1
 """Seconds between two images of a picture or film."""
 
 
+class SessionUse:
+    """What each session of the folder is in use for."""
+
+    def __init__(self, runner: Runner) -> None:
+        self._runner = runner
+        self.exporting: str | None = None
+
+    @property
+    def playing(self) -> str | None:
+        """Name of the session that is being played."""
+        replay = self._runner.replay
+        return replay.path.name if replay is not None else None
+
+    @property
+    def recording(self) -> str | None:
+        """Name of the session that is being recorded."""
+        path = self._runner.status().recording
+        return path.name if path is not None else None
+
+    def check_ended(self, name: str) -> None:
+        """Raise DataError where the session is still being recorded."""
+        if name == self.recording:
+            raise DataError("is still being recorded: end the recording first", where=name)
+
+    def check_idle(self, name: str) -> None:
+        """Raise DataError where the session is in use."""
+        self.check_ended(name)
+        if name == self.playing:
+            raise DataError("is playing: go back to live first", where=name)
+        if name == self.exporting:
+            raise DataError("is being exported: wait until it has ended", where=name)
+
+
 class FileHandlers:
     """Answers about files of one folder by their names; one export at a time."""
 
     def __init__(self, hub: Hub, switch: SourceSwitch) -> None:
         self._hub, self._switch = hub, switch
         self._folder = Folder(hub.folder)
-        self._exporting: str | None = None
+        self._use = SessionUse(hub.runner)
         self._share = 0.0
         hub.serve(
             {
@@ -57,9 +91,9 @@ class FileHandlers:
                 text_of(
                     type="files",
                     **asdict(file),
-                    recording=self._recording(),
-                    playing=self._playing(),
-                    exporting=self._exporting,
+                    recording=self._use.recording,
+                    playing=self._use.playing,
+                    exporting=self._use.exporting,
                     share=self._share,
                 )
             )
@@ -68,14 +102,14 @@ class FileHandlers:
 
     def _rename(self, page: Listener, request: RenameSession) -> None:
         def work() -> str:
-            self._check_idle(request.name)
+            self._use.check_idle(request.name)
             return self._folder.rename(request.name, request.to)
 
         self._change(page, work, lambda new: f"{request.name} is now {new}")
 
     def _delete(self, page: Listener, request: DeleteSession) -> None:
         def work() -> None:
-            self._check_idle(request.name)
+            self._use.check_idle(request.name)
             self._folder.delete(request.name)
 
         self._change(page, work, lambda _: f"{request.name} is deleted")
@@ -95,14 +129,6 @@ class FileHandlers:
 
         self._hub.tasks.run(page, work, done)
 
-    def _check_idle(self, name: str) -> None:
-        """Raise DataError where the session is in use."""
-        self._check_ended(name)
-        if name == self._playing():
-            raise DataError("is playing: go back to live first", where=name)
-        if name == self._exporting:
-            raise DataError("is being exported: wait until it has ended", where=name)
-
     def _open(self, page: Listener, request: OpenSession) -> None:
         def work() -> None:
             self._switch.play(self._complete(request.name))
@@ -113,15 +139,15 @@ class FileHandlers:
         self._hub.tasks.run(page, self._switch.back, lambda _: self._hub.show())
 
     def _export(self, page: Listener, request: ExportSession) -> None:
-        if self._exporting is not None:
-            raise WireError(f"{self._exporting} is being exported: wait until it has ended")
-        self._exporting, self._share = request.name, 0.0
+        if self._use.exporting is not None:
+            raise WireError(f"{self._use.exporting} is being exported: wait until it has ended")
+        self._use.exporting, self._share = request.name, 0.0
 
         def work() -> Path:
             try:
                 return self._written(self._complete(request.name), request.format)
             finally:
-                self._exporting = None
+                self._use.exporting = None
 
         def done(path: Path) -> None:
             self._hub.tell([text_of(type="exported", name=path.name)])
@@ -141,18 +167,6 @@ class FileHandlers:
     def _advance(self, done: float, total: float) -> None:
         self._share = done / total if total else 0.0
 
-    def _check_ended(self, name: str) -> None:
-        if name == self._recording():
-            raise DataError("is still being recorded: end the recording first", where=name)
-
     def _complete(self, name: str) -> Path:
-        self._check_ended(name)
+        self._use.check_ended(name)
         return self._folder.existing(name, SESSION)
-
-    def _playing(self) -> str | None:
-        replay = self._hub.runner.replay
-        return replay.path.name if replay is not None else None
-
-    def _recording(self) -> str | None:
-        path = self._hub.runner.status().recording
-        return path.name if path is not None else None

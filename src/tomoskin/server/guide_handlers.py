@@ -88,7 +88,7 @@ class GuideHandlers:
         self._leave()
         self._flow = flow
         look = partial(self._look, flow, asyncio.get_running_loop())
-        self._watching.enter_context(self._hub.runner.subscribe("guide", look))
+        self._watching.enter_context(self._hub.runner.audience.subscribe("guide", look))
         self._tell()
 
     def _leave(self) -> None:

@@ -86,7 +86,7 @@ class Hub:
 
         async with beside(self._tick()):
             self._read_timeline()
-            with self.runner.watch(announce):
+            with self.runner.audience.watch(announce):
                 yield
 
     def join(self, page: Listener) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from tomoskin import __version__
 from tomoskin.calibration import BendReading, CalibrationHealth, ClassReading
 from tomoskin.core import Event, FloatArray, IntArray, encode_json
+from tomoskin.mesh import Plane
 from tomoskin.pipeline import Prepared
 from tomoskin.recording import Timeline
 from tomoskin.run import MAX_FORCE, Status
@@ -43,7 +44,7 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
         unit=prepared.operator.unit,
         limit=limit,
         points=flat(mesh.points),
-        solid=None if skin.is_flat else flat(skin.surface.point(mesh.points)),
+        solid=None if isinstance(skin.surface, Plane) else flat(skin.surface.point(mesh.points)),
         cells=flat(mesh.cells),
         outline=flat(skin.outline.polyline(skin.outline.length / _OUTLINE_POINTS)),
         electrodes=_electrodes(prepared),

@@ -152,11 +152,6 @@ class Skin:
         drive = self._sections.drive
         return drive.chop_frequency if drive.mode == "chopped" else 0.0
 
-    @property
-    def is_flat(self) -> bool:
-        """Whether the sheet lies flat, on no surface."""
-        return self._sections.surface.shape == "flat"
-
     @cached_property
     def electrode_centres(self) -> FloatArray:
         """(n, 2) middle of each electrode on the rim, m."""

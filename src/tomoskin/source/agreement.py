@@ -71,6 +71,28 @@ class LineQuality:
         self._messages, self._corrupt = counters.messages, counters.corrupt
 
 
+class RateFollower:
+    """Follows the board to another rate; asks for a slower one on a bad line."""
+
+    def __init__(self, transport: Rated) -> None:
+        self._transport, self._first = transport, transport.rate
+        self._quality = LineQuality()
+
+    def follow(self, rate: int | None, *, silent: bool) -> None:
+        """Use the ``rate`` that the board has changed to, or its first when it is ``silent``."""
+        if silent and self._transport.rate != self._first:
+            rate = self._first  # what a board that was reset speaks
+        if rate is not None:
+            self._transport.use_rate(rate)
+
+    def slower(self, counters: Counters, *, running: bool) -> int | None:
+        """The rate to set the board up at, where this one damages too much; else None."""
+        if not running:
+            self._quality.forget(counters)
+            return None
+        return self._quality.slower(counters, self._transport.rate)
+
+
 _UPDATE_BOARD = "flash the firmware of this tomoskin: tomoskin firmware flash"
 _UPDATE_HOST = "update tomoskin on this computer, or flash an older firmware"
 

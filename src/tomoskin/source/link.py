@@ -5,23 +5,23 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
-from types import TracebackType
-from typing import Self
+from contextlib import AbstractContextManager
 
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.pattern import Scan
-from tomoskin.source.agreement import LineQuality, Rated
+from tomoskin.source.agreement import Rated, RateFollower
 from tomoskin.source.command_queue import FrameCounters
+from tomoskin.source.configuration import Configuration
 from tomoskin.source.protocol_session import ProtocolSession, Stage
 from tomoskin.source.settings import ScanSettings, Timing
 from tomoskin.source.transport import Diagnosable, Fetched, Played, Transport
-from tomoskin.wire import Ack, Counters, Decoder, Info, SetMode
+from tomoskin.wire import Ack, Counters, Decoder, Info
 
 _HEARD = 256
 """So many of the first bytes tell what speaks where no board does."""
 
 
-class Link:
+class Link(AbstractContextManager["Link"]):
     """Sets a board up for a scan and passes its frames on.
 
     Everything happens in :meth:`poll`; leaving the ``with`` block, or :meth:`close`, stops the
@@ -54,10 +54,8 @@ class Link:
         self._tap = tap
         self._timing = timing or Timing()
         self._decoder = Decoder()
-        self._quality = LineQuality()
         self._fetched = transport if isinstance(transport, Fetched) else None
-        self._rated = transport if isinstance(transport, Rated) else None
-        self._first_rate = self._rated.rate if self._rated else 0
+        self._rate = RateFollower(transport) if isinstance(transport, Rated) else None
         self._session = ProtocolSession(scan, settings, self._timing, self._clock(), transport.name)
         self._closed = False
         self._heard = b""
@@ -79,14 +77,9 @@ class Link:
         return self._session.board.text if self._session.board else ""
 
     @property
-    def mode(self) -> SetMode | None:
-        """The alternating drive as it was set on the board; None where the drive is direct."""
-        return self._session.mode
-
-    @property
-    def configuration(self) -> int:
-        """Identity of this scan's configuration."""
-        return self._session.configuration.identity
+    def configuration(self) -> Configuration:
+        """What this scan asks of the board, fitted to the board once that is known."""
+        return self._session.configuration
 
     @property
     def waited(self) -> float:
@@ -155,16 +148,7 @@ class Link:
                     if isinstance(message, Ack) and message.request == request:
                         return
 
-    def __enter__(self) -> Self:
-        """The link itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close."""
         self.close()
 
@@ -181,25 +165,12 @@ class Link:
         items = []
         for message in self._decoder.feed(data, now):
             items += self._session.receive(message, now)
-        items += self._follow_rate(now)
+        if self._rate:
+            self._rate.follow(self._session.take_rate(), silent=self._session.is_silent)
+            slower = self._rate.slower(self.counters, running=self.running)
+            items += [] if slower is None else [self._session.fall_back(slower, now)]
         self._flush()
         return items
-
-    def _follow_rate(self, now: float) -> list[Event]:
-        """Follow the board to another rate; fall back to a slower one on a bad line."""
-        transport = self._rated
-        if transport is None:
-            return []
-        rate = self._session.take_rate()
-        if self._session.is_silent and transport.rate != self._first_rate:
-            rate = self._first_rate  # what a board that was reset speaks
-        if rate is not None:
-            transport.use_rate(rate)
-        if not self.running:
-            self._quality.forget(self.counters)
-            return []
-        slower = self._quality.slower(self.counters, transport.rate)
-        return [] if slower is None else [self._session.fall_back(slower, now)]
 
     def _flush(self) -> None:
         data = self._session.commands.take()

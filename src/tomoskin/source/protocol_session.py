@@ -33,7 +33,6 @@ from tomoskin.wire import (
     Ping,
     Result,
     SetBaud,
-    SetMode,
     Stop,
     type_byte,
 )
@@ -62,6 +61,8 @@ class ProtocolSession:
 
     Attributes
     ----------
+    configuration
+        What the scan asks of the board, fitted to the board once that is known.
     commands
         What is to be sent to the board.
     frames
@@ -85,7 +86,7 @@ class ProtocolSession:
     ) -> None:
         """A session that has not begun."""
         self._scan, self._settings, self._timing, self._where = scan, settings, timing, where
-        self.configuration = self._on_board = Configuration.of(scan, settings)
+        self.configuration = Configuration.of(scan, settings)
         self.frames = SequenceFilter(self.configuration)
         self.commands = CommandQueue(timing, now, where)
         self.stage = Stage.WAITING
@@ -98,11 +99,6 @@ class ProtocolSession:
         self._since = self._last_frame = now
         self._resets = 0
         self._rate: int | None = None
-
-    @property
-    def mode(self) -> SetMode | None:
-        """What sets the alternating drive on this board; None where the drive is direct."""
-        return self._on_board.mode
 
     def take_rate(self) -> int | None:
         """The serial rate that the board has just changed to, once."""
@@ -225,9 +221,10 @@ class ProtocolSession:
         if isinstance(pending, GetInfo) and info.request == pending.request:
             check_version(info, self._where)
             fitted = fit_board(info, self._scan, self._settings, self._where)
-            self._on_board = self.configuration.on_board(fitted)
-            if info.minor < BOARDS_SINCE:
-                self._set(info)
+            self.configuration = self.configuration.on_board(fitted)
+            if info.minor < BOARDS_SINCE:  # that is all that it says of itself
+                self.info = info
+                self.commands.add(self.configuration.commands(info.minor))
             else:
                 self._met = info, fitted
                 self.commands.add((GetBoard(0),))
@@ -241,21 +238,16 @@ class ProtocolSession:
         info, fitted = self._met
         channels = int(np.bincount(self._scan.sample_drive).max())
         periods = choose_periods(board, fitted, channels, info.tick_rate, self._where)
-        self._on_board = self._on_board.with_periods(periods)
-        self.board = board
-        self._set(info)
+        self.configuration = self.configuration.with_periods(periods)
+        self.info, self.board = info, board
+        self.commands.add(self.configuration.commands(info.minor))
         self._answered(now)
-
-    def _set(self, info: Info) -> None:
-        """The board has said all that is asked of it: what sets it."""
-        self.info = info
-        self.commands.add(self._on_board.commands(info.minor))
 
     def _held(self, held: HeldScan | HeldPattern | HeldMode, now: float) -> list[Frame | Event]:
         pending = self.commands.pending
         if not isinstance(pending, _ANSWERED[type(held)]) or held.request != pending.request:
             return []
-        check_held(held, self._on_board.behind(pending), self._where)
+        check_held(held, self.configuration.behind(pending), self._where)
         return self._answered(now)
 
     def _ack(self, ack: Ack, now: float) -> list[Frame | Event]:
