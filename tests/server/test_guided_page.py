@@ -184,9 +184,11 @@ def test_a_rubbed_skin_is_learnt_and_used(rubbed, folder):
     opened.page.wait_for_function(
         "() => !document.querySelector('[data-testid=flow-learn]').disabled"
     )
-    covered = "[data-testid=covered] circle"
-    assert (
-        opened.page.locator(f"{covered}.full").count() > 0.7 * opened.page.locator(covered).count()
+    opened.page.wait_for_function(  # the map goes on to fill while the rubbing goes on
+        """() => {
+            const all = [...document.querySelectorAll('[data-testid=covered] circle')];
+            return all.filter(c => c.classList.contains('full')).length > 0.7 * all.length;
+        }"""
     )
     opened.test_id("flow-learn").click()
     opened.test_id("flow-stop").click()

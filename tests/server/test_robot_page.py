@@ -105,6 +105,7 @@ def pressed(run, twins):
     Watch(run).until(lambda: run.runners["right"].newest.result.touches)
     yield
     twins["right"].set_presses(())
+    Watch(run).until(lambda: not run.runners["right"].newest.result.touches)
 
 
 def test_touches_are_told_in_the_frame_of_the_robot(site, pressed):
