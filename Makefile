@@ -1,15 +1,16 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: set-up together checks programs style types page-check page-test engine-check help soak live test test-all firmware-test fuzz bench bench-docs docs board gallery lint lock native wheel release clean page dev
+.PHONY: set-up together checks programs style types page-check page-test engine-check help soak live test test-all suite firmware-test fuzz bench bench-docs docs board gallery lint lock native wheel release clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check --quiet
 # uv installs in a tenth of pip's time; where it cannot (a mirror that only pip knows), pip does.
 PINNED := scripts/install.sh $(PY)
-# As many processes as cores; a file's tests stay together, since they share what they set up.
-PYTEST := $(PY) -m pytest -n auto --maxprocesses 8 --dist loadfile
+# Two processes a core, for tests wait half of their time: for a clock, a browser, a board. A file's
+# tests stay together, since they share what they set up.
+PYTEST := $(PY) -m pytest -n $$(expr 2 \* $$(getconf _NPROCESSORS_ONLN)) --maxprocesses 8 --dist loadfile
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1	/p' Makefile
@@ -24,12 +25,14 @@ together: $(VENV)/.uv  # two cores have two things to do: Python packages and th
 	@$(MAKE) --no-print-directory $(VENV)/.installed
 
 test: set-up  ## lint, documentation, page tests and the test suite, without what is slow
-	@$(MAKE) --no-print-directory -j2 --output-sync=target checks programs
-	@$(PYTEST) $(ARGS)
+	@$(MAKE) --no-print-directory -j3 --output-sync=target checks suite
 
 test-all: set-up  ## the same, with what is slow
-	@$(MAKE) --no-print-directory -j2 --output-sync=target checks programs
-	@$(PYTEST) -m "" $(ARGS)
+	@$(MAKE) --no-print-directory -j3 --output-sync=target checks suite MARKED='-m ""'
+
+# The plus keeps make from holding its output back until the end.
+suite: programs native page
+	+@$(PYTEST) $(MARKED) $(ARGS)
 
 firmware-test: dev  ## the firmware alone: GoogleTest, mutants, host build, emulator
 	@sh scripts/firmware.sh
@@ -88,7 +91,7 @@ programs: $(VENV)/.dev
 
 set-up: together dev $(VENV)/.docs
 	@mkdir -p build && rm -f build/left-out.txt
-	@echo "checks: style, types, page, documentation, native engine, side by side; two to four minutes"
+	@echo "checks and tests, side by side: style, types, page, documentation, native engine, test suite"
 
 native: dev  ## the native engine, where Rust is installed; live runs without
 	@MAKEFLAGS= $(PY) scripts/native.py
