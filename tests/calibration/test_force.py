@@ -94,6 +94,23 @@ def test_the_memory_is_what_makes_loading_and_unloading_agree():
     assert abs(np.mean(loop) - 1) < 0.1 < np.mean(alone) - 1
 
 
+def test_a_press_that_is_held_for_an_hour_keeps_its_force():
+    law = MaterialMemory((0.25,), (0.04,), creep=(0.04, 0.03), creep_times=(1.0, 30.0))
+    rng, touches, forces, number = np.random.default_rng(3), [], [], []
+    for k, top in enumerate(np.geomspace(2.0, 20.0, 20)):
+        more, known = press(rng, float(top), LOOP, law)
+        touches, forces, number = touches + more, forces + known, number + [k] * len(more)
+    times = 0.5 * np.arange(len(touches))
+    model = ForceModel.learn(WeighedPresses.of(touches, forces, number, times), SHEET, UNIT)
+    held, state, spots, now = [], MemoryState.fresh(law), None, 0.0
+    for seconds in (0.5, 60.0, 600.0, 3000.0):
+        state = advanced(state, law, np.array([[0.4 * 8.0 / 13.0]]), seconds)
+        now += seconds
+        (force,), spots = model.read(spots, [touch(0.0, 0.0, response(state, law)[0])], now)
+        held.append(force.newtons)
+    assert held == pytest.approx([held[0]] * 4, rel=0.1)
+
+
 def test_reading_is_pure_and_a_spot_goes_on_where_it_was():
     model, rng = learnt(), np.random.default_rng(6)
     touches, _ = press(rng, 8.0)

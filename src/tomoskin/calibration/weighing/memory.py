@@ -15,7 +15,7 @@ from tomoskin.skin import MaterialMemory, MemoryState, load_of
 _PARTS, _WIDTHS = (0.2, 0.4), (0.1, 0.2, 0.4)
 """Plays that are averaged over, beside none: parts, and half widths over the usual depth."""
 
-_FAST, _SLOW = (0.0, 0.03, 0.06, 0.12), (0.0, 0.02, 0.04)
+_FAST, _SLOW = (0.0, 0.03, 0.06, 0.12), (0.0, 0.01, 0.02)
 _TIMES = (1.0, 10.0, 100.0)
 """Creep that is averaged over: the part that comes within a second, and that of each further decade
 of time, s. Materials creep for minutes; presses of a second or two cannot tell how much."""
