@@ -64,8 +64,8 @@ class Shown:
 class Scale:
     """A twin whose presses are weighed; each begins on a sheet that nothing has touched."""
 
-    def __init__(self, seed: int, radii: Sequence[float]) -> None:
-        self.lab = Lab(SKIN, "textile", seed)
+    def __init__(self, seed: int, radii: Sequence[float], skin: str = SKIN) -> None:
+        self.lab = Lab(skin, "textile", seed)
         self.random = np.random.default_rng(seed)
         self.radii = radii
         self.finder = self.lab.by_fit()
@@ -139,7 +139,8 @@ class Weighed:
         return float(np.nanstd(np.nanmean(self.ratio, axis=1)))
 
 
-def _model(scale: Scale) -> ForceModel:
+def calibrated(scale: Scale) -> ForceModel:
+    """Learnt from labelled presses."""
     tops = LIGHT + (HEAVY - LIGHT) * (np.arange(LABELLED) * 0.618 % 1)
     shown = [
         one
@@ -175,7 +176,7 @@ def _twin() -> tuple[Report, Report]:
     ones, twos, left_out = [], [], []
     for seed, radius in zip(SEEDS, TIPS, strict=True):
         scale = Scale(seed, (radius,))
-        model = _model(scale)
+        model = calibrated(scale)
         left_out.append(float(np.abs(model.errors).mean()))
         ones.append(_weighed(scale, model, 1, HELD_OUT))
         twos.append(_weighed(scale, model, 2, PAIRS))

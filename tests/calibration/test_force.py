@@ -1,11 +1,21 @@
 """Newtons from presses with known weights: synthetic touches of a law that is known."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from tomoskin.calibration import FORCE, ForceModel, ForceProcess, WeighedPresses, identify
+from tomoskin.calibration import (
+    BENDS,
+    CLASSES,
+    FORCE,
+    TOUCH,
+    ForceModel,
+    ForceProcess,
+    WeighedPresses,
+    identify,
+)
 from tomoskin.core import DataError, Detection
 from tomoskin.skin import MaterialMemory, MemoryState, Skin, advanced, response, responses
 
@@ -84,6 +94,23 @@ def test_the_memory_is_what_makes_loading_and_unloading_agree():
     assert abs(np.mean(loop) - 1) < 0.1 < np.mean(alone) - 1
 
 
+def test_a_press_that_is_held_for_an_hour_keeps_its_force():
+    law = MaterialMemory((0.25,), (0.04,), creep=(0.04, 0.03), creep_times=(1.0, 30.0))
+    rng, touches, forces, number = np.random.default_rng(3), [], [], []
+    for k, top in enumerate(np.geomspace(2.0, 20.0, 20)):
+        more, known = press(rng, float(top), LOOP, law)
+        touches, forces, number = touches + more, forces + known, number + [k] * len(more)
+    times = 0.5 * np.arange(len(touches))
+    model = ForceModel.learn(WeighedPresses.of(touches, forces, number, times), SHEET, UNIT)
+    held, state, spots, now = [], MemoryState.fresh(law), None, 0.0
+    for seconds in (0.5, 60.0, 600.0, 3000.0):
+        state = advanced(state, law, np.array([[0.4 * 8.0 / 13.0]]), seconds)
+        now += seconds
+        (force,), spots = model.read(spots, [touch(0.0, 0.0, response(state, law)[0])], now)
+        held.append(force.newtons)
+    assert held == pytest.approx([held[0]] * 4, rel=0.1)
+
+
 def test_reading_is_pure_and_a_spot_goes_on_where_it_was():
     model, rng = learnt(), np.random.default_rng(6)
     touches, _ = press(rng, 8.0)
@@ -96,7 +123,7 @@ def test_reading_is_pure_and_a_spot_goes_on_where_it_was():
     assert len(released) == 1
     assert released.memory.lagging[0, 0, 0] > 0  # what the press left there
     forces, both = model.read(state, [touches[3], touch(-0.05, 0.05, 0.2)], 0.5)
-    assert forces[0] == first[0][0]
+    assert forces[0].newtons == pytest.approx(first[0][0].newtons, rel=1e-12)
     assert len(both) == 2
 
 
@@ -130,6 +157,18 @@ def test_the_calibration_of_another_skin_is_refused():
         calibration.check(skin.altered({"touch": {"method": other}}))
     with pytest.raises(DataError, match="to another sheet"):
         calibration.check(skin.altered({"material": {"sheet_resistance": "7 ohm/sq"}}))
+
+
+def test_beside_a_calibration_of_touch_no_touches_are_fitted():
+    skin = Skin.load("textile-disc-8")
+    model = ForceModel.fit(WeighedPresses.of(*presses(2, count=6)), skin)
+    calibration = FORCE.of(model, skin.pattern(), skin)
+    calibration.check(skin, [BENDS, CLASSES])
+    with pytest.raises(DataError, match="forces would be wrong") as raised:
+        calibration.check(skin, [BENDS, TOUCH])
+    assert "use one of the two" in str(raised.value)
+    in_image = FORCE.of(replace(model, method="image"), skin.pattern(), skin)
+    in_image.check(skin.altered({"touch": {"method": "image"}}), [TOUCH])
 
 
 def test_grams_are_not_newtons():

@@ -1,4 +1,4 @@
-"""The examples on soft bodies make their figures; their checks hold, and fail on wrong data."""
+"""The examples on other models make their figures; their checks hold, and fail on wrong data."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from tomoskin.mesh import simplex_measure
 
-BODIES = ["fig62_palpation", "fig64_chopped", "fig64_face", "soft_volume"]
+BODIES = ["fig62_palpation", "fig64_chopped", "fig64_face", "newtons", "soft_volume"]
 
 
 @pytest.mark.slow

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tomoskin.core import DataError, ModelError, SkinError
+from tomoskin.calibration import FORCE, Calibration, ForceModel, WeighedPresses
+from tomoskin.core import DataError, Detection, ModelError, SkinError
 from tomoskin.forward import ForwardModel
 from tomoskin.inverse import Evidence, Greit, OneStep
 from tomoskin.mesh import Mesh
@@ -56,3 +57,20 @@ def test_a_rule_cannot_choose_the_alpha_of_a_method_without_one() -> None:
         tuned_by_rule(prepared, "gcv", Evidence())
     with pytest.raises(SkinError, match=r"needs method"):
         prepared.skin.altered({"inverse": {"alpha": 0.1}})
+
+
+def test_calibrations_that_cannot_serve_together_or_with_new_settings_are_refused() -> None:
+    weighed = WeighedPresses.of(
+        [Detection(0.01 * n, 0.0, 1e-3, 1e-3, 4e-4, -0.01 * n, np.empty(0)) for n in range(1, 7)],
+        np.arange(1.0, 7.0), np.arange(6), np.arange(6.0),
+    )  # fmt: skip
+    forces = FORCE.of(ForceModel.fit(weighed, PREPARED.skin), PREPARED.pattern, PREPARED.skin)
+    locating = replace(FORCE, name="places", locates=True, check=None, check_beside=None)
+    places = Calibration(locating, forces.model, PREPARED.pattern)
+    for first, second in ((forces, places), (places, forces)):
+        with pytest.raises(DataError, match="the forces would be wrong"):
+            PREPARED.calibrated(first).calibrated(second)
+    weighing = PREPARED.calibrated(forces)
+    assert prepare(PREPARED.skin.altered({"inverse": {"alpha": 0.2}}), weighing).calibrations
+    with pytest.raises(DataError, match="touches found by"):
+        prepare(PREPARED.skin.altered({"touch": {"method": "image"}}), weighing)

@@ -9,6 +9,7 @@ Keys of the .npz: ``kind``, ``version``; of n touches in the order of time ``xy_
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -112,6 +113,17 @@ def _check(calibration: Calibration[ForceModel], skin: Skin) -> None:
         raise calibration.mismatch("sheet", skin)
 
 
+def _check_beside(calibration: Calibration[ForceModel], other: Kind[Any]) -> None:
+    """Beside a kind that locates touches none are fitted: peaks and areas are others."""
+    if other.locates and calibration.model.method == "fit":
+        raise DataError(
+            f"the calibration of forces needs fitted touches, but the calibration of "
+            f"{other.subject} finds them in the image: the forces would be wrong",
+            hint=f"use one of the two: leave out the calibration of {other.subject}, or that of "
+            "forces",
+        )
+
+
 def _exclude(model: ForceModel, _measurements: IntArray) -> ForceModel:
     """Touches found without some measurements are touches all the same."""
     return model
@@ -132,6 +144,7 @@ FORCE = Kind(
     pack=_pack,
     unpack=_unpack,
     check=_check,
+    check_beside=_check_beside,
     exclude=_exclude,
     apply=_apply,
     skin_id=lambda model: model.skin_id,

@@ -7,7 +7,7 @@ module that makes a :class:`Kind` and stands in :data:`tomoskin.calibration.KIND
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, Self, TypeVar
@@ -172,6 +172,9 @@ class Kind(Generic[M]):
     check
         Raises DataError where a calibration cannot serve a skin of its own scan; None where it
         always can.
+    check_beside
+        Raises DataError where a calibration cannot serve beside one of that other kind; None where
+        it always can.
     directions
         Model → (n_meas, k) V along which what it reads moves the data: images do without them.
         None where it reads nothing of that sort.
@@ -196,6 +199,7 @@ class Kind(Generic[M]):
     apply: Callable[[M, Conditions], Applied]
     skin_id: Callable[[M], str]
     check: Callable[[Calibration[M], Skin], None] | None = None
+    check_beside: Callable[[Calibration[M], Kind[Any]], None] | None = None
     directions: Callable[[M], FloatArray] | None = None
     locates: bool = False
     fits: bool = False
@@ -263,12 +267,18 @@ class Calibration(Generic[M]):
         """The same file's bytes, for a session that holds it."""
         return pack_arrays(self._arrays())
 
-    def check(self, skin: Skin) -> None:
-        """Raise DataError where it cannot serve ``skin``: of another scan, or as its kind says."""
+    def check(self, skin: Skin, beside: Iterable[Kind[Any]] = ()) -> None:
+        """Raise DataError where it cannot serve ``skin``: of another scan, or as its kind says.
+
+        ``beside``: kinds of the other calibrations in use.
+        """
         if skin.pattern().identity != self.pattern.identity:
             raise self.mismatch("scan", skin)
         if self.kind.check is not None:
             self.kind.check(self, skin)
+        if self.kind.check_beside is not None:
+            for other in beside:
+                self.kind.check_beside(self, other)
 
     def check_skin(self, skin: Skin) -> None:
         """Raise DataError where it was learnt on another skin, or on other settings of it."""

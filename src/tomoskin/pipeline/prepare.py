@@ -89,10 +89,11 @@ class Prepared:
     def calibrated(self, calibration: Calibration[Any]) -> Prepared:
         """With a calibration, in place of an earlier one of its kind.
 
-        Raises DataError where it is not of this skin.
+        Raises DataError where it is not of this skin, or where two cannot serve together.
         """
-        calibration.check(self.skin)
-        return self._with({**self.calibrations, calibration.kind.name: calibration})
+        together = {**self.calibrations, calibration.kind.name: calibration}
+        _check_together(together, self.skin)
+        return self._with(together)
 
     def uncalibrated(self, kind: Kind[Any]) -> Prepared:
         """Without a calibration of that kind."""
@@ -194,9 +195,11 @@ def prepare(skin: Skin, previous: Prepared | None = None) -> Prepared:
     Raises
     ------
     TomoskinError
-        When the skin cannot be meshed, modelled or inverted; the message says which.
+        When the skin cannot be meshed, modelled or inverted, or a calibration cannot serve it any
+        more; the message says which.
     """
     if previous is not None and previous.skin.body == skin.body:
+        _check_together(previous.calibrations, skin)
         return _prepared(skin, _problem_after(previous, skin), previous)
     reach("mesh")
     mesh = skin.mesh()
@@ -282,6 +285,11 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
         spots=spots,
         calibrations=calibrations,
     )
+
+
+def _check_together(calibrations: Mapping[str, Calibration[Any]], skin: Skin) -> None:
+    for name, one in calibrations.items():
+        one.check(skin, [other.kind for k, other in calibrations.items() if k != name])
 
 
 def _fits(skin: Skin, calibrations: Mapping[str, Calibration[Any]]) -> bool:

@@ -20,14 +20,15 @@ from scipy.linalg import cho_factor, cho_solve
 
 from tomoskin.core import FloatArray
 
-_HALF = np.geomspace(0.03, 300.0, 17)
+_HALF = np.geomspace(0.02, 50.0, 41)
 """F₀ over the median force of the labels."""
 
 _NOISE = np.geomspace(0.01, 0.6, 9)
 """Deviations of log u about the curve."""
 
-_LEVEL, _SLOPE, _RADIUS = 3.0, 0.3, 0.7
-"""Prior deviations of β: of the level, of each term of the position, and of log radius."""
+_LEVEL, _SLOPE, _RADIUS, _OUTWARD = 3.0, 0.3, 0.7, 1.0
+"""Prior deviations of β: of the level, of each term of the position, of log radius, and of how that
+changes towards the rim. Noise moves radius and depth together, in the middle less than outside."""
 
 _WIDER = 1.25
 """The prior of log F is so many times as wide as the labels are."""
@@ -41,18 +42,19 @@ _LEVELS = np.array([0.5, 0.05, 0.95])
 
 
 def basis(xy: FloatArray, radius: FloatArray, unit: float) -> FloatArray:
-    """(n, 5) terms of a touch at ``xy`` (n, 2) over ``unit`` m, of log ``radius`` (n,) beside the
+    """(n, 6) terms of a touch at ``xy`` (n, 2) over ``unit`` m, of log ``radius`` (n,) beside the
     usual."""
-    terms = np.empty((len(xy), 5))
+    terms = np.empty((len(xy), 6))
     x, y = terms[:, 1:3].T
     np.divide(xy, unit, out=terms[:, 1:3])
     terms[:, 0] = 1.0
     terms[:, 3] = x * x + y * y - 0.5
     terms[:, 4] = radius
+    terms[:, 5] = radius * terms[:, 3]
     return terms
 
 
-_PRIOR = np.array([_LEVEL, _SLOPE, _SLOPE, _SLOPE, _RADIUS]) ** 2
+_PRIOR = np.array([_LEVEL, _SLOPE, _SLOPE, _SLOPE, _RADIUS, _OUTWARD]) ** 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,7 @@ class ForceCurve:
     weight
         (g,) of each, 1 together.
     mean, covariance
-        (g, 5), (g, 5, 5) of β.
+        (g, 6), (g, 6, 6) of β.
     evidence
         Log marginal likelihood of the labelled touches.
     log_force
@@ -83,7 +85,7 @@ class ForceCurve:
 
     @classmethod
     def of(cls, terms: FloatArray, depth: FloatArray, force: FloatArray) -> ForceCurve:
-        """Learn from ``terms`` (n, 5), ``depth`` u (n,) and ``force`` (n,) N, all above 0."""
+        """Learn from ``terms`` (n, 6), ``depth`` u (n,) and ``force`` (n,) N, all above 0."""
         half = _HALF * float(np.median(force))
         level = np.log(depth)[:, None] - np.log(force[:, None] / (force[:, None] + half))
         members = [_members(terms, level, noise) for noise in _NOISE]
@@ -113,7 +115,7 @@ class ForceCurve:
         Parameters
         ----------
         terms, depth, sd
-            (n, 5); u (n,); its relative deviation (n,) beyond the labelled touches'.
+            (n, 6); u (n,); its relative deviation (n,) beyond the labelled touches'.
         """
         grid, prior, curves = self._tabulated
         level = terms @ self.mean.T
@@ -147,7 +149,7 @@ class ForceCurve:
 def _members(
     terms: FloatArray, level: FloatArray, noise: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Means (h, 5) and one covariance (5, 5) of β where each column of ``level`` (n, h) is
+    """Means (h, 6) and one covariance (6, 6) of β where each column of ``level`` (n, h) is
     ``terms`` β + noise; evidence (h,)."""
     n = len(level)
     carried = terms * _PRIOR

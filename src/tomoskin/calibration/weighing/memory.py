@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -16,13 +15,15 @@ from tomoskin.skin import MaterialMemory, MemoryState, load_of
 _PARTS, _WIDTHS = (0.2, 0.4), (0.1, 0.2, 0.4)
 """Plays that are averaged over, beside none: parts, and half widths over the usual depth."""
 
-_LATE, _TIMES = (0.1, 0.2), (1.0, 3.0, 10.0)
-"""Creep that is averaged over, beside none: parts, and time constants, s."""
+_FAST, _SLOW = (0.0, 0.03, 0.06, 0.12), (0.0, 0.01, 0.02)
+_TIMES = (1.0, 10.0, 100.0)
+"""Creep that is averaged over: the part that comes within a second, and that of each further decade
+of time, s. Materials creep for minutes; presses of a second or two cannot tell how much."""
 
 SHALLOW = 1e-3
 """Depth, over the usual one, below which a touch is not told from none."""
 
-_WEIGHTLESS = 1e-3
+_SMALL = 1e-3
 """A part below this one of the whole response is left out."""
 
 _STEP = 1e-3
@@ -52,31 +53,31 @@ def averaged_memory(
     A response is linear in the parts, so that the mean of memories is a memory.
     """
     rows, press, time = presses.labelled, presses.press, presses.time
-    plays = [(), *product(_PARTS, [width * usual for width in _WIDTHS])]
-    creeps = [(), *product(_LATE, _TIMES)]
+    widths = tuple(width * usual for width in _WIDTHS)
+    alone = np.eye(len(widths))
+    plays = np.vstack([0 * alone[:1], *(part * alone for part in _PARTS)])
+    creeps = np.array([(fast, slow, slow) for fast in _FAST for slow in _SLOW])
     tried, evidence = list(product(plays, creeps)), []
     for play, creep in tried:
-        memory = MaterialMemory(
-            play=play[:1], play_widths=play[1:], creep=creep[:1], creep_times=creep[1:]
-        )
+        memory = _memory(play, widths, creep)
         both = without_memory(memory, depth[:, None] * (1, 1 + _STEP), press, time)
         free, more = np.maximum(both, SHALLOW * usual).T
         slope = np.maximum(more - free, 1e-6 * free) / (_STEP * free)
         curve = ForceCurve.of(terms[rows], free[rows], presses.force[rows])
         evidence.append(curve.evidence + float(np.log(slope[rows]).sum()))
-    weight = softmax(evidence)
-    play, play_widths = _mean_parts([play for play, _ in tried], weight)
-    creep, creep_times = _mean_parts([creep for _, creep in tried], weight)
-    return MaterialMemory(play, play_widths, creep, creep_times)
+    weight = softmax(evidence).reshape(len(plays), len(creeps))
+    return _memory(weight.sum(axis=1) @ plays, widths, weight.sum(axis=0) @ creeps)
 
 
-def _mean_parts(
-    pairs: Sequence[tuple[float, ...]], weight: FloatArray
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Mean parts by size, and the sizes, of ``pairs`` of a part and its size, or of nothing."""
-    parts: dict[float, float] = {}
-    for pair, share in zip(pairs, weight.tolist(), strict=True):
-        if pair:
-            parts[pair[1]] = parts.get(pair[1], 0.0) + share * pair[0]
-    counts = {size: part for size, part in parts.items() if part > _WEIGHTLESS}
-    return tuple(counts.values()), tuple(counts)
+def _memory(play: FloatArray, widths: tuple[float, ...], creep: FloatArray) -> MaterialMemory:
+    """Of parts ``play`` with ``widths`` and ``creep`` with its times; small parts are left out."""
+    plays, creeps = (
+        [(part, size) for part, size in zip(parts.tolist(), sizes, strict=True) if part > _SMALL]
+        for parts, sizes in ((play, widths), (creep, _TIMES))
+    )
+    return MaterialMemory(
+        play=tuple(part for part, _ in plays),
+        play_widths=tuple(width for _, width in plays),
+        creep=tuple(part for part, _ in creeps),
+        creep_times=tuple(time for _, time in creeps),
+    )

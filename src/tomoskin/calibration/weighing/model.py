@@ -20,7 +20,9 @@ from tomoskin.touch import Region
 _DEEPEST = 0.999
 """Part of the conductivity that a touch may take away: all of it has no logarithm."""
 
-_SCALES = (0.8, 1.6)
+_SCALES = (1.0, 1.6)
+"""By which intervals are widened; never narrowed, since the labels of a press go together."""
+
 _LONELY = 0.15
 """Presses within so many radii of the skin are of one spot."""
 
