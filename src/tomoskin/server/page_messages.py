@@ -4,7 +4,6 @@ frames: ``server/frames.py``."""
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import asdict
 from typing import Any
 
@@ -24,7 +23,6 @@ PROBE_RADIUS = 0.015
 PROBE_FORCE = 3.0
 """Its force, N."""
 
-_ELECTRODE = re.compile(r"\belectrode (\d+)\b(?: \(E\d+\))?")
 
 _OUTLINE_POINTS = 240
 
@@ -97,7 +95,7 @@ def state(status: Status) -> str:
         sinks=status.sinks,
         replay=status.replay,
         **readings(status),
-        problem=status.problem and as_on_bench(status.problem),
+        problem=status.problem,
         text=status.text,
     )
 
@@ -154,12 +152,12 @@ def _calibration(now: CalibrationHealth | None) -> dict[str, Any] | None:
     return {
         "well": now.well,
         "broken": now.broken,
-        "findings": [as_on_bench(text) for text in now.findings],
+        "findings": list(now.findings),
     }
 
 
 def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{as_on_bench(text[1:])}."
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
@@ -173,9 +171,7 @@ def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
 
 def event(happened: Event) -> str:
     """Something that a person should know."""
-    return text_of(
-        type="event", time_s=happened.host_time, kind=happened.kind, text=as_on_bench(happened.text)
-    )
+    return text_of(type="event", time_s=happened.host_time, kind=happened.kind, text=happened.text)
 
 
 def timeline(line: Timeline) -> str:
@@ -196,12 +192,7 @@ def timeline(line: Timeline) -> str:
 
 def error(message: str) -> str:
     """Answer to a request that was not understood."""
-    return text_of(type="error", message=as_on_bench(message))
-
-
-def as_on_bench(message: str) -> str:
-    """``message`` with electrodes as people call them: "electrode 3", counted from 0, is E4."""
-    return _ELECTRODE.sub(lambda found: f"E{int(found[1]) + 1}", message)
+    return text_of(type="error", message=message)
 
 
 def _electrodes(prepared: Prepared) -> list[dict[str, Any]]:

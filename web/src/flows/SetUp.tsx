@@ -14,7 +14,7 @@ import { Weigh } from "./Weigh";
 type Step = "board" | "wiring" | "touch" | "force";
 const STEPS: readonly (readonly [Step, string])[] = [
   ["board", "1 Board"],
-  ["wiring", "2 Wiring"],
+  ["wiring", "2 Channel mapping"],
   ["touch", "3 Touch"],
   ["force", "4 Force"],
 ];
@@ -253,7 +253,7 @@ function View() {
   );
 }
 
-addDrawer({ id: "setup", label: "Set up", key: "U", title: "Board, reference, wiring, touch, force", View });
+addDrawer({ id: "setup", label: "Set up", key: "U", title: "Board, reference, channel mapping, touch, force", View });
 
 const OFTEN = 2000;
 let timer = 0;
