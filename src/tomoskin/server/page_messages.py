@@ -12,7 +12,7 @@ import numpy as np
 from tomoskin import __version__
 from tomoskin.calibration import BendReading, CalibrationHealth, ClassReading
 from tomoskin.core import Event, FloatArray, IntArray, encode_json
-from tomoskin.pipeline import Prepared
+from tomoskin.pipeline import Prepared, Unresolved
 from tomoskin.recording import Timeline
 from tomoskin.run import MAX_FORCE, Status
 from tomoskin.signal import BaselineState, ElectrodeHealth
@@ -172,6 +172,17 @@ def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
 def event(happened: Event) -> str:
     """Something that a person should know."""
     return text_of(type="event", time_s=happened.host_time, kind=happened.kind, text=happened.text)
+
+
+def unresolved(found: Unresolved | None, problem: str = "") -> str:
+    """What the data cannot tell: part of a change that they leave open, per cell; or why not."""
+    values, radius = (None, 0.0) if found is None else (found.values.round(3), found.radius)
+    return text_of(
+        type="unresolved",
+        values=None if values is None else flat(values),
+        radius_m=radius,
+        problem=problem,
+    )
 
 
 def timeline(line: Timeline) -> str:
