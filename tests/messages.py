@@ -11,22 +11,25 @@ SOURCES = ROOT / "src" / "tomoskin"
 HOLE = "…"
 """Stands for a value in an f-string."""
 
-_LEAST = 3
+LEAST = 3
 """Words of a text that is read as prose; shorter ones are names and keys."""
 
 
-def messages() -> Iterator[tuple[str, str]]:
-    """Each text with its file and line; docstrings are not among them."""
+def messages(least: int = LEAST) -> Iterator[tuple[str, str]]:
+    """Each text of ``least`` words with its file and line; docstrings are not among them."""
     for path in sorted(SOURCES.rglob("*.py")):
         name = path.relative_to(SOURCES).as_posix()
-        for line, text in messages_in(path.read_text(encoding="utf-8")):
+        for line, text in messages_in(path.read_text(encoding="utf-8"), least):
             yield f"{name}:{line}", text
 
 
-def messages_in(source: str) -> Iterator[tuple[int, str]]:
-    """Texts of some words in Python ``source``, with their lines."""
+def messages_in(source: str, least: int = LEAST) -> Iterator[tuple[int, str]]:
+    """Texts of ``least`` words in Python ``source``, with their lines."""
     tree = ast.parse(source)
-    yield from _texts(tree, {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)})
+    docstrings = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)}
+    for line, text in _texts(tree, docstrings):
+        if len(text.split()) >= least:
+            yield line, text
 
 
 def _texts(node: ast.AST, docstrings: set[int]) -> Iterator[tuple[int, str]]:
@@ -34,16 +37,11 @@ def _texts(node: ast.AST, docstrings: set[int]) -> Iterator[tuple[int, str]]:
         return
     if isinstance(node, ast.JoinedStr):
         parts = (p.value if isinstance(p, ast.Constant) else HOLE for p in node.values)
-        yield from _prose(node.lineno, "".join(map(str, parts)))
+        yield node.lineno, "".join(map(str, parts))
     if isinstance(node, ast.Constant):
         if isinstance(node.value, str):
-            yield from _prose(node.lineno, node.value)
+            yield node.lineno, node.value
         return
     for child in ast.iter_child_nodes(node):
         if not (isinstance(node, ast.JoinedStr) and isinstance(child, ast.Constant)):
             yield from _texts(child, docstrings)
-
-
-def _prose(line: int, text: str) -> Iterator[tuple[int, str]]:
-    if len(text.split()) >= _LEAST:
-        yield line, text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections import Counter
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import pytest
 from typer.main import get_command
 
-from messages import messages, messages_in
+from messages import HOLE, messages, messages_in
 from prose import DOCS, PAGES, ROOT, Sentence, helps, sentences, sentences_of
 from tomoskin.cli.app import app
 
@@ -42,6 +43,11 @@ NOT_IN_MESSAGES = (
     *("blamed", "wavers", "is no", "are no"),
 )
 """Beside the glossary's: old habits of our messages. "There is no" is English."""
+
+_NUMBERED = re.compile(
+    rf"\b[Ee]lectrode \(?[{HOLE}\d]|\belectrodes?(?: numbers)? from 0(?! \(E1\))"
+)
+"""Files and Python count electrodes from 0; people read E1."""
 
 _GOT = re.compile(r"\b(?:got|found|but|missing|is too few|holds?)\b")
 
@@ -99,6 +105,16 @@ def test_messages_are_short_plain_and_say_what_was_found() -> None:
     assert long_ones(MOST_WORDS_OF_MESSAGE, said()) == []
     assert old_words(said()) == []
     assert without_found(said()) == []
+
+
+def numbered(found: Iterable[str]) -> list[str]:
+    """Messages that name an electrode by a number, or a range from 0 without its E1."""
+    return [text for text in found if _NUMBERED.search(text)]
+
+
+def test_electrodes_are_e1_in_every_message() -> None:
+    assert numbered(text for _, text in messages(least=2)) == []
+    assert numbered(sentence.text for sentence in read()) == []
 
 
 def test_the_spelling_is_british() -> None:
@@ -185,4 +201,6 @@ def test_planted_mistakes_are_found() -> None:
     planted = tuple(Sentence(str(line), text) for line, text in messages_in(bad))
     assert [s.text for s in old_words(planted)] == ["nobody has told it"]
     assert [s.text for s in without_found(planted)] == ["expected … rows"]
+    planted_names = ["electrode …: is cut", "E… is cut", "electrodes from 0 to …", "from 0 (E1)"]
+    assert numbered(planted_names) == [planted_names[0], planted_names[2]]
     assert not AMERICAN.search(_without_names("`color` in Regularization Tools"))

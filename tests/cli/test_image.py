@@ -121,8 +121,14 @@ def test_every_kind_of_output(save, image, tmp_path) -> None:
     with np.load(tmp_path / "maps.npz") as found:
         assert found["images"].shape == (4, len(found["cells"]))
         assert str(found["unit"]) == "S"
+        left = found["unresolved"]
+        assert left.shape == (len(found["cells"]),)
+        assert 0.02 < found["unresolved_radius_m"] * 1.1 < 0.03
+    assert 0.3 < left.min() < left.max() < 1
     grid = ElementTree.parse(tmp_path / "maps.vtu").getroot()
-    assert len(grid.findall(".//CellData/DataArray")) == 4
+    fields = grid.findall(".//CellData/DataArray")
+    assert [field.get("Name") for field in fields][3:] == ["frame_000003", "unresolved"]
+    assert len(fields) == 5
 
 
 @pytest.mark.parametrize("side", [-1, 1])

@@ -44,7 +44,7 @@ def test_it_writes_a_skin_file(tomoskin, surface: Path) -> None:
         ({}, "1,2\n", "places.csv, line 1: expected three numbers"),
         ({}, "1;2;3\n", "line 1: expected three numbers"),
         ({}, "\n", "is an empty file"),
-        ({}, "-50,0,0\n50,0,0\n0,50,0\n0,0,99\n", "electrode 3: is 99 mm away from the surface"),
+        ({}, "-50,0,0\n50,0,0\n0,50,0\n0,0,99\n", "E4: is 99 mm away from the surface"),
         ({}, "-50,0,0\n50,0,0\n0,50,0\n", "expected at least 4 electrodes, got 3"),
         (
             {},

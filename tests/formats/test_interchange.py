@@ -193,6 +193,6 @@ def test_missing_rows_name_the_recording() -> None:
 def test_impossible_rows_name_the_recording() -> None:
     drive = PATTERN.drive.copy()
     drive[4] = [2, 2]
-    with pytest.raises(PatternError, match="source and sink are both electrode 2") as caught:
+    with pytest.raises(PatternError, match="source and sink are both E3") as caught:
         replace(BARE, drive=drive).in_order_of(PATTERN)
     assert caught.value.where == "here, drive row 4"

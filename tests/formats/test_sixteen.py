@@ -140,7 +140,10 @@ GOOD = full(rim(0, 1))
         ({"valid": VALID[:208]}, r"expected valid of shape \(256,\), got \(208,\)"),
         ({"valid": np.full(256, "yes")}, "expected numbers in valid"),
         ({"inj": INJ[:208]}, r"expected inj of shape \(256, 2\), got \(208, 2\)"),
-        ({"meas": MEAS + 1}, r"meas row 14: expected electrodes from 0 to 15, got \[15, 16\]"),
+        (
+            {"meas": MEAS + 1},
+            r"meas row 14: expected electrodes from 0 \(E1\) to 15, got \[15, 16\]",
+        ),
         ({"inj": INJ - 1}, "inj row 0: expected whole electrode numbers from 0"),
         ({"v_ref": np.ones(208)}, r"expected v_ref of shape \(256,\), got \(208,\)"),
         ({"fps": 0.0}, "expected one fps above 0, got 0.0"),

@@ -44,7 +44,7 @@ def test_impossible_contact_impedance_names_the_electrode(value: complex) -> Non
     z[3] = value
     with pytest.raises(ModelError, match="positive contact impedance") as caught:
         ForwardModel(MESH, PATTERN, z)
-    assert caught.value.where == "electrode 3"
+    assert caught.value.where == "E4"
 
 
 def test_another_count_of_contact_impedances() -> None:

@@ -107,7 +107,7 @@ def test_rectangles_are_exact() -> None:
 def test_electrodes_that_do_not_fit_are_named(patch: BoxPatch, message: str) -> None:
     with pytest.raises(GeometryError, match=message) as caught:
         box(SIZE, (4, 2, 2), [BoxPatch("-x"), patch])
-    assert caught.value.where == "electrode 1"
+    assert caught.value.where == "E2"
 
 
 @pytest.mark.parametrize("size", [(0.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, np.inf)])

@@ -168,7 +168,7 @@ def test_what_is_no_sheet_is_refused(broken: object, words: str) -> None:
 
 def test_a_place_off_the_surface_is_named() -> None:
     draped = Draped.of(*on(Cap(0.1)))
-    with pytest.raises(GeometryError, match=r"place 1: is 50.* mm away from the surface"):
+    with pytest.raises(GeometryError, match=r"position 1: is 50.* mm away from the surface"):
         draped.place(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.05]]))
     with pytest.raises(GeometryError, match="positions"):
         draped.place(np.zeros((2, 2)))

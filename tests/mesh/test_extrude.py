@@ -245,11 +245,11 @@ ARC = ElectrodeArc(0.0, 0.02)
         (WallPatch(0.01, 0.02, ElectrodeArc(0.1, 0.1)), "width above 0"),
         (WallPatch(0.01, 0.02, ElectrodeArc(0.1, 0.9)), "longer than the outline"),
         (WallPatch(0.01, 0.02, ElectrodeArc(math.nan, 0.1)), "finite arclengths"),
-        (WallPatch(0.015, 0.03, ElectrodeArc(0.01, 0.03)), "overlaps or touches electrode 0"),
-        (WallPatch(0.02, 0.03, ElectrodeArc(0.01, 0.03)), "overlaps or touches electrode 0"),
-        (WallPatch(0.01, 0.02, ElectrodeArc(0.02, 0.04)), "overlaps or touches electrode 0"),
-        (WallPatch(0.0, 0.04), "overlaps or touches electrode 0"),
-        (WallPatch(0.01, 0.02, ElectrodeArc(-0.01, 0.001)), "overlaps or touches electrode 0"),
+        (WallPatch(0.015, 0.03, ElectrodeArc(0.01, 0.03)), "overlaps or touches E1"),
+        (WallPatch(0.02, 0.03, ElectrodeArc(0.01, 0.03)), "overlaps or touches E1"),
+        (WallPatch(0.01, 0.02, ElectrodeArc(0.02, 0.04)), "overlaps or touches E1"),
+        (WallPatch(0.0, 0.04), "overlaps or touches E1"),
+        (WallPatch(0.01, 0.02, ElectrodeArc(-0.01, 0.001)), "overlaps or touches E1"),
         (FacePatch("top", Disc(1e-5), (0.0123, 0.002)), "no facet lies inside"),
         (FacePatch("top", Disc(0.01), (1.0, 0.0)), "no facet lies inside"),
     ],
@@ -257,13 +257,13 @@ ARC = ElectrodeArc(0.0, 0.02)
 def test_patches_that_do_not_fit_are_named(patch: Patch, message: str) -> None:
     with pytest.raises(GeometryError, match=message) as caught:
         extrude(Disc(0.1), HEIGHT, [WallPatch(0.01, 0.02, ARC), patch], cells=300, layers=4)
-    assert caught.value.where == "electrode 1"
+    assert caught.value.where == "E2"
 
 
 def test_faces_that_overlap() -> None:
-    with pytest.raises(GeometryError, match="electrode 0") as caught:
+    with pytest.raises(GeometryError, match="E1") as caught:
         extrude(Disc(0.1), HEIGHT, 2 * [FacePatch("top")], cells=300, layers=4)
-    assert caught.value.where == "electrode 1"
+    assert caught.value.where == "E2"
 
 
 @pytest.mark.parametrize(

@@ -111,15 +111,15 @@ def test_identity_tells_meshes_apart() -> None:
         ({"cells": np.empty((0, 3))}, "expected triangles"),
         ({"cells": [[0, 1, 2, 3]]}, "expected points in 3D"),
         ({"electrodes": ()}, "expected at least one electrode"),
-        ({"electrodes": (np.empty((0, 2)),)}, "electrode 0: expected facets"),
-        ({"electrodes": ([[0, 1]], [[0, 1, 2]])}, "electrode 1: expected facets"),
-        ({"electrodes": ([[0, 1]], [[2, 7]])}, "electrode 1: expected points from 0 to 3"),
-        ({"electrodes": ([[0, 1]], [[0, 2]])}, r"electrode 1: facet \[0, 2\] is not on the bound"),
+        ({"electrodes": (np.empty((0, 2)),)}, "E1: expected facets"),
+        ({"electrodes": ([[0, 1]], [[0, 1, 2]])}, "E2: expected facets"),
+        ({"electrodes": ([[0, 1]], [[2, 7]])}, "E2: expected points from 0 to 3"),
+        ({"electrodes": ([[0, 1]], [[0, 2]])}, r"E2: facet \[0, 2\] is not on the bound"),
         (
             {"electrodes": ([[0, 1]], [[1, 0]])},
-            r"electrode 1: shares facet \[0, 1\] with",
+            r"E2: shares facet \[0, 1\] with",
         ),
-        ({"electrodes": ([[0, 1], [1, 0]],)}, "electrode 0: shares facet"),
+        ({"electrodes": ([[0, 1], [1, 0]],)}, "E1: shares facet"),
     ],
 )
 def test_refused(changes: dict[str, Any], message: str) -> None:

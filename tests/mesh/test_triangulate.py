@@ -228,9 +228,9 @@ def test_hint_names_a_number_that_would_do() -> None:
 
 
 def test_overlapping_electrodes_are_refused() -> None:
-    with pytest.raises(GeometryError, match="overlaps electrode 0") as caught:
+    with pytest.raises(GeometryError, match="overlaps E1") as caught:
         triangulate(Disc(0.1), [ElectrodeArc(0, 0.02), ElectrodeArc(0.01, 0.03)], 400)
-    assert caught.value.where == "electrode 1"
+    assert caught.value.where == "E2"
 
 
 def test_a_sliver_is_refused_before_its_rim_has_nodes_without_number(

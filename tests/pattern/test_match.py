@@ -97,8 +97,8 @@ def test_missing_rows_are_listed() -> None:
     message = str(caught.value)
     assert message.startswith(f"{touched.sum()} of 40 rows are not in the recording: ")
     row = int(np.argmax(touched))
-    (source, sink), (plus, minus) = pattern.drive[row], pattern.measure[row]
-    assert f"row {row}: source {source}, sink {sink}, plus {plus}, minus {minus}" in message
+    (source, sink), (plus, minus) = pattern.drive[row] + 1, pattern.measure[row] + 1
+    assert f"row {row}: source E{source}, sink E{sink}, plus E{plus}, minus E{minus}" in message
     assert f"and {touched.sum() - 5} more" in message
 
 
@@ -106,7 +106,9 @@ def test_one_missing_row_is_named_alone() -> None:
     pattern = Pattern.adjacent(4)
     drive, measure = [[1, 0], [2, 1]], [[2, 3], [3, 0]]
     match_rows(pattern, drive, measure)  # by reciprocity
-    with pytest.raises(PatternError, match=r"2 of 4 rows.*row 1: source 2.*; row 3: source 0") as e:
+    with pytest.raises(
+        PatternError, match=r"2 of 4 rows.*row 1: source E3.*; row 3: source E1"
+    ) as e:
         match_rows(pattern, drive[:1], measure[:1])
     assert "more" not in str(e.value)
 

@@ -177,10 +177,10 @@ def test_refused(make: Callable[[], Pattern], message: str) -> None:
 @pytest.mark.parametrize(
     ("change", "where", "message"),
     [
-        ({"drive": [5, 5]}, "drive row 2", "source and sink are both electrode 5"),
-        ({"measure": [7, 7]}, "measurement row 2", "plus and minus are both electrode 7"),
-        ({"drive": [9, 0]}, "drive row 2", r"expected electrodes from 0 to 7, got \[9, 0\]"),
-        ({"measure": [2, -1]}, "measurement row 2", "expected electrodes from 0 to 7"),
+        ({"drive": [5, 5]}, "drive row 2", "source and sink are both E6"),
+        ({"measure": [7, 7]}, "measurement row 2", "plus and minus are both E8"),
+        ({"drive": [9, 0]}, "drive row 2", r"expected electrodes from 0 \(E1\) to 7, got \[9, 0\]"),
+        ({"measure": [2, -1]}, "measurement row 2", r"expected electrodes from 0 \(E1\) to 7"),
     ],
 )
 def test_refused_rows_are_named(change: dict[str, Any], where: str, message: str) -> None:
@@ -218,5 +218,7 @@ def test_rows_of_an_electrode_are_those_that_drive_or_read_it(electrode: int) ->
 
 @pytest.mark.parametrize("electrode", [-1, 8])
 def test_rows_of_an_electrode_that_does_not_exist(electrode: int) -> None:
-    with pytest.raises(PatternError, match=f"expected an electrode from 0 to 7, got {electrode}"):
+    with pytest.raises(
+        PatternError, match=rf"expected an electrode from 0 \(E1\) to 7, got {electrode}"
+    ):
         Pattern.adjacent(8).rows_of(electrode)

@@ -20,9 +20,10 @@ PANELS = {
     "sessions": "[data-testid=drawer-sessions] .flow",
     "twin": "[data-testid=lay-flat]",
     "signals": "[data-testid=signals-sum]",
+    "signals unresolved": "dl[data-testid=signals-sum]",
     "settings": "[data-testid=set-alpha]",
 }
-"""Each with what stands in it once it has something to say."""
+"""Each drawer, and what of it is chosen, with what stands in it once it has something to say."""
 
 
 class Bench(Board):
@@ -66,6 +67,10 @@ def still_site(folder):
 def show(opened, panel):
     """Open a panel, and wait until it says something."""
     if panel != "now":
-        opened.test_id(f"open-{panel}").click()
+        drawer, _, tab = panel.partition(" ")
+        if opened.test_id(f"drawer-{drawer}").count() == 0:
+            opened.test_id(f"open-{drawer}").click()
+        if tab:
+            opened.test_id(f"{drawer}-{tab}").click()
     opened.page.locator(PANELS[panel]).first.wait_for()
     opened.page.mouse.move(1, 1)

@@ -74,7 +74,7 @@ def test_an_electrode_is_cut_and_mended(twin):
 
 def test_an_electrode_that_is_not_there(twin):
     hub, [transport] = twin
-    with pytest.raises(WireError, match="expected electrodes from 0 to 7, got 8"):
+    with pytest.raises(WireError, match=r"expected electrodes from 0 \(E1\) to 7, got 8"):
         hub.obey(Heard(), asked(cut=[8]))
     assert not transport.electronics.faults.cut
 

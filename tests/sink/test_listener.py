@@ -25,7 +25,7 @@ def test_a_function_gets_the_contacts_of_each_frame(stream):
     sink.publish(EVENT)
     sink.publish(moment_at(0.1))
     sink.publish(moment_at(0.2, TOUCH, sequence=9))
-    sink.publish(replace(moment_at(0.3), valid=False, problem="electrode 3 is dead"))
+    sink.publish(replace(moment_at(0.3), valid=False, problem="E4 is dead"))
     sink.close()
     assert [len(contacts.touches) for contacts in heard] == [0, 1, 0]
     assert [contacts.valid for contacts in heard] == [True, True, False]
@@ -33,7 +33,7 @@ def test_a_function_gets_the_contacts_of_each_frame(stream):
     assert (contacts.skin, contacts.frame_id) == (stream.skin, "left_arm/skin")
     assert (contacts.sequence, contacts.latency) == (9, pytest.approx(0.3))
     assert contacts.touches[0].position == (TOUCH.detection.x, TOUCH.detection.y, 0)
-    assert heard[2].problem == "electrode 3 is dead"
+    assert heard[2].problem == "E4 is dead"
 
 
 def test_the_first_lines_of_the_documentation_react_to_a_touch(monkeypatch):

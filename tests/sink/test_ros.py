@@ -226,7 +226,7 @@ def test_points_lie_on_the_surface(stream):
 
 def test_a_report_says_whether_touches_are_valid(stream):
     view = RosView(stream, Naming())
-    lost = replace(moment_at(0.1), valid=False, problem="electrode 3 is dead")
+    lost = replace(moment_at(0.1), valid=False, problem="E4 is dead")
     reports = {
         moment.host_time: [m.value for m in view.of(moment) if m.topic == "/diagnostics"]
         for moment in (moment_at(0.0), lost, replace(lost, host_time=0.9), moment_at(1.0))
@@ -235,7 +235,7 @@ def test_a_report_says_whether_touches_are_valid(stream):
     levels = [
         (r[0]["status"][0]["level"], r[0]["status"][0]["message"]) for r in reports.values() if r
     ]
-    assert levels == [(0, "OK"), (2, "electrode 3 is dead"), (0, "OK")]
+    assert levels == [(0, "OK"), (2, "E4 is dead"), (0, "OK")]
 
 
 def test_a_frame_on_a_robot_is_a_transform(stream):

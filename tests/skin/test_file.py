@@ -152,7 +152,7 @@ BAD = {
     "count with a fraction": ("count = 8", "count = 8.0", "[electrodes] count", "got 8.0"),
     "count as boolean": ("count = 8", "count = true", "[electrodes] count", "got true"),
     "too many electrodes": ("count = 8", "count = 33", "[electrodes] count", "got 33"),
-    "overlap": ('"10 mm"', '"80 mm"', "[electrodes], electrode 1", "overlaps electrode 0"),
+    "overlap": ('"10 mm"', '"80 mm"', "[electrodes], E2", "overlaps E1"),
     "no gap": ("count = 8", "count = 32", "[electrodes]", "overlaps"),
     "list of wrong length": (
         '"0.2 mohm*m"',
@@ -207,9 +207,9 @@ ADDED = {
     "electrode that is not there": (
         "drive = [[1, 9]]\nmeasure = [[2, 3]]",
         "[drive], drive row 0",
-        "electrodes from 0 to 7",
+        "electrodes from 0 (E1) to 7",
     ),
-    "source is sink": ("drive = [[1, 1]]\nmeasure = [[2, 3]]", "[drive]", "are both electrode 1"),
+    "source is sink": ("drive = [[1, 1]]\nmeasure = [[2, 3]]", "[drive]", "are both E2"),
     "row of three": (
         "drive = [[1, 0, 2]]\nmeasure = [[2, 3]]",
         "[drive] drive",
@@ -261,7 +261,7 @@ def test_position_off_the_rim_names_the_electrode() -> None:
     text = changed('shape = "disc"\ndiameter = "20 cm"', SQUARE)
     text = changed("count = 8", changed('"99.5 mm"', '"80 mm"', PLACES), text)
     error = failure(text)
-    assert "electrode 2 (E3)" in error.where
+    assert "E3" in error.where
     assert "(50, 80) mm, 20 mm off" in error.message
 
 

@@ -63,10 +63,10 @@ def test_electrodes_are_where_they_were_put(file: Path) -> None:
 def test_an_electrode_off_the_surface_or_its_rim_is_named(file: Path) -> None:
     places = electrodes()
     places[3] += 30
-    with pytest.raises(GeometryError, match=r"electrode 3: is .* mm away from the surface"):
+    with pytest.raises(GeometryError, match=r"E4: is .* mm away from the surface"):
         lay(file, places, like=LIKE)
     places[3] = 0
-    with pytest.raises(SkinError, match=r"electrode 3 \(E4\): expected a position on the rim"):
+    with pytest.raises(SkinError, match=r"E4: expected a position on the rim"):
         lay(file, places, like=LIKE)
 
 

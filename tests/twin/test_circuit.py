@@ -112,8 +112,8 @@ def test_faults_come_and_go_in_their_order():
     [
         ((1.0, "melt", 0), r"fault at 1.0 s: expected a kind among cut, .* got \"melt\""),
         ((math.nan, "cut", 0), "finite time"),
-        ((1.0, "cut", -1), "an electrode from 0, got -1"),
-        ((1.0, "short", 2, 2), r"two different electrodes from 0, got \(2, 2\)"),
+        ((1.0, "cut", -1), r"an electrode from 0 \(E1\), got -1"),
+        ((1.0, "short", 2, 2), r"two different electrodes from 0 \(E1\), got \(2, 2\)"),
         ((1.0, "short", 2), "two different electrodes"),
     ],
 )
@@ -123,5 +123,5 @@ def test_impossible_faults(values, said):
 
 
 def test_a_fault_of_an_electrode_that_is_not_there():
-    with pytest.raises(ModelError, match="electrodes from 0 to 7, got 8"):
+    with pytest.raises(ModelError, match=r"electrodes from 0 \(E1\) to 7, got 8"):
         check_electrodes(Faults(shorts=frozenset({(0, 8)})), 8)

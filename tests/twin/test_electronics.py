@@ -201,7 +201,7 @@ def test_faults_show_in_the_counts(sheet, skin, table):
 
 def test_a_fault_of_a_missing_electrode_is_refused(sheet, skin):
     electronics = TwinElectronics(sheet, FINE, skin.current, QUIET, 0)
-    with pytest.raises(ModelError, match="electrodes from 0 to 7, got 9"):
+    with pytest.raises(ModelError, match=r"electrodes from 0 \(E1\) to 7, got 9"):
         electronics.set_faults(Faults(cut=frozenset({9})))
     assert electronics.faults == Faults()
 

@@ -250,12 +250,12 @@ def test_an_error_says_where_what_was_expected_and_found_and_what_to_do(
     ("keys", "where", "what"),
     [
         ('kind = "cut"\nend = "1.01 s"\nelectrode = 2', "end", "10 ms, shorter than a frame"),
-        ('kind = "cut"\nend = "1.4 s"\nelectrode = 8', "electrode", "from 0 to 7, got 8 (a script"),
+        ('kind = "cut"\nend = "1.4 s"\nelectrode = 8', "electrode", "from 0 (E1) to 7, got 8"),
         ('kind = "rail"\nend = "0.4 s"\nelectrode = 2', "end", "after start, 1 s, got 0.4 s"),
         (
             'kind = "short"\nend = "2 s"\nelectrode = 2\nother = 2',
             "other",
-            "expected an electrode other than 2, got 2",
+            "expected an electrode other than E3, got the same",
         ),
         ('kind = "los"', "kind", 'or "temperature", got "los"'),
         ('kind = "reboot"\nend = "2 s"', "end", "needs kind"),

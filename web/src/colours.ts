@@ -6,6 +6,9 @@ import scales from "../../src/tomoskin/core/colours.json";
 /** The scale's stops, #rrggbb, on a light and on a dark ground. */
 export const CHANGE: Readonly<Record<"light" | "dark", readonly string[]>> = scales.change;
 
+/** Of an amount without a sign, from the least to the most. */
+export const AMOUNT: readonly string[] = scales.amount;
+
 /** Odd, so that zero has a colour of its own. */
 export const MAP_SIZE = 511;
 

@@ -53,7 +53,7 @@ def calibrate_wiring(
     xy, dv = labels(data), changes(data, reference, pattern)
     frames = labelled_frames(xy)
     rest, noise = _at_rest(data, reference, pattern)
-    with Bar("weighing wirings") as bar:
+    with Bar("comparing channel mappings") as bar:
         answer = solve_channel_mapping(
             dv[frames], xy[frames], drawn, reference=rest, noise=noise, progress=bar
         )

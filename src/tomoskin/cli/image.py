@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from tomoskin.core import Touch
     from tomoskin.formats import Display
     from tomoskin.pattern import Pattern
-    from tomoskin.pipeline import Prepared, Reconstruction
+    from tomoskin.pipeline import Prepared, Reconstruction, Unresolved
     from tomoskin.touch import Span
 
 
@@ -51,8 +51,8 @@ _MOST_FIELDS = 200
 
 IMAGES = {
     ".png": "pictures of some frames",
-    ".npz": "images of all frames with their mesh",
-    ".vtu": "the mesh with a field for each frame",
+    ".npz": "images of all frames with their mesh, and what the data leave open",
+    ".vtu": "the mesh with a field for each frame, and what the data leave open",
 }
 
 
@@ -255,6 +255,8 @@ def _npz(
         "points": prepared.mesh.points,
         "cells": prepared.mesh.cells,
     }
+    if (map_ := _unresolved(prepared, result)) is not None:
+        arrays |= {"unresolved": map_.values, "unresolved_radius_m": np.array(map_.radius)}
     save_arrays(path, arrays, overwrite=overwrite)
 
 
@@ -272,7 +274,19 @@ def _vtu(
         )
     images, _ = display.applied(result.images, prepared.mesh, result.unit)
     names = [f"frame_{frame:06d}" for frame in result.frames.tolist()]
-    write_vtu(path, prepared.mesh, dict(zip(names, images, strict=True)), overwrite=overwrite)
+    fields = dict(zip(names, images, strict=True))
+    if (map_ := _unresolved(prepared, result)) is not None:
+        fields["unresolved"] = map_.values
+    write_vtu(path, prepared.mesh, fields, overwrite=overwrite)
+
+
+def _unresolved(prepared: Prepared, result: Reconstruction) -> Unresolved | None:
+    """What the data of these images cannot tell; None of a trained operator."""
+    from tomoskin.pipeline import Unresolved
+
+    if prepared.skin.inverse.method != "one-step":
+        return None
+    return Unresolved.of(prepared, result.choice.alpha, result.rows_left_out)
 
 
 WRITERS = {".png": _png, ".npz": _npz, ".vtu": _vtu}

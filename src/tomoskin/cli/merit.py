@@ -31,7 +31,7 @@ def merit(
     skin: SkinArgument,
     towards: Annotated[
         int,
-        typer.Option(min=1, metavar="N", help="Targets lie between the centre and electrode N."),
+        typer.Option(min=1, metavar="N", help="Targets lie between the centre and EN."),
     ] = 1,
     greit: Annotated[
         float | None,
@@ -70,7 +70,7 @@ def _figures(prepared: Prepared, towards: int, figure: float | None) -> dict[str
     skin, operator = prepared.skin, prepared.operator
     if towards > skin.n_electrodes:
         raise typer.BadParameter(
-            f"expected an electrode from 1 to {skin.n_electrodes}, got {towards}",
+            f"expected an electrode from 1 (E1) to {skin.n_electrodes}, got {towards}",
             param_hint="--towards",
         )
     fine = _finer(prepared)

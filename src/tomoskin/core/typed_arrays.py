@@ -49,7 +49,7 @@ def electrode_table(arrays: Arrays, key: str, source: str) -> IntArray:
     if not good.all():
         row = int(np.argmin(good.all(axis=1)))
         raise DataError(
-            f"expected whole electrode numbers from 0, got {table[row].tolist()}",
+            f"expected whole electrode numbers from 0 (E1), got {table[row].tolist()}",
             where=f"{source}, {key} row {row}",
         )
     return table.astype(np.int64)

@@ -95,7 +95,7 @@ def _impedance(value: ArrayLike, n: int) -> NDArray[Any]:
         electrode = int(np.argmin(good))
         raise ModelError(
             f"expected a positive contact impedance, got {z[electrode]}",
-            where=f"electrode {electrode}",
+            where=f"E{electrode + 1}",
         )
     return z
 

@@ -47,6 +47,7 @@ from tomoskin.inverse.resolution import (
     resolution_matrix,
     resolved,
     sensitivity,
+    unresolved,
 )
 from tomoskin.inverse.similarity import SimilarityWindows
 from tomoskin.inverse.thesis_metrics import ThesisMetrics
@@ -116,6 +117,7 @@ __all__ = [
     "resolved",
     "sensitivity",
     "simple_change",
+    "unresolved",
     "weighted_change",
 ]
 

@@ -1,4 +1,4 @@
-"""What an operator can tell: resolution, point spread, sensitivity, and the Picard plot."""
+"""What an operator can tell and what not: resolution, point spread, sensitivity, Picard plot."""
 
 from __future__ import annotations
 
@@ -8,14 +8,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eigvalsh
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.inverse.linear.operator import Operator
 from tomoskin.inverse.linear.problem import LinearProblem
 from tomoskin.inverse.linear.spectrum import Spectrum
+from tomoskin.inverse.priors.penalty import Diagonal
+from tomoskin.mesh import Mesh
 
 _ROUNDING = 1e-14
 """An eigenvalue of RᴴR below this part of the largest is rounding."""
+
+_BLOCK = 256
+"""Discs that the prior is asked of at a time."""
 
 
 def resolution_matrix(operator: Operator, problem: LinearProblem) -> NDArray[Any]:
@@ -37,6 +44,60 @@ def resolved(operator: Operator, problem: LinearProblem) -> NDArray[Any]:
     """
     _check_pair(operator, problem)
     return np.asarray(np.einsum("cm,mc->c", operator.matrix, problem.jacobian))
+
+
+def unresolved(
+    operator: Operator, problem: LinearProblem, alpha: float, radius: float
+) -> FloatArray:
+    """(n_cells,) part of a change that one frame leaves open about each cell, 0 to 1.
+
+    The change is the mean of the conductivity over a disc of ``radius`` m. Before the data its
+    variance is the prior's; after them it is the expected square of the image's error, by the
+    noise and the prior that ``alpha`` stands for. The value is the second over the first. Of the
+    prior's free images, which have no variance before, only the error counts.
+
+    ``operator`` may exclude measurements of the problem. Nothing here depends on a frame.
+
+    Raises
+    ------
+    ModelError
+        When operator and problem are not of one mesh, pattern and difference, and for a radius
+        that is not above 0.
+    """
+    _check_pair(operator, problem)
+    if not radius > 0:
+        raise ModelError(f"expected a radius above 0 m, got {radius:g} m")
+    discs = _discs(problem.model.mesh, radius)
+    spread, gram = problem.carried
+    data = gram + np.diag(alpha**2 / problem.weights)  # covariance of the data
+    prior = _prior_variance(problem, discs)
+    seen, shared = discs @ operator.matrix, discs @ spread
+    explained = 2 * _products(seen, shared) - _products(seen @ data, seen)
+    return np.asarray(np.clip(1.0 - explained / prior, 0.0, 1.0))
+
+
+def _discs(mesh: Mesh, radius: float) -> csr_array:
+    """(n_cells, n_cells) means by area over the cells within ``radius`` m of each, its own too."""
+    tree = cKDTree(mesh.centroids)
+    near = tree.query_ball_tree(tree, radius)
+    row = np.repeat(np.arange(len(near)), [len(cells) for cells in near])
+    column = np.concatenate(near)
+    area = np.bincount(row, mesh.volumes[column])
+    return csr_array((mesh.volumes[column] / area[row], (row, column)))
+
+
+def _prior_variance(problem: LinearProblem, discs: csr_array) -> FloatArray:
+    """(n_discs,) diagonal of AQ⁻¹Aᵀ for the means A."""
+    prior = problem.prior
+    if isinstance(prior, Diagonal):
+        return np.asarray(discs.power(2) @ (1.0 / prior.matrix))
+    blocks = (discs[k : k + _BLOCK].toarray() for k in range(0, discs.shape[0], _BLOCK))
+    return np.concatenate([np.diag(prior.carry(block)[1]) for block in blocks])
+
+
+def _products(one: NDArray[Any], other: NDArray[Any]) -> FloatArray:
+    """(n,) real part of the product of each row with the other's."""
+    return np.asarray(np.einsum("nm,nm->n", one, other.conj()).real)
 
 
 def point_spread(operator: Operator, problem: LinearProblem, cells: ArrayLike) -> NDArray[Any]:

@@ -45,7 +45,7 @@ def check_arcs(outline: Outline, arcs: Sequence[ElectrodeArc]) -> None:
     if not arcs:
         raise GeometryError("expected at least one electrode, got none")
     for number, arc in enumerate(arcs):
-        _check_width(outline, arc, f"electrode {number}")
+        _check_width(outline, arc, f"E{number + 1}")
     order = sorted(range(len(arcs)), key=lambda i: arcs[i].start % outline.length)
     for this, following in zip(order, [*order[1:], order[0]], strict=True):
         if this != following:
@@ -75,14 +75,14 @@ def _check_gap(outline: Outline, arcs: Sequence[ElectrodeArc], this: int, follow
     if room - width < smallest * (1 - 1e-9):
         low, high = sorted((this, following))
         gap = room - width
-        state = f"overlaps electrode {low} by {-gap * 1e3:.3g} mm"
+        state = f"overlaps E{low + 1} by {-gap * 1e3:.3g} mm"
         if gap > -1e-9 * outline.length:
             state = (
-                f"is {max(gap, 0.0) * 1e3:.3g} mm from electrode {low}; expected at least "
+                f"is {max(gap, 0.0) * 1e3:.3g} mm from E{low + 1}; expected at least "
                 f"{MIN_GAP:.0%} of the narrower one's width ({smallest * 1e3:.3g} mm)"
             )
         raise GeometryError(
-            state, where=f"electrode {high}", hint="make them narrower or fewer, or move them"
+            state, where=f"E{high + 1}", hint="make them narrower or fewer, or move them"
         )
 
 

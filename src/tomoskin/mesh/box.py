@@ -58,7 +58,7 @@ def box(
         check_size(f"length along {name}", length)
     half = np.array([size[0], size[1]]) / 2
     extent = np.array([[-half[0], half[0]], [-half[1], half[1]], [0.0, size[2]]])
-    ranges = [_ranges(p, extent, f"electrode {i}") for i, p in enumerate(electrodes)]
+    ranges = [_ranges(p, extent, f"E{i}") for i, p in enumerate(electrodes, 1)]
     x, y, z = (
         grid_lines(low, high, [m for r in ranges for m in r.get(i, ())], cells[i])
         for i, (low, high) in enumerate(extent.tolist())

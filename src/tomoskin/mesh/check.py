@@ -54,7 +54,7 @@ def _check_shapes(points: FloatArray, cells: IntArray) -> None:
 
 def _check_indices(points: FloatArray, cells: IntArray, electrodes: tuple[IntArray, ...]) -> None:
     n = len(points)
-    tables = [("cell {row}", cells), *((f"electrode {i}", e) for i, e in enumerate(electrodes))]
+    tables = [("cell {row}", cells), *((f"E{i}", e) for i, e in enumerate(electrodes, 1))]
     for name, table in tables:
         outside = ((table < 0) | (table >= n)).any(axis=1)
         if outside.any():
@@ -117,7 +117,7 @@ def _check_electrodes(
     boundary = {tuple(f) for f in boundary_table.tolist()}
     owner: dict[tuple[int, ...], int] = {}
     for number, table in enumerate(electrodes):
-        where = f"electrode {number}"
+        where = f"E{number + 1}"
         if not len(table) or table.shape[1] != width:
             raise GeometryError(
                 f"expected facets (n, {width}) with n > 0, got {table.shape}", where=where
@@ -127,7 +127,7 @@ def _check_electrodes(
                 raise GeometryError(f"facet {list(facet)} is not on the boundary", where=where)
             if facet in owner:
                 raise GeometryError(
-                    f"shares facet {list(facet)} with electrode {owner[facet]}", where=where
+                    f"shares facet {list(facet)} with E{owner[facet] + 1}", where=where
                 )
             owner[facet] = number
 

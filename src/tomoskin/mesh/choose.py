@@ -58,7 +58,7 @@ def choose(
             chosen = [np.asarray(e) for e in electrodes]
     for number, facets in enumerate(chosen):
         if not facets.size:
-            raise GeometryError("has no facet on the boundary", where=f"electrode {number}")
+            raise GeometryError("has no facet on the boundary", where=f"E{number + 1}")
     return tuple(chosen)
 
 
@@ -114,6 +114,6 @@ def _nearest(centroids: FloatArray, places: Places) -> IntArray:
         raise GeometryError(
             f"no facet lies within {places.radius * 1e3:.4g} mm; "
             f"the nearest is {off * 1e3:.4g} mm away",
-            where=f"electrode {first}",
+            where=f"E{first + 1}",
         )
     return number

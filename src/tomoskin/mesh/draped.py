@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -101,13 +102,13 @@ class Draped(Surface):
         """(n, 3, 2), the same all over a triangle."""
         return np.asarray(self._slopes[self._within(rows_of(uv))[0]])
 
-    def place(self, xyz: ArrayLike, name: str = "place") -> FloatArray:
+    def place(self, xyz: ArrayLike, names: Sequence[str] = ()) -> FloatArray:
         """(n, 2) m: flat coordinates of the surface's points nearest to ``xyz`` (n, 3) m.
 
         Raises
         ------
         GeometryError
-            Naming the first ``name`` that does not lie on the surface.
+            Naming the first position that does not lie on the surface; ``names`` has one for each.
         """
         wanted = np.atleast_2d(np.asarray(xyz, dtype=np.float64))
         if wanted.shape[1] != 3:
@@ -118,7 +119,7 @@ class Draped(Surface):
             first = int(np.argmax(gap > reach))
             raise GeometryError(
                 f"is {1e3 * gap[first]:.4g} mm away from the surface",
-                where=f"{name} {first}",
+                where=names[first] if names else f"position {first}",
                 hint="give positions in the coordinates and the unit of the surface's file",
             )
         return flat

@@ -177,7 +177,7 @@ class Body:
             if not len(facets):
                 raise GeometryError(
                     "no facet lies inside this electrode",
-                    where=f"electrode {number}",
+                    where=f"E{number + 1}",
                     hint="make the electrode larger, or use more cells",
                 )
         n = len(self.flat)

@@ -60,9 +60,7 @@ class Mesh:
         """Freeze the arrays and check them."""
         object.__setattr__(self, "points", _frozen(self.points, np.float64, "points"))
         object.__setattr__(self, "cells", _frozen(self.cells, np.int64, "cells"))
-        facets = tuple(
-            _frozen(e, np.int64, f"electrode {i}") for i, e in enumerate(self.electrodes)
-        )
+        facets = tuple(_frozen(e, np.int64, f"E{i}") for i, e in enumerate(self.electrodes, 1))
         object.__setattr__(self, "electrodes", facets)
         check_mesh(self.points, self.cells, self.electrodes)
         if self.metric is not None:
@@ -186,7 +184,7 @@ class MeshFile:
             used, compact = np.unique(self.cells, return_inverse=True)
             number = np.full(len(self.points), -1)
             number[used] = np.arange(len(used))
-            tables = [renumbered(number, f, f"electrode {i}") for i, f in enumerate(facets)]
+            tables = [renumbered(number, f, f"E{i}") for i, f in enumerate(facets, 1)]
             return Mesh(self.points[used], compact.reshape(self.cells.shape), tuple(tables))
         except GeometryError as error:
             raise at_source(error, self.source) from error

@@ -85,9 +85,9 @@ def check_patches(outline: Outline, height: float, patches: Sequence[Patch]) -> 
         raise GeometryError("expected at least one electrode, got none")
     wall = [(i, p) for i, p in enumerate(patches) if isinstance(p, WallPatch)]
     for number, patch in wall:
-        _check_heights(height, patch, f"electrode {number}")
+        _check_heights(height, patch, f"E{number + 1}")
         if patch.arc is not None:
-            _check_arc(outline, patch.arc, f"electrode {number}")
+            _check_arc(outline, patch.arc, f"E{number + 1}")
     for (low, one), (high, other) in combinations(wall, 2):
         _check_apart(outline, one, other, low, high)
 
@@ -118,8 +118,8 @@ def _check_apart(outline: Outline, one: WallPatch, other: WallPatch, low: int, h
     if aside >= slack * MIN_GAP * min(heights) or along >= slack * MIN_GAP * min(widths):
         return
     raise GeometryError(
-        f"overlaps or touches electrode {low}",
-        where=f"electrode {high}",
+        f"overlaps or touches E{low + 1}",
+        where=f"E{high + 1}",
         hint=f"leave {MIN_GAP:.0%} of the smaller one's width or height between them",
     )
 

@@ -190,14 +190,14 @@ class Pattern:
         """(k,) rows that drive or read ``electrode``. Raises PatternError where it is none."""
         if not 0 <= electrode < self.n_electrodes:
             raise PatternError(
-                f"expected an electrode from 0 to {self.n_electrodes - 1}, got {electrode}"
+                f"expected an electrode from 0 (E1) to {self.n_electrodes - 1}, got {electrode}"
             )
         return np.flatnonzero((np.hstack([self.drive, self.measure]) == electrode).any(axis=1))
 
     def row_text(self, row: int) -> str:
         """The row in words, for messages."""
-        (source, sink), (plus, minus) = self.drive[row], self.measure[row]
-        return f"row {row}: source {source}, sink {sink}, plus {plus}, minus {minus}"
+        source, sink, plus, minus = np.hstack([self.drive[row], self.measure[row]]) + 1
+        return f"row {row}: source E{source}, sink E{sink}, plus E{plus}, minus E{minus}"
 
     @cached_property
     def identity(self) -> str:
@@ -234,14 +234,14 @@ def _check_pairs(pairs: IntArray, n: int, kind: str, ends: tuple[str, str]) -> N
     if outside.any():
         row = int(np.argmax(outside))
         raise PatternError(
-            f"expected electrodes from 0 to {n - 1}, got {pairs[row].tolist()}",
+            f"expected electrodes from 0 (E1) to {n - 1}, got {pairs[row].tolist()}",
             where=f"{kind} row {row}",
         )
     same = pairs[:, 0] == pairs[:, 1]
     if same.any():
         row = int(np.argmax(same))
         raise PatternError(
-            f"{ends[0]} and {ends[1]} are both electrode {pairs[row, 0]}",
+            f"{ends[0]} and {ends[1]} are both E{pairs[row, 0] + 1}",
             where=f"{kind} row {row}",
         )
 

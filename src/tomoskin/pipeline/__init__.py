@@ -11,6 +11,7 @@ from tomoskin.pipeline.prepare import Prepared, colour_limit, prepare
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
 from tomoskin.pipeline.records import FrameResult, Measured, ReferenceState
 from tomoskin.pipeline.tune import tuned, tuned_image
+from tomoskin.pipeline.unresolved import Unresolved
 
 __all__ = [
     "DOUBTED",
@@ -24,6 +25,7 @@ __all__ = [
     "Reconstruction",
     "RecordedFrames",
     "ReferenceState",
+    "Unresolved",
     "colour_limit",
     "prepare",
     "reconstruct",

@@ -202,7 +202,7 @@ def estimate_wiring(
     presses: Sequence[GuidedPress],
     untouched: tuple[FloatArray, FloatArray] | None,
 ) -> Estimate:
-    """The likeliest wiring and how sure that is; ``untouched`` mean and noise V. DataError."""
+    """The likeliest channel mapping and how sure it is; ``untouched`` mean, noise V. DataError."""
     if len(presses) < _FEWEST_WIRING:
         left = _FEWEST_WIRING - len(presses)
         return Estimate(f"{_counted(left)} more for a first answer")
@@ -263,7 +263,7 @@ class Dots:
         return x, y
 
     def _first(self) -> tuple[float, float]:
-        """Off every axis of the sheet: a press in the middle tells no wiring from its turns."""
+        """Off every axis of the sheet: a press in the middle allows every rotation."""
         middle, extent = self._filled.mean(axis=0), np.ptp(self._filled, axis=0)
         wanted = middle + extent * (0.32, 0.16)
         x, y = self._filled[int(np.argmin(np.linalg.norm(self._filled - wanted, axis=1)))].tolist()

@@ -4,7 +4,6 @@ frames: ``server/frames.py``."""
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import asdict
 from typing import Any
 
@@ -14,7 +13,7 @@ from tomoskin import __version__
 from tomoskin.calibration import BendReading, CalibrationHealth, ClassReading
 from tomoskin.core import Event, FloatArray, IntArray, encode_json
 from tomoskin.mesh import Plane
-from tomoskin.pipeline import Prepared
+from tomoskin.pipeline import Prepared, Unresolved
 from tomoskin.recording import Timeline
 from tomoskin.run import MAX_FORCE, Status
 from tomoskin.signal import BaselineState, ElectrodeHealth
@@ -25,7 +24,6 @@ PROBE_RADIUS = 0.015
 PROBE_FORCE = 3.0
 """Its force, N."""
 
-_ELECTRODE = re.compile(r"\belectrode (\d+)\b(?: \(E\d+\))?")
 
 _OUTLINE_POINTS = 240
 
@@ -98,7 +96,7 @@ def state(status: Status) -> str:
         sinks=status.sinks,
         replay=status.replay,
         **readings(status),
-        problem=status.problem and as_on_bench(status.problem),
+        problem=status.problem,
         text=status.text,
     )
 
@@ -155,12 +153,12 @@ def _calibration(now: CalibrationHealth | None) -> dict[str, Any] | None:
     return {
         "well": now.well,
         "broken": now.broken,
-        "findings": [as_on_bench(text) for text in now.findings],
+        "findings": list(now.findings),
     }
 
 
 def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{as_on_bench(text[1:])}."
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
@@ -174,8 +172,17 @@ def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
 
 def event(happened: Event) -> str:
     """Something that a person should know."""
+    return text_of(type="event", time_s=happened.host_time, kind=happened.kind, text=happened.text)
+
+
+def unresolved(found: Unresolved | None, problem: str = "") -> str:
+    """What the data cannot tell: part of a change that they leave open, per cell; or why not."""
+    values, radius = (None, 0.0) if found is None else (found.values.round(3), found.radius)
     return text_of(
-        type="event", time_s=happened.host_time, kind=happened.kind, text=as_on_bench(happened.text)
+        type="unresolved",
+        values=None if values is None else flat(values),
+        radius_m=radius,
+        problem=problem,
     )
 
 
@@ -197,12 +204,7 @@ def timeline(line: Timeline) -> str:
 
 def error(message: str) -> str:
     """Answer to a request that was not understood."""
-    return text_of(type="error", message=as_on_bench(message))
-
-
-def as_on_bench(message: str) -> str:
-    """``message`` with electrodes as people call them: "electrode 3", counted from 0, is E4."""
-    return _ELECTRODE.sub(lambda found: f"E{int(found[1]) + 1}", message)
+    return text_of(type="error", message=message)
 
 
 def _electrodes(prepared: Prepared) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""The flows of presses where the dot is: touch is learnt, or the wiring found."""
+"""The flows of presses where the dot is: touch is learnt, or the channel mapping found."""
 
 from __future__ import annotations
 

@@ -43,6 +43,10 @@ class SetRecording(StrictRequest, frozen=True, tag="record"):
     on: bool
 
 
+class AskUnresolved(StrictRequest, frozen=True, tag="unresolved"):
+    """The map of what the data cannot tell, with the electrodes and the alpha of the moment."""
+
+
 class Painted(StrictRequest, frozen=True, tag="painted"):
     """How long the page took of late from a frame's arrival to the end of drawing it, s."""
 
@@ -200,6 +204,7 @@ RunRequest = (
     commands.TakeReference
     | commands.SetPause
     | SetRecording
+    | AskUnresolved
     | commands.Note
     | Painted
     | SetPresses

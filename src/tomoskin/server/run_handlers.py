@@ -10,9 +10,11 @@ from typing import get_args
 
 import numpy as np
 
-from tomoskin.core import DataError, GeometryError, WireError
+from tomoskin.core import DataError, GeometryError, TomoskinError, WireError
+from tomoskin.pipeline import Unresolved
 from tomoskin.run import Runner, SetPresses, commands
-from tomoskin.server.requests import Painted, SetRecording
+from tomoskin.server import page_messages
+from tomoskin.server.requests import AskUnresolved, Painted, SetRecording
 from tomoskin.server.task import Handlers, Listener, Tasks
 from tomoskin.skin import Skin
 from tomoskin.twin import Contact
@@ -36,6 +38,9 @@ def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
     def record(_: Listener, request: SetRecording) -> None:
         tasks.keep(_record(runner, folder, on=request.on))
 
+    def map_out(page: Listener, _: AskUnresolved) -> None:
+        tasks.run(page, partial(_unresolved, runner), page.post)
+
     def play(page: Listener, request: commands.ReplayCommand) -> None:
         tasks.run(page, partial(runner.ask, request), lambda _: None)  # a seek may read a file
 
@@ -45,9 +50,22 @@ def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
         commands.Note: submit,
         SetPresses: press,
         Painted: paint,
+        AskUnresolved: map_out,
         SetRecording: record,
         **dict.fromkeys(get_args(commands.ReplayCommand), play),
     }
+
+
+def _unresolved(runner: Runner) -> str:
+    """What the data of this moment cannot tell, as a message."""
+    newest, prepared = runner.newest, runner.prepared
+    health = newest.result.health if newest else None
+    lost = np.zeros(prepared.pattern.n_meas, bool) if health is None else health.lost
+    try:
+        found = Unresolved.of(prepared, runner.status().choice.alpha, np.flatnonzero(lost))
+    except TomoskinError as error:
+        return page_messages.unresolved(None, error.message)
+    return page_messages.unresolved(found)
 
 
 async def _record(runner: Runner, folder: Path, *, on: bool) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from tomoskin.core import PatternError, SkinError, TomoskinError
 from tomoskin.pattern import named
-from tomoskin.server.page_messages import as_on_bench, text_of
+from tomoskin.server.page_messages import text_of
 from tomoskin.skin import (
     SECTIONS,
     Choice,
@@ -33,7 +33,7 @@ LOCKED = frozenset({("surface", "file")})
 """Keys that name files: a page cannot set them."""
 
 _PLACE = re.compile(r"\[(\w+)\](?: (\w+))?(?:, (.+))?$")
-"""Section, key, and what of them: ``[electrodes], electrode 3``."""
+"""Section, key, and what of them: ``[electrodes], E4``."""
 
 
 @cache
@@ -73,7 +73,7 @@ def refusal(error: TomoskinError) -> str:
     section, key, part = place.groups() if place else (None, None, None)
     advice = f" ({error.hint})" if error.hint else ""
     text = f"{f'{part}: ' if part else ''}{error.message}{advice}" if place else str(error)
-    return text_of(type="settings_error", section=section, key=key, message=as_on_bench(text))
+    return text_of(type="settings_error", section=section, key=key, message=text)
 
 
 def table_of(name: str, n_electrodes: int) -> str:

@@ -13,7 +13,7 @@ from tomoskin.pipeline import Prepared
 from tomoskin.recording import ReplayTransport, SessionReader, as_recorded, parse_replay
 from tomoskin.run import commands
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_messages import as_on_bench, text_of
+from tomoskin.server.page_messages import text_of
 from tomoskin.server.requests import Connect, ListSources
 from tomoskin.server.task import Listener
 from tomoskin.skin import Skin
@@ -129,7 +129,7 @@ class SourceHandlers:
             current=self._switch.spec,
             host_protocol=f"{SCHEMA.major}.{SCHEMA.minor}",
             board=_board(status.board, status.board_name),
-            problem=status.problem and as_on_bench(status.problem),
+            problem=status.problem,
         )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from tomoskin.core import TomoskinError, WireError
 from tomoskin.run import SetPose, SetTwin, way_to_bend
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_messages import as_on_bench, text_of
+from tomoskin.server.page_messages import text_of
 from tomoskin.server.task import Listener
 
 
@@ -66,4 +66,4 @@ class TwinHandlers:
 
 def _refusal(error: TomoskinError) -> str:
     hint = f" ({error.hint})" if error.hint else ""
-    return text_of(type="twin_refused", message=as_on_bench(error.message + hint))
+    return text_of(type="twin_refused", message=error.message + hint)

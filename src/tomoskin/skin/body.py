@@ -137,13 +137,13 @@ class DriveSection(Section, section="drive"):
     )
     drive: Pairs | None = key(
         Table(Row({"source": _ELECTRODE, "sink": _ELECTRODE})),
-        "Driven electrodes of each measurement, counted from 0.",
+        "Driven electrodes of each measurement, counted from 0: E1 is 0.",
         default=None,
         needs="measure",
     )
     measure: Pairs | None = key(
         Table(Row({"plus": _ELECTRODE, "minus": _ELECTRODE})),
-        "Read electrodes of each measurement, counted from 0.",
+        "Read electrodes of each measurement, counted from 0: E1 is 0.",
         default=None,
         needs="drive",
     )

@@ -200,7 +200,7 @@ def _on_rim(outline: Outline, positions: FloatArray, width: float) -> FloatArray
         raise GeometryError(
             f"expected a position on the rim within {allowed * 1e3:.3g} mm, "
             f"got ({x:.4g}, {y:.4g}) mm, {gap[number] * 1e3:.3g} mm off",
-            where=f"electrode {number} (E{number + 1})",
+            where=f"E{number + 1}",
         )
     return s
 

@@ -56,7 +56,7 @@ def lay(
     draped = Draped.read(Path(file), scale=scale)
     middles = scale * np.asarray(electrodes, dtype=np.float64)
     _check_sizes(draped.points, middles, str(file), unit)
-    positions = draped.place(middles, "electrode")
+    positions = draped.place(middles, [f"E{n + 1}" for n in range(len(middles))])
     rim = fewer_corners(draped.outline.vertices)
     given = like.document["electrodes"]
     from_there = path.relpath(file, Path(source).parent)

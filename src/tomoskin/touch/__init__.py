@@ -8,6 +8,7 @@ from tomoskin.touch.fit.covariance import idle_covariance
 from tomoskin.touch.fit.finder import SpotFinder, SpotModel
 from tomoskin.touch.fit.noise import Whitener, measured_covariance
 from tomoskin.touch.fit.pace import EXHAUSTIVE, LIVE, Pace
+from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.spot import Response, Spots, spots_of
 from tomoskin.touch.region import Region
 from tomoskin.touch.segment import ImageNoise, Segmenter
@@ -43,6 +44,7 @@ __all__ = [
     "Span",
     "SpotFinder",
     "SpotModel",
+    "SpotPrior",
     "Spots",
     "TouchEvent",
     "TouchedFrame",

@@ -66,7 +66,7 @@ class FaultEvent:
         if self.electrode < 0 or (pair and (self.other < 0 or self.other == self.electrode)):
             raise ModelError(
                 "expected "
-                f"{'two different electrodes from 0' if pair else 'an electrode from 0'}, got "
+                f"{'two different electrodes' if pair else 'an electrode'} from 0 (E1), got "
                 f"{(self.electrode, self.other) if pair else self.electrode}",
                 where=where,
             )
@@ -107,7 +107,7 @@ def check_electrodes(faults: Faults, n: int) -> None:
     wrong = sorted(e for e in named if e >= n)
     if wrong:
         raise ModelError(
-            f"expected electrodes from 0 to {n - 1}, got {wrong[0]}", where="twin: fault"
+            f"expected electrodes from 0 (E1) to {n - 1}, got {wrong[0]}", where="twin: fault"
         )
 
 

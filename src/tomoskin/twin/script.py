@@ -178,7 +178,7 @@ def _fault(given: FaultSection, where: str) -> ScriptedFault:
         )
     if given.other is not None and given.other == given.electrode:
         raise ScriptError(
-            f"expected an electrode other than {given.electrode}, got {given.other}",
+            f"expected an electrode other than E{given.electrode + 1}, got the same",
             where=f"{where} other",
             hint="an electrode is always connected to itself",
         )

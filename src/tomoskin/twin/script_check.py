@@ -94,9 +94,9 @@ def _check_faults(script: Script, skin: Skin, frame_time: float) -> None:
         for key, electrode in (("electrode", fault.electrode), ("other", fault.other)):
             if electrode >= skin.n_electrodes:
                 raise ScriptError(
-                    f"expected an electrode from 0 to {skin.n_electrodes - 1}, got {electrode}",
+                    "expected an electrode from 0 (E1) to "
+                    f"{skin.n_electrodes - 1}, got {electrode}",
                     where=f"{fault.where} {key}",
-                    hint="a script counts electrodes from 0: E1 is 0",
                 )
 
 

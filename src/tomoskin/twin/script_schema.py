@@ -205,9 +205,9 @@ class FaultSection(Section, section="fault", many=True):
     start: float = key(_TIME, "When it begins.")
     end: float | None = key(_TIME, "When it ends.", kind=_LASTING)
     electrode: int | None = key(
-        _ELECTRODE, "Its electrode, counted from 0.", kind=("cut", "short", "rail")
+        _ELECTRODE, "Its electrode, counted from 0: E1 is 0.", kind=("cut", "short", "rail")
     )
-    other: int | None = key(_ELECTRODE, "The electrode that it touches.", kind="short")
+    other: int | None = key(_ELECTRODE, "The one that it touches, counted from 0.", kind="short")
     lsb: float | None = key(
         Number(0, 1000), "Standard deviation of one conversion, LSB.", kind="noise"
     )

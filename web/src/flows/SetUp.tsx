@@ -14,7 +14,7 @@ import { Weigh } from "./Weigh";
 type Step = "board" | "wiring" | "touch" | "force";
 const STEPS: readonly (readonly [Step, string])[] = [
   ["board", "1 Board"],
-  ["wiring", "2 Wiring"],
+  ["wiring", "2 Channels"],
   ["touch", "3 Touch"],
   ["force", "4 Force"],
 ];
@@ -121,7 +121,7 @@ const TEACHING: Readonly<Record<Exclude<Step, "board">, readonly Teaching[]>> = 
   wiring: [
     {
       kind: "wiring",
-      text: "This finds which wire ends at which electrode. Press the skin where the dot is, a few times. The answer is saved as a skin file.",
+      text: "This finds the channel mapping: which wire ends at which electrode. Press the skin where the dot is, a few times. The answer is saved as a skin file.",
       begin: "Begin",
     },
   ],
@@ -253,7 +253,7 @@ function View() {
   );
 }
 
-addDrawer({ id: "setup", label: "Set up", key: "U", title: "Board, reference, wiring, touch, force", View });
+addDrawer({ id: "setup", label: "Set up", key: "U", title: "Board, reference, channel mapping, touch, force", View });
 
 const OFTEN = 2000;
 let timer = 0;

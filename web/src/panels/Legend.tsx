@@ -5,13 +5,13 @@ import { MAP_SIZE } from "../colours";
 import { fitColours } from "../commands";
 import { inScale, scaleFor } from "../format";
 import { narrow } from "../screen";
+import { AMOUNTS, percent, unresolved } from "../signals/unresolved";
 import { limit, ownLimit, scene } from "../state";
 import { theme } from "../theme";
 
 /** The map as a strip: upright with the largest increase on top; lying, with it at the right. */
-function Strip() {
+function Strip({ map }: { map: Uint8Array }) {
   const canvas = useRef<HTMLCanvasElement>(null);
-  const { map } = theme.value;
   const lying = narrow.value;
   useEffect(() => {
     const pen = canvas.current?.getContext("2d");
@@ -28,8 +28,27 @@ function Strip() {
 
 const PARTS = [1, 0.5, 0, -0.5, -1];
 
+/** Of the map of what the data cannot tell. */
+function LeftOpen() {
+  const marks = narrow.value ? [0, 0.25, 0.5, 0.75, 1] : [1, 0.75, 0.5, 0.25, 0];
+  return (
+    <aside class="legend" aria-label="Colour scale: part of a change that the data leave open, %">
+      <p class="unit">left open, %</p>
+      <div class="scale">
+        <Strip map={AMOUNTS} />
+        <ol>
+          {marks.map((mark) => (
+            <li key={mark}>{percent(mark)}</li>
+          ))}
+        </ol>
+      </div>
+    </aside>
+  );
+}
+
 export function Legend() {
   if (!scene.value) return null;
+  if (unresolved.value) return <LeftOpen />;
   const scale = scaleFor(limit.value, scene.value.unit);
   const fixedScale = scaleFor(scene.value.limit, scene.value.unit);
   const fixedLimit = inScale(scene.value.limit, fixedScale);
@@ -42,7 +61,7 @@ export function Legend() {
     <aside class="legend" aria-label={`Colour scale: change of conductivity, ${scale.unit}`}>
       <p class="unit">change, {scale.unit}</p>
       <div class="scale">
-        <Strip />
+        <Strip map={theme.value.map} />
         <ol>
           {marks.map((mark) => (
             <li key={mark}>{mark}</li>

@@ -16,6 +16,7 @@ import {
   status,
   topology,
 } from "../state";
+import { painted, percent, unresolved } from "../signals/unresolved";
 import { theme } from "../theme";
 import { Target } from "../flows/Target";
 import { narrow } from "../screen";
@@ -50,10 +51,12 @@ function Reading() {
   const found = place && locator.value?.find(...place);
   if (!scene.value || !frame || !place || !found) return null;
   const scale = scaleFor(limit.value, scene.value.unit);
+  const open = unresolved.value;
   return (
     <p class="reading" data-testid="reading">
       {millimetres(place[0], 0)}, {millimetres(place[1], 0)} mm{" "}
-      <strong>{inScale(frame.image[found.cell], scale)}</strong> {scale.unit}
+      <strong>{open ? percent(open[found.cell]) : inScale(frame.image[found.cell], scale)}</strong>{" "}
+      {open ? "% left open" : scale.unit}
     </p>
   );
 }
@@ -94,7 +97,7 @@ export function Sheet() {
         painter.resize(width, height);
       }),
       effect(() => {
-        void [view.value, theme.value, topology.value, limit.value, smoothed.value, showTruth.value, hand.value, cursor.value];
+        void [view.value, theme.value, topology.value, limit.value, smoothed.value, painted.value, showTruth.value, hand.value, cursor.value];
         painter.request();
       }),
       () => painter.stop(),

@@ -2,6 +2,7 @@
 
 import { hand, history, limit, newest, scene, showTruth, smoothed, timed, topology } from "../state";
 import { drewNewest } from "../latency";
+import { AMOUNTS, painted } from "../signals/unresolved";
 import { theme } from "../theme";
 import { GlPicture, openGl } from "./gl";
 import { drawMarks } from "./overlay";
@@ -73,11 +74,12 @@ export class Painter {
     }
     const colours = theme.peek();
     const frame = newest.frame;
-    this.picture.paint(frame?.image ?? this.untouched, {
+    const open = painted.peek();
+    this.picture.paint(open ?? frame?.image ?? this.untouched, {
       view,
-      limit: limit.peek(),
+      limit: open ? 1 : limit.peek(),
       smoothed: smoothed.peek(),
-      map: colours.map,
+      map: open ? AMOUNTS : colours.map,
       mesh: channels(colours.mesh, 0.22),
     });
     if (!this.pen) return;

@@ -1,6 +1,7 @@
 /** The signals drawer: the pattern drive by drive, noise, drift, reciprocity, positions of touches. */
 
 import { computed, effect, signal } from "@preact/signals";
+import type { JSX } from "preact";
 import type uPlot from "uplot";
 import { addDrawer, opened } from "../drawers";
 import { fixed, niceAbove } from "../format";
@@ -13,6 +14,7 @@ import { shownDrive } from "../sheet/space";
 import { theme } from "../theme";
 import { Budget } from "./Budget";
 import { Log, NoiseMeter, reciprocalPairs, reciprocity } from "./measures";
+import { Unresolved, wanted } from "./unresolved";
 
 const DRIFT_PERIOD = 2;
 const HOUR = 3600;
@@ -151,6 +153,17 @@ const TABS: readonly Tab[] = [
     series: 2 * SLOTS,
   },
   {
+    id: "unresolved",
+    label: "Left open",
+    unit: "%",
+    meaning:
+      "What the data cannot tell. The sheet shows how much of a change about each position stays open, by the prior and the alpha of the image: 0 % where the data decide it, 100 % where they say nothing. Touches do not move this map; lost electrodes and alpha do.",
+    fit: () => [0, 100],
+    range: [0, 1],
+    data: () => [[], []],
+    series: 1,
+  },
+  {
     id: "latency",
     label: "Latency",
     unit: "ms",
@@ -177,6 +190,7 @@ effect(() => {
   const row = groups.value.rows[drive.from];
   shownDrive.value = [scene.value.pattern.drive[2 * row], scene.value.pattern.drive[2 * row + 1]];
 });
+effect(() => void (wanted.value = opened.value?.id === "signals" && current.value.id === "unresolved"));
 effect(() => {
   const known = ends.value[current.value.id];
   if (opened.value?.id === "signals" && !known && shown.value) fitAxis();
@@ -277,6 +291,12 @@ function Chart({ tab }: { tab: Tab }) {
   );
 }
 
+/** Tabs that are no plots. */
+const OWN: Readonly<Record<string, () => JSX.Element>> = {
+  latency: () => <Budget />,
+  unresolved: () => <Unresolved />,
+};
+
 function View() {
   const tab = current.value;
   void shown.value;
@@ -297,7 +317,7 @@ function View() {
       </div>
       <p class="hint">{tab.meaning}</p>
       {tab.id === "drive" && <Drives />}
-      {tab.id === "latency" ? <Budget /> : <Chart tab={tab} />}
+      {(OWN[tab.id] ?? (() => <Chart tab={tab} />))()}
     </div>
   );
 }
@@ -306,6 +326,6 @@ addDrawer({
   id: "signals",
   label: "Signals",
   key: "G",
-  title: "Voltages drive by drive, noise, drift, reciprocity, positions, latency",
+  title: "Voltages drive by drive, noise, drift, reciprocity, positions, what is left open, latency",
   View,
 });

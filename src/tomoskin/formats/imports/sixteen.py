@@ -143,7 +143,7 @@ def _electrodes(arrays: Arrays, key: str, source: str) -> IntArray:
     if table.max() >= _N:
         row = int(np.argmax(table.max(axis=1)))
         raise DataError(
-            f"expected electrodes from 0 to {_N - 1}, got {table[row].tolist()}",
+            f"expected electrodes from 0 (E1) to {_N - 1}, got {table[row].tolist()}",
             where=f"{source}, {key} row {row}",
         )
     return table

@@ -53,7 +53,7 @@ def pairs_of(patterns: NDArray[Any], what: str, source: str) -> IntArray:
     good = ((signs > 0).sum(axis=1) == 1) & ((signs < 0).sum(axis=1) == 1) & balanced
     if not good.all():
         row = int(np.argmin(good))
-        used = np.flatnonzero(patterns[row]).tolist()
+        used = ", ".join(f"E{e + 1}" for e in np.flatnonzero(patterns[row])) or "none"
         raise DataError(
             f"expected one electrode against one other, got a pattern on {used}",
             where=f"{source}, {what} {row}",
