@@ -15,7 +15,7 @@ from tomoskin.core import Detection, FloatArray, SkinError, finished
 from tomoskin.forward import ForwardModel
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
-from tomoskin.touch.fit.candidates import Candidates, Matched
+from tomoskin.touch.fit.candidates import Candidates, Matched, footprints_of
 from tomoskin.touch.fit.cell_discs import CellDiscs
 from tomoskin.touch.fit.certificate import Certificate, Reduced
 from tomoskin.touch.fit.excess import Gauge
@@ -26,9 +26,9 @@ from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
 from tomoskin.touch.fit.search import SpotDetections, joined, search
 from tomoskin.touch.fit.selection import ForwardSelection
-from tomoskin.touch.fit.sheet import fitting_sheet
+from tomoskin.touch.fit.sheet import fields_of, fitting_sheet
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
-from tomoskin.touch.fit.spot import N_PARAMETERS, Response, depth_of
+from tomoskin.touch.fit.spot import N_PARAMETERS, Footprints, Response, depth_of
 from tomoskin.touch.fit.table import ResponseTable
 from tomoskin.touch.fit.tabulate import Tabulation, kept_tabulation
 from tomoskin.touch.fit.watch import FrameWatch
@@ -120,6 +120,11 @@ class SpotModel:
         return Candidates.of(self.response, self.prior)
 
     @cached_property
+    def _feet(self) -> tuple[Footprints, ...]:
+        """Of the candidates, for uneven sheets."""
+        return footprints_of(self.response, self.prior)
+
+    @cached_property
     def solver(self) -> Solver:
         """What fits spots by a table of what one does."""
         made = self.tabulation if self.adapted is None else self.adapted
@@ -133,7 +138,8 @@ class SpotModel:
 
     def warm_up(self) -> None:
         """Do what takes seconds the first time, and half a second later on, before frames come."""
-        _ = self.tabulation.lattices, self.candidates, self.solver, self.reduced
+        _ = self.tabulation.lattices, self.candidates, self._feet, self.solver, self.reduced
+        _ = fields_of(self.response.spots.mesh)
 
     def changes(self, spots: FloatArray) -> FloatArray:
         """(k, n_meas) V that each of ``spots`` (k, 4) alone adds to the reference, by the table."""
@@ -157,16 +163,18 @@ class SpotModel:
         response = Response(state)
         table = yield from self.tabulation.adapted(response)
         certificate = yield from self.tabulation.certificate.adapted(response, table)
-        candidates = yield from self.candidates.adapted(self.response, response, self.prior)
+        candidates = yield from self.candidates.adapted(self.response, response, self._feet)
         scale = self.scale
         if (scale != 1.0).any():
             scale = 1 / np.abs(response.reference)
         adapted = Adapted(table, certificate, candidates)
         made = replace(self, response=response, scale=scale, adapted=adapted, even=self)
         yield
-        _ = made.reduced
+        made.__dict__["reduced"] = yield from Reduced.making(response, certificate, self.prior)
         yield
-        _ = made.solver.table.typical
+        _ = made.solver
+        yield
+        _ = table.typical
         return made
 
 

@@ -10,6 +10,7 @@ one that is exact to second order (Maxwell 1873, article 314, in the plane).
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Self
 
@@ -18,14 +19,14 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 from scipy.spatial import cKDTree
 
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray, IntArray, finished
 from tomoskin.forward import State
 from tomoskin.touch.fit.spot import CONTENT, FILLING, LOG_RADIUS, REACH, Response, profile
 
 _PATCHES = 120
 """Of the sheet, about."""
 
-_ABREAST = 256
+_ABREAST = 32
 """Columns of the inverse that are held at a time."""
 
 
@@ -57,6 +58,11 @@ class Interaction:
     @classmethod
     def of(cls, response: Response) -> Self:
         """Some ten milliseconds of work for a mesh of 1,500 cells."""
+        return finished(cls.making(response))
+
+    @classmethod
+    def making(cls, response: Response) -> Generator[None, None, Self]:
+        """As :meth:`of`, a piece between two yields."""
         state = response.state
         mesh, sigma = state.model.mesh, np.asarray(state.conductivity)
         patch, centres, area = _patches(mesh.centroids, mesh.volumes)
@@ -65,7 +71,9 @@ class Interaction:
         root = np.sqrt(mean.power(2) @ sigma)
         gradient = state.model.gradient
         across = vstack([mean @ gradient[:n], mean @ gradient[n:]]).tocsr()
-        between = _carried(state, across).reshape(2, len(area), 2, len(area)).transpose(1, 0, 3, 2)
+        carried = yield from _carried(state, across)
+        yield
+        between = carried.reshape(2, len(area), 2, len(area)).transpose(1, 0, 3, 2)
         between = between * root[:, None, None, None] * root[:, None]
         fields = np.stack([(mean @ state.gradient[:, axis].T) for axis in (0, 1)], axis=1)
         spread = 4 * float(area.mean()) / 12
@@ -112,11 +120,13 @@ def _patches(centroids: FloatArray, volumes: FloatArray) -> tuple[IntArray, Floa
     return patch, np.stack(sums, axis=1) / area[:, None], area
 
 
-def _carried(state: State, across: csr_array) -> FloatArray:
+def _carried(state: State, across: csr_array) -> Generator[None, None, FloatArray]:
     """(m, m): ``across`` (m, n_nodes) on both sides of the inverse of the sheet's matrix."""
     n_nodes = across.shape[1]
     through = np.empty(across.shape)
     for first in range(0, n_nodes, _ABREAST):
+        yield
         nodes = np.arange(first, min(first + _ABREAST, n_nodes))
         through[:, nodes] = across @ state.factor.columns(nodes)[:n_nodes]
+    yield
     return np.asarray(across @ through.T)
