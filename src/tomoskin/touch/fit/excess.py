@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray, IntArray, finished
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.signal import Reciprocity
 from tomoskin.touch.fit.noise import Whitener
@@ -56,6 +58,11 @@ class Channels:
     names: tuple[str, ...]
     apart: FloatArray
     both: FloatArray
+
+    @cached_property
+    def seen(self) -> FloatArray:
+        """(n_parts, n_pairs): what each part does to the differences."""
+        return self.parts @ self.apart.T
 
     @classmethod
     def of(cls, pattern: Pattern) -> Self:
@@ -114,17 +121,26 @@ class Gauge:
 
     @classmethod
     def of(cls, channels: Channels, covariance: FloatArray, nuisance: FloatArray) -> Self:
+        """As :meth:`making`, at once."""
+        return finished(cls.making(channels, covariance, nuisance))
+
+    @classmethod
+    def making(
+        cls, channels: Channels, covariance: FloatArray, nuisance: FloatArray
+    ) -> Generator[None, None, Self]:
         """For a ``covariance`` (n_meas, n_meas) V² of the data, and a ``nuisance`` subspace
-        (n_meas, k) V."""
+        (n_meas, k) V; a piece of work between two yields."""
         apart, both = channels.apart, channels.both
         whiten = _white(apart @ covariance @ apart.T, apart @ nuisance)
-        directions = whiten(channels.parts @ apart.T)
+        yield
+        directions = whiten(channels.seen)
         squares = np.einsum("pr,pr->p", directions, directions)
         shows = squares > 1e-12 * squares.max(initial=0.0)
         squares = np.where(shows, squares, np.inf)
         directions = directions / np.sqrt(squares)[:, None]
         order = np.argsort(channels.channel, kind="stable")
         order = order[shows[order]]
+        yield
         count = np.bincount(channels.channel[order], minlength=len(channels.names))
         starts = np.cumsum(count) - count
         own = [directions[order[a : a + n]] for a, n in zip(starts, count, strict=True)]

@@ -49,6 +49,10 @@ _MASKS = 8
 """Nuisance subspaces whose whitening is kept."""
 
 
+Seen = tuple[WhitenedTable, Matched, Gauge]
+"""How frames of one noise are seen: the table, candidates and channels."""
+
+
 @dataclass(frozen=True, eq=False)
 class Adapted:
     """What an even sheet's model became for an uneven one.
@@ -228,13 +232,31 @@ class SpotFinder:
         self._deficit = Deficit.none(len(model.solver.table.basis))
         pattern = model.response.state.model.pattern
         self.watch = FrameWatch(pattern, skin.touch.sign, skin.touch.snr)
-        self.renew(noise, gain)
-
-    def renew(self, noise: FloatArray, gain: float = 1.0) -> None:
-        """Go on with other noise, or another gain."""
-        self._scale = self._model.scale * gain
+        self._scale = model.scale * gain
         self._noise = noise / self._scale[:, None] / self._scale
-        self._matched: OrderedDict[bytes, tuple[WhitenedTable, Matched, Gauge]] = OrderedDict()
+        self._nuisance = np.zeros((len(noise), 0))
+        self._matched: OrderedDict[bytes, Seen] = OrderedDict()
+
+    def renewing(self, noise: FloatArray, gain: float = 1.0) -> Generator[None, None, None]:
+        """Go on with other noise, or another gain, at the end of some pieces of work."""
+        scale = self._model.scale * gain
+        yield from self._renewed(noise / scale[:, None] / scale, scale)
+
+    def preparing(self, nuisance: FloatArray) -> Generator[None, None, None]:
+        """Make ready for frames of that ``nuisance`` subspace; see :meth:`push`."""
+        self._nuisance = nuisance
+        yield from self._renewed(self._noise, self._scale)
+
+    def _renewed(self, noise: FloatArray, scale: FloatArray) -> Generator[None, None, None]:
+        nuisance, excess = self._nuisance / scale[:, None], self.watch.excess
+        made = yield from self._making(noise, nuisance)
+        self._scale, self._noise = scale, noise
+        self._matched = OrderedDict({nuisance.tobytes() + excess.key: made})
+
+    @property
+    def nuisance(self) -> FloatArray:
+        """(n_meas, k) of the newest frame; see :meth:`push`."""
+        return self._nuisance
 
     def push(self, dv: FloatArray, nuisance: FloatArray) -> list[Detection]:
         """Touches of ``dv`` (n_meas,), strongest first.
@@ -242,6 +264,7 @@ class SpotFinder:
         ``nuisance`` (n_meas, k) spans the directions along which the data tell nothing of a
         touch: a unit vector for each excluded row. There must be more rows than that.
         """
+        self._nuisance = nuisance
         data, nuisance = dv / self._scale, nuisance / self._scale[:, None]
         self.watch.begin(data, self._whitened(nuisance)[2])
         detected, matched = self._searched(data, nuisance)
@@ -318,19 +341,29 @@ class SpotFinder:
         unrest = min(1.0, math.hypot(_REST, moved / self._reach))
         return unrest, way if moved <= self._reach else np.zeros_like(way)
 
-    def _whitened(self, nuisance: FloatArray) -> tuple[WhitenedTable, Matched, Gauge]:
-        excess, channels = self.watch.excess, self.watch.channels
-        key = nuisance.tobytes() + excess.key
+    def _whitened(self, nuisance: FloatArray) -> Seen:
+        key = nuisance.tobytes() + self.watch.excess.key
         if key not in self._matched:
-            model, noise = self._model, excess.added(self._noise, channels)
-            whiten = Whitener.of(noise).without(nuisance)
-            seen = WhitenedTable.of(model.solver, whiten, model.response.times)
-            gauge = Gauge.of(channels, noise, nuisance)
-            self._matched[key] = seen, model.candidates.matched(seen), gauge
+            self._matched[key] = finished(self._making(self._noise, nuisance))
             if len(self._matched) > _MASKS:
                 self._matched.popitem(last=False)
         self._matched.move_to_end(key)
         return self._matched[key]
+
+    def _making(self, noise: FloatArray, nuisance: FloatArray) -> Generator[None, None, Seen]:
+        """What frames of this noise and nuisance subspace are seen by."""
+        model, channels = self._model, self.watch.channels
+        noise = self.watch.excess.added(noise, channels)
+        white = Whitener.of(noise)
+        yield
+        white = white.without(nuisance)
+        yield
+        seen = yield from WhitenedTable.making(model.solver, white, model.response.times)
+        yield
+        gauge = yield from Gauge.making(channels, noise, nuisance)
+        yield
+        matched, _ = model.candidates.matched(seen), seen.kept
+        return seen, matched, gauge
 
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from scipy.linalg.lapack import dpocon, dpotrf, dtrtri
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.pattern import Scan
@@ -48,7 +49,11 @@ class Whitener:
         covariance = np.diag(noise**2) if noise.ndim == 1 else (noise + noise.T) / 2
         size = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         scale = np.where(size > 0, size, 1.0)
-        variance, direction = np.linalg.eigh(covariance / scale[:, None] / scale)
+        even = covariance / scale[:, None] / scale
+        root, singular = dpotrf(even, lower=1, clean=1)
+        if not singular and dpocon(root, np.abs(even).sum(axis=0).max(), uplo="L")[0] > _LEAST:
+            return cls(dtrtri(root, lower=1)[0] / scale)
+        variance, direction = np.linalg.eigh(even)
         kept = variance > _LEAST * variance[-1]
         return cls((direction[:, kept] / np.sqrt(variance[kept])).T / scale)
 

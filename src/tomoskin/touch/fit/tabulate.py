@@ -44,7 +44,7 @@ FAINT = -0.3
 UNCLEAR = 1e-9
 """Part of the largest square below which a linear change is no measure of an exact one."""
 
-_PIECE = 20_000
+_PIECE = 50_000
 """Numbers that are filtered in a piece of work: half a millisecond."""
 
 _BLOCKS = 8
