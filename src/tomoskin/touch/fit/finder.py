@@ -301,7 +301,9 @@ class SpotFinder:
             rest=rest,
             left=self._left(seen),
         )
-        problem = replace(problem, sign=self.watch.sign(problem, matched))
+        sign = self.watch.sign(problem, matched)
+        if sign != problem.sign:
+            problem = replace(problem, sign=sign)
         detected = self._sought(problem, matched)
         if self.watch.puzzled(problem, detected.fit, matched):
             both = self._sought(replace(problem, sign="both"), matched)

@@ -88,14 +88,16 @@ class Interaction:
 
     def change(self, spots: FloatArray) -> FloatArray:
         """(n_meas,) V of spots (k, 4) together, less what each does alone."""
-        heights = self._heights(spots).astype(np.float32)
-        first, *others = (height[:, None, None] * self.fields for height in heights)
-        before = first.reshape(len(self.between), -1)
-        total = np.zeros((before.shape[1], before.shape[1]))
-        for other in others:
-            scattered = other.reshape(before.shape)
-            total += before.T @ (self.between @ scattered)
-            before = before + scattered
+        heights, n = self._heights(spots).astype(np.float32), self.fields.shape[2]
+        total = np.zeros((n, n), np.float32)
+        before: list[tuple[IntArray, NDArray[np.float32]]] = []
+        for height in heights:
+            own = np.flatnonzero(height)  # few: beyond a spot's reach there is nothing to multiply
+            scattered = (height[own, None, None] * self.fields[own]).reshape(-1, n)
+            axes = np.add.outer(2 * own, (0, 1)).ravel()
+            for others, earlier in before:
+                total += earlier.T @ (self.between[others[:, None], axes] @ scattered)
+            before.append((axes, scattered))
         return self.state.model.voltages(total + total.T)
 
     def _heights(self, spots: FloatArray) -> FloatArray:
