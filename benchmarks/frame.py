@@ -65,6 +65,7 @@ def run(data: Path | None) -> tuple[Report, ...]:
 def row(prepared: Prepared, repeats: int = REPEATS, presses: int = 2) -> tuple[object, ...]:
     """Values under ``COLUMNS``."""
     idle, pressed = _chunks(prepared, presses)
+    prepared.warm_up()
     decoder, pipeline = Decoder(), Pipeline(prepared)
     taken, touches = _taken(decoder, pipeline, idle, pressed, repeats)
     p50, p99 = 1e3 * np.percentile(taken, (50, 99))

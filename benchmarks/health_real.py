@@ -114,7 +114,7 @@ def _drifted(pattern: Pattern, values: FloatArray) -> tuple[object, ...]:
         first, last = (frame - reference.mean) / noise, (frame - baseline.mean) / noise
         found.append([_rms(x) for x in (first, blind(first), last, blind(last))])
         if baseline.push(frame, none, float(number), touched=False):
-            modes = baseline.idle.modes(np.zeros((pattern.n_meas, 1)))
+            modes = baseline.idle.modes(lambda: np.zeros((pattern.n_meas, 1)))
             blind = _plain(np.hstack([gain, modes]), noise)
     part = max(len(values) // 20, 1)
     start, end = values[:part].mean(axis=0), values[-part:].mean(axis=0)

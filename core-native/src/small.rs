@@ -18,8 +18,33 @@ pub fn dots(left: &[f64], right: &[f64], length: usize) -> Matrix<f64> {
             left,
             right,
             length,
+            lower: false,
             out: &mut out,
         });
+    }
+    out
+}
+
+/// columnsᵀ columns, of columns of `length`: half of the products, as it is symmetric.
+///
+/// # Panics
+/// When the length is zero.
+pub fn squares(columns: &[f64], length: usize) -> Matrix<f64> {
+    let n = columns.len() / length;
+    let mut out = Matrix::zeros(n, n);
+    if n > 0 {
+        Arch::new().dispatch(Dots {
+            left: columns,
+            right: columns,
+            length,
+            lower: true,
+            out: &mut out,
+        });
+    }
+    for j in 0..n {
+        for i in 0..j {
+            out[(i, j)] = out[(j, i)];
+        }
     }
     out
 }
@@ -113,6 +138,8 @@ struct Dots<'a> {
     left: &'a [f64],
     right: &'a [f64],
     length: usize,
+    /// Whether blocks above the diagonal are of no use.
+    lower: bool,
     out: &'a mut Matrix<f64>,
 }
 
@@ -126,7 +153,8 @@ impl WithSimd for Dots<'_> {
         let right = |j: usize| &self.right[j.min(width - 1) * length..][..length];
         // the right side is the smaller one, as a rule, and stays in the first cache
         for i in (0..height).step_by(BLOCK) {
-            for j in (0..width).step_by(BLOCK) {
+            let end = if self.lower { i + 1 } else { width };
+            for j in (0..end).step_by(BLOCK) {
                 let found = block(simd, [left(i), left(i + 1)], [right(j), right(j + 1)]);
                 for (row, values) in found.iter().enumerate().take(height - i) {
                     for (column, value) in values.iter().enumerate().take(width - j) {

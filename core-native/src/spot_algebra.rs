@@ -1,7 +1,7 @@
 //! Small systems of directions whose amplitudes are not known.
 
 use crate::dense::Matrix;
-use crate::small::{add_sums, dots};
+use crate::small::{add_sums, dots, squares};
 
 /// C = 1 + DDᵀ of unknown directions D: C⁻¹ = 1 − D(1 + DᵀD)⁻¹Dᵀ (Woodbury 1950).
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ impl Metric {
     /// Of unknown directions; `None` where they are not finite.
     pub fn of(unknown: Matrix<f64>) -> Option<Self> {
         let q = unknown.width();
-        let mut root = dots(&unknown.values, &unknown.values, unknown.height);
+        let mut root = squares(&unknown.values, unknown.height);
         for i in 0..q {
             root[(i, i)] += 1.0;
         }
@@ -33,7 +33,7 @@ impl Metric {
     /// The products of columns (rows, n) with C⁻¹ between them, (n, n).
     pub fn products(&self, columns: &[f64]) -> Matrix<f64> {
         let rows = self.unknown.height;
-        let mut own = dots(columns, columns, rows);
+        let mut own = squares(columns, rows);
         if self.unknown.values.is_empty() {
             return own;
         }
@@ -42,7 +42,7 @@ impl Metric {
         for column in across.values.chunks_exact_mut(q) {
             forward(&self.root, column);
         }
-        let taken = dots(&across.values, &across.values, q);
+        let taken = squares(&across.values, q);
         for (value, taken) in own.values.iter_mut().zip(&taken.values) {
             *value -= taken;
         }
@@ -133,7 +133,7 @@ impl Beside {
     pub fn of(unknown: &[f64], free: &[f64], rows: usize, ridge: f64) -> Option<Self> {
         let q = unknown.len() / rows;
         let both = [unknown, free].concat();
-        let mut root = dots(&both, &both, rows);
+        let mut root = squares(&both, rows);
         let n = root.height;
         for i in 0..q {
             root[(i, i)] += 1.0;

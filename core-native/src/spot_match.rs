@@ -1,7 +1,7 @@
 //! How far spots stand out of the noise, and candidates out of what spots leave.
 
 use crate::dense::Matrix;
-use crate::small::{dots, product};
+use crate::small::{dots, product, squares as squares_of};
 use crate::spot_algebra::{Beside, Metric, backward, eliminated, forward};
 use crate::spot_table::PARAMETERS;
 
@@ -131,7 +131,7 @@ pub fn covariance(
         let both = column.iter_mut().zip(seen.change);
         both.for_each(|(value, change)| *value *= change);
     }
-    let square = dots(&answers.values, &answers.values, n_meas);
+    let square = squares_of(&answers.values, n_meas);
     let moved = dots(&own.values, &square.values, n);
     let taken: f64 = (0..n).map(|i| moved[(i, i)]).sum();
     let all = seen.squares.iter().zip(seen.change);

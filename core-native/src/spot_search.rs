@@ -80,7 +80,7 @@ pub struct Search<'a> {
 impl Search<'_> {
     /// Touches of the frame, from those of the last one; `None` where nothing can be compared.
     pub fn found(&self, before: &[Spot]) -> Option<Found> {
-        let kept = self.pruned(self.started(before)?)?;
+        let (kept, weakest) = self.pruned(self.started(before)?)?;
         let lost = match kept.fit.spots.len() {
             0 => 0,
             k => before.len() - k,
@@ -88,7 +88,7 @@ impl Search<'_> {
         let tries = self.pace.tries as isize - lost as isize;
         let (mut found, tried, changed) = self.more(kept, tries)?;
         if tries > tried && tried == 0 {
-            found = self.fewer(found)?;
+            found = self.fewer(found, weakest)?;
         }
         let astray = if self.pace.restart {
             found.fit.spots.len() != before.len() || !found.fit.settled
@@ -125,24 +125,23 @@ impl Search<'_> {
         self.refined(spots, false, self.pace.warm)
     }
 
-    /// Without the spots that have faded.
-    fn pruned(&self, mut found: Found) -> Option<Found> {
+    /// Without the spots that have faded; and the weakest of the others.
+    fn pruned(&self, mut found: Found) -> Option<(Found, (usize, f64))> {
         while !found.fit.spots.is_empty() {
             let (weakest, ratio) = self.weakest(&found.fit)?;
             if ratio >= self.rules.held * self.rules.least {
-                break;
+                return Some((found, (weakest, ratio)));
             }
             found = self.started(&without(&found.fit.spots, weakest))?;
         }
-        Some(found)
+        Some((found, (0, f64::INFINITY)))
     }
 
     /// Without the weakest of several spots, where that explains the frame as well.
-    fn fewer(&self, found: Found) -> Option<Found> {
+    fn fewer(&self, found: Found, (weakest, ratio): (usize, f64)) -> Option<Found> {
         if found.fit.spots.len() < 2 {
             return Some(found);
         }
-        let (weakest, ratio) = self.weakest(&found.fit)?;
         let enough = if found.fit.settled {
             1.0
         } else {

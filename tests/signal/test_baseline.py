@@ -160,14 +160,14 @@ def test_a_direction_of_drift_is_learnt_and_noise_is_none():
     unlike = np.random.default_rng(2).standard_normal((ROWS, 50))
     still, drifting = Idle(np.full(ROWS, NOISE), 20, 60.0), Idle(np.full(ROWS, NOISE), 20, 60.0)
     fed(still, Skin(), 40)
-    assert still.modes(unlike).shape[1] == 0
+    assert still.modes(lambda: unlike).shape[1] == 0
     fed(drifting, Skin(), 40, lambda n: 5 * NOISE * n / 1280 * way)
-    found = drifting.modes(unlike)
+    found = drifting.modes(lambda: unlike)
     assert found.shape[1] == 1
     cosine = found[:, 0] @ way / np.linalg.norm(found) / np.linalg.norm(way)
     assert abs(cosine) > 0.97
     touchlike = np.column_stack([unlike, way])
-    assert drifting.modes(touchlike).shape[1] == 0
+    assert drifting.modes(lambda: touchlike).shape[1] == 0
 
 
 def test_what_touches_leave_behind_is_no_direction_of_drift():
@@ -176,7 +176,8 @@ def test_what_touches_leave_behind_is_no_direction_of_drift():
     for press in range(12):
         fed(idle, skin, 3, lambda _, step=press: 2 * NOISE * step * way)
         idle.interrupt()
-    assert idle.modes(np.random.default_rng(2).standard_normal((ROWS, 50))).shape[1] == 0
+    some = np.random.default_rng(2).standard_normal((ROWS, 50))
+    assert idle.modes(lambda: some).shape[1] == 0
 
 
 def test_frames_that_are_all_the_same_waver_by_what_rounding_leaves():

@@ -81,10 +81,16 @@ class Element:
             cells=cells,
             gradients=_gradients(mesh, order),
             facets=facets,
-            facet_sizes=tuple(mesh.facet_sizes(e) for e in mesh.electrodes),
+            facet_sizes=_facet_sizes(mesh),
             facet_mass=mass,
             facet_load=mass.sum(axis=1),  # the shape functions add up to one
         )
+
+
+def _facet_sizes(mesh: Mesh) -> tuple[FloatArray, ...]:
+    """Per electrode, (n_facets,) length or area."""
+    ends = np.cumsum([len(electrode) for electrode in mesh.electrodes])[:-1]
+    return tuple(np.split(mesh.facet_sizes(np.concatenate(mesh.electrodes)), ends))
 
 
 @dataclass(frozen=True, eq=False)

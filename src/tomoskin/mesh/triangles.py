@@ -42,11 +42,10 @@ def facets(cells: IntArray) -> tuple[IntArray, IntArray]:
 def owners(cells: IntArray, chosen: IntArray) -> IntArray:
     """(n,) a cell that each facet of ``chosen`` (n, k − 1) belongs to, by its corners."""
     facet, owner = facets(cells)
-    both = np.concatenate([facet, np.sort(chosen, axis=1)])
-    number = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
-    of = np.empty(number.max() + 1, dtype=np.int64)
-    of[number[: len(facet)]] = owner
-    return np.asarray(of[number[len(facet) :]])
+    size = (int(cells.max()) + 1,) * facet.shape[1]
+    number, wanted = (np.ravel_multi_index(f.T, size) for f in (facet, np.sort(chosen, axis=1)))
+    order = np.argsort(number)
+    return np.asarray(owner[order[np.searchsorted(number, wanted, sorter=order)]])
 
 
 def neighbour_pairs(cells: IntArray) -> IntArray:

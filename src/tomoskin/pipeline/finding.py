@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
 from tomoskin.calibration import FrameView, TouchFit
-from tomoskin.core import Detection, FloatArray
+from tomoskin.core import Detection, FloatArray, finished
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.signal import Reference
 from tomoskin.source import Configuration, ScanSettings
@@ -25,8 +26,8 @@ from tomoskin.touch import (
 class Finder(Protocol):
     """What finds the touches of one frame after the other."""
 
-    def renew(self, prepared: Prepared, reference: Reference | None) -> None:
-        """Go on with another operator or noise."""
+    def renewing(self, prepared: Prepared, reference: Reference | None) -> Finding:
+        """What goes on with another operator or noise, in pieces of work."""
         ...
 
     def push(self, view: FrameView) -> list[Detection]:
@@ -44,6 +45,10 @@ class Finder(Protocol):
         ...
 
 
+Finding = Generator[None, None, Finder]
+"""Pieces of work, each of a millisecond or less, that lead to a finder."""
+
+
 class InImage:
     """Touches are regions of the picture."""
 
@@ -53,10 +58,11 @@ class InImage:
     def __init__(self, prepared: Prepared) -> None:
         self._segmenter = prepared.segmenter
 
-    def renew(self, prepared: Prepared, reference: Reference | None) -> None:
+    def renewing(self, prepared: Prepared, reference: Reference | None) -> Finding:
         """See :class:`Finder`."""
         del reference
-        self._segmenter = prepared.segmenter
+        yield from ()
+        return InImage(prepared)
 
     def push(self, view: FrameView) -> list[Detection]:
         """See :class:`Finder`."""
@@ -66,27 +72,37 @@ class InImage:
 class InData:
     """Touches are fitted to the data themselves; a filter over frames does not enter."""
 
-    def __init__(
-        self,
+    def __init__(self, model: SpotModel, spots: SpotFinder, pace: Pace) -> None:
+        self.model = model
+        """The sheet on which touches are fitted."""
+        self._spots, self._pace = spots, pace
+
+    @classmethod
+    def making(
+        cls,
         model: SpotModel,
         prepared: Prepared,
         reference: Reference | None,
         pace: Pace = EXHAUSTIVE,
-    ) -> None:
+    ) -> Generator[None, None, Self]:
+        """On the sheet of ``model``, a piece of work between two yields."""
         gain = _gain(model, prepared, reference)
-        noise = _noise(prepared, reference, gain)
-        self.model = model
-        """The sheet on which touches are fitted."""
+        noise = yield from _noise(prepared, reference, gain)
         skin, settings = prepared.skin, ScanSettings.of(prepared.skin)
         scan_time = Configuration.of(prepared.scan, settings).scan_time
-        self._spots = SpotFinder(
-            model, skin, prepared.mesh, noise, gain, scan_time=scan_time, pace=pace
-        )
+        spots = SpotFinder(model, skin, prepared.mesh, noise, gain, scan_time=scan_time, pace=pace)
+        return cls(model, spots, pace)
 
-    def renew(self, prepared: Prepared, reference: Reference | None) -> None:
-        """See :class:`Finder`."""
-        gain = _gain(self.model, prepared, reference)
-        self._spots.renew(_noise(prepared, reference, gain), gain)
+    def renewing(self, prepared: Prepared, reference: Reference | None) -> Finding:
+        """See :class:`Finder`; where the sheet is another one, what is found begins anew."""
+        if prepared.spots is None or prepared.spots is self.model:
+            gain = _gain(self.model, prepared, reference)
+            noise = yield from _noise(prepared, reference, gain)
+            yield from self._spots.renewing(noise, gain)
+            return self
+        other = yield from InData.making(prepared.spots, prepared, reference, self._pace)
+        yield from other._spots.preparing(self._spots.nuisance)
+        return other
 
     def push(self, view: FrameView) -> list[Detection]:
         """See :class:`Finder`."""
@@ -110,7 +126,7 @@ def finding(prepared: Prepared, reference: Reference | None, pace: Pace = EXHAUS
     """
     if prepared.spots is None or not prepared.fits_touches:
         return InImage(prepared)
-    return InData(prepared.spots, prepared, reference, pace)
+    return finished(InData.making(prepared.spots, prepared, reference, pace))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +151,7 @@ class Fitting:
         gain = _voltage_ratio(model, reference)
         if prepared.skin.touch.method == "fit":
             return TouchFit(model.response, gain, lambda _, detections: detections)
-        beside = InData(model, prepared, reference)
+        beside = finished(InData.making(model, prepared, reference))
         return TouchFit(model.response, gain, lambda view, _: beside.push(view))
 
 
@@ -143,17 +159,25 @@ def voltage_covariance(
     prepared: Prepared, reference: Reference | None, gain: float = 1.0
 ) -> FloatArray:
     """(n_meas, n_meas) V² of one frame less the reference; ``gain`` of what is predicted."""
+    return finished(_voltage_covariance(prepared, reference, gain))
+
+
+def _voltage_covariance(
+    prepared: Prepared, reference: Reference | None, gain: float
+) -> Generator[None, None, FloatArray]:
     readout, scan = prepared.readout, prepared.scan
     oversampling = prepared.skin.readout.oversampling
     step = abs(gain) * readout.volts_per_count * oversampling
     if reference is not None and reference.scatter is not None:
-        return idle_covariance(
-            scan,
-            reference.scatter,
-            least=reference.least,
-            step=step,
-            oversampling=oversampling,
-            signatures=None if prepared.spots is None else prepared.spots.candidates.signatures,
+        return (
+            yield from idle_covariance(
+                scan,
+                reference.scatter,
+                least=reference.least,
+                step=step,
+                oversampling=oversampling,
+                signatures=None if prepared.spots is None else prepared.spots.candidates.signatures,
+            )
         )
     return measured_covariance(
         scan,
@@ -165,9 +189,11 @@ def voltage_covariance(
     )
 
 
-def _noise(prepared: Prepared, reference: Reference | None, gain: float) -> FloatArray:
+def _noise(
+    prepared: Prepared, reference: Reference | None, gain: float
+) -> Generator[None, None, FloatArray]:
     """(n_meas, n_meas) covariance of difference data: one frame less the reference."""
-    volts = voltage_covariance(prepared, reference, gain)
+    volts = yield from _voltage_covariance(prepared, reference, gain)
     if prepared.operator.difference == "plain":
         return volts
     size = np.abs(prepared.operator.reference if reference is None else reference.mean)

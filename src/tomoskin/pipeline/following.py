@@ -17,7 +17,7 @@ from tomoskin.pipeline.conditioning import (
     Followed,
     GivenDifferences,
 )
-from tomoskin.pipeline.finding import Finder, Fitting, finding
+from tomoskin.pipeline.finding import Finder, Finding, Fitting, finding
 from tomoskin.pipeline.imaging import Filtered, SingleFrame, imaging
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.records import FrameResult, Measured
@@ -72,6 +72,8 @@ class Following:
         self._tracker = FingerTracker(tracker, prepared.skin.touch.slide_lag)
         self._imaging = _imaging(conditioning, rest, reference)
         self._finder: Finder = finding(prepared, reference, setting.pace)
+        self._finding: Finding | None = None
+        self._is_outdated = False
         conditions = Fitting(prepared, reference)
         self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
         self._tuning: Steps | None = None
@@ -121,6 +123,7 @@ class Following:
     def push(self, measured: Measured) -> FrameResult:
         """Take one frame."""
         self._tune()
+        self._refind()
         conditioned = self._conditioning.condition(measured)
         if conditioned.differences is None:
             return self._without_touches(measured, conditioned)
@@ -176,14 +179,26 @@ class Following:
         learnt = conditioning.learn(time, moved, touched=touched, noise=noise)
         if not any(learnt) or (reference := conditioning.reference) is None:
             return
-        prepared = conditioning.prepared
         if learnt.image:
+            prepared = conditioning.prepared
             self._imaging.renew(prepared, reference, conditioning.subspace())
-        self._finder.renew(prepared, reference)
+        self._is_outdated = True
+
+    def _refind(self) -> None:
+        """One step towards a finder of what is known now; what there is serves meanwhile."""
+        if self._finding is None:
+            if not self._is_outdated:
+                return
+            conditioning, self._is_outdated = self._conditioning, False
+            self._finding = self._finder.renewing(conditioning.prepared, conditioning.reference)
+        try:
+            next(self._finding)
+        except StopIteration as end:
+            self._finder, self._finding = end.value, None
 
     def _tune(self) -> None:
         """One step towards what the reference says; what there is serves meanwhile."""
-        if self._tuning is None:
+        if self._tuning is None or self._finding is not None:
             return
         try:
             better = next(self._tuning)
@@ -194,15 +209,10 @@ class Following:
                 self._renew(better)
 
     def _renew(self, prepared: Prepared) -> None:
-        before, self._prepared = self._prepared, prepared
+        self._prepared = prepared
         self._conditioning.renew(prepared)
-        reference = self._conditioning.reference
-        self._imaging = _imaging(self._conditioning, self.rest, reference)
-        now = self._conditioning.prepared
-        if prepared.spots is before.spots:
-            self._finder.renew(now, reference)
-        else:
-            self._finder = finding(now, reference, self._setting.pace)
+        self._imaging = _imaging(self._conditioning, self.rest, self._conditioning.reference)
+        self._is_outdated = True
 
     def _result(
         self,

@@ -43,7 +43,7 @@ class Drift:
         """
         if not self._projects or baseline.idle.blocks % _LEARN:
             return
-        modes = baseline.idle.modes(signatures())
+        modes = baseline.idle.modes(signatures)
         if modes.shape[1] or self.directions.shape[1] > 1:
             self.directions = np.hstack([self.directions[:, :1], modes])
             self.revision += 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from tomoskin.core import FloatArray
@@ -149,13 +151,14 @@ class Idle:
                 self._levels = self._levels[::2]
                 self._stride *= 2
 
-    def modes(self, signatures: FloatArray) -> FloatArray:
+    def modes(self, signatures: Callable[[], FloatArray]) -> FloatArray:
         """(n_meas, k) V: directions in which the skin has drifted, beyond noise.
 
         Principal directions of the levels, each stretch between two touches about its own mean:
         what a touch leaves behind is no drift. They count above the edge of the spectrum of
         noise (Marchenko & Pastur 1967: √n + √m for n by m) and where no touch could have caused
-        them: ``signatures`` (n_meas, n_cells), what each cell's change does to the data in V.
+        them: ``signatures`` gives (n_meas, n_cells) V, what each cell's change does to the data,
+        and is asked where there are some.
         """
         levels = self._centred()
         if len(levels) < _FEWEST:
@@ -163,7 +166,9 @@ class Idle:
         _, singular, directions = np.linalg.svd(levels, full_matrices=False)
         edge = (np.sqrt(len(self.noise)) + np.sqrt(len(levels))) / np.sqrt(BLOCK)
         beyond = directions[:MODES][singular[:MODES] > _EDGE * edge]
-        whitened = signatures / self.noise[:, None]
+        if not len(beyond):
+            return np.zeros((len(self.noise), 0))
+        whitened = signatures() / self.noise[:, None]
         whitened /= np.maximum(np.linalg.norm(whitened, axis=0), 1e-300)
         cosine = np.abs(beyond @ whitened).max(axis=1)
         return np.asarray((beyond[cosine < _TOUCHLIKE] * self.noise).T)

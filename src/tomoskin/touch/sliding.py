@@ -7,13 +7,12 @@ hardly on the speed, and nothing is left of it once the finger stands.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
-import numpy as np
-
-from tomoskin.core import Detection, FloatArray, Touch
+from tomoskin.core import Detection, Touch
 from tomoskin.touch.tracking import TouchEvent, Tracker
 
 # Chosen on the twin's seeds 1 to 3 (docs/theory/tracking.md).
@@ -61,11 +60,11 @@ class SlideCorrection:
         course = self.courses.get(touch.id, ())
         if len(course) < _FEWEST:
             return touch
-        way = self.lag * _heading(np.array(course))
-        if not way.any():
+        u, v = _heading(course)
+        if not (u or v):
             return touch
         d = touch.detection
-        return replace(touch, detection=replace(d, x=d.x + float(way[0]), y=d.y + float(way[1])))
+        return replace(touch, detection=replace(d, x=d.x + self.lag * u, y=d.y + self.lag * v))
 
     def _gone_on(self, touch: Touch, time: float) -> Course:
         before = self.courses.get(touch.id, ())
@@ -98,16 +97,24 @@ class FingerTracker:
         return tuple(map(self._slides.of_finger, tracked))
 
 
-def _heading(course: FloatArray) -> FloatArray:
-    """(2,) direction in which a touch slides, as long as it is sure that it does: from 0 to 1."""
-    time, places = course[:, 0] - course[-1, 0], course[:, 1:]
-    spread = time - time.mean()
-    velocity = spread @ places / (spread @ spread)
-    speed = float(np.hypot(*velocity))
+def _heading(course: Course) -> tuple[float, float]:
+    """Direction in which a touch slides, as long as it is sure that it does: from 0 to 1.
+
+    Plain numbers: a course of some rows is quicker without arrays.
+    """
+    times = [row[0] - course[-1][0] for row in course]
+    mean = math.fsum(times) / len(times)
+    square = math.fsum([(time - mean) ** 2 for time in times])
+    u, v = (
+        math.fsum([(time - mean) * row[axis] for time, row in zip(times, course, strict=True)])
+        / square
+        for axis in (1, 2)
+    )
+    speed = math.hypot(u, v)
     if not speed > _STANDS:
-        return np.zeros(2)
-    direction = velocity / speed
-    last = max(int(np.count_nonzero(time <= -_RECENT)) - 1, 0)
-    of_late = float((places[-1] - places[last]) @ direction) / -float(time[last])
-    part = float(np.clip((min(speed, of_late) - _STANDS) / (_SLIDES - _STANDS), 0.0, 1.0))
-    return np.asarray(part * direction)
+        return 0.0, 0.0
+    last = max(sum(time <= -_RECENT for time in times) - 1, 0)
+    x, y = (course[-1][axis] - course[last][axis] for axis in (1, 2))
+    of_late = (x * u + y * v) / speed / -times[last]
+    part = min(max((min(speed, of_late) - _STANDS) / (_SLIDES - _STANDS), 0.0), 1.0)
+    return part * u / speed, part * v / speed

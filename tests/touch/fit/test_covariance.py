@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tomoskin.core import finished
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.signal import Scatter
 from tomoskin.touch.fit import Whitener, idle_covariance, row_covariance
@@ -43,8 +44,9 @@ def idle(truth, seed, frames=FRAMES):
 
 
 def learnt(values, signatures=None):
-    return idle_covariance(
-        SCAN, Scatter.of(values), least=0.0, step=1e-6, oversampling=1, signatures=signatures
+    scatter = Scatter.of(values)
+    return finished(
+        idle_covariance(SCAN, scatter, least=0.0, step=1e-6, oversampling=1, signatures=signatures)
     )
 
 
@@ -97,9 +99,8 @@ def test_a_touch_among_the_idle_frames_is_not_learnt():
 
 
 def test_no_noise_at_all_leaves_rounding():
-    covariance = idle_covariance(
-        SCAN, Scatter.of(np.zeros((20, N))), least=0.1, step=1.0, oversampling=8
-    )
+    silent = Scatter.of(np.zeros((20, N)))
+    covariance = finished(idle_covariance(SCAN, silent, least=0.1, step=1.0, oversampling=8))
     assert (np.diag(covariance) > 0.01).all()
 
 

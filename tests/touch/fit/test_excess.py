@@ -61,8 +61,9 @@ def test_it_goes_with_the_noise():
 
 
 def test_what_a_touch_changes_is_no_noise():
-    pairs = CHANNELS.both
-    change = pairs.T @ np.random.default_rng(7).standard_normal(len(pairs))
+    pairs, change = CHANNELS.pairs, np.zeros(CHANNELS.apart.shape[1])
+    change[pairs.first] = np.random.default_rng(7).standard_normal(len(pairs.first))
+    change[pairs.second] = pairs.sign * change[pairs.first]
     change *= 200 / np.linalg.norm(change)
     idle = frames(30, 8)
     touched = idle + np.where(np.arange(30)[:, None] >= 10, change, 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray, finished
 from tomoskin.touch.fit import Response
-from tomoskin.touch.fit.candidates import Candidates
+from tomoskin.touch.fit.candidates import Candidates, footprints_of
 from tomoskin.touch.fit.random_field import field_modes
 from tomoskin.touch.fit.table import ResponseTable
 from tomoskin.touch.fit.tabulate import kept_tabulation
@@ -46,7 +46,8 @@ def test_an_uneven_sheets_table_is_nearly_as_exact_as_an_even_ones() -> None:
 
 def test_candidates_of_an_uneven_sheet_are_those_made_for_it() -> None:
     ours, there = model(), uneven()
-    found = finished(ours.candidates.adapted(ours.response, there, ours.prior))
+    feet = footprints_of(ours.response, ours.prior)
+    found = finished(ours.candidates.adapted(ours.response, there, feet))
     made = Candidates.of(there, ours.prior)
     size = np.linalg.norm(made.signatures, axis=1)
     wrong = np.linalg.norm(found.signatures - made.signatures, axis=1) / size

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -12,7 +12,7 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Fit, Limits, Solver, WhitenedTable
-from tomoskin.touch.fit.spot import CONTENT, FILLING, Response, spots_of
+from tomoskin.touch.fit.spot import CONTENT, FILLING, LOG_RADIUS, Footprints, Response, spots_of
 
 _SPACING = 0.7
 """Between candidates, in median radii."""
@@ -28,6 +28,9 @@ _USEFUL = 0.02
 
 _FAINT = 0.05
 """Depth at which signatures are taken: linear, and far above rounding."""
+
+_PIECES = 4
+"""Of the work for the candidates of one size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,18 +61,25 @@ class Candidates:
         return cls(spots, changes / content[:, None])
 
     def adapted(
-        self, even: Response, uneven: Response, prior: SpotPrior
+        self, even: Response, uneven: Response, feet: Sequence[Footprints]
     ) -> Generator[None, None, Candidates]:
         """Those of an ``uneven`` sheet, from these of an ``even`` one on the same mesh, a piece
-        between two yields: what faint spots change is linear in the fields."""
-        more, positions = uneven.by_cell - even.by_cell, _positions(even, prior)
-        moved = []
-        for size in _SIZES:
-            yield
-            radius = size * prior.radius
-            feet = even.spots.footprints(positions, radius)
-            moved.append(feet.linear(more, feet.height) / (FILLING * radius**2))
-        return Candidates(self.spots, self.signatures + np.concatenate(moved))
+        between two yields: what faint spots change is linear in the fields.
+
+        ``feet``: what :func:`footprints_of` gives for the even one.
+        """
+        more = uneven.by_cell - even.by_cell
+        signatures = self.signatures.copy()
+        content = np.exp(2 * self.spots[:, LOG_RADIUS]) * FILLING
+        start = 0
+        for own in feet:
+            here = slice(start, start + len(own.starts) - 1)
+            for rows in np.array_split(np.arange(signatures.shape[1]), _PIECES):
+                yield
+                moved = own.linear(more[:, rows], own.height)
+                signatures[here, rows] += moved / content[here, None]
+            start = here.stop
+        return Candidates(self.spots, signatures)
 
     def matched(self, seen: WhitenedTable) -> Matched:
         """The same for one noise."""
@@ -114,6 +124,13 @@ def limits_of(sign: str) -> Limits:
     low = 0.0 if sign == "increase" else -math.inf
     high = 0.0 if sign == "decrease" else math.inf
     return Limits(low, high, _LEAST, _USEFUL)
+
+
+def footprints_of(response: Response, prior: SpotPrior) -> tuple[Footprints, ...]:
+    """Of the candidates, of one size after the other."""
+    positions = _positions(response, prior)
+    spots = response.spots
+    return tuple(spots.footprints(positions, size * prior.radius) for size in _SIZES)
 
 
 def _positions(response: Response, prior: SpotPrior) -> FloatArray:

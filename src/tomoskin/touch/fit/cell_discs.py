@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -42,7 +44,8 @@ class CellDiscs:
         """(m,) in order, those whose middles are no farther from ``x``, ``y`` m than the root of
         ``square`` m², or the nearest one."""
         reach = math.sqrt(square) * _MARGIN
-        first, last = np.searchsorted(self.x, (x - reach, x + reach)).tolist()
+        along = self._along
+        first, last = bisect_left(along, x - reach), bisect_left(along, x + reach)
         near = slice(first, last)
         found = self.cells[near][self._squares(x, y, near) <= square]
         if len(found):
@@ -50,6 +53,10 @@ class CellDiscs:
             return found
         squares = self._squares(x, y, slice(None))
         return np.sort(self.cells[squares == squares.min()])
+
+    @cached_property
+    def _along(self) -> list[float]:
+        return list(map(float, self.x))
 
     def _squares(self, x: float, y: float, part: slice) -> FloatArray:
         along, across = self.x[part] - x, self.y[part] - y

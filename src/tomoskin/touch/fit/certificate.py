@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tomoskin.core import Arrays, FloatArray, IntArray, reach
+from tomoskin.core import Arrays, FloatArray, IntArray, finished, reach
 from tomoskin.touch.fit.interaction import Interaction
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.spot import CONTENT, FILLING, LOG_RADIUS, N_PARAMETERS, Response
@@ -176,7 +176,16 @@ class Reduced:
     @classmethod
     def of(cls, response: Response, certificate: Certificate, prior: SpotPrior) -> Self:
         """For a sheet."""
-        return cls(Interaction.of(response), certificate, Rim.of(response, prior))
+        return finished(cls.making(response, certificate, prior))
+
+    @classmethod
+    def making(
+        cls, response: Response, certificate: Certificate, prior: SpotPrior
+    ) -> Generator[None, None, Self]:
+        """As :meth:`of`, a piece between two yields."""
+        interaction = yield from Interaction.making(response)
+        yield
+        return cls(interaction, certificate, Rim.of(response, prior))
 
     def error(self, spots: FloatArray, sizes: FloatArray, together: float) -> float:
         """See :meth:`Certificate.error`, of spots (k, 4)."""

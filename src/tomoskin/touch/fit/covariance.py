@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from scipy.linalg import eigh, solve_triangular
 from scipy.special import ndtr, stdtrit
 
 from tomoskin.core import FloatArray
@@ -31,30 +33,48 @@ many rows tell of it. Between 4 and 100 in the cases of the benchmark."""
 _PASSES = 3
 """Structure and factors are fitted by turns."""
 
+_RIDGE = 1e-12
+"""Part of the largest variance that every row has at the least."""
+
 
 @dataclass(frozen=True, eq=False)
-class Turned:
-    """A scatter in the eigenvectors in which it meets its structure.
+class Factors:
+    """What stands out of a structure, as its root sees a scatter.
 
-    ``back`` (n_meas, n_meas) V makes rows of them; ``variance`` (n_meas,), ascending, are 1 where
-    the structure is right; the last ``factors`` of them stand out.
+    Attributes
+    ----------
+    structure, root
+        (n_meas, n_meas) V² and V: the structure, and its lower root.
+    directions
+        (n_meas, k) of length 1, in what is white by the structure.
+    variance
+        (k,), ascending: 1 is the structure's.
+    total, squares
+        Sum, and sum of squares, of the variances along all directions.
     """
 
-    back: FloatArray
+    structure: FloatArray
+    root: FloatArray
+    directions: FloatArray
     variance: FloatArray
-    factors: int
+    total: float
+    squares: float
+
+    @property
+    def back(self) -> FloatArray:
+        """(n_meas, k) V: what each direction does to the rows."""
+        return np.asarray(self.root @ self.directions)
 
     @property
     def removed(self) -> FloatArray:
         """(n_meas, k) V: the factors, each as long as its deviation."""
-        first = len(self.variance) - self.factors
-        return np.asarray(self.back[:, first:] * np.sqrt(self.variance[first:]))
+        return np.asarray(self.back * np.sqrt(self.variance))
 
     def likeness(self, signatures: FloatArray) -> FloatArray:
         """(k,) cosine of each factor to the nearest of ``signatures`` (n, n_meas)."""
-        turned = np.linalg.solve(self.back, signatures.T)
-        turned /= np.linalg.norm(turned, axis=0)
-        return np.asarray(np.abs(turned[len(turned) - self.factors :]).max(axis=1))
+        white = solve_triangular(self.root, signatures.T, lower=True, check_finite=False)
+        white /= np.linalg.norm(white, axis=0)
+        return np.asarray(np.abs(self.directions.T @ white).max(axis=1))
 
 
 def idle_covariance(
@@ -65,8 +85,9 @@ def idle_covariance(
     step: float,
     oversampling: int,
     signatures: FloatArray | None = None,
-) -> FloatArray:
-    """(n_meas, n_meas) V²: of one frame less the reference, as idle frames scatter.
+) -> Generator[None, None, FloatArray]:
+    """(n_meas, n_meas) V²: of one frame less the reference, as idle frames scatter; a piece of
+    work, about a millisecond, between two yields.
 
     Parameters
     ----------
@@ -88,9 +109,8 @@ def idle_covariance(
     size = np.sqrt(more)
     shared = row_covariance(scan, np.sqrt(0.5))
     matrix = scatter.matrix + shared * size[:, None] * size
-    return _uncertain(scatter.frames) * learnt_covariance(
-        blocks, matrix, scatter.frames, signatures
-    )
+    learnt = yield from learnt_covariance(blocks, matrix, scatter.frames, signatures)
+    return _uncertain(scatter.frames) * learnt
 
 
 def _uncertain(frames: int) -> float:
@@ -109,7 +129,7 @@ def _blocks(scan: Scan) -> Blocks:
 
 def learnt_covariance(
     blocks: Blocks, scatter: FloatArray, frames: int, signatures: FloatArray | None = None
-) -> FloatArray:
+) -> Generator[None, None, FloatArray]:
     """(n_meas, n_meas) V² for a ``scatter`` (n_meas, n_meas) V² of so many independent frames.
 
     The structure of the read-out (:mod:`tomoskin.touch.fit.targets`), and in it: factors that many
@@ -119,45 +139,62 @@ def learnt_covariance(
     betters Ledoit & Wolf 2004 for normal noise). A factor like one of the ``signatures``,
     (n, n_meas), is a touch that stood for a part of the frames, and no noise.
     """
-    turned = _turned(blocks, scatter, frames)
-    first = len(turned.variance) - turned.factors
-    left = max(frames - turned.factors, 2)
-    variance = turned.variance.copy()
-    variance[:first] = _shrunk(variance[:first] * frames / left, left)
-    if turned.factors and signatures is not None:
-        variance[first:][turned.likeness(signatures) > _TOUCHLIKE] = 1.0
-    return np.asarray((turned.back * variance) @ turned.back.T)
+    found = yield from _factors(blocks, scatter, frames)
+    yield
+    seen, back = found.variance, found.back
+    count = len(seen)
+    left = max(frames - count, 2)
+    more = frames / left
+    total, squares = found.total - float(seen.sum()), found.squares - float(seen @ seen)
+    part = _part(len(scatter) - count, more * total, more**2 * squares, left)
+    known = seen.copy()
+    if count and signatures is not None:
+        known[found.likeness(signatures) > _TOUCHLIKE] = 1.0
+        yield
+    # along each factor what is known of it, along all else the structure and the scatter
+    known -= part + (1 - part) * more * seen
+    covariance = part * found.structure + (1 - part) * more * scatter
+    return np.asarray(covariance + (back * known) @ back.T)
 
 
-def _turned(blocks: Blocks, scatter: FloatArray, frames: int) -> Turned:
+def _factors(blocks: Blocks, scatter: FloatArray, frames: int) -> Generator[None, None, Factors]:
     found = None
     for _ in range(_PASSES):
-        found = _once(blocks, scatter, frames, found)
-        if not found.factors:
+        found = yield from _once(blocks, scatter, frames, found)
+        if not len(found.variance):
             break
     assert found is not None
     return found
 
 
-def _once(blocks: Blocks, scatter: FloatArray, frames: int, before: Turned | None) -> Turned:
+def _once(
+    blocks: Blocks, scatter: FloatArray, frames: int, before: Factors | None
+) -> Generator[None, None, Factors]:
     """One pass: the structure of what the factors of the pass before leave, then factors."""
     rest, left = scatter, frames
     if before is not None:
-        left = max(frames - before.factors, 2)
+        left = max(frames - len(before.variance), 2)
         rest = (scatter - before.removed @ before.removed.T) * (frames / left)
-    values, vectors = np.linalg.eigh(target(blocks, rest, left))
-    root = vectors * np.sqrt(np.maximum(values, 1e-12 * values[-1]))
-    white = vectors / np.sqrt(np.maximum(values, 1e-12 * values[-1]))
-    variance, directions = np.linalg.eigh(white.T @ scatter @ white)
-    edge = _EDGE * (1 + np.sqrt(len(values) / frames)) ** 2
-    factors = min(int(np.count_nonzero(variance > edge)), _MOST, frames // 3)
-    return Turned(root @ directions, np.maximum(variance, 0.0), factors)
+    structure = yield from target(blocks, rest, left)
+    yield
+    structure[np.diag_indices_from(structure)] += _RIDGE * np.diag(structure).max()
+    root = np.asarray(np.linalg.cholesky(structure))
+    half = solve_triangular(root, scatter, lower=True, check_finite=False)
+    white = solve_triangular(root, half.T, lower=True, check_finite=False)
+    yield
+    edge = _EDGE * (1 + np.sqrt(len(white) / frames)) ** 2
+    variance, directions = eigh(white, driver="evr", subset_by_value=(edge, np.inf))
+    most = min(len(variance), _MOST, frames // 3)
+    first = len(variance) - most
+    squares = float(np.einsum("ij,ij->", white, white))
+    return Factors(
+        structure, root, directions[:, first:], variance[first:], float(np.trace(white)), squares
+    )
 
 
-def _shrunk(variance: FloatArray, frames: int) -> FloatArray:
-    """Variances drawn towards 1, by the part that makes the expected error least."""
-    p, total, squares = len(variance), float(variance.sum()), float(variance @ variance)
+def _part(p: int, total: float, squares: float, frames: int) -> float:
+    """How far ``p`` variances are drawn towards 1, which makes the expected error least; ``total``
+    and ``squares`` are the sums of them and of their squares."""
     chance = (1 - 2 / p) * squares + total**2
     differs = (frames + 1 - 2 / p) * (squares - total**2 / p)
-    part = min(1.0, chance / differs) if differs > 0 else 1.0
-    return np.asarray(part + (1 - part) * variance)
+    return min(1.0, chance / differs) if differs > 0 else 1.0

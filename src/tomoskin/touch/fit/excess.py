@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray, IntArray, finished
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.signal import Reciprocity
 from tomoskin.touch.fit.noise import Whitener
@@ -47,15 +49,22 @@ class Channels:
         (n_parts,) that each is of: electrodes first, then pairs.
     names
         Of the channels, for people.
-    apart, both
-        (n_pairs, n_meas): difference and sum of rows that exchange driven and measuring pair.
+    pairs
+        Rows that exchange driven and measuring pair.
+    apart
+        (n_pairs, n_meas): the difference of each two.
     """
 
     parts: FloatArray
     channel: IntArray
     names: tuple[str, ...]
+    pairs: Reciprocity
     apart: FloatArray
-    both: FloatArray
+
+    @cached_property
+    def seen(self) -> FloatArray:
+        """(n_parts, n_pairs): what each part does to the differences."""
+        return self.parts @ self.apart.T
 
     @classmethod
     def of(cls, pattern: Pattern) -> Self:
@@ -69,13 +78,9 @@ class Channels:
         names += [f"E{a + 1} to E{b + 1}" for a, b in pairs.tolist()]
         channel = np.concatenate([scan.sample_electrode, n + pair.reshape(-1)])
         parts = np.concatenate([samples, np.eye(pattern.n_meas)])
-        reciprocal = Reciprocity.of(pattern)
-        one, other = (
-            np.eye(pattern.n_meas)[reciprocal.first],
-            np.eye(pattern.n_meas)[reciprocal.second],
-        )
-        other = other * reciprocal.sign[:, None]
-        return cls(parts, channel, tuple(names), one - other, one + other)
+        reciprocal, single = Reciprocity.of(pattern), np.eye(pattern.n_meas)
+        apart = single[reciprocal.first] - reciprocal.sign[:, None] * single[reciprocal.second]
+        return cls(parts, channel, tuple(names), reciprocal, apart)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +92,12 @@ class Gauge:
 
     Attributes
     ----------
-    differs, agrees
-        (r, n_meas) 1/V: differences of the pairs, white; and the sums in the same measure.
-    directions
-        (n_seen, r) of length 1, of the parts that can be seen, one channel's after the other.
-        These three in single precision: they are read through in each frame.
+    pairs
+        Of the rows.
+    shows
+        (n_seen, n_pairs) 1/V: how the parts that can be seen, one channel's after the other, show
+        in the pairs' differences where these are white; as one deviation of noise does. In single
+        precision: it is read through in each frame.
     starts, count
         (n_channels,) its first part among these, and how many it has.
     variance
@@ -103,9 +109,8 @@ class Gauge:
         Numbers of the channels that can be judged.
     """
 
-    differs: NDArray[np.float32]
-    agrees: NDArray[np.float32]
-    directions: NDArray[np.float32]
+    pairs: Reciprocity
+    shows: NDArray[np.float32]
     starts: IntArray
     count: IntArray
     variance: FloatArray
@@ -114,26 +119,34 @@ class Gauge:
 
     @classmethod
     def of(cls, channels: Channels, covariance: FloatArray, nuisance: FloatArray) -> Self:
+        """As :meth:`making`, at once."""
+        return finished(cls.making(channels, covariance, nuisance))
+
+    @classmethod
+    def making(
+        cls, channels: Channels, covariance: FloatArray, nuisance: FloatArray
+    ) -> Generator[None, None, Self]:
         """For a ``covariance`` (n_meas, n_meas) V² of the data, and a ``nuisance`` subspace
-        (n_meas, k) V."""
-        apart, both = channels.apart, channels.both
+        (n_meas, k) V; a piece of work between two yields."""
+        apart = channels.apart
         whiten = _white(apart @ covariance @ apart.T, apart @ nuisance)
-        directions = whiten(channels.parts @ apart.T)
+        yield
+        directions = whiten(channels.seen)
         squares = np.einsum("pr,pr->p", directions, directions)
         shows = squares > 1e-12 * squares.max(initial=0.0)
         squares = np.where(shows, squares, np.inf)
         directions = directions / np.sqrt(squares)[:, None]
         order = np.argsort(channels.channel, kind="stable")
         order = order[shows[order]]
+        yield
         count = np.bincount(channels.channel[order], minlength=len(channels.names))
         starts = np.cumsum(count) - count
         own = [directions[order[a : a + n]] for a, n in zip(starts, count, strict=True)]
         spread = np.array([np.linalg.norm(d @ d.T) / max(len(d), 1) for d in own])
         limit = np.where(count >= _FEWEST, 1 + _LIMIT * np.sqrt(2) * spread, np.inf)
         return cls(
-            differs=(whiten.matrix @ apart).astype(np.float32),
-            agrees=(whiten.matrix @ both).astype(np.float32),
-            directions=directions[order].astype(np.float32),
+            pairs=channels.pairs,
+            shows=(directions[order] @ whiten.matrix).astype(np.float32),
             starts=starts,
             count=count,
             variance=_means(1 / squares[order], starts, count),
@@ -147,9 +160,10 @@ class Gauge:
         ``moved`` (n_meas,) V since the frame before: of that a part may stand between two rows,
         since one is read after the other; and of all data as much as channels differ in gain.
         """
-        single, both = dv.astype(np.float32), np.column_stack([moved, dv]).astype(np.float32)
-        seen = np.column_stack([self.differs @ single, self.agrees @ both])
-        along = (self.directions @ seen).astype(np.float64)
+        first, second, sign = self.pairs.first, self.pairs.second, self.pairs.sign
+        one, other = dv[first], sign * dv[second]
+        seen = np.stack([one - other, moved[first] + sign * moved[second], one + other], axis=1)
+        along = (self.shows @ seen.astype(np.float32)).astype(np.float64)
         differs, changes, gains = _means(along * along, self.starts, self.count).T
         allowed = _MOVES**2 * changes + _GAINS**2 * gains
         return np.asarray(differs - (allowed + allowed.mean()) / 2)

@@ -15,7 +15,7 @@ from tomoskin.core import Detection, FloatArray, SkinError, finished
 from tomoskin.forward import ForwardModel
 from tomoskin.mesh import Mesh
 from tomoskin.skin import Skin
-from tomoskin.touch.fit.candidates import Candidates, Matched
+from tomoskin.touch.fit.candidates import Candidates, Matched, footprints_of
 from tomoskin.touch.fit.cell_discs import CellDiscs
 from tomoskin.touch.fit.certificate import Certificate, Reduced
 from tomoskin.touch.fit.excess import Gauge
@@ -26,9 +26,9 @@ from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
 from tomoskin.touch.fit.search import SpotDetections, joined, search
 from tomoskin.touch.fit.selection import ForwardSelection
-from tomoskin.touch.fit.sheet import fitting_sheet
+from tomoskin.touch.fit.sheet import fields_of, fitting_sheet
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
-from tomoskin.touch.fit.spot import N_PARAMETERS, Response, depth_of
+from tomoskin.touch.fit.spot import N_PARAMETERS, Footprints, Response, depth_of
 from tomoskin.touch.fit.table import ResponseTable
 from tomoskin.touch.fit.tabulate import Tabulation, kept_tabulation
 from tomoskin.touch.fit.watch import FrameWatch
@@ -47,6 +47,10 @@ _REST = 0.5
 
 _MASKS = 8
 """Nuisance subspaces whose whitening is kept."""
+
+
+Seen = tuple[WhitenedTable, Matched, Gauge]
+"""How frames of one noise are seen: the table, candidates and channels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +124,11 @@ class SpotModel:
         return Candidates.of(self.response, self.prior)
 
     @cached_property
+    def _feet(self) -> tuple[Footprints, ...]:
+        """Of the candidates, for uneven sheets."""
+        return footprints_of(self.response, self.prior)
+
+    @cached_property
     def solver(self) -> Solver:
         """What fits spots by a table of what one does."""
         made = self.tabulation if self.adapted is None else self.adapted
@@ -133,7 +142,8 @@ class SpotModel:
 
     def warm_up(self) -> None:
         """Do what takes seconds the first time, and half a second later on, before frames come."""
-        _ = self.tabulation.lattices, self.candidates, self.solver, self.reduced
+        _ = self.tabulation.lattices, self.candidates, self._feet, self.solver, self.reduced
+        _ = fields_of(self.response.spots.mesh)
 
     def changes(self, spots: FloatArray) -> FloatArray:
         """(k, n_meas) V that each of ``spots`` (k, 4) alone adds to the reference, by the table."""
@@ -157,16 +167,18 @@ class SpotModel:
         response = Response(state)
         table = yield from self.tabulation.adapted(response)
         certificate = yield from self.tabulation.certificate.adapted(response, table)
-        candidates = yield from self.candidates.adapted(self.response, response, self.prior)
+        candidates = yield from self.candidates.adapted(self.response, response, self._feet)
         scale = self.scale
         if (scale != 1.0).any():
             scale = 1 / np.abs(response.reference)
         adapted = Adapted(table, certificate, candidates)
         made = replace(self, response=response, scale=scale, adapted=adapted, even=self)
         yield
-        _ = made.reduced
+        made.__dict__["reduced"] = yield from Reduced.making(response, certificate, self.prior)
         yield
-        _ = made.solver.table.typical
+        _ = made.solver
+        yield
+        _ = table.typical
         return made
 
 
@@ -220,13 +232,31 @@ class SpotFinder:
         self._deficit = Deficit.none(len(model.solver.table.basis))
         pattern = model.response.state.model.pattern
         self.watch = FrameWatch(pattern, skin.touch.sign, skin.touch.snr)
-        self.renew(noise, gain)
-
-    def renew(self, noise: FloatArray, gain: float = 1.0) -> None:
-        """Go on with other noise, or another gain."""
-        self._scale = self._model.scale * gain
+        self._scale = model.scale * gain
         self._noise = noise / self._scale[:, None] / self._scale
-        self._matched: OrderedDict[bytes, tuple[WhitenedTable, Matched, Gauge]] = OrderedDict()
+        self._nuisance = np.zeros((len(noise), 0))
+        self._matched: OrderedDict[bytes, Seen] = OrderedDict()
+
+    def renewing(self, noise: FloatArray, gain: float = 1.0) -> Generator[None, None, None]:
+        """Go on with other noise, or another gain, at the end of some pieces of work."""
+        scale = self._model.scale * gain
+        yield from self._renewed(noise / scale[:, None] / scale, scale)
+
+    def preparing(self, nuisance: FloatArray) -> Generator[None, None, None]:
+        """Make ready for frames of that ``nuisance`` subspace; see :meth:`push`."""
+        self._nuisance = nuisance
+        yield from self._renewed(self._noise, self._scale)
+
+    def _renewed(self, noise: FloatArray, scale: FloatArray) -> Generator[None, None, None]:
+        nuisance, excess = self._nuisance / scale[:, None], self.watch.excess
+        made = yield from self._making(noise, nuisance)
+        self._scale, self._noise = scale, noise
+        self._matched = OrderedDict({nuisance.tobytes() + excess.key: made})
+
+    @property
+    def nuisance(self) -> FloatArray:
+        """(n_meas, k) of the newest frame; see :meth:`push`."""
+        return self._nuisance
 
     def push(self, dv: FloatArray, nuisance: FloatArray) -> list[Detection]:
         """Touches of ``dv`` (n_meas,), strongest first.
@@ -234,6 +264,7 @@ class SpotFinder:
         ``nuisance`` (n_meas, k) spans the directions along which the data tell nothing of a
         touch: a unit vector for each excluded row. There must be more rows than that.
         """
+        self._nuisance = nuisance
         data, nuisance = dv / self._scale, nuisance / self._scale[:, None]
         self.watch.begin(data, self._whitened(nuisance)[2])
         detected, matched = self._searched(data, nuisance)
@@ -270,7 +301,9 @@ class SpotFinder:
             rest=rest,
             left=self._left(seen),
         )
-        problem = replace(problem, sign=self.watch.sign(problem, matched))
+        sign = self.watch.sign(problem, matched)
+        if sign != problem.sign:
+            problem = replace(problem, sign=sign)
         detected = self._sought(problem, matched)
         if self.watch.puzzled(problem, detected.fit, matched):
             both = self._sought(replace(problem, sign="both"), matched)
@@ -310,19 +343,29 @@ class SpotFinder:
         unrest = min(1.0, math.hypot(_REST, moved / self._reach))
         return unrest, way if moved <= self._reach else np.zeros_like(way)
 
-    def _whitened(self, nuisance: FloatArray) -> tuple[WhitenedTable, Matched, Gauge]:
-        excess, channels = self.watch.excess, self.watch.channels
-        key = nuisance.tobytes() + excess.key
+    def _whitened(self, nuisance: FloatArray) -> Seen:
+        key = nuisance.tobytes() + self.watch.excess.key
         if key not in self._matched:
-            model, noise = self._model, excess.added(self._noise, channels)
-            whiten = Whitener.of(noise).without(nuisance)
-            seen = WhitenedTable.of(model.solver, whiten, model.response.times)
-            gauge = Gauge.of(channels, noise, nuisance)
-            self._matched[key] = seen, model.candidates.matched(seen), gauge
+            self._matched[key] = finished(self._making(self._noise, nuisance))
             if len(self._matched) > _MASKS:
                 self._matched.popitem(last=False)
         self._matched.move_to_end(key)
         return self._matched[key]
+
+    def _making(self, noise: FloatArray, nuisance: FloatArray) -> Generator[None, None, Seen]:
+        """What frames of this noise and nuisance subspace are seen by."""
+        model, channels = self._model, self.watch.channels
+        noise = self.watch.excess.added(noise, channels)
+        white = Whitener.of(noise)
+        yield
+        white = white.without(nuisance)
+        yield
+        seen = yield from WhitenedTable.making(model.solver, white, model.response.times)
+        yield
+        gauge = yield from Gauge.making(channels, noise, nuisance)
+        yield
+        matched, _ = model.candidates.matched(seen), seen.kept
+        return seen, matched, gauge
 
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots

@@ -10,6 +10,7 @@ one that is exact to second order (Maxwell 1873, article 314, in the plane).
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Self
 
@@ -18,14 +19,14 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 from scipy.spatial import cKDTree
 
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray, IntArray, finished
 from tomoskin.forward import State
 from tomoskin.touch.fit.spot import CONTENT, FILLING, LOG_RADIUS, REACH, Response, profile
 
 _PATCHES = 120
 """Of the sheet, about."""
 
-_ABREAST = 256
+_ABREAST = 32
 """Columns of the inverse that are held at a time."""
 
 
@@ -57,6 +58,11 @@ class Interaction:
     @classmethod
     def of(cls, response: Response) -> Self:
         """Some ten milliseconds of work for a mesh of 1,500 cells."""
+        return finished(cls.making(response))
+
+    @classmethod
+    def making(cls, response: Response) -> Generator[None, None, Self]:
+        """As :meth:`of`, a piece between two yields."""
         state = response.state
         mesh, sigma = state.model.mesh, np.asarray(state.conductivity)
         patch, centres, area = _patches(mesh.centroids, mesh.volumes)
@@ -65,7 +71,9 @@ class Interaction:
         root = np.sqrt(mean.power(2) @ sigma)
         gradient = state.model.gradient
         across = vstack([mean @ gradient[:n], mean @ gradient[n:]]).tocsr()
-        between = _carried(state, across).reshape(2, len(area), 2, len(area)).transpose(1, 0, 3, 2)
+        carried = yield from _carried(state, across)
+        yield
+        between = carried.reshape(2, len(area), 2, len(area)).transpose(1, 0, 3, 2)
         between = between * root[:, None, None, None] * root[:, None]
         fields = np.stack([(mean @ state.gradient[:, axis].T) for axis in (0, 1)], axis=1)
         spread = 4 * float(area.mean()) / 12
@@ -80,14 +88,16 @@ class Interaction:
 
     def change(self, spots: FloatArray) -> FloatArray:
         """(n_meas,) V of spots (k, 4) together, less what each does alone."""
-        heights = self._heights(spots).astype(np.float32)
-        first, *others = (height[:, None, None] * self.fields for height in heights)
-        before = first.reshape(len(self.between), -1)
-        total = np.zeros((before.shape[1], before.shape[1]))
-        for other in others:
-            scattered = other.reshape(before.shape)
-            total += before.T @ (self.between @ scattered)
-            before = before + scattered
+        heights, n = self._heights(spots).astype(np.float32), self.fields.shape[2]
+        total = np.zeros((n, n), np.float32)
+        before: list[tuple[IntArray, NDArray[np.float32]]] = []
+        for height in heights:
+            own = np.flatnonzero(height)  # few: beyond a spot's reach there is nothing to multiply
+            scattered = (height[own, None, None] * self.fields[own]).reshape(-1, n)
+            axes = np.add.outer(2 * own, (0, 1)).ravel()
+            for others, earlier in before:
+                total += earlier.T @ (self.between[others[:, None], axes] @ scattered)
+            before.append((axes, scattered))
         return self.state.model.voltages(total + total.T)
 
     def _heights(self, spots: FloatArray) -> FloatArray:
@@ -112,11 +122,13 @@ def _patches(centroids: FloatArray, volumes: FloatArray) -> tuple[IntArray, Floa
     return patch, np.stack(sums, axis=1) / area[:, None], area
 
 
-def _carried(state: State, across: csr_array) -> FloatArray:
+def _carried(state: State, across: csr_array) -> Generator[None, None, FloatArray]:
     """(m, m): ``across`` (m, n_nodes) on both sides of the inverse of the sheet's matrix."""
     n_nodes = across.shape[1]
     through = np.empty(across.shape)
     for first in range(0, n_nodes, _ABREAST):
+        yield
         nodes = np.arange(first, min(first + _ABREAST, n_nodes))
         through[:, nodes] = across @ state.factor.columns(nodes)[:n_nodes]
+    yield
     return np.asarray(across @ through.T)

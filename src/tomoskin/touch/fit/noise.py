@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from scipy.linalg.lapack import dpocon, dpotrf, dtrtri
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.pattern import Scan
-from tomoskin.touch.fit.spot import CONTENT, N_PARAMETERS
+from tomoskin.touch.fit.spot import N_PARAMETERS
 
 _LEAST = 1e-10
 """Directions with less than this part of the largest variance hold no data: rows that follow
@@ -48,7 +49,11 @@ class Whitener:
         covariance = np.diag(noise**2) if noise.ndim == 1 else (noise + noise.T) / 2
         size = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         scale = np.where(size > 0, size, 1.0)
-        variance, direction = np.linalg.eigh(covariance / scale[:, None] / scale)
+        even = covariance / scale[:, None] / scale
+        root, singular = dpotrf(even, lower=1, clean=1)
+        if not singular and dpocon(root, np.abs(even).sum(axis=0).max(), uplo="L")[0] > _LEAST:
+            return cls(dtrtri(root, lower=1)[0] / scale)
+        variance, direction = np.linalg.eigh(even)
         kept = variance > _LEAST * variance[-1]
         return cls((direction[:, kept] / np.sqrt(variance[kept])).T / scale)
 
@@ -182,7 +187,7 @@ class ResidualResponse:
                 return self.none(self.changes.shape[1])
             return replace(self, quiet=self.quiet + 1)
         kept = self.spots.tolist()
-        news = [not any(_holds(foot, spot) for foot in kept) for spot in spots.tolist()]
+        news = [not _is_held(spot, kept) for spot in spots.tolist()]
         if not any(news):
             return self if not self.quiet else replace(self, quiet=0)
         fresh = spots[news]
@@ -198,6 +203,11 @@ def _is_near(foot: list[float], spot: list[float]) -> bool:
     return math.sqrt(x * x + y * y) < _STEP
 
 
-def _holds(foot: list[float], spot: list[float]) -> bool:
+def _is_held(spot: list[float], feet: list[list[float]]) -> bool:
     """Whether a footprint stands for a touch that is there."""
-    return _STRONGER * abs(foot[CONTENT]) >= abs(spot[CONTENT]) and _is_near(foot, spot)
+    x, y, _, content = spot
+    for there, across, _, strength in reversed(feet):  # it is one of the newest, as a rule
+        near = (there - x) ** 2 + (across - y) ** 2 < _STEP**2
+        if near and _STRONGER * abs(strength) >= abs(content):
+            return True
+    return False

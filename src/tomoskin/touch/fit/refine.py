@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, Protocol
 
 import numpy as np
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, finished
 from tomoskin.touch.fit.certificate import Reduced
 from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.pace import Pace
@@ -172,10 +173,20 @@ class WhitenedTable:
     @classmethod
     def of(cls, solver: Solver, whiten: Whitener, times: FloatArray) -> WhitenedTable:
         """``times`` (n_meas,) of the measurements about the middle of the scan."""
+        return finished(cls.making(solver, whiten, times))
+
+    @classmethod
+    def making(
+        cls, solver: Solver, whiten: Whitener, times: FloatArray
+    ) -> Generator[None, None, WhitenedTable]:
+        """As :meth:`of`, a piece of work between two yields."""
         full, table = whiten.matrix, solver.table
         direct, timed = full @ table.basis.T, full @ (times[:, None] * table.basis.T)
+        yield
         axes = _axes(direct @ table.typical, least=1)
+        yield
         more = _axes(_less(timed @ table.typical, axes), least=0)
+        yield
         both, narrow = np.column_stack([axes, more]), axes.shape[1]
         direct = both.T @ direct
         direct[narrow:] = 0.0

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from typing import Self
 
@@ -20,6 +21,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from tomoskin.core import FloatArray, finished, reach
 from tomoskin.forward import ForwardModel, State
+from tomoskin.mesh import Mesh
 from tomoskin.touch.fit.anisotropy import anisotropy_slopes, directed
 from tomoskin.touch.fit.channels import channel_errors
 from tomoskin.touch.fit.random_field import field_modes
@@ -68,15 +70,20 @@ class _Linear:
     size: FloatArray
 
     @classmethod
-    def of(cls, now: State, measured: _Measured) -> Self:
+    def about(cls, now: State, measured: _Measured) -> Generator[None, None, Self]:
+        """About a sheet, a piece between two yields."""
         rows = measured.rows
         size, values = now.voltages[rows], measured.values[rows]
         factor = float(values @ size) / float(size @ size)
+        yield
+        by_cell = (now.jacobian * now.conductivity)[rows]
+        yield
         channels = channel_errors(now)[rows]
+        yield
         noise = np.diag((measured.deviation[rows] / factor) ** 2)
         return cls(
             residual=values / factor - size,
-            by_cell=(now.jacobian * now.conductivity)[rows],
+            by_cell=by_cell,
             along=_DIRECTED * anisotropy_slopes(now)[rows],
             common=channels @ channels.T + np.outer(size, size) + noise,
             size=size,
@@ -108,6 +115,13 @@ class _Linear:
         return float(-data @ spread / 2 - np.log(np.diag(factor)).sum())
 
 
+@lru_cache(maxsize=4)
+def fields_of(mesh: Mesh) -> list[FloatArray]:
+    """(n_cells, k) modes of a field of each length: some ten milliseconds of work for a mesh."""
+    breadth = math.sqrt(float(mesh.volumes.sum()))
+    return [field_modes(mesh, part * breadth) for part in _LENGTHS]
+
+
 def fitted_sheet(state: State, reference: FloatArray, deviation: FloatArray | float) -> State:
     """As :func:`fitting_sheet`, at once."""
     return finished(fitting_sheet(state, reference, deviation))
@@ -126,18 +140,18 @@ def fitting_sheet(
     if len(finite) < len(reference) / 2:
         return state
     mesh = state.model.mesh
-    breadth = math.sqrt(float(mesh.volumes.sum()))
-    fields = [field_modes(mesh, part * breadth) for part in _LENGTHS]
+    fields = fields_of(mesh)
     measured = _Measured(reference, np.broadcast_to(deviation, reference.shape), finite)
     uneven, anisotropy, now = np.zeros(len(mesh.cells)), np.zeros(2), state
     for _ in range(_STEPS):
-        linear = _Linear.of(now, measured)
+        linear = yield from _Linear.about(now, measured)
         yield
         data = linear.residual + linear.by_cell @ uneven + linear.along @ anisotropy
         likeliest = yield from _likeliest(fields, linear, data)
         uneven, anisotropy = linear.explained(data, *likeliest)
         yield
-        now = _sheet(state, uneven, _DIRECTED * anisotropy)
+        now = yield from _sheet(state, uneven, _DIRECTED * anisotropy)
+        yield
     even = not uneven.any() and _DIRECTED * math.hypot(*anisotropy) < _LEAST
     return state if even else now
 
@@ -161,9 +175,13 @@ def _likeliest(
     return best[1:]
 
 
-def _sheet(state: State, uneven: FloatArray, anisotropy: FloatArray) -> State:
+def _sheet(
+    state: State, uneven: FloatArray, anisotropy: FloatArray
+) -> Generator[None, None, State]:
     """The sheet with that change (n_cells,) of log σ and that anisotropy."""
     model = state.model
     mesh = directed(model.mesh, anisotropy)
+    yield
     own = ForwardModel(mesh, model.pattern, model.contact_impedance, model.current)
+    yield
     return own.at(state.conductivity * np.exp(uneven))

@@ -12,7 +12,7 @@ import math
 from collections.abc import Generator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Self
 
 import numpy as np
@@ -43,6 +43,12 @@ FAINT = -0.3
 
 UNCLEAR = 1e-9
 """Part of the largest square below which a linear change is no measure of an exact one."""
+
+_PIECE = 50_000
+"""Numbers that are filtered in a piece of work: half a millisecond."""
+
+_BLOCKS = 8
+"""Of cells whose fields are compared, one in a piece of work."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,16 +171,21 @@ class Tabulation:
         """The table of ``response``, another sheet on the same mesh, a piece between two yields."""
         table = self.table
         basis, n_nodes = table.basis.T, len(table.nodes)
-        more = (response.by_cell - self.response.by_cell) @ basis
-        values, start = table.values.copy(), 0
+        more = np.empty((len(response.by_cell), basis.shape[1]))
+        for cells in np.array_split(np.arange(len(more)), _BLOCKS):
+            yield
+            more[cells] = (response.by_cell[cells] - self.response.by_cell[cells]) @ basis
+        values, start = np.empty_like(table.values), 0
         for lattice in self.lattices:
             yield
             linear = lattice.linear(more, lattice.feet.height)
             here = slice(start, start + len(linear))
-            for node in range(n_nodes):
+            values[here, n_nodes:] = table.values[here, n_nodes:]
+            for node, part in product(range(n_nodes), _slices(*linear.shape)):
                 yield
-                moved = self.parts[here, node, None] * linear
-                values[here, node] += _filtered(moved, lattice.grid.shape)
+                moved = self.parts[here, node, None] * linear[:, part]
+                filtered = _filtered(moved, lattice.grid.shape)
+                values[here, node, part] = table.values[here, node, part] + filtered
             start = here.stop
         return replace(table, values=values)
 
@@ -256,6 +267,12 @@ def _basis(sampled: list[FloatArray]) -> FloatArray:
     square, basis = np.linalg.eigh(rows.T @ rows)
     wanted = int(np.count_nonzero(square > NEGLIGIBLE**2 * square[-1]))
     return np.asarray(basis.T[-min(-(-wanted // ABREAST) * ABREAST, len(square)) :])
+
+
+def _slices(n_points: int, rank: int) -> list[slice]:
+    """Entries of the basis that are filtered in a piece of work, at so many points."""
+    step = max(_PIECE // n_points, 1)
+    return [slice(first, first + step) for first in range(0, rank, step)]
 
 
 def _filtered(samples: FloatArray, shape: tuple[int, int]) -> FloatArray:

@@ -6,6 +6,7 @@ for each drive.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -23,7 +24,9 @@ _SHARED = 1 - np.concatenate([[0.0], np.geomspace(1e-3, 1.0, 40)])
 _FAR = 1.5
 """A row's variance is drawn towards the others' by at most so many deviations of its logarithm."""
 
-_STEPS = 30
+_STEPS, _ABREAST = 30, 5
+"""And how many of them in a piece of work."""
+
 _LEAST = 1e-6
 
 
@@ -85,15 +88,16 @@ class Blocks:
         return matrix
 
 
-def target(blocks: Blocks, scatter: FloatArray, frames: int) -> FloatArray:
-    """(n_meas, n_meas) V²: the likelier structure for a ``scatter`` (n_meas, n_meas) of frames.
+def target(blocks: Blocks, scatter: FloatArray, frames: int) -> Generator[None, None, FloatArray]:
+    """(n_meas, n_meas) V²: the likelier structure for a ``scatter`` (n_meas, n_meas) of frames; a
+    piece of work between two yields.
 
     Either rows differ in variance, and neighbours share a part of it; or electrodes differ, and
     every row has some noise of its own. The second has far fewer parameters: Akaike (1974).
     """
     own = blocks.cut(scatter)
     by_row, row_cost = _by_row(blocks, own, np.diag(scatter), frames)
-    by_electrode, electrode_cost = _by_electrode(blocks, own, frames)
+    by_electrode, electrode_cost = yield from _by_electrode(blocks, own, frames)
     return blocks.joined(by_row if row_cost <= electrode_cost else by_electrode)
 
 
@@ -117,7 +121,9 @@ def _by_row(
     return block, frames * float(fit[best] + logs) + 2 * (parameters + 1)
 
 
-def _by_electrode(blocks: Blocks, own: FloatArray, frames: int) -> tuple[FloatArray, float]:
+def _by_electrode(
+    blocks: Blocks, own: FloatArray, frames: int
+) -> Generator[None, None, tuple[FloatArray, float]]:
     """Samples with the variance of their electrode, rows with one of their own.
 
     Variance components by steps that never fall below zero (Zhou, Hu, Qiao & Yau 2015).
@@ -127,7 +133,9 @@ def _by_electrode(blocks: Blocks, own: FloatArray, frames: int) -> tuple[FloatAr
     level = float(np.einsum("dii->", own) / blocks.there.sum())
     sample, row = np.full(n, level / 4), level / 2
     empty = np.eye(own.shape[1]) * (1 - blocks.there)[:, :, None]
-    for _ in range(_STEPS):
+    for step in range(_STEPS):
+        if step % _ABREAST == 0:
+            yield
         block = _components(blocks, sample, row) + empty
         inverse: FloatArray = np.asarray(np.linalg.inv(block), dtype=np.float64)
         explained: FloatArray = np.asarray(inverse @ own @ inverse, dtype=np.float64)
