@@ -256,7 +256,7 @@ def draw(lives: Sequence[dict[str, list[Month]]], out: Path) -> None:
         at = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
         error.annotate(str(event["event"]), (month, 1), (3, -11), fontsize=8, **at)
     honest.axhline(90, color="0.5", linestyle=":")
-    error.set(ylabel="mean error, mm", ylim=(0, None))
+    error.set(ylabel="mean error, mm", ylim=(0, 15))
     honest.set(ylabel="in the 90 % ellipse, %", xlabel="month", ylim=(0, 102))
     error.legend(fontsize=8, loc="lower left")
     figure.savefig(out, dpi=110)

@@ -259,14 +259,13 @@ class Locator:
         return self.learn(presses, self.region, self.pattern, self.skin_id)
 
     def aligned(self, alignment: SessionAlignment, progress: Progress = silent) -> Self:
-        """Locator that has learnt from its presses and an alignment's frames, with their labels.
+        """Locator that has learnt from the frames of an alignment, with their labels.
 
         Where that is not needed, the labels that were given are added to its own.
         """
+        presses, given = alignment.presses, alignment.labelled
         if not alignment.needed:
-            given = alignment.labelled
             return self.updated(given.dv, given.xy) if len(given) else self
-        presses = self.presses.and_then(alignment.presses)
         return self.learn(presses, self.region, self.pattern, self.skin_id, progress)
 
     def strength(self, dv: ArrayLike) -> FloatArray:
