@@ -163,10 +163,10 @@ class Locator:
         features = like.features if like else Features.of(presses.dv)
         data = features(presses.dv)
         progress(0, _STEPS)
-        maps = like.estimates.likelihood.maps if like else None
+        before = like.estimates if like else None
         rotations = Rotations.of(origin[0]) if origin[0] else Rotations.none(presses.dv.shape[1])
         grid = region.lattice(_COARSE) if len(presses) < FEW else region.grid
-        estimates = Estimates.of(data, positions, grid, rotations.of_rows(features.rows), maps)
+        estimates = Estimates.of(data, positions, grid, rotations.of_rows(features.rows), before)
         progress(1, _STEPS)
         stacking = Stacking.of(data, estimates.left_out, positions, like.stacking if like else None)
         progress(2, _STEPS)
