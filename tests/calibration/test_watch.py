@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibration.labelled import RADIUS, ROWS, Floats, presses
+from calibration.labelled import RADIUS, ROWS, Floats, held, presses
 from tomoskin import Locator
 from tomoskin.calibration import Watch
-from tomoskin.calibration.locator.health import BROKEN, STRANGE
+from tomoskin.calibration.locator.health import STRANGE
+from tomoskin.calibration.locator.reduced import LIVE, Reduced
 from tomoskin.core import DataError
 
 JUMPED = [3, 8, 21, 30, 35, 38]
@@ -81,17 +82,60 @@ def test_frames_of_another_pattern_are_refused(locator: Locator) -> None:
         Watch(locator)(np.ones((2, ROWS + 1)))
 
 
-def test_live_rows_are_left_out_only_where_frames_do_not_fit_with_them(locator: Locator) -> None:
-    """What a sheet remembers doubles a row here and there; a broken wire does more."""
-    for times, excluded in ((2, []), (-20, [3, 8])):
-        dv, _ = presses(60, 5)
-        dv[:, [3, 8]] *= times
-        watch = Watch(locator, BROKEN)
-        watch(dv)
-        assert watch.jumped.tolist() == excluded
-        assert watch.health.broken is bool(excluded)
+@pytest.mark.parametrize("times", [2, -20])
+def test_a_row_of_another_gain_is_left_out_too(locator: Locator, times: float) -> None:
+    dv, _ = presses(60, 5)
+    dv[:, [3, 8]] *= times
+    watch = Watch(locator, LIVE)
+    watch(dv)
+    assert watch.jumped.tolist() == [3, 8]
     assert "2 rows have jumped" in watch.health.findings[0]
-    assert watch.health.strangeness < STRANGE, "without them the frames fit again"
+    assert not watch.health.well
+    assert not watch.health.broken, "without them the frames fit again, and most rows are left"
+    assert watch.health.strangeness < STRANGE
+
+
+def test_where_all_rows_are_off_by_as_much_none_is_blamed(locator: Locator) -> None:
+    """Then it is the sheet, which remembers, or the press."""
+    dv, _ = presses(60, 5, noise=0.25)
+    watch = Watch(locator, LIVE)
+    watch(dv)
+    assert watch.jumped.tolist() == []
+
+
+LOST = slice(0, 16)
+
+
+def test_rows_that_are_missing_for_good_are_learnt_without(locator: Locator) -> None:
+    dv, xy = presses(200, 5)
+    dv[:, LOST] = np.nan
+    watch = Watch(locator)
+    told, covariance = watch(dv)
+    np.testing.assert_allclose(told[2:], locator.without(np.arange(16)).predict(dv[2:])[0])
+    assert held(told - xy, covariance) > 0.8
+
+
+def test_a_live_run_goes_on_while_it_learns_without_rows(locator: Locator) -> None:
+    """From which frame on is counted, so that a replay says the same."""
+    dv, _ = presses(12, 5)
+    dv[:, LOST] = np.nan
+    reduced = Reduced(locator, (2, 8))
+    assert all(reduced(frame) is locator for frame in dv[:9])
+    later = reduced(dv[9])
+    assert later is not locator
+    assert not np.isin(later.features.rows, np.arange(16)).any()
+    assert reduced(presses(1, 5)[0][0]) is locator, "all rows are back"
+    dv[:, :36] = np.nan
+    assert all(reduced(frame) is locator for frame in dv), "too few are left"
+
+
+def test_a_frame_that_lacks_rows_is_less_sure(locator: Locator) -> None:
+    dv, xy = presses(200, 5)
+    whole = np.linalg.det(locator.predict(dv)[1])
+    dv[:, LOST] = np.nan
+    told, covariance = locator.predict(dv)
+    assert np.median(np.linalg.det(covariance) / whole) > 2
+    assert held(told - xy, covariance) > 0.8
 
 
 def test_a_touch_that_comes_or_goes_says_nothing_of_the_calibration(locator: Locator) -> None:
@@ -105,7 +149,7 @@ def test_a_touch_that_comes_or_goes_says_nothing_of_the_calibration(locator: Loc
 def test_another_gain_of_every_channel_is_said(locator: Locator) -> None:
     dv, _ = presses(60, 5)
     gains = np.exp(1.2 * np.random.default_rng(4).normal(size=dv.shape[1]))
-    watch = Watch(locator, BROKEN)
+    watch = Watch(locator, LIVE)
     watch(dv * gains)
     assert not watch.health.well
     assert any("times worse than its own presses" in text for text in watch.health.findings)

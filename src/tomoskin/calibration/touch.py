@@ -23,9 +23,11 @@ from tomoskin.calibration.kind import (
     Progress,
     located,
 )
-from tomoskin.calibration.locator.health import BROKEN, CalibrationHealth
+from tomoskin.calibration.locator.health import CalibrationHealth
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import Presses
+from tomoskin.calibration.locator.reduced import LIVE
+from tomoskin.calibration.locator.standing import Standing
 from tomoskin.calibration.locator.watch import Watch
 from tomoskin.core import Arrays, DataError, Detection, FloatArray, IntArray, real_numbers
 from tomoskin.pattern import Pattern
@@ -35,12 +37,8 @@ from tomoskin.touch import Region
 _ALL = 0.999
 """Part of a measurement that is taken for all of it."""
 
-_STANDS, _STEADY = 0.7, 0.1
-"""A touch stands, as presses do that are learnt from, at this part of the most that it has been,
-and while it changes by less than the second from one frame to the next."""
-
-_EVERY = 4
-"""Of the frames in which it stands so many are one from which something is concluded."""
+_EVERY = 8
+"""Of the frames in which a touch stands so many are one from which something is concluded."""
 
 _SAME_SHAPE = 1e-4
 """Outlines within so many metres of each other are one."""
@@ -53,14 +51,14 @@ class LocatedTouch(Applied):
     """
 
     def __init__(self, locator: Locator) -> None:
-        self._watch = Watch(locator, BROKEN)
-        self._size = self._most = 0.0
+        self._watch = Watch(locator, LIVE)
+        self._standing = Standing()
         self._stood = 0
 
     def locate(self, view: FrameView, detections: list[Detection]) -> list[Detection]:
         """The strongest detection, at the position that the presses tell."""
         if not detections:
-            self._size = self._most = 0.0
+            self._standing.clear()
             self._stood = 0
             return []
         # The presses were learnt with all that is in them: nothing is taken out here either.
@@ -68,7 +66,7 @@ class LocatedTouch(Applied):
         dv = np.where(_excluded(differences.nuisance), np.nan, differences.change)
         if not np.isfinite(dv).any():
             return []
-        (position,), (covariance,) = self._watch(dv, settled=self._settled(dv))
+        (position,), (covariance,) = self._watch(self._standing.push(dv), settled=self._settled())
         sd_x, sd_y = np.sqrt(np.diag(covariance)).tolist()
         return [
             replace(
@@ -82,12 +80,9 @@ class LocatedTouch(Applied):
             )
         ]
 
-    def _settled(self, dv: FloatArray) -> bool:
-        """Whether the touch of the newest frame neither comes nor goes, now and then."""
-        before, self._size = self._size, float(np.sqrt(np.nanmean(dv**2)))
-        self._most = max(self._most, self._size)
-        steady = abs(self._size - before) < _STEADY * self._size
-        stands = steady and self._size > _STANDS * self._most
+    def _settled(self) -> bool:
+        """Whether the touch stands still, now and then."""
+        stands = self._standing.stands
         self._stood += stands
         return stands and self._stood % _EVERY == 1
 

@@ -8,11 +8,15 @@ STRANGE = 1.5
 """How many times worse than its own presses frames may fit a calibration unsaid."""
 
 BROKEN = 3.0
-"""How many times worse someone must act: one broken row makes it 6 and more, what a textile sheet
-remembers up to 2.4 (three seeds of the twin, 25 presses after 40 that were learnt from)."""
+"""How many times worse someone must act: what a textile sheet remembers makes it up to 1.4 (ten
+seeds of the twin, 50 touches after up to 40 presses that were learnt from)."""
 
 FEWEST = 5
 """Presses before which nothing is said."""
+
+_FEW = 3
+"""Rows that may be left out without that someone must act: on the twin one of 40 was left out
+without need in two of six sessions."""
 
 _SHOWN = 20
 
@@ -48,7 +52,7 @@ class CalibrationHealth:
     @property
     def broken(self) -> bool:
         """Whether someone must act."""
-        return bool(self.excluded) or (self.known and self.strangeness > BROKEN)
+        return len(self.excluded) > _FEW or (self.known and self.strangeness > BROKEN)
 
     @property
     def findings(self) -> tuple[str, ...]:

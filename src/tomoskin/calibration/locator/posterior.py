@@ -149,16 +149,18 @@ class Estimates:
         positions: FloatArray,
         grid: FloatArray,
         rotations: Rotations,
-        like: ResponseMaps | None = None,
+        like: Estimates | None = None,
     ) -> Self:
         """Learn the maps; length scales by evidence, powers by left-out presses.
 
-        Maps that are ``like`` others have their length scale and coregionalisation.
+        Estimates that are ``like`` others have the length scale and coregionalisation of their
+        maps. Their usual misfit too: a coregionalisation has seen the presses that are left out.
         """
-        directions = like.directions if like else principal(features)
-        coregion = like.coregion if like else None
-        if like:
-            maps = ResponseMaps.of(like.basis.likeness, positions, features, directions, coregion)
+        known = like.likelihood.maps if like else None
+        directions = known.directions if known else principal(features)
+        coregion = known.coregion if known else None
+        if known:
+            maps = ResponseMaps.of(known.basis.likeness, positions, features, directions, coregion)
         else:
             maps = _likeliest(positions, features, directions)
         together = maps.basis.likeness
@@ -183,7 +185,7 @@ class Estimates:
         powers = powers_of(parts, grid, positions)
         left_out = moments(pooled(parts, powers), grid)
         per_channel = ChannelLikelihood.of(alone, grid) if alone and powers[1] else None
-        usual = float(np.median(misfit.min(axis=1)))
+        usual = like.usual if like else float(np.median(misfit.min(axis=1)))
         return cls(grid, GridLikelihood.of(maps, grid), per_channel, powers, usual, *left_out)
 
     def __call__(self, features: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -207,10 +208,19 @@ class Features:
     def _fill(self, values: FloatArray, hole: NDArray[np.bool_]) -> None:
         """Put the conditional mean of a Gaussian, given the other values, into the holes."""
         finite = ~hole
-        gain = cho_solve(
-            cho_factor(self.covariance[np.ix_(finite, finite)]), values[finite] - self.mean[finite]
+        values[hole] = self.mean[hole] + (values[finite] - self.mean[finite]) @ _gain(
+            self, hole.tobytes()
         )
-        values[hole] = self.mean[hole] + self.covariance[np.ix_(hole, finite)] @ gain
+
+
+@lru_cache(maxsize=4)
+def _gain(features: Features, holes: bytes) -> FloatArray:
+    """(finite, missing): by which values that are missing follow the others. The same rows are
+    missing in many frames."""
+    hole = np.frombuffer(holes, dtype=np.bool_)
+    covariance = features.covariance
+    known = cho_factor(covariance[np.ix_(~hole, ~hole)])
+    return np.asarray(cho_solve(known, covariance[np.ix_(~hole, hole)]))
 
 
 def _scales(sizes: FloatArray) -> FloatArray:

@@ -29,6 +29,10 @@ that is; and how many times as far as the fits disagree labels may be off. Chose
 _ALIKE = 0.27
 """Correlation with the skin's own responses below which the data are not of this skin."""
 
+_APART = 0.19
+"""Way, in radii, by which fits that assume different things may differ (root mean square): it was
+0.02 and 0.15 on the two skins that settings were chosen on."""
+
 _QUIET = 3.0
 """An electrode that no touch came near answers in its largest answers less than so many times as
 strongly as usual, by itself times as a part of the frame: 1.8 to 2.6 there, 3.4 and more elsewhere
@@ -148,7 +152,11 @@ class Rubbing:
     @property
     def holds(self) -> bool:
         """Whether the positions can be believed."""
-        return not (self.alike < _ALIKE or self.contradicted)
+        return not (self.alike < _ALIKE or self.contradicted or self._unsure)
+
+    @property
+    def _unsure(self) -> bool:
+        return self.disagreement > _APART * Region.of(self.skin).unit
 
     @property
     def findings(self) -> tuple[str, ...]:
@@ -158,6 +166,12 @@ class Rubbing:
             found.append(
                 "the voltages do not change as this skin's model predicts: the pattern or the "
                 "skin may be another one, or wires may be swapped (tomoskin calibrate wiring)"
+            )
+        if self._unsure:
+            found.append(
+                "the touches do not say where they were: fits that assume different things differ "
+                f"by {1e3 * self.disagreement:.0f} mm; press known positions instead (tomoskin "
+                "calibrate touch)"
             )
         if self.quiet:
             names = ", ".join(f"E{e + 1}" for e in self.quiet)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from tomoskin.calibration.locator.health import CalibrationHealth
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.presses import frames
+from tomoskin.calibration.locator.reduced import OFFLINE, Reduced
 from tomoskin.core import FloatArray, IntArray
 
 _PRESSES = 20
@@ -21,6 +22,11 @@ _APART = 0.1
 _OFF, _GUARD = 4.0, 1.2
 """A row has jumped that is off by so many times its usual, and by so many times the most that
 the calibration's own presses were off in as many in a row."""
+
+_BESIDE = 2.0
+"""Nor is a row off that is off by less than so many times what the rows are as a rule, both in
+parts of the above: then it is the sheet, or the press. Chosen on the twin's textile disc, one of
+six rows doubled or none, seeds 3 to 6."""
 
 _FARTHEST = 10.0
 """How many times its usual a row may be off for one press: more counts no more."""
@@ -37,17 +43,19 @@ class Watch:
     again. Neither labels nor frames to come are used. The rows' own spread is that of the left-out
     presses (median absolute deviation).
 
+    Frames that lack rows for good, as of a lost electrode, are answered by a locator that has
+    learnt without them; see :class:`Reduced`.
+
     Parameters
     ----------
     locator
         What answers.
-    strange
-        Rows are left out only while frames with all rows fit so many times worse than the
-        calibration's own presses: what a sheet remembers moves some rows as well, and by little.
+    patience
+        Of :class:`Reduced`.
     """
 
-    def __init__(self, locator: Locator, strange: float = 0.0) -> None:
-        self._locator, self._least = locator, strange
+    def __init__(self, locator: Locator, patience: tuple[int, int] = OFFLINE) -> None:
+        self._locator, self._reduced = locator, Reduced(locator, patience)
         estimates = locator.stacking.left_out
         off = np.abs(self._surprise(locator.presses.dv, estimates))
         self._usual = np.median(off, axis=0) + np.finfo(float).tiny
@@ -55,7 +63,7 @@ class Watch:
         usual = [np.ones(off.shape[1])] * _PRESSES
         self._off: deque[FloatArray] = deque(usual, maxlen=_PRESSES)
         self._last: FloatArray | None = None
-        self._fits: deque[list[tuple[float, float]]] = deque(maxlen=_PRESSES)
+        self._fits: deque[list[float]] = deque(maxlen=_PRESSES)
         self._jumped = np.zeros(off.shape[1], dtype=np.bool_)
 
     @property
@@ -69,7 +77,7 @@ class Watch:
         pattern = self._locator.pattern
         return CalibrationHealth(
             len(self._fits),
-            self._fit(0),
+            self._fit(),
             tuple(pattern.row_text(row) if pattern else f"row {row}" for row in self.jumped),
         )
 
@@ -87,9 +95,9 @@ class Watch:
         return np.concatenate(positions), np.concatenate(covariances)
 
     def _next(self, frame: FloatArray, *, settled: bool) -> tuple[FloatArray, FloatArray]:
-        answer = self._locator.predict(self._kept(frame))
+        answer = self._told(frame)
         if not settled:
-            return answer
+            return answer[:2]
         place = self._locator.region.scaled(answer[0])
         off = self._clipped(np.abs(self._surprise(frame[None], place)))[0]
         if self._last is not None and np.linalg.norm(place[0] - self._last) < _APART:
@@ -97,20 +105,21 @@ class Watch:
         else:
             self._last = place[0]
             self._fits.append([])
-        both = self._locator.strangeness(np.stack([self._kept(frame), frame]))
-        self._fits[-1].append((float(both[0]), float(both[1])))
+        self._fits[-1].append(float(answer[2][0]))
         self._off.append(off)
-        jumped = np.mean(self._off, axis=0) > self._limit
-        jumped &= self._fit(1) >= self._least
+        far = np.mean(self._off, axis=0) / self._limit
+        jumped = far > max(1.0, _BESIDE * float(np.median(far)))
         if jumped.mean() > _MOST or (jumped == self._jumped).all():
-            return answer
+            return answer[:2]
         self._jumped = jumped
-        return self._locator.predict(self._kept(frame))
+        return self._told(frame)[:2]
 
-    def _fit(self, which: int) -> float:
-        """How strange the last presses are, without the rows that have jumped (0) or with all (1);
-        medians of each, and over them."""
-        each = [np.median([pair[which] for pair in press]) for press in self._fits]
+    def _told(self, frame: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return self._reduced(frame).told(self._kept(frame))
+
+    def _fit(self) -> float:
+        """How strange the last presses are: medians of each, and over them."""
+        each = [np.median(press) for press in self._fits]
         return float(np.median(each)) if each else np.nan
 
     def _kept(self, frame: FloatArray) -> FloatArray:

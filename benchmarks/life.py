@@ -1,0 +1,266 @@
+"""Years of a calibrated skin in minutes: wear, a cut, a new mounting, an electrode lost."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from report import Report, progress
+from tomoskin import Locator, Skin
+from tomoskin.calibration import CalibrationHealth, Watch
+from tomoskin.core import Frame
+from tomoskin.forward import ForwardModel
+from tomoskin.mesh import triangulate
+from tomoskin.pattern import Scan
+from tomoskin.signal import Readout
+from tomoskin.source import ScanSettings
+from tomoskin.touch import Region
+from tomoskin.twin import Press, Stretched, TwinElectronics, TwinSettings, TwinSkin, table_of
+
+Floats = NDArray[np.float64]
+
+SKIN, SEEDS = "textile-disc-8", (71, 72)
+LEARNT, LABELS, RUBBED, ASKED = 60, 10, 200, 60
+"""Presses of the first day; each month: labelled ones, touches without labels, others asked."""
+
+FORCES, RADIUS, REACH = (2.0, 6.0), 0.010, 0.85
+"""N; m; part of the radius over which touches are spread."""
+
+PRESSED, LIFTED, WARMER = 0.4, 2.0, 1.0
+"""Seconds on and off; deviation of the room, K."""
+
+WORN, GAINS = 0.01, 0.002
+"""Conductivity that the middle loses each month, and by how much the channels' gains part."""
+
+UNSURE = 0.25
+"""Deviation, in radii, from which a touch counts as one of which nothing is said."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Of the skin in one month.
+
+    ``cut``: part of the conductivity that is left in a cut; ``shift`` (2,) m by which the sheet
+    lies beside its place, ``stretch`` by which it is longer; ``lost`` electrodes.
+    """
+
+    month: int
+    event: str = "new"
+    cut: float = 1.0
+    shift: tuple[float, float] = (0.0, 0.0)
+    stretch: float = 0.0
+    lost: tuple[int, ...] = ()
+
+
+EVENTS: dict[int, dict[str, Any]] = {
+    3: {"event": "worn"},
+    9: {"event": "cut", "cut": 0.02},
+    12: {"event": "healed", "cut": 0.7},
+    18: {"event": "mounted again", "shift": (0.003, -0.002), "stretch": 0.02},
+    27: {"event": "electrode lost", "lost": (4,)},
+    33: {"event": "mended", "lost": ()},
+}
+"""What happens at the beginning of a month, and stays."""
+
+MONTHS = 36
+
+
+def life() -> list[Condition]:
+    """The condition in each month."""
+    conditions = [Condition(0)]
+    for month in range(1, MONTHS):
+        conditions.append(replace(conditions[-1], month=month, **EVENTS.get(month, {})))
+    return conditions
+
+
+class Worn:
+    """A twin in one condition; presses go on from where the last one left the sheet."""
+
+    def __init__(self, skin: Skin, condition: Condition, seed: int) -> None:
+        settings = TwinSettings.preset(skin.twin.preset, seed)
+        flat = triangulate(skin.outline, skin.arcs, round(settings.mesh_ratio * skin.mesh_cells))
+        model = ForwardModel(flat, skin.pattern(), skin.contact_impedance, skin.current)
+        sheet = TwinSkin(
+            model, skin.outline, skin.conductivity * left(flat.centroids, condition), settings
+        )
+        sheet.set_pose((Stretched(condition.stretch, axis=0.6),) if condition.stretch else ())
+        sheet.warm(WARMER * float(np.random.default_rng((seed, condition.month)).normal()))
+        parting = settings.electronics.gain_sd + GAINS * condition.month
+        board = replace(settings.electronics, gain_sd=parting)
+        self._board = TwinElectronics(sheet, skin.readout, skin.current, board, seed)
+        scan = Scan.of(skin.pattern())
+        self._table, self._readout = (
+            table_of(scan, ScanSettings.of(skin)),
+            Readout.of(scan, skin.readout),
+        )
+        self._shift, self._time = np.array(condition.shift), 0.0
+        used = np.hstack([skin.pattern().drive, skin.pattern().measure])
+        self._missing = np.isin(used, condition.lost).any(axis=1)
+
+    def __call__(self, xy: Floats, forces: Floats) -> Floats:
+        """(n, n_meas) V: touched less untouched before; NaN of an electrode that is lost."""
+        changes = []
+        for (x, y), force in zip(xy + self._shift, forces, strict=True):
+            rest = self._volts((), LIFTED)
+            press = Press(float(x), float(y), force=float(force), radius=RADIUS)
+            changes.append(self._volts((press,), PRESSED) - rest)
+        return np.where(self._missing, np.nan, changes)
+
+    def _volts(self, presses: tuple[Press, ...], seconds: float) -> Floats:
+        self._board.sheet.set_presses(presses)
+        self._time += seconds
+        samples, sums = self._table.readings(self._board.sample(self._table, self._time))
+        frame = Frame(0, 0, self._time, 0, 0, 0, samples=samples, sums=sums)
+        return self._readout(frame).values
+
+
+def left(points: Floats, condition: Condition) -> Floats:
+    """(n,) part of the conductivity that is left at ``points`` (n, 2) m."""
+    size = float(np.abs(points).max())
+    often = np.exp(-((points**2).sum(axis=1)) / (0.5 * size) ** 2)
+    worn = np.exp(-WORN * condition.month * (0.3 + 0.7 * often))
+    along, across = points @ [0.8, 0.6], points @ [-0.6, 0.8]
+    inside = (np.abs(across - 0.2 * size) < 0.02 * size) & (np.abs(along) < 0.4 * size)
+    return np.asarray(worn * np.where(inside, condition.cut, 1.0))
+
+
+@dataclass(frozen=True)
+class Month:
+    """What a calibration is worth in a month: errors m, whether each lies in its 90 % ellipse,
+    whether so little is said of it that it counts as unknown; and what the page says."""
+
+    errors: Floats
+    held: NDArray[np.bool_]
+    unknown: NDArray[np.bool_]
+    health: CalibrationHealth
+
+
+def unhelped(locator: Locator, _skin: Worn, _rng: np.random.Generator) -> Locator:
+    """No labels: the calibration of the first day."""
+    return locator
+
+
+def labelled(locator: Locator, skin: Worn, rng: np.random.Generator) -> Locator:
+    """Some presses at known positions."""
+    xy, forces = touches(locator.region, LABELS, rng)
+    return locator.updated(skin(xy, forces), xy)
+
+
+def rubbed(locator: Locator, skin: Worn, rng: np.random.Generator) -> Locator:
+    """Touches everywhere, without labels."""
+    return locator.in_session(skin(*touches(locator.region, RUBBED, rng)))
+
+
+LIVES: dict[str, tuple[Callable[[Locator, Worn, np.random.Generator], Locator], bool]] = {
+    "no labels": (unhelped, False),
+    f"{LABELS} presses a month": (labelled, True),
+    "rubbed each month": (rubbed, False),
+}
+"""What is done each month; and whether to the calibration of the month before, or the first."""
+
+
+def touches(region: Region, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Positions (n, 2) m and forces (n,) N."""
+    radius, angle = REACH * np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
+    xy = region.metres(np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
+    return xy, rng.uniform(*FORCES, n)
+
+
+def lived(seed: int, conditions: Sequence[Condition]) -> dict[str, list[Month]]:
+    """Each way of life, month by month."""
+    skin = Skin.load(SKIN)
+    region = Region.of(skin)
+    xy, forces = touches(region, LEARNT, np.random.default_rng(seed))
+    first = Locator.fit(Worn(skin, conditions[0], seed)(xy, forces), xy, skin=skin)
+    newest, found = dict.fromkeys(LIVES, first), {name: list[Month]() for name in LIVES}
+    for condition in conditions:
+        progress(f"seed {seed}, month {condition.month}")
+        asked, hard = touches(region, ASKED, np.random.default_rng((seed, condition.month, 1)))
+        dv = Worn(skin, condition, seed)(asked, hard)
+        for name, (live, onwards) in LIVES.items():
+            rng = np.random.default_rng((seed, condition.month, 2))
+            locator = live(newest[name] if onwards else first, Worn(skin, condition, seed), rng)
+            newest[name] = locator
+            found[name].append(worth(locator, dv, asked))
+    return found
+
+
+def worth(locator: Locator, dv: Floats, xy: Floats) -> Month:
+    """Of presses at ``xy``, located one after the other as in a live run."""
+    watch = Watch(locator)
+    positions, covariances = watch(dv)
+    off = positions - xy
+    far = np.einsum("ni,nij,nj->n", off, np.linalg.inv(covariances), off)
+    size = np.sqrt(np.trace(covariances, axis1=1, axis2=2) / 2)
+    unknown = size > UNSURE * locator.region.unit
+    return Month(np.linalg.norm(off, axis=1), far < 4.605, unknown, watch.health)
+
+
+def run(data: Path | None) -> tuple[Report, ...]:
+    """Live ``MONTHS`` months with each seed; ``data`` is not needed."""
+    del data
+    return (table([lived(seed, life()) for seed in SEEDS]),)
+
+
+def table(lives: Sequence[dict[str, list[Month]]]) -> Report:
+    """Means over each stretch between two events."""
+    rows = []
+    for event, months in groupby(life(), key=lambda condition: condition.event):
+        numbers = [condition.month for condition in months]
+        cells = [_cell([one[name][n] for one in lives for n in numbers]) for name in LIVES]
+        rows.append((event, f"{numbers[0]} to {numbers[-1]}", *cells))
+    return Report(
+        f"{MONTHS / 12:g} years of {SKIN}",
+        ("condition", "months", *LIVES),
+        tuple(rows),
+        (
+            "mean error in mm, part of the presses in the 90 % ellipses, part of them unknown "
+            f"(deviation over {UNSURE:g} radii), part of the months in which the page "
+            "says that the calibration fits badly",
+            f"{LEARNT} presses learnt on the first day, {ASKED} others asked a month, "
+            f"{FORCES[0]:g} to {FORCES[1]:g} N; seeds {' and '.join(map(str, SEEDS))}; preset "
+            "textile",
+        ),
+    )
+
+
+def _cell(months: Sequence[Month]) -> str:
+    error = 1e3 * np.mean([month.errors.mean() for month in months])
+    parts = (
+        np.mean([month.held.mean() for month in months]),
+        np.mean([month.unknown.mean() for month in months]),
+        np.mean([not month.health.well for month in months]),
+    )
+    return ", ".join([f"{error:.1f}", *(f"{part:.0%}" for part in parts)])
+
+
+def draw(lives: Sequence[dict[str, list[Month]]], out: Path) -> None:
+    """Error and honesty month by month."""
+    figure = Figure(figsize=(8, 5), layout="constrained")
+    error, honest = figure.subplots(2, 1, sharex=True)
+    for name in LIVES:
+        months = list(zip(*(one[name] for one in lives), strict=True))
+        error.plot([1e3 * np.mean([m.errors for m in month]) for month in months], label=name)
+        honest.plot([100 * np.mean([m.held for m in month]) for month in months])
+    for month, event in EVENTS.items():
+        for axes in (error, honest):
+            axes.axvline(month, color="0.7", linewidth=0.8)
+        at = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
+        error.annotate(str(event["event"]), (month, 1), (3, -11), fontsize=8, **at)
+    honest.axhline(90, color="0.5", linestyle=":")
+    error.set(ylabel="mean error, mm", ylim=(0, 15))
+    honest.set(ylabel="in the 90 % ellipse, %", xlabel="month", ylim=(0, 102))
+    error.legend(fontsize=8, loc="lower left")
+    figure.savefig(out, dpi=110)
+
+
+if __name__ == "__main__":
+    draw([lived(seed, life()) for seed in SEEDS], Path(sys.argv[1]))
