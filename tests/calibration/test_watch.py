@@ -9,7 +9,7 @@ from calibration.labelled import RADIUS, ROWS, Floats, held, presses
 from tomoskin import Locator
 from tomoskin.calibration import Watch
 from tomoskin.calibration.locator.health import STRANGE
-from tomoskin.calibration.locator.reduced import LIVE, Reduced
+from tomoskin.calibration.locator.lost_rows import LIVE, LostRows, without
 from tomoskin.core import DataError
 
 JUMPED = [3, 8, 21, 30, 35, 38]
@@ -111,7 +111,7 @@ def test_rows_that_are_missing_for_good_are_learnt_without(locator: Locator) -> 
     dv[:, LOST] = np.nan
     watch = Watch(locator)
     told, covariance = watch(dv)
-    np.testing.assert_allclose(told[2:], locator.without(np.arange(16)).predict(dv[2:])[0])
+    np.testing.assert_allclose(told[2:], without(locator, np.arange(16)).predict(dv[2:])[0])
     assert held(told - xy, covariance) > 0.8
 
 
@@ -119,7 +119,7 @@ def test_a_live_run_goes_on_while_it_learns_without_rows(locator: Locator) -> No
     """From which frame on is counted, so that a replay says the same."""
     dv, _ = presses(12, 5)
     dv[:, LOST] = np.nan
-    reduced = Reduced(locator, (2, 8))
+    reduced = LostRows(locator, (2, 8))
     assert all(reduced(frame) is locator for frame in dv[:9])
     later = reduced(dv[9])
     assert later is not locator

@@ -25,8 +25,8 @@ from tomoskin.calibration.kind import (
 )
 from tomoskin.calibration.locator.health import CalibrationHealth
 from tomoskin.calibration.locator.locator import Locator
+from tomoskin.calibration.locator.lost_rows import LIVE
 from tomoskin.calibration.locator.presses import Presses
-from tomoskin.calibration.locator.reduced import LIVE
 from tomoskin.calibration.locator.standing import Standing
 from tomoskin.calibration.locator.watch import Watch
 from tomoskin.core import Arrays, DataError, Detection, FloatArray, IntArray, real_numbers

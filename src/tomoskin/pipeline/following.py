@@ -204,15 +204,11 @@ class Following:
             better = next(self._tuning)
         except StopIteration:
             self._tuning = None
-        else:
-            if better is not None:
-                self._renew(better)
-
-    def _renew(self, prepared: Prepared) -> None:
-        self._prepared = prepared
-        self._conditioning.renew(prepared)
-        self._imaging = _imaging(self._conditioning, self.rest, self._conditioning.reference)
-        self._is_outdated = True
+            return
+        if better is not None:
+            self._prepared, self._is_outdated = better, True
+            self._conditioning.renew(better)
+            self._imaging = _imaging(self._conditioning, self.rest, self._conditioning.reference)
 
     def _result(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -30,7 +30,7 @@ from tomoskin.calibration.locator.stacking import (
     squared_lengths,
     twins,
 )
-from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.core import DataError, FloatArray
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
 from tomoskin.touch import Region
@@ -60,6 +60,13 @@ def _bounded(covariance: FloatArray) -> FloatArray:
     """Covariances (n, 2, 2), none larger than not knowing the place."""
     size = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 2)
     return np.asarray(covariance * np.minimum(_WIDEST / size, 1.0)[:, None, None] ** 2)
+
+
+def _label_spread(presses: Presses, region: Region, positions: FloatArray) -> FloatArray | float:
+    """(n, 2, 2) usual covariance of the labels about ``positions`` (n, 2), both in radii."""
+    if presses.spread is None:
+        return 0.0
+    return mean_about(positions, region.scaled(presses.xy), presses.spread / region.unit**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,16 +226,10 @@ class Locator:
         covariance = self.calibrated(spread, disagreement_of(by_expert, answer))
         present = np.isfinite(given[:, self.features.rows]).mean(axis=1)
         wider = widening(strangeness) * present**-_MISSING
-        wide = _bounded(wider[:, None, None] * covariance + self._label_spread(answer))
+        wide = _bounded(
+            wider[:, None, None] * covariance + _label_spread(self.presses, self.region, answer)
+        )
         return self.region.metres(answer), self.region.unit**2 * wide, strangeness
-
-    def _label_spread(self, positions: FloatArray) -> FloatArray | float:
-        """(n, 2, 2) usual covariance of the labels about ``positions`` (n, 2), both in radii."""
-        presses = self.presses
-        if presses.spread is None:
-            return 0.0
-        spread = presses.spread / self.region.unit**2
-        return mean_about(positions, self.region.scaled(presses.xy), spread)
 
     def in_session(self, dv: ArrayLike, xy: ArrayLike | None = None) -> Self:
         """Locator for another session, from its frames (n, n_meas) of one touch each.
@@ -246,17 +247,6 @@ class Locator:
         About one where nothing has changed. Raises DataError as :meth:`predict`.
         """
         return self.estimates(self.features(frames(dv, self.presses.dv.shape[1])))[2]
-
-    def without(self, rows: IntArray) -> Self:
-        """Locator that has learnt from the same presses without some ``rows`` of the pattern.
-
-        What frames that lack them are told by, other than from values that are filled in. Raises
-        DataError where no other row says anything.
-        """
-        dv = self.presses.dv.copy()
-        dv[:, rows] = np.nan
-        presses = replace(self.presses, dv=dv)
-        return self.learn(presses, self.region, self.pattern, self.skin_id)
 
     def aligned(self, alignment: SessionAlignment, progress: Progress = silent) -> Self:
         """Locator that has learnt from the frames of an alignment, with their labels.

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.calibration.locator.health import CalibrationHealth
 from tomoskin.calibration.locator.locator import Locator
+from tomoskin.calibration.locator.lost_rows import OFFLINE, LostRows
 from tomoskin.calibration.locator.presses import frames
-from tomoskin.calibration.locator.reduced import OFFLINE, Reduced
 from tomoskin.core import FloatArray, IntArray
 
 _PRESSES = 20
@@ -44,18 +44,18 @@ class Watch:
     presses (median absolute deviation).
 
     Frames that lack rows for good, as of a lost electrode, are answered by a locator that has
-    learnt without them; see :class:`Reduced`.
+    learnt without them; see :class:`LostRows`.
 
     Parameters
     ----------
     locator
         What answers.
     patience
-        Of :class:`Reduced`.
+        Of :class:`LostRows`.
     """
 
     def __init__(self, locator: Locator, patience: tuple[int, int] = OFFLINE) -> None:
-        self._locator, self._reduced = locator, Reduced(locator, patience)
+        self._locator, self._reduced = locator, LostRows(locator, patience)
         estimates = locator.stacking.left_out
         off = np.abs(self._surprise(locator.presses.dv, estimates))
         self._usual = np.median(off, axis=0) + np.finfo(float).tiny

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import Future
+from dataclasses import replace
 from threading import Thread
 
 import numpy as np
@@ -17,7 +18,19 @@ _MOST = 0.8
 """Part of the rows without which nothing is learnt."""
 
 
-class Reduced:
+def without(locator: Locator, rows: IntArray) -> Locator:
+    """Locator that has learnt from the same presses without some ``rows`` of the pattern.
+
+    What frames that lack them are told by, other than from values that are filled in. Raises
+    DataError where no other row says anything.
+    """
+    dv = locator.presses.dv.copy()
+    dv[:, rows] = np.nan
+    presses = replace(locator.presses, dv=dv)
+    return locator.learn(presses, locator.region, locator.pattern, locator.skin_id)
+
+
+class LostRows:
     """Chooses what answers a frame: the locator, or what it is without the rows that are missing.
 
     Values that are filled in make a calibration worse and its ellipses too small, so it learns
@@ -63,7 +76,7 @@ class Reduced:
 
         def learn() -> None:
             try:
-                future.set_result(self._locator.without(rows))
+                future.set_result(without(self._locator, rows))
             except DataError:  # nothing is left to learn from
                 future.set_result(self._locator)
             except BaseException as error:
