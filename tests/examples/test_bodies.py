@@ -1,4 +1,4 @@
-"""The examples on other models make their figures; their checks hold, and fail on wrong data."""
+"""The examples on models make their figures; their checks hold, and fail on wrong data."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ import pytest
 
 from tomoskin.mesh import simplex_measure
 
-BODIES = ["fig62_palpation", "fig64_chopped", "fig64_face", "newtons", "soft_volume"]
+MODELS = [
+    *("fig62_palpation", "fig64_chopped", "fig64_face", "fit_bound", "newtons", "soft_volume"),
+]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", MODELS)
 def test_the_figure_is_made_and_the_numbers_hold(imported, gallery, name, tmp_path):
     module = imported(name)
     found = module.main(["--out", str(tmp_path)])
@@ -29,7 +31,7 @@ def test_the_figure_is_made_and_the_numbers_hold(imported, gallery, name, tmp_pa
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2, 7))
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", MODELS)
 def test_the_numbers_hold_on_other_seeds(imported, name, seed, tmp_path):
     assert imported(name).main(["--seed", str(seed), "--out", str(tmp_path)])
 

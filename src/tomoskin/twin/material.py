@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -95,13 +96,13 @@ class MaterialSettings:
     @property
     def memory(self) -> MaterialMemory:
         """What the sheet remembers, of strain and of compression alike."""
-        return MaterialMemory(
-            play=self.play,
-            play_widths=self.play_widths,
-            creep=self.creep,
-            creep_times=self.creep_times,
-            breakdown=self.breakdown,
-            breakdown_times=self.breakdown_times,
+        return _memory(
+            self.play,
+            self.play_widths,
+            self.creep,
+            self.creep_times,
+            self.breakdown,
+            self.breakdown_times,
         )
 
     @property
@@ -114,6 +115,9 @@ class MaterialSettings:
         """Whether time alone changes nothing."""
         return self.memory.still and self.temperature_sd == 0
 
+
+_memory = lru_cache(maxsize=64)(MaterialMemory)
+"""The same for the same series: it is asked for several times a frame, and checks its numbers."""
 
 LOAD = Metric(((0.5, 0.5, 1.0), (1.0,)))
 """Strain xx, yy, xy, whatever its direction, and compression: two loads, each with its own plays.

@@ -107,28 +107,28 @@ class SampleTable:
         place = np.unique(key, return_inverse=True)[1]
         return np.asarray(place), np.where(direction % 2, -1, 1)
 
-    @property
+    @cached_property
     def source(self) -> IntArray:
         """(n_samples,)."""
         return np.asarray(self.drives[self.drive, 0])
 
-    @property
+    @cached_property
     def sink(self) -> IntArray:
         """(n_samples,)."""
         return np.asarray(self.drives[self.drive, 1])
 
-    @property
+    @cached_property
     def middles(self) -> FloatArray:
         """(n_drives,) s from the start of the scan to the middle of each drive."""
         dead = self._dead / max(len(self.drives), 1)
         return np.asarray(np.cumsum(self.length + dead) - self.length / 2)
 
-    @property
+    @cached_property
     def seconds(self) -> float:
         """How long one scan takes."""
         return float(self.length.sum()) + self._dead
 
-    @property
+    @cached_property
     def _dead(self) -> float:
         return float(self.time[0] - self.since[0]) * len(self.drives) if len(self.time) else 0.0
 

@@ -60,6 +60,22 @@ def test_it_goes_with_the_noise():
     assert not followed(excess, frames(40, 6)).any
 
 
+def test_what_one_frame_alone_shows_is_forgotten_in_the_next():
+    """A finger that comes down within a scan looks like noise, in that scan only."""
+    excess = followed(Excess.none(CHANNELS), frames(1, 9, 10.0, electrode=3))
+    assert excess.variance[3] > 25
+    after = followed(excess, frames(1, 10))
+    assert not after.variance.any()
+    assert after.level < 2
+
+
+def test_noise_that_stays_is_believed_all_the_time():
+    excess = Excess.none(CHANNELS)
+    for number in range(20):
+        excess = followed(excess, frames(1, 20 + number, 10.0, electrode=3))
+        assert 25 < excess.variance[3] < 600
+
+
 def test_what_a_touch_changes_is_no_noise():
     pairs, change = CHANNELS.pairs, np.zeros(CHANNELS.apart.shape[1])
     change[pairs.first] = np.random.default_rng(7).standard_normal(len(pairs.first))

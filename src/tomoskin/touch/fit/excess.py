@@ -22,7 +22,9 @@ _MARGIN = 2.0
 """What one frame shows of a variance is taken times this: it is a rough estimate."""
 
 _CALM = 8
-"""Frames without more noise after which no more is believed than they have shown."""
+"""Frames without more noise after which no more is believed than they have shown. One is enough
+where noise has risen from nothing: what came down within a scan looks like noise in that scan
+only."""
 
 _MOVES = 0.5
 """Part of what has changed since the frame before that may stand between two reciprocal rows."""
@@ -201,12 +203,15 @@ class Excess:
         Frames since it rose, or was looked at anew.
     seen
         (n_channels,) largest mean squares in these, of noise with the excess.
+    fresh
+        Whether it has risen from nothing, in one frame.
     """
 
     level: float
     variance: FloatArray
     calm: int
     seen: FloatArray
+    fresh: bool = False
 
     @classmethod
     def none(cls, channels: Channels) -> Self:
@@ -258,14 +263,17 @@ class Excess:
             return self._passed(squares, gauge)
         more = np.where(louder, _MARGIN * (squares - common) * gauge.variance / self.level, 0.0)
         level = self.level if common == 1.0 else _MARGIN * common * self.level
-        return Excess(level, self.variance + more, 0, np.zeros_like(squares))
+        return Excess(level, self.variance + more, 0, np.zeros_like(squares), not self.any)
 
     def _passed(self, squares: FloatArray, gauge: Gauge) -> Excess:
-        """After a frame that showed no more: what ``_CALM`` of them do not show is forgotten."""
+        """After a frame that showed no more: what ``_CALM`` of them do not show is forgotten, and
+        what one does not show of that which is fresh."""
         if not self.any:
             return self
         seen, calm = np.maximum(self.seen, squares), self.calm + 1
-        if calm < _CALM:
+        if self.fresh:
+            seen = _MARGIN * seen
+        elif calm < _CALM:
             return replace(self, calm=calm, seen=seen)
         common = float(np.clip(_common(seen, gauge), 1e-12, 1.0))
         variance = self.variance * np.clip(seen / common, 0.0, 1.0)
