@@ -24,7 +24,7 @@ from tomoskin.source import Link, ScanSettings, SerialTransport, Timing
 
 FRAMES = 100_000
 PICO_FRAMES = 2_000
-"""rp2040js runs at a tenth to a quarter of the board's own speed."""
+"""Of each case; ``board_long`` has more."""
 PICO_CASES = ((8, 84e-6), (8, 36e-6), (16, 84e-6), (16, 36e-6), (32, 84e-6), (32, 36e-6))
 """Electrodes, and the slowest and the fastest settling that the decks give, s."""
 # electrodes, conversions summed: one conversion a sample is sent packed
@@ -78,7 +78,7 @@ def pico_report(frames: int, cases: Sequence[tuple[int, float]]) -> Report:
         ),
         tuple(_ran_pico(*case, frames) for case in cases),
         (
-            "adjacent, four conversions of 12 bits a sample, dead time 2 us; frames/s by the "
+            "adjacent, four conversions of 12 bits a sample, dead time 5 us; frames/s by the "
             "board's own clock",
             "jitter: by which the instant of one and the same conversion moves against the "
             "beginning of its drive, at most; processor: share of the time that it is awake",

@@ -1,4 +1,4 @@
-"""100,000 frames of the Pico's image in its emulator: ten minutes to half an hour."""
+"""100,000 frames of the Pico's image in its emulator: two minutes, or more on a busy machine."""
 
 from __future__ import annotations
 

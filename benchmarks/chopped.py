@@ -10,7 +10,7 @@ import numpy as np
 
 from report import Report
 from tomoskin.core import FloatArray, Frame
-from tomoskin.emulator import BoardProcess, Front, SkinMemory
+from tomoskin.emulator import BoardProcess, Front, OwnVoltages, SkinMemory
 from tomoskin.emulator.source import BOARDS, programs_of
 from tomoskin.pattern import Pattern, Scan
 from tomoskin.signal import FIGURES, Readout
@@ -105,7 +105,7 @@ def _rows(
     front = Front(CURRENT, 1e9, GAIN, 0.5, REFERENCE, levels, noise * finer)
     arms = np.diag(ARM * np.arange(1.0, case.electrodes + 1))
     with tempfile.TemporaryDirectory() as folder:
-        memory = SkinMemory(Path(folder) / "skin", front, arms, potentials=own)
+        memory = SkinMemory(Path(folder) / "skin", front, arms, own=OwnVoltages(own))
         board = BoardProcess(programs_of(case.board), memory.path, CURRENT, "-f")
         timing = Timing(ping=0.02)
         with Link(SerialTransport(board.port), scan, settings, timing=timing) as link:

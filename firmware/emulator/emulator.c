@@ -50,6 +50,7 @@ static uint8_t address;       /* that the demultiplexers hold */
 static unsigned source = OFF; /* connected */
 static unsigned sink = OFF;
 static avr_cycle_count_t opened;
+static avr_cycle_count_t passed; /* until when the electrodes have charged */
 static uint16_t code; /* of the conversion */
 static uint8_t out[4096];
 static size_t n_out;
@@ -71,8 +72,15 @@ static unsigned chosen(uint8_t low, uint8_t high, unsigned number, const char *b
     return (control & low) != 0 ? number : (control & high) != 0 ? number + 8u : OFF;
 }
 
+/* What has flowed until now has charged the electrodes. */
+static void pass(void) {
+    skin_pass(skin, source, sink, (double)(avr->cycle - passed) / CLOCK);
+    passed = avr->cycle;
+}
+
 /* What is connected from now on. */
 static void connect(unsigned new_source, unsigned new_sink) {
+    pass();
     bool was_on = source != OFF || sink != OFF;
     bool is_on = new_source != OFF || new_sink != OFF;
     if (watch != NULL && source < WATCH_CHANNELS && sink < WATCH_CHANNELS) {
@@ -128,6 +136,7 @@ static void on_conversion(struct avr_irq_t *irq, uint32_t value, void *unused) {
     (void)value;
     (void)unused;
     unsigned channel = (avr->data[ADC_MUX] & 7u) | ((avr->data[ADC_SRB] & MUX5) != 0 ? 8u : 0u);
+    pass();
     code = skin_code(skin, source, sink, channel);
 }
 

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/mman.h>
@@ -36,6 +37,21 @@ const struct skin_memory *skin_star(void) {
         star.resistance[e * SKIN_MOST + e] = 1.0 + e;
     }
     return &star;
+}
+
+static double layer[SKIN_MOST]; /* V of the double layers */
+
+void skin_pass(const struct skin_memory *skin, unsigned source, unsigned sink, double seconds) {
+    if (skin->double_layer <= 0.0) {
+        return;
+    }
+    bool flows = source < SKIN_MOST && sink < SKIN_MOST;
+    double limit = flows ? skin->current * skin->leak : 0.0; /* after all time */
+    double kept = exp(-seconds / (skin->double_layer * skin->leak));
+    for (unsigned e = 0; e < SKIN_MOST; e++) {
+        double end = e == source ? limit : e == sink ? -limit : 0.0;
+        layer[e] = end + (layer[e] - end) * kept;
+    }
 }
 
 static const double *row(const struct skin_memory *skin, unsigned electrode) {
@@ -101,7 +117,8 @@ static double volts_now(const struct skin_memory *skin, unsigned source, unsigne
     if (amperes * load > skin->compliance) {
         amperes = skin->compliance / load;
     }
-    return amperes * (ohms_here - ohms_low) + skin->potential[at] - skin->potential[low.main];
+    return amperes * (ohms_here - ohms_low) + skin->potential[at] - skin->potential[low.main] +
+           layer[at] - layer[low.main];
 }
 
 double skin_volts(const struct skin_memory *skin, unsigned source, unsigned sink,
@@ -132,7 +149,9 @@ static double chance(void) {
 
 uint16_t skin_code(const struct skin_memory *skin, unsigned source, unsigned sink,
                    unsigned channel) {
-    double volts = skin->gain * skin_volts(skin, source, sink, channel) + skin->offset;
+    double input = skin_volts(skin, source, sink, channel);
+    input += channel < SKIN_MOST ? skin->offset_of[channel] : 0.0;
+    double volts = skin->gain * input + skin->offset;
     double code = volts * skin->levels / skin->reference;
     if (skin->noise > 0.0) {
         code += skin->noise * chance();

@@ -34,6 +34,9 @@ struct skin_memory {
     double resistance[SKIN_MOST * SKIN_MOST]; /* ohm, transfer, row by row, n by n */
     struct skin_faults faults;
     double potential[SKIN_MOST]; /* V that each electrode has by itself, whatever flows */
+    double offset_of[SKIN_MOST]; /* V of each channel's amplifier, at its input */
+    double double_layer; /* F of each electrode, which polarises; 0: none does */
+    double leak;         /* ohm across it */
 };
 
 /* Map `path`, or exit with a sentence. */
@@ -41,6 +44,10 @@ const struct skin_memory *skin_open(const char *path);
 
 /* A skin for want of another: each electrode at the end of a resistor of 1 + e ohm to one point. */
 const struct skin_memory *skin_star(void);
+
+/* The current has flowed from `source` to `sink` for so many seconds, and has charged their double
+   layers, which leak; SKIN_MOST or more for either: none has flowed. */
+void skin_pass(const struct skin_memory *skin, unsigned source, unsigned sink, double seconds);
 
 /* V of a channel against the sink; 0 beyond the skin's electrodes or with nothing connected. */
 double skin_volts(const struct skin_memory *skin, unsigned source, unsigned sink, unsigned channel);

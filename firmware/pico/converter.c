@@ -1,5 +1,6 @@
 /* The converter runs without a pause from the first sample of a drive to the last, so that the
-   instants of sampling stand on a grid of 2 us whatever interrupts do; DMA fetches what it gives. */
+   instants of sampling stand on a grid of 2 us whatever interrupts do; DMA fetches what it gives,
+   in turn, and the converter's FIFO holds four conversions while the interrupt is late. */
 #include "converter.h"
 
 #include "clocks.h"
@@ -42,7 +43,11 @@ uint16_t hal_adc_ticks(void) {
     return (uint16_t)(((DROPPED + conversions) * US_PER_CONVERSION + LATENESS_US) / US_PER_TICK + 1u);
 }
 
-/* Whatever has been converted of another channel. */
+static bool runs(void) {
+    return (REGISTER(ADC_CS) & ADC_START_MANY) != 0u;
+}
+
+/* Whatever was converted after the last sample of a drive. */
 static void drain(void) {
     while ((REGISTER(ADC_FCS) & FCS_EMPTY) == 0u) {
         (void)REGISTER(ADC_FIFO);
@@ -52,7 +57,9 @@ static void drain(void) {
 void hal_adc_start(uint8_t channel) {
     uint32_t address = (uint32_t)channel << READ_SHIFT;
     REGISTER(SIO_OUT_XOR) = (REGISTER(SIO_OUT) ^ address) & (ADDRESS_MASK << READ_SHIFT);
-    drain();
+    if (!runs()) {
+        drain();
+    }
     REGISTER(DMA_READ) = ADC_FIFO;
     REGISTER(DMA_WRITE) = (uint32_t)codes;
     REGISTER(DMA_COUNT) = DROPPED + conversions;

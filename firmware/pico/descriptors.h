@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #define PACKET 64u
+#define DATA_INTERFACE 1u
 #define EP_NOTIFY 1u /* in; nothing is ever said there */
 #define EP_DATA 2u   /* in and out */
 

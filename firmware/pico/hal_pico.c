@@ -91,7 +91,7 @@ const struct hal_board hal_board = {
     .name = "Raspberry Pi Pico",
     .most_chop_hz = 5000u,
     .half_ns = 6000u,
-    .sample_ns = 6000u, /* two conversions are dropped, and at times a third */
+    .sample_ns = 6000u, /* two conversions are dropped; a third of slack */
     .conversion_ns = 2000u,
     .clock_ns = 0u,
 };

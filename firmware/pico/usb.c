@@ -22,6 +22,10 @@
 #define MOST_ADDRESS 127u
 #define TO_HOST 0x80u
 #define KIND_MASK 0x60u
+#define RECIPIENT_MASK 0x1Fu
+#define OF_INTERFACE 1u
+#define OF_ENDPOINT 2u
+#define ENDPOINT_HALT 0u
 
 /* Requests; with the class's bit in the upper byte. */
 enum {
@@ -95,6 +99,24 @@ static void listen(void) {
     received.size = 0u;
     give(USB_BUFFER_OUT(EP_DATA), received.pid | PACKET);
     received.pid ^= USB_DATA1;
+}
+
+/* The next packet is of DATA0 again, and so is one that waits: USB 2.0, 9.4.5. */
+static void restart_toggle(uint32_t buffer, uint32_t *pid) {
+    uint32_t held = REGISTER(buffer);
+    *pid = 0u;
+    if ((held & USB_AVAILABLE) != 0u) {
+        give(buffer, held & ~(USB_AVAILABLE | USB_DATA1));
+        *pid = USB_DATA1;
+    }
+}
+
+static void restart_toggles(uint16_t index) {
+    if (index == (EP_DATA | TO_HOST)) {
+        restart_toggle(USB_BUFFER_IN(EP_DATA), &sending.pid);
+    } else if (index == EP_DATA) {
+        restart_toggle(USB_BUFFER_OUT(EP_DATA), &received.pid);
+    }
 }
 
 static void give_packet(const uint8_t *bytes, uint16_t size) {
@@ -212,7 +234,7 @@ static void tell(uint16_t request, const struct setup *setup) {
 }
 
 /* Requests without data; false: there is none of that kind. */
-static bool obey(uint16_t request, uint16_t value) {
+static bool obey(uint16_t request, uint8_t recipient, uint16_t value, uint16_t index) {
     switch (request) {
     case SET_ADDRESS:
         control.address = (uint8_t)value;
@@ -225,8 +247,17 @@ static bool obey(uint16_t request, uint16_t value) {
         }
         return value <= 1u;
     case CLEAR_FEATURE:
-    case SET_FEATURE:
+        if (recipient == OF_ENDPOINT && value == ENDPOINT_HALT) {
+            restart_toggles(index);
+        }
+        return true;
     case SET_INTERFACE:
+        if (recipient == OF_INTERFACE && index == DATA_INTERFACE && value == 0u) {
+            restart_toggles(EP_DATA);
+            restart_toggles(EP_DATA | TO_HOST);
+        }
+        return value == 0u; /* neither has an alternative */
+    case SET_FEATURE:
     case SET_CONTROL_LINE_STATE:
         return true;
     default:
@@ -241,7 +272,7 @@ static void take_request(const struct setup *setup) {
     } else if (request == SET_LINE_CODING && setup->length == CODING_SIZE) {
         control.takes_coding = true;
         give(USB_BUFFER_OUT(0u), USB_DATA1 | PACKET);
-    } else if (setup->length == 0u && obey(request, setup->value)) {
+    } else if (setup->length == 0u && obey(request, setup->kind & RECIPIENT_MASK, setup->value, setup->index)) {
         agree();
     } else {
         control.address = 0u;

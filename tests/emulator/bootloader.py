@@ -19,6 +19,7 @@ SIGNATURE = b"\x1e\x98\x01"
 SIGN_ON, SET, GET, ADDRESS, ENTER, LEAVE = 0x01, 0x02, 0x03, 0x06, 0x10, 0x11
 PROGRAM_FLASH, READ_FLASH, PROGRAM_EEPROM, READ_EEPROM, SIGNED = 0x13, 0x14, 0x15, 0x16, 0x1B
 START = 0x1B
+NAME = b"Arduino Mega 2560"
 
 
 class Mega:
@@ -95,8 +96,9 @@ class Mega:
 
     def _info(self):
         current, unique_id = struct.unpack_from("<I8s", self.eeprom)
-        info = Board(8, 10, 0.1, 250e3, 128, 400, unique_id=unique_id).info(1)
-        return encode(replace(info, current=100_000 if current == 2**32 - 1 else current))
+        board = Board(8, 10, 0.1, 250e3, 128, 400, unique_id=unique_id)
+        info = replace(board.info(1), current=100_000 if current == 2**32 - 1 else current)
+        return encode(info) + encode(replace(board.limits, name=NAME.ljust(24, b"\0")))
 
 
 def _framed(number, body):

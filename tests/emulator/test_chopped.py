@@ -17,7 +17,7 @@ from emulator.test_pico import mutated as mutated_image
 from emulator.watch import CLOCK, Watch
 from firmware.boards import SCAN, Talk
 from tomoskin.core import Frame, SourceError
-from tomoskin.emulator import BoardProcess, Front, SkinMemory
+from tomoskin.emulator import BoardProcess, Front, OwnVoltages, SkinMemory
 from tomoskin.emulator.process import BoardPrograms
 from tomoskin.source import Link, ScanSettings, SerialTransport, Timing
 from tomoskin.wire import (
@@ -130,7 +130,7 @@ def powered(programs: BoardPrograms, kind: Kind, folder: Path) -> Iterator[Power
     """A board on a star of 1 + e ohm; what its emulator complains of fails the test."""
     front = Front(CURRENT, 1e9, 1.0, OFFSET, kind.reference, 2.0**kind.bits, 0.0)
     arms = np.diag(np.arange(1.0, N + 1))
-    memory = SkinMemory(folder / "skin", front, arms, potentials=POTENTIALS)
+    memory = SkinMemory(folder / "skin", front, arms, own=OwnVoltages(POTENTIALS))
     board = BoardProcess(programs, memory.path, CURRENT, "-w", str(folder / "watch"), "-f")
     try:
         yield Powered(kind, board, folder / "watch")
@@ -291,7 +291,7 @@ def test_a_mutant_is_noticed(
 ) -> None:
     change = MUTANTS[name]
     if kind == "pico":
-        programs: BoardPrograms = mutated_image(change, request.getfixturevalue("pico"), tmp_path)
+        programs: BoardPrograms = mutated_image(request.getfixturevalue("pico"), tmp_path, change)
     else:
         whole = request.getfixturevalue("programs")
         programs = type(whole)(mutated_elf([change], tmp_path), whole.emulator)

@@ -52,7 +52,8 @@ def test_the_firmware_reads_what_configure_has_written(mega, tomoskin, programs,
 
 
 def test_what_is_not_named_stays_and_a_board_gets_an_id(mega, tomoskin):
-    assert "100 mA, id ffffffffffffffff" in tomoskin("firmware", "configure", mega.port)[1]
+    shown = tomoskin("firmware", "configure", mega.port)[1]
+    assert "Arduino Mega 2560, 100 mA, id ffffffffffffffff" in shown
     assert tomoskin("firmware", "configure", mega.port, "--current", "50 mA")[0] == 0
     current, unique_id = struct.unpack_from("<I8s", mega.eeprom)
     assert current == 50_000

@@ -78,6 +78,7 @@ def test_scans_in_order_at_its_rate_and_samples_on_time(
     periods = np.diff([frame.ticks for frame in frames]) / info.tick_rate
     assert 1 / periods.mean() > LEAST_RATE[electrodes]
     assert seen["instants"] > scan.n_samples * 4
+    assert seen["unsettled"] > 4
     assert seen["jitter"] < MOST_JITTER
     assert seen["shortestOff"] >= 1e9 * DEAD
     assert seen["resets"] == 0
@@ -133,6 +134,14 @@ MUTANTS: dict[str, Change] = {
     ),
     "an id of its own": ("pico/flash.c", "#define ID_AT 5u", "#define ID_AT 4u"),
 }
+LATE: Change = (
+    "pico/converter.c",
+    "    uint32_t sum = 0u;\n",
+    "    static uint8_t turn;\n    uint32_t sum = 0u;\n    if (++turn == 5u) {\n"
+    "        turn = 0u;\n        hal_delay_us(1u);\n    }\n",
+)
+"""Every fifth interrupt of the converter comes later than one may; 5 and 8 share no divisor."""
+DRAINS: Change = ("pico/converter.c", "if (!runs()) {", "if (!runs() || true) {")
 HANGS: dict[str, Change] = {
     "in an interrupt, with current on": (
         "src/scan.c",
@@ -153,14 +162,14 @@ HANGS: dict[str, Change] = {
 }
 
 
-def mutated(change: Change, pico: PicoPrograms, folder: Path) -> PicoPrograms:
-    """The image of a copy of the firmware with ``change``."""
+def mutated(pico: PicoPrograms, folder: Path, *changes: Change) -> PicoPrograms:
+    """The image of a copy of the firmware with ``changes``."""
     copy = folder / "firmware"
     shutil.copytree(FIRMWARE, copy, ignore=shutil.ignore_patterns("node_modules"))
-    file, old, new = change
-    text = (copy / file).read_text(encoding="utf-8")
-    assert text.count(old) == 1, f"{file}: {old} is gone or not the only one"
-    (copy / file).write_text(text.replace(old, new), encoding="utf-8")
+    for file, old, new in changes:
+        text = (copy / file).read_text(encoding="utf-8")
+        assert text.count(old) == 1, f"{file}: {old} is gone or not the only one"
+        (copy / file).write_text(text.replace(old, new), encoding="utf-8")
     made = make("pico", f"BUILD={folder}", "CHANNELS=32", folder=copy)
     assert made.returncode == 0, made.stderr
     image = folder / "mutant.uf2"
@@ -177,10 +186,12 @@ def examine(programs: PicoPrograms, folder: Path, impatience: float = PATIENCE) 
         assert asked(talk, GetInfo(5), impatience, Info).unique_id == b"emulated"
         assert asked(talk, Start(10, 5)).result is Result.OK
         for number in range(30):
+            talk.say(Ping(20 + number))  # so that USB is busy at any time
             frame = talk.next(Frame, impatience)
             assert frame.sequence == number
             assert frame.samples.tolist() == star(SCAN, 1)
         seen = board.watch()
+        assert seen["unsettled"] > 1
         assert seen["jitter"] < MOST_JITTER
         assert seen["shortestOff"] >= 1e9 * DEAD
         assert asked(talk, SetHeartbeat(11, 10_000)).result is Result.OK
@@ -291,18 +302,30 @@ def test_one_skin_file_runs_on_either_board(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_mutant_is_noticed(name: str, pico: PicoPrograms, tmp_path: Path) -> None:
+    planted = mutated(pico, tmp_path, MUTANTS[name])
     with pytest.raises(AssertionError):
-        examine(mutated(MUTANTS[name], pico, tmp_path), tmp_path, impatience=20.0)
+        examine(planted, tmp_path, impatience=20.0)
 
 
 def test_the_real_one_passes_what_mutants_do_not(pico: PicoPrograms, tmp_path: Path) -> None:
     assert examine(pico, tmp_path) == 0
 
 
+def test_an_interrupt_that_is_late_costs_no_conversion(pico: PicoPrograms, tmp_path: Path) -> None:
+    assert examine(mutated(pico, tmp_path, LATE), tmp_path) == 0
+
+
+@pytest.mark.slow
+def test_a_conversion_lost_by_lateness_is_noticed(pico: PicoPrograms, tmp_path: Path) -> None:
+    planted = mutated(pico, tmp_path, LATE, DRAINS)
+    with pytest.raises(AssertionError, match=f"< {MOST_JITTER}"):
+        examine(planted, tmp_path, impatience=20.0)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", HANGS)
 def test_the_watchdog_ends_a_hang(name: str, pico: PicoPrograms, tmp_path: Path) -> None:
-    programs = mutated(HANGS[name], pico, tmp_path)
+    programs = mutated(pico, tmp_path, HANGS[name])
     with powered(programs, tmp_path, "-f") as board:
         talk = Talk(SerialTransport(board.board.port))
         set_up(talk)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -15,9 +14,7 @@ from firmware.boards import FIRMWARE
 from tomoskin.cli.app import app
 from tomoskin.core import SourceError
 from tomoskin.emulator import PicoPrograms, find_boot_drive, write_uf2
-from tomoskin.emulator.flash import ask_info
 from tomoskin.emulator.uf2 import FLASH, boot_checksum, check_boot, pack_uf2, unpack_uf2
-from tomoskin.source import SerialTransport
 
 IMAGE = bytes(range(256)) * 2 + b"end"
 ABOUT = "UF2 Bootloader v3.0\nModel: Raspberry Pi RP2\nBoard-ID: {}\n"
@@ -100,11 +97,9 @@ def test_configure_writes_the_last_sector_and_the_firmware_reads_it(
     ((address, page),) = unpack_uf2((boot / "tomoskin.uf2").read_bytes(), "x").items()
     assert address == FLASH + 0x1FF000
     (settings := tmp_path / "settings").write_bytes(page)
-    with (
-        powered(pico, tmp_path, "-f", "-e", str(settings)) as board,
-        closing(SerialTransport(board.board.port)) as transport,
-    ):
-        assert ask_info(transport).current == 50_000
+    with powered(pico, tmp_path, "-f", "-e", str(settings)) as board:
+        shown = CliRunner().invoke(app, ["firmware", "configure", board.board.port]).output
+    assert "Raspberry Pi Pico, 50 mA, id emulated" in " ".join(shown.split())
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,14 @@ USB_MUTANTS = {
         "REGISTER(USB_SIE_STATUS) = USB_RESUMED;\n        suspended",
         "(void)0;\n        bool suspended",
     ),
+    "a halt cleared, and the toggle kept": (
+        "*pid = 0u;\n    if",
+        "if",
+    ),
+    "a halt cleared, and the packet that waits kept": (
+        "give(buffer, held & ~(USB_AVAILABLE | USB_DATA1));",
+        "",
+    ),
     "data where there are none": ("(setup->kind & TO_HOST) != 0u", "true"),
 }
 

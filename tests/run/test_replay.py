@@ -16,7 +16,7 @@ from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.recording import Mark, SessionReader, advance, replayed
 from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.run import Runner, commands
-from tomoskin.run.flow import MOST_AT_ONCE
+from tomoskin.run.backlog import MOST_AT_ONCE
 from tomoskin.skin import Skin
 from tomoskin.source import Link, ScanSettings
 

@@ -14,7 +14,7 @@ from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.recording import RawRead, session_info
 from tomoskin.run import Runner, commands
-from tomoskin.run.flow import MOST_AT_ONCE
+from tomoskin.run.backlog import MOST_AT_ONCE
 from tomoskin.run.publisher import EventLog
 from tomoskin.run.recordings import Recordings
 from tomoskin.skin import Skin

@@ -14,6 +14,7 @@ const NONE = -1;
 const LEAST_DEAD_NS = 1000;
 const MULTIPLEXER_NS = 1500;
 const CONVERSION_NS = 2000;
+const DMA_CHANNEL = 0;
 
 export class Front {
   /** `skin` gives codes; `watch` takes what is seen; `complain` a sentence. */
@@ -25,6 +26,7 @@ export class Front {
     this.pair = [NONE, NONE];
     this.opened = -Infinity;
     this.since = 0;
+    this.passed = 0;
   }
 
   /** Stand before a chip that has just been powered on or reset: its pins float. */
@@ -42,6 +44,7 @@ export class Front {
       chip.gpio[READ_SHIFT + bit].addListener(() => this.#onRead());
     }
     const done = chip.clock.createAlarm(() => chip.adc.completeADCRead(this.code, false));
+    this.#follow(chip.adc.fifo, chip.dma.channels[DMA_CHANNEL]);
     chip.adc.onADCRead = (input) => {
       this.code = this.#convert(input);
       done.schedule(CONVERSION_NS);
@@ -82,7 +85,7 @@ export class Front {
   #connect(source, sink) {
     const was = this.source !== NONE || this.sink !== NONE;
     const is = source !== NONE || sink !== NONE;
-    const now = this.now();
+    const now = this.#pass();
     if (was && !is) {
       this.opened = now;
       this.watch.ended(now - this.since, ...this.pair);
@@ -98,14 +101,39 @@ export class Front {
     }
   }
 
+  /** What has flowed until now has charged the electrodes. */
+  #pass() {
+    const now = this.now();
+    this.skin.pass(this.source, this.sink, now - this.passed);
+    this.passed = now;
+    return now;
+  }
+
   #onRead() {
     const read = this.#address(READ_SHIFT);
     if (read !== this.read) {
       this.before = this.read;
       this.read = read;
       this.readSince = this.now();
-      this.ordinal = 0;
     }
+  }
+
+  /** What a conversion goes through until DMA fetches it, as one of so many for a sample. */
+  #follow(fifo, dma) {
+    const waiting = [];
+    const push = fifo.push.bind(fifo);
+    const pull = fifo.pull.bind(fifo);
+    fifo.push = (code) => {
+      waiting.push(this.begun);
+      push(code);
+    };
+    fifo.pull = () => {
+      const begun = waiting.shift();
+      if (dma.active) {
+        this.watch.fetched(begun, this.read, dma.transCount);
+      }
+      return pull();
+    };
   }
 
   /** The code of a conversion that begins now; of the channel before while the switch settles. */
@@ -113,9 +141,9 @@ export class Front {
     if (input !== AMPLIFIER) {
       this.complain(`converter input ${input} has nothing on it`);
     }
-    const now = this.now();
+    const now = this.#pass();
     const channel = now - this.readSince < MULTIPLEXER_NS ? this.before : this.read;
-    this.watch.sampled(this.source, this.sink, this.read, this.ordinal++, now - this.since);
+    this.begun = { source: this.source, sink: this.sink, channel, after: now - this.since };
     return this.skin.code(this.source, this.sink, channel);
   }
 }

@@ -7,13 +7,17 @@ const HEAD = 72;
 const FAULTS = HEAD + 8 * MOST * MOST; // those of a Mega's board, and:
 const READING = FAULTS + 4 * 4 + 2 * MOST; // 1 + the channel that is read instead; 0: its own
 const POTENTIALS = READING + MOST;
-const SIZE = POTENTIALS + 8 * MOST;
+const OFFSETS = POTENTIALS + 8 * MOST; // of the channels' amplifiers
+const DOUBLE_LAYER = OFFSETS + 8 * MOST;
+const LEAK = DOUBLE_LAYER + 8;
+const SIZE = LEAK + 8;
 
 export class Skin {
   /** The skin in the file at `path`; without one, each electrode at the end of 1 + e ohm. */
   constructor(path) {
     this.view = new DataView(new ArrayBuffer(SIZE));
     this.state = 88172645;
+    this.layer = new Float64Array(MOST); // V of the double layers
     this.file = path === undefined ? undefined : openSync(path, 'r');
     if (this.file === undefined) {
       this.#star();
@@ -45,9 +49,25 @@ export class Skin {
   code(source, sink, addressed) {
     const channel = (this.view.getUint8(READING + addressed) || addressed + 1) - 1;
     const [gain, offset, reference, levels, noise] = [2, 3, 4, 5, 6].map((k) => this.#figure(k));
-    const volts = gain * this.#volts(source, sink, channel) + offset;
+    const input = this.#volts(source, sink, channel) + this.view.getFloat64(OFFSETS + 8 * addressed, true);
+    const volts = gain * input + offset;
     const exact = (volts * levels) / reference + (noise > 0 ? noise * this.#chance() : 0);
     return Math.min(Math.max(Math.floor(exact), 0), levels - 1);
+  }
+
+  /** The current has flowed for so many ns, and has charged the double layers, which leak. */
+  pass(source, sink, nanos) {
+    const farads = this.view.getFloat64(DOUBLE_LAYER, true);
+    if (farads <= 0) {
+      return;
+    }
+    const leak = this.view.getFloat64(LEAK, true);
+    const limit = source >= 0 && sink >= 0 ? this.#figure(0) * leak : 0;
+    const kept = Math.exp(-nanos / 1e9 / (farads * leak));
+    this.layer.forEach((volts, e) => {
+      const end = e === source ? limit : e === sink ? -limit : 0;
+      this.layer[e] = end + (volts - end) * kept;
+    });
   }
 
   #figure(number) {
@@ -55,8 +75,8 @@ export class Skin {
   }
 
   /** V that an electrode has by itself. */
-  #potential(electrode) {
-    return this.view.getFloat64(POTENTIALS + 8 * electrode, true);
+  #own(electrode) {
+    return this.view.getFloat64(POTENTIALS + 8 * electrode, true) + this.layer[electrode];
   }
 
   #resistance(row, column) {
@@ -74,7 +94,7 @@ export class Skin {
     const atSink = r(source, sink) - r(sink, sink);
     const load = r(source, source) - r(sink, source) - atSink;
     const amperes = Math.min(this.#figure(0), load > 0 ? this.#figure(1) / load : Infinity);
-    const own = this.#potential(channel) - this.#potential(sink);
+    const own = this.#own(channel) - this.#own(sink);
     return amperes * (r(source, channel) - r(sink, channel) - atSink) + own;
   }
 

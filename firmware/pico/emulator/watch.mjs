@@ -26,12 +26,16 @@ export class Watch {
     }
   }
 
-  /** A conversion began `after` ns into its drive, the `ordinal`th since the channel's turn. */
-  sampled(source, sink, channel, ordinal, after) {
+  /** A conversion that `begun` so many ns into its drive is fetched for `channel`, when `left`, with
+      it, are to come. Unsettled: the last one that was of another channel. */
+  fetched({ source, sink, channel: begun, after }, channel, left) {
     if (this.path === undefined || source < 0) {
       return;
     }
-    const key = ((source * 32 + sink) * 32 + channel) * 256 + ordinal;
+    if (begun !== channel && !(this.seen.unsettled <= left)) {
+      this.seen.unsettled = left;
+    }
+    const key = ((source * 32 + sink) * 32 + channel) * 256 + left;
     const span = this.instants.get(key);
     if (span === undefined) {
       this.instants.set(key, [after, after]);

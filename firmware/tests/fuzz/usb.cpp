@@ -45,8 +45,8 @@ void interrupt(uint32_t why) {
 }
 
 struct Host {
-    bool out_toggle = false;      // of its next packet to the serial line
-    int in_toggle = -1;           // of the next one from there; -1: not known
+    int out_toggle = -1;          // of its next packet to the serial line; -1: not known
+    int in_toggle = -1;           // of the next one from there
     int left = 0x10000;           // of the answer that it asked for
     Bytes line;                   // from the device's serial line
     size_t newest = 0;            // bytes in its newest packet
@@ -58,7 +58,7 @@ struct Host {
             fail("an address after a reset");
         }
         left = 0x10000;
-        in_toggle = -1;
+        in_toggle = out_toggle = -1;
     }
 
     void setup(const uint8_t *bytes) {
@@ -68,10 +68,23 @@ struct Host {
         REGISTER(USB_BUFFER_IN(0u)) = REGISTER(USB_BUFFER_OUT(0u)) = 0u;
         REGISTER(USB_SIE_STATUS) = USB_SETUP_CAME;
         interrupt(USB_ON_SETUP);
-        static const uint8_t configure[8] = {0, 9, 1, 0, 0, 0, 0, 0};
-        if (std::equal(configure, configure + 8, bytes)) {
-            out_toggle = false;
-            in_toggle = 0;
+        note_toggles(bytes);
+    }
+
+    // What a host knows of either toggle once it has made a request without data.
+    void note_toggles(const uint8_t *bytes) {
+        int kind = bytes[0], request = bytes[1], value = bytes[2] | bytes[3] << 8;
+        int index = bytes[4] | bytes[5] << 8, length = bytes[6] | bytes[7] << 8;
+        if ((kind & 0xE0) != 0 || length != 0) {
+            return;
+        }
+        if (request == 9) {  // SET_CONFIGURATION
+            in_toggle = out_toggle = value == 1 ? 0 : -1;
+        } else if (request == 1 && kind == 2 && value == 0) {  // CLEAR_FEATURE: the halt
+            in_toggle = index == (EP_DATA | 0x80) ? 0 : in_toggle;
+            out_toggle = index == EP_DATA ? 0 : out_toggle;
+        } else if (request == 11 && kind == 1 && value == 0 && index == DATA_INTERFACE) {
+            in_toggle = out_toggle = 0;  // SET_INTERFACE
         }
     }
 
@@ -88,21 +101,21 @@ struct Host {
         }
         uint32_t data = endpoint == 0u ? USB_EP0_DATA : USB_MEMORY + (get(USB_EP_IN(endpoint)) & 0xFFC0u);
         bytes.assign(simulated(data, size), simulated(data, size) + size);
-        check_toggle(endpoint, control);
+        if (endpoint == EP_DATA) {
+            check_turn(in_toggle, control);
+        }
         REGISTER(at) = control & ~USB_AVAILABLE;
         REGISTER(USB_BUFF_STATUS) = 1u << (2u * endpoint);
         interrupt(USB_ON_BUFFER);
         return true;
     }
 
-    void check_toggle(uint32_t endpoint, uint32_t control) {
-        int toggle = (control & USB_DATA1) != 0u;
-        if (endpoint == EP_DATA) {
-            if (in_toggle >= 0 && toggle != in_toggle) {
-                fail("a packet twice or out of turn");
-            }
-            in_toggle = in_toggle < 0 ? -1 : !toggle;
+    static void check_turn(int &toggle, uint32_t control) {
+        int now = (control & USB_DATA1) != 0u;
+        if (toggle >= 0 && now != toggle) {
+            fail("a packet twice or out of turn");
         }
+        toggle = toggle < 0 ? -1 : !now;
     }
 
     bool give(uint32_t endpoint, const uint8_t *bytes, uint32_t size) {
@@ -110,6 +123,9 @@ struct Host {
         uint32_t control = get(at);
         if ((control & USB_AVAILABLE) == 0u) {
             return false;
+        }
+        if (endpoint == EP_DATA) {
+            check_turn(out_toggle, control);
         }
         uint32_t data = endpoint == 0u ? USB_EP0_DATA : USB_MEMORY + (get(USB_EP_OUT(endpoint)) & 0xFFC0u);
         std::copy(bytes, bytes + size, simulated(data, PACKET));
@@ -156,6 +172,9 @@ struct Host {
     }
 };
 
+constexpr std::array<uint8_t, 8> CLEAR_IN = {2, 1, 0, 0, EP_DATA | 0x80u, 0, 0, 0};
+constexpr std::array<uint8_t, 8> CLEAR_OUT = {2, 1, 0, 0, EP_DATA, 0, 0, 0};
+
 Bytes heard;  // by the firmware
 
 void hear() {
@@ -185,6 +204,11 @@ void check_device(Host &host) {
         fail("not the address that it was given");
     }
     (void)host.ask({0, 9, 1, 0, 0, 0, 0, 0});
+    REGISTER(USB_SIE_STATUS) = USB_SUSPENDED;
+    interrupt(USB_ON_SUSPEND);
+    if (hal_uart_up()) {
+        fail("a line though the host is asleep");
+    }
     REGISTER(USB_SIE_STATUS) = USB_RESUMED;
     interrupt(USB_ON_RESUME);
     if (!hal_uart_up()) {
@@ -196,7 +220,13 @@ void check_device(Host &host) {
     }
     for (uint16_t size : {130, 128}) {
         host.line.clear();
+        if (size == 130) {
+            (void)host.ask(CLEAR_IN);
+        }
         say(size);
+        if (size == 128) {
+            (void)host.ask(CLEAR_IN);  // while a packet waits
+        }
         for (int k = 0; k < 4; k++) {
             host.take_line();
         }
@@ -209,8 +239,14 @@ void check_device(Host &host) {
     }
     for (uint32_t size : {9u, PACKET, 0u, 5u}) {
         heard.clear();
+        if (size == 5u) {
+            (void)host.ask(CLEAR_OUT);
+        }
         if (!host.give(EP_DATA, message.data(), size)) {
             fail("the device does not listen");
+        }
+        if (size == PACKET) {
+            (void)host.ask(CLEAR_OUT);  // while a packet has not been heard
         }
         hear();
         if (heard != Bytes(message.begin(), message.begin() + size)) {

@@ -122,10 +122,11 @@ def configure(
     board: Board = "mega",
 ) -> None:
     """Write a board's current and id into its EEPROM and read them back; without either, show
-    them. Of a Pico the current alone is written, to its flash."""
+    them and the board's name. Of a Pico the current alone is written, to its flash."""
     from tomoskin.emulator import (
         check_current,
         read_identity,
+        say_board,
         say_identity,
         write_identity,
     )
@@ -140,7 +141,7 @@ def configure(
         return
     held = read_identity(port)
     if asked is None and name is None:
-        typer.echo(f"{port}: {say_identity(held)}")
+        typer.echo(f"{port}: {say_board(held)}")
         return
     identity = held.change(asked, name)
     check_current(identity.current, of_skin)

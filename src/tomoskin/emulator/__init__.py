@@ -4,6 +4,7 @@ from tomoskin.emulator.flash import (
     BoardIdentity,
     check_current,
     read_identity,
+    say_board,
     say_identity,
     sense_resistor,
     write_firmware,
@@ -23,6 +24,7 @@ from tomoskin.emulator.process import (
     BoardProcess,
     BoardPrograms,
     Front,
+    OwnVoltages,
     SkinMemory,
 )
 from tomoskin.emulator.program import Programs, build_elf, build_programs, firmware_image
@@ -39,6 +41,7 @@ __all__ = [
     "BoardPrograms",
     "EmulatorTransport",
     "Front",
+    "OwnVoltages",
     "PicoPrograms",
     "Programs",
     "SkinMemory",
@@ -53,6 +56,7 @@ __all__ = [
     "firmware_image",
     "pico_image",
     "read_identity",
+    "say_board",
     "say_identity",
     "sense_resistor",
     "settings_uf2",

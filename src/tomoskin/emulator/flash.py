@@ -7,14 +7,14 @@ import shutil
 import struct
 import subprocess
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
 
 from tomoskin.core import SourceError
 from tomoskin.emulator.program import firmware_image
-from tomoskin.source import Exchange, SerialTransport, Transport
-from tomoskin.wire import GetInfo, Info
+from tomoskin.source import BOARDS_SINCE, Exchange, SerialTransport, Transport
+from tomoskin.wire import BoardLimits, GetBoard, GetInfo, Info
 
 MOST_CURRENT = 0.1
 """A, that the parts of the board are made for."""
@@ -34,23 +34,27 @@ _NEVER_WRITTEN = b"\xff" * 8
 class BoardIdentity:
     """What only the one who built a board knows: the setting of its current limiter, and its id.
 
-    ``current`` A; ``unique_id``: eight bytes. They are the first bytes of its EEPROM.
+    ``current`` A; ``unique_id``: eight bytes. They are the first bytes of its EEPROM. ``board``:
+    what its firmware calls it; empty before protocol 1.2.
     """
 
     current: float
     unique_id: bytes
+    board: str = ""
 
     @classmethod
-    def of(cls, info: Info) -> Self:
+    def of(cls, info: Info, board: str) -> Self:
         """What the firmware says."""
-        return cls(info.current / 1e6, info.unique_id)
+        return cls(info.current / 1e6, info.unique_id, board)
 
     def change(self, current: float | None, name: str | None) -> Self:
         """With what is not None; a board that never had an id gets one."""
         unique_id = self.unique_id if name is None else name.encode().ljust(8, b"\0")
         if unique_id == _NEVER_WRITTEN:
             unique_id = secrets.token_bytes(8)
-        return type(self)(self.current if current is None else current, unique_id)
+        return replace(
+            self, current=self.current if current is None else current, unique_id=unique_id
+        )
 
     def pack(self) -> bytes:
         """As the firmware reads it: µA, then the id."""
@@ -111,7 +115,8 @@ def read_identity(port: str) -> BoardIdentity:
     """What the firmware at ``port`` says; SourceError where none answers."""
     transport = SerialTransport(port)
     try:
-        return BoardIdentity.of(ask_info(transport))
+        info = ask_info(transport)
+        return BoardIdentity.of(info, _ask_name(transport, info))
     finally:
         transport.close()
 
@@ -126,6 +131,18 @@ def ask_info(transport: Transport) -> Info:
             hint="is it the board's port? tomoskin firmware flash comes first",
         )
     return info
+
+
+def _ask_name(transport: Transport, info: Info) -> str:
+    if info.minor < BOARDS_SINCE:
+        return ""
+    board = Exchange(transport).ask(GetBoard(0), BoardLimits)
+    return board.text if board else ""
+
+
+def say_board(identity: BoardIdentity) -> str:
+    """``Raspberry Pi Pico, 100 mA, id left-arm (6c6566742d61726d)``."""
+    return ", ".join(filter(None, (identity.board, say_identity(identity))))
 
 
 def say_identity(identity: BoardIdentity) -> str:

@@ -11,6 +11,8 @@ from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import IO, Protocol
 
+import numpy as np
+
 from tomoskin.core import FloatArray, SourceError, StrPath
 from tomoskin.emulator.flash import BoardIdentity
 
@@ -22,7 +24,10 @@ _SEQUENCE_AT = 8
 _FAULTS_AT = _HEAD.size + 8 * MOST_ELECTRODES**2
 _FAULTS = struct.Struct(f"<4I{MOST_ELECTRODES}s{MOST_ELECTRODES}s{MOST_ELECTRODES}s")
 _POTENTIALS_AT = _FAULTS_AT + _FAULTS.size
-_SIZE = _POTENTIALS_AT + 8 * MOST_ELECTRODES
+_OFFSETS_AT = _POTENTIALS_AT + 8 * MOST_ELECTRODES
+_LAYER = struct.Struct("<2d")
+_LAYER_AT = _OFFSETS_AT + 8 * MOST_ELECTRODES
+_SIZE = _LAYER_AT + _LAYER.size
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +74,21 @@ class BoardFaults:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class OwnVoltages:
+    """What is read though it does not come from the sheet.
+
+    ``potentials`` (n,) V that each electrode has by itself, such as a thermoelectric voltage;
+    ``offsets`` (n,) V of each channel's amplifier, at its input; ``double_layer`` F of an electrode
+    that polarises, or 0, and ``leak`` Ω across it.
+    """
+
+    potentials: FloatArray = field(default_factory=lambda: np.zeros(0))
+    offsets: FloatArray = field(default_factory=lambda: np.zeros(0))
+    double_layer: float = 0.0
+    leak: float = 0.0
+
+
 class SkinMemory:
     """A file, mapped by this process and by the emulator's; a seqlock, so nobody waits."""
 
@@ -78,12 +98,9 @@ class SkinMemory:
         front: Front,
         resistance: FloatArray,
         faults: BoardFaults | None = None,
-        potentials: FloatArray | None = None,
+        own: OwnVoltages | None = None,
     ) -> None:
-        """Make the file; ``resistance`` as in :meth:`write`; without ``faults``, none.
-
-        ``potentials`` (n,) V that each electrode has by itself, such as a thermoelectric voltage.
-        """
+        """Make the file; ``resistance`` as in :meth:`write`. Without ``faults``, ``own``: none."""
         self.path = Path(path)
         self._n = len(resistance)
         if self._n > MOST_ELECTRODES:
@@ -96,16 +113,24 @@ class SkinMemory:
         self._sequence = 0
         _HEAD.pack_into(self._map, 0, _MAGIC, 0, self._n, *astuple(front))
         self._map[_FAULTS_AT:_POTENTIALS_AT] = (faults or BoardFaults()).pack()
-        if potentials is not None:
-            data = potentials.astype("<f8").tobytes()
-            self._map[_POTENTIALS_AT : _POTENTIALS_AT + len(data)] = data
+        own = own or OwnVoltages()
+        _LAYER.pack_into(self._map, _LAYER_AT, own.double_layer, own.leak)
+        self._put(_OFFSETS_AT, own.offsets)
+        self.write_potentials(own.potentials)
         self.write(resistance)
 
     def write(self, resistance: FloatArray) -> None:
         """(n, n) Ω transfer resistance from now on."""
-        data = resistance.astype("<f8").tobytes()
+        self._put(_HEAD.size, resistance)
+
+    def write_potentials(self, potentials: FloatArray) -> None:
+        """(n,) V that each electrode has by itself from now on."""
+        self._put(_POTENTIALS_AT, potentials)
+
+    def _put(self, at: int, numbers: FloatArray) -> None:
+        data = numbers.astype("<f8").tobytes()
         self._count()
-        self._map[_HEAD.size : _HEAD.size + len(data)] = data
+        self._map[at : at + len(data)] = data
         self._count()
 
     def _count(self) -> None:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from tomoskin.core import FloatArray
 from tomoskin.emulator import pico, program
 from tomoskin.emulator.pico import build_pico_programs
@@ -18,13 +20,14 @@ from tomoskin.emulator.process import (
     BoardProcess,
     BoardPrograms,
     Front,
+    OwnVoltages,
     SkinMemory,
 )
 from tomoskin.emulator.program import build_programs
 from tomoskin.emulator.transport import EmulatorTransport
 from tomoskin.signal import FIGURES
 from tomoskin.source import SerialTransport, Transport, read_options
-from tomoskin.twin import TwinSettings, TwinSkin, read_settings
+from tomoskin.twin import ThermalVoltages, TwinSettings, TwinSkin, read_settings
 
 if TYPE_CHECKING:
     from tomoskin.skin import Skin
@@ -54,7 +57,8 @@ DEFAULT = "mega"
 def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
     """``emulator``, ``emulator:pico``, or with options: ``emulator:pico,seed=3,preset=ideal``.
 
-    The sheet is the twin's; of the twin's electronics, current, compliance, gain and noise.
+    The sheet is the twin's; of the twin's electronics, current, compliance, gain and noise, the
+    amplifiers' offsets, and electrodes that polarise and have thermoelectric voltages.
 
     Raises
     ------
@@ -63,19 +67,25 @@ def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
     """
     options = read_options(argument, ("seed", "preset", *BOARDS), "emulator")
     board = next((name for name in BOARDS if name in options), DEFAULT)
-    settings = read_settings(options, skin, "emulator")
+    settings = read_settings(options, skin, "emulator").with_electrodes(skin.twin.electrodes)
+    own, thermal = own_of(skin, settings)
     return EmulatorTransport(
-        programs_of(board), TwinSkin.of(skin, settings), front_of(skin, settings, board)
+        programs_of(board),
+        TwinSkin.of(skin, settings),
+        front_of(skin, settings, board),
+        own,
+        thermal=thermal,
     )
 
 
 @contextmanager
 def emulate_board(skin: Skin, board: str = DEFAULT) -> Iterator[BoardProcess]:
     """A board on the skin at rest, for a host that opens its port itself; SourceError."""
-    settings = TwinSettings.preset(skin.twin.preset)
-    resistance = TwinSkin.of(skin, settings).resistance()
+    settings = TwinSettings.preset(skin.twin.preset).with_electrodes(skin.twin.electrodes)
+    resistance, (own, _) = TwinSkin.of(skin, settings).resistance(), own_of(skin, settings)
     with tempfile.TemporaryDirectory(prefix="tomoskin-") as folder:
-        memory = SkinMemory(Path(folder) / "skin", front_of(skin, settings, board), resistance)
+        front = front_of(skin, settings, board)
+        memory = SkinMemory(Path(folder) / "skin", front, resistance, own=own)
         process = BoardProcess(programs_of(board), memory.path, skin.current)
         try:
             yield process
@@ -114,6 +124,21 @@ def emulate_load(
 def programs_of(board: str) -> BoardPrograms:
     """Firmware and emulator of one of :data:`BOARDS`, built if need be; SourceError."""
     return BOARDS[board].build()
+
+
+def own_of(skin: Skin, settings: TwinSettings) -> tuple[OwnVoltages, ThermalVoltages]:
+    """What is read of electrodes and amplifiers themselves, and how their warmth wanders."""
+    electronics, n = settings.electronics, skin.n_electrodes
+    offsets, warmth = np.random.SeedSequence(settings.seed).spawn(2)
+    thermal = ThermalVoltages(n, electronics, warmth)
+    polarises = math.isfinite(electronics.double_layer)
+    own = OwnVoltages(
+        potentials=thermal.volts,
+        offsets=electronics.offset_sd * np.random.default_rng(offsets).standard_normal(n),
+        double_layer=electronics.double_layer if polarises else 0.0,
+        leak=electronics.leak,
+    )
+    return own, thermal
 
 
 def front_of(skin: Skin, settings: TwinSettings, board: str = DEFAULT) -> Front:

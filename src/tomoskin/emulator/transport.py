@@ -9,9 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tomoskin.core import SourceError
-from tomoskin.emulator.process import BoardProcess, BoardPrograms, Front, SkinMemory
+from tomoskin.emulator.process import BoardProcess, BoardPrograms, Front, OwnVoltages, SkinMemory
 from tomoskin.source import SerialTransport
-from tomoskin.twin import Contact, Pose, TwinSkin
+from tomoskin.twin import Contact, Pose, ThermalVoltages, TwinSkin
 
 _STEP = 0.01
 """Between two looks at the sheet, s."""
@@ -25,9 +25,15 @@ class EmulatorTransport:
         programs: BoardPrograms,
         sheet: TwinSkin,
         front: Front,
+        own: OwnVoltages | None = None,
+        *,
+        thermal: ThermalVoltages | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Power the board on; SourceError when it does not start."""
+        """Power the board on; SourceError when it does not start.
+
+        ``own``: without it, none; ``thermal`` takes the place of its potentials.
+        """
         self.name = "emulator"
         self.sheet = sheet
         self._clock = clock
@@ -35,7 +41,10 @@ class EmulatorTransport:
         self._closed = False
         self._folder = Path(tempfile.mkdtemp(prefix="tomoskin-"))
         self._written = sheet.resistance()
-        self._memory = SkinMemory(self._folder / "skin", front, self._written)
+        self._memory = SkinMemory(self._folder / "skin", front, self._written, own=own)
+        self._thermal = thermal
+        if thermal:
+            self._memory.write_potentials(thermal.volts)
         self._board: BoardProcess | None = None
         self._serial: SerialTransport | None = None
         try:
@@ -101,6 +110,9 @@ class EmulatorTransport:
         if self._closed or now - self._stood < _STEP:
             return
         self.sheet.advance(now - self._stood)
+        if self._thermal:
+            self._thermal.wander(now - self._stood)
+            self._memory.write_potentials(self._thermal.volts)
         self._stood = now
         resistance = self.sheet.resistance()
         if resistance is not self._written:

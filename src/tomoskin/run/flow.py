@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from tomoskin.core import DataError, Event, Frame
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
 from tomoskin.recording import BoardInfo, Mark, MarkedFrame, RawRead, Truth, advance
+from tomoskin.run.backlog import Backlog
 from tomoskin.run.counters import Latency, Losses
 from tomoskin.run.marker import Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
@@ -18,9 +19,6 @@ from tomoskin.run.twin_control import TwinControl, described
 from tomoskin.source import Link, ScanSettings, Transport
 from tomoskin.twin import Contact
 from tomoskin.wire import Info
-
-MOST_AT_ONCE = 16
-"""Where more frames than this wait, the oldest are skipped: a late picture helps nobody."""
 
 _STANDSTILL = frozenset({"silent", "fault", "reset"})
 """Events after which no frame comes until the board is well again."""
@@ -65,7 +63,7 @@ class Flow:
         self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered)
         self.latency = Latency()
         self._clock, self._turns = audience.clock, audience.turns
-        self._recall = Recall(audience.memory)
+        self._recall, self._backlog = Recall(audience.memory), Backlog()
         self._settings = ScanSettings.of(prepared.skin)
         self._losses, self._earlier, self._skipped = Losses(), Losses(), 0
         self._drops, self._polled, self._waited = 0, 0.0, 0.0
@@ -208,7 +206,7 @@ class Flow:
             self.out.wake()
 
     def _take_frames(self, frames: Sequence[Frame]) -> None:
-        late = len(frames) - MOST_AT_ONCE
+        late = self._backlog.late(len(frames), self._waited) if frames else 0
         for number, frame in enumerate(frames):
             mark = self.marker.mark(frame, late=number < late)
             if mark is not None:

@@ -3,6 +3,7 @@
 from typing import Any
 
 from tomoskin._moved import moved
+from tomoskin.source.agreement import BOARDS_SINCE
 from tomoskin.source.chopping import choose_periods, chop_limit
 from tomoskin.source.command_queue import FrameCounters, SequenceFilter
 from tomoskin.source.configuration import Configuration
@@ -21,6 +22,7 @@ from tomoskin.source.settings import (
 from tomoskin.source.transport import Played, Transport
 
 __all__ = [
+    "BOARDS_SINCE",
     "GROUP",
     "PRESCALERS",
     "Configuration",

@@ -7,6 +7,7 @@ from tomoskin.twin.contact import ContactSettings, Dented, Grid, solve_contact
 from tomoskin.twin.course import ScriptedBend, bent, bent_truth, pressed
 from tomoskin.twin.dent import Load, indent
 from tomoskin.twin.device import TwinDevice
+from tomoskin.twin.electrodes import ThermalVoltages
 from tomoskin.twin.electronics import TwinElectronics, convert
 from tomoskin.twin.faults import Disturbance, FaultEvent, Faults, disturbed, faults_at, reboots
 from tomoskin.twin.layered import Inclusion, Layered, Plate
@@ -78,6 +79,7 @@ __all__ = [
     "Step",
     "SteppedSkin",
     "Stretched",
+    "ThermalVoltages",
     "TwinDevice",
     "TwinElectronics",
     "TwinSettings",

@@ -17,6 +17,26 @@ from tomoskin.twin.circuit import ElectronicsSettings
 from tomoskin.twin.scanning import SampleTable
 
 
+class ThermalVoltages:
+    """The thermoelectric voltages of ``n`` contacts, which wander with their temperatures."""
+
+    def __init__(
+        self, n: int, settings: ElectronicsSettings, chance: np.random.SeedSequence
+    ) -> None:
+        """Begin anywhere, as ``chance`` has it."""
+        self._sd, self._time = settings.thermal_sd, settings.thermal_time
+        self._random = np.random.default_rng(chance)
+        self.volts: FloatArray = self._sd * self._random.standard_normal(n)
+
+    def wander(self, dt: float) -> None:
+        """Ornstein–Uhlenbeck, exact for any step (Gillespie 1996, eq. 2.47)."""
+        if self._sd == 0:
+            return
+        kept = math.exp(-dt / self._time)
+        fresh = self._random.standard_normal(len(self.volts))
+        self.volts = kept * self.volts + self._sd * math.sqrt(1 - kept**2) * fresh
+
+
 class Electrodes:
     """The ``n`` electrodes' own voltages from scan to scan."""
 
@@ -35,18 +55,17 @@ class Electrodes:
 
     def renew(self, chance: np.random.SeedSequence) -> None:
         """Discharge them; their temperatures begin anew from ``chance``."""
-        self._random = np.random.default_rng(chance)
         self._charged = np.zeros(self._n)
-        self._thermal = self._settings.thermal_sd * self._random.standard_normal(self._n)
+        self._thermal = ThermalVoltages(self._n, self._settings, chance)
         self._until: float | None = None
 
     def read(self, table: SampleTable, time: float) -> FloatArray:
         """(n_samples,) V that a scan begun at ``time`` s reads of them, against the sink's."""
         gap = 0.0 if self._until is None else max(0.0, time - self._until)
-        self._wander(gap + table.seconds)
+        self._thermal.wander(gap + table.seconds)
         self._charged = self._charged * math.exp(-gap / self._tau)
         self._until = time + table.seconds
-        own = np.tile(self._thermal, (len(table.channel), 1)) + self._charging(table)
+        own = np.tile(self._thermal.volts, (len(table.channel), 1)) + self._charging(table)
         each = np.arange(len(own))
         return np.asarray(own[each, table.channel] - own[each, table.sink])
 
@@ -67,12 +86,3 @@ class Electrodes:
             self._charged = end * rest
         aim, begun = limit[table.drive], start[table.drive]
         return np.asarray(aim + (begun - aim) * np.exp(-table.since / self._tau)[:, None])
-
-    def _wander(self, dt: float) -> None:
-        """Ornstein–Uhlenbeck, exact for any step (Gillespie 1996, eq. 2.47)."""
-        sd = self._settings.thermal_sd
-        if sd == 0:
-            return
-        kept = math.exp(-dt / self._settings.thermal_time)
-        fresh = self._random.standard_normal(self._n)
-        self._thermal = kept * self._thermal + sd * math.sqrt(1 - kept**2) * fresh
