@@ -144,6 +144,11 @@ class FrameWatch:
         return np.asarray(content * _SIGNS[self._sign] < 0)
 
     @property
+    def rises(self) -> bool:
+        """Whether the newest frame shows a change of the sign that touches do not have."""
+        return self._lifted is not None
+
+    @property
     def problem(self) -> str | None:
         """What of the newest frame no touch explains, in a sentence, or None."""
         if self._lifted is not None:
