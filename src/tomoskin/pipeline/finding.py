@@ -41,7 +41,7 @@ class Finder(Protocol):
 
     @property
     def rises(self) -> bool:
-        """Whether the newest frame shows a change of the sign that touches do not have."""
+        """Whether the newest frames show a change of the sign that touches do not have."""
         ...
 
     @property
