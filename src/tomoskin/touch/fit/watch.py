@@ -30,7 +30,7 @@ _LIFTED = 1.0
 """A press has been lifted, or the sheet been raised, where a change of the sign that touches do not
 have stands out by so many thresholds."""
 
-_CLEAR = 2.0
+_CLEAR = 1.5
 """Thresholds by which such a change stands out beside touches."""
 
 _ASTRAY = 1.0
