@@ -74,6 +74,15 @@ def test_a_reference_under_a_press_is_said_once_it_is_lifted(fitted):
     assert "take a new reference" in said(results)
 
 
+def test_a_reference_under_a_faint_press_follows_in_the_end(fitted):
+    run = Run(fitted, samples_of(fitted, pressed(fitted, 0.03, 0.02, loss=0.1)))
+    results = run.show(samples_of(fitted), 1300)
+    assert seen(results) == []
+    assert "a press was probably on the skin" in said(results[:20])
+    assert "a press was probably on the skin" in said(results[400:500])
+    assert said(results[-20:]) == ""
+
+
 @pytest.mark.parametrize("modes", ["projected", "kept"])
 def test_a_gain_that_doubles_is_no_touch(fitted, modes):
     skin = fitted.skin.altered({"signal": {"common_modes": modes}})

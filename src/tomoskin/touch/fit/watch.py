@@ -23,6 +23,9 @@ _YOUNG = 3
 """Frames of a touch in which what it does not explain is held for noise; later it is the error of
 its model."""
 
+_STANDS = 600
+"""Frames for which a change of the sign that touches do not have is no part of the idle skin."""
+
 _CHANCE = 6.0
 """Deviations by which the squares of a residual must be too many to be more noise."""
 
@@ -162,8 +165,11 @@ class FrameWatch:
 
     @property
     def rises(self) -> bool:
-        """Whether the newest frames show a change of the sign that touches do not have."""
-        return self._raised >= _YOUNG
+        """Whether the newest frames show a change of the sign that touches do not have.
+
+        Not where it stands for long: a faint press may have become part of the reference.
+        """
+        return _YOUNG <= self._raised < _STANDS
 
     @property
     def problem(self) -> str | None:
