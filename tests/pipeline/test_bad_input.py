@@ -74,6 +74,15 @@ def test_a_reference_under_a_press_is_said_once_it_is_lifted(fitted):
     assert "take a new reference" in said(results)
 
 
+def test_a_reference_under_a_faint_press_follows_in_the_end(fitted):
+    run = Run(fitted, samples_of(fitted, pressed(fitted, 0.03, 0.02, loss=0.1)))
+    results = run.show(samples_of(fitted), 1300)
+    assert seen(results) == []
+    assert "a press was probably on the skin" in said(results[:20])
+    assert "a press was probably on the skin" in said(results[400:500])
+    assert said(results[-20:]) == ""
+
+
 @pytest.mark.parametrize("modes", ["projected", "kept"])
 def test_a_gain_that_doubles_is_no_touch(fitted, modes):
     skin = fitted.skin.altered({"signal": {"common_modes": modes}})
@@ -135,3 +144,17 @@ def test_a_press_and_a_rise_at_once_are_one_touch(fitted, angle):
     (touch,) = results[-1].touches
     assert np.hypot(touch.detection.x - press.real, touch.detection.y - press.imag) < 0.008
     assert "a press was probably on the skin" in said(results)
+
+
+def test_nothing_is_left_where_a_rise_has_been(fitted):
+    """The reference does not follow it: else a touch would seem to be there once it ends."""
+    x, y = fitted.mesh.centroids.T
+    risen = np.exp(0.35 * np.exp(-((x - 0.03) ** 2 + (y - 0.02) ** 2) / 0.015**2))
+    run = Run(fitted, samples_of(fitted))
+    run.show(samples_of(fitted, pressed(fitted, -0.03, 0.02, loss=0.4)), 10)
+    run.show(samples_of(fitted), 20)  # what a release leaves fades within a second
+    results = run.show(samples_of(fitted, fitted.skin.conductivity * risen), 60)
+    results += run.show(samples_of(fitted), 40)
+    assert seen(results) == []
+    assert "a press was probably on the skin" in said(results[:60])
+    assert said(results[-10:]) == ""

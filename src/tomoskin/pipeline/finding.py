@@ -40,6 +40,11 @@ class Finder(Protocol):
         ...
 
     @property
+    def rises(self) -> bool:
+        """Whether the newest frames show a change of the sign that touches do not have."""
+        ...
+
+    @property
     def problem(self) -> str | None:
         """What is wrong with the newest frame, in a sentence, or None."""
         ...
@@ -52,7 +57,7 @@ Finding = Generator[None, None, Finder]
 class InImage:
     """Touches are regions of the picture."""
 
-    like_touch = False
+    like_touch = rises = False
     problem: str | None = None
 
     def __init__(self, prepared: Prepared) -> None:
@@ -112,6 +117,11 @@ class InData:
     def like_touch(self) -> bool:
         """See :class:`Finder`."""
         return self._spots.watch.like_touch
+
+    @property
+    def rises(self) -> bool:
+        """See :class:`Finder`."""
+        return self._spots.watch.rises
 
     @property
     def problem(self) -> str | None:

@@ -136,7 +136,8 @@ class Following:
         touches = self._tracker.update(detections, measured.time, measured.host_time)
         readings = self._read(view, detections, touched=bool(touches))
         untouched = not (detections or self._finder.like_touch)
-        self._learn(measured.time, touched=bool(touches), noise=untouched)
+        held = bool(touches) or self._finder.rises
+        self._learn(measured.time, touched=held, noise=untouched)
         return self._result(measured, conditioned, image, touches, readings)
 
     def _found(

@@ -146,6 +146,23 @@ def test_only_the_sign_that_counts() -> None:
     assert detection.peak > 0
 
 
+@pytest.mark.parametrize("first", [0, 6])
+def test_a_rise_beside_a_press_is_no_touch(first: int) -> None:
+    """Both at once, and the rise when the press has stood for so many frames."""
+    ours, pressed = finder(), press(-0.04, 0.02)
+    risen = np.concatenate([pressed, press(0.045, -0.01, depth=0.3)])
+    n = noise(16, first + 6, 12)
+    for k in range(first):
+        assert len(ours.push(data(pressed) + n[k], NOTHING)) == 1
+    for k in range(first, first + 6):
+        (detection,) = ours.push(data(risen) + n[k], NOTHING)
+        assert place(detection) == pytest.approx([-0.04, 0.02], abs=4e-3)
+        assert "near 4" in (ours.watch.problem or "")
+    assert ours.watch.rises
+    assert len(ours.push(data(pressed) + n[0], NOTHING)) == 1
+    assert not ours.watch.rises
+
+
 def test_no_more_than_asked_for() -> None:
     spots = np.concatenate([press(-0.05, 0.0), press(0.05, 0.0)])
     assert len(finder(max_touches=1).push(data(spots), NOTHING)) == 1

@@ -304,17 +304,25 @@ class SpotFinder:
         sign = self.watch.sign(problem, matched)
         if sign != problem.sign:
             problem = replace(problem, sign=sign)
-        detected = self._sought(problem, matched)
-        if self.watch.puzzled(problem, detected.fit, matched):
-            both = self._sought(replace(problem, sign="both"), matched)
+        least, pace = self._settings.snr, self._pace
+        selection = ForwardSelection(problem, matched, least, self._most, pace, self._deficit)
+        detected = search(selection, self._expected)
+        if self.watch.puzzled(problem, detected.fit):
+            both = self._anew(selection, len(detected.fit.spots) + 1)
             if self.watch.turns(both, detected.fit) and problem.favours(both.fit, detected.fit):
                 detected = both
         return detected, matched
 
-    def _sought(self, problem: Problem, matched: Matched) -> SpotDetections:
-        least, pace = self._settings.snr, self._pace
-        selection = ForwardSelection(problem, matched, least, self._most, pace, self._deficit)
-        return search(selection, self._expected)
+    def _anew(self, selection: ForwardSelection, most: int) -> SpotDetections:
+        """Touches of both signs, ``most`` of them, as if there had been none in the last frame."""
+        most = min(most, self._most)
+        pace = replace(self._pace, tries=most)
+        none = Deficit.none(len(self._deficit.change))
+        problem = replace(selection.problem, sign="both")
+        return search(
+            ForwardSelection(problem, selection.matched, selection.least, most, pace, none),
+            np.zeros((0, N_PARAMETERS)),
+        )
 
     def _left(self, seen: WhitenedTable) -> FloatArray:
         """(q, c) whitened directions of residual responses; those of the last frame where nothing

@@ -23,12 +23,24 @@ _YOUNG = 3
 """Frames of a touch in which what it does not explain is held for noise; later it is the error of
 its model."""
 
+_STANDS = 600
+"""Frames for which a change of the sign that touches do not have is no part of the idle skin."""
+
 _CHANCE = 6.0
 """Deviations by which the squares of a residual must be too many to be more noise."""
 
-_LIFTED = 2.0
+_LIFTED = 1.0
 """A press has been lifted, or the sheet been raised, where a change of the sign that touches do not
 have stands out by so many thresholds."""
+
+_CLEAR = 1.5
+"""Thresholds by which such a change stands out beside touches."""
+
+_ASTRAY = 1.0
+"""Squares of the threshold from which what touches leave of a frame is looked at for it."""
+
+_LOOKS = 4
+"""Frames in a row that are looked at so; later those whose number is a power of two."""
 
 _REMAINS = 0.5
 """Part of what touches of the skin's sign leave beyond noise that may still be left with both."""
@@ -65,8 +77,10 @@ class FrameWatch:
         self._usual = np.full(len(self.channels.names), np.inf)
         self._last: FloatArray | None = None
         self._lifted: FloatArray | None = None
+        self._raised = 0
         self._before = np.zeros((0, 4))
         self._age, self._times = 0, 1.0
+        self._in_vain, self._astray = 0, False
 
     def begin(self, data: FloatArray, gauge: Gauge) -> None:
         """Take the data (n_meas,) of a frame: what no touch can do to them is noise."""
@@ -92,23 +106,27 @@ class FrameWatch:
         away = self._is_wrong(content[best])
         return "both" if away and ratio[best] > _LIFTED * self._least else self._sign
 
-    def puzzled(self, problem: Problem, fit: Fit, matched: Matched) -> bool:
-        """Whether touches that begin leave so much of a frame unexplained that some of it may be
-        of the sign that they do not have: then there would seem to be touches all round."""
+    def puzzled(self, problem: Problem, fit: Fit) -> bool:
+        """Whether touches leave so much of a frame unexplained that some of it may be of the sign
+        that they do not have: then there would seem to be touches all round.
+
+        Where frame after frame is so, the second to fourth are looked at, and ever fewer later.
+        """
         if problem.sign == "both" or not len(fit.spots):
             return False
-        begins = len(fit.spots) > len(self._before) or self._age < _YOUNG
-        if not begins or fit.misfit - fit.degrees < (_LIFTED * self._least) ** 2:
+        if fit.misfit - fit.degrees < _ASTRAY * self._least**2:
             return False
-        ratio, content = matched.ratios(problem.solver, fit, "both")
-        best = int(ratio.argmax())
-        return bool(ratio[best] > self._least and self._is_wrong(content[best]))
+        self._astray = True
+        seen = self._in_vain
+        if not seen and problem.reach:  # as a rule it is a touch that began within the scan
+            return False
+        return seen < _LOOKS or seen.bit_count() == 1
 
     def turns(self, both: SpotDetections, fit: Fit) -> bool:
         """Whether touches of ``both`` signs explain what those of a ``fit`` leave: some clearly are
         not of the skin's sign, and little is left then. Where much is, more touches come."""
         wrong = self.wrong(both.fit.spots)
-        clear = bool((both.ratio[wrong] > _LIFTED * self._least).any())
+        clear = bool((both.ratio[wrong] > _CLEAR * self._least).any())
         left = both.fit.misfit - both.fit.degrees
         return clear and left < _REMAINS * (fit.misfit - fit.degrees)
 
@@ -127,9 +145,11 @@ class FrameWatch:
     def end(self, solver: Solver, fit: Fit, matched: Matched, times: float) -> None:
         """Take what a frame was explained with, in so many times the noise that was known."""
         self._before, self._times = fit.spots, times
+        self._in_vain, self._astray = self._in_vain + 1 if self._astray else 0, False
         self._age = self._age + 1 if len(fit.spots) else 0
         wrong = fit.spots[self.wrong(fit.spots)]
         self._lifted = wrong[np.abs(wrong[:, CONTENT]).argmax(), :2] if len(wrong) else None
+        self._raised = self._raised + 1 if len(wrong) else 0
         self.like_touch = bool(len(fit.spots))
         beyond = fit.misfit - fit.degrees
         if beyond > 0 and not self.like_touch:
@@ -142,6 +162,14 @@ class FrameWatch:
 
     def _is_wrong(self, content: FloatArray) -> NDArray[np.bool_]:
         return np.asarray(content * _SIGNS[self._sign] < 0)
+
+    @property
+    def rises(self) -> bool:
+        """Whether the newest frames show a change of the sign that touches do not have.
+
+        Not where it stands for long: a faint press may have become part of the reference.
+        """
+        return _YOUNG <= self._raised < _STANDS
 
     @property
     def problem(self) -> str | None:
