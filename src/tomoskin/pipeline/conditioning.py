@@ -136,6 +136,7 @@ class Followed:
     ) -> None:
         self._monitor, self._baseline, self._drift = monitor, baseline, drift
         self._scale = _scale(prepared, baseline.start)
+        self._has_gain = False
         self._health = health
         self._noise_for: tuple[object, float] = (None, np.nan)
         self._blocks, self._due = baseline.idle.blocks, 1
@@ -233,8 +234,11 @@ class Followed:
         if subspace.nuisance.count > MOST_NUISANCE * len(values):
             return Conditioned(None, n_excluded, health)
         times = _gain_of(values, mean, self._excluded)
+        self._has_gain = times is not None
         if times is not None and self._prepared.skin.signal.common_modes != "projected":
             return Conditioned(None, n_excluded, health, f"{_gain_text(times)}; no image is shown")
+        if times is not None:
+            values = values / times  # touches and noise are then as large as they were learnt
         dv = subspace.nuisance(difference(values, mean, self._prepared.operator.difference))
         differences = Differences(
             dv=dv,
@@ -252,7 +256,7 @@ class Followed:
     ) -> Learnt:
         """See :class:`Conditioning`."""
         health, baseline = self._health, self._baseline
-        if health is None:
+        if health is None or self._has_gain:  # another gain is nothing that the skin does
             return Learnt(image=False, touches=False)
         values = self._values if isinstance(moved, float) else self._values - moved
         if baseline.push(values, self._excluded, time, touched=touched, noise=noise):
