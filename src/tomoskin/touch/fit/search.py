@@ -12,10 +12,6 @@ from tomoskin.touch.fit.refine import Fit
 from tomoskin.touch.fit.selection import ForwardSelection
 from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
 
-_WIDE = 1.2
-"""Deviations of the prior by which a spot is so wide: one of 250 fingers, and one of eight fits of
-two that were found as one (moving plant, seeds 1 to 3)."""
-
 _DOUBTFUL = 0.8
 """Part of the ratio at which a touch begins; above it, another touch beside one is possible."""
 
@@ -79,15 +75,13 @@ def _judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
 
 
 def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:
-    """Where a spot is as wide as fingers side by side, or a candidate within a radius of it stands
-    out nearly enough."""
-    wide = np.asarray(selection.problem.prior.away(fit.spots)[:, LOG_RADIUS] > _WIDE)
+    """Where a candidate within a radius of a spot stands out nearly enough."""
     ratio, _ = selection.standing_out(fit)
     doubtful = selection.matched.spots[ratio > selection.threshold(fit, _DOUBTFUL), :2]
     if not len(doubtful):
-        return wide
+        return np.zeros(len(fit.spots), dtype=bool)
     apart = np.linalg.norm(fit.spots[:, None, :2] - doubtful, axis=2).min(axis=1)
-    return np.asarray(wide | (apart < 2 * np.exp(fit.spots[:, LOG_RADIUS])))
+    return np.asarray(apart < 2 * np.exp(fit.spots[:, LOG_RADIUS]))
 
 
 def joined(detected: SpotDetections) -> SpotDetections:
