@@ -86,8 +86,8 @@ def pressed(twin: SteppedSkin) -> FloatArray:
             time = twin.period * (len(rows) + 1)
             touches = twin.step((Press(*SPOT, force, RADIUS),)).touches
             weighed = touches[0].detection.force if len(touches) == 1 else None
-            told = (weighed.newtons, weighed.low, weighed.high) if weighed else (np.nan,) * 3
-            rows.append((time, force, *told))
+            estimate = (weighed.newtons, weighed.low, weighed.high) if weighed else (np.nan,) * 3
+            rows.append((time, force, *estimate))
     return np.array(rows)
 
 
@@ -133,7 +133,7 @@ def drawn(loop: FloatArray, slides: Sequence[FloatArray]) -> Figure:
     time, true, newtons, low, high = loop.T
     left, right = axes[0]
     left.fill_between(time, low, high, color=figures.PALE, alpha=0.4, linewidth=0, label="90 %")
-    left.plot(time, newtons, ".-", color=figures.BLUE, markersize=3, label="told")
+    left.plot(time, newtons, ".-", color=figures.BLUE, markersize=3, label="estimate")
     left.step(time, true, color="0.1", linewidth=0.9, linestyle="--", where="mid", label="true")
     left.set(xlabel="time / s", ylabel="force / N", title="loading and unloading")
     left.set_ylim(0, 1.6 * true.max())
