@@ -48,6 +48,9 @@ def pressed(
     )
 
 
+_REMARKED = 53
+
+
 @settings(max_examples=5)
 @given(wirings, st.integers(0, 99))
 def test_five_presses_tell_any_scramble(wiring: ChannelMapping, seed: int) -> None:
@@ -56,8 +59,8 @@ def test_five_presses_tell_any_scramble(wiring: ChannelMapping, seed: int) -> No
     assert found.sure
     assert found.mapping == wiring
     assert found.odds > 19
-    # a sound press is remarked on by chance once in 500: seed 53 of this wiring and seeds 0 to 99
-    assert len(found.contradicted) <= 1
+    # of the 500 sound presses of these seeds, one is remarked on with some wirings
+    assert len(found.contradicted) <= (seed == _REMARKED)
 
 
 def test_one_press_in_the_middle_tells_nothing() -> None:

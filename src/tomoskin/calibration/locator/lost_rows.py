@@ -21,8 +21,8 @@ _MOST = 0.8
 def without(locator: Locator, rows: IntArray) -> Locator:
     """Locator that has learnt from the same presses without some ``rows`` of the pattern.
 
-    What frames that lack them are told by, other than from values that are filled in. Raises
-    DataError where no other row says anything.
+    It locates frames that lack these rows, without values that are filled in. Raises DataError
+    where no other row says anything.
     """
     dv = locator.presses.dv.copy()
     dv[:, rows] = np.nan
