@@ -221,6 +221,14 @@ def conduct(
     logarithm.
     """
 
+def converted(
+    volts: NDArray[np.float64], chance: NDArray[np.float64], numbers: tuple[float, ...]
+) -> NDArray[np.uint16]:
+    """Summed codes (m,) of potentials, (m,) or (k, m) V, with standard normal numbers (k, m).
+
+    ``numbers``: gain, offset, low and high rail, codes per volt, number of codes, bow, noise.
+    """
+
 def dented(
     x: NDArray[np.float64],
     y: NDArray[np.float64],

@@ -16,7 +16,7 @@ use crate::product::Rows;
 use crate::scalar::{Scalar, c64};
 use crate::spot_match_python::{standing, standing_out};
 use crate::spot_python::{SeenTable, SpotTable};
-use crate::twin_python::{Terminals, conduct, dented, lines, remember};
+use crate::twin_python::{Terminals, conduct, converted, dented, lines, remember};
 use crate::{factor, jacobian, product, solve, symbolic, threads};
 
 #[pyclass(frozen, module = "tomoskin_core")]
@@ -275,6 +275,7 @@ fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     #[cfg(feature = "reference")]
     module.add_class::<crate::reference::Reference>()?;
     module.add_function(wrap_pyfunction!(jacobian_rows, module)?)?;
+    module.add_function(wrap_pyfunction!(converted, module)?)?;
     module.add_function(wrap_pyfunction!(dented, module)?)?;
     module.add_function(wrap_pyfunction!(conduct, module)?)?;
     module.add_function(wrap_pyfunction!(lines, module)?)?;

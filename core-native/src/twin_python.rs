@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use ndarray::IxDyn;
 use numpy::{Ix1, Ix2, Ix3, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pulp::Arch;
 use pyo3::prelude::*;
 
 use crate::arrays::{Any, array, contiguous, invalid, same, unsigned};
-use crate::circuit::Circuit;
+use crate::circuit::{Circuit, Converter};
 use crate::conduction::{self, Cause, GROUPS, LOADS, Material, Memory, Past, Present};
 use crate::dent::{self, Dent, PARTS};
 use crate::python::pairs;
@@ -264,6 +265,41 @@ pub(crate) fn lines<'py>(
         &drives,
         out.readwrite().as_slice_mut()?,
     );
+    Ok(out)
+}
+
+/// Summed codes (m,) of potentials, (m,) or (k, m), with standard normal numbers (k, m).
+///
+/// `numbers`: gain, offset, low and high rail, codes per volt, number of codes, bow, noise.
+#[pyfunction]
+pub(crate) fn converted<'py>(
+    volts: &Any<'py>,
+    chance: &Any<'py>,
+    numbers: [f64; 8],
+) -> PyResult<Bound<'py, PyArray1<u16>>> {
+    let py = volts.py();
+    let (volts, chance) = (
+        array::<f64, IxDyn>("volts", volts)?,
+        array::<f64, Ix2>("chance", chance)?,
+    );
+    let n = chance.shape()[1];
+    let each = if volts.len() == n { n } else { chance.len() };
+    same("number of volts", each, volts.len())?;
+    let [gain, offset, low, high, scale, levels, bow, noise] = numbers;
+    let converter = Converter {
+        gain,
+        offset,
+        rails: [low, high],
+        scale,
+        levels,
+        bow,
+        noise,
+    };
+    let out = PyArray1::<u16>::zeros(py, n, false);
+    if n > 0 {
+        let (volts, chance) = (contiguous("volts", &volts)?, contiguous("chance", &chance)?);
+        converter.sums(volts, chance, out.readwrite().as_slice_mut()?);
+    }
     Ok(out)
 }
 

@@ -66,7 +66,7 @@ class Terminals:
         """The native layout, for what cells conduct (components, k, k, n_cells) of so many axes."""
         assembly, core = self._model.assembly, self._model.engine.core
         if core is None:
-            raise AssertionError("asked for with an engine only")
+            raise AssertionError("the layout needs the native engine")
         i, j = np.array(list(combinations(range(forms.shape[1]), 2))).T
         return core.Terminals(
             assembly.indptr,
