@@ -1,5 +1,6 @@
 """Sparse Cholesky factors and Jacobian rows for tomoskin."""
 
+from collections.abc import Sequence
 from typing import Any, final
 
 import numpy as np
@@ -173,6 +174,94 @@ Fitted = tuple[
 """Spots (k, 4), each (k, c), slopes (4k, c), unknown (q, c), normal (4k, 4k); predicted (c,),
 residual (c,), gradient (4k,); misfit, log_size, cost, settled: see
 tomoskin.touch.fit.refine.Fit."""
+
+@final
+class Terminals:
+    """The transfer resistance between a network's last nodes, again and again."""
+
+    def __new__(
+        cls,
+        indptr: NDArray[np.int32],
+        indices: NDArray[np.int32],
+        contacts: NDArray[np.float64],
+        position: NDArray[np.int32],
+        forms: NDArray[np.float64],
+        axes: int,
+        last: NDArray[np.int32],
+    ) -> Terminals:
+        """Lay out a system matrix whose rows ``last`` (t,) are eliminated last.
+
+        ``contacts`` (n_values,): what it has beside the cells; ``position`` (n, k, k): which value
+        each entry of a cell's matrix adds to; ``forms`` (components, pairs, n): what a cell
+        conducts between each pair of its nodes, for each component of a tensor of so many ``axes``
+        on and above its diagonal.
+        """
+
+    def resistance(self, conductivity: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(t + 1, t + 1) Ω between them and the ground, last, for (axes, axes, n) S.
+
+        Rows and columns sum to zero.
+
+        Raises
+        ------
+        ValueError
+            When a pivot is not positive, or a terminal's has lost nine digits.
+        """
+
+def conduct(
+    causes: Sequence[NDArray[np.float64]],
+    numbers: tuple[float, ...],
+    creep: Sequence[float],
+    breakdown: Sequence[float],
+) -> NDArray[np.float64]:
+    """Conductivity of cells (1, n) S, or xx, xy, yx, yy (4, n) where directions differ.
+
+    ``causes``, each flat: prompt, late and broken parts of the load, wear, conductivity without
+    load. ``numbers``: gauge, the same across, compression, wear, heat, largest compression and
+    logarithm.
+    """
+
+def converted(
+    volts: NDArray[np.float64], chance: NDArray[np.float64], numbers: tuple[float, ...]
+) -> NDArray[np.uint16]:
+    """Summed codes (m,) of potentials, (m,) or (k, m) V, with standard normal numbers (k, m).
+
+    ``numbers``: gain, offset, low and high rail, codes per volt, number of codes, bow, noise.
+    """
+
+def dented(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    dents: Sequence[tuple[object, ...]],
+) -> NDArray[np.float64]:
+    """Depth, and strain xx, yy, xy (4, m) of dents together at points x, y (m,).
+
+    A dent: its table (n·n, 4), its (n, step, reach), and (x, y, cosine, sine) of its probe.
+    """
+
+def lines(
+    resistance: NDArray[np.float64],
+    drives: NDArray[np.int64],
+    contact: NDArray[np.float64],
+    numbers: tuple[float, ...],
+) -> NDArray[np.float64]:
+    """What amplifiers see (n_drives, n) V of a sheet with ``resistance`` (n, n), nothing broken.
+
+    ``contact`` (n,) Ω: what each contact has more. ``numbers``: current, resistance and compliance
+    of its source, resistance of a switch, parts of the common mode and of a neighbour.
+    """
+
+def remember(
+    load: NDArray[np.float64],
+    past: Sequence[NDArray[np.float64]],
+    play: Sequence[tuple[float, float]],
+    kept: Sequence[Sequence[float]],
+) -> list[NDArray[np.float64]]:
+    """Lagging, prompt, late and broken parts of a ``load`` (4, n) after a step, and wear, flat.
+
+    ``past``, each flat: the load before, lagging, late and broken parts, wear (or nothing).
+    ``play``: parts and half widths; ``kept``: of late parts, and of breakdowns.
+    """
 
 @final
 class SpotTable:

@@ -18,25 +18,27 @@ struct Node {
 }
 
 /// What a panel takes in a factor and a solve, in the time of one multiplication in a tile.
-fn cost(width: usize, below: usize) -> f64 {
+fn cost(width: usize, below: usize, entry: f64) -> f64 {
     let (width, below) = (width as f64, below as f64);
     let height = width + below;
     let multiplications = width * height * height / 2.0;
-    PANEL + ENTRY * width * height + SQUARE * below * below + multiplications
+    PANEL + entry * width * height + SQUARE * below * below + multiplications
 }
 
 /// Loops that begin and end, whatever their length.
 const PANEL: f64 = 3000.0;
 /// A value is cleared, gathered, written and read by two substitutions.
-const ENTRY: f64 = 80.0;
+pub const ENTRY: f64 = 80.0;
+/// The same without substitutions, nor a factor that is kept.
+pub const PASSING: f64 = 20.0;
 /// Half of the square below is cleared, handed on and added to the parent.
 const SQUARE: f64 = 20.0;
 
 /// The columns in an order that fills in the same, and the first column of each panel, then the size.
 ///
 /// The columns are given in postorder: for each, its parent in the elimination tree, and the number
-/// of its entries in the factor.
-pub fn amalgamated(parent: &[u32], counts: &[u32]) -> (Vec<u32>, Vec<u32>) {
+/// of its entries in the factor. `entry`: what each of these takes.
+pub fn amalgamated(parent: &[u32], counts: &[u32], entry: f64) -> (Vec<u32>, Vec<u32>) {
     let starts = runs(parent, counts);
     let mut run_of = vec![0; parent.len()];
     for (number, ends) in (0..).zip(starts.windows(2)) {
@@ -57,6 +59,7 @@ pub fn amalgamated(parent: &[u32], counts: &[u32]) -> (Vec<u32>, Vec<u32>) {
             &mut node,
             std::mem::take(&mut waiting[number as usize]),
             &mut nodes,
+            entry,
         );
         nodes.push(node);
         match parent[last] {
@@ -76,14 +79,14 @@ fn runs(parent: &[u32], counts: &[u32]) -> Vec<u32> {
 }
 
 /// Gives a panel its children, or what they are made of where that costs less.
-fn take_in(node: &mut Node, mut children: Vec<u32>, nodes: &mut [Node]) {
+fn take_in(node: &mut Node, mut children: Vec<u32>, nodes: &mut [Node], entry: f64) {
     // those with most in common first
     children.sort_by_key(|&child| std::cmp::Reverse(nodes[child as usize].below));
     for number in children {
         let child = &nodes[number as usize];
         let width = node.width + child.width;
-        let apart = cost(node.width, node.below) + cost(child.width, child.below);
-        if cost(width, node.below) > apart {
+        let apart = cost(node.width, node.below, entry) + cost(child.width, child.below, entry);
+        if cost(width, node.below, entry) > apart {
             node.children.push(number);
             continue;
         }

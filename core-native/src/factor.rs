@@ -44,14 +44,7 @@ impl<T: Scalar> Factor<T> {
             let expected = symbolic.n_values();
             return Err(format!("expected {expected} values, got {}", values.len()));
         }
-        let elimination = Elimination {
-            symbolic: &symbolic,
-            values,
-        };
-        let values = run(arch, elimination).map_err(|column| {
-            let row = symbolic.order()[column];
-            format!("the matrix is not positive definite: pivot of row {row}")
-        })?;
+        let values = eliminated(arch, &symbolic, values, 0)?;
         Ok(Self {
             arch,
             symbolic,
@@ -78,9 +71,35 @@ impl<T: Scalar> Factor<T> {
     }
 }
 
+/// The factor's values of the panels from `first` on, for the matrix with these values.
+///
+/// # Errors
+/// When the real part of the matrix is not positive definite.
+///
+/// # Panics
+/// When there are fewer values than the structure has.
+pub(crate) fn eliminated<T: Scalar>(
+    arch: Arch,
+    symbolic: &Symbolic,
+    values: &[T],
+    first: usize,
+) -> Result<Vec<T>, String> {
+    let elimination = Elimination {
+        symbolic,
+        values,
+        first,
+    };
+    run(arch, elimination).map_err(|column| {
+        let row = symbolic.order()[column];
+        format!("the matrix is not positive definite: pivot of row {row}")
+    })
+}
+
 struct Elimination<'a, T> {
     symbolic: &'a Symbolic,
     values: &'a [T],
+    /// The first panel whose values are kept.
+    first: usize,
 }
 
 impl<T: Scalar> WithSimd for Elimination<'_, T> {
@@ -93,7 +112,8 @@ impl<T: Scalar> WithSimd for Elimination<'_, T> {
         let mut memory = vec![T::ZERO; columns_len + squares_len + LINE];
         let begin = memory.as_ptr().align_offset(LINE).min(LINE);
         let (columns, squares) = memory[begin..].split_at_mut(columns_len);
-        let mut factor = Vec::with_capacity(symbolic.factor_len() + ROWS);
+        let omitted = symbolic.panel(self.first).first_value;
+        let mut factor = Vec::with_capacity(symbolic.factor_len() - omitted + ROWS);
         let mut end = 0;
         for number in 0..symbolic.n_panels() {
             let panel = symbolic.panel(number);
@@ -115,12 +135,14 @@ impl<T: Scalar> WithSimd for Elimination<'_, T> {
             }
             eliminate(simd, columns, shape).map_err(|j| panel.start + j)?;
             subtract_square(simd, square, columns, shape);
-            factor.resize(panel.values().end + ROWS, T::ZERO);
-            pack(columns, shape, &mut factor[panel.first_value..]);
+            if number >= self.first {
+                factor.resize(panel.values().end - omitted + ROWS, T::ZERO);
+                pack(columns, shape, &mut factor[panel.first_value - omitted..]);
+            }
             squares.copy_within(end..end + shape.square_len(), start);
             end = start + shape.square_len();
         }
-        factor.truncate(symbolic.factor_len());
+        factor.truncate(symbolic.factor_len() - omitted);
         Ok(factor)
     }
 }

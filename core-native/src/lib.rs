@@ -1,11 +1,15 @@
 //! Sparse Cholesky factors and Jacobian rows for tomoskin.
 
+mod abreast;
 mod amalgamation;
 #[cfg(feature = "python")]
 mod arrays;
 #[cfg(target_arch = "x86_64")]
 mod assembly;
+pub mod circuit;
+pub mod conduction;
 pub mod dense;
+pub mod dent;
 pub mod factor;
 pub mod instructions;
 pub mod jacobian;
@@ -36,5 +40,8 @@ mod spot_python;
 pub mod spot_search;
 pub mod spot_table;
 pub mod symbolic;
+pub mod terminals;
 pub mod threads;
 pub mod tiles;
+#[cfg(feature = "python")]
+mod twin_python;

@@ -7,6 +7,7 @@ use feral_amd::amd_order;
 use feral_metis::metis_order;
 use feral_ordering_core::{CscPattern, OrderingError};
 
+use crate::amalgamation::{ENTRY, PASSING};
 use crate::panels::{Panels, Structure};
 
 /// Multiplications per unknown in a factorisation from which nested dissection is tried: sheets of
@@ -14,48 +15,76 @@ use crate::panels::{Panels, Structure};
 /// 10 on a million triangles, win back.
 const COSTLY: f64 = 2000.0;
 
-/// Orders and analyses the structure of a symmetric matrix given in full, by columns.
+/// Orders and analyses the structure of a symmetric matrix given in full, by columns; the unknowns
+/// `last` come at the end. Where there are some, the matrix is factorised again and again for these
+/// alone, and nested dissection is tried at any size: a sheet of 3,000 triangles takes a tenth less.
 ///
 /// # Errors
 /// When the arrays are no such structure, or the factor is too large to index.
-pub fn analyse(size: usize, column_starts: &[u32], rows: &[u32]) -> Result<Panels, String> {
+pub fn analyse(
+    size: usize,
+    column_starts: &[u32],
+    rows: &[u32],
+    last: &[u32],
+) -> Result<Panels, String> {
     check(size, column_starts, rows)?;
     let matrix = Structure {
         starts: column_starts,
         rows,
     };
-    let order = ordered(matrix, amd_order)
+    let order = ordered(matrix, last, amd_order)
         .ok_or_else(|| "the structure has too many entries to order".to_owned())?;
-    let panels = Panels::new(matrix, &order);
-    if panels.multiplications() < COSTLY * size as f64 {
+    let whole = last.is_empty();
+    let entry = if whole { ENTRY } else { PASSING };
+    let panels = Panels::new(matrix, &order, entry);
+    if whole && panels.multiplications() < COSTLY * size as f64 {
         return Ok(panels);
     }
-    let Some(order) = ordered(matrix, metis_order) else {
+    let Some(order) = ordered(matrix, last, metis_order) else {
         return Ok(panels);
     };
-    let dissected = Panels::new(matrix, &order);
+    let dissected = Panels::new(matrix, &order, entry);
     let pays = dissected.multiplications() < panels.multiplications();
     Ok(if pays { dissected } else { panels })
 }
 
-/// The order that `method` finds; `None` where it is not one of all unknowns.
+/// The order that `method` finds, the unknowns `last` at its end; `None` where it is not one of all
+/// unknowns.
 fn ordered(
     matrix: Structure<'_>,
+    last: &[u32],
     method: impl Fn(&CscPattern<'_>) -> Result<Vec<i32>, OrderingError>,
 ) -> Option<Vec<u32>> {
-    let signed = |part: &[u32]| {
-        part.iter()
-            .map(|&v| i32::try_from(v).ok())
-            .collect::<Option<Vec<i32>>>()
-    };
-    let (size, starts, rows) = (matrix.size(), signed(matrix.starts)?, signed(matrix.rows)?);
-    let order = method(&CscPattern::new(size, &starts, &rows)?).ok()?;
+    let size = matrix.size();
+    let mut place = vec![Some(0); size];
+    for &row in last {
+        *place.get_mut(row as usize)? = None;
+    }
+    let mut first = Vec::with_capacity(size);
+    for (row, place) in (0..).zip(&mut place) {
+        if let Some(place) = place {
+            *place = i32::try_from(first.len()).ok()?;
+            first.push(row);
+        }
+    }
+    let (mut starts, mut rows) = (vec![0], Vec::with_capacity(matrix.rows.len()));
+    for &column in &first {
+        let kept = matrix.column(column).iter();
+        rows.extend(kept.filter_map(|&row| place[row as usize]));
+        starts.push(i32::try_from(rows.len()).ok()?);
+    }
+    let found = method(&CscPattern::new(first.len(), &starts, &rows)?).ok()?;
+    let mut order = Vec::with_capacity(size);
+    for number in found {
+        order.push(*first.get(usize::try_from(number).ok()?)?);
+    }
+    order.extend(last);
     let mut seen = vec![false; size];
     for &old in &order {
-        *seen.get_mut(usize::try_from(old).ok()?)? = true;
+        seen[old as usize] = true;
     }
     let whole = order.len() == size && seen.iter().all(|&seen| seen);
-    whole.then(|| order.iter().map(|&old| old.cast_unsigned()).collect())
+    whole.then_some(order)
 }
 
 /// Checks that the arrays hold the whole structure of a symmetric matrix, rows ascending.

@@ -41,8 +41,9 @@ pub struct Panels {
 }
 
 impl Panels {
-    /// The panels of the factor in this order of the rows, or in one that fills in the same.
-    pub fn new(matrix: Structure<'_>, order: &[u32]) -> Self {
+    /// The panels of the factor in this order of the rows, or in one that fills in the same, where an
+    /// entry takes the time of so many multiplications beside its own.
+    pub fn new(matrix: Structure<'_>, order: &[u32], entry: f64) -> Self {
         let tree = elimination_tree(matrix, order);
         let post = postorder(&tree);
         let place = inverse(&post);
@@ -57,7 +58,7 @@ impl Panels {
             starts: &column_starts,
             rows: &rows,
         };
-        let (merged, starts) = amalgamated(&tree, &column_counts(lower, &tree));
+        let (merged, starts) = amalgamated(&tree, &column_counts(lower, &tree), entry);
         let order: Vec<u32> = merged.iter().map(|&old| order[old as usize]).collect();
         let (column_starts, rows) = self::lower(matrix, &order);
         let lower = Structure {

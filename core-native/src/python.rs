@@ -16,6 +16,7 @@ use crate::product::Rows;
 use crate::scalar::{Scalar, c64};
 use crate::spot_match_python::{standing, standing_out};
 use crate::spot_python::{SeenTable, SpotTable};
+use crate::twin_python::{Terminals, conduct, converted, dented, lines, remember};
 use crate::{factor, jacobian, product, solve, symbolic, threads};
 
 #[pyclass(frozen, module = "tomoskin_core")]
@@ -209,7 +210,7 @@ fn jacobian_rows<'py>(
 }
 
 /// Pairs of electrodes; a negative number becomes one that is too large.
-fn pairs(name: &str, value: &Any<'_>) -> PyResult<Vec<[usize; 2]>> {
+pub(crate) fn pairs(name: &str, value: &Any<'_>) -> PyResult<Vec<[usize; 2]>> {
     let table = array::<i64, Ix2>(name, value)?;
     same(&format!("columns of {name}"), 2, table.shape()[1])?;
     let table = table.as_array();
@@ -257,7 +258,7 @@ fn keep_freed_memory() {
 
 /// Number of what `tomoskin_core.pyi` says: raised with each change of it, so that tomoskin does
 /// not call an engine that was built for other arguments.
-const INTERFACE: u32 = 2;
+const INTERFACE: u32 = 3;
 
 #[pymodule]
 fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -269,10 +270,16 @@ fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Factor>()?;
     module.add_class::<Patches>()?;
     module.add_class::<SpotTable>()?;
+    module.add_class::<Terminals>()?;
     module.add_class::<SeenTable>()?;
     #[cfg(feature = "reference")]
     module.add_class::<crate::reference::Reference>()?;
     module.add_function(wrap_pyfunction!(jacobian_rows, module)?)?;
+    module.add_function(wrap_pyfunction!(converted, module)?)?;
+    module.add_function(wrap_pyfunction!(dented, module)?)?;
+    module.add_function(wrap_pyfunction!(conduct, module)?)?;
+    module.add_function(wrap_pyfunction!(lines, module)?)?;
+    module.add_function(wrap_pyfunction!(remember, module)?)?;
     module.add_function(wrap_pyfunction!(standing, module)?)?;
     module.add_function(wrap_pyfunction!(standing_out, module)?)?;
     module.add_function(wrap_pyfunction!(transposed_product, module)?)

@@ -85,7 +85,20 @@ impl Symbolic {
     /// # Errors
     /// When the arrays are no such structure, or the factor is too large to index.
     pub fn new(size: usize, column_starts: &[u32], rows: &[u32]) -> Result<Self, String> {
-        let mut symbolic = Self::of_panels(analyse(size, column_starts, rows)?);
+        Self::ending(size, column_starts, rows, &[])
+    }
+
+    /// The same, with the rows `last` eliminated after all others.
+    ///
+    /// # Errors
+    /// As above.
+    pub fn ending(
+        size: usize,
+        column_starts: &[u32],
+        rows: &[u32],
+        last: &[u32],
+    ) -> Result<Self, String> {
+        let mut symbolic = Self::of_panels(analyse(size, column_starts, rows, last)?);
         (symbolic.column_starts, symbolic.rows) = (column_starts.to_vec(), rows.to_vec());
         symbolic.link_panels();
         (symbolic.scatter, symbolic.scatter_starts) = symbolic.scatter_of()?;

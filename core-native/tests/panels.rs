@@ -69,7 +69,7 @@ fn panels_hold_the_factor_and_few_zeros() {
 }
 
 fn check(matrix: Structure<'_>, order: &[u32], side: usize) {
-    let panels = Panels::new(matrix, order);
+    let panels = Panels::new(matrix, order, 80.0);
     let mut sorted = panels.order.clone();
     sorted.sort_unstable();
     assert!(sorted.iter().copied().eq(0..matrix.size() as u32));

@@ -13,7 +13,7 @@ import pytest
 import shapes
 from conftest import NO_ENGINE, ROOT
 from tomoskin.core import ModelError
-from tomoskin.forward import ForwardModel, choose_engine, engine_choice, native
+from tomoskin.forward import ForwardModel, State, Terminals, choose_engine, engine_choice, native
 from tomoskin.mesh import Mesh
 from tomoskin.pattern import Pattern
 
@@ -96,6 +96,40 @@ def test_the_engines_agree_on_tensors_and_local_updates(monkeypatch: pytest.Monk
     assert_same(*(model.at(1.0).local.voltages_of(touches) for model in both))
 
 
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("made", [sheet, body])
+def test_the_electrodes_alone_see_what_the_whole_solve_says(
+    monkeypatch: pytest.MonkeyPatch, made: Any, order: int
+) -> None:
+    mesh, pattern = made()
+    both = models(monkeypatch, mesh, pattern, contact_impedance=2e-3, order=order)
+    random = np.random.default_rng(31)
+    axes = mesh.points.shape[1]
+    part = random.standard_normal((len(mesh.cells), axes, axes))
+    tensor = np.eye(axes) + part @ part.swapaxes(1, 2)
+    for conductivity in (random.uniform(0.1, 9.0, len(mesh.cells)), tensor):
+        for model in both:
+            exact = State(model, conductivity).transfer_resistance
+            found = Terminals(model).transfer_resistance(conductivity)
+            assert np.abs(found - exact).max() < TOLERANCE * np.abs(exact).max()
+
+
+def test_the_electrodes_alone_refuse_what_is_singular(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, pattern = sheet()
+    for contact, value in ((1e-3, 0.0), (1e-3, np.nan), (1e-15, 1.0)):
+        model = models(monkeypatch, mesh, pattern, contact_impedance=contact)[0]
+        with pytest.raises(ModelError, match="singular"):
+            Terminals(model).transfer_resistance(np.full(len(mesh.cells), value))
+
+
+def test_the_electrodes_alone_have_complex_contacts(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, pattern = sheet()
+    model = models(monkeypatch, mesh, pattern, contact_impedance=1e-3 - 1e-4j)[0]
+    even = np.ones(len(mesh.cells))
+    exact = State(model, even).transfer_resistance
+    assert Terminals(model).transfer_resistance(even) == pytest.approx(exact)
+
+
 def test_a_system_that_is_singular_to_rounding_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh, pattern = sheet()
     sigma = np.where(np.arange(len(mesh.cells)) % 2, 1e-180, 1e180)
@@ -149,8 +183,8 @@ def test_a_change_of_the_interface_raises_its_number() -> None:
     stub = (ROOT / "core-native" / "tomoskin_core.pyi").read_text(encoding="utf-8")
     signatures = ast.unparse(_without_docs(ast.parse(stub)))
     assert (native.INTERFACE, hashlib.sha256(signatures.encode()).hexdigest()[:8]) == (
-        2,
-        "79b7f9e5",
+        3,
+        "3d1aa79c",
     )
 
 

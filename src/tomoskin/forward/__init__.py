@@ -4,5 +4,6 @@ from tomoskin.forward.engine import Engine
 from tomoskin.forward.engine_choice import choose_engine
 from tomoskin.forward.model import ForwardModel, State
 from tomoskin.forward.solution import Solution
+from tomoskin.forward.terminals import Terminals
 
-__all__ = ["Engine", "ForwardModel", "Solution", "State", "choose_engine"]
+__all__ = ["Engine", "ForwardModel", "Solution", "State", "Terminals", "choose_engine"]

@@ -193,6 +193,12 @@ class MemoryState:
         return self.load, self.lagging, self.prompt, self.late, self.broken
 
 
+def check_step(dt: float) -> None:
+    """Raise ModelError unless ``dt`` s is a step of time."""
+    if not 0 <= dt < math.inf:
+        raise ModelError(f"expected a time step of 0 s or more, got {dt}", where=_WHERE)
+
+
 def advanced(
     state: MemoryState,
     memory: MaterialMemory,
@@ -209,8 +215,7 @@ def advanced(
     ModelError
         When dt is negative or not finite.
     """
-    if not 0 <= dt < math.inf:
-        raise ModelError(f"expected a time step of 0 s or more, got {dt}", where=_WHERE)
+    check_step(dt)
     lagging, prompt, late, broken = state.lagging, load, state.late, state.broken
     if memory.play:
         lagging = metric.dragged(lagging, load, memory.half_widths)

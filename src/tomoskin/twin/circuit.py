@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
+from tomoskin.forward import choose_engine
 from tomoskin.twin.faults import Faults
 from tomoskin.twin.parameters import check_numbers, parameter
 
@@ -113,6 +114,18 @@ def line_potentials(
     contact
         (n,) Ω that each contact has more than in ``resistance``.
     """
+    core = choose_engine().core
+    if core is not None and faults == Faults():
+        numbers = (
+            current,
+            settings.output_resistance,
+            settings.compliance,
+            settings.switch_resistance,
+            _part(settings.rejection),
+            settings.crosstalk,
+        )
+        read = core.lines(resistance, drives, contact, numbers)
+        return Lines(read, np.zeros(read.shape, dtype=bool))
     resistance = shorted(resistance, faults.shorts)
     source, sink = drives.T
     n, rows = len(resistance), np.arange(len(drives))
@@ -129,12 +142,17 @@ def line_potentials(
     potential[rows, source] += amperes * contact[source]
     line = (amperes * settings.switch_resistance)[:, None]
     common = (potential + 2 * line) / 2
-    read = potential + common * 10 ** (-settings.rejection / 20)
+    read = potential + common * _part(settings.rejection)
     stuck = np.zeros_like(read, dtype=bool)
     stuck[:, broken] = True
     stuck[:, sorted(faults.railed)] = True
     stuck[broken[sink] & ~broken[source]] = True  # nothing holds the sheet down
     return Lines(_mixed(read, settings.crosstalk), stuck)
+
+
+def _part(rejection: float) -> float:
+    """Of the common mode, that a ``rejection`` dB leaves."""
+    return float(10 ** (-rejection / 20))
 
 
 def driven(current: float, load: FloatArray, settings: ElectronicsSettings) -> FloatArray:

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from tomoskin.core import FloatArray
+from tomoskin.forward import choose_engine
 from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
 from tomoskin.twin.probe import Probe
 from tomoskin.twin.shape import Shape
@@ -112,24 +113,11 @@ def indent(
     face within a few reaches of another would in truth press a little otherwise
     (:func:`solve_contact` solves them together).
     """
-    total = np.zeros((4, len(points)))
     x, y = np.ascontiguousarray(points.T)
-    for probe in probes:
-        if probe.force == 0:
-            continue
-        c, s = math.cos(probe.angle), math.sin(probe.angle)
-        dx, dy = probe.drag
-        along = (c * dx + s * dy, c * dy - s * dx)
-        dent = _blended(probe.shape, settings, probe.force, along, blur)
-        ax, ay = x - probe.x, y - probe.y
-        near = np.flatnonzero(ax * ax + ay * ay < dent.grid.reach**2)
-        ax, ay = ax[near], ay[near]
-        values = _read(dent, c * ax + s * ay, c * ay - s * ax)
-        if probe.angle:
-            values[1:] = _turn(probe.angle) @ values[1:]
-        for row, felt in zip(total, values, strict=True):
-            row[near] += felt
-    return Load(strain=total[1:].T, depth=total[0])
+    placed = [_Placed.of(probe, settings, blur) for probe in probes if probe.force > 0]
+    core = choose_engine().core
+    felt = _felt(placed, x, y) if core is None else core.dented(x, y, [p.plain for p in placed])
+    return Load(strain=felt[1:].T, depth=felt[0])
 
 
 def turned(strain: FloatArray, angle: float) -> FloatArray:
@@ -153,6 +141,46 @@ class _Blend:
 
     grid: Grid
     table: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """The dent of a probe at its place: cosine and sine of the angle by which it is turned."""
+
+    dent: _Blend
+    x: float
+    y: float
+    turn: tuple[float, float]
+
+    @classmethod
+    def of(cls, probe: Probe, settings: ContactSettings, blur: float) -> Self:
+        c, s = math.cos(probe.angle), math.sin(probe.angle)
+        dx, dy = probe.drag
+        along = (c * dx + s * dy, c * dy - s * dx)
+        return cls(
+            _blended(probe.shape, settings, probe.force, along, blur), probe.x, probe.y, (c, s)
+        )
+
+    @property
+    def plain(self) -> tuple[object, ...]:
+        """As the native engine takes it."""
+        grid = self.dent.grid
+        return self.dent.table, (grid.n, grid.step, grid.reach), (self.x, self.y, *self.turn)
+
+
+def _felt(placed: Sequence[_Placed], x: FloatArray, y: FloatArray) -> FloatArray:
+    """(4, n) depth and strain of all dents together at points (n,)."""
+    total = np.zeros((4, len(x)))
+    for one in placed:
+        ax, ay, (c, s) = x - one.x, y - one.y, one.turn
+        near = np.flatnonzero(ax * ax + ay * ay < one.dent.grid.reach**2)
+        ax, ay = ax[near], ay[near]
+        values = _read(one.dent, c * ax + s * ay, c * ay - s * ax)
+        if s:
+            values[1:] = _turn(math.atan2(s, c)) @ values[1:]
+        for row, felt in zip(total, values, strict=True):
+            row[near] += felt
+    return total
 
 
 @lru_cache(maxsize=64)

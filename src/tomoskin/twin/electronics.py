@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
+from tomoskin.forward import choose_engine
 from tomoskin.twin.bend import Pose
 from tomoskin.twin.circuit import ElectronicsSettings, Lines, line_potentials, settling
 from tomoskin.twin.electrodes import Electrodes
@@ -43,14 +44,21 @@ def convert(
     the converter's rails.
     """
     levels = 1 << readout.adc_bits
+    chance = random.standard_normal((oversampling, volts.shape[-1]))
+    if (core := choose_engine().core) is not None:
+        amplifier = readout.gain, readout.offset, electronics.low_rail, electronics.high_rail
+        converter = levels / readout.reference_voltage, levels, electronics.nonlinearity
+        codes: NDArray[np.uint16] = core.converted(
+            volts, chance, (*amplifier, *converter, electronics.noise)
+        )
+        return codes
     output = readout.gain * volts + readout.offset
     np.clip(output, electronics.low_rail, electronics.high_rail, out=output)
     exact = output * (levels / readout.reference_voltage)
     if electronics.nonlinearity:
         part = np.clip(exact / levels, 0.0, 1.0)
         exact = exact + electronics.nonlinearity * 4 * part * (1 - part)
-    noisy = random.standard_normal((oversampling, volts.shape[-1]))
-    noisy *= electronics.noise
+    noisy = electronics.noise * chance
     noisy += exact
     np.floor(noisy, out=noisy)
     np.clip(noisy, 0, levels - 1, out=noisy)

@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.forward import choose_engine
 from tomoskin.skin import (
     MaterialMemory,
     MemoryState,
     Metric,
     advanced,
     broken_down,
+    check_step,
     followed,
 )
 from tomoskin.twin.dent import Load
@@ -168,11 +171,18 @@ def advance(
     ModelError
         When dt is negative or not finite.
     """
-    felt = np.concatenate([load.strain.T, load.depth[None] / settings.thickness])
+    felt = np.empty((4, len(load.depth)))
+    felt[:3] = load.strain.T
+    np.divide(load.depth, settings.thickness, out=felt[3])
+    core, memory = choose_engine().core, settings.memory
+    warmer = _warmed(state.warmer, settings, dt, chance)
+    if core is not None and (memory.play or memory.creep or memory.breakdown or settings.wear):
+        check_step(dt)
+        return MaterialState(*_remembered(core, state, settings, felt, dt), warmer)
     return MaterialState(
-        memory=advanced(state.memory, settings.memory, felt, dt, LOAD),
+        memory=advanced(state.memory, memory, felt, dt, LOAD),
         worn=_worn(state, felt, settings),
-        warmer=_warmed(state.warmer, settings, dt, chance),
+        warmer=warmer,
     )
 
 
@@ -190,6 +200,8 @@ def conductivity(
     unloaded
         (n_cells,) S.
     """
+    if (core := choose_engine().core) is not None:
+        return _conducted(core, state, settings, unloaded)
     memory = settings.memory
     xx, yy, xy, squeezed = followed(state.memory, memory)
     squeezed = np.clip(squeezed, -_MOST_COMPRESSION, _MOST_COMPRESSION)
@@ -206,6 +218,49 @@ def conductivity(
         return np.asarray(level * np.exp(rise))
     half, cross = settings.gauge_across / 2 * (xx - yy), settings.gauge_across * xy
     return _directed(level, rise, half, cross)
+
+
+def _remembered(
+    core: Any, state: MaterialState, settings: MaterialSettings, felt: FloatArray, dt: float
+) -> tuple[MemoryState, FloatArray]:
+    """What :func:`advanced` gives, and the wear, by the native engine ``core``."""
+    past, memory = state.memory, settings.memory
+    kept = [
+        [math.exp(-dt / time) for time in times]
+        for times in (memory.creep_times, memory.breakdown_times)
+    ]
+    parts = [part.ravel() for part in (past.load, past.lagging, past.late, past.broken)]
+    worn = state.worn if settings.wear else state.worn[:0]
+    play = list(zip(memory.play, memory.play_widths, strict=True))
+    lagging, prompt, late, broken, fresh = core.remember(felt, [*parts, worn], play, kept)
+    remembered = MemoryState(
+        load=felt,
+        lagging=lagging.reshape(past.lagging.shape),
+        prompt=prompt.reshape(felt.shape),
+        late=late.reshape(past.late.shape),
+        broken=broken.reshape(past.broken.shape),
+    )
+    return remembered, fresh if settings.wear else state.worn
+
+
+def _conducted(
+    core: Any, state: MaterialState, settings: MaterialSettings, unloaded: FloatArray
+) -> FloatArray:
+    """What :func:`conductivity` gives, by the native engine ``core``."""
+    memory = state.memory
+    causes = [part.ravel() for part in (memory.prompt, memory.late, memory.broken)]
+    numbers = (
+        settings.gauge,
+        settings.gauge_across,
+        settings.compression,
+        settings.wear,
+        1 + settings.temperature_coefficient * state.warmer,
+        _MOST_COMPRESSION,
+        _MOST_LOG,
+    )
+    parts = settings.creep, settings.breakdown
+    rows: FloatArray = core.conduct([*causes, state.worn, unloaded], numbers, *parts)
+    return rows[0] if settings.scalar else rows.reshape(2, 2, -1).transpose(2, 0, 1)
 
 
 def _worn(state: MaterialState, felt: FloatArray, settings: MaterialSettings) -> FloatArray:

@@ -1,0 +1,320 @@
+//! What Python sees of a sheet under load: dents, conduction, and resistance between terminals.
+
+use std::sync::Arc;
+
+use ndarray::IxDyn;
+use numpy::{Ix1, Ix2, Ix3, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pulp::Arch;
+use pyo3::prelude::*;
+
+use crate::arrays::{Any, array, contiguous, invalid, same, unsigned};
+use crate::circuit::{Circuit, Converter};
+use crate::conduction::{self, Cause, GROUPS, LOADS, Material, Memory, Past, Present};
+use crate::dent::{self, Dent, PARTS};
+use crate::python::pairs;
+use crate::symbolic::Symbolic;
+use crate::terminals;
+
+#[pyclass(frozen, module = "tomoskin_core")]
+pub(crate) struct Terminals(terminals::Terminals);
+
+#[pymethods]
+impl Terminals {
+    #[new]
+    fn new(
+        indptr: &Any<'_>,
+        indices: &Any<'_>,
+        contacts: &Any<'_>,
+        position: &Any<'_>,
+        forms: &Any<'_>,
+        axes: usize,
+        last: &Any<'_>,
+    ) -> PyResult<Self> {
+        let (starts, rows) = (unsigned("indptr", indptr)?, unsigned("indices", indices)?);
+        let last = unsigned("last", last)?;
+        let contacts = array::<f64, Ix1>("contacts", contacts)?;
+        let position = array::<i32, Ix3>("position", position)?;
+        let forms = array::<f64, Ix3>("forms", forms)?;
+        let [count, nodes, other] = [0, 1, 2].map(|axis| position.shape()[axis]);
+        same("columns of position", nodes, other)?;
+        same("cells of forms", count, forms.shape()[2])?;
+        let cells = terminals::Cells {
+            forms: contiguous("forms", &forms)?.to_vec(),
+            axes,
+            count,
+            nodes,
+            position: position.as_array().iter().map(|&at| at as u32).collect(),
+        };
+        let symbolic = Symbolic::ending(starts.len().saturating_sub(1), &starts, &rows, &last);
+        let others = contiguous("contacts", &contacts)?.to_vec();
+        symbolic
+            .and_then(|symbolic| {
+                terminals::Terminals::new(Arc::new(symbolic), cells, others, &last)
+            })
+            .map(Self)
+            .map_err(invalid)
+    }
+
+    fn resistance<'py>(&self, conductivity: &Any<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let py = conductivity.py();
+        let conductivity = array::<f64, Ix3>("conductivity", conductivity)?;
+        let conductivity = contiguous("conductivity", &conductivity)?;
+        let out = PyArray2::<f64>::zeros(py, [self.0.count() + 1; 2], false);
+        {
+            let mut writable = out.readwrite();
+            let values = writable.as_slice_mut()?;
+            py.detach(|| self.0.resistance(Arch::new(), conductivity, values))
+                .map_err(invalid)?;
+        }
+        Ok(out)
+    }
+}
+
+/// A table (n·n, 4), its n, step and reach, and place, cosine and sine of the turn of its probe.
+type Placed<'py> = (Any<'py>, (usize, f64, f64), [f64; 4]);
+
+/// Depth, and strain xx, yy, xy (4, m) of all dents together at points x, y (m,).
+#[pyfunction]
+pub(crate) fn dented<'py>(
+    x: &Any<'py>,
+    y: &Any<'py>,
+    dents: Vec<Placed<'py>>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let py = x.py();
+    let (x, y) = (array::<f64, Ix1>("x", x)?, array::<f64, Ix1>("y", y)?);
+    same("length of y", x.len(), y.len())?;
+    let (x, y) = (contiguous("x", &x)?, contiguous("y", &y)?);
+    let tables: Vec<_> = dents
+        .iter()
+        .map(|(table, ..)| array::<f64, Ix2>("table", table))
+        .collect::<PyResult<_>>()?;
+    let mut placed = Vec::with_capacity(dents.len());
+    for (table, &(_, (nodes, step, reach), [px, py, cosine, sine])) in tables.iter().zip(&dents) {
+        same("values of table", PARTS * nodes * nodes, table.len())?;
+        if nodes < 2 || step <= 0.0 || reach > step * (nodes / 2) as f64 {
+            return Err(invalid("dents: expected a reach within two nodes or more"));
+        }
+        placed.push(Dent {
+            table: contiguous("table", table)?,
+            nodes,
+            step,
+            reach,
+            place: [px, py],
+            turn: [cosine, sine],
+        });
+    }
+    // SAFETY: `add` writes all of it.
+    let felt = unsafe { PyArray2::<f64>::new(py, [PARTS, x.len()], false) };
+    dent::add(&placed, x, y, felt.readwrite().as_slice_mut()?);
+    Ok(felt)
+}
+
+/// Lagging, prompt, late and broken parts after a step under `load` (4, n), and wear.
+type Step<'py> = [Bound<'py, PyArray1<f64>>; 5];
+
+/// What cells remember after a step: `past` are the load before, lagging, late and broken parts, and
+/// wear, each flat; `play`: parts and half widths; `kept`: of late parts, and of breakdowns.
+#[pyfunction]
+pub(crate) fn remember<'py>(
+    load: &Any<'py>,
+    past: [Any<'py>; 5],
+    play: Vec<(f64, f64)>,
+    kept: [Vec<f64>; 2],
+) -> PyResult<Step<'py>> {
+    let py = load.py();
+    let load = array::<f64, Ix2>("load", load)?;
+    same("rows of load", LOADS, load.shape()[0])?;
+    let n = load.shape()[1];
+    let load = contiguous("load", &load)?;
+    let [late, broken] = &kept;
+    let parts = [1, play.len(), late.len()].map(|parts| parts * LOADS * n);
+    let worn = if past[4].is_empty()? { 0 } else { n };
+    let sizes = [
+        parts[0],
+        parts[1],
+        parts[2],
+        broken.len() * GROUPS * n,
+        worn,
+    ];
+    let names = ["load before", "lagging", "late", "broken", "worn"];
+    let flat = flat(names, &past, sizes)?;
+    let [before, lagging, reached, shaken, wear] = [0, 1, 2, 3, 4].map(|k| flat[k].as_slice());
+    // SAFETY: `advance` writes all of them.
+    let made = |size: usize| unsafe { PyArray1::<f64>::new(py, size, false) };
+    let out = [sizes[1], sizes[0], sizes[2], sizes[3], worn].map(made);
+    {
+        let [mut a, mut b, mut c, mut d, mut e] = out.each_ref().map(|part| part.readwrite());
+        let memory = Memory {
+            play: &play,
+            late,
+            broken,
+        };
+        let past = Past {
+            load: before?,
+            lagging: lagging?,
+            late: reached?,
+            broken: shaken?,
+            worn: wear?,
+        };
+        let present = Present {
+            lagging: a.as_slice_mut()?,
+            prompt: b.as_slice_mut()?,
+            late: c.as_slice_mut()?,
+            broken: d.as_slice_mut()?,
+            worn: e.as_slice_mut()?,
+        };
+        conduction::advance(memory, load, past, present);
+    }
+    Ok(out)
+}
+
+/// Conductivity of cells, (1, n), or xx, xy, yx, yy (4, n) where directions differ.
+///
+/// `causes`: prompt, late and broken parts, wear, conductivity without load, each flat;
+/// `numbers`: gauge, across, compression, wear, heat, most compression, most logarithm.
+#[pyfunction]
+pub(crate) fn conduct<'py>(
+    causes: [Any<'py>; 5],
+    numbers: [f64; 7],
+    creep: Vec<f64>,
+    breakdown: Vec<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let py = causes[0].py();
+    let n = array::<f64, Ix1>("unloaded", &causes[4])?.len();
+    let sizes = [LOADS, creep.len() * LOADS, breakdown.len() * GROUPS, 1, 1].map(|k| k * n);
+    let flat = flat(
+        ["prompt", "late", "broken", "worn", "unloaded"],
+        &causes,
+        sizes,
+    )?;
+    let [prompt, late, broken, worn, unloaded] = [0, 1, 2, 3, 4].map(|k| flat[k].as_slice());
+    let [
+        gauge,
+        gauge_across,
+        compression,
+        wear,
+        heat,
+        most_compression,
+        most_log,
+    ] = numbers;
+    let rows = if gauge_across == 0.0 { 1 } else { 4 };
+    // SAFETY: `conductivity` writes all of it.
+    let out = unsafe { PyArray2::<f64>::new(py, [rows, n], false) };
+    {
+        let mut writable = out.readwrite();
+        let material = Material {
+            gauge,
+            gauge_across,
+            compression,
+            wear,
+            heat,
+            creep: &creep,
+            breakdown: &breakdown,
+            most_compression,
+            most_log,
+        };
+        let cause = Cause {
+            prompt: prompt?,
+            late: late?,
+            broken: broken?,
+            worn: worn?,
+            unloaded: unloaded?,
+        };
+        conduction::conductivity(material, cause, writable.as_slice_mut()?);
+    }
+    Ok(out)
+}
+
+/// What the amplifiers see (n_drives, n) of a sheet with that resistance (n, n), with nothing broken.
+///
+/// `contact` (n,): what each contact has more; `numbers`: current, resistance and compliance of its
+/// source, resistance of a switch, part of the common mode, part of a neighbour.
+#[pyfunction]
+pub(crate) fn lines<'py>(
+    resistance: &Any<'py>,
+    drives: &Any<'py>,
+    contact: &Any<'py>,
+    numbers: [f64; 6],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let py = resistance.py();
+    let resistance = array::<f64, Ix2>("resistance", resistance)?;
+    let contact = array::<f64, Ix1>("contact", contact)?;
+    let drives = pairs("drives", drives)?;
+    let n = contact.len();
+    same("rows of resistance", n, resistance.shape()[0])?;
+    same("columns of resistance", n, resistance.shape()[1])?;
+    if drives.iter().flatten().any(|&electrode| electrode >= n) {
+        return Err(invalid("drives: an electrode that is not there"));
+    }
+    let resistance = contiguous("resistance", &resistance)?;
+    let contact = contiguous("contact", &contact)?;
+    let [current, output, compliance, switch, common, neighbour] = numbers;
+    let circuit = Circuit {
+        current,
+        output,
+        compliance,
+        switch,
+        common,
+        neighbour,
+    };
+    // SAFETY: `read` writes all of it.
+    let out = unsafe { PyArray2::<f64>::new(py, [drives.len(), n], false) };
+    circuit.read(
+        resistance,
+        contact,
+        &drives,
+        out.readwrite().as_slice_mut()?,
+    );
+    Ok(out)
+}
+
+/// Summed codes (m,) of potentials, (m,) or (k, m), with standard normal numbers (k, m).
+///
+/// `numbers`: gain, offset, low and high rail, codes per volt, number of codes, bow, noise.
+#[pyfunction]
+pub(crate) fn converted<'py>(
+    volts: &Any<'py>,
+    chance: &Any<'py>,
+    numbers: [f64; 8],
+) -> PyResult<Bound<'py, PyArray1<u16>>> {
+    let py = volts.py();
+    let (volts, chance) = (
+        array::<f64, IxDyn>("volts", volts)?,
+        array::<f64, Ix2>("chance", chance)?,
+    );
+    let n = chance.shape()[1];
+    let each = if volts.len() == n { n } else { chance.len() };
+    same("number of volts", each, volts.len())?;
+    let [gain, offset, low, high, scale, levels, bow, noise] = numbers;
+    let converter = Converter {
+        gain,
+        offset,
+        rails: [low, high],
+        scale,
+        levels,
+        bow,
+        noise,
+    };
+    let out = PyArray1::<u16>::zeros(py, n, false);
+    if n > 0 {
+        let (volts, chance) = (contiguous("volts", &volts)?, contiguous("chance", &chance)?);
+        converter.sums(volts, chance, out.readwrite().as_slice_mut()?);
+    }
+    Ok(out)
+}
+
+/// Flat arrays of these sizes.
+fn flat<'py, const N: usize>(
+    names: [&str; N],
+    values: &[Any<'py>; N],
+    sizes: [usize; N],
+) -> PyResult<Vec<numpy::PyReadonlyArray1<'py, f64>>> {
+    let mut out = Vec::with_capacity(N);
+    for ((name, value), size) in names.into_iter().zip(values).zip(sizes) {
+        let value = array::<f64, Ix1>(name, value)?;
+        same(&format!("length of {name}"), size, value.len())?;
+        contiguous(name, &value)?;
+        out.push(value);
+    }
+    Ok(out)
+}
