@@ -19,11 +19,9 @@ _REST, _MOST_REST = 10, 32
 _LAG = 4
 """Frames before those that show a press, which are not taken for untouched: it began in them."""
 
-_WINDOWS = (1, 4, 16)
-"""Newest frames whose mean is looked at: the more they are, the fainter a press may be."""
-
-_PRESENT = 1.7
-"""Noises of its own by which such a mean must differ from the untouched skin to be a press."""
+_WINDOWS = {1: 2.4, 4: 1.8, 16: 1.7}
+"""Numbers of newest frames whose mean is looked at, the more the fainter a press may be; and noises
+of its own by which the mean must differ from the untouched skin to be a press."""
 
 _STEADY, _LONGEST, _STEP = 8, 40, 4
 """Frames that a press must stand still for, at least and at most; lengths that are tried."""
@@ -43,7 +41,7 @@ _PATIENCE = 5.0
 """Seconds in a phase after which it is said what is wrong."""
 
 OFTEN = 0.02
-"""Frames within such a time are averaged, s: a hand is not faster."""
+"""Frames are taken no more often than this, s: a hand is not faster."""
 
 _LEAST = 0.5
 """Noise is never taken for less than this part of what the read-out predicts."""
@@ -68,7 +66,6 @@ class PressTaker:
 
     def __init__(self, least: float) -> None:
         self._least = least
-        self._together: list[FloatArray] = []
         self._last = self._now = -np.inf
         self._mean = self._noise = np.zeros(0)
         self._rested = self._window = 1
@@ -98,7 +95,7 @@ class PressTaker:
                 "this press."
             )
         if self.phase == "press" and late:
-            return "No press shows in the voltages. If you are pressing, press harder."
+            return "No press shows in the voltages. If you are pressing, let go, then press harder."
         if self.phase in {"rest", "press"} and self._early:
             return "The last press ended too early: hold still until it is recorded."
         if self.phase == "hold" and late:
@@ -111,22 +108,19 @@ class PressTaker:
         if len(self._pressed) < _LONGEST or self._clear >= _FAINTEST:
             return "A faint press: hold still, more frames are averaged."
         return (
-            f"This press is too faint: the mean of {_LONGEST} frames stands out of the noise by "
-            f"{self._clear:.1f}, and {_FAINTEST:g} are needed. Press harder."
+            f"This press is too faint: expected {_FAINTEST:g} noises in the mean of {_LONGEST} "
+            f"frames, found {self._clear:.1f}. Press harder."
         )
 
     def push(self, host_time: float, voltages: FloatArray) -> FloatArray | None:
         """Take a frame (n_meas,) V; (n_meas,) V, the change, when a press has stood still."""
-        self._together.append(voltages)
         if 0 <= host_time - self._last < OFTEN:
             return None
         self._last = self._now = host_time
-        frame = np.asarray(np.mean(self._together, axis=0))
-        self._together.clear()
         if self.phase in {"rest", "press"}:
-            self._wait(frame)
+            self._wait(voltages)
             return None
-        self._pressed.append(frame)
+        self._pressed.append(voltages)
         size = self._size(np.array(self._pressed)[-self._window :])
         if size < _RELEASED * self._largest:
             self._early = self.phase == "hold"
@@ -147,13 +141,13 @@ class PressTaker:
         if self.phase == "rest" and len(self._frames) >= _REST + _LAG:
             self._enter("press")
         frames = np.array(self._frames)
-        for window in _WINDOWS:
+        for window, present in _WINDOWS.items():
             quiet = frames[: -window - _LAG][-_MOST_REST:]
             if len(quiet) < _REST:
                 return
             self._tell_untouched(quiet)
             apart = frames[-window:].mean(axis=0) - self._mean
-            if self._noises(apart) > _PRESENT * self._deviation(window):
+            if self._noises(apart) > present * self._deviation(window):
                 self._press(frames[-window:], window)
                 return
 
