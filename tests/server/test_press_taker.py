@@ -11,7 +11,7 @@ from tomoskin.server.press_taker import PressTaker
 Floats = NDArray[np.float64]
 
 ROWS, NOISE, PERIOD = 60, 1e-5, 0.05
-SHAPE = np.random.default_rng(3).normal(size=ROWS)
+SHAPE = np.random.default_rng(3).normal(0.5, 1, size=ROWS)
 SHAPE /= np.sqrt((SHAPE**2).mean())
 
 
@@ -65,6 +65,16 @@ def test_a_faint_press_is_averaged_for_longer(skin: Skin, noises: float) -> None
     assert amplitude(dv) == pytest.approx(noises, abs=0.15)
     skin.frames(60)
     assert skin.phase == "press", "it was seen to end"
+
+
+def test_the_end_of_a_press_that_was_not_seen_is_none(skin: Skin) -> None:
+    """It has passed for the untouched skin: what comes then has the other sign."""
+    skin.taker = PressTaker(0.1 * NOISE, sign=1)
+    skin.frames(60, 20)
+    assert skin.frames(60) == []
+    assert skin.phase == "press"
+    assert "too faint to be seen" in skin.taker.hint
+    assert len(skin.frames(12, 20)) == 1
 
 
 def test_nothing_is_taken_of_an_untouched_skin(skin: Skin) -> None:

@@ -19,7 +19,7 @@ from tomoskin.server.guided_presses import (
     estimate_touch,
     estimate_wiring,
 )
-from tomoskin.server.press_taker import Phase, PressTaker, least_noise
+from tomoskin.server.press_taker import Phase, PressTaker
 from tomoskin.server.requests import FlowKind, UndoPress
 
 
@@ -45,7 +45,7 @@ class PressFlow(GuidedFlow):
         super().__init__(kind, prepared)
         self.presses: list[GuidedPress] = []
         self.answers = {UndoPress: lambda _: self._undo()}
-        self._taker = PressTaker(least_noise(prepared))
+        self._taker = PressTaker.of(prepared)
         self._now = _Seen(self._taker.phase, "", None)
         self._undone = False
         self._dots = Dots(prepared)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -40,6 +40,9 @@ _RELEASED = 0.4
 _PATIENCE = 5.0
 """Seconds in a phase after which it is said what is wrong."""
 
+_EARLY = "The last press ended too early: hold still until it is recorded."
+_UNSEEN = "The last press was too faint to be seen: press harder."
+
 OFTEN = 0.02
 """Frames are taken no more often than this, s: a hand is not faster."""
 
@@ -47,9 +50,8 @@ _LEAST = 0.5
 """Noise is never taken for less than this part of what the read-out predicts."""
 
 
-def least_noise(prepared: Prepared) -> float:
-    """V that the noise of a measurement is never taken to be below."""
-    return _LEAST * prepared.readout.noise
+_SIGNS = {"decrease": 1, "increase": -1}
+"""Of the voltages' magnitudes, by what a press does to the conductivity."""
 
 
 class PressTaker:
@@ -62,23 +64,30 @@ class PressTaker:
     ----------
     least
         V that noise is never taken to be below.
+    sign
+        1 where a press makes voltages larger by magnitude, -1 where smaller, 0 where either.
     """
 
-    def __init__(self, least: float) -> None:
-        self._least = least
+    def __init__(self, least: float, sign: int = 0) -> None:
+        self._least, self._sign = least, sign
         self._last = self._now = -np.inf
         self._mean = self._noise = np.zeros(0)
         self._rested = self._window = 1
         self._frames: deque[FloatArray] = deque(maxlen=_MOST_REST + _LAG + max(_WINDOWS))
         self._pressed: deque[FloatArray] = deque(maxlen=_LONGEST)
         self._largest = self._clear = 0.0
-        self._early = False
+        self._remark = ""
         self._enter("rest")
 
     def restart(self) -> None:
         """The skin is read anew: nothing touches it now."""
         self._frames.clear()
         self._enter("rest")
+
+    @classmethod
+    def of(cls, prepared: Prepared) -> Self:
+        """For the skin that is prepared."""
+        return cls(_LEAST * prepared.readout.noise, _SIGNS.get(prepared.skin.touch.sign, 0))
 
     @property
     def untouched(self) -> tuple[FloatArray, FloatArray] | None:
@@ -96,8 +105,8 @@ class PressTaker:
             )
         if self.phase == "press" and late:
             return "No press shows in the voltages. If you are pressing, let go, then press harder."
-        if self.phase in {"rest", "press"} and self._early:
-            return "The last press ended too early: hold still until it is recorded."
+        if self.phase in {"rest", "press"}:
+            return self._remark
         if self.phase == "hold" and late:
             return self._held_up()
         return ""
@@ -123,7 +132,7 @@ class PressTaker:
         self._pressed.append(voltages)
         size = self._size(np.array(self._pressed)[-self._window :])
         if size < _RELEASED * self._largest:
-            self._early = self.phase == "hold"
+            self._remark = _EARLY if self.phase == "hold" else ""
             self.restart()
             return None
         if self.phase == "release":
@@ -148,7 +157,11 @@ class PressTaker:
             self._tell_untouched(quiet)
             apart = frames[-window:].mean(axis=0) - self._mean
             if self._noises(apart) > present * self._deviation(window):
-                self._press(frames[-window:], window)
+                if self._sign * float(np.nansum(np.sign(self._mean) * apart)) < 0:
+                    self._remark = _UNSEEN  # and has ended: it passed for the untouched skin
+                    self.restart()
+                else:
+                    self._press(frames[-window:], window)
                 return
 
     def _tell_untouched(self, quiet: FloatArray) -> None:
@@ -158,7 +171,7 @@ class PressTaker:
 
     def _press(self, newest: FloatArray, window: int) -> None:
         self._enter("hold")
-        self._window, self._early = window, False
+        self._window, self._remark = window, ""
         self._largest, self._clear = self._size(newest), 0.0
         self._pressed.clear()
         self._pressed.extend(newest[-max(1, window // 4) :])

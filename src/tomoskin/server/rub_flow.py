@@ -14,7 +14,7 @@ from tomoskin.run import Runner
 from tomoskin.server.folder import Folder
 from tomoskin.server.guided_flow import Estimate, GuidedFlow, keep_calibration
 from tomoskin.server.guided_presses import Dots
-from tomoskin.server.press_taker import OFTEN, PressTaker, least_noise
+from tomoskin.server.press_taker import OFTEN, PressTaker
 from tomoskin.server.requests import AskPoint, LearnFlow, StopLearning, UndoPress
 from tomoskin.touch import Region
 
@@ -223,7 +223,7 @@ class RubFlow(GuidedFlow):
         return self._dots.next([point.xy for point in self.points], None)
 
     def _ask(self, *, on: bool) -> bool:
-        self._taker = PressTaker(least_noise(self.prepared)) if on else None
+        self._taker = PressTaker.of(self.prepared) if on else None
         self._dot = self._next_dot() if on else None
         return False
 
