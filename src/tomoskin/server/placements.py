@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from tomoskin.core import Detection, FloatArray, Touch
-from tomoskin.server.guided_presses import OFTEN
+from tomoskin.server.press_taker import OFTEN
 
 PlacingPhase = Literal["rest", "press", "hold", "several", "release"]
 """Lift everything; lay something on; let it lie; too much lies there; lift it."""

@@ -16,20 +16,19 @@ from tomoskin.server.guided_presses import (
     Dots,
     Effort,
     GuidedPress,
-    Phase,
-    Taker,
     estimate_touch,
     estimate_wiring,
-    least_noise,
 )
+from tomoskin.server.press_taker import Phase, PressTaker
 from tomoskin.server.requests import FlowKind, UndoPress
 
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """A phase that has begun, and the change (n_meas,) V of a press that was taken, or None."""
+    """The phase, what is wrong, and the change (n_meas,) V of a press that was taken, or None."""
 
     phase: Phase
+    hint: str
     dv: FloatArray | None
 
 
@@ -46,21 +45,25 @@ class PressFlow(GuidedFlow):
         super().__init__(kind, prepared)
         self.presses: list[GuidedPress] = []
         self.answers = {UndoPress: lambda _: self._undo()}
-        self._taker = Taker(least_noise(prepared))
-        self._phase: Phase = self._taker.phase
+        self._taker = PressTaker.of(prepared)
+        self._now = _Seen(self._taker.phase, "", None)
+        self._undone = False
         self._dots = Dots(prepared)
         self._dot = self._dots.next((), None)
 
     def see(self, result: FrameResult) -> _Seen | None:
         """See :class:`GuidedFlow`."""
-        before = self._taker.phase
-        dv = self._taker.push(result.host_time, result.voltages)
-        changed = dv is not None or self._taker.phase != before
-        return _Seen(self._taker.phase, dv) if changed else None
+        taker, before = self._taker, (self._taker.phase, self._taker.hint)
+        if self._undone and taker.phase == "release":  # it may have been no press
+            taker.restart()
+        self._undone = False
+        dv = taker.push(result.host_time, result.voltages)
+        changed = dv is not None or before != (taker.phase, taker.hint)
+        return _Seen(taker.phase, taker.hint, dv) if changed else None
 
     def take(self, seen: _Seen) -> bool:
-        """A press on the dot was taken, and the dot moves on; or a phase has begun."""
-        self._phase = seen.phase
+        """A press on the dot was taken, and the dot moves on; or something else is to be done."""
+        self._now = seen
         if seen.dv is None:
             return False
         self.presses.append(GuidedPress(self._dot, seen.dv, self.effort))
@@ -77,7 +80,7 @@ class PressFlow(GuidedFlow):
         if not self.presses:
             raise WireError("there is no press to undo")
         self._dot = self.presses.pop().place
-        self.estimate = None
+        self.estimate, self._undone = None, True
         return True
 
     def examples(self) -> tuple[GuidedPress, ...]:
@@ -92,8 +95,10 @@ class PressFlow(GuidedFlow):
 
     def details(self) -> dict[str, Any]:
         """See :class:`GuidedFlow`."""
+        hint = {"text": self._now.hint} if self._now.hint else {}
         return {
-            "phase": self._phase,
+            **hint,
+            "phase": self._now.phase,
             "dot": self._dot,
             "effort": self.effort,
             "presses": [press.place for press in self.presses],

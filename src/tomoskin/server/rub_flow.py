@@ -13,7 +13,8 @@ from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner
 from tomoskin.server.folder import Folder
 from tomoskin.server.guided_flow import Estimate, GuidedFlow, keep_calibration
-from tomoskin.server.guided_presses import OFTEN, Dots, Taker, least_noise
+from tomoskin.server.guided_presses import Dots
+from tomoskin.server.press_taker import OFTEN, PressTaker
 from tomoskin.server.requests import AskPoint, LearnFlow, StopLearning, UndoPress
 from tomoskin.touch import Region
 
@@ -190,7 +191,7 @@ class RubFlow(GuidedFlow):
             LearnFlow: lambda _: self._learn(),
             StopLearning: lambda _: self._stop(),
         }
-        self._taker: Taker | None = None
+        self._taker: PressTaker | None = None
         self._phase = "rub"
         self._dots = Dots(prepared)
         self._dot: tuple[float, float] | None = None
@@ -222,7 +223,7 @@ class RubFlow(GuidedFlow):
         return self._dots.next([point.xy for point in self.points], None)
 
     def _ask(self, *, on: bool) -> bool:
-        self._taker = Taker(least_noise(self.prepared)) if on else None
+        self._taker = PressTaker.of(self.prepared) if on else None
         self._dot = self._next_dot() if on else None
         return False
 

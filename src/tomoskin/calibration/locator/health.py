@@ -15,8 +15,8 @@ FEWEST = 5
 """Presses before which nothing is said."""
 
 _FEW = 3
-"""Rows that may be left out without that someone must act: on the twin one of 40 was left out
-without need in two of six sessions."""
+"""Rows that may be left out without that someone must act: on the twin one of 40 was left out for
+some touches without need in four of six sessions."""
 
 _SHOWN = 20
 

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.calibration.locator.posterior import BoolArray
 from tomoskin.calibration.locator.presses import Presses, frames
-from tomoskin.calibration.locator.process import squared_distances
+from tomoskin.calibration.locator.process import Process, squared_distances
 from tomoskin.calibration.locator.topographic import (
     TopographicMap,
     learnt_surface,
@@ -43,6 +43,9 @@ _AGREE = 0.35
 
 _FLOOR = 0.01
 """Deviation, in radii of the region, that every estimated label has at least."""
+
+_CORRECTS = 5
+"""Labels from which the positions of all frames are corrected."""
 
 _AS_BEFORE = 1.5
 """Strangeness up to which a session is as the calibration was: learnt maps are better then."""
@@ -143,6 +146,8 @@ class SessionAlignment:
         mean = fit.posterior(white) @ grid
         moved = float(np.linalg.norm(mean - start @ grid, axis=1).mean())
         missed = _missed(mean[known], region.scaled(xy[known]))
+        if known.sum() >= _CORRECTS:
+            mean = mean + _correction(mean, known, region.scaled(xy[known]))
         believed = moved < _MOVED and covered > _COVERED
         holds = believed if np.isnan(missed) else missed < _AGREE
         spread = _spread(fit.tempered(grown).posterior(white), mean, grid)
@@ -246,6 +251,18 @@ def _entropy(part: FloatArray) -> float:
 
 def _missed(answers: FloatArray, labels: FloatArray) -> float:
     return float(np.linalg.norm(answers - labels, axis=1).mean()) if len(labels) else np.nan
+
+
+def _correction(positions: FloatArray, known: BoolArray, labels: FloatArray) -> FloatArray:
+    """(n, 2) by which ``positions`` (n, 2) are off, as ``labels`` of the ``known`` ones tell.
+
+    A smooth mapping of the sheet onto itself fits the frames about as well.
+    """
+    off = labels - positions[known]
+    size = float(np.sqrt((off**2).mean())) or 1.0
+    among = squared_distances(positions[known], positions[known])
+    process = Process.of((("position",),), {"position": among}, off / size)
+    return size * process({"position": squared_distances(positions, positions[known])})
 
 
 def _spread(weights: FloatArray, mean: FloatArray, grid: FloatArray) -> FloatArray:

@@ -101,7 +101,7 @@ _BOTH = (("features", "estimate"), ("features",), ("estimate",))
 _NEAR = 0.5
 """Unit of the estimates' distances, in radii of the region."""
 
-_BEFORE, _WORTH = np.array([0.55, 0.15, 0.15, 0.15]), 8
+_BEFORE, _WORTH = np.array([0.64, 0.18, 0.18]), 8
 """Weights before any press, the maps first, and as many presses they count for: from few, weights
 are learnt badly."""
 
@@ -111,10 +111,9 @@ _TOGETHER = 1e3
 
 @dataclass(frozen=True, eq=False)
 class Expert:
-    """A process that predicts a place: from ``start`` it learns the rest, in units of ``scale``."""
+    """A process that predicts a place about ``centre``, in units of ``scale``."""
 
     process: Process
-    from_estimate: bool
     centre: FloatArray
     scale: float
 
@@ -124,34 +123,32 @@ class Expert:
         terms: tuple[tuple[str, ...], ...],
         squares: Distances,
         xy: FloatArray,
-        estimate: FloatArray | None,
         like: Expert | None,
     ) -> Self:
-        """Learn ``xy`` (n, 2), or what is left of it after ``estimate`` (n, 2).
+        """Learn ``xy`` (n, 2).
 
         An expert that is ``like`` another has its hyper-parameters.
         """
-        rest = xy if estimate is None else xy - estimate
-        centre = rest.mean(axis=0) if estimate is None else np.zeros(2)
-        scale = float((rest - centre).std()) or 1.0
-        targets = (rest - centre) / scale
+        centre = xy.mean(axis=0)
+        scale = float((xy - centre).std()) or 1.0
+        targets = (xy - centre) / scale
         if like is None:
             process = Process.of(terms, squares, targets)
         else:
             process = Process.given(terms, like.process.logs, squares, targets)
-        return cls(process, estimate is not None, centre, scale)
+        return cls(process, centre, scale)
 
-    def left_out(self, estimate: FloatArray) -> FloatArray:
+    @property
+    def left_out(self) -> FloatArray:
         """(n, 2) what each press would be told without itself."""
-        return self._placed(self.process.left_out, estimate)
+        return self._placed(self.process.left_out)
 
-    def __call__(self, squares: Distances, estimate: FloatArray) -> FloatArray:
+    def __call__(self, squares: Distances) -> FloatArray:
         """(m, 2) places of frames."""
-        return self._placed(self.process(squares), estimate)
+        return self._placed(self.process(squares))
 
-    def _placed(self, answer: FloatArray, estimate: FloatArray) -> FloatArray:
-        start = estimate if self.from_estimate else self.centre
-        return np.asarray(start + self.scale * answer)
+    def _placed(self, answer: FloatArray) -> FloatArray:
+        return np.asarray(self.centre + self.scale * answer)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,13 +184,12 @@ class Stacking:
             "features": between / unit,
             "estimate": squared_distances(estimates, estimates) / _NEAR**2,
         }
-        given = like.experts if like else (None, None, None)
+        given = like.experts if like else (None, None)
         experts = (
-            Expert.of(_PLAIN, squares, xy, None, given[0]),
-            Expert.of(_BOTH, squares, xy, None, given[1]),
-            Expert.of(_BOTH, squares, xy, estimates, given[2]),
+            Expert.of(_PLAIN, squares, xy, given[0]),
+            Expert.of(_BOTH, squares, xy, given[1]),
         )
-        by_expert = np.stack([estimates, *(e.left_out(estimates) for e in experts)])
+        by_expert = np.stack([estimates, *(expert.left_out for expert in experts)])
         weights = _weights(by_expert, xy)
         return cls(features, estimates, unit, experts, weights, by_expert)
 
@@ -212,7 +208,7 @@ class Stacking:
             "features": squared_distances(features, self.features, self._norms) / self.unit,
             "estimate": squared_distances(estimates, self.estimates) / _NEAR**2,
         }
-        return np.stack([estimates, *(expert(squares, estimates) for expert in self.experts)])
+        return np.stack([estimates, *(expert(squares) for expert in self.experts)])
 
     def combined(self, by_expert: FloatArray) -> FloatArray:
         """(m, 2) places from what each says, (experts, m, 2)."""

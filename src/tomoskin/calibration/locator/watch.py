@@ -13,35 +13,48 @@ from tomoskin.calibration.locator.lost_rows import OFFLINE, LostRows
 from tomoskin.calibration.locator.presses import frames
 from tomoskin.core import FloatArray, IntArray
 
-_PRESSES = 20
-"""Presses that are looked back on; those before the first were as usual."""
+_PRESSES = 40
+"""Presses that are looked back on."""
+
+_NEWEST = (8, 20, _PRESSES)
+"""So many of the newest are looked at by themselves: a large jump shows soon."""
 
 _APART = 0.1
 """How far the touch must have moved to count as another press, in radii of the region."""
 
-_OFF, _GUARD = 4.0, 1.2
-"""A row has jumped that is off by so many times its usual, and by so many times the most that
-the calibration's own presses were off in as many in a row."""
+_LEAST = 0.3
+"""Change of a row, over the most presses, below which it has not jumped; over fewer, it is larger
+by the square root. Chosen on the twin's textile disc, six rows doubled or none, seeds 1 to 6, as
+are the next two."""
 
-_BESIDE = 2.0
-"""Nor is a row off that is off by less than so many times what the rows are as a rule, both in
-parts of the above: then it is the sheet, or the press. Chosen on the twin's textile disc, one of
-six rows doubled or none, seeds 3 to 6."""
+_BESIDE, _SURELY = 5.5, 1.2
+"""Nor has a row jumped that has changed by less than so many deviations of the rows' changes: then
+it is the sheet, or the press. But one has that has changed by the second: many rows that jump at
+once make the positions wrong, and so the others' deviation large."""
 
-_FARTHEST = 10.0
-"""How many times its usual a row may be off for one press: more counts no more."""
+_CHANCE = 10.0
+"""Nor one that has changed by less than so many times its usual scatter in the calibration, over
+the root of the presses."""
+
+_STRANGE = 1.0
+"""Deviation of the rows' changes from which nothing is concluded: it is the press or the skin."""
+
+_FITS = 20
+"""Presses that tell how well the calibration fits."""
 
 _MOST = 0.5
-"""Where more than this part of the rows is off, it is the press that is strange."""
+"""Where more than this part of the rows has changed, it is the press that is strange."""
+
+_NORMAL = 1.48
+"""Deviation of a Gaussian over its median distance from the middle."""
 
 
 class Watch:
     """Answers of a locator, frame by frame in the order of time.
 
-    Each frame's place tells what every row should have said. A row that has been off for the last
-    presses as it never was in the calibration is left out, as a missing value is, until it agrees
-    again. Neither labels nor frames to come are used. The rows' own spread is that of the left-out
-    presses (median absolute deviation).
+    Each frame's place tells what every row should have said. A row that has said more, or less,
+    than that for the last presses, other than the rows do as a rule, is left out, as a missing
+    value is, until it agrees again. Neither labels nor frames to come are used.
 
     Frames that lack rows for good, as of a lost electrode, are answered by a locator that has
     learnt without them; see :class:`LostRows`.
@@ -56,15 +69,13 @@ class Watch:
 
     def __init__(self, locator: Locator, patience: tuple[int, int] = OFFLINE) -> None:
         self._locator, self._reduced = locator, LostRows(locator, patience)
-        estimates = locator.stacking.left_out
-        off = np.abs(self._surprise(locator.presses.dv, estimates))
-        self._usual = np.median(off, axis=0) + np.finfo(float).tiny
-        self._limit = np.maximum(_OFF, _GUARD * _worst(self._clipped(off)))
-        usual = [np.ones(off.shape[1])] * _PRESSES
-        self._off: deque[FloatArray] = deque(usual, maxlen=_PRESSES)
+        more, _ = self._surprise(locator.presses.dv, locator.stacking.left_out)
+        self._usual = np.median(np.abs(more), axis=0) + np.finfo(float).tiny
+        self._more: deque[FloatArray] = deque(maxlen=_PRESSES)
+        self._weight: deque[FloatArray] = deque(maxlen=_PRESSES)
         self._last: FloatArray | None = None
-        self._fits: deque[list[float]] = deque(maxlen=_PRESSES)
-        self._jumped = np.zeros(off.shape[1], dtype=np.bool_)
+        self._fits: deque[list[float]] = deque(maxlen=_FITS)
+        self._jumped = np.zeros(len(locator.features.rows), dtype=np.bool_)
 
     @property
     def jumped(self) -> IntArray:
@@ -99,20 +110,38 @@ class Watch:
         if not settled:
             return answer[:2]
         place = self._locator.region.scaled(answer[0])
-        off = self._clipped(np.abs(self._surprise(frame[None], place)))[0]
         if self._last is not None and np.linalg.norm(place[0] - self._last) < _APART:
-            self._off.pop()
+            self._more.pop()
+            self._weight.pop()
         else:
             self._last = place[0]
             self._fits.append([])
         self._fits[-1].append(float(answer[2][0]))
-        self._off.append(off)
-        far = np.mean(self._off, axis=0) / self._limit
-        jumped = far > max(1.0, _BESIDE * float(np.median(far)))
+        more, weight = self._surprise(frame[None], place)
+        self._more.append(more[0])
+        self._weight.append(weight[0])
+        jumped = self._changed()
         if jumped.mean() > _MOST or (jumped == self._jumped).all():
             return answer[:2]
         self._jumped = jumped
         return self._told(frame)[:2]
+
+    def _changed(self) -> NDArray[np.bool_]:
+        """(k,) whether each row has changed, by any of the looks back."""
+        more, weight = np.array(self._more), np.array(self._weight)
+        changed = np.zeros(more.shape[1], dtype=np.bool_)
+        for n in _NEWEST:
+            if len(more) < n:
+                break
+            by = _medians(more[-n:], weight[-n:])
+            by -= np.median(by)
+            apart = _NORMAL * float(np.median(np.abs(by)))
+            if apart > _STRANGE:
+                return self._jumped
+            least = _LEAST * float(np.sqrt(_PRESSES / n))
+            beside = max(least, min(_BESIDE * apart, _SURELY))
+            changed |= np.abs(by) > np.maximum(beside, _CHANCE / np.sqrt(n) * self._usual)
+        return changed
 
     def _told(self, frame: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         return self._reduced(frame).told(self._kept(frame))
@@ -129,16 +158,21 @@ class Watch:
         used = np.isfinite(kept[self._locator.features.rows])
         return kept if used.any() else frame
 
-    def _surprise(self, dv: FloatArray, positions: FloatArray) -> FloatArray:
-        """(n, k) features less what the maps say of presses at ``positions`` (n, 2)."""
-        maps = self._locator.estimates.likelihood.maps
-        return self._locator.features(dv) - maps.features_at(positions)
+    def _surprise(self, dv: FloatArray, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(n, k) by how much each feature is more than the maps say of presses at ``positions``
+        (n, 2), in the direction in which they say that it changes; and how much that tells. What
+        all rows have in common is the press's force."""
+        expected = self._locator.estimates.likelihood.maps.features_at(positions)
+        more = np.sign(expected) * (self._locator.features(dv) - expected)
+        return (
+            more - np.median(more, axis=1, keepdims=True),
+            np.abs(expected) / np.sqrt(1 + expected**2),
+        )
 
-    def _clipped(self, off: FloatArray) -> FloatArray:
-        return np.minimum(off / self._usual, _FARTHEST)
 
-
-def _worst(off: NDArray[np.float64]) -> FloatArray:
-    """(k,) the largest mean of as many presses in a row as a watch looks back on."""
-    length = min(_PRESSES, len(off))
-    return np.asarray(np.lib.stride_tricks.sliding_window_view(off, length, axis=0).mean(-1).max(0))
+def _medians(values: FloatArray, weights: FloatArray) -> FloatArray:
+    """(k,) weighted medians of columns (n, k)."""
+    order = values.argsort(axis=0)
+    total = np.take_along_axis(weights, order, axis=0).cumsum(axis=0)
+    middle = (total < total[-1] / 2).sum(axis=0)
+    return np.asarray(np.take_along_axis(values, order, axis=0)[middle, np.arange(values.shape[1])])
