@@ -64,7 +64,7 @@ def expected_sizes(model: ForwardModel, conductivity: float, positions: FloatArr
     sizes = np.log(np.maximum(product / mesh.volumes, np.finfo(float).tiny))
     away = squared_distances(positions, mesh.centroids[:, :2])
     near = np.argpartition(away, _NEAR_CELLS, axis=1)[:, :_NEAR_CELLS]
-    return np.exp(sizes.T[near].mean(axis=1))
+    return np.asarray(np.exp(sizes.T[near].mean(axis=1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,8 @@ def affine_terms(positions: FloatArray) -> FloatArray:
 
 def inside(positions: FloatArray) -> FloatArray:
     """Positions (n, 2) in radii, those beyond one radius drawn back to it."""
-    return positions / np.maximum(np.linalg.norm(positions, axis=1, keepdims=True), 1.0)
+    away = np.linalg.norm(positions, axis=1, keepdims=True)
+    return np.asarray(positions / np.maximum(away, 1.0))
 
 
 def _logarithms(dv: FloatArray) -> FloatArray:

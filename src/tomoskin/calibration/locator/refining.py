@@ -32,8 +32,8 @@ _LEAST = 1e-9
 def signed_features(dv: FloatArray) -> FloatArray:
     """(n, k) features of the shape of frames (n, n_meas), with their sign, about their mean."""
     shape = dv / levels(dv)
-    features = Features.of(shape)(shape)
-    features = features - features.mean(axis=0)
+    features: FloatArray = Features.of(shape)(shape)
+    features = np.asarray(features - features.mean(axis=0))
     if features.shape[1] <= _MOST:
         return features
     return np.asarray(features @ np.linalg.svd(features, full_matrices=False)[2][:_MOST].T)

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.calibration.kind import Progress, silent
 from tomoskin.calibration.locator.locator import Locator
+from tomoskin.calibration.locator.posterior import BoolArray
 from tomoskin.calibration.locator.presses import Presses, frames
 from tomoskin.calibration.locator.unlabelled import UnlabelledFit, from_labels, missed_labels
 from tomoskin.core import DataError, FloatArray, IntArray
@@ -21,9 +22,12 @@ from tomoskin.touch import Region
 FEWEST, _MOST = 150, 800
 """Touches that are needed, and that are used: spread evenly over those that were made."""
 
-_ALIGNED, _UNSURE = 0.15, 1.2
-"""Deviation, in radii, of labels on a sheet that is nothing like the model, less on one
-that is; and how many times as far as the fits disagree labels may be off. Chosen on two skins."""
+_WARPED, _UNSURE = 0.26, 1.2
+"""How far a position may be off, in each direction: times the way from where the electrodes'
+order alone puts it, and times that by which the fits disagree. Chosen on two skins."""
+
+_MODEL = 0.035
+"""The same, in radii, of positions that are the model's. Chosen on the twin."""
 
 _ALIKE = 0.27
 """Correlation with the skin's own responses below which the data are not of this skin."""
@@ -38,7 +42,7 @@ most of the two skins that settings were chosen on."""
 _ENOUGH = 20
 """Labels that align the touches by themselves where the electrodes' order misleads."""
 
-_HARDER = 0.7
+_HARDER = 1.0
 """Logarithm by which a touch may be harder or softer than those that were made, where the changes
 of a sheet are in proportion to the force. Chosen on the twin's seeds 1 to 3."""
 
@@ -145,9 +149,8 @@ class Rubbing:
         Presses.of_more(dv[given], xy[given]).within(region)
         chosen = _evenly(len(dv), given)
         dv, xy = dv[chosen], xy[chosen]
-        labelled: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
         labels = region.scaled(xy)
-        labelled = np.isfinite(labels).all(axis=1)
+        labelled: BoolArray = np.asarray(np.isfinite(labels).all(axis=1))
         alone = UnlabelledFit.of(dv, skin, pattern, region, np.full(xy.shape, np.nan))
         far = np.linalg.norm(alone.positions - labels, axis=1) > _CONTRADICTED
         found = cls(
@@ -177,7 +180,7 @@ class Rubbing:
             return self
         positions = from_labels(dv, labels, region, self.pattern)
         spread = np.tile(0.5 * (region.unit * missed) ** 2 * np.eye(2), (len(dv), 1, 1))
-        known = np.isfinite(labels).all(axis=1)
+        known: BoolArray = np.asarray(np.isfinite(labels).all(axis=1))
         spread[known] = 0.0
         position = region.metres(np.where(known[:, None], labels, positions))
         presses = Presses.of(dv, position, spread=spread)
@@ -247,12 +250,15 @@ class Rubbing:
             raise DataError("; ".join(self.findings))
         region, presses = Region.of(self.skin), self.presses
         if self.modelled:
-            presses = replace(presses, dv=_harder_and_softer(presses.dv))
+            # What is off in each frame by itself is in the left-out errors.
+            shared = (_MODEL * region.unit) ** 2 * np.eye(2)
+            spread = np.where(presses.spreads.any(axis=(1, 2), keepdims=True), shared, 0.0)
+            presses = replace(presses, dv=_harder_and_softer(presses.dv), spread=spread)
         return Locator.learn(presses, region, self.pattern, self.skin.identity, progress)
 
 
 def _presses(dv: FloatArray, xy: FloatArray, fit: UnlabelledFit, region: Region) -> Presses:
-    known = np.isfinite(xy).all(axis=1)
+    known: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
     spread = _spread(fit, region)
     spread[known] = 0.0
     position = np.where(known[:, None], xy, region.metres(fit.positions))
@@ -261,7 +267,8 @@ def _presses(dv: FloatArray, xy: FloatArray, fit: UnlabelledFit, region: Region)
 
 def _spread(fit: UnlabelledFit, region: Region) -> FloatArray:
     """(n, 2, 2) m² covariance of positions that were found."""
-    beyond = (_ALIGNED * (1 - fit.alike)) ** 2 + (_UNSURE * fit.disagreement) ** 2
+    warped = _MODEL if fit.modelled else _WARPED * fit.moved
+    beyond = warped**2 + (_UNSURE * fit.disagreement) ** 2
     return np.asarray(region.unit**2 * (fit.spread + beyond * np.eye(2)))
 
 

@@ -23,9 +23,9 @@ def unfolded(scores: FloatArray, neighbours: int) -> FloatArray:
     away = np.sqrt(squared_distances(scores, scores))
     n = len(away)
     near = np.argsort(away, axis=1)[:, 1 : neighbours + 1]
-    links = (np.take_along_axis(away, near, axis=1).ravel(),)
+    links = np.take_along_axis(away, near, axis=1).ravel()
     ends = (np.repeat(np.arange(n), neighbours), near.ravel())
-    along = shortest_path(csr_matrix((*links, ends), (n, n)), directed=False)
+    along = shortest_path(csr_matrix((links, ends), (n, n)), directed=False)
     along = np.where(np.isfinite(along), along, along[np.isfinite(along)].max()) ** 2
     about = along - along.mean(axis=0) - along.mean(axis=1, keepdims=True) + along.mean()
     size, axes = eigh(-0.5 * about, subset_by_index=(n - 2, n - 1))

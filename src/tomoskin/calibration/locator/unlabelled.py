@@ -10,7 +10,6 @@ import numpy as np
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.modelled import ModelFit, model_responses
 from tomoskin.calibration.locator.presses import Presses
-from tomoskin.calibration.locator.process import Likeness
 from tomoskin.calibration.locator.ranks import Ranked, expected_sizes, inside
 from tomoskin.calibration.locator.refining import refined, signed_features
 from tomoskin.calibration.locator.unfolding import laid_over, unfolded
@@ -24,10 +23,7 @@ _POSITIONS = 400
 _NEIGHBOURS = (10, 14)
 """Of a frame: what both fits agree on does not rest on either. Chosen on two skins."""
 
-_WARP, _WARP_LENGTH, _WARP_NOISE = 0.25, 0.8, 0.03
-"""Deviation and length of what labels may move the positions by, and their noise, in radii."""
-
-_FOLDS = 5
+_FOLDS = 3
 """Into which labels are divided, to see how far left-out ones are missed."""
 
 
@@ -63,15 +59,14 @@ class UnlabelledFit:
         cls, dv: FloatArray, skin: Skin, pattern: Pattern, region: Region, labels: FloatArray
     ) -> Self:
         """Fit frames (n, n_meas); ``labels`` (n, 2) in radii, NaN where there is none."""
-        grid = region.lattice(_POSITIONS)
-        places = region.metres(grid)
         model = ForwardModel(skin.mesh(), pattern, contact_impedance=skin.contact_impedance)
-        unit = region.unit
-        answer = ModelFit.of(dv, model_responses(model, skin.conductivity, places, unit))
+        places, sheet = region.metres(region.grid), skin.conductivity
+        answer = ModelFit.of(dv, model_responses(model, sheet, places, region.unit))
         if answer.holds:
             alike = float(np.sqrt(answer.explained))
-            return cls._mean([answer.weights], grid, labels, (0.0, alike, True))
-        ranked = Ranked.of(dv, expected_sizes(model, skin.conductivity, places), grid)
+            return cls._mean([answer.weights], region.grid, (0.0, alike, True))
+        grid = region.lattice(_POSITIONS)
+        ranked = Ranked.of(dv, expected_sizes(model, sheet, region.metres(grid)), grid)
         features, fits = signed_features(dv), []
         for neighbours in _NEIGHBOURS:
             layout = unfolded(ranked.scores, neighbours)
@@ -82,17 +77,16 @@ class UnlabelledFit:
             fits.append(refined(features, start, labels, grid))
         away = np.mean(fits, axis=0) @ grid - ranked.positions
         moved = float(np.linalg.norm(away, axis=1).mean())
-        return cls._mean(fits, grid, labels, (moved, ranked.alike, False))
+        return cls._mean(fits, grid, (moved, ranked.alike, False))
 
     @classmethod
     def _mean(
         cls,
         fits: list[FloatArray],
         grid: FloatArray,
-        labels: FloatArray,
         found: tuple[float, float, bool],
     ) -> Self:
-        means = np.stack([_corrected(weights @ grid, labels) for weights in fits])
+        means = np.stack([weights @ grid for weights in fits])
         middle = means.mean(axis=0)
         off = means - middle
         between = np.einsum("fna,fnb->nab", off, off) / len(fits)
@@ -110,7 +104,7 @@ def from_labels(dv: FloatArray, labels: FloatArray, region: Region, pattern: Pat
     presses = Presses.of(dv[known], region.metres(labels[known]))
     start = region.scaled(Locator.learn(presses, region, pattern).predict(dv)[0])
     grid = region.lattice(_POSITIONS)
-    return _corrected(refined(signed_features(dv), start, labels, grid) @ grid, labels)
+    return np.asarray(refined(signed_features(dv), start, labels, grid) @ grid)
 
 
 def missed_labels(dv: FloatArray, labels: FloatArray, region: Region, pattern: Pattern) -> float:
@@ -129,16 +123,3 @@ def _covariances(weights: FloatArray, grid: FloatArray) -> FloatArray:
     mean = weights @ grid
     second = (weights @ (grid[:, :, None] * grid[:, None]).reshape(-1, 4)).reshape(-1, 2, 2)
     return np.asarray(second - mean[:, :, None] * mean[:, None])
-
-
-def _corrected(positions: FloatArray, labels: FloatArray) -> FloatArray:
-    """Positions (n, 2) moved smoothly, so that labelled ones come to where they were."""
-    some = np.isfinite(labels).all(axis=1)
-    if not some.any():
-        return positions
-    known = positions[some]
-    likeness = Likeness(_WARP_LENGTH)
-    among = likeness(known, known) / likeness.variance
-    noise = (_WARP_NOISE / _WARP) ** 2 * np.eye(len(known))
-    pull = np.linalg.solve(among + noise, labels[some] - known)
-    return np.asarray(positions + likeness(positions, known) / likeness.variance @ pull)
