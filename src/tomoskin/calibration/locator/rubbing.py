@@ -82,6 +82,8 @@ class Rubbing:
         be so though they have, and does not refuse.
     contradicted
         Labelled frames that are found far from their label.
+    by_labels
+        Whether labels did without the model and the electrodes' order, which do not hold.
     """
 
     skin: Skin
@@ -93,6 +95,7 @@ class Rubbing:
     modelled: bool
     quiet: tuple[int, ...]
     contradicted: tuple[int, ...]
+    by_labels: bool = False
 
     @classmethod
     def of(
@@ -184,14 +187,13 @@ class Rubbing:
         spread[known] = 0.0
         position = region.metres(np.where(known[:, None], labels, positions))
         presses = Presses.of(dv, position, spread=spread)
-        return replace(
-            self, presses=presses, disagreement=0.0, moved=0.0, alike=1.0, contradicted=()
-        )
+        return replace(self, presses=presses, contradicted=(), by_labels=True)
 
     @property
     def holds(self) -> bool:
         """Whether the positions can be believed."""
-        return not (self.alike < _ALIKE or self.contradicted or self._unsure)
+        doubtful = self.alike < _ALIKE or self.contradicted or self._unsure
+        return self.by_labels or not doubtful
 
     @property
     def _unsure(self) -> bool:
@@ -202,12 +204,12 @@ class Rubbing:
     def findings(self) -> tuple[str, ...]:
         """What speaks against the positions and what would mend it, in words."""
         found = []
-        if self.alike < _ALIKE:
+        if self.alike < _ALIKE and not self.by_labels:
             found.append(
                 "the voltages do not change as this skin's model predicts: the pattern or the "
                 "skin may be another one, or wires may be swapped (tomoskin calibrate wiring)"
             )
-        if self._unsure:
+        if self._unsure and not self.by_labels:
             found.append(
                 "the touches do not say where they were: fits that assume different things differ "
                 f"by {1e3 * max(self.disagreement, self.moved):.0f} mm; label at least {_ENOUGH} "
