@@ -349,7 +349,7 @@ def _of(known: Set, asked: Set) -> Score:
     taken = (time.process_time() - begun) / min(len(asked.dv), 50)
     return Score(
         _missed(told, asked),
-        _missed(_plain(known.dv, known.xy, asked.dv), asked),
+        _missed(plain(known.dv, known.xy, asked.dv), asked),
         _missed(Watch(locator)(asked.dv)[0], asked),
         held(locator, asked),
         fit,
@@ -357,7 +357,7 @@ def _of(known: Set, asked: Set) -> Score:
     )
 
 
-def _plain(dv: Floats, xy: Floats, tested: Floats) -> Floats:
+def plain(dv: Floats, xy: Floats, tested: Floats) -> Floats:
     """The reference: one process from squashed data to a place."""
     scale = np.median(np.abs(dv))
     learnt, asked = np.arcsinh(dv / scale), np.arcsinh(tested / scale)

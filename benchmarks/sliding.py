@@ -50,13 +50,13 @@ class Way:
     force: float
 
     @classmethod
-    def drawn(cls, seed: int, number: int) -> Way:
-        """From corner to corner at one speed, evenly over the middle of the skin."""
+    def drawn(cls, seed: int, number: int, seconds: float = SECONDS, within: float = WITHIN) -> Way:
+        """From corner to corner at one speed, evenly ``within`` m of the middle of the skin."""
         random = np.random.default_rng((seed, number))
         force = float(random.uniform(2, 6))
-        corners = [(0.0, *_somewhere(random))]
-        while corners[-1][0] < SECONDS:
-            x, y = _somewhere(random)
+        corners = [(0.0, *_somewhere(random, within))]
+        while corners[-1][0] < seconds:
+            x, y = _somewhere(random, within)
             time, *last = corners[-1]
             length = float(np.hypot(x - last[0], y - last[1]))
             if length > LEAST_WAY:
@@ -165,7 +165,7 @@ def _row(runs: Sequence[tuple[Way, Sequence[Seen]]], lag: float) -> tuple[object
 
 def _seen(electrodes: int, preset: str, motion: str, way: Way, seed: int) -> Iterator[Seen]:
     """What the live pipeline makes of it, by way of a session file."""
-    prepared, scan_time = _stage(electrodes)
+    prepared, scan_time = stage(electrodes)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.mcap"
         script = Script.from_toml(way.script(preset, motion))
@@ -183,11 +183,12 @@ def _seen(electrodes: int, preset: str, motion: str, way: Way, seed: int) -> Ite
 
 
 @cache
-def _stage(electrodes: int) -> tuple[Prepared, float]:
+def stage(electrodes: int) -> tuple[Prepared, float]:
+    """What frames are seen by, and s that a scan takes."""
     prepared = prepare(Skin.load(f"textile-disc-{electrodes}"))
     return prepared, Configuration.of(prepared.scan, ScanSettings.of(prepared.skin)).scan_time
 
 
-def _somewhere(random: np.random.Generator) -> tuple[float, float]:
-    away, turn = WITHIN * np.sqrt(random.uniform()), random.uniform(0, 2 * np.pi)
+def _somewhere(random: np.random.Generator, within: float) -> tuple[float, float]:
+    away, turn = within * np.sqrt(random.uniform()), random.uniform(0, 2 * np.pi)
     return float(away * np.cos(turn)), float(away * np.sin(turn))

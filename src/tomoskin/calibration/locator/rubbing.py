@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -13,7 +13,7 @@ from tomoskin.calibration.kind import Progress, silent
 from tomoskin.calibration.locator.locator import Locator
 from tomoskin.calibration.locator.posterior import BoolArray
 from tomoskin.calibration.locator.presses import Presses, frames
-from tomoskin.calibration.locator.unlabelled import UnlabelledFit
+from tomoskin.calibration.locator.unlabelled import UnlabelledFit, from_labels, missed_labels
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.pattern import Pattern
 from tomoskin.skin import Skin
@@ -22,16 +22,32 @@ from tomoskin.touch import Region
 FEWEST, _MOST = 150, 800
 """Touches that are needed, and that are used: spread evenly over those that were made."""
 
-_ALIGNED, _UNSURE = 0.15, 1.2
-"""Deviation, in radii, of labels on a sheet that is nothing like the model, less on one
-that is; and how many times as far as the fits disagree labels may be off. Chosen on two skins."""
+_WARPED, _UNSURE = 0.26, 1.2
+"""How far a position may be off, in each direction: times the way from where the electrodes'
+order alone puts it, and times that by which the fits disagree. Chosen on two skins."""
+
+_MODEL = 0.035
+"""The same, in radii, of positions that are the model's. Chosen on the twin."""
 
 _ALIKE = 0.27
 """Correlation with the skin's own responses below which the data are not of this skin."""
 
 _APART = 0.19
-"""Way, in radii, by which fits that assume different things may differ (root mean square): it was
-0.02 and 0.15 on the two skins that settings were chosen on."""
+"""Way, in radii, by which fits that assume different things may differ (root mean square)."""
+
+_MOVED = 0.45
+"""Mean way, in radii, from where the electrodes' order alone puts the touches: 1.25 times the
+most of the two skins that settings were chosen on."""
+
+_ENOUGH = 20
+"""Labels that align the touches by themselves where the electrodes' order misleads."""
+
+_HARDER = 1.0
+"""Logarithm by which a touch may be harder or softer than those that were made, where the changes
+of a sheet are in proportion to the force. Chosen on the twin's seeds 1 to 3."""
+
+_GOLDEN = 0.6180339887
+"""Multiples of it are spread evenly between whole numbers."""
 
 _QUIET = 3.0
 """An electrode that no touch came near answers in its largest answers less than so many times as
@@ -53,24 +69,33 @@ class Rubbing:
         What was touched, and what was measured.
     presses
         The touches that are used, with the positions that were found and their covariance.
-    disagreement
-        m by which fits that assume different things differ (root mean square).
+    disagreement, moved
+        m by which fits that assume different things differ (root mean square), and mean way from
+        where the electrodes' order alone puts the touches; both 0 where neither was asked.
     alike
         Correlation of the data with what the skin's model expects.
+    modelled
+        Whether the sheet answers as its model says, and the positions are the model's: those of
+        the sheet's response, which friction drags behind a finger that slides.
     quiet
         Electrodes, from 0, that touches seem not to have come near: on a patterned skin that may
         be so though they have, and does not refuse.
     contradicted
         Labelled frames that are found far from their label.
+    by_labels
+        Whether labels did without the model and the electrodes' order, which do not hold.
     """
 
     skin: Skin
     pattern: Pattern
     presses: Presses
     disagreement: float
+    moved: float
     alike: float
+    modelled: bool
     quiet: tuple[int, ...]
     contradicted: tuple[int, ...]
+    by_labels: bool = False
 
     @classmethod
     def of(
@@ -127,51 +152,68 @@ class Rubbing:
         Presses.of_more(dv[given], xy[given]).within(region)
         chosen = _evenly(len(dv), given)
         dv, xy = dv[chosen], xy[chosen]
-        labelled: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
+        labels = region.scaled(xy)
+        labelled: BoolArray = np.asarray(np.isfinite(labels).all(axis=1))
         alone = UnlabelledFit.of(dv, skin, pattern, region, np.full(xy.shape, np.nan))
-        away: FloatArray = np.linalg.norm(alone.positions - region.scaled(xy), axis=1)
-        far = np.asarray(away > _CONTRADICTED)
-        fit = alone
-        if labelled.any() and not far[labelled].any():
-            fit = UnlabelledFit.of(dv, skin, pattern, region, region.scaled(xy))
-        aside = _ALIGNED * (1 - alone.alike)
-        beyond = aside**2 + (_UNSURE * fit.disagreement) ** 2
-        spread = region.unit**2 * (fit.spread + beyond * np.eye(2))
-        spread[labelled] = 0.0
-        position = np.where(labelled[:, None], xy, region.metres(fit.positions))
-        return cls(
+        far = np.linalg.norm(alone.positions - labels, axis=1) > _CONTRADICTED
+        found = cls(
             skin,
             pattern,
-            Presses.of(dv, position, spread=spread),
-            region.unit * fit.disagreement,
+            Presses.of(dv, region.metres(alone.positions), spread=_spread(alone, region)),
+            region.unit * alone.disagreement,
+            region.unit * alone.moved,
             alone.alike,
+            alone.modelled,
             quiet_electrodes(dv, pattern),
             tuple(chosen[far & labelled].tolist()),
         )
+        if not labelled.any():
+            return found
+        if found.holds:
+            fit = UnlabelledFit.of(dv, skin, pattern, region, labels)
+            apart = region.unit * fit.disagreement
+            return replace(found, presses=_presses(dv, xy, fit, region), disagreement=apart)
+        return found._by_labels(labels) if labelled.sum() >= _ENOUGH else found
+
+    def _by_labels(self, labels: FloatArray) -> Self:
+        """The same from ``labels`` (n, 2) in radii alone, unless they contradict each other."""
+        dv, region = self.presses.dv, Region.of(self.skin)
+        missed = missed_labels(dv, labels, region, self.pattern)
+        if missed > _CONTRADICTED:
+            return self
+        positions = from_labels(dv, labels, region, self.pattern)
+        spread = np.tile(0.5 * (region.unit * missed) ** 2 * np.eye(2), (len(dv), 1, 1))
+        known: BoolArray = np.asarray(np.isfinite(labels).all(axis=1))
+        spread[known] = 0.0
+        position = region.metres(np.where(known[:, None], labels, positions))
+        presses = Presses.of(dv, position, spread=spread)
+        return replace(self, presses=presses, contradicted=(), by_labels=True)
 
     @property
     def holds(self) -> bool:
         """Whether the positions can be believed."""
-        return not (self.alike < _ALIKE or self.contradicted or self._unsure)
+        doubtful = self.alike < _ALIKE or self.contradicted or self._unsure
+        return self.by_labels or not doubtful
 
     @property
     def _unsure(self) -> bool:
-        return self.disagreement > _APART * Region.of(self.skin).unit
+        unit = Region.of(self.skin).unit
+        return self.disagreement > _APART * unit or self.moved > _MOVED * unit
 
     @property
     def findings(self) -> tuple[str, ...]:
         """What speaks against the positions and what would mend it, in words."""
         found = []
-        if self.alike < _ALIKE:
+        if self.alike < _ALIKE and not self.by_labels:
             found.append(
                 "the voltages do not change as this skin's model predicts: the pattern or the "
                 "skin may be another one, or wires may be swapped (tomoskin calibrate wiring)"
             )
-        if self._unsure:
+        if self._unsure and not self.by_labels:
             found.append(
                 "the touches do not say where they were: fits that assume different things differ "
-                f"by {1e3 * self.disagreement:.0f} mm; press known positions instead (tomoskin "
-                "calibrate touch)"
+                f"by {1e3 * max(self.disagreement, self.moved):.0f} mm; label at least {_ENOUGH} "
+                "touches, or press known positions (tomoskin calibrate touch)"
             )
         if self.quiet:
             names = ", ".join(f"E{e + 1}" for e in self.quiet)
@@ -208,8 +250,34 @@ class Rubbing:
         """A locator that has learnt from the touches. Raises DataError where they do not hold."""
         if not self.holds:
             raise DataError("; ".join(self.findings))
-        region = Region.of(self.skin)
-        return Locator.learn(self.presses, region, self.pattern, self.skin.identity, progress)
+        region, presses = Region.of(self.skin), self.presses
+        if self.modelled:
+            # What is off in each frame by itself is in the left-out errors.
+            shared = (_MODEL * region.unit) ** 2 * np.eye(2)
+            spread = np.where(presses.spreads.any(axis=(1, 2), keepdims=True), shared, 0.0)
+            presses = replace(presses, dv=_harder_and_softer(presses.dv), spread=spread)
+        return Locator.learn(presses, region, self.pattern, self.skin.identity, progress)
+
+
+def _presses(dv: FloatArray, xy: FloatArray, fit: UnlabelledFit, region: Region) -> Presses:
+    known: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
+    spread = _spread(fit, region)
+    spread[known] = 0.0
+    position = np.where(known[:, None], xy, region.metres(fit.positions))
+    return Presses.of(dv, position, spread=spread)
+
+
+def _spread(fit: UnlabelledFit, region: Region) -> FloatArray:
+    """(n, 2, 2) m² covariance of positions that were found."""
+    warped = _MODEL if fit.modelled else _WARPED * fit.moved
+    beyond = warped**2 + (_UNSURE * fit.disagreement) ** 2
+    return np.asarray(region.unit**2 * (fit.spread + beyond * np.eye(2)))
+
+
+def _harder_and_softer(dv: FloatArray) -> FloatArray:
+    """Frames (n, k) as if each had been touched harder or softer: one finger has one force."""
+    between = np.modf(_GOLDEN * np.arange(len(dv)))[0]
+    return np.asarray(dv * np.exp(_HARDER * (2 * between - 1))[:, None])
 
 
 def _evenly(n: int, given: IntArray) -> IntArray:
