@@ -16,7 +16,7 @@ from tomoskin.calibration import Differences, FrameView
 from tomoskin.core import Detection, Frame
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.finding import Finder, finding
-from tomoskin.pipeline.tune import tuned
+from tomoskin.pipeline.tune import tuned, tuned_sheet
 from tomoskin.signal import Reference
 from tomoskin.skin import Skin
 from tomoskin.source import ScanSettings
@@ -60,9 +60,10 @@ class Lab:
         self.prepared, self.table = fit, _table(self.skin, fit.scan)
         idle = np.array([self.volts(()) for _ in range(IDLE)])
         self.reference = Reference.of(idle)
-        image = tuned(prepare(self.skin), self.reference)
+        image = prepare(self.skin.altered({"touch": {"method": "image"}}))
+        image, on_sheet = tuned(image, self.reference), tuned_sheet(fit, self.reference)
         self.image = image.operator
-        self.by_fit = lambda: finding(fit, self.reference)
+        self.by_fit = lambda: finding(on_sheet, self.reference)
         self.by_image = lambda: finding(image, self.reference)
         self.floor = image.image_noise(self.reference)
         noise = fit.readout.noise / np.sqrt(2) * np.sqrt(1 + 1 / IDLE)
@@ -75,16 +76,6 @@ class Lab:
         self.time += HOLD
         samples = self.board.sample(self.table, self.time)
         return self.prepared.readout(Frame(0, 0, self.time, 1, 0, 0, samples)).values
-
-    def by_fit(self) -> Finder:
-        """The finder of fitted touches, after a frame in which nothing touches."""
-        self._fit.push(self._shown(0 * self.reference.mean))
-        return self._fit
-
-    def by_image(self) -> Finder:
-        """The same of the other method."""
-        self._image.push(self._shown(0 * self.reference.mean))
-        return self._image
 
     def view(self, presses: Sequence[Press]) -> FrameView:
         """What one frame shows."""

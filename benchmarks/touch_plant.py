@@ -19,7 +19,7 @@ from tomoskin.mesh import Mesh
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.finding import Finder, finding
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.tune import tuned
+from tomoskin.pipeline.tune import tuned, tuned_sheet
 from tomoskin.signal import NuisanceSubspace, Reference
 from tomoskin.signal.health import Roles
 from tomoskin.skin import Skin
@@ -156,6 +156,7 @@ class Lab:
             np.column_stack([self.reference.mean, lost]), self._image.operator.precision
         )
         self._floor = self._image.image_noise(self.reference, self._nuisance)
+        fit = tuned_sheet(fit, self.reference, self.lost)
         self.by_fit = finding(fit, self.reference)
         self.by_image = finding(self._image, self.reference)
 

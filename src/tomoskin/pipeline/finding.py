@@ -107,6 +107,7 @@ class InData:
             return self
         other = yield from InData.making(prepared.spots, prepared, reference, self._pace)
         yield from other._spots.preparing(self._spots.nuisance)
+        other._spots.watch.go_on(self._spots.watch)
         return other
 
     def push(self, view: FrameView) -> list[Detection]:

@@ -89,12 +89,13 @@ LIVE = Pace(
     closing=1,
     near=0.5,
     tolerance=0.1,
-    tries=1,
-    look=0.8,
+    tries=3,
+    look=0.6,
     rare=math.log(200),
     joint=0,
     restart=False,
     speed=0.1,
     fading=4.0,
 )
-"""What is not found in this frame is found in the next: one more touch a frame."""
+"""What is not found in this frame is found in the next. With one try, presses that begin together
+are one touch between them for some frames."""

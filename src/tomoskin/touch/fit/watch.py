@@ -82,6 +82,10 @@ class FrameWatch:
         self._age, self._times = 0, 1.0
         self._in_vain, self._astray = 0, False
 
+    def go_on(self, other: FrameWatch) -> None:
+        """Count a change of the other sign from where an ``other`` watch has begun to."""
+        self._raised = other._raised
+
     def begin(self, data: FloatArray, gauge: Gauge) -> None:
         """Take the data (n_meas,) of a frame: what no touch can do to them is noise."""
         if not self.excess.any:
@@ -110,10 +114,13 @@ class FrameWatch:
         """Whether touches leave so much of a frame unexplained that some of it may be of the sign
         that they do not have: then there would seem to be touches all round.
 
-        Where frame after frame is so, the second to fourth are looked at, and ever fewer later.
+        Several that begin in one frame may be such. Where frame after frame is so, the second to
+        fourth are looked at, and ever fewer later.
         """
         if problem.sign == "both" or not len(fit.spots):
             return False
+        if len(fit.spots) > len(self._before) + 1:
+            return True
         if fit.misfit - fit.degrees < _ASTRAY * self._least**2:
             return False
         self._astray = True
@@ -177,8 +184,8 @@ class FrameWatch:
         if self._lifted is not None:
             x, y = 1e3 * self._lifted
             return (
-                f"near {x:.0f}, {y:.0f} mm a press was probably on the skin when the reference "
-                "was taken, and has been lifted since: take a new reference while nothing touches"
+                f"the conductivity has risen near {x:.0f}, {y:.0f} mm: if a press was on the skin "
+                "when the reference was taken, take a new one while nothing touches"
             )
         if len(self._before):  # what they do not explain is their model's as a rule
             return None
