@@ -10,6 +10,9 @@ const SETTLED: f64 = 0.05;
 const LEAST_DAMPING: f64 = 1e-6;
 const MOST_DAMPING: f64 = 1e3;
 
+/// Cells that are compared at a time.
+const ABREAST: usize = 8;
+
 /// Where a spot may be.
 #[derive(Debug)]
 pub struct Sheet {
@@ -22,13 +25,17 @@ pub struct Sheet {
 impl Sheet {
     /// Brings a spot that is off the sheet back to its nearest cell.
     fn hold(&self, spot: &mut Spot) {
-        let (mut nearest, mut least) = (0, f64::INFINITY);
-        for (number, [x, y]) in self.centroids.iter().enumerate() {
-            let square = (x - spot[0]).powi(2) + (y - spot[1]).powi(2);
-            if square < least {
-                (nearest, least) = (number, square);
+        let square = |[x, y]: &[f64; 2]| (x - spot[0]).powi(2) + (y - spot[1]).powi(2);
+        let mut least = [f64::INFINITY; ABREAST];
+        for cells in self.centroids.chunks(ABREAST) {
+            for (least, cell) in least.iter_mut().zip(cells) {
+                let square = square(cell);
+                *least = if square < *least { square } else { *least };
             }
         }
+        let least = least.into_iter().fold(f64::INFINITY, f64::min);
+        let nearest = self.centroids.iter().position(|cell| square(cell) == least);
+        let nearest = nearest.unwrap_or(0);
         if least.sqrt() > self.margin[nearest] {
             spot[..2].copy_from_slice(&self.centroids[nearest]);
         }
@@ -84,7 +91,7 @@ pub struct Seen {
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     /// The table, and how it is seen.
-    pub table: &'a Table,
+    pub table: Table<'a>,
     /// See there.
     pub seen: &'a Seen,
     /// See there.
@@ -155,7 +162,7 @@ struct Descent {
 impl Frame<'_> {
     /// The frame with these spots, as they are; `None` where they cannot be compared with it.
     pub fn at(&self, spots: Vec<Spot>) -> Option<Fit> {
-        let (rank, rows, k) = (self.table.rank, self.seen.rows, spots.len());
+        let (rank, rows, k) = (self.table.layout.rank, self.seen.rows, spots.len());
         let parts = self.expanded(&spots, ROWS);
         let seen = self.whitened(&parts);
         let pick = |first: usize, count: usize| picked(&seen, ROWS, first, count);
@@ -274,7 +281,7 @@ impl Frame<'_> {
 
     /// (k, rows, rank) of spots.
     fn expanded(&self, spots: &[Spot], rows: usize) -> Vec<f64> {
-        let size = rows * self.table.rank;
+        let size = rows * self.table.layout.rank;
         let mut parts = vec![0.0; spots.len() * size];
         for (spot, part) in spots.iter().zip(parts.chunks_exact_mut(size.max(1))) {
             self.table.expand(spot, rows, part);
@@ -340,7 +347,7 @@ impl Frame<'_> {
     /// Directions whose amplitudes are unknown: what is left, each spot's direction, its way and
     /// growth within the scan.
     fn unknown(&self, spots: &[Spot], parts: &[f64], own: [Matrix<f64>; 2]) -> Matrix<f64> {
-        let (rows, rank) = (self.seen.rows, self.table.rank);
+        let (rows, rank) = (self.seen.rows, self.table.layout.rank);
         let [directed, reshaped, reach, grows] = self.deviations;
         let mut values = self.left.to_vec();
         for (size, directions) in [directed, reshaped].into_iter().zip(&own) {
