@@ -106,28 +106,42 @@ impl Products<'_> {
     /// first cache.
     #[inline(always)]
     fn rows<S: Simd, const N: usize>(&mut self, simd: S, first: usize) {
-        let (height, inner) = (self.height, self.left.len() / self.height);
-        let (n, lanes) = (self.target.len() / height, S::F64_LANES);
+        let n = self.target.len() / self.height;
         for start in (0..n).step_by(WIDE) {
-            // beyond the last column the last one is multiplied again, and dropped
-            let column = |j: usize| &self.right[(start + j).min(n - 1) * inner..][..inner];
-            let columns: [&[f64]; WIDE] = std::array::from_fn(column);
-            let mut sums = [[simd.splat_f64s(0.0); N]; WIDE];
-            let rows = self.left.chunks_exact(height);
-            for (k, row) in rows.enumerate().take(inner) {
-                let values = S::as_simd_f64s(&row[first..first + N * lanes]).0;
-                for (sum, column) in sums.iter_mut().zip(columns) {
-                    let factor = simd.splat_f64s(column[k]);
-                    for (sum, &value) in sum.iter_mut().zip(values) {
-                        *sum = simd.mul_add_e_f64s(value, factor, *sum);
-                    }
+            match n - start {
+                1 => self.block::<S, N, 1>(simd, first, start),
+                2 => self.block::<S, N, 2>(simd, first, start),
+                3 => self.block::<S, N, 3>(simd, first, start),
+                _ => self.block::<S, N, WIDE>(simd, first, start),
+            }
+        }
+    }
+
+    /// The same of so many columns from the `start` on.
+    #[inline(always)]
+    fn block<S: Simd, const N: usize, const W: usize>(
+        &mut self,
+        simd: S,
+        first: usize,
+        start: usize,
+    ) {
+        let (height, inner) = (self.height, self.left.len() / self.height);
+        let column = |j: usize| &self.right[(start + j) * inner..][..inner];
+        let columns: [&[f64]; W] = std::array::from_fn(column);
+        let (mut sums, end) = ([[simd.splat_f64s(0.0); N]; W], first + N * S::F64_LANES);
+        for (k, row) in self.left.chunks_exact(height).enumerate() {
+            let values = S::as_simd_f64s(&row[first..end]).0;
+            for (sum, column) in sums.iter_mut().zip(columns) {
+                let factor = simd.splat_f64s(column[k]);
+                for (sum, &value) in sum.iter_mut().zip(values) {
+                    *sum = simd.mul_add_e_f64s(value, factor, *sum);
                 }
             }
-            for (j, sum) in sums.iter().enumerate().take(n - start) {
-                let at = (start + j) * height + first;
-                let target = S::as_mut_simd_f64s(&mut self.target[at..at + N * lanes]).0;
-                target.copy_from_slice(sum);
-            }
+        }
+        let targets = self.target[start * height..].chunks_exact_mut(height);
+        for (target, sum) in targets.zip(&sums) {
+            let target = S::as_mut_simd_f64s(&mut target[first..end]).0;
+            target.copy_from_slice(sum);
         }
     }
 }

@@ -87,6 +87,20 @@ pub struct Seen {
     pub timed: Vec<f64>,
 }
 
+impl Seen {
+    /// (rows, n) of n changes in the basis.
+    pub fn whitened(&self, changes: &[f64]) -> Matrix<f64> {
+        let (rows, narrow) = (self.rows, self.narrow);
+        let seen = product(&self.direct, narrow, changes);
+        let mut out = Matrix::zeros(rows, seen.width());
+        let columns = out.values.chunks_exact_mut(rows);
+        for (target, column) in columns.zip(seen.values.chunks_exact(narrow)) {
+            target[..narrow].copy_from_slice(column);
+        }
+        out
+    }
+}
+
 /// Whitened data of one frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
@@ -104,7 +118,7 @@ pub struct Frame<'a> {
     pub rest: f64,
     /// (left, rows), one direction after the other.
     pub left: &'a [f64],
-    /// (rank) what the table lacks.
+    /// (rows) what the table lacks, whitened.
     pub offset: &'a [f64],
     /// Deviation of a spot's direction, of its shape, of its way within the scan, m, and of its
     /// growth.
@@ -164,7 +178,7 @@ impl Frame<'_> {
     pub fn at(&self, spots: Vec<Spot>) -> Option<Fit> {
         let (rank, rows, k) = (self.table.layout.rank, self.seen.rows, spots.len());
         let parts = self.expanded(&spots, ROWS);
-        let seen = self.whitened(&parts);
+        let seen = self.seen.whitened(&parts);
         let pick = |first: usize, count: usize| picked(&seen, ROWS, first, count);
         let (each, jacobian) = (pick(0, 1), pick(1, PARAMETERS));
         let unknown = self.unknown(&spots, &parts, [pick(SLOPES, 1), pick(SLOPES + 1, 1)]);
@@ -265,7 +279,7 @@ impl Frame<'_> {
     /// The cost of spots by the metric of others.
     fn slope(&self, metric: &Metric, spots: Vec<Spot>) -> Slope {
         let (k, n) = (spots.len(), spots.len() * PARAMETERS);
-        let seen = self.whitened(&self.expanded(&spots, SLOPES));
+        let seen = self.seen.whitened(&self.expanded(&spots, SLOPES));
         let each = picked(&seen, SLOPES, 0, 1);
         let mut columns = picked(&seen, SLOPES, 1, PARAMETERS).values;
         columns.extend(self.residual(&self.predicted(&each)));
@@ -290,7 +304,7 @@ impl Frame<'_> {
     }
 
     fn predicted(&self, each: &Matrix<f64>) -> Vec<f64> {
-        let mut predicted = self.whitened(self.offset).values;
+        let mut predicted = self.offset.to_vec();
         for column in each.values.chunks_exact(self.seen.rows) {
             predicted.iter_mut().zip(column).for_each(|(p, c)| *p += c);
         }
@@ -371,18 +385,6 @@ impl Frame<'_> {
             values,
             height: rows,
         }
-    }
-
-    /// (rows, n) of n changes in the basis.
-    fn whitened(&self, changes: &[f64]) -> Matrix<f64> {
-        let (rows, narrow) = (self.seen.rows, self.seen.narrow);
-        let seen = product(&self.seen.direct, narrow, changes);
-        let mut out = Matrix::zeros(rows, seen.width());
-        let columns = out.values.chunks_exact_mut(rows);
-        for (target, column) in columns.zip(seen.values.chunks_exact(narrow)) {
-            target[..narrow].copy_from_slice(column);
-        }
-        out
     }
 }
 

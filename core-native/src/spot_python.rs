@@ -155,7 +155,7 @@ impl SpotTable {
         let squares = array::<f64, Ix1>("squares", &candidates.2)?;
         same("columns of candidates", PARAMETERS, places.shape()[1])?;
         same("candidates", squares.len(), places.shape()[0])?;
-        let nothing = vec![0.0; self.layout.rank];
+        let nothing = vec![0.0; seen.seen.rows];
         let bare = Frame {
             offset: &nothing,
             ..frame
@@ -294,7 +294,7 @@ type FrameArrays<'py> = (Any<'py>, f64, Any<'py>, Any<'py>, [f64; 4], [f64; 2]);
 struct Arrays<'py> {
     data: PyReadonlyArray1<'py, f64>,
     left: PyReadonlyArray2<'py, f64>,
-    offset: PyReadonlyArray1<'py, f64>,
+    offset: Vec<f64>,
     values: PyReadonlyArray3<'py, f32>,
 }
 
@@ -315,7 +315,7 @@ impl<'py> Arrays<'py> {
         Ok(Self {
             data,
             left,
-            offset,
+            offset: seen.seen.whitened(contiguous("offset", &offset)?).values,
             values,
         })
     }
@@ -334,7 +334,7 @@ impl<'py> Arrays<'py> {
             data: contiguous("data", &self.data)?,
             rest: frame.1,
             left: contiguous("left", &self.left)?,
-            offset: contiguous("offset", &self.offset)?,
+            offset: &self.offset,
             deviations: frame.4,
             depths: frame.5,
         })

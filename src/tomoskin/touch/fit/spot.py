@@ -32,7 +32,7 @@ _BELL = 0.5
 _SPLIT = 2
 """Each side of a cell is cut into so many, for the mean of a profile over the cell."""
 
-_FEW = 400
+_FEW = 300
 """Up to so many cells a local update is faster than a new solve (1,500 cells, native engine)."""
 
 
