@@ -4,8 +4,8 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::dense::Matrix;
 
-/// Columns of each side that are multiplied at a time.
-const BLOCK: usize = 2;
+/// Columns of the left side, and of the right one, that are multiplied at a time.
+const BLOCK: [usize; 2] = [4, 2];
 
 /// leftᵀ right, of columns of `length`.
 ///
@@ -56,23 +56,18 @@ pub fn squares(columns: &[f64], length: usize) -> Matrix<f64> {
 pub fn product(left: &[f64], height: usize, right: &[f64]) -> Matrix<f64> {
     let inner = left.len() / height;
     let mut out = Matrix::zeros(height, right.len() / inner);
-    for (target, right) in out
-        .values
-        .chunks_mut(WIDE * height)
-        .zip(right.chunks(WIDE * inner))
-    {
-        Arch::new().dispatch(Products {
-            left,
-            height,
-            right,
-            target,
-        });
-    }
+    Arch::new().dispatch(Products {
+        left,
+        height,
+        right,
+        target: &mut out.values,
+    });
     out
 }
 
-/// Columns of the right side that are multiplied at a time.
+/// Columns of the right side that are multiplied at a time, with so many registers of rows.
 const WIDE: usize = 4;
+const HIGH: usize = 2;
 
 struct Products<'a> {
     left: &'a [f64],
@@ -85,36 +80,68 @@ impl WithSimd for Products<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let (height, inner) = (self.height, self.left.len() / self.height);
-        let n = self.target.len() / height;
-        // beyond the last column the last one is multiplied again, and dropped
-        let column = |j: usize| &self.right[j.min(n - 1) * inner..][..inner];
-        let (a, b, c, d) = (column(0), column(1), column(2), column(3));
-        let lanes = S::F64_LANES;
-        let whole = height - height % lanes;
-        for first in (0..whole).step_by(lanes) {
-            let zero = simd.splat_f64s(0.0);
-            let (mut ra, mut rb, mut rc, mut rd) = (zero, zero, zero, zero);
-            for k in 0..inner {
-                let at = k * height + first;
-                let value = S::as_simd_f64s(&self.left[at..at + lanes]).0[0];
-                ra = simd.mul_add_e_f64s(value, simd.splat_f64s(a[k]), ra);
-                rb = simd.mul_add_e_f64s(value, simd.splat_f64s(b[k]), rb);
-                rc = simd.mul_add_e_f64s(value, simd.splat_f64s(c[k]), rc);
-                rd = simd.mul_add_e_f64s(value, simd.splat_f64s(d[k]), rd);
-            }
-            for (j, sum) in [ra, rb, rc, rd].into_iter().enumerate().take(n) {
-                let at = j * height + first;
-                S::as_mut_simd_f64s(&mut self.target[at..at + lanes]).0[0] = sum;
-            }
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let whole = self.height - self.height % S::F64_LANES;
+        let step = HIGH * S::F64_LANES;
+        let even = whole - whole % step;
+        for first in (0..even).step_by(step) {
+            self.rows::<S, HIGH>(simd, first);
         }
+        for first in (even..whole).step_by(S::F64_LANES) {
+            self.rows::<S, 1>(simd, first);
+        }
+        let (height, inner) = (self.height, self.left.len() / self.height);
         for row in whole..height {
-            for j in 0..n {
-                let right = column(j).iter().enumerate();
+            for (j, right) in self.right.chunks_exact(inner).enumerate() {
+                let right = right.iter().enumerate();
                 self.target[j * height + row] =
                     right.map(|(k, x)| self.left[k * height + row] * x).sum();
             }
+        }
+    }
+}
+
+impl Products<'_> {
+    /// So many registers of rows from the `first` on, of all columns: the left side's stay in the
+    /// first cache.
+    #[inline(always)]
+    fn rows<S: Simd, const N: usize>(&mut self, simd: S, first: usize) {
+        let n = self.target.len() / self.height;
+        for start in (0..n).step_by(WIDE) {
+            match n - start {
+                1 => self.block::<S, N, 1>(simd, first, start),
+                2 => self.block::<S, N, 2>(simd, first, start),
+                3 => self.block::<S, N, 3>(simd, first, start),
+                _ => self.block::<S, N, WIDE>(simd, first, start),
+            }
+        }
+    }
+
+    /// The same of so many columns from the `start` on.
+    #[inline(always)]
+    fn block<S: Simd, const N: usize, const W: usize>(
+        &mut self,
+        simd: S,
+        first: usize,
+        start: usize,
+    ) {
+        let (height, inner) = (self.height, self.left.len() / self.height);
+        let column = |j: usize| &self.right[(start + j) * inner..][..inner];
+        let columns: [&[f64]; W] = std::array::from_fn(column);
+        let (mut sums, end) = ([[simd.splat_f64s(0.0); N]; W], first + N * S::F64_LANES);
+        for (k, row) in self.left.chunks_exact(height).enumerate() {
+            let values = S::as_simd_f64s(&row[first..end]).0;
+            for (sum, column) in sums.iter_mut().zip(columns) {
+                let factor = simd.splat_f64s(column[k]);
+                for (sum, &value) in sum.iter_mut().zip(values) {
+                    *sum = simd.mul_add_e_f64s(value, factor, *sum);
+                }
+            }
+        }
+        let targets = self.target[start * height..].chunks_exact_mut(height);
+        for (target, sum) in targets.zip(&sums) {
+            let target = S::as_mut_simd_f64s(&mut target[first..end]).0;
+            target.copy_from_slice(sum);
         }
     }
 }
@@ -152,10 +179,15 @@ impl WithSimd for Dots<'_> {
         let left = |i: usize| &self.left[i.min(height - 1) * length..][..length];
         let right = |j: usize| &self.right[j.min(width - 1) * length..][..length];
         // the right side is the smaller one, as a rule, and stays in the first cache
-        for i in (0..height).step_by(BLOCK) {
-            let end = if self.lower { i + 1 } else { width };
-            for j in (0..end).step_by(BLOCK) {
-                let found = block(simd, [left(i), left(i + 1)], [right(j), right(j + 1)]);
+        for i in (0..height).step_by(BLOCK[0]) {
+            let end = if self.lower {
+                width.min(i + BLOCK[0])
+            } else {
+                width
+            };
+            let own = std::array::from_fn(|row| left(i + row));
+            for j in (0..end).step_by(BLOCK[1]) {
+                let found = block(simd, own, std::array::from_fn(|column| right(j + column)));
                 for (row, values) in found.iter().enumerate().take(height - i) {
                     for (column, value) in values.iter().enumerate().take(width - j) {
                         self.out[(i + row, j + column)] = *value;
@@ -166,31 +198,32 @@ impl WithSimd for Dots<'_> {
     }
 }
 
-/// Each of two columns times each of two others.
+/// Each of some columns times each of others, all of one length.
 #[inline(always)]
-fn block<S: Simd>(simd: S, [a, b]: [&[f64]; 2], [c, d]: [&[f64]; 2]) -> [[f64; 2]; 2] {
-    let zero = simd.splat_f64s(0.0);
-    let (mut ac, mut ad, mut bc, mut bd) = (zero, zero, zero, zero);
-    let whole = a.len() - a.len() % S::F64_LANES;
-    let (u, v) = (S::as_simd_f64s(a).0, S::as_simd_f64s(b).0);
-    let (x, y) = (S::as_simd_f64s(c).0, S::as_simd_f64s(d).0);
-    let n = u.len();
-    let (v, x, y) = (&v[..n], &x[..n], &y[..n]);
-    for n in 0..n {
-        ac = simd.mul_add_e_f64s(u[n], x[n], ac);
-        ad = simd.mul_add_e_f64s(u[n], y[n], ad);
-        bc = simd.mul_add_e_f64s(v[n], x[n], bc);
-        bd = simd.mul_add_e_f64s(v[n], y[n], bd);
+fn block<S: Simd>(
+    simd: S,
+    left: [&[f64]; BLOCK[0]],
+    right: [&[f64]; BLOCK[1]],
+) -> [[f64; BLOCK[1]]; BLOCK[0]] {
+    let length = left[0].len();
+    let whole = length - length % S::F64_LANES;
+    let one = left.map(|column| S::as_simd_f64s(&column[..whole]).0);
+    let other = right.map(|column| S::as_simd_f64s(&column[..whole]).0);
+    let mut sums = [[simd.splat_f64s(0.0); BLOCK[1]]; BLOCK[0]];
+    for n in 0..whole / S::F64_LANES {
+        for (sums, one) in sums.iter_mut().zip(one) {
+            for (sum, other) in sums.iter_mut().zip(other) {
+                *sum = simd.mul_add_e_f64s(one[n], other[n], *sum);
+            }
+        }
     }
-    let mut out = [
-        [simd.reduce_sum_f64s(ac), simd.reduce_sum_f64s(ad)],
-        [simd.reduce_sum_f64s(bc), simd.reduce_sum_f64s(bd)],
-    ];
-    for n in whole..a.len() {
-        out[0][0] += a[n] * c[n];
-        out[0][1] += a[n] * d[n];
-        out[1][0] += b[n] * c[n];
-        out[1][1] += b[n] * d[n];
+    let mut out = sums.map(|row| row.map(|sum| simd.reduce_sum_f64s(sum)));
+    for n in whole..length {
+        for (sums, one) in out.iter_mut().zip(left) {
+            for (sum, other) in sums.iter_mut().zip(right) {
+                *sum += one[n] * other[n];
+            }
+        }
     }
     out
 }

@@ -10,6 +10,9 @@ const SETTLED: f64 = 0.05;
 const LEAST_DAMPING: f64 = 1e-6;
 const MOST_DAMPING: f64 = 1e3;
 
+/// Cells that are compared at a time.
+const ABREAST: usize = 8;
+
 /// Where a spot may be.
 #[derive(Debug)]
 pub struct Sheet {
@@ -22,13 +25,17 @@ pub struct Sheet {
 impl Sheet {
     /// Brings a spot that is off the sheet back to its nearest cell.
     fn hold(&self, spot: &mut Spot) {
-        let (mut nearest, mut least) = (0, f64::INFINITY);
-        for (number, [x, y]) in self.centroids.iter().enumerate() {
-            let square = (x - spot[0]).powi(2) + (y - spot[1]).powi(2);
-            if square < least {
-                (nearest, least) = (number, square);
+        let square = |[x, y]: &[f64; 2]| (x - spot[0]).powi(2) + (y - spot[1]).powi(2);
+        let mut least = [f64::INFINITY; ABREAST];
+        for cells in self.centroids.chunks(ABREAST) {
+            for (least, cell) in least.iter_mut().zip(cells) {
+                let square = square(cell);
+                *least = if square < *least { square } else { *least };
             }
         }
+        let least = least.into_iter().fold(f64::INFINITY, f64::min);
+        let nearest = self.centroids.iter().position(|cell| square(cell) == least);
+        let nearest = nearest.unwrap_or(0);
         if least.sqrt() > self.margin[nearest] {
             spot[..2].copy_from_slice(&self.centroids[nearest]);
         }
@@ -80,11 +87,25 @@ pub struct Seen {
     pub timed: Vec<f64>,
 }
 
+impl Seen {
+    /// (rows, n) of n changes in the basis.
+    pub fn whitened(&self, changes: &[f64]) -> Matrix<f64> {
+        let (rows, narrow) = (self.rows, self.narrow);
+        let seen = product(&self.direct, narrow, changes);
+        let mut out = Matrix::zeros(rows, seen.width());
+        let columns = out.values.chunks_exact_mut(rows);
+        for (target, column) in columns.zip(seen.values.chunks_exact(narrow)) {
+            target[..narrow].copy_from_slice(column);
+        }
+        out
+    }
+}
+
 /// Whitened data of one frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     /// The table, and how it is seen.
-    pub table: &'a Table,
+    pub table: Table<'a>,
     /// See there.
     pub seen: &'a Seen,
     /// See there.
@@ -97,7 +118,7 @@ pub struct Frame<'a> {
     pub rest: f64,
     /// (left, rows), one direction after the other.
     pub left: &'a [f64],
-    /// (rank) what the table lacks.
+    /// (rows) what the table lacks, whitened.
     pub offset: &'a [f64],
     /// Deviation of a spot's direction, of its shape, of its way within the scan, m, and of its
     /// growth.
@@ -155,9 +176,9 @@ struct Descent {
 impl Frame<'_> {
     /// The frame with these spots, as they are; `None` where they cannot be compared with it.
     pub fn at(&self, spots: Vec<Spot>) -> Option<Fit> {
-        let (rank, rows, k) = (self.table.rank, self.seen.rows, spots.len());
+        let (rank, rows, k) = (self.table.layout.rank, self.seen.rows, spots.len());
         let parts = self.expanded(&spots, ROWS);
-        let seen = self.whitened(&parts);
+        let seen = self.seen.whitened(&parts);
         let pick = |first: usize, count: usize| picked(&seen, ROWS, first, count);
         let (each, jacobian) = (pick(0, 1), pick(1, PARAMETERS));
         let unknown = self.unknown(&spots, &parts, [pick(SLOPES, 1), pick(SLOPES + 1, 1)]);
@@ -258,7 +279,7 @@ impl Frame<'_> {
     /// The cost of spots by the metric of others.
     fn slope(&self, metric: &Metric, spots: Vec<Spot>) -> Slope {
         let (k, n) = (spots.len(), spots.len() * PARAMETERS);
-        let seen = self.whitened(&self.expanded(&spots, SLOPES));
+        let seen = self.seen.whitened(&self.expanded(&spots, SLOPES));
         let each = picked(&seen, SLOPES, 0, 1);
         let mut columns = picked(&seen, SLOPES, 1, PARAMETERS).values;
         columns.extend(self.residual(&self.predicted(&each)));
@@ -274,7 +295,7 @@ impl Frame<'_> {
 
     /// (k, rows, rank) of spots.
     fn expanded(&self, spots: &[Spot], rows: usize) -> Vec<f64> {
-        let size = rows * self.table.rank;
+        let size = rows * self.table.layout.rank;
         let mut parts = vec![0.0; spots.len() * size];
         for (spot, part) in spots.iter().zip(parts.chunks_exact_mut(size.max(1))) {
             self.table.expand(spot, rows, part);
@@ -283,7 +304,7 @@ impl Frame<'_> {
     }
 
     fn predicted(&self, each: &Matrix<f64>) -> Vec<f64> {
-        let mut predicted = self.whitened(self.offset).values;
+        let mut predicted = self.offset.to_vec();
         for column in each.values.chunks_exact(self.seen.rows) {
             predicted.iter_mut().zip(column).for_each(|(p, c)| *p += c);
         }
@@ -340,7 +361,7 @@ impl Frame<'_> {
     /// Directions whose amplitudes are unknown: what is left, each spot's direction, its way and
     /// growth within the scan.
     fn unknown(&self, spots: &[Spot], parts: &[f64], own: [Matrix<f64>; 2]) -> Matrix<f64> {
-        let (rows, rank) = (self.seen.rows, self.table.rank);
+        let (rows, rank) = (self.seen.rows, self.table.layout.rank);
         let [directed, reshaped, reach, grows] = self.deviations;
         let mut values = self.left.to_vec();
         for (size, directions) in [directed, reshaped].into_iter().zip(&own) {
@@ -364,18 +385,6 @@ impl Frame<'_> {
             values,
             height: rows,
         }
-    }
-
-    /// (rows, n) of n changes in the basis.
-    fn whitened(&self, changes: &[f64]) -> Matrix<f64> {
-        let (rows, narrow) = (self.seen.rows, self.seen.narrow);
-        let seen = product(&self.seen.direct, narrow, changes);
-        let mut out = Matrix::zeros(rows, seen.width());
-        let columns = out.values.chunks_exact_mut(rows);
-        for (target, column) in columns.zip(seen.values.chunks_exact(narrow)) {
-            target[..narrow].copy_from_slice(column);
-        }
-        out
     }
 }
 

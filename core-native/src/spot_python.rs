@@ -2,7 +2,7 @@
 
 use numpy::{
     Ix1, Ix2, Ix3, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1,
-    PyReadonlyArray2, PyUntypedArrayMethods,
+    PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
@@ -13,12 +13,13 @@ use crate::spot_algebra::{Beside, Metric};
 use crate::spot_fit::{Fit, Frame, Prior, Seen, Sheet};
 use crate::spot_match::{self, Limits, Measurements, Quality, Signatures};
 use crate::spot_search::{Found, Pace, Rules, Search};
-use crate::spot_table::{DIRECTIONS, Grid, PARAMETERS, ROWS, SLOPES, Spot, Table};
+use crate::spot_table::{DIRECTIONS, Grid, Layout, PARAMETERS, ROWS, SLOPES, Spot, Table};
 
-/// A table of spots, and where they may be.
+/// A table of spots, whose values stay Python's, and where they may be.
 #[pyclass(frozen, module = "tomoskin_core")]
 pub(crate) struct SpotTable {
-    table: Table,
+    layout: Layout,
+    values: Py<PyArray3<f32>>,
     sheet: Sheet,
     prior: Prior,
 }
@@ -68,21 +69,22 @@ impl SpotTable {
         same("entries of prior", 2 * PARAMETERS, prior.len())?;
         let (sheet, prior) = (sheet.as_array(), prior.as_array());
         let row = |number: usize| -> Spot { std::array::from_fn(|i| prior[(number, i)]) };
-        let table = Table {
+        let layout = Layout {
             log_radii: array::<f64, Ix1>("log_radii", log_radii)?
                 .as_array()
                 .to_vec(),
             grids: grids_of(grids)?,
             nodes: nodes.as_array().to_vec(),
             rank: values.shape()[2],
-            values: contiguous("values", &values)?.to_vec(),
             filling,
         };
+        let count = contiguous("values", &values)?.len();
         if sheet.is_empty() {
             return Err(invalid("sheet: a cell at least"));
         }
         Ok(Self {
-            table: table.checked().map_err(invalid)?,
+            layout: layout.checked(count).map_err(invalid)?,
+            values: (*values).clone().unbind(),
             sheet: Sheet {
                 centroids: sheet.outer_iter().map(|cell| [cell[0], cell[1]]).collect(),
                 margin: sheet.outer_iter().map(|cell| cell[2]).collect(),
@@ -98,14 +100,16 @@ impl SpotTable {
 
     /// (k, ROWS, rank) of spots (k, 4).
     fn expanded<'py>(&self, spots: &Any<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let (py, spots) = (spots.py(), spots_of(spots)?);
-        let size = ROWS * self.table.rank;
-        let out = PyArray3::<f64>::zeros(py, [spots.len(), ROWS, self.table.rank], false);
+        let (py, spots, rank) = (spots.py(), spots_of(spots)?, self.layout.rank);
+        let values = self.values.bind(py).try_readonly()?;
+        let table = self.table(&values)?;
+        let size = ROWS * rank;
+        let out = PyArray3::<f64>::zeros(py, [spots.len(), ROWS, rank], false);
         {
             let mut writable = out.readwrite();
             let parts = writable.as_slice_mut()?.chunks_exact_mut(size.max(1));
             for (spot, part) in spots.iter().zip(parts) {
-                self.table.expand(spot, ROWS, part);
+                table.expand(spot, ROWS, part);
             }
         }
         Ok(out)
@@ -151,7 +155,7 @@ impl SpotTable {
         let squares = array::<f64, Ix1>("squares", &candidates.2)?;
         same("columns of candidates", PARAMETERS, places.shape()[1])?;
         same("candidates", squares.len(), places.shape()[0])?;
-        let nothing = vec![0.0; self.table.rank];
+        let nothing = vec![0.0; seen.seen.rows];
         let bare = Frame {
             offset: &nothing,
             ..frame
@@ -220,7 +224,9 @@ impl SpotTable {
         same("rows of slopes", n, slopes.shape()[0])?;
         same("rows of normal", n, normal.shape()[0])?;
         same("columns of normal", n, normal.shape()[1])?;
-        same("length of offset", self.table.rank, offset.len())?;
+        same("length of offset", self.layout.rank, offset.len())?;
+        let values = self.values.bind(py).try_readonly()?;
+        let table = self.table(&values)?;
         let (each, slopes) = (contiguous("each", &each)?, contiguous("slopes", &slopes)?);
         let unknown = contiguous("unknown", &unknown)?;
         let offset = contiguous("offset", &offset)?;
@@ -239,7 +245,7 @@ impl SpotTable {
             let squares = spot_match::standing(&alone, [slopes, each], ridge)?;
             let onto = Beside::of(unknown, &[], seen.seen.rows, ridge)?;
             let onto = onto.projected(slopes, seen.seen.rows);
-            let change = self.change(seen, &spots, offset);
+            let change = change(table, seen, &spots, offset);
             let measurements = Measurements {
                 matrix: &seen.matrix,
                 squares: &seen.squares,
@@ -254,17 +260,24 @@ impl SpotTable {
 }
 
 impl SpotTable {
-    /// (n_meas) what spots change, with what the table lacks of them.
-    fn change(&self, seen: &SeenTable, spots: &[Spot], offset: &[f64]) -> Vec<f64> {
-        let rank = self.table.rank;
-        let (mut sum, mut part) = (offset.to_vec(), vec![0.0; SLOPES * rank]);
-        for spot in spots {
-            self.table.expand(spot, SLOPES, &mut part);
-            let both = sum.iter_mut().zip(&part[..rank]);
-            both.for_each(|(sum, value)| *sum += value);
-        }
-        product(&seen.basis, seen.squares.len(), &sum).values
+    fn table<'a>(&'a self, values: &'a PyReadonlyArray3<'_, f32>) -> PyResult<Table<'a>> {
+        Ok(Table {
+            layout: &self.layout,
+            values: contiguous("values", values)?,
+        })
     }
+}
+
+/// (n_meas) what spots change, with what the table lacks of them.
+fn change(table: Table<'_>, seen: &SeenTable, spots: &[Spot], offset: &[f64]) -> Vec<f64> {
+    let rank = table.layout.rank;
+    let (mut sum, mut part) = (offset.to_vec(), vec![0.0; SLOPES * rank]);
+    for spot in spots {
+        table.expand(spot, SLOPES, &mut part);
+        let both = sum.iter_mut().zip(&part[..rank]);
+        both.for_each(|(sum, value)| *sum += value);
+    }
+    product(&seen.basis, seen.squares.len(), &sum).values
 }
 
 /// Squares of what spots change, and a covariance.
@@ -281,7 +294,8 @@ type FrameArrays<'py> = (Any<'py>, f64, Any<'py>, Any<'py>, [f64; 4], [f64; 2]);
 struct Arrays<'py> {
     data: PyReadonlyArray1<'py, f64>,
     left: PyReadonlyArray2<'py, f64>,
-    offset: PyReadonlyArray1<'py, f64>,
+    offset: Vec<f64>,
+    values: PyReadonlyArray3<'py, f32>,
 }
 
 impl<'py> Arrays<'py> {
@@ -291,13 +305,19 @@ impl<'py> Arrays<'py> {
         let offset = array::<f64, Ix1>("offset", &frame.3)?;
         same("length of data", seen.seen.rows, data.len())?;
         same("columns of left", seen.seen.rows, left.shape()[1])?;
-        same("length of offset", table.table.rank, offset.len())?;
+        same("length of offset", table.layout.rank, offset.len())?;
         same(
             "entries of the table seen",
-            table.table.rank * seen.seen.rows,
+            table.layout.rank * seen.seen.rows,
             seen.seen.timed.len(),
         )?;
-        Ok(Self { data, left, offset })
+        let values = table.values.bind(frame.0.py()).try_readonly()?;
+        Ok(Self {
+            data,
+            left,
+            offset: seen.seen.whitened(contiguous("offset", &offset)?).values,
+            values,
+        })
     }
 
     fn frame<'a>(
@@ -307,14 +327,14 @@ impl<'py> Arrays<'py> {
         frame: &FrameArrays<'py>,
     ) -> PyResult<Frame<'a>> {
         Ok(Frame {
-            table: &table.table,
+            table: table.table(&self.values)?,
             seen: &seen.seen,
             sheet: &table.sheet,
             prior: &table.prior,
             data: contiguous("data", &self.data)?,
             rest: frame.1,
             left: contiguous("left", &self.left)?,
-            offset: contiguous("offset", &self.offset)?,
+            offset: &self.offset,
             deviations: frame.4,
             depths: frame.5,
         })

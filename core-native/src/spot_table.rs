@@ -32,32 +32,39 @@ pub struct Grid {
     pub start: usize,
 }
 
-/// Spline coefficients of all grids, and between what they are.
+/// What the entries of a table are.
 #[derive(Debug)]
-pub struct Table {
+pub struct Layout {
     /// Logarithms of the radii in m, evenly apart.
     pub log_radii: Vec<f64>,
     /// One of each radius.
     pub grids: Vec<Grid>,
     /// Of exp(depth/4) − 1.
     pub nodes: Vec<f64>,
-    /// By points, nodes and directions, and entries of the basis.
-    pub values: Vec<f32>,
     /// Entries of the basis.
     pub rank: usize,
     /// Content of a spot of radius and depth one.
     pub filling: f64,
 }
 
+/// Spline coefficients of all grids.
+#[derive(Clone, Copy, Debug)]
+pub struct Table<'a> {
+    /// See there.
+    pub layout: &'a Layout,
+    /// By points, nodes and directions, and entries of the basis.
+    pub values: &'a [f32],
+}
+
 /// Weights of four points, and the slopes of these.
 type Weights = [[f64; NEAR]; 2];
 
-impl Table {
-    /// Checks that the parts fit together.
+impl Layout {
+    /// Checks that the parts fit together, and so many values.
     ///
     /// # Errors
     /// When they do not.
-    pub fn checked(self) -> Result<Self, &'static str> {
+    pub fn checked(self, values: usize) -> Result<Self, &'static str> {
         let points: usize = self.grids.iter().map(|g| g.shape[0] * g.shape[1]).sum();
         let planes = self.nodes.len() + DIRECTIONS;
         if self.log_radii.len() < NEAR || self.grids.len() != self.log_radii.len() {
@@ -66,27 +73,32 @@ impl Table {
         if self.grids.iter().any(|g| g.shape.iter().any(|&n| n < NEAR)) {
             return Err("four points along each axis at least");
         }
-        if self.values.len() != points * planes * self.rank || self.nodes.is_empty() {
+        if values != points * planes * self.rank || self.nodes.is_empty() {
             return Err("as many values as points, nodes and entries");
         }
         Ok(self)
     }
+}
 
+impl Table<'_> {
     /// Writes the expansion of a spot, (rows, rank), to `out`: `rows` are ROWS, or SLOPES where its
     /// directions are not needed.
     pub fn expand(&self, spot: &Spot, rows: usize, out: &mut [f64]) {
-        let n = self.nodes.len();
+        let n = self.layout.nodes.len();
         let planes = n + rows - SLOPES;
-        let (width, used) = ((n + DIRECTIONS) * self.rank, planes * self.rank);
+        let (width, used) = (
+            (n + DIRECTIONS) * self.layout.rank,
+            planes * self.layout.rank,
+        );
         let mut mixed = vec![0.0; MIXED * used];
-        let step = self.log_radii[1] - self.log_radii[0];
-        let place = (spot[2] - self.log_radii[0]) / step;
-        let most = (self.log_radii.len() - NEAR) as f64;
+        let step = self.layout.log_radii[1] - self.layout.log_radii[0];
+        let place = (spot[2] - self.layout.log_radii[0]) / step;
+        let most = (self.layout.log_radii.len() - NEAR) as f64;
         let first = (place.floor() - 1.0).clamp(0.0, most);
         let [radius, wider] = cubic(place - first);
         let mut lines = [Line::default(); NEAR * NEAR];
         for level in 0..NEAR {
-            let grid = &self.grids[first as usize + level];
+            let grid = &self.layout.grids[first as usize + level];
             let (x, along) = grid.along(0, spot[0]);
             let (y, across) = grid.along(1, spot[1]);
             for (i, (&weight, &slope)) in along[0].iter().zip(&along[1]).enumerate() {
@@ -102,7 +114,7 @@ impl Table {
             }
         }
         Arch::new().dispatch(Mix {
-            values: &self.values,
+            values: self.values,
             width,
             lines: &lines,
             mixed: &mut mixed,
@@ -112,8 +124,8 @@ impl Table {
 
     /// From values and slopes at the nodes to those of the spot's depth.
     fn of_depth(&self, spot: &Spot, planes: usize, mixed: &[f64], out: &mut [f64]) {
-        let (n, rank) = (self.nodes.len(), self.rank);
-        let filling = self.filling * (2.0 * spot[2]).exp();
+        let (n, rank) = (self.layout.nodes.len(), self.layout.rank);
+        let filling = self.layout.filling * (2.0 * spot[2]).exp();
         let depth = spot[3] / filling;
         let s = (depth / 4.0).exp_m1();
         let plane = |row: usize, node: usize| &mixed[(row * planes + node) * rank..];
@@ -142,15 +154,16 @@ impl Table {
 
     /// Weight of a node's value at s, and its slope by s.
     fn power(&self, s: f64, node: usize) -> (f64, f64) {
-        let others = || (0..self.nodes.len()).filter(move |&other| other != node);
+        let others = || (0..self.layout.nodes.len()).filter(move |&other| other != node);
         let apart: f64 = others()
-            .map(|other| self.nodes[node] - self.nodes[other])
+            .map(|other| self.layout.nodes[node] - self.layout.nodes[other])
             .product();
-        let product: f64 = others().map(|other| s - self.nodes[other]).product();
+        let product: f64 = others().map(|other| s - self.layout.nodes[other]).product();
         let slope: f64 = others()
             .map(|left_out| {
                 let rest = others().filter(|&other| other != left_out);
-                rest.map(|other| s - self.nodes[other]).product::<f64>()
+                rest.map(|other| s - self.layout.nodes[other])
+                    .product::<f64>()
             })
             .sum();
         (s * product / apart, (product + s * slope) / apart)

@@ -97,15 +97,18 @@ def test_state():
 
 
 def test_sick_electrodes_and_the_drift_of_the_reference_are_told():
-    baseline = BaselineState(drift=0.012, held=30.0, doubt=4.0, noise=1e-4)
+    start, deviation = np.ones(4), np.full(4, 1e-4)
+    baseline = BaselineState(
+        start, 1.012 * start, deviation, (4 * deviation) ** 2, 20, held=30.0, followed=0.0
+    )
     reference = ReferenceState(20, 20, 5.0, 1e-4, baseline)
     sick = ElectrodeHealth(4, "open", "no current", 3.5)
     status = make_status(reference=reference, electrodes=(sick,))
     state = json.loads(page_messages.state(status))
     assert state["baseline"] == {
-        "drift": 0.012,
+        "drift": pytest.approx(0.012),
         "held_s": 30.0,
-        "noise_v": 1e-4,
+        "noise_v": pytest.approx(1e-4),
         "stale": baseline.stale,
     }
     assert "30 s" in state["baseline"]["stale"]

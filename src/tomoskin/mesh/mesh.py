@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -65,6 +65,14 @@ class Mesh:
         check_mesh(self.points, self.cells, self.electrodes)
         if self.metric is not None:
             object.__setattr__(self, "metric", checked_metric(self.metric, self.points, self.cells))
+
+    def with_metric(self, metric: FloatArray) -> Mesh:
+        """The same mesh measured otherwise, (n_cells, d, d): nothing else is checked again."""
+        made = object.__new__(Mesh)
+        for field in fields(self):
+            object.__setattr__(made, field.name, getattr(self, field.name))
+        object.__setattr__(made, "metric", checked_metric(metric, self.points, self.cells))
+        return made
 
     @classmethod
     def read(cls, path: str | Path, electrodes: Electrodes = None, *, scale: float = 1.0) -> Mesh:

@@ -25,10 +25,6 @@ from tomoskin.pipeline.tune import Steps, tune, tuned_sheet
 from tomoskin.signal import Reference
 from tomoskin.touch import EXHAUSTIVE, FingerTracker, Pace, Tracker
 
-_PIECES = 2
-"""Of the search for the sheet, in a frame: by one, touches are fitted on an even sheet for twice as
-long, and there are twice as many ghosts (16 electrodes, moving plant, seeds 1 to 3)."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setting:
@@ -126,8 +122,7 @@ class Following:
 
     def push(self, measured: Measured) -> FrameResult:
         """Take one frame."""
-        for _ in range(_PIECES):
-            self._tune()
+        self._tune()
         self._refind()
         conditioned = self._conditioning.condition(measured)
         if conditioned.differences is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -41,26 +42,60 @@ _TREND = 30.0
 """Seconds that the skin must have been followed before a trend is estimated."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class BaselineState:
-    """How the baseline is.
+    """How the baseline is; what nobody asks for is not computed.
 
     Attributes
     ----------
-    drift
-        By how much it has moved since the reference, as a part of its size (rms of all rows).
-    held
-        Seconds for which it has been held under a touch; 0 where it follows.
-    doubt
-        What it may have drifted by meanwhile, in deviations of one frame's noise; median row.
-    noise
-        V, rms of the rows.
+    start, mean
+        (n_meas,) V, the untouched skin when the reference was taken, and now.
+    deviation
+        (n_meas,) V, of one frame.
+    variance
+        (n_meas,) V² of the mean.
+    n_frames
+        Of that reference.
+    held, followed
+        Seconds for which it has been held under a touch, 0 where it follows; and for which it has
+        followed.
     """
 
-    drift: float
+    start: FloatArray
+    mean: FloatArray
+    deviation: FloatArray
+    variance: FloatArray
+    n_frames: int
     held: float
-    doubt: float
-    noise: float
+    followed: float
+
+    @cached_property
+    def drift(self) -> float:
+        """By how much it has moved since the reference, as a part of its size (rms of all rows)."""
+        size = _rms(self.start)
+        return _rms(self.mean - self.start) / size if size else 0.0
+
+    @cached_property
+    def noise(self) -> float:
+        """V, rms of the rows."""
+        return _rms(self.deviation)
+
+    @cached_property
+    def doubt(self) -> float:
+        """What a held baseline may be off by, in deviations of one frame's noise; median row.
+
+        As a random walk, and as much as the skin has gone one way until now, which a random walk
+        does not foresee.
+        """
+        if not self.held:
+            return 0.0
+        walked = self.variance / self.deviation**2
+        middle = float(np.median(walked))
+        if self.followed < _TREND:
+            return math.sqrt(middle)
+        moved = np.mean(((self.mean - self.start) / self.deviation) ** 2) - 1.0 / self.n_frames
+        trend = math.sqrt(max(float(moved - walked.mean()), 0.0)) * self.held / self.followed
+        return math.hypot(math.sqrt(middle), trend)
 
     @property
     def stale(self) -> str | None:
@@ -96,9 +131,8 @@ class Baseline:
 
     def __init__(self, reference: Reference, *, follows: bool = True) -> None:
         self.start = reference.mean
-        self._size = float(np.sqrt(np.mean(reference.mean**2)))
         # frames that are all the same have no noise but for rounding
-        least = _ROUNDING * self._size
+        least = _ROUNDING * _rms(reference.mean)
         self._known = reference.noise_is_known and bool((reference.noise > least).all())
         noise = reference.noise if self._known else np.full_like(reference.mean, np.nan)
         self._follows = follows and self._known
@@ -187,26 +221,16 @@ class Baseline:
     @property
     def state(self) -> BaselineState:
         """How it is now."""
-        moved = float(np.sqrt(np.mean((self.mean - self.start) ** 2)))
-        noise = self.idle.noise
-        doubt = self._doubt() if self._held else 0.0
         return BaselineState(
-            drift=moved / self._size if self._size else 0.0,
-            held=self._held,
-            doubt=doubt,
-            noise=float(np.sqrt(np.mean(noise**2))),
+            self.start,
+            self.mean,
+            self.idle.noise,
+            self._variance,
+            self._n_frames,
+            self._held,
+            self._followed,
         )
 
-    def _doubt(self) -> float:
-        """What a held baseline may be off by, in deviations of a frame: as a random walk, and as
-        much as the skin has gone one way until now, which a random walk does not foresee."""
-        noise = self.idle.noise
-        walked = self._variance / noise**2
-        ordered = np.sort(walked)  # np.median takes ten times as long
-        half = len(ordered) // 2
-        middle = float(ordered[half] + ordered[~half]) / 2
-        if self._followed < _TREND:
-            return math.sqrt(middle)
-        moved = np.mean(((self.mean - self.start) / noise) ** 2) - 1.0 / self._n_frames
-        trend = np.sqrt(max(float(moved - walked.mean()), 0.0)) * self._held / self._followed
-        return float(np.hypot(np.sqrt(middle), trend))
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

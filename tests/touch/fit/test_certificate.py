@@ -62,7 +62,7 @@ def test_no_more_is_wrong_than_is_certified() -> None:
     errors = np.linalg.norm(by_table(spots)[:, 0] - exact, axis=1)
     said = np.array(
         [
-            ours.reduced.error(spot[None], size[None], 0.0)
+            ours.reduced.error(spot[None], size[None])
             for spot, size in zip(spots, sizes, strict=True)
         ]
     )

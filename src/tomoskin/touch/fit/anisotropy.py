@@ -7,8 +7,6 @@ same sheet with the metric exp(−D) instead of none, up to a factor.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from tomoskin.core import FloatArray
@@ -30,9 +28,9 @@ def directed(mesh: Mesh, anisotropy: FloatArray) -> Mesh:
     part = np.sinh(size) / size if size else 1.0
     within = np.cosh(size) * np.eye(2) - part * _traceless(anisotropy)
     if mesh.metric is None:
-        return replace(mesh, metric=np.tile(within, (len(mesh.cells), 1, 1)))
+        return mesh.with_metric(np.tile(within, (len(mesh.cells), 1, 1)))
     frame = np.linalg.cholesky(mesh.metric)
-    return replace(mesh, metric=frame @ within @ frame.transpose(0, 2, 1))
+    return mesh.with_metric(frame @ within @ frame.transpose(0, 2, 1))
 
 
 def _traceless(anisotropy: FloatArray) -> FloatArray:

@@ -73,11 +73,12 @@ class Candidates:
         content = np.exp(2 * self.spots[:, LOG_RADIUS]) * FILLING
         start = 0
         for own in feet:
-            here = slice(start, start + len(own.starts) - 1)
+            yield
+            sums = own.sums(own.height, len(more))
+            here = slice(start, start + sums.shape[0])
             for rows in np.array_split(np.arange(signatures.shape[1]), _PIECES):
                 yield
-                moved = own.linear(more[:, rows], own.height)
-                signatures[here, rows] += moved / content[here, None]
+                signatures[here, rows] += sums @ more[:, rows] / content[here, None]
             start = here.stop
         return Candidates(self.spots, signatures)
 

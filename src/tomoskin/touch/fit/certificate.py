@@ -105,23 +105,23 @@ class Certificate:
         """That of the ``table`` of ``response``, another sheet on the same mesh, a piece between
         two yields."""
         exact = []
-        for first in range(0, _MOVED, 2):
+        for some in np.array_split(self.spots[:_MOVED, None], _MOVED // 3):
             yield
-            exact.append(response.changes(list(self.spots[first : first + 2, None])))
+            exact.append(response.changes(list(some)))
+        yield
         alone = np.concatenate(exact)
         wrong = alone - table.expanded(self.spots[:_MOVED])[:, 0] @ table.basis
         beside = _norms(wrong) ** 2 / _norms(alone) ** 2 - self.parts[:_MOVED] ** 2
         return replace(self, moved=float(np.sqrt(max(beside.mean(), 0.0))))
 
-    def error(self, like: FloatArray, sizes: FloatArray, together: float) -> float:
-        """What table and interaction lack of k spots, at the most, as a rule.
+    def error(self, like: FloatArray, sizes: FloatArray) -> float:
+        """What the table lacks of k spots, at the most, as a rule.
 
         ``like`` (k, 2) as :meth:`Rim.like` has it. In the measure of the ``sizes`` (k,) of what
-        each changes, and of the size of what they do ``together`` beyond that. Errors have
-        nothing to do with each other.
+        each changes. Errors have nothing to do with each other.
         """
         each = self.margin * np.hypot(self._around(like, first=0), self.moved) * sizes
-        return float(np.hypot(np.linalg.norm(each), self.pair * together))
+        return float(np.linalg.norm(each))
 
     def _around(self, like: FloatArray, first: int) -> FloatArray:
         """(k,) root mean square of the errors of spots (k, 2) like these, from the ``first`` on."""
@@ -187,9 +187,9 @@ class Reduced:
         yield
         return cls(interaction, certificate, Rim.of(response, prior))
 
-    def error(self, spots: FloatArray, sizes: FloatArray, together: float) -> float:
+    def error(self, spots: FloatArray, sizes: FloatArray) -> float:
         """See :meth:`Certificate.error`, of spots (k, 4)."""
-        return self.certificate.error(self.rim.like(spots), sizes, together)
+        return self.certificate.error(self.rim.like(spots), sizes)
 
 
 def drawn_spots(

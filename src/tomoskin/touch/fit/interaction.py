@@ -26,7 +26,7 @@ from tomoskin.touch.fit.spot import CONTENT, FILLING, LOG_RADIUS, REACH, Respons
 _PATCHES = 120
 """Of the sheet, about."""
 
-_ABREAST = 32
+_ABREAST = 128
 """Columns of the inverse that are held at a time."""
 
 

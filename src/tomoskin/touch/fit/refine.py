@@ -427,12 +427,13 @@ class Problem:
         """What the table lacks of the spots of a fit; so many deviations may be wrong of it."""
         spots, basis = fit.spots, self.solver.table.basis
         sizes = np.linalg.norm(fit.each, axis=1)
-        if allowed:
+        alone = self.reduced.error(spots, sizes) if allowed else 0.0
+        if alone < allowed:
             change = np.zeros(len(basis))
             if len(spots) > 1:
                 change = basis @ self.reduced.interaction.change(spots)
             together = float(np.linalg.norm(self.seen.direct @ change))
-            if self.reduced.error(spots, sizes, together) < allowed:
+            if math.hypot(alone, self.reduced.certificate.pair * together) < allowed:
                 return Deficit(spots, change)
         exact = basis @ self.response.changes([spots])[0]
         return Deficit(spots, exact - self.solver.expanded(spots)[:, 0].sum(axis=0))

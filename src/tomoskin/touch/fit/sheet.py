@@ -12,12 +12,11 @@ import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_triangular
 
 from tomoskin.core import FloatArray, finished, reach
 from tomoskin.forward import ForwardModel, State
@@ -95,24 +94,29 @@ class _Linear:
 
     def explained(
         self, data: FloatArray, field: FloatArray, error: float
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> Generator[None, None, tuple[FloatArray, FloatArray]]:
         """(n_cells,) change of log σ and (2,) anisotropy, in deviations, that explain ``data`` (n,)
-        V best where ``field`` (n_cells, k) is random."""
+        V best where ``field`` (n_cells, k) is random; a piece between two yields."""
+        yield
         columns = np.hstack([self.by_cell @ field, self.along])
+        yield
         solved = cho_solve(cho_factor(self.covariance(error)), columns)
         normal = columns.T @ solved + np.eye(columns.shape[1])
         amplitudes = np.asarray(np.linalg.solve(normal, solved.T @ data), np.float64)
         return np.asarray(field @ amplitudes[:-2]), amplitudes[-2:]
 
-    def log_evidence(self, data: FloatArray, seen: FloatArray, error: float) -> float:
-        """Of ``data`` (n,) V where the ``seen`` (n, k) V of a field, and channels, are random."""
-        own = np.hstack([seen, self.along])
-        try:
-            factor, _ = cho_factor(self.covariance(error) + own @ own.T, lower=True)
-        except LinAlgError:
-            return -math.inf
-        spread = cho_solve((factor, True), data)
-        return float(-data @ spread / 2 - np.log(np.diag(factor)).sum())
+    def whitened(self, columns: FloatArray, error: float) -> tuple[FloatArray, float]:
+        """``columns`` (n, k) V where channels, an anisotropy and an ``error`` of rows are noise of
+        variance one; and half the logarithm of that noise's determinant.
+
+        Raises
+        ------
+        LinAlgError
+            When a row has no noise.
+        """
+        root = cholesky(self.covariance(error) + self.along @ self.along.T, lower=True)
+        white = solve_triangular(root, columns, lower=True, check_finite=False)
+        return white, float(np.log(np.diag(root)).sum())
 
 
 @lru_cache(maxsize=4)
@@ -148,7 +152,7 @@ def fitting_sheet(
         yield
         data = linear.residual + linear.by_cell @ uneven + linear.along @ anisotropy
         likeliest = yield from _likeliest(fields, linear, data)
-        uneven, anisotropy = linear.explained(data, *likeliest)
+        uneven, anisotropy = yield from linear.explained(data, *likeliest)
         yield
         now = yield from _sheet(state, uneven, _DIRECTED * anisotropy)
         yield
@@ -159,20 +163,45 @@ def fitting_sheet(
 def _likeliest(
     fields: Sequence[FloatArray], linear: _Linear, data: FloatArray
 ) -> Generator[None, None, tuple[FloatArray, float]]:
-    """(n_cells, k) modes of the random field that makes ``data`` (n,) V likeliest, none of an even
+    """(n_cells, k) modes of the random field that makes ``data`` (n,) V likeliest, zero for an even
     sheet; and how far rows are off."""
-    none = fields[0][:, :0]
-    best = (-math.inf, none, 0.0)
-    choices = [(none, 0.0), *product(fields, _UNEVEN)]
-    for modes, size in choices:
+    best = (-math.inf, fields[0][:, :0], 0.0)
+    seen = []
+    for modes in fields:
+        yield
+        seen.append(linear.by_cell @ modes)
+    columns = np.column_stack([*seen, data])
+    ends = np.cumsum([modes.shape[1] for modes in fields])
+    for error in _ERRORS:
         reach()
-        seen = size * (linear.by_cell @ modes)
-        for error in _ERRORS:
-            yield
-            log_evidence = linear.log_evidence(data, seen, error)
-            if log_evidence > best[0]:
-                best = log_evidence, size * modes, error
+        yield
+        try:
+            white, log_size = linear.whitened(columns, error)
+        except LinAlgError:
+            continue
+        *white_modes, (own,) = (part.T for part in np.split(white, ends, axis=1))
+        for modes, rows in zip(fields, white_modes, strict=True):
+            square = np.vstack([rows, own]) @ np.vstack([rows, own]).T
+            for size in (0.0, *_UNEVEN):
+                log_evidence = _log_evidence(square, size) - log_size
+                if log_evidence > best[0]:
+                    best = log_evidence, size * modes, error
     return best[1:]
+
+
+def _log_evidence(square: FloatArray, size: float) -> float:
+    """Of white data, where the modes of a field have random amplitudes of that ``size``.
+
+    ``square`` (k + 1, k + 1): products of what the k modes do to the data, and the data. Of a root
+    of these, the modes' diagonal is the determinant's, and what is left of the data the misfit's.
+    """
+    scale = np.append(np.full(len(square) - 1, size), 1.0)
+    noise = np.append(np.ones(len(square) - 1), 0.0)
+    try:
+        root = np.diag(np.linalg.cholesky(square * scale[:, None] * scale + np.diag(noise)))
+    except LinAlgError:
+        return -math.inf
+    return float(-(root[-1] ** 2) / 2 - np.log(root[:-1]).sum())
 
 
 def _sheet(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg.lapack import dposv, dtrtrs
 from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray
@@ -301,7 +301,7 @@ class _Beside:
         if not len(self.both):
             return rows
         taken = _solved_lower(self.root, self.both @ rows.T)
-        back = solve_triangular(self.root, taken, lower=True, trans=1, check_finite=False)
+        back = dtrtrs(self.root, taken, lower=1, trans=1)[0]
         return np.asarray(rows - back.T @ self.both)
 
     def taken(self, rows: FloatArray) -> FloatArray:
@@ -316,18 +316,20 @@ def _even_root(square: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(n, n) lower root of a matrix scaled to a diagonal of 1 and a ridge, and (n,) the scale."""
     scale = 1 / np.sqrt(np.maximum(np.diag(square), 1e-300))
     even = square * scale[:, None] * scale
-    even[np.diag_indices_from(even)] += RIDGE
+    even.flat[:: len(even) + 1] += RIDGE
     return np.asarray(np.linalg.cholesky(even)), scale
 
 
 def _solved_lower(root: FloatArray, columns: FloatArray) -> FloatArray:
-    if not len(root):
-        return np.zeros_like(columns)
-    return np.asarray(solve_triangular(root, columns, lower=True, check_finite=False))
+    if not columns.size:
+        return columns
+    return np.asarray(dtrtrs(root, columns, lower=1)[0])
 
 
 def _solved(normal: FloatArray, gradient: FloatArray, damping: float) -> FloatArray:
+    if not len(gradient):
+        return gradient
     scale = 1 / np.sqrt(np.diag(normal))
     even = normal * scale[:, None] * scale
-    even[np.diag_indices_from(even)] *= 1 + damping
-    return np.asarray(scale * cho_solve(cho_factor(even), scale * gradient))
+    even.flat[:: len(even) + 1] *= 1 + damping
+    return np.asarray(scale * dposv(even, scale * gradient)[1])

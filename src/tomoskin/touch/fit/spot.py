@@ -32,7 +32,7 @@ _BELL = 0.5
 _SPLIT = 2
 """Each side of a cell is cut into so many, for the mean of a profile over the cell."""
 
-_FEW = 400
+_FEW = 300
 """Up to so many cells a local update is faster than a new solve (1,500 cells, native engine)."""
 
 
@@ -168,10 +168,9 @@ class Footprints:
     directed: FloatArray
     reshaped: FloatArray
 
-    def linear(self, slopes: FloatArray, part: FloatArray) -> FloatArray:
-        """(n, r) of ``slopes`` (n_cells, r) where each cell (c,) has its ``part`` (c,)."""
-        shape = len(self.starts) - 1, len(slopes)
-        return np.asarray(csr_array((part, self.cells, self.starts), shape) @ slopes)
+    def sums(self, part: FloatArray, n_cells: int) -> csr_array:
+        """(n, n_cells): each spot's sum over the cells, of which each has its ``part`` (c,)."""
+        return csr_array((part, self.cells, self.starts), (len(self.starts) - 1, n_cells))
 
 
 class Spots:

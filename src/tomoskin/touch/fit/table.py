@@ -43,13 +43,21 @@ def spline(t: FloatArray) -> FloatArray:
     return np.stack([np.stack(each, axis=-1) for each in (weights, slopes)])
 
 
-def between(nodes: FloatArray, t: FloatArray) -> FloatArray:
-    """(2, k, n) weights at ``t`` (k,) of a polynomial through ``nodes`` (n,), and their slopes."""
-    order = np.arange(len(nodes))
-    powers = t[:, None] ** order
-    slopes = np.zeros_like(powers)
-    slopes[:, 1:] = order[1:] * powers[:, :-1]
-    return np.asarray(np.stack([powers, slopes]) @ np.linalg.inv(np.vander(nodes, increasing=True)))
+def through(nodes: FloatArray) -> FloatArray:
+    """(n, n): coefficients of a polynomial through ``nodes`` (n,), by its values there."""
+    return np.asarray(np.linalg.inv(np.vander(nodes, increasing=True)))
+
+
+def between(coefficients: FloatArray, t: FloatArray) -> FloatArray:
+    """(2, k, n) weights at ``t`` (k,) of a polynomial :func:`through` nodes, and their slopes."""
+    order = np.arange(len(coefficients))
+    powers = np.empty((2, len(t), len(order)))
+    powers[0] = t[:, None] ** order
+    powers[1, :, 0], powers[1, :, 1:] = 0.0, order[1:] * powers[0, :, :-1]
+    return np.asarray(powers @ coefficients)
+
+
+_RADII = through(np.arange(float(NEAR)))
 
 
 @dataclass(frozen=True)
@@ -138,7 +146,7 @@ class ResponseTable:
         """:meth:`expanded` of values, and their slopes by x, y and log radius, at the nodes."""
         n, depth = len(self.nodes), depth_of(spots)
         s = np.expm1(depth / 4)
-        weight, slope = between(self.nodes, s)  # of values that are divided by s
+        weight, slope = between(self._depths, s)  # of values that are divided by s
         flat = np.einsum("kn,kmnr->kmr", s[:, None] * weight, mixed[:, :, :n])
         steep = (weight + s[:, None] * slope) * ((s + 1) / 4)[:, None]
         deeper = np.einsum("kn,knr->kr", steep, mixed[:, 0, :n])
@@ -152,9 +160,14 @@ class ResponseTable:
         step = self.log_radii[1] - self.log_radii[0]
         place = (log_radius - self.log_radii[0]) / step
         first = np.clip(np.floor(place) - 1, 0, len(self.log_radii) - NEAR)
-        weights = between(np.arange(float(NEAR)), place - first)
+        weights = between(_RADII, place - first)
         weights[1] /= step
         return first.astype(np.int64), weights
+
+    @cached_property
+    def _depths(self) -> FloatArray:
+        """See :func:`through`."""
+        return through(self.nodes)
 
     @cached_property
     def typical(self) -> FloatArray:

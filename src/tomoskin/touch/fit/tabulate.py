@@ -44,8 +44,11 @@ FAINT = -0.3
 UNCLEAR = 1e-9
 """Part of the largest square below which a linear change is no measure of an exact one."""
 
-_PIECE = 50_000
-"""Numbers that are filtered in a piece of work: half a millisecond."""
+_PIECE = 80_000
+"""Numbers that are filtered in a piece of work: less than a millisecond."""
+
+_SUMS = 8_000_000
+"""Products that are summed in a piece of work: as long."""
 
 _BLOCKS = 8
 """Of cells whose fields are compared, one in a piece of work."""
@@ -80,7 +83,16 @@ class Lattice:
 
     def linear(self, slopes: FloatArray, part: FloatArray) -> FloatArray:
         """(n_points, r) of ``slopes`` (n_cells, r) where each cell (c,) has its ``part`` (c,)."""
-        return self.feet.linear(slopes, part)[self.nearest]
+        return np.asarray((self.feet.sums(part, len(slopes)) @ slopes)[self.nearest])
+
+    def summing(self, slopes: FloatArray) -> Generator[None, None, FloatArray]:
+        """As :meth:`linear`, each cell by its height; a piece of work between two yields."""
+        sums = self.feet.sums(self.feet.height, len(slopes))
+        linear = np.empty((len(self.nearest), slopes.shape[1]))
+        for part in _slices(sums.nnz, slopes.shape[1], _SUMS):
+            yield
+            linear[:, part] = (sums @ slopes[:, part])[self.nearest]
+        return linear
 
     def exact(self, response: Response, depth: float) -> FloatArray:
         """(n_points, n_meas) V of each spot alone, of that ``depth``."""
@@ -178,10 +190,13 @@ class Tabulation:
         values, start = np.empty_like(table.values), 0
         for lattice in self.lattices:
             yield
-            linear = lattice.linear(more, lattice.feet.height)
+            linear = yield from lattice.summing(more)
             here = slice(start, start + len(linear))
+            yield
             values[here, n_nodes:] = table.values[here, n_nodes:]
-            for node, part in product(range(n_nodes), _slices(*linear.shape)):
+            for node, part in product(
+                range(n_nodes), _slices(len(linear), linear.shape[1], _PIECE)
+            ):
                 yield
                 moved = self.parts[here, node, None] * linear[:, part]
                 filtered = _filtered(moved, lattice.grid.shape)
@@ -269,9 +284,9 @@ def _basis(sampled: list[FloatArray]) -> FloatArray:
     return np.asarray(basis.T[-min(-(-wanted // ABREAST) * ABREAST, len(square)) :])
 
 
-def _slices(n_points: int, rank: int) -> list[slice]:
-    """Entries of the basis that are filtered in a piece of work, at so many points."""
-    step = max(_PIECE // n_points, 1)
+def _slices(size: int, rank: int, most: int) -> list[slice]:
+    """Entries of the basis that make up a piece of work, each of that ``size``."""
+    step = max(most // size, 1)
     return [slice(first, first + step) for first in range(0, rank, step)]
 
 
