@@ -204,7 +204,7 @@ class Excess:
     seen
         (n_channels,) largest mean squares in these, of noise with the excess.
     fresh
-        Whether it has risen from nothing, in one frame.
+        Whether it has risen from nothing, in this frame or in frames without a pause.
     """
 
     level: float
@@ -263,7 +263,8 @@ class Excess:
             return self._passed(squares, gauge)
         more = np.where(louder, _MARGIN * (squares - common) * gauge.variance / self.level, 0.0)
         level = self.level if common == 1.0 else _MARGIN * common * self.level
-        return Excess(level, self.variance + more, 0, np.zeros_like(squares), not self.any)
+        fresh = not self.any or self.fresh
+        return Excess(level, self.variance + more, 0, np.zeros_like(squares), fresh)
 
     def _passed(self, squares: FloatArray, gauge: Gauge) -> Excess:
         """After a frame that showed no more: what ``_CALM`` of them do not show is forgotten, and

@@ -48,10 +48,15 @@ def met_by(lost: Trace, traces: Sequence[Trace]) -> tuple[float, Trace | None]:
 
 def origin_of(branch: Trace, traces: Sequence[Trace]) -> Trace | None:
     """The merged touch that a new one has come out of, or None."""
+    return _likeliest(branch, [trace for trace in traces if len(trace.members) > 1])
+
+
+def _likeliest(branch: Trace, traces: Sequence[Trace]) -> Trace | None:
+    """That of the ``traces`` which has most likely been one with the ``branch``, or None."""
     best: tuple[float, Trace | None] = (0.0, None)
     for trace in traces:
         before = branch.beside.get(trace.key)
-        if before and len(trace.members) > 1 and trace.sign == branch.sign:
+        if before and trace.sign == branch.sign:
             odds = parting(trace.detection, branch.detection, reach_of(trace.members))
             if trace.missing is None:
                 left, gone = TouchStrength.of(trace.detection), TouchStrength.of(branch.detection)
@@ -59,6 +64,12 @@ def origin_of(branch: Trace, traces: Sequence[Trace]) -> Trace | None:
             if odds > best[0]:
                 best = odds, trace
     return best[1]
+
+
+def sibling_of(branch: Trace, traces: Sequence[Trace]) -> Trace | None:
+    """The touch that a new one has been seen as one with since it began, or None."""
+    alone = [trace for trace in traces if len(trace.members) == 1 and trace.missing is None]
+    return _likeliest(branch, alone)
 
 
 def divide(carrier: Trace, branch: Trace, time: float) -> list[tuple[int, int, float]]:

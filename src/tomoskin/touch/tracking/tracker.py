@@ -9,7 +9,14 @@ from tomoskin.touch.tracking import existence
 from tomoskin.touch.tracking.clock import TrackClock
 from tomoskin.touch.tracking.event import Happening, TouchEvent
 from tomoskin.touch.tracking.ledger import IdentityLedger
-from tomoskin.touch.tracking.meetings import divide, merge, met_by, origin_of, weigh_meetings
+from tomoskin.touch.tracking.meetings import (
+    divide,
+    merge,
+    met_by,
+    origin_of,
+    sibling_of,
+    weigh_meetings,
+)
 from tomoskin.touch.tracking.merging import Alone, MergedFinger
 from tomoskin.touch.tracking.motion import TrackSettings, begin
 from tomoskin.touch.tracking.pairing import FrameOfTouches, expected, miss, pairs_of, see
@@ -83,8 +90,8 @@ class Tracker:
         traces, now = list(self._traces), self._clock.now
         states = expected(traces, frame)
         found = pairs_of(traces, states, frame)
-        groups = [trace for trace in traces if len(trace.members) > 1]
-        merged = {m.key: t.alone(now) for t in groups for m in t.members}
+        fresh = len(found.pairs) < len(frame.detections)
+        beside = {m.key: t.alone(now) for t in traces if fresh and t.reported for m in t.members}
         miss(traces, states, found, frame)
         see(traces, states, found, frame)
         weigh_meetings(traces)
@@ -92,7 +99,7 @@ class Tracker:
             if index in found.pairs or detection.weak or detection.snr < self.settings.snr:
                 continue
             if not self._residuals.explain(detection, now, self._traces):
-                self._begin(index, frame, merged)
+                self._begin(index, frame, beside)
         for i, k, odds in found.exchanges:  # while both were seen
             one, other = traces[i], traces[k]
             if one.reported and other.reported and not self.settings.still:
@@ -103,7 +110,7 @@ class Tracker:
         self._settle()
         self._ledger.judge(self._traces)
 
-    def _begin(self, index: int, frame: FrameOfTouches, merged: dict[int, Alone]) -> None:
+    def _begin(self, index: int, frame: FrameOfTouches, beside: dict[int, Alone]) -> None:
         self._keys += 1
         detection = frame.detections[index]
         others = any(trace.reported for trace in self._traces)
@@ -111,7 +118,10 @@ class Tracker:
         state = begin(frame.seen[index].position, self.settings)
         clock = self._clock
         trace = Trace(detection, state, clock.now, clock.host, odds, [MergedFinger(self._keys)])
-        trace.beside = merged
+        trace.beside = beside
+        sibling = sibling_of(trace, self._traces)
+        if sibling is not None:  # its strength has not faded: some of it was the newcomer's
+            sibling.change(clock.now)
         self._traces.append(trace)
 
     def _settle(self) -> None:
