@@ -51,6 +51,19 @@ def missed(found: Rubbing, xy: Floats) -> Floats:
     return np.asarray(found.presses.xy - xy)
 
 
+def recorded(path: Path, count: int) -> tuple[Floats, Floats, Pattern]:
+    with np.load(path) as kept:
+        order = np.random.default_rng(31).permutation(len(kept["dv"]))[:count]
+        dv, xy = kept["dv"][order].astype(float), 1e-3 * kept["xy_mm"][order]
+        return dv, xy, Pattern.from_tables(kept["inj"], kept["meas"])
+
+
+def hydrogel(first: str) -> Skin:
+    electrodes = {"width": "3 mm", "first": first, "order": "counter-clockwise"}
+    changes = {"outline": {"diameter": "80 mm"}, "electrodes": electrodes}
+    return Skin.load("textile-disc-16").altered(changes)
+
+
 def test_touches_are_found_without_labels() -> None:
     error = missed(rubbed(), touches(TOUCHES, 0)[1])
     assert np.linalg.norm(error, axis=1).mean() < 0.012
@@ -111,16 +124,8 @@ def test_what_cannot_be_learnt_from_is_refused() -> None:
 
 @pytest.mark.data
 def test_a_real_skin_that_no_setting_was_chosen_on(data_dir: Path) -> None:
-    with np.load(data_dir / "eskin_varsens16" / "concentric.npz") as kept:
-        order = np.random.default_rng(31).permutation(len(kept["dv"]))[:250]
-        dv, xy = kept["dv"][order].astype(float), 1e-3 * kept["xy_mm"][order]
-        pattern = Pattern.from_tables(kept["inj"], kept["meas"])
-    disc = Skin.load("textile-disc-16").altered(
-        {
-            "outline": {"diameter": "80 mm"},
-            "electrodes": {"width": "3 mm", "first": "-73 deg", "order": "counter-clockwise"},
-        }
-    )
+    dv, xy, pattern = recorded(data_dir / "eskin_varsens16" / "concentric.npz", 250)
+    disc = hydrogel("-73 deg")
     found = Rubbing.of(dv, disc, pattern=pattern)
     assert not found.modelled
     assert np.linalg.norm(missed(found, xy), axis=1).mean() < 0.007
@@ -130,16 +135,8 @@ def test_a_real_skin_that_no_setting_was_chosen_on(data_dir: Path) -> None:
 @pytest.mark.data
 def test_enough_labels_do_without_the_order_of_the_electrodes(data_dir: Path) -> None:
     """On full carbon black that order misleads; labels that contradict each other do not help."""
-    with np.load(data_dir / "eskin_varsens16" / "fullCB.npz") as kept:
-        order = np.random.default_rng(31).permutation(len(kept["dv"]))[:300]
-        dv, xy = kept["dv"][order].astype(float), 1e-3 * kept["xy_mm"][order]
-        pattern = Pattern.from_tables(kept["inj"], kept["meas"])
-    disc = Skin.load("textile-disc-16").altered(
-        {
-            "outline": {"diameter": "80 mm"},
-            "electrodes": {"width": "3 mm", "first": "-75 deg", "order": "counter-clockwise"},
-        }
-    )
+    dv, xy, pattern = recorded(data_dir / "eskin_varsens16" / "fullCB.npz", 300)
+    disc = hydrogel("-75 deg")
     labels = np.full(xy.shape, np.nan)
     assert not Rubbing.of(dv, disc, labels, pattern=pattern).holds
     labels[:25] = xy[:25]

@@ -82,8 +82,7 @@ class SystemAssembly:
     @cached_property
     def stiffness(self) -> csr_array:
         """(n_values, n_cells): values per unit of a scalar conductivity."""
-        g = self.element.gradients
-        return self._stiffness_map(np.einsum("nqid,nqjd->nij", g, g)[..., None])
+        return self._stiffness_map(self.element.forms())
 
     @cached_property
     def tensor_stiffness(self) -> csr_array:
@@ -91,10 +90,7 @@ class SystemAssembly:
 
         Those on and above its diagonal, row by row, all cells of one after all of another.
         """
-        g = self.element.gradients
-        both = np.einsum("nqia,nqjb->nijab", g, g)
-        both = both + np.triu(both.swapaxes(3, 4), 1)
-        return self._stiffness_map(both[..., *np.triu_indices(g.shape[3])])
+        return self._stiffness_map(self.element.tensor_forms())
 
     def matrix(self, conductivity: NDArray[Any], contacts: NDArray[Any]) -> Compressed:
         """System matrix for σ (n_cells,) or (n_cells, d, d), and the values of the contacts."""

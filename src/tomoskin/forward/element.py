@@ -86,6 +86,21 @@ class Element:
             facet_load=mass.sum(axis=1),  # the shape functions add up to one
         )
 
+    def forms(self) -> FloatArray:
+        """(n_cells, k, k, 1): what each pair of nodes conducts, per unit of conductivity."""
+        g = self.gradients
+        return np.asarray(np.einsum("nqid,nqjd->nij", g, g)[..., None])
+
+    def tensor_forms(self) -> FloatArray:
+        """(n_cells, k, k, d(d + 1)/2): the same, per unit of each component of a tensor.
+
+        Those on and above its diagonal, row by row.
+        """
+        g = self.gradients
+        both = np.einsum("nqia,nqjb->nijab", g, g)
+        both = both + np.triu(both.swapaxes(3, 4), 1)
+        return np.asarray(both[..., *np.triu_indices(g.shape[3])])
+
 
 def _facet_sizes(mesh: Mesh) -> tuple[FloatArray, ...]:
     """Per electrode, (n_facets,) length or area."""

@@ -9,14 +9,12 @@ electrode must keep more than a few of its digits.
 from __future__ import annotations
 
 from functools import cached_property
-from itertools import combinations, combinations_with_replacement
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
-from tomoskin.forward.element import Element
 from tomoskin.forward.engine import singular
 from tomoskin.forward.model import ForwardModel, State
 
@@ -54,36 +52,25 @@ class Terminals:
 
     @cached_property
     def _scalar(self) -> Any:
-        gradients = self._model.assembly.element.gradients
-        return self._network(np.einsum("nqid,nqjd->ijn", gradients, gradients)[None], 1)
+        return self._network(self._model.assembly.element.forms(), 1)
 
     @cached_property
     def _tensor(self) -> Any:
         element = self._model.assembly.element
-        return self._network(_tensor_forms(element), element.gradients.shape[3])
+        return self._network(element.tensor_forms(), element.gradients.shape[3])
 
     def _network(self, forms: FloatArray, axes: int) -> Any:
-        """The native layout, for what cells conduct (components, k, k, n_cells) of so many axes."""
+        """The native layout, for the ``forms`` (n_cells, k, k, components) of so many axes."""
         assembly, core = self._model.assembly, self._model.engine.core
         if core is None:
             raise AssertionError("the layout needs the native engine")
-        i, j = np.array(list(combinations(range(forms.shape[1]), 2))).T
+        i, j = np.triu_indices(forms.shape[1], 1)
         return core.Terminals(
             assembly.indptr,
             assembly.indices,
             self._model.contacts,
             np.ascontiguousarray(assembly.position, np.int32),
-            np.ascontiguousarray(forms[:, i, j]),
+            np.ascontiguousarray(forms[:, i, j].transpose(2, 1, 0)),
             axes,
             np.arange(assembly.n_points, assembly.n_unknowns, dtype=np.int32),
         )
-
-
-def _tensor_forms(element: Element) -> FloatArray:
-    """(components, k, k, n_cells) of a tensor's components on and above its diagonal."""
-    g = element.gradients
-    both = np.einsum("nqia,nqjb->abijn", g, g)
-    return np.stack([
-        both[a, b] if a == b else both[a, b] + both[b, a]
-        for a, b in combinations_with_replacement(range(g.shape[3]), 2)
-    ])  # fmt: skip

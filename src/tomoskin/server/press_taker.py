@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 from typing import Literal, Self
 
 import numpy as np
@@ -54,6 +55,54 @@ _SIGNS = {"decrease": 1, "increase": -1}
 """Of the voltages' magnitudes, by what a press does to the conductivity."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Untouched:
+    """The untouched skin: ``mean`` and ``noise`` (n_meas,) V of a frame, as told from ``count``
+    frames."""
+
+    mean: FloatArray
+    noise: FloatArray
+    count: int
+
+    @classmethod
+    def of(cls, frames: FloatArray, least: float) -> Self:
+        """Of frames (n, n_meas) V, with no less noise than ``least`` V."""
+        own = frames.var(axis=0, ddof=1)  # of few frames: drawn halfway to that of all rows
+        noise = np.maximum(np.sqrt((own + np.nanmean(own)) / 2), least)
+        return cls(frames.mean(axis=0), noise, len(frames))
+
+    def size(self, frames: FloatArray) -> float:
+        """How far the mean of frames is from the untouched skin, in noises of one frame; what
+        noise alone would show is taken off."""
+        apart = self.noises(frames.mean(axis=0) - self.mean)
+        return float(np.sqrt(max(apart**2 - self.deviation(len(frames)) ** 2, 0.0)))
+
+    def deviation(self, n: int) -> float:
+        """Of the mean of ``n`` frames less the untouched skin, in noises of one frame."""
+        return float(np.sqrt(1 / n + 1 / self.count))
+
+    def noises(self, change: FloatArray) -> float:
+        """Root mean square in noises, of the rows that are known."""
+        squares = (change / self.noise) ** 2
+        known = squares[np.isfinite(squares)]
+        return float(np.sqrt(known.mean())) if len(known) else 0.0
+
+    def stands_still(self, frames: FloatArray) -> bool:
+        """Whether neither half, nor any quarter, is unlike the other frames."""
+        most = _STILL * self.size(frames)
+        for parts in (2, 4):
+            means = frames.reshape(parts, -1, frames.shape[1]).mean(axis=1)
+            others = (means.sum(axis=0) - means) / (parts - 1)
+            noise = np.sqrt(parts / len(frames) * (1 + 1 / (parts - 1)))
+            moved = max(self.noises(apart) for apart in means - others)
+            if moved > most + _WAVERS * noise:
+                return False
+        return True
+
+
+_UNKNOWN = _Untouched(np.zeros(0), np.zeros(0), 1)
+
+
 class PressTaker:
     """Takes presses from a stream of voltages.
 
@@ -71,8 +120,7 @@ class PressTaker:
     def __init__(self, least: float, sign: int = 0) -> None:
         self._least, self._sign = least, sign
         self._last = self._now = -np.inf
-        self._mean = self._noise = np.zeros(0)
-        self._rested = self._window = 1
+        self._rest, self._window = _UNKNOWN, 1
         self._frames: deque[FloatArray] = deque(maxlen=_MOST_REST + _LAG + max(_WINDOWS))
         self._pressed: deque[FloatArray] = deque(maxlen=_LONGEST)
         self._largest = self._clear = 0.0
@@ -92,7 +140,7 @@ class PressTaker:
     @property
     def untouched(self) -> tuple[FloatArray, FloatArray] | None:
         """(n_meas,) V, mean and noise before the last press; None before the first frames."""
-        return (self._mean, self._noise) if len(self._mean) else None
+        return None if self._rest is _UNKNOWN else (self._rest.mean, self._rest.noise)
 
     @property
     def hint(self) -> str:
@@ -130,7 +178,7 @@ class PressTaker:
             self._wait(voltages)
             return None
         self._pressed.append(voltages)
-        size = self._size(np.array(self._pressed)[-self._window :])
+        size = self._rest.size(np.array(self._pressed)[-self._window :])
         if size < _RELEASED * self._largest:
             self._remark = _EARLY if self.phase == "hold" else ""
             self.restart()
@@ -154,25 +202,20 @@ class PressTaker:
             quiet = frames[: -window - _LAG][-_MOST_REST:]
             if len(quiet) < _REST:
                 return
-            self._tell_untouched(quiet)
-            apart = frames[-window:].mean(axis=0) - self._mean
-            if self._noises(apart) > present * self._deviation(window):
-                if self._sign * float(np.nansum(np.sign(self._mean) * apart)) < 0:
+            self._rest = rest = _Untouched.of(quiet, self._least)
+            apart = frames[-window:].mean(axis=0) - rest.mean
+            if rest.noises(apart) > present * rest.deviation(window):
+                if self._sign * float(np.nansum(np.sign(rest.mean) * apart)) < 0:
                     self._remark = _UNSEEN  # and has ended: it passed for the untouched skin
                     self.restart()
                 else:
                     self._press(frames[-window:], window)
                 return
 
-    def _tell_untouched(self, quiet: FloatArray) -> None:
-        self._mean, self._rested = quiet.mean(axis=0), len(quiet)
-        own = quiet.var(axis=0, ddof=1)  # of few frames: drawn halfway to that of all rows
-        self._noise = np.maximum(np.sqrt((own + np.nanmean(own)) / 2), self._least)
-
     def _press(self, newest: FloatArray, window: int) -> None:
         self._enter("hold")
         self._window, self._remark = window, ""
-        self._largest, self._clear = self._size(newest), 0.0
+        self._largest, self._clear = self._rest.size(newest), 0.0
         self._pressed.clear()
         self._pressed.extend(newest[-max(1, window // 4) :])
 
@@ -181,39 +224,11 @@ class PressTaker:
         frames = np.array(self._pressed)
         self._clear = 0.0
         for n in range(_STEADY, len(frames) + 1, _STEP):
-            if not self._still(frames[-n:]):
+            if not self._rest.stands_still(frames[-n:]):
                 continue
-            self._clear = float(np.sqrt(n)) * self._size(frames[-n:])
+            self._clear = float(np.sqrt(n)) * self._rest.size(frames[-n:])
             if self._clear >= (_CLEAR if n < _LONGEST else _FAINTEST):
                 self._enter("release")
                 self._pressed.clear()
-                return np.asarray(frames[-n:].mean(axis=0) - self._mean)
+                return np.asarray(frames[-n:].mean(axis=0) - self._rest.mean)
         return None
-
-    def _still(self, frames: FloatArray) -> bool:
-        """Whether neither half, nor any quarter, is unlike the other frames."""
-        most = _STILL * self._size(frames)
-        for parts in (2, 4):
-            means = frames.reshape(parts, -1, frames.shape[1]).mean(axis=1)
-            others = (means.sum(axis=0) - means) / (parts - 1)
-            noise = np.sqrt(parts / len(frames) * (1 + 1 / (parts - 1)))
-            moved = max(self._noises(apart) for apart in means - others)
-            if moved > most + _WAVERS * noise:
-                return False
-        return True
-
-    def _size(self, frames: FloatArray) -> float:
-        """How far the mean of frames is from the untouched skin, in noises of one frame; what
-        noise alone would show is taken off."""
-        apart = self._noises(frames.mean(axis=0) - self._mean)
-        return float(np.sqrt(max(apart**2 - self._deviation(len(frames)) ** 2, 0.0)))
-
-    def _deviation(self, n: int) -> float:
-        """Of the mean of ``n`` frames less the untouched skin, in noises of one frame."""
-        return float(np.sqrt(1 / n + 1 / self._rested))
-
-    def _noises(self, change: FloatArray) -> float:
-        """Root mean square in noises, of the rows that are known."""
-        squares = (change / self._noise) ** 2
-        known = squares[np.isfinite(squares)]
-        return float(np.sqrt(known.mean())) if len(known) else 0.0

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.forward import ForwardModel, Terminals
+from tomoskin.forward import ForwardModel, State, Terminals
 from tomoskin.mesh import Outline, Plane, Surface, laid_on, triangulate
 from tomoskin.skin import Skin
 from tomoskin.twin import material
@@ -209,18 +209,19 @@ class TwinSkin:
         if sigma is self._solved_for:
             return self._resistance
         if _changed(self._solved_for, sigma):
-            self._resistance = self._resistance_of(sigma)
+            self._resistance = _resistance_of(self._base, self._terminals, sigma)
             self.solves += 1
             self._solved_for = sigma
         return self._resistance
 
-    def _resistance_of(self, sigma: FloatArray) -> FloatArray:
-        """Exact either way: by the local update where few cells have changed since rest."""
-        if sigma.ndim == 1:
-            changed = np.flatnonzero(sigma != self._base.conductivity)
-            if 0 < len(changed) <= _FEW * len(sigma):
-                return np.asarray(self._base.local.transfer_resistance(changed, sigma[changed]))
-        return np.asarray(self._terminals.transfer_resistance(sigma))
+
+def _resistance_of(rest: State, terminals: Terminals, sigma: FloatArray) -> FloatArray:
+    """Exact either way: by the local update where few cells have changed since ``rest``."""
+    if sigma.ndim == 1:
+        changed = np.flatnonzero(sigma != rest.conductivity)
+        if 0 < len(changed) <= _FEW * len(sigma):
+            return rest.local.transfer_resistance(changed, sigma[changed])
+    return np.asarray(terminals.transfer_resistance(sigma))
 
 
 def _changed(old: FloatArray, new: FloatArray) -> bool:

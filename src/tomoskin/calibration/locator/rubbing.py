@@ -172,21 +172,20 @@ class Rubbing:
         if found.holds:
             fit = UnlabelledFit.of(dv, skin, pattern, region, labels)
             apart = region.unit * fit.disagreement
-            return replace(found, presses=_presses(dv, xy, fit, region), disagreement=apart)
-        return found._by_labels(labels) if labelled.sum() >= _ENOUGH else found
+            presses = _presses(dv, xy, region.metres(fit.positions), _spread(fit, region))
+            return replace(found, presses=presses, disagreement=apart)
+        return found._by_labels(xy) if labelled.sum() >= _ENOUGH else found
 
-    def _by_labels(self, labels: FloatArray) -> Self:
-        """The same from ``labels`` (n, 2) in radii alone, unless they contradict each other."""
+    def _by_labels(self, xy: FloatArray) -> Self:
+        """The same from labels ``xy`` (n, 2) m alone, unless they contradict each other."""
         dv, region = self.presses.dv, Region.of(self.skin)
+        labels = region.scaled(xy)
         missed = missed_labels(dv, labels, region, self.pattern)
         if missed > _CONTRADICTED:
             return self
         positions = from_labels(dv, labels, region, self.pattern)
         spread = np.tile(0.5 * (region.unit * missed) ** 2 * np.eye(2), (len(dv), 1, 1))
-        known: BoolArray = np.asarray(np.isfinite(labels).all(axis=1))
-        spread[known] = 0.0
-        position = region.metres(np.where(known[:, None], labels, positions))
-        presses = Presses.of(dv, position, spread=spread)
+        presses = _presses(dv, xy, region.metres(positions), spread)
         return replace(self, presses=presses, contradicted=(), by_labels=True)
 
     @property
@@ -259,12 +258,11 @@ class Rubbing:
         return Locator.learn(presses, region, self.pattern, self.skin.identity, progress)
 
 
-def _presses(dv: FloatArray, xy: FloatArray, fit: UnlabelledFit, region: Region) -> Presses:
+def _presses(dv: FloatArray, xy: FloatArray, positions: FloatArray, spread: FloatArray) -> Presses:
+    """Frames at labels ``xy`` (n, 2) m, without spread; at ``positions`` where these are NaN."""
     known: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
-    spread = _spread(fit, region)
-    spread[known] = 0.0
-    position = np.where(known[:, None], xy, region.metres(fit.positions))
-    return Presses.of(dv, position, spread=spread)
+    spread = np.where(known[:, None, None], 0.0, spread)
+    return Presses.of(dv, np.where(known[:, None], xy, positions), spread=spread)
 
 
 def _spread(fit: UnlabelledFit, region: Region) -> FloatArray:

@@ -14,6 +14,7 @@ from tomoskin.calibration.locator.presses import Presses, frames
 from tomoskin.calibration.locator.process import Process, squared_distances
 from tomoskin.calibration.locator.topographic import (
     TopographicMap,
+    covariances,
     learnt_surface,
     likeliest_power,
     surface_basis,
@@ -135,9 +136,10 @@ class SessionAlignment:
         before, features = _learnt(locator, grid)
         theirs = SessionFeatures.of(dv)
         known: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
+        labels = region.scaled(xy[known])
         named = np.full(len(dv), -1)
         if known.any():
-            named[known] = _numbers(region.scaled(xy[known]), grid)
+            named[known] = _numbers(labels, grid)
         white = theirs(dv) @ features.whiten + before.middle
         start = before.surface.posterior(white)
         covered = float(np.exp(_entropy(start.mean(axis=0))) / len(grid))
@@ -145,9 +147,9 @@ class SessionAlignment:
         grown = noise / before.noise
         mean = fit.posterior(white) @ grid
         moved = float(np.linalg.norm(mean - start @ grid, axis=1).mean())
-        missed = _missed(mean[known], region.scaled(xy[known]))
+        missed = _missed(mean[known], labels)
         if known.sum() >= _CORRECTS:
-            mean = mean + _correction(mean, known, region.scaled(xy[known]))
+            mean = mean + _correction(mean, known, labels)
         believed = moved < _MOVED and covered > _COVERED
         holds = believed if np.isnan(missed) else missed < _AGREE
         spread = _spread(fit.tempered(grown).posterior(white), mean, grid)
@@ -267,8 +269,6 @@ def _correction(positions: FloatArray, known: BoolArray, labels: FloatArray) -> 
 
 def _spread(weights: FloatArray, mean: FloatArray, grid: FloatArray) -> FloatArray:
     """(n, 2, 2) mean square of the grid's positions about ``mean`` (n, 2)."""
-    second = (weights @ (grid[:, :, None] * grid[:, None, :]).reshape(-1, 4)).reshape(-1, 2, 2)
-    middle = weights @ grid
-    about = second - middle[:, :, None] * middle[:, None]
-    off = middle - mean
-    return np.asarray(about + off[:, :, None] * off[:, None] + _FLOOR**2 * np.eye(2))
+    off = weights @ grid - mean
+    about = covariances(weights, grid) + off[:, :, None] * off[:, None]
+    return np.asarray(about + _FLOOR**2 * np.eye(2))

@@ -43,19 +43,18 @@ class TopographicMap:
     A frame is Gaussian about the response of its position; positions are those of a grid, all as
     likely. ``values`` (g, m) of a basis on the grid, ``coefficients`` (m, k) of the responses,
     ``variance`` (k,) of the noise, ``power`` to which a frame's likelihood is raised: features err
-    together. ``offset`` (g, k): responses that the basis' are added to.
+    together.
     """
 
     values: FloatArray
     coefficients: FloatArray
     variance: FloatArray
     power: float
-    offset: FloatArray | float = 0.0
 
     @property
     def answers(self) -> FloatArray:
         """(g, k) responses at the grid's positions."""
-        return np.asarray(self.offset + self.values @ self.coefficients)
+        return np.asarray(self.values @ self.coefficients)
 
     @property
     def noise(self) -> float:
@@ -91,34 +90,29 @@ class TopographicMap:
             weights = fit.posterior(features)
             weights = balanced(weights) if everywhere else weights
             weights[some] = np.eye(len(self.values))[named[some]]
-            fit = fit.renewed(features, weights, self.coefficients, _KEPT, _LEAST)
+            fit = fit._renewed(features, weights, self.coefficients)
             noise = fit.noise
             fit = replace(fit, variance=fit.variance * (self.noise / noise))
         return fit, noise
 
-    def renewed(
-        self, features: FloatArray, weights: FloatArray, kept: FloatArray, keep: float, least: float
-    ) -> Self:
+    def _renewed(self, features: FloatArray, weights: FloatArray, kept: FloatArray) -> Self:
         """With the responses of frames at positions, one step of the maximisation.
 
         Parameters
         ----------
         features, weights
             (n, k), and (n, g) how much each frame counts at each position.
-        kept, keep
-            (m, k) coefficients of the prior responses, and their weight in frames.
-        least
-            Variance that the noise has at least.
+        kept
+            (m, k) coefficients of the earlier responses.
         """
         count, frames = weights.sum(axis=0)[:, None], weights.sum(axis=1)
         pull = weights.T @ features
-        normal = (self.values * count).T @ self.values + keep * np.eye(self.values.shape[1])
-        beyond = pull - count * self.offset
-        coefficients = np.linalg.solve(normal, self.values.T @ beyond + keep * kept)
-        answers = self.offset + self.values @ coefficients
+        normal = (self.values * count).T @ self.values + _KEPT * np.eye(self.values.shape[1])
+        coefficients = np.linalg.solve(normal, self.values.T @ pull + _KEPT * kept)
+        answers = self.values @ coefficients
         left = frames @ features**2 - 2 * (pull * answers).sum(axis=0)
         variance = (left + (count * answers**2).sum(axis=0)) / frames.sum()
-        return replace(self, coefficients=coefficients, variance=np.maximum(variance, least))
+        return replace(self, coefficients=coefficients, variance=np.maximum(variance, _LEAST))
 
     def tempered(self, grown: float) -> Self:
         """With likelihoods of less weight where the noise has ``grown``."""
@@ -132,6 +126,13 @@ def balanced(weights: FloatArray) -> FloatArray:
         weights = weights * (target / np.maximum(weights.sum(axis=0), _LEAST))
         weights = weights / np.maximum(weights.sum(axis=1, keepdims=True), _LEAST)
     return weights
+
+
+def covariances(weights: FloatArray, grid: FloatArray) -> FloatArray:
+    """(n, 2, 2) of positions that are those of ``grid`` (g, 2) with probabilities (n, g)."""
+    mean = weights @ grid
+    second = (weights @ (grid[:, :, None] * grid[:, None]).reshape(-1, 4)).reshape(-1, 2, 2)
+    return np.asarray(second - mean[:, :, None] * mean[:, None])
 
 
 def learnt_surface(

@@ -12,6 +12,7 @@ from tomoskin.calibration.locator.modelled import ModelFit, model_responses
 from tomoskin.calibration.locator.presses import Presses
 from tomoskin.calibration.locator.ranks import Ranked, expected_sizes, inside
 from tomoskin.calibration.locator.refining import refined, signed_features
+from tomoskin.calibration.locator.topographic import covariances
 from tomoskin.calibration.locator.unfolding import laid_over, unfolded
 from tomoskin.core import FloatArray
 from tomoskin.forward import ForwardModel
@@ -90,7 +91,7 @@ class UnlabelledFit:
         middle = means.mean(axis=0)
         off = means - middle
         between = np.einsum("fna,fnb->nab", off, off) / len(fits)
-        within = np.mean([_covariances(weights, grid) for weights in fits], axis=0)
+        within = np.mean([covariances(weights, grid) for weights in fits], axis=0)
         apart = float(np.sqrt(np.trace(between, axis1=1, axis2=2).mean()))
         return cls(middle, within + between, apart, *found)
 
@@ -117,9 +118,3 @@ def missed_labels(dv: FloatArray, labels: FloatArray, region: Region, pattern: P
         off = (from_labels(dv, others, region, pattern) - labels)[known[fold::_FOLDS]]
         square += float((off**2).sum())
     return float(np.sqrt(square / len(known)))
-
-
-def _covariances(weights: FloatArray, grid: FloatArray) -> FloatArray:
-    mean = weights @ grid
-    second = (weights @ (grid[:, :, None] * grid[:, None]).reshape(-1, 4)).reshape(-1, 2, 2)
-    return np.asarray(second - mean[:, :, None] * mean[:, None])
