@@ -26,6 +26,7 @@ from tomoskin.core.written import write_text, written
 if TYPE_CHECKING:
     from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
     from tomoskin.core.cache import cache_folder, kept
+    from tomoskin.core.clocks import clock_ahead
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
     from tomoskin.core.extras import install_hint
     from tomoskin.core.json_bytes import encode_json, plain_values
@@ -63,6 +64,7 @@ _HOME = {
     "electrode_table": "typed_arrays",
     "encode_json": "json_bytes",
     "cache_folder": "cache",
+    "clock_ahead": "clocks",
     "install_hint": "extras",
     "kept": "cache",
     "load_arrays": "archive",
@@ -117,6 +119,7 @@ __all__ = [
     "cache_folder",
     "check_fits",
     "check_outputs",
+    "clock_ahead",
     "electrode_table",
     "encode_json",
     "finished",

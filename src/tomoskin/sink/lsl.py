@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Event, FloatArray, SinkError, encode_json
+from tomoskin.core import Event, FloatArray, SinkError, clock_ahead, encode_json
 from tomoskin.pattern import Pattern
 from tomoskin.sink.consumer import needed
 from tomoskin.sink.sink import Item, Moment, Stream, TouchPace
@@ -34,7 +33,7 @@ class LslSink:
         place = stream.place
         self._prefix = self._root if place is None else f"{self._root}-{place.name}"
         # both are the machine's monotonic clock, but LSL may count from elsewhere
-        self._offset = self._lsl.local_clock() - time.monotonic()
+        self._offset = clock_ahead(self._lsl.local_clock)
         self._pace = TouchPace()
         rows = [(label, "V") for label in _row_labels(stream.pattern)]
         touches = [

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol, Self
 
-from tomoskin.core import Event, FloatArray, GeometryError, Image, PixelMap, Touch
+from tomoskin.core import Event, FloatArray, GeometryError, Image, PixelMap, Touch, clock_ahead
 from tomoskin.mesh import Mesh, Plane, Surface
 from tomoskin.pattern import Pattern
 from tomoskin.pipeline import FrameResult, Prepared, colour_limit
@@ -228,4 +228,4 @@ def _in_space(surface: Surface, positions: FloatArray) -> FloatArray:
 
 def epoch() -> float:
     """What is added to a host time of now to give seconds since 1970."""
-    return time.time() - time.monotonic()
+    return clock_ahead(time.time)
