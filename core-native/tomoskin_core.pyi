@@ -222,10 +222,14 @@ def conduct(
     """
 
 def converted(
-    volts: NDArray[np.float64], chance: NDArray[np.float64], numbers: tuple[float, ...]
+    volts: NDArray[np.float64],
+    moving: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
+    chance: NDArray[np.float64],
+    numbers: tuple[float, ...],
 ) -> NDArray[np.uint16]:
-    """Summed codes (m,) of potentials, (m,) or (k, m) V, with standard normal numbers (k, m).
+    """Summed codes (m,) of potentials (m,) V, with standard normal numbers (k, m).
 
+    ``moving``: what comes to them, (m,) V times (k, m).
     ``numbers``: gain, offset, low and high rail, codes per volt, number of codes, bow, noise.
     """
 

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use ndarray::IxDyn;
 use numpy::{Ix1, Ix2, Ix3, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pulp::Arch;
 use pyo3::prelude::*;
@@ -46,7 +45,7 @@ impl Terminals {
             position: position.as_array().iter().map(|&at| at as u32).collect(),
         };
         let symbolic = Symbolic::ending(starts.len().saturating_sub(1), &starts, &rows, &last);
-        let others = contiguous("contacts", &contacts)?.to_vec();
+        let others = contiguous("contacts", &contacts)?;
         symbolic
             .and_then(|symbolic| {
                 terminals::Terminals::new(Arc::new(symbolic), cells, others, &last)
@@ -268,23 +267,38 @@ pub(crate) fn lines<'py>(
     Ok(out)
 }
 
-/// Summed codes (m,) of potentials, (m,) or (k, m), with standard normal numbers (k, m).
+/// Summed codes (m,) of potentials (m,), and others (m,) times (k, m), with standard normal numbers
+/// (k, m).
 ///
 /// `numbers`: gain, offset, low and high rail, codes per volt, number of codes, bow, noise.
 #[pyfunction]
 pub(crate) fn converted<'py>(
     volts: &Any<'py>,
+    moving: Vec<(Any<'py>, Any<'py>)>,
     chance: &Any<'py>,
     numbers: [f64; 8],
 ) -> PyResult<Bound<'py, PyArray1<u16>>> {
     let py = volts.py();
     let (volts, chance) = (
-        array::<f64, IxDyn>("volts", volts)?,
+        array::<f64, Ix1>("volts", volts)?,
         array::<f64, Ix2>("chance", chance)?,
     );
     let n = chance.shape()[1];
-    let each = if volts.len() == n { n } else { chance.len() };
-    same("number of volts", each, volts.len())?;
+    same("number of volts", n, volts.len())?;
+    let mut courses = Vec::with_capacity(moving.len());
+    for (size, course) in &moving {
+        let (size, course) = (
+            array::<f64, Ix1>("size", size)?,
+            array::<f64, Ix2>("course", course)?,
+        );
+        same("length of size", n, size.len())?;
+        same("number of courses", chance.len(), course.len())?;
+        courses.push((size, course));
+    }
+    let mut moving = Vec::with_capacity(courses.len());
+    for (size, course) in &courses {
+        moving.push([contiguous("size", size)?, contiguous("course", course)?]);
+    }
     let [gain, offset, low, high, scale, levels, bow, noise] = numbers;
     let converter = Converter {
         gain,
@@ -298,7 +312,7 @@ pub(crate) fn converted<'py>(
     let out = PyArray1::<u16>::zeros(py, n, false);
     if n > 0 {
         let (volts, chance) = (contiguous("volts", &volts)?, contiguous("chance", &chance)?);
-        converter.sums(volts, chance, out.readwrite().as_slice_mut()?);
+        converter.sums(volts, &moving, chance, out.readwrite().as_slice_mut()?);
     }
     Ok(out)
 }
