@@ -52,7 +52,7 @@ impl Converter {
     fn exact(&self, volts: f64) -> f64 {
         let output = (self.gain * volts + self.offset).max(self.rails[0]);
         let exact = output.min(self.rails[1]) * self.scale;
-        let part = (exact / self.levels).clamp(0.0, 1.0);
+        let part = (exact * (1.0 / self.levels)).clamp(0.0, 1.0);
         exact + self.bow * 4.0 * part * (1.0 - part)
     }
 }

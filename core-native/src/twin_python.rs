@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use numpy::{Ix1, Ix2, Ix3, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{
+    Ix1, Ix2, Ix3, IxDyn, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods,
+};
 use pulp::Arch;
 use pyo3::prelude::*;
 
@@ -109,10 +112,10 @@ pub(crate) fn dented<'py>(
 }
 
 /// Lagging, prompt, late and broken parts after a step under `load` (4, n), and wear.
-type Step<'py> = [Bound<'py, PyArray1<f64>>; 5];
+type Step<'py> = [Bound<'py, PyArrayDyn<f64>>; 5];
 
 /// What cells remember after a step: `past` are the load before, lagging, late and broken parts, and
-/// wear, each flat; `play`: parts and half widths; `kept`: of late parts, and of breakdowns.
+/// wear; `play`: parts and half widths; `kept`: of late parts, and of breakdowns.
 #[pyfunction]
 pub(crate) fn remember<'py>(
     load: &Any<'py>,
@@ -126,21 +129,21 @@ pub(crate) fn remember<'py>(
     let n = load.shape()[1];
     let load = contiguous("load", &load)?;
     let [late, broken] = &kept;
-    let parts = [1, play.len(), late.len()].map(|parts| parts * LOADS * n);
     let worn = if past[4].is_empty()? { 0 } else { n };
-    let sizes = [
-        parts[0],
-        parts[1],
-        parts[2],
-        broken.len() * GROUPS * n,
-        worn,
+    let shapes: [&[usize]; 5] = [
+        &[LOADS, n],
+        &[play.len(), LOADS, n],
+        &[late.len(), LOADS, n],
+        &[broken.len(), GROUPS, n],
+        &[worn],
     ];
+    let sizes = shapes.map(|shape| shape.iter().product());
     let names = ["load before", "lagging", "late", "broken", "worn"];
     let flat = flat(names, &past, sizes)?;
     let [before, lagging, reached, shaken, wear] = [0, 1, 2, 3, 4].map(|k| flat[k].as_slice());
     // SAFETY: `advance` writes all of them.
-    let made = |size: usize| unsafe { PyArray1::<f64>::new(py, size, false) };
-    let out = [sizes[1], sizes[0], sizes[2], sizes[3], worn].map(made);
+    let made = |part: usize| unsafe { PyArrayDyn::<f64>::new(py, IxDyn(shapes[part]), false) };
+    let out = [1, 0, 2, 3, 4].map(made);
     {
         let [mut a, mut b, mut c, mut d, mut e] = out.each_ref().map(|part| part.readwrite());
         let memory = Memory {
@@ -169,7 +172,7 @@ pub(crate) fn remember<'py>(
 
 /// Conductivity of cells, (1, n), or xx, xy, yx, yy (4, n) where directions differ.
 ///
-/// `causes`: prompt, late and broken parts, wear, conductivity without load, each flat;
+/// `causes`: prompt, late and broken parts, wear, conductivity without load;
 /// `numbers`: gauge, across, compression, wear, heat, most compression, most logarithm.
 #[pyfunction]
 pub(crate) fn conduct<'py>(
@@ -317,16 +320,16 @@ pub(crate) fn converted<'py>(
     Ok(out)
 }
 
-/// Flat arrays of these sizes.
+/// Arrays of these sizes.
 fn flat<'py, const N: usize>(
     names: [&str; N],
     values: &[Any<'py>; N],
     sizes: [usize; N],
-) -> PyResult<Vec<numpy::PyReadonlyArray1<'py, f64>>> {
+) -> PyResult<Vec<PyReadonlyArrayDyn<'py, f64>>> {
     let mut out = Vec::with_capacity(N);
     for ((name, value), size) in names.into_iter().zip(values).zip(sizes) {
-        let value = array::<f64, Ix1>(name, value)?;
-        same(&format!("length of {name}"), size, value.len())?;
+        let value = array::<f64, IxDyn>(name, value)?;
+        same(name, size, value.len())?;
         contiguous(name, &value)?;
         out.push(value);
     }

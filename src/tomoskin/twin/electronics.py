@@ -152,7 +152,7 @@ class TwinElectronics:
     def _scanned(self, table: SampleTable, time: float) -> Lines:
         """What the channels stand at under each drive, as the presses stand or move."""
         middles = table.middles
-        moves = self._moves(middles.tolist())
+        moves = self._moves(middles)
         if moves and all(move == moves[0] for move in moves):
             self._set(*moves[0])
             moves = []
@@ -169,14 +169,14 @@ class TwinElectronics:
             stuck=np.concatenate([line.stuck for line in lines]),
         )
 
-    def _moves(self, times: list[float]) -> list[tuple[tuple[Contact, ...], Pose]]:
+    def _moves(self, times: FloatArray) -> list[tuple[tuple[Contact, ...], Pose]]:
         """What presses, and how the sheet is bent, at each of the ``times``."""
         course, bending, sheet = self._course, self._bending, self.sheet
         if course is None and bending is None:
             return []
         return [
             (course(t) if course else sheet.presses, bending(t) if bending else sheet.pose)
-            for t in times
+            for t in times.tolist()
         ]
 
     def _set(self, presses: tuple[Contact, ...], pose: Pose) -> None:

@@ -17,7 +17,7 @@ from tomoskin.twin.bend import Pose, depth_of, strain_of
 from tomoskin.twin.dent import Load, indent
 from tomoskin.twin.material import MaterialState
 from tomoskin.twin.presets import TwinSettings
-from tomoskin.twin.probe import Contact, check_on_skin, probes_of
+from tomoskin.twin.probe import Contact, check_on_skin
 
 _MESH_SEED = 7919
 """Seed of the twin's mesh; the reconstruction's is another, so no mesh is ever shared."""
@@ -116,7 +116,7 @@ class TwinSkin:
         presses, pose = self._presses, self._pose
         if not _same((presses, pose), self._loaded):
             if presses is not self._dented[0]:
-                self._dented = presses, indent(probes_of(presses), *self._ground)
+                self._dented = presses, indent(presses, *self._ground)
             self._load = dented = self._dented[1]
             if pose:
                 given = dented.depth + depth_of(pose, self._points)
@@ -142,7 +142,7 @@ class TwinSkin:
         check_on_skin(presses, self._outline)
         if presses != self._presses:
             taken = tuple(presses)
-            self._dented = taken, indent(probes_of(taken), *self._ground)
+            self._dented = taken, indent(taken, *self._ground)
             self._presses = taken
 
     def set_pose(self, pose: Pose) -> None:
