@@ -216,16 +216,20 @@ def conduct(
 ) -> NDArray[np.float64]:
     """Conductivity of cells (1, n) S, or xx, xy, yx, yy (4, n) where directions differ.
 
-    ``causes``, each flat: prompt, late and broken parts of the load, wear, conductivity without
+    ``causes``: prompt, late and broken parts of the load, wear, conductivity without
     load. ``numbers``: gauge, the same across, compression, wear, heat, largest compression and
     logarithm.
     """
 
 def converted(
-    volts: NDArray[np.float64], chance: NDArray[np.float64], numbers: tuple[float, ...]
+    volts: NDArray[np.float64],
+    moving: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
+    chance: NDArray[np.float64],
+    numbers: tuple[float, ...],
 ) -> NDArray[np.uint16]:
-    """Summed codes (m,) of potentials, (m,) or (k, m) V, with standard normal numbers (k, m).
+    """Summed codes (m,) of potentials (m,) V, with standard normal numbers (k, m).
 
+    ``moving``: what comes to them, (m,) V times (k, m).
     ``numbers``: gain, offset, low and high rail, codes per volt, number of codes, bow, noise.
     """
 
@@ -257,9 +261,9 @@ def remember(
     play: Sequence[tuple[float, float]],
     kept: Sequence[Sequence[float]],
 ) -> list[NDArray[np.float64]]:
-    """Lagging, prompt, late and broken parts of a ``load`` (4, n) after a step, and wear, flat.
+    """Lagging, prompt, late and broken parts of a ``load`` (4, n) after a step, and wear.
 
-    ``past``, each flat: the load before, lagging, late and broken parts, wear (or nothing).
+    ``past``: the load before, lagging, late and broken parts, wear (or nothing).
     ``play``: parts and half widths; ``kept``: of late parts, and of breakdowns.
     """
 

@@ -5,6 +5,8 @@ use std::slice::from_raw_parts_mut;
 
 use pulp::Simd;
 
+use crate::scalar::Scalar;
+
 /// As many numbers as a register of `S` holds.
 #[derive(Clone, Copy)]
 pub(crate) struct Reals<S: Simd> {
@@ -17,6 +19,27 @@ impl<S: Simd> Reals<S> {
     #[inline(always)]
     pub fn all(self, value: f64) -> Self {
         self.made(self.simd.splat_f64s(value))
+    }
+
+    /// These times the factor, and what is added.
+    #[inline(always)]
+    pub fn times_plus(self, factor: Self, added: Self) -> Self {
+        let (values, factor) = (self.values, factor.values);
+        self.made(f64::plus_product(self.simd, values, factor, added.values))
+    }
+
+    /// The polynomial of these numbers, its highest factor first.
+    #[inline(always)]
+    pub fn series(self, factors: &[f64]) -> Self {
+        let sum = |sum: Self, &factor| sum.times_plus(self, self.all(factor));
+        factors.iter().fold(self.all(0.0), sum)
+    }
+
+    /// Whether all are below.
+    #[inline(always)]
+    pub fn below(self, limit: f64) -> bool {
+        let most = self.simd.reduce_max_f64s(self.values);
+        most < limit
     }
 
     #[inline(always)]
@@ -113,18 +136,15 @@ pub(crate) fn exp<S: Simd>(x: Reals<S>) -> Reals<S> {
     ];
     let shifted = x * x.all(std::f64::consts::LOG2_E) + x.all(WHOLE);
     let k = shifted - x.all(WHOLE);
-    let r = x - k * x.all(LN_2[0]) - k * x.all(LN_2[1]);
-    let mut series = x.all(SERIES[0]);
-    for factor in &SERIES[1..] {
-        series = series * r + x.all(*factor);
-    }
+    let r = k.times_plus(x.all(-LN_2[1]), k.times_plus(x.all(-LN_2[0]), x));
+    let series = r.series(&SERIES);
     let mut scale = shifted.values;
     // SAFETY: a register of these numbers is nothing but so many times eight bytes.
     let bits = unsafe { from_raw_parts_mut((&raw mut scale).cast::<u64>(), S::F64_LANES) };
     for bits in bits {
         *bits = bits.wrapping_add(1023) << 52;
     }
-    x.made(scale) * (x.all(1.0) + (r + r * r * series))
+    x.made(scale) * (x.all(1.0) + (r * r).times_plus(series, r))
 }
 
 /// Rows of `n` numbers each, of which blocks are taken.

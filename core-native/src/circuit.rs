@@ -26,18 +26,22 @@ pub struct Converter {
 impl Converter {
     /// Writes the sum of all conversions of each sample.
     ///
-    /// `volts` has one number a sample, or one a conversion: all samples of the first, then of the
-    /// next, as `chance` has standard normal numbers.
+    /// `volts` has one number a sample; `moving`: what comes to it, so many volts a sample, times
+    /// one number a conversion: all samples of the first, then of the next, as `chance` has
+    /// standard normal numbers.
     ///
     /// # Panics
     /// When a size is another.
-    pub fn sums(self, volts: &[f64], chance: &[f64], out: &mut [u16]) {
+    pub fn sums(self, volts: &[f64], moving: &[[&[f64]; 2]], chance: &[f64], out: &mut [u16]) {
         let n = out.len();
-        assert!(n > 0 && chance.len().is_multiple_of(n));
-        assert!(volts.len() == n || volts.len() == chance.len());
+        assert!(n > 0 && chance.len().is_multiple_of(n) && volts.len() == n);
+        for [size, course] in moving {
+            assert!(size.len() == n && course.len() == chance.len());
+        }
         narrow(Conversion {
             converter: self,
             volts,
+            moving,
             chance,
             out,
         });
@@ -48,7 +52,7 @@ impl Converter {
     fn exact(&self, volts: f64) -> f64 {
         let output = (self.gain * volts + self.offset).max(self.rails[0]);
         let exact = output.min(self.rails[1]) * self.scale;
-        let part = (exact / self.levels).clamp(0.0, 1.0);
+        let part = (exact * (1.0 / self.levels)).clamp(0.0, 1.0);
         exact + self.bow * 4.0 * part * (1.0 - part)
     }
 }
@@ -56,6 +60,7 @@ impl Converter {
 struct Conversion<'a> {
     converter: Converter,
     volts: &'a [f64],
+    moving: &'a [[&'a [f64]; 2]],
     chance: &'a [f64],
     out: &'a mut [u16],
 }
@@ -66,18 +71,22 @@ impl WithSimd for Conversion<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let (converter, n) = (self.converter, self.out.len());
-        let mut exact: Vec<f64> = self.volts.to_vec();
-        for value in &mut exact {
-            *value = converter.exact(*value);
-        }
+        let mut exact = vec![0.0; n];
         let mut sums = vec![0.0; n];
         for (number, chance) in self.chance.chunks_exact(n).enumerate() {
-            let exact = if exact.len() == n {
-                &exact
-            } else {
-                &exact[number * n..][..n]
-            };
-            for ((sum, exact), chance) in sums.iter_mut().zip(exact).zip(chance) {
+            if number == 0 || !self.moving.is_empty() {
+                exact.copy_from_slice(self.volts);
+                for [size, course] in self.moving {
+                    let course = &course[number * n..][..n];
+                    for ((value, size), part) in exact.iter_mut().zip(*size).zip(course) {
+                        *value += size * part;
+                    }
+                }
+                for value in &mut exact {
+                    *value = converter.exact(*value);
+                }
+            }
+            for ((sum, exact), chance) in sums.iter_mut().zip(&exact).zip(chance) {
                 let code = (converter.noise * chance + exact).floor();
                 *sum += code.max(0.0).min(converter.levels - 1.0);
             }

@@ -202,6 +202,28 @@ pub struct Cause<'a> {
 const LEAST: f64 = 1e-3;
 /// A deviator below is none.
 const NONE: f64 = 1e-12;
+/// Squares of deviators for which these series have all digits: cosh √x, and sinh √x / √x.
+const SMALL: f64 = 0.25;
+const COSH: [f64; 8] = [
+    1.0 / 87_178_291_200.0,
+    1.0 / 479_001_600.0,
+    1.0 / 3_628_800.0,
+    1.0 / 40_320.0,
+    1.0 / 720.0,
+    1.0 / 24.0,
+    0.5,
+    1.0,
+];
+const SINH: [f64; 8] = [
+    1.0 / 1_307_674_368_000.0,
+    1.0 / 6_227_020_800.0,
+    1.0 / 39_916_800.0,
+    1.0 / 362_880.0,
+    1.0 / 5_040.0,
+    1.0 / 120.0,
+    1.0 / 6.0,
+    1.0,
+];
 
 /// Writes the conductivity of all cells; where directions differ, xx, xy, yx, yy after each other.
 ///
@@ -232,13 +254,13 @@ impl WithSimd for Conducting<'_> {
         let (cause, material) = (self.cause, self.material);
         let n = cause.unloaded.len();
         let rows = Abreast { simd, n };
-        let (least, heat) = (rows.all(LEAST), rows.all(material.heat.max(LEAST)));
+        let (least, cold) = (rows.all(LEAST), rows.all(1.0 / material.heat.max(LEAST)));
         for at in rows.begins() {
             let [xx, yy, xy, squeezed] = followed(rows, &material, &cause, at);
             let rise = risen(rows, &material, &cause, at, xx + yy);
             let squeezed = squeezed.bounded(rows.all(material.most_compression));
             let factor = rows.all(1.0) + rows.all(material.compression) * squeezed;
-            let level = rows.read(cause.unloaded, 0, at) * factor.max(least) / heat;
+            let level = rows.read(cause.unloaded, 0, at) * factor.max(least) * cold;
             if material.gauge_across == 0.0 {
                 rows.write(self.out, 0, at, level * exp(rise));
                 continue;
@@ -303,7 +325,17 @@ fn directed<S: Simd>(
     [rise, half, cross]: [Reals<S>; 3],
     most: f64,
 ) -> [Reals<S>; 3] {
-    let size = (half * half + cross * cross).sqrt().max(level.all(NONE));
+    let square = half.times_plus(half, cross * cross);
+    if square.below(SMALL) {
+        let level = level * exp(rise);
+        let (mean, slope) = (level * square.series(&COSH), level * square.series(&SINH));
+        return [
+            mean - slope * half,
+            level.all(0.0) - slope * cross,
+            mean + slope * half,
+        ];
+    }
+    let size = square.sqrt().max(level.all(NONE));
     let bounded = size.min(level.all(most));
     let level = level * level.all(0.5);
     let (up, down) = (level * exp(rise + bounded), level * exp(rise - bounded));

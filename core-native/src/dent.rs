@@ -7,9 +7,6 @@ use crate::instructions::narrow;
 /// Depth, and strain xx, yy, xy.
 pub const PARTS: usize = 4;
 
-/// Points that are looked at together.
-const BLOCK: usize = 8;
-
 /// The dent of a probe, on a square grid around it, and where that is.
 #[derive(Clone, Copy, Debug)]
 pub struct Dent<'a> {
@@ -33,24 +30,18 @@ pub struct Dent<'a> {
 /// When a table is smaller than it says, or `felt` has another size.
 pub fn add(dents: &[Dent<'_>], x: &[f64], y: &[f64], felt: &mut [f64]) {
     assert!(y.len() == x.len() && felt.len() == PARTS * x.len());
-    let mut sums = vec![[0.0; PARTS]; x.len()];
-    let mut read = sums.clone();
-    let mut near = vec![0; x.len()];
+    felt.fill(0.0);
+    let (mut far, mut near) = (vec![0.0; x.len()], vec![0; x.len() + 1]);
     for dent in dents {
         assert!(dent.table.len() == PARTS * dent.nodes * dent.nodes && dent.nodes > 1);
         narrow(Reading {
             dent,
             x,
             y,
+            far: &mut far,
             near: &mut near,
-            read: &mut read,
-            sums: &mut sums,
+            felt,
         });
-    }
-    for (part, felt) in felt.chunks_exact_mut(x.len()).enumerate() {
-        for (felt, sums) in felt.iter_mut().zip(&sums) {
-            *felt = sums[part];
-        }
     }
 }
 
@@ -58,90 +49,89 @@ struct Reading<'a> {
     dent: &'a Dent<'a>,
     x: &'a [f64],
     y: &'a [f64],
-    /// Room for the numbers of points that are near.
+    /// Room for squares of distances.
+    far: &'a mut [f64],
+    /// Room for the numbers of points that are near, and one more.
     near: &'a mut [u32],
-    /// Room for what is felt there.
-    read: &'a mut [[f64; PARTS]],
-    /// Of each point.
-    sums: &'a mut [[f64; PARTS]],
+    /// What is added to.
+    felt: &'a mut [f64],
 }
 
 impl WithSimd for Reading<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let count = self.find();
         let Dent {
+            table,
             nodes,
             step,
             turn: [c, s],
             place,
             ..
         } = *self.dent;
-        let squared = self.dent.reach * self.dent.reach;
-        let mut count = 0;
-        let mut first = 0;
-        // neighbours in the order of the cells are neighbours on the sheet, as a rule
-        for (xs, ys) in self.x.chunks(BLOCK).zip(self.y.chunks(BLOCK)) {
-            let inside = |x: f64, y: f64| {
-                let (x, y) = (x - place[0], y - place[1]);
-                x * x + y * y < squared
-            };
-            let mut any = false;
-            for (&x, &y) in xs.iter().zip(ys) {
-                any |= inside(x, y);
-            }
-            if any {
-                for (at, (&x, &y)) in (first..).zip(xs.iter().zip(ys)) {
-                    self.near[count] = at; // written over unless it counts
-                    count += usize::from(inside(x, y));
-                }
-            }
-            first += xs.len() as u32;
-        }
-        let table = self.dent.table.as_chunks::<PARTS>().0;
         let (middle, scale) = ((nodes / 2) as f64, 1.0 / step);
-        for (&at, read) in self.near[..count].iter().zip(&mut *self.read) {
+        let last = nodes as i32 - 2;
+        let n = self.x.len();
+        let (depth, strain) = self.felt.split_at_mut(n);
+        let (xx, strain) = strain.split_at_mut(n);
+        let (yy, xy) = strain.split_at_mut(n);
+        for &at in &self.near[..count] {
             let at = at as usize;
             let (x, y) = (self.x[at] - place[0], self.y[at] - place[1]);
-            let (x, y) = (
-                (c * x + s * y) * scale + middle,
-                (c * y - s * x) * scale + middle,
-            );
-            let (i, j) = (
-                (x as i32 as usize).min(nodes - 2),
-                (y as i32 as usize).min(nodes - 2),
-            );
-            let (right, up) = (x - i as f64, y - j as f64);
-            let (low, high) = (
-                &table[i * nodes + j..][..2],
-                &table[(i + 1) * nodes + j..][..2],
-            );
-            let (low, high) = (
-                between(&low[0], &low[1], up),
-                between(&high[0], &high[1], up),
-            );
-            *read = between(&low, &high, right);
-        }
-        if s != 0.0 {
-            for read in &mut self.read[..count] {
-                *read = turned(*read, c, s);
+            let right = (c * x + s * y) * scale + middle;
+            let up = (c * y - s * x) * scale + middle;
+            let (i, j) = ((right as i32).clamp(0, last), (up as i32).clamp(0, last));
+            let corners = &table[PARTS * (i as usize * nodes + j as usize)..];
+            let part = [right - f64::from(i), up - f64::from(j)];
+            let mut read = between(simd, corners, PARTS * nodes, part);
+            if s != 0.0 {
+                read = turned(read, c, s);
             }
-        }
-        for (&at, read) in self.near[..count].iter().zip(&*self.read) {
-            for (sum, part) in self.sums[at as usize].iter_mut().zip(read) {
-                *sum += part;
-            }
+            depth[at] += read[0];
+            xx[at] += read[1];
+            yy[at] += read[2];
+            xy[at] += read[3];
         }
     }
 }
 
-/// So far from `low` to `high`.
+impl Reading<'_> {
+    /// Finds what is near, and gives the number of these points.
+    #[inline(always)]
+    fn find(&mut self) -> usize {
+        let Dent { reach, place, .. } = *self.dent;
+        for ((far, x), y) in self.far.iter_mut().zip(self.x).zip(self.y) {
+            let (x, y) = (x - place[0], y - place[1]);
+            *far = x * x + y * y;
+        }
+        let mut count = 0;
+        for (at, &far) in (0..).zip(&*self.far) {
+            self.near[count] = at; // written over unless it counts
+            count += usize::from(far < reach * reach);
+        }
+        count
+    }
+}
+
+/// The parts at a point within a square of nodes, from the first two of which the others are `row`
+/// numbers away.
 #[inline(always)]
-fn between(low: &[f64; PARTS], high: &[f64; PARTS], part: f64) -> [f64; PARTS] {
-    let mut out = *low;
-    for ((out, low), high) in out.iter_mut().zip(low).zip(high) {
-        *out += (high - low) * part;
+fn between<S: Simd>(simd: S, corners: &[f64], row: usize, part: [f64; 2]) -> [f64; PARTS] {
+    const { assert!(PARTS.is_multiple_of(S::F64_LANES)) }
+    let (near, next) = (&corners[..2 * PARTS], &corners[row..][..2 * PARTS]);
+    let [near, next] = [near, next].map(|nodes| S::as_simd_f64s(nodes).0);
+    let [right, up] = part.map(|part| simd.splat_f64s(part));
+    let way = |from, to, part| simd.mul_add_e_f64s(simd.sub_f64s(to, from), part, from);
+    let mut out = [0.0; PARTS];
+    let half = near.len() / 2;
+    for (k, out) in S::as_mut_simd_f64s(&mut out).0.iter_mut().enumerate() {
+        let (low, high) = (
+            way(near[k], near[half + k], up),
+            way(next[k], next[half + k], up),
+        );
+        *out = way(low, high, right);
     }
     out
 }

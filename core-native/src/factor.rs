@@ -5,12 +5,13 @@
 //! leaves the square to its parent (Duff & Reid 1983).
 
 use std::array::from_fn;
+use std::ops::Range;
 use std::sync::Arc;
 
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::instructions::run;
-use crate::kernel::{ROWS, Shape, eliminate, subtract_square};
+use crate::kernel::{ROWS, Shape, eliminate, write_square};
 use crate::scalar::Scalar;
 use crate::symbolic::{Panel, Symbolic};
 
@@ -44,7 +45,7 @@ impl<T: Scalar> Factor<T> {
             let expected = symbolic.n_values();
             return Err(format!("expected {expected} values, got {}", values.len()));
         }
-        let values = eliminated(arch, &symbolic, values, 0)?;
+        let values = eliminated(arch, &symbolic, &symbolic.lower(values), 0)?;
         Ok(Self {
             arch,
             symbolic,
@@ -71,7 +72,8 @@ impl<T: Scalar> Factor<T> {
     }
 }
 
-/// The factor's values of the panels from `first` on, for the matrix with these values.
+/// The factor's values of the panels from `first` on, for the matrix with these [values of the lower
+/// triangle](Symbolic::lower).
 ///
 /// # Errors
 /// When the real part of the matrix is not positive definite.
@@ -97,6 +99,7 @@ pub(crate) fn eliminated<T: Scalar>(
 
 struct Elimination<'a, T> {
     symbolic: &'a Symbolic,
+    /// Of the lower triangle, panel by panel.
     values: &'a [T],
     /// The first panel whose values are kept.
     first: usize,
@@ -108,74 +111,79 @@ impl<T: Scalar> WithSimd for Elimination<'_, T> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let symbolic = self.symbolic;
-        let [columns_len, squares_len] = symbolic.workspace();
-        let mut memory = vec![T::ZERO; columns_len + squares_len + LINE];
+        let sizes = symbolic.workspace();
+        let mut memory = vec![T::ZERO; sizes.iter().sum::<usize>() + LINE];
         let begin = memory.as_ptr().align_offset(LINE).min(LINE);
-        let (columns, squares) = memory[begin..].split_at_mut(columns_len);
+        let (columns, squares) = memory[begin..].split_at_mut(sizes[0]);
+        let (even, odd) = squares.split_at_mut(sizes[1]);
         let omitted = symbolic.panel(self.first).first_value;
         let mut factor = Vec::with_capacity(symbolic.factor_len() - omitted + ROWS);
-        let mut end = 0;
         for number in 0..symbolic.n_panels() {
             let panel = symbolic.panel(number);
             let shape = panel.shape();
+            let (squares, others) = if panel.odd {
+                (&mut *odd, &*even)
+            } else {
+                (&mut *even, &*odd)
+            };
             let columns = &mut columns[..shape.columns_len()];
-            let (done, free) = squares.split_at_mut(end);
-            let square = &mut free[..shape.square_len()];
             columns.fill(T::ZERO);
-            square.fill(T::ZERO);
-            for &(to, from) in symbolic.scatter(number) {
-                columns[to as usize] = self.values[from as usize];
+            let scatter = symbolic.lower_of(number);
+            for (&to, &value) in symbolic
+                .targets(scatter.clone())
+                .iter()
+                .zip(&self.values[scatter])
+            {
+                columns[to as usize] = value;
             }
-            let start = end - symbolic.children_len(panel);
-            let mut at = start;
             for &child in panel.children {
                 let child = symbolic.panel(child as usize);
-                add_child(&done[at..], child, shape, columns, square);
-                at += child.shape().square_len();
+                let begin = |row: u32| row as usize * shape.stride();
+                add_child(
+                    &others[child.square..],
+                    child,
+                    0..child.inner,
+                    columns,
+                    begin,
+                );
             }
             eliminate(simd, columns, shape).map_err(|j| panel.start + j)?;
-            subtract_square(simd, square, columns, shape);
+            let square = &mut squares[panel.square..][..shape.square_len()];
+            write_square(simd, square, columns, shape);
+            for &child in panel.children {
+                let child = symbolic.panel(child as usize);
+                let (top, rest) = (shape.top(), child.inner..child.below.len());
+                let begin = |row: u32| ((row as usize - top) * shape.side()).wrapping_sub(top);
+                add_child(&others[child.square..], child, rest, square, begin);
+            }
             if number >= self.first {
                 factor.resize(panel.values().end - omitted + ROWS, T::ZERO);
                 pack(columns, shape, &mut factor[panel.first_value - omitted..]);
             }
-            squares.copy_within(end..end + shape.square_len(), start);
-            end = start + shape.square_len();
         }
         factor.truncate(symbolic.factor_len() - omitted);
         Ok(factor)
     }
 }
 
-/// Adds a child's square to the front of its parent, whose size is `shape`.
+/// Adds some columns of a child's square to a part of its parent's front, in which the columns begin
+/// at `begin` of their rows.
 #[inline(always)]
 fn add_child<T: Scalar>(
     update: &[T],
     child: Panel<'_>,
-    shape: Shape,
-    columns: &mut [T],
-    square: &mut [T],
+    columns: Range<usize>,
+    target: &mut [T],
+    begin: impl Fn(u32) -> usize + Copy,
 ) {
     let (rows, side) = (child.in_parent, child.shape().side());
-    let inner = rows.partition_point(|&row| (row as usize) < shape.top());
-    let target = |column: u32| column as usize * shape.stride();
-    let mut j = 0;
-    while j + 4 <= inner {
-        add_columns::<4, T>(columns, target, &rows[j..], &update[j * side + j..], side);
+    let Range { start: mut j, end } = columns;
+    while j + 4 <= end {
+        add_columns::<4, T>(target, begin, &rows[j..], &update[j * side + j..], side);
         j += 4;
     }
-    while j < inner {
-        add_columns::<1, T>(columns, target, &rows[j..], &update[j * side + j..], side);
-        j += 1;
-    }
-    let target =
-        |column: u32| ((column as usize - shape.top()) * shape.side()).wrapping_sub(shape.top());
-    while j + 4 <= rows.len() {
-        add_columns::<4, T>(square, target, &rows[j..], &update[j * side + j..], side);
-        j += 4;
-    }
-    while j < rows.len() {
-        add_columns::<1, T>(square, target, &rows[j..], &update[j * side + j..], side);
+    while j < end {
+        add_columns::<1, T>(target, begin, &rows[j..], &update[j * side + j..], side);
         j += 1;
     }
 }
@@ -183,7 +191,7 @@ fn add_child<T: Scalar>(
 /// Adds the first `N` columns of a child's square, from the diagonal on, to those of the front that
 /// begin at `begin` of their numbers.
 ///
-/// Several at a time, since most are short; what comes above the diagonal is of no use.
+/// Several at a time, since most are short.
 #[inline(always)]
 fn add_columns<const N: usize, T: Scalar>(
     target: &mut [T],
@@ -199,14 +207,18 @@ fn add_columns<const N: usize, T: Scalar>(
         assert!(begin.wrapping_add(last) < target.len());
     }
     assert!(update.len() >= (N - 1) * side + rows.len());
-    for (i, &row) in rows.iter().enumerate() {
-        for (c, begin) in begins.into_iter().enumerate() {
-            // SAFETY: rows ascend, and the first and the last are within what has been asserted.
-            unsafe {
-                *target.get_unchecked_mut(begin.wrapping_add(row as usize)) +=
-                    *update.get_unchecked(c * side + i);
-            }
+    let mut add = |i: usize, row: u32, c: usize| {
+        // SAFETY: rows ascend, and the first and the last are within what has been asserted.
+        unsafe {
+            *target.get_unchecked_mut(begins[c].wrapping_add(row as usize)) +=
+                *update.get_unchecked(c * side + i);
         }
+    };
+    for (i, &row) in rows[..N].iter().enumerate() {
+        (0..=i).for_each(|c| add(i, row, c));
+    }
+    for (i, &row) in rows.iter().enumerate().skip(N) {
+        (0..N).for_each(|c| add(i, row, c));
     }
 }
 

@@ -84,7 +84,9 @@ pub fn eliminate<S: Simd, T: Scalar>(
                     stride,
                     depth: j - first,
                 };
-                subtract(simd, &mut rest[begin..], stride, stride - begin, source);
+                let less = |value: &mut _, sum| *value = T::less(simd, *value, sum);
+                let size = [stride, stride - begin];
+                tiles::<S, T>(simd, &mut rest[begin..], size, source, less);
             }
             eliminate_four(simd, rest, stride, j, WIDE.min(end - j))?;
         }
@@ -99,12 +101,13 @@ pub fn eliminate<S: Simd, T: Scalar>(
     Ok(())
 }
 
-/// Subtracts the lower triangle of L Lᵀ, L the rows below in the columns, from the square.
+/// Writes the lower triangle of −L Lᵀ, L the rows below in the columns, to the square.
 #[inline(always)]
-pub fn subtract_square<S: Simd, T: Scalar>(simd: S, square: &mut [T], columns: &[T], shape: Shape) {
+pub fn write_square<S: Simd, T: Scalar>(simd: S, square: &mut [T], columns: &[T], shape: Shape) {
     let (below, side, stride) = (shape.below, shape.side(), shape.stride());
     let rows = &columns[shape.top()..];
     if below * below * shape.width >= LARGE {
+        square.fill(T::ZERO);
         let target = Target::lower(square, side);
         subtract_lower(target, rows, stride, [below, below, shape.width]);
         return;
@@ -118,7 +121,8 @@ pub fn subtract_square<S: Simd, T: Scalar>(simd: S, square: &mut [T], columns: &
             depth: shape.width,
         };
         let target = &mut square[j * side + begin..];
-        subtract(simd, target, side, side - begin, source);
+        let written = |value: &mut _, sum| *value = T::less(simd, T::zeros(simd), sum);
+        tiles::<S, T>(simd, target, [side, side - begin], source, written);
     }
 }
 
@@ -134,40 +138,55 @@ struct Source<'a, T> {
     depth: usize,
 }
 
-/// Subtracts from four columns, `height` rows of them, the columns of the source times its factors.
+impl<T> Source<'_, T> {
+    /// The same from a later row on.
+    #[inline(always)]
+    fn from(self, row: usize) -> Self {
+        let rows = &self.rows[row..];
+        Self { rows, ..self }
+    }
+}
+
+/// Gives `put` the values of four columns, `size[1]` rows of them and `size[0]` from column to column,
+/// and the columns of the source times its factors.
 #[inline(always)]
-fn subtract<S: Simd, T: Scalar>(
+fn tiles<S: Simd, T: Scalar>(
     simd: S,
     target: &mut [T],
-    column: usize,
-    height: usize,
+    size: [usize; 2],
     source: Source<'_, T>,
+    put: impl Fn(&mut T::Vector<S>, T::Vector<S>),
 ) {
     let lanes = size_of::<T::Vector<S>>() / size_of::<T>();
-    let mut row = 0;
+    let ([column, height], mut row) = (size, 0);
     while row + 2 * lanes <= height {
-        subtract_tile::<S, T, 2>(simd, &mut target[row..], column, row, source);
+        put_tile::<S, T, 2>(simd, &mut target[row..], column, source.from(row), &put);
         row += 2 * lanes;
     }
     if row < height {
-        subtract_tile::<S, T, 1>(simd, &mut target[row..], column, row, source);
+        put_tile::<S, T, 1>(simd, &mut target[row..], column, source.from(row), &put);
     }
 }
 
 #[inline(always)]
-fn subtract_tile<S: Simd, T: Scalar, const TALL: usize>(
+fn put_tile<S: Simd, T: Scalar, const TALL: usize>(
     simd: S,
     target: &mut [T],
     column: usize,
-    row: usize,
     source: Source<'_, T>,
+    put: &impl Fn(&mut T::Vector<S>, T::Vector<S>),
 ) {
-    let rows = &source.rows[row..];
-    let sums = tile::<S, T, TALL, WIDE>(simd, rows, source.factors, source.stride, source.depth);
+    let Source {
+        rows,
+        factors,
+        stride,
+        depth,
+    } = source;
+    let sums = tile::<S, T, TALL, WIDE>(simd, rows, factors, stride, depth);
     for (c, sums) in sums.into_iter().enumerate() {
         let values = &mut T::vectors_mut::<S>(&mut target[c * column..])[..TALL];
         for (value, sum) in values.iter_mut().zip(sums) {
-            *value = T::less(simd, *value, sum);
+            put(value, sum);
         }
     }
 }
@@ -219,19 +238,20 @@ fn eliminate_four<S: Simd, T: Scalar>(
 ) -> Result<(), usize> {
     let block: [&[T]; WIDE] = from_fn(|k| &columns[k * stride + j..][..WIDE]);
     let mut factor: [[T; WIDE]; WIDE] = block.map(|column| from_fn(|i| column[i]));
-    let mut inverse = [T::ZERO; WIDE];
+    let (mut inverse, mut scale) = ([T::ZERO; WIDE], [T::ZERO; WIDE]);
+    let mut by = [[T::ZERO; WIDE]; WIDE];
+    // no root is waited for: columns are scaled by it when all else is done
     for k in 0..WIDE {
         for d in 0..k {
-            let (done, by) = (factor[d], factor[d][k]);
+            let done = factor[d];
+            by[d][k] = -(done[k] * inverse[d]);
             for i in k..WIDE {
-                factor[k][i] -= done[i] * by;
+                factor[k][i] += done[i] * by[d][k];
             }
         }
         if k < count {
-            inverse[k] = T::ONE / factor[k][k].pivot().ok_or(j + k)?;
-        }
-        for value in &mut factor[k][k + 1..] {
-            *value *= inverse[k];
+            inverse[k] = T::ONE / factor[k][k];
+            scale[k] = inverse[k].pivot().ok_or(j + k)?;
         }
     }
     let begin = j - j % ROWS;
@@ -239,26 +259,26 @@ fn eliminate_four<S: Simd, T: Scalar>(
     let (second, rest) = rest.split_at_mut(stride);
     let (third, rest) = rest.split_at_mut(stride);
     let fourth = &mut rest[..stride];
-    let scale = inverse.map(|value| T::factor(simd, value));
-    let by = factor.map(|column| column.map(|value| T::factor(simd, -value)));
+    let scales = scale.map(|value| T::factor(simd, value));
+    let by = by.map(|column| column.map(|value| T::factor(simd, value)));
     let first = T::vectors_mut::<S>(&mut first[begin..]);
     let second = T::vectors_mut::<S>(&mut second[begin..]);
     let third = T::vectors_mut::<S>(&mut third[begin..]);
     let fourth = T::vectors_mut::<S>(&mut fourth[begin..]);
     for (((a, b), c), d) in first.iter_mut().zip(second).zip(third).zip(fourth) {
-        *a = T::times(simd, *a, scale[0]);
         *b = T::plus_product(simd, *a, by[0][1], *b);
-        *b = T::times(simd, *b, scale[1]);
         *c = T::plus_product(simd, *a, by[0][2], *c);
-        *c = T::plus_product(simd, *b, by[1][2], *c);
-        *c = T::times(simd, *c, scale[2]);
         *d = T::plus_product(simd, *a, by[0][3], *d);
+        *c = T::plus_product(simd, *b, by[1][2], *c);
         *d = T::plus_product(simd, *b, by[1][3], *d);
         *d = T::plus_product(simd, *c, by[2][3], *d);
-        *d = T::times(simd, *d, scale[3]);
+        *a = T::times(simd, *a, scales[0]);
+        *b = T::times(simd, *b, scales[1]);
+        *c = T::times(simd, *c, scales[2]);
+        *d = T::times(simd, *d, scales[3]);
     }
     for k in 0..count {
-        columns[k * stride + j + k] = inverse[k];
+        columns[k * stride + j + k] = scale[k];
     }
     Ok(())
 }

@@ -1,5 +1,7 @@
 //! Layout of a factor: which panels it has, and how each adds to its parent.
 
+use std::ops::Range;
+
 use crate::kernel::Shape;
 use crate::ordering::analyse;
 use crate::panels::{Panels, inverse};
@@ -21,21 +23,24 @@ pub struct Symbolic {
     below: Vec<u32>,
     /// For each entry of `below`, the row of the parent's front, padding counted.
     in_parent: Vec<u32>,
+    /// For each panel, how many rows below are columns of the parent.
+    inner: Vec<u32>,
     /// Where each panel's values begin.
     value_starts: Vec<usize>,
     /// For each panel, its children: `children[child_starts[p]..child_starts[p + 1]]`.
     child_starts: Vec<u32>,
     children: Vec<u32>,
-    /// (position in the front's columns, position in the matrix) of each value of the lower
-    /// triangle, panel by panel.
-    scatter: Vec<(u32, u32)>,
-    /// Where each panel's entries of `scatter` begin.
-    scatter_starts: Vec<u32>,
-    /// What the columns of the largest front take, and all squares that there are at a time.
-    workspace: [usize; 2],
+    /// Position in the matrix of each value of the lower triangle, panel by panel.
+    lower: Vec<u32>,
+    /// Position in the front's columns of each of these.
+    targets: Vec<u32>,
+    /// Where each panel's begin.
+    lower_starts: Vec<u32>,
+    /// For each panel, on which of two stacks its square lies, and where.
+    squares: Vec<(bool, usize)>,
+    /// What the columns of the largest front take, and each of the stacks.
+    workspace: [usize; 3],
 }
-
-type Scatter = (Vec<(u32, u32)>, Vec<u32>);
 
 /// Adjacent columns of the factor that share one pattern below their diagonal block.
 #[derive(Clone, Copy, Debug)]
@@ -48,8 +53,14 @@ pub struct Panel<'a> {
     pub below: &'a [u32],
     /// For each row below, the row of the parent's front that it adds to, padding counted.
     pub in_parent: &'a [u32],
+    /// How many of these are columns of the parent.
+    pub inner: usize,
     /// Panels whose rows below begin in these columns.
     pub children: &'a [u32],
+    /// Whether its square lies on the second of two stacks; its children's lie on the other.
+    pub odd: bool,
+    /// Where its square begins there.
+    pub square: usize,
     /// First value: column-major, `height()` rows.
     pub first_value: usize,
 }
@@ -101,8 +112,8 @@ impl Symbolic {
         let mut symbolic = Self::of_panels(analyse(size, column_starts, rows, last)?);
         (symbolic.column_starts, symbolic.rows) = (column_starts.to_vec(), rows.to_vec());
         symbolic.link_panels();
-        (symbolic.scatter, symbolic.scatter_starts) = symbolic.scatter_of()?;
-        symbolic.workspace = symbolic.workspace_of();
+        symbolic.scatter()?;
+        symbolic.stack();
         Ok(symbolic)
     }
 
@@ -122,18 +133,23 @@ impl Symbolic {
             below_starts: panels.below_starts,
             below: panels.below,
             in_parent: Vec::new(),
+            inner: Vec::new(),
             value_starts,
             child_starts: Vec::new(),
             children: Vec::new(),
-            scatter: Vec::new(),
-            scatter_starts: Vec::new(),
-            workspace: [0; 2],
+            lower: Vec::new(),
+            targets: Vec::new(),
+            lower_starts: vec![0],
+            squares: Vec::new(),
+            workspace: [0; 3],
         }
     }
 
     /// Finds each panel's parent, the panel of its first row below, and where its rows lie there.
     fn link_panels(&mut self) {
         let n_panels = self.n_panels();
+        self.inner = vec![0; n_panels];
+        self.squares = vec![(false, 0); n_panels];
         let mut panel_of = vec![0_u32; self.size()];
         for (number, columns) in self.starts.windows(2).enumerate() {
             panel_of[columns[0] as usize..columns[1] as usize].fill(number as u32);
@@ -170,6 +186,7 @@ impl Symbolic {
             for entry in self.below_starts[number]..self.below_starts[number + 1] {
                 let row = self.below[entry];
                 self.in_parent[entry] = if row < end {
+                    self.inner[number] += 1;
                     row - start
                 } else {
                     at += theirs[at..].partition_point(|&other| other < row);
@@ -179,10 +196,9 @@ impl Symbolic {
         }
     }
 
-    fn scatter_of(&self) -> Result<Scatter, String> {
+    /// Finds where in the fronts the values of the lower triangle belong.
+    fn scatter(&mut self) -> Result<(), String> {
         let mut row_in_front = vec![0; self.size()];
-        let mut scatter = Vec::with_capacity((self.rows.len() + self.size()) / 2);
-        let mut starts = vec![0];
         for number in 0..self.n_panels() {
             let panel = self.panel(number);
             let shape = panel.shape();
@@ -195,42 +211,45 @@ impl Symbolic {
             for j in 0..panel.width {
                 row_in_front[panel.start + j] = j;
             }
+            let mut scatter = Vec::new();
             for j in 0..panel.width {
-                let done = scatter.len();
                 for (row, from) in self.row(panel.start + j) {
                     if row >= panel.start + j {
                         let to = j * shape.stride() + row_in_front[row];
                         scatter.push((to as u32, from as u32));
                     }
                 }
-                scatter[done..].sort_unstable();
             }
-            starts.push(scatter.len() as u32);
+            scatter.sort_unstable();
+            self.targets.extend(scatter.iter().map(|&(to, _)| to));
+            self.lower.extend(scatter.iter().map(|&(_, from)| from));
+            self.lower_starts.push(self.lower.len() as u32);
         }
-        Ok((scatter, starts))
+        Ok(())
     }
 
-    /// See `workspace`. Squares lie one after the other; a panel's takes the place of its children's
-    /// when it is done.
-    fn workspace_of(&self) -> [usize; 2] {
-        let (mut columns, mut squares, mut end) = (0, 0, 0);
-        for number in 0..self.n_panels() {
+    /// Finds places for the squares. Each is taken from the top of one stack when its parent, whose
+    /// square lies on the other, is done.
+    fn stack(&mut self) {
+        let n_panels = self.n_panels();
+        for number in (0..n_panels).rev() {
+            let odd = !self.squares[number].0;
+            for at in self.child_starts[number]..self.child_starts[number + 1] {
+                self.squares[self.children[at as usize] as usize].0 = odd;
+            }
+        }
+        let mut ends = [0; 2];
+        for number in 0..n_panels {
             let panel = self.panel(number);
-            let square = panel.shape().square_len();
-            columns = columns.max(panel.shape().columns_len());
-            squares = squares.max(end + square);
-            end = end + square - self.children_len(panel);
+            let (own, shape) = (usize::from(panel.odd), panel.shape());
+            if let Some(&first) = panel.children.first() {
+                ends[1 - own] = self.squares[first as usize].1;
+            }
+            self.squares[number].1 = ends[own];
+            ends[own] += shape.square_len();
+            self.workspace[0] = self.workspace[0].max(shape.columns_len());
+            self.workspace[1 + own] = self.workspace[1 + own].max(ends[own]);
         }
-        [columns, squares]
-    }
-
-    /// What the squares of a panel's children take.
-    pub(crate) fn children_len(&self, panel: Panel<'_>) -> usize {
-        let squares = panel
-            .children
-            .iter()
-            .map(|&child| self.panel(child as usize));
-        squares.map(|child| child.shape().square_len()).sum()
     }
 
     /// Number of rows and columns.
@@ -274,16 +293,29 @@ impl Symbolic {
             .zip(entries)
     }
 
-    /// (position in the front's columns, position in the matrix) of each value that a panel has of
-    /// the matrix.
-    #[inline(always)]
-    pub(crate) fn scatter(&self, number: usize) -> &[(u32, u32)] {
-        let starts = &self.scatter_starts[number..number + 2];
-        &self.scatter[starts[0] as usize..starts[1] as usize]
+    /// The values of the lower triangle, panel by panel, of a matrix with these values.
+    ///
+    /// # Panics
+    /// When there are fewer values than the structure has.
+    pub(crate) fn lower<T: Copy>(&self, values: &[T]) -> Vec<T> {
+        let positions = self.lower.iter();
+        positions.map(|&at| values[at as usize]).collect()
     }
 
-    /// What the columns of the largest front take, and all squares that there are at a time.
-    pub(crate) fn workspace(&self) -> [usize; 2] {
+    /// Which values of the lower triangle are in a panel.
+    #[inline(always)]
+    pub(crate) fn lower_of(&self, number: usize) -> Range<usize> {
+        self.lower_starts[number] as usize..self.lower_starts[number + 1] as usize
+    }
+
+    /// Positions in a front's columns of values of the lower triangle.
+    #[inline(always)]
+    pub(crate) fn targets(&self, values: Range<usize>) -> &[u32] {
+        &self.targets[values]
+    }
+
+    /// What the columns of the largest front take, and each of the two stacks of squares.
+    pub(crate) fn workspace(&self) -> [usize; 3] {
         self.workspace
     }
 
@@ -305,6 +337,9 @@ impl Symbolic {
             width: self.starts[number + 1] as usize - start,
             below: &self.below[below.clone()],
             in_parent: &self.in_parent[below],
+            inner: self.inner[number] as usize,
+            odd: self.squares[number].0,
+            square: self.squares[number].1,
             children: &self.children[children],
             first_value: self.value_starts[number],
         }

@@ -21,15 +21,15 @@ const LEAST: f64 = 1e-9;
 pub struct Terminals {
     symbolic: Arc<Symbolic>,
     cells: Cells,
-    /// What is in the matrix beside the cells.
+    /// What is in the lower triangle beside the cells, panel by panel; all else counts so, too.
     others: Vec<f64>,
-    /// For each value of the lower triangle: where it stands in the matrix, and where its parts end.
-    rows: Vec<(u32, u32)>,
-    /// Cells' entries that are added, value after value.
-    parts: Vec<u32>,
+    /// Pair after pair of nodes, in each all cells: which edge they are.
+    edge: Vec<u32>,
+    /// Each edge's value, and the diagonal's at its ends.
+    edges: Vec<[u32; 3]>,
     /// Where each of the last columns of the factor is among the terminals.
     order: Vec<usize>,
-    /// The diagonal's value in the matrix of each of these.
+    /// The diagonal's value of each of these.
     diagonal: Vec<u32>,
     /// The first panel with one of them.
     first: usize,
@@ -76,22 +76,28 @@ impl Cells {
         Ok(())
     }
 
-    /// (value of the matrix, cells' entry) of all that is added in the lower triangle: pairs once.
-    fn entries(&self) -> impl Iterator<Item = (u32, u32)> {
-        let (k, n) = (self.nodes, self.count);
-        let pair = move |i: usize, j: usize| i * (2 * k - i - 1) / 2 + j - i - 1;
-        (0..n).flat_map(move |cell| {
-            let position = &self.position[cell * k * k..][..k * k];
-            (0..k * k).map(move |at| {
-                let (i, j) = (at / k, at % k);
-                let number = if i == j {
-                    self.pairs() + i
-                } else {
-                    pair(i.min(j), i.max(j))
-                };
-                (position[at], (number * n + cell) as u32)
+    /// Each pair of nodes of a cell.
+    fn ends(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
+        let nodes = self.nodes;
+        (0..nodes).flat_map(move |i| (i + 1..nodes).map(move |j| [i, j]))
+    }
+
+    /// Which edge each pair is, and the edges, in the order of their values: `place` has that of
+    /// each value of the matrix in the lower triangle, or more than there are.
+    fn edges(&self, place: &[u32]) -> (Vec<u32>, Vec<[u32; 3]>) {
+        let k = self.nodes;
+        let found = self.ends().flat_map(|[i, j]| {
+            self.position.chunks_exact(k * k).map(move |position| {
+                let at = |i: usize, j: usize| place[position[i * k + j] as usize];
+                [at(i, j).min(at(j, i)), at(i, i), at(j, j)]
             })
-        })
+        });
+        let found: Vec<_> = found.collect();
+        let mut edges = found.clone();
+        edges.sort_unstable();
+        edges.dedup_by_key(|edge| edge[0]);
+        let number = |edge: &[u32; 3]| edges.partition_point(|other| other[0] < edge[0]) as u32;
+        (found.iter().map(number).collect(), edges)
     }
 }
 
@@ -103,7 +109,7 @@ impl Terminals {
     pub fn new(
         symbolic: Arc<Symbolic>,
         cells: Cells,
-        others: Vec<f64>,
+        others: &[f64],
         last: &[u32],
     ) -> Result<Self, String> {
         cells.check(symbolic.n_values())?;
@@ -119,23 +125,24 @@ impl Terminals {
         let panels = 0..symbolic.n_panels();
         let within = |number: &usize| symbolic.panel(*number).start <= begin;
         let first = panels.rev().find(within).unwrap_or(0);
-        let mut lower: Vec<u32> = (0..symbolic.n_panels())
-            .flat_map(|number| symbolic.scatter(number).iter().map(|&(_, from)| from))
-            .collect();
-        lower.sort_unstable();
+        let mut place = vec![u32::MAX; symbolic.n_values()];
+        let all: Vec<u32> = (0..).take(place.len()).collect();
+        for (at, value) in (0..).zip(symbolic.lower(&all)) {
+            place[value as usize] = at;
+        }
         let diagonal = (begin..symbolic.size()).map(|row| {
             let mut entries = symbolic.row(row);
-            entries.find_map(|(column, at)| (column == row).then_some(at as u32))
+            entries.find_map(|(column, at)| (column == row).then_some(place[at]))
         });
         let diagonal = diagonal.collect::<Option<_>>();
-        let (rows, parts) = gathered(&lower, &cells, symbolic.n_values());
+        let (edge, edges) = cells.edges(&place);
         Ok(Self {
             diagonal: diagonal.ok_or("a row without a diagonal")?,
+            others: symbolic.lower(others),
             symbolic,
             cells,
-            others,
-            rows,
-            parts,
+            edge,
+            edges,
             order,
             first,
         })
@@ -166,7 +173,7 @@ impl Terminals {
         if conductivity.len() != expected || out.len() != size * size {
             return Err(format!("conductivity: expected {expected} values"));
         }
-        let mut values = vec![0.0; self.symbolic.n_values()];
+        let mut values = self.others.clone();
         narrow(Assembly {
             network: self,
             conductivity,
@@ -248,30 +255,10 @@ fn centre(values: &mut [f64], size: usize) {
     }
 }
 
-/// The rows of `lower`, each with the end of its parts, and the parts.
-fn gathered(lower: &[u32], cells: &Cells, n_values: usize) -> (Vec<(u32, u32)>, Vec<u32>) {
-    let mut wanted = vec![false; n_values];
-    for &value in lower {
-        wanted[value as usize] = true;
-    }
-    let mut entries: Vec<_> = cells
-        .entries()
-        .filter(|&(value, _)| wanted[value as usize])
-        .collect();
-    entries.sort_unstable();
-    let ends = lower
-        .iter()
-        .map(|&value| entries.partition_point(|&(other, _)| other <= value));
-    let rows = lower.iter().copied().zip(ends.map(|end| end as u32));
-    (
-        rows.collect(),
-        entries.iter().map(|&(_, part)| part).collect(),
-    )
-}
-
 struct Assembly<'a> {
     network: &'a Terminals,
     conductivity: &'a [f64],
+    /// What is added to.
     values: &'a mut [f64],
 }
 
@@ -282,32 +269,24 @@ impl WithSimd for Assembly<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         let cells = &self.network.cells;
         let (n, pairs) = (cells.count, cells.pairs());
-        let mut entries = vec![0.0; (pairs + cells.nodes) * n];
-        let (edges, corners) = entries.split_at_mut(pairs * n);
+        let mut conducted = vec![0.0; pairs * n];
         let each = cells.forms.chunks_exact(pairs * n);
         for (forms, component) in each.zip(cells.components()) {
             let sigma = &self.conductivity[component * n..][..n];
-            for (edges, forms) in edges.chunks_exact_mut(n).zip(forms.chunks_exact(n)) {
-                for ((edge, form), sigma) in edges.iter_mut().zip(forms).zip(sigma) {
-                    *edge += form * sigma;
+            for (pair, forms) in conducted.chunks_exact_mut(n).zip(forms.chunks_exact(n)) {
+                for ((value, form), sigma) in pair.iter_mut().zip(forms).zip(sigma) {
+                    *value += form * sigma;
                 }
             }
         }
-        let nodes = 0..cells.nodes;
-        let ends = nodes.flat_map(|i| (i + 1..cells.nodes).map(move |j| [i, j]));
-        for (edges, ends) in edges.chunks_exact(n).zip(ends) {
-            for end in ends {
-                for (corner, edge) in corners[end * n..][..n].iter_mut().zip(edges) {
-                    *corner -= edge;
-                }
-            }
+        let mut sums = vec![0.0; self.network.edges.len()];
+        for (&edge, value) in self.network.edge.iter().zip(&conducted) {
+            sums[edge as usize] += value;
         }
-        let mut begin = 0;
-        for &(value, end) in &self.network.rows {
-            let parts = &self.network.parts[begin..end as usize];
-            let sum: f64 = parts.iter().map(|&part| entries[part as usize]).sum();
-            self.values[value as usize] = self.network.others[value as usize] + sum;
-            begin = end as usize;
+        for (&[at, first, second], sum) in self.network.edges.iter().zip(&sums) {
+            self.values[at as usize] += sum;
+            self.values[first as usize] -= sum;
+            self.values[second as usize] -= sum;
         }
     }
 }

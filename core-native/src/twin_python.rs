@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
-use ndarray::IxDyn;
-use numpy::{Ix1, Ix2, Ix3, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{
+    Ix1, Ix2, Ix3, IxDyn, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods,
+};
 use pulp::Arch;
 use pyo3::prelude::*;
 
@@ -46,7 +48,7 @@ impl Terminals {
             position: position.as_array().iter().map(|&at| at as u32).collect(),
         };
         let symbolic = Symbolic::ending(starts.len().saturating_sub(1), &starts, &rows, &last);
-        let others = contiguous("contacts", &contacts)?.to_vec();
+        let others = contiguous("contacts", &contacts)?;
         symbolic
             .and_then(|symbolic| {
                 terminals::Terminals::new(Arc::new(symbolic), cells, others, &last)
@@ -110,10 +112,10 @@ pub(crate) fn dented<'py>(
 }
 
 /// Lagging, prompt, late and broken parts after a step under `load` (4, n), and wear.
-type Step<'py> = [Bound<'py, PyArray1<f64>>; 5];
+type Step<'py> = [Bound<'py, PyArrayDyn<f64>>; 5];
 
 /// What cells remember after a step: `past` are the load before, lagging, late and broken parts, and
-/// wear, each flat; `play`: parts and half widths; `kept`: of late parts, and of breakdowns.
+/// wear; `play`: parts and half widths; `kept`: of late parts, and of breakdowns.
 #[pyfunction]
 pub(crate) fn remember<'py>(
     load: &Any<'py>,
@@ -127,21 +129,21 @@ pub(crate) fn remember<'py>(
     let n = load.shape()[1];
     let load = contiguous("load", &load)?;
     let [late, broken] = &kept;
-    let parts = [1, play.len(), late.len()].map(|parts| parts * LOADS * n);
     let worn = if past[4].is_empty()? { 0 } else { n };
-    let sizes = [
-        parts[0],
-        parts[1],
-        parts[2],
-        broken.len() * GROUPS * n,
-        worn,
+    let shapes: [&[usize]; 5] = [
+        &[LOADS, n],
+        &[play.len(), LOADS, n],
+        &[late.len(), LOADS, n],
+        &[broken.len(), GROUPS, n],
+        &[worn],
     ];
+    let sizes = shapes.map(|shape| shape.iter().product());
     let names = ["load before", "lagging", "late", "broken", "worn"];
     let flat = flat(names, &past, sizes)?;
     let [before, lagging, reached, shaken, wear] = [0, 1, 2, 3, 4].map(|k| flat[k].as_slice());
     // SAFETY: `advance` writes all of them.
-    let made = |size: usize| unsafe { PyArray1::<f64>::new(py, size, false) };
-    let out = [sizes[1], sizes[0], sizes[2], sizes[3], worn].map(made);
+    let made = |part: usize| unsafe { PyArrayDyn::<f64>::new(py, IxDyn(shapes[part]), false) };
+    let out = [1, 0, 2, 3, 4].map(made);
     {
         let [mut a, mut b, mut c, mut d, mut e] = out.each_ref().map(|part| part.readwrite());
         let memory = Memory {
@@ -170,7 +172,7 @@ pub(crate) fn remember<'py>(
 
 /// Conductivity of cells, (1, n), or xx, xy, yx, yy (4, n) where directions differ.
 ///
-/// `causes`: prompt, late and broken parts, wear, conductivity without load, each flat;
+/// `causes`: prompt, late and broken parts, wear, conductivity without load;
 /// `numbers`: gauge, across, compression, wear, heat, most compression, most logarithm.
 #[pyfunction]
 pub(crate) fn conduct<'py>(
@@ -268,23 +270,38 @@ pub(crate) fn lines<'py>(
     Ok(out)
 }
 
-/// Summed codes (m,) of potentials, (m,) or (k, m), with standard normal numbers (k, m).
+/// Summed codes (m,) of potentials (m,), and others (m,) times (k, m), with standard normal numbers
+/// (k, m).
 ///
 /// `numbers`: gain, offset, low and high rail, codes per volt, number of codes, bow, noise.
 #[pyfunction]
 pub(crate) fn converted<'py>(
     volts: &Any<'py>,
+    moving: Vec<(Any<'py>, Any<'py>)>,
     chance: &Any<'py>,
     numbers: [f64; 8],
 ) -> PyResult<Bound<'py, PyArray1<u16>>> {
     let py = volts.py();
     let (volts, chance) = (
-        array::<f64, IxDyn>("volts", volts)?,
+        array::<f64, Ix1>("volts", volts)?,
         array::<f64, Ix2>("chance", chance)?,
     );
     let n = chance.shape()[1];
-    let each = if volts.len() == n { n } else { chance.len() };
-    same("number of volts", each, volts.len())?;
+    same("number of volts", n, volts.len())?;
+    let mut courses = Vec::with_capacity(moving.len());
+    for (size, course) in &moving {
+        let (size, course) = (
+            array::<f64, Ix1>("size", size)?,
+            array::<f64, Ix2>("course", course)?,
+        );
+        same("length of size", n, size.len())?;
+        same("number of courses", chance.len(), course.len())?;
+        courses.push((size, course));
+    }
+    let mut moving = Vec::with_capacity(courses.len());
+    for (size, course) in &courses {
+        moving.push([contiguous("size", size)?, contiguous("course", course)?]);
+    }
     let [gain, offset, low, high, scale, levels, bow, noise] = numbers;
     let converter = Converter {
         gain,
@@ -298,21 +315,21 @@ pub(crate) fn converted<'py>(
     let out = PyArray1::<u16>::zeros(py, n, false);
     if n > 0 {
         let (volts, chance) = (contiguous("volts", &volts)?, contiguous("chance", &chance)?);
-        converter.sums(volts, chance, out.readwrite().as_slice_mut()?);
+        converter.sums(volts, &moving, chance, out.readwrite().as_slice_mut()?);
     }
     Ok(out)
 }
 
-/// Flat arrays of these sizes.
+/// Arrays of these sizes.
 fn flat<'py, const N: usize>(
     names: [&str; N],
     values: &[Any<'py>; N],
     sizes: [usize; N],
-) -> PyResult<Vec<numpy::PyReadonlyArray1<'py, f64>>> {
+) -> PyResult<Vec<PyReadonlyArrayDyn<'py, f64>>> {
     let mut out = Vec::with_capacity(N);
     for ((name, value), size) in names.into_iter().zip(values).zip(sizes) {
-        let value = array::<f64, Ix1>(name, value)?;
-        same(&format!("length of {name}"), size, value.len())?;
+        let value = array::<f64, IxDyn>(name, value)?;
+        same(name, size, value.len())?;
         contiguous(name, &value)?;
         out.push(value);
     }

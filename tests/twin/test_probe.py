@@ -2,11 +2,22 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from tomoskin.core import GeometryError, ModelError
 from tomoskin.mesh import Disc
-from tomoskin.twin import FACES, Circle, Face, Finger, Press, Probe, Square
+from tomoskin.twin import (
+    FACES,
+    Circle,
+    ContactSettings,
+    Face,
+    Finger,
+    Press,
+    Probe,
+    Square,
+    indent,
+)
 from tomoskin.twin.probe import check_on_skin
 
 
@@ -35,9 +46,14 @@ def test_a_press_off_the_skin_is_named():
 
 
 def test_a_press_is_a_flat_round_probe():
-    probe = Press(0.01, 0.02, 3.0, 0.015).probe
+    press = Press(0.01, 0.02, 3.0, 0.015)
+    settings, points = ContactSettings(), 0.03 * np.random.default_rng(5).standard_normal((50, 2))
+    probe = Probe(press.shape, press.x, press.y, press.force, press.angle, press.drag)
     assert probe == Probe(Circle(0.015), 0.01, 0.02, 3.0)
     assert probe.radius == pytest.approx(0.015)
+    one, other = (indent([contact], settings, points) for contact in (press, probe))
+    assert (one.depth == other.depth).all()
+    assert one.depth.max() > 0
 
 
 @pytest.mark.parametrize(

@@ -198,7 +198,7 @@ class Disc(Outline):
     def contains(self, xy: ArrayLike) -> NDArray[np.bool_]:
         """(n,) True where a point of ``xy`` (n, 2) lies inside."""
         target = np.atleast_2d(np.asarray(xy, dtype=float))
-        return np.asarray(np.linalg.norm(target, axis=1) < self.radius)
+        return np.asarray(np.hypot(target[:, 0], target[:, 1]) < self.radius)
 
     def nearest(self, xy: ArrayLike) -> FloatArray:
         """(n,) arclengths of the rim points that are nearest to ``xy`` (n, 2)."""

@@ -13,6 +13,8 @@ from tomoskin.forward import choose_engine
 from tomoskin.twin.faults import Faults
 from tomoskin.twin.parameters import check_numbers, parameter
 
+_NO_FAULTS = Faults()
+
 _SHORT = 1e-3
 """Resistance of two electrodes that touch, Ω; assumed."""
 
@@ -115,7 +117,7 @@ def line_potentials(
         (n,) Ω that each contact has more than in ``resistance``.
     """
     core = choose_engine().core
-    if core is not None and faults == Faults():
+    if core is not None and faults == _NO_FAULTS:
         numbers = (
             current,
             settings.output_resistance,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter
 from tomoskin.core import FloatArray
 from tomoskin.forward import choose_engine
 from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
-from tomoskin.twin.probe import Probe
+from tomoskin.twin.probe import Contact, Probe
 from tomoskin.twin.shape import Shape
 from tomoskin.twin.strain import bulge_strain, drag_strain, slope_strain
 
@@ -105,7 +105,7 @@ def solved_dent(shape: Shape, settings: ContactSettings, force: float, blur: flo
 
 
 def indent(
-    probes: Sequence[Probe], settings: ContactSettings, points: FloatArray, blur: float = 0.0
+    probes: Sequence[Contact], settings: ContactSettings, points: FloatArray, blur: float = 0.0
 ) -> Load:
     """What ``probes`` do to the sheet at ``points`` (n, 2) m.
 
@@ -114,9 +114,9 @@ def indent(
     (:func:`solve_contact` solves them together).
     """
     x, y = np.ascontiguousarray(points.T)
-    placed = [_Placed.of(probe, settings, blur) for probe in probes if probe.force > 0]
+    placed = [_placed(probe, settings, blur) for probe in probes if probe.force > 0]
     core = choose_engine().core
-    felt = _felt(placed, x, y) if core is None else core.dented(x, y, [p.plain for p in placed])
+    felt = _felt(placed, x, y) if core is None else core.dented(x, y, placed)
     return Load(strain=felt[1:].T, depth=felt[0])
 
 
@@ -135,47 +135,40 @@ def _turn(angle: float) -> FloatArray:
     ])  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class _Blend:
-    """(n·n, 4) depth and strain of a probe as it presses now, on its grid."""
+class _Blend(NamedTuple):
+    """Depth and strain (n·n, 4) of a probe as it presses now, and its grid: n, step, reach."""
 
-    grid: Grid
     table: FloatArray
+    grid: tuple[int, float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class _Placed:
-    """The dent of a probe at its place: cosine and sine of the angle by which it is turned."""
+class _Placed(NamedTuple):
+    """The dent of a probe and its place: x, y, cosine and sine of the angle by which it is turned.
 
-    dent: _Blend
-    x: float
-    y: float
-    turn: tuple[float, float]
+    As the native engine takes it.
+    """
 
-    @classmethod
-    def of(cls, probe: Probe, settings: ContactSettings, blur: float) -> Self:
-        c, s = math.cos(probe.angle), math.sin(probe.angle)
-        dx, dy = probe.drag
-        along = (c * dx + s * dy, c * dy - s * dx)
-        return cls(
-            _blended(probe.shape, settings, probe.force, along, blur), probe.x, probe.y, (c, s)
-        )
+    table: FloatArray
+    grid: tuple[int, float, float]
+    place: tuple[float, float, float, float]
 
-    @property
-    def plain(self) -> tuple[object, ...]:
-        """As the native engine takes it."""
-        grid = self.dent.grid
-        return self.dent.table, (grid.n, grid.step, grid.reach), (self.x, self.y, *self.turn)
+
+def _placed(probe: Contact, settings: ContactSettings, blur: float) -> _Placed:
+    c, s = math.cos(probe.angle), math.sin(probe.angle)
+    dx, dy = probe.drag
+    along = (c * dx + s * dy, c * dy - s * dx)
+    table, grid = _blended(probe.shape, settings, probe.force, along, blur)
+    return _Placed(table, grid, (probe.x, probe.y, c, s))
 
 
 def _felt(placed: Sequence[_Placed], x: FloatArray, y: FloatArray) -> FloatArray:
     """(4, n) depth and strain of all dents together at points (n,)."""
     total = np.zeros((4, len(x)))
-    for one in placed:
-        ax, ay, (c, s) = x - one.x, y - one.y, one.turn
-        near = np.flatnonzero(ax * ax + ay * ay < one.dent.grid.reach**2)
-        ax, ay = ax[near], ay[near]
-        values = _read(one.dent, c * ax + s * ay, c * ay - s * ax)
+    for table, (n, step, reach), (px, py, c, s) in placed:
+        ax, ay = x - px, y - py
+        near = np.flatnonzero(ax * ax + ay * ay < reach**2)
+        ax, ay = ax[near] / step, ay[near] / step
+        values = _read(table, n, c * ax + s * ay, c * ay - s * ax)
         if s:
             values[1:] = _turn(math.atan2(s, c)) @ values[1:]
         for row, felt in zip(total, values, strict=True):
@@ -208,7 +201,7 @@ def _blended(
         total, grid = total + mixed, dent.grid
     table = np.ascontiguousarray(total.T)  # a point's values side by side, to be read at once
     table.flags.writeable = False
-    return _Blend(grid, table)
+    return _Blend(table, (grid.n, grid.step, grid.reach))
 
 
 def _rungs(shape: Shape, force: float) -> list[tuple[float, float]]:
@@ -222,13 +215,12 @@ def _rungs(shape: Shape, force: float) -> list[tuple[float, float]]:
     return [(below, 1 - part), (above, part)]
 
 
-def _read(dent: _Blend, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Values (4, m) at points on the grid, linear between its nodes."""
-    n, step = dent.grid.n, dent.grid.step
-    x, y = x / step + n // 2, y / step + n // 2
+def _read(table: FloatArray, n: int, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Values (4, m) at points, in steps from the middle of the grid, linear between its nodes."""
+    x, y = x + n // 2, y + n // 2
     i, j = x.astype(np.int64), y.astype(np.int64)
     first, right, up = i * n + j, _by_four(x - i), _by_four(y - j)
-    at = [dent.table.take(first + corner, axis=0) for corner in (0, 1, n, n + 1)]
+    at = [table.take(first + corner, axis=0) for corner in (0, 1, n, n + 1)]
     between = _between(_between(at[0], at[1], up), _between(at[2], at[3], up), right)
     return np.ascontiguousarray(between.T)
 

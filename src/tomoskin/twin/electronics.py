@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -30,28 +30,37 @@ Bending = Callable[[float], Pose]
 """How the sheet is bent then."""
 
 
+Courses = Sequence[tuple[FloatArray, FloatArray]]
+"""What is not the same at each conversion: (n_samples,) V, and (oversampling, n_samples) of what
+part there is of it."""
+
+
 def convert(
     volts: FloatArray,
     readout: ReadoutSettings,
     oversampling: int,
     electronics: ElectronicsSettings,
     random: np.random.Generator,
+    *,
+    moving: Courses = (),
 ) -> NDArray[np.uint16]:
-    """(n_samples,) summed codes of the potentials ``volts``, (n_samples,) or one per conversion.
+    """(n_samples,) summed codes of the potentials ``volts`` (n_samples,) and what is ``moving``.
 
     Amplified, shifted and held between the amplifier's rails; each conversion then has its own
     Gaussian noise, is rounded down as the converter does (code = V · 2ⁿ / V_ref) and stops at
     the converter's rails.
     """
     levels = 1 << readout.adc_bits
-    chance = random.standard_normal((oversampling, volts.shape[-1]))
+    chance = random.standard_normal((oversampling, len(volts)))
     if (core := choose_engine().core) is not None:
         amplifier = readout.gain, readout.offset, electronics.low_rail, electronics.high_rail
         converter = levels / readout.reference_voltage, levels, electronics.nonlinearity
         codes: NDArray[np.uint16] = core.converted(
-            volts, chance, (*amplifier, *converter, electronics.noise)
+            volts, moving, chance, (*amplifier, *converter, electronics.noise)
         )
         return codes
+    for size, course in moving:
+        volts = volts + size * course
     output = readout.gain * volts + readout.offset
     np.clip(output, electronics.low_rail, electronics.high_rail, out=output)
     exact = output * (levels / readout.reference_voltage)
@@ -135,13 +144,15 @@ class TwinElectronics:
         self._age_contacts(0.0 if self._time is None else max(0.0, time - self._time))
         self._aged = time if first else self._aged
         self._time = time
-        volts = self._volts(table, time, self._scanned(table, time))
-        return convert(volts, self._readout, table.oversampling, self.settings, self._random)
+        volts, moving = self._volts(table, time, self._scanned(table, time))
+        return convert(
+            volts, self._readout, table.oversampling, self.settings, self._random, moving=moving
+        )
 
     def _scanned(self, table: SampleTable, time: float) -> Lines:
         """What the channels stand at under each drive, as the presses stand or move."""
         middles = table.middles
-        moves = self._moves(middles.tolist())
+        moves = self._moves(middles)
         if moves and all(move == moves[0] for move in moves):
             self._set(*moves[0])
             moves = []
@@ -158,14 +169,14 @@ class TwinElectronics:
             stuck=np.concatenate([line.stuck for line in lines]),
         )
 
-    def _moves(self, times: list[float]) -> list[tuple[tuple[Contact, ...], Pose]]:
+    def _moves(self, times: FloatArray) -> list[tuple[tuple[Contact, ...], Pose]]:
         """What presses, and how the sheet is bent, at each of the ``times``."""
         course, bending, sheet = self._course, self._bending, self.sheet
         if course is None and bending is None:
             return []
         return [
             (course(t) if course else sheet.presses, bending(t) if bending else sheet.pose)
-            for t in times
+            for t in times.tolist()
         ]
 
     def _set(self, presses: tuple[Contact, ...], pose: Pose) -> None:
@@ -177,27 +188,30 @@ class TwinElectronics:
         self.sheet.advance(max(0.0, time - self._aged))
         self._aged = max(self._aged, time)
 
-    def _volts(self, table: SampleTable, time: float, lines: Lines) -> FloatArray:
-        """(n_samples,) or (oversampling, n_samples) V at the amplifiers' inputs."""
-        settings, drive, channel = self.settings, table.drive, table.channel
-        volts = lines.read[drive, channel]
+    def _volts(self, table: SampleTable, time: float, lines: Lines) -> tuple[FloatArray, Courses]:
+        """(n_samples,) V at the amplifiers' inputs, and what is added to them."""
+        settings, channel, gain = self.settings, table.channel, self._gain
+        place = _places(table, len(gain))
+        volts, each = lines.read.take(place), gain.take(channel)
+        moving = []
         if settings.time_constant > 0:
             carried, remaining = _settling(table, settings.time_constant)
             start = carried @ np.concatenate([self._before[None], lines.read])
             self._before = start[-1]
-            volts = volts + (start[:-1][drive, channel] - volts) * remaining
+            moving.append((each * (start.take(place) - volts), remaining))
         if settings.hum > 0:
             sine, cosine = _turning(table, settings.hum_frequency)
             turn = 2 * np.pi * settings.hum_frequency * time + self._phase
-            volts = volts + (self._hum * np.sin(turn))[channel] * cosine
-            volts += (self._hum * np.cos(turn))[channel] * sine
+            hum = gain * self._hum
+            moving.append(((hum * np.sin(turn)).take(channel), cosine))
+            moving.append(((hum * np.cos(turn)).take(channel), sine))
         if not self._electrodes.silent:
-            volts = volts + self._electrodes.read(table, time)
-        volts = self._gain[channel] * (volts + self._offset[channel])
-        stuck = lines.stuck[drive, channel]
-        if stuck.any():
-            volts = np.where(stuck, np.inf, volts)
-        return volts
+            volts += self._electrodes.read(table, time)
+        volts += self._offset.take(channel)
+        volts *= each
+        if lines.stuck.any():
+            volts[lines.stuck.take(place)] = np.inf
+        return volts, moving
 
     def _potentials(self, table: SampleTable) -> Lines:
         """What the channels stand at under each drive; worked out anew when something changed."""
@@ -229,6 +243,12 @@ class TwinElectronics:
         kept = math.exp(-dt / self.settings.contact_time)
         fresh = self._contacts.standard_normal(len(self._contact))
         self._contact = kept * self._contact + sd * math.sqrt(1 - kept**2) * fresh
+
+
+@lru_cache(maxsize=16)
+def _places(table: SampleTable, channels: int) -> IntArray:
+    """(n_samples,) which of the drives' channels each sample reads, drive after drive."""
+    return np.asarray(table.drive * channels + table.channel)
 
 
 @lru_cache(maxsize=16)

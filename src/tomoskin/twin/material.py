@@ -229,18 +229,11 @@ def _remembered(
         [math.exp(-dt / time) for time in times]
         for times in (memory.creep_times, memory.breakdown_times)
     ]
-    parts = [part.ravel() for part in (past.load, past.lagging, past.late, past.broken)]
+    parts = past.load, past.lagging, past.late, past.broken
     worn = state.worn if settings.wear else state.worn[:0]
     play = list(zip(memory.play, memory.play_widths, strict=True))
-    lagging, prompt, late, broken, fresh = core.remember(felt, [*parts, worn], play, kept)
-    remembered = MemoryState(
-        load=felt,
-        lagging=lagging.reshape(past.lagging.shape),
-        prompt=prompt.reshape(felt.shape),
-        late=late.reshape(past.late.shape),
-        broken=broken.reshape(past.broken.shape),
-    )
-    return remembered, fresh if settings.wear else state.worn
+    *parts, fresh = core.remember(felt, [*parts, worn], play, kept)
+    return MemoryState(felt, *parts), fresh if settings.wear else state.worn
 
 
 def _conducted(
@@ -248,7 +241,7 @@ def _conducted(
 ) -> FloatArray:
     """What :func:`conductivity` gives, by the native engine ``core``."""
     memory = state.memory
-    causes = [part.ravel() for part in (memory.prompt, memory.late, memory.broken)]
+    causes = memory.prompt, memory.late, memory.broken, state.worn, unloaded
     numbers = (
         settings.gauge,
         settings.gauge_across,
@@ -259,7 +252,7 @@ def _conducted(
         _MOST_LOG,
     )
     parts = settings.creep, settings.breakdown
-    rows: FloatArray = core.conduct([*causes, state.worn, unloaded], numbers, *parts)
+    rows: FloatArray = core.conduct(causes, numbers, *parts)
     return rows[0] if settings.scalar else rows.reshape(2, 2, -1).transpose(2, 0, 1)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -93,22 +94,31 @@ class Press:
     def __post_init__(self) -> None:
         """Check the numbers."""
         _check_place(self.x, self.y)
-        Circle(self.radius)
+        _circle(self.radius)
         _check_force(self.force)
 
     @property
-    def probe(self) -> Probe:
-        """The same as a general probe."""
-        return Probe(Circle(self.radius), self.x, self.y, self.force)
+    def shape(self) -> Circle:
+        """Its face."""
+        return _circle(self.radius)
+
+    @property
+    def angle(self) -> float:
+        """None: it is round."""
+        return 0.0
+
+    @property
+    def drag(self) -> tuple[float, float]:
+        """None: it does not slide."""
+        return 0.0, 0.0
+
+
+_circle = lru_cache(maxsize=64)(Circle)
+"""The same for the same radius, since a press that moves is another at each step."""
 
 
 Contact = Press | Probe
 """What may press on a twin."""
-
-
-def probes_of(contacts: Sequence[Contact]) -> tuple[Probe, ...]:
-    """Each as a general probe."""
-    return tuple(c.probe if isinstance(c, Press) else c for c in contacts)
 
 
 def check_on_skin(contacts: Sequence[Contact], outline: Outline) -> None:

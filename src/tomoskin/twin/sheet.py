@@ -17,7 +17,7 @@ from tomoskin.twin.bend import Pose, depth_of, strain_of
 from tomoskin.twin.dent import Load, indent
 from tomoskin.twin.material import MaterialState
 from tomoskin.twin.presets import TwinSettings
-from tomoskin.twin.probe import Contact, check_on_skin, probes_of
+from tomoskin.twin.probe import Contact, check_on_skin
 
 _MESH_SEED = 7919
 """Seed of the twin's mesh; the reconstruction's is another, so no mesh is ever shared."""
@@ -55,7 +55,7 @@ class TwinSkin:
         self.material, self.bend = settings.material, settings.bend
         self.rest = rest or Plane()
         self._outline = outline
-        self._points = model.mesh.centroids
+        self._points = np.asfortranarray(model.mesh.centroids)  # columns are read, not rows
         self._blur = math.sqrt(float(model.mesh.volumes.mean())) / math.sqrt(12)
         self._ground = settings.contact, self._points, self._blur
         spread, self._random = (
@@ -75,6 +75,7 @@ class TwinSkin:
         self._state = MaterialState.fresh(self.material, n)
         self._conductivity: FloatArray | None = None
         self._solved_for: FloatArray = np.empty(0)
+        self._solved_under: tuple[object, ...] = (None, None)
         self._resistance: FloatArray = np.empty((0, 0))
         self.solves = 0
 
@@ -115,7 +116,7 @@ class TwinSkin:
         presses, pose = self._presses, self._pose
         if not _same((presses, pose), self._loaded):
             if presses is not self._dented[0]:
-                self._dented = presses, indent(probes_of(presses), *self._ground)
+                self._dented = presses, indent(presses, *self._ground)
             self._load = dented = self._dented[1]
             if pose:
                 given = dented.depth + depth_of(pose, self._points)
@@ -141,7 +142,7 @@ class TwinSkin:
         check_on_skin(presses, self._outline)
         if presses != self._presses:
             taken = tuple(presses)
-            self._dented = taken, indent(probes_of(taken), *self._ground)
+            self._dented = taken, indent(taken, *self._ground)
             self._presses = taken
 
     def set_pose(self, pose: Pose) -> None:
@@ -208,19 +209,21 @@ class TwinSkin:
         sigma = self.conductivity()
         if sigma is self._solved_for:
             return self._resistance
-        if _changed(self._solved_for, sigma):
+        under = (self._presses, self._pose)
+        if not _same(under, self._solved_under) or _changed(self._solved_for, sigma):
             self._resistance = _resistance_of(self._base, self._terminals, sigma)
             self.solves += 1
-            self._solved_for = sigma
+            self._solved_for, self._solved_under = sigma, under
         return self._resistance
 
 
 def _resistance_of(rest: State, terminals: Terminals, sigma: FloatArray) -> FloatArray:
     """Exact either way: by the local update where few cells have changed since ``rest``."""
     if sigma.ndim == 1:
-        changed = np.flatnonzero(sigma != rest.conductivity)
-        if 0 < len(changed) <= _FEW * len(sigma):
-            return rest.local.transfer_resistance(changed, sigma[changed])
+        changed = sigma != rest.conductivity
+        if 0 < np.count_nonzero(changed) <= _FEW * len(sigma):
+            cells = np.flatnonzero(changed)
+            return rest.local.transfer_resistance(cells, sigma[cells])
     return np.asarray(terminals.transfer_resistance(sigma))
 
 
