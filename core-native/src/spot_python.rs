@@ -10,7 +10,7 @@ use crate::arrays::{Any, array, contiguous, invalid, same};
 use crate::dense::Matrix;
 use crate::small::product;
 use crate::spot_algebra::{Beside, Metric};
-use crate::spot_fit::{Fit, Frame, Prior, Seen, Sheet};
+use crate::spot_fit::{CONTENT, Expected, Fit, Frame, Known, Prior, Seen, Sheet};
 use crate::spot_match::{self, Limits, Measurements, Quality, Signatures};
 use crate::spot_search::{Found, Pace, Rules, Search};
 use crate::spot_table::{DIRECTIONS, Grid, Layout, PARAMETERS, ROWS, SLOPES, Spot, Table};
@@ -39,6 +39,7 @@ type Fitted<'py> = (
     [Bound<'py, PyArray2<f64>>; 5],
     [Bound<'py, PyArray1<f64>>; 3],
     (f64, f64, f64, bool),
+    Vec<Known>,
 );
 
 #[pymethods]
@@ -115,18 +116,28 @@ impl SpotTable {
         Ok(out)
     }
 
-    /// The minimum near `spots` (k, 4), after at most so many steps; none: at the spots.
+    /// The minimum near `spots` (k, 4), after at most so many steps; none: at the spots. `known`
+    /// (k) which of the expected touches each is, or None.
     fn settled<'py>(
         &self,
         seen: &SeenTable,
         frame: FrameArrays<'py>,
         spots: &Any<'py>,
+        known: Vec<Known>,
         most: usize,
     ) -> PyResult<Fitted<'py>> {
         let (py, spots) = (frame.0.py(), spots_of(spots)?);
         let arrays = Arrays::of(self, seen, &frame)?;
+        same("length of known", spots.len(), known.len())?;
+        if known
+            .iter()
+            .flatten()
+            .any(|&number| number >= arrays.expected.len())
+        {
+            return Err(invalid("known: numbers of expected touches, or None"));
+        }
         let frame = arrays.frame(self, seen, &frame)?;
-        let fit = py.detach(|| frame.settled(&spots, most));
+        let fit = py.detach(|| frame.settled(&spots, &known, most));
         let fit = fit.ok_or_else(|| invalid("spots: not comparable with the data"))?;
         Ok(fitted(py, fit))
     }
@@ -287,8 +298,19 @@ type Judged<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 type Others<'py> = [Bound<'py, PyArray1<f64>>; 2];
 
 /// Whitened data of a frame, the square of their rest, directions that are left, an offset,
-/// deviations and depths; see `Frame`.
-type FrameArrays<'py> = (Any<'py>, f64, Any<'py>, Any<'py>, [f64; 4], [f64; 2]);
+/// deviations and depths, and the expected touches; see `Frame`.
+type FrameArrays<'py> = (
+    Any<'py>,
+    f64,
+    Any<'py>,
+    Any<'py>,
+    [f64; 4],
+    [f64; 2],
+    ExpectedArrays<'py>,
+);
+
+/// Spots (m, 4), covariances (m, 3, 3), and the logarithm of the volume of a content's prior.
+type ExpectedArrays<'py> = (Any<'py>, Any<'py>, f64);
 
 /// A frame's arrays, checked.
 struct Arrays<'py> {
@@ -296,6 +318,7 @@ struct Arrays<'py> {
     left: PyReadonlyArray2<'py, f64>,
     offset: Vec<f64>,
     values: PyReadonlyArray3<'py, f32>,
+    expected: Vec<Expected>,
 }
 
 impl<'py> Arrays<'py> {
@@ -317,6 +340,7 @@ impl<'py> Arrays<'py> {
             left,
             offset: seen.seen.whitened(contiguous("offset", &offset)?).values,
             values,
+            expected: expected_of(&frame.6)?,
         })
     }
 
@@ -337,6 +361,7 @@ impl<'py> Arrays<'py> {
             offset: &self.offset,
             deviations: frame.4,
             depths: frame.5,
+            expected: &self.expected,
         })
     }
 }
@@ -353,6 +378,7 @@ fn fitted(py: Python<'_>, fit: Fit) -> Fitted<'_> {
         matrices.map(|matrix| by_rows(py, matrix)),
         vectors.map(|vector| PyArray1::from_vec(py, vector)),
         (fit.misfit, fit.metric.log_size, fit.cost, fit.settled),
+        fit.known,
     )
 }
 
@@ -453,6 +479,20 @@ fn spots_of(spots: &Any<'_>) -> PyResult<Vec<Spot>> {
     let spots = spots.as_array();
     let row = |spot: ndarray::ArrayView1<'_, f64>| std::array::from_fn(|i| spot[i]);
     Ok(spots.outer_iter().map(row).collect())
+}
+
+/// Of spots (m, 4), covariances (m, 3, 3) and what contents take up of a volume.
+fn expected_of((spots, spreads, content): &ExpectedArrays<'_>) -> PyResult<Vec<Expected>> {
+    let spots = spots_of(spots)?;
+    let spreads = array::<f64, Ix3>("covariances", spreads)?;
+    let entries = spots.len() * CONTENT * CONTENT;
+    same("entries of covariances", entries, spreads.len())?;
+    let spreads = spreads.as_array();
+    let one = |(number, &middle): (usize, &Spot)| {
+        let spread = std::array::from_fn(|i| std::array::from_fn(|j| spreads[(number, i, j)]));
+        Expected::of(middle, &spread, *content).ok_or_else(|| invalid("covariances: not positive"))
+    };
+    spots.iter().enumerate().map(one).collect()
 }
 
 fn grids_of(grids: &Any<'_>) -> PyResult<Vec<Grid>> {
