@@ -10,7 +10,8 @@ use crate::arrays::{Any, array, contiguous, invalid, same};
 use crate::dense::Matrix;
 use crate::small::product;
 use crate::spot_algebra::{Beside, Metric};
-use crate::spot_fit::{CONTENT, Expected, Fit, Frame, Known, Prior, Seen, Sheet};
+use crate::spot_expected_python::{ExpectedArrays, expected_of};
+use crate::spot_fit::{Expected, Fit, Frame, Known, Prior, Seen, Sheet};
 use crate::spot_match::{self, Limits, Measurements, Quality, Signatures};
 use crate::spot_search::{Found, Pace, Rules, Search};
 use crate::spot_table::{DIRECTIONS, Grid, Layout, PARAMETERS, ROWS, SLOPES, Spot, Table};
@@ -309,9 +310,6 @@ type FrameArrays<'py> = (
     ExpectedArrays<'py>,
 );
 
-/// Spots (m, 4), covariances (m, 3, 3), and the logarithm of the volume of a content's prior.
-type ExpectedArrays<'py> = (Any<'py>, Any<'py>, f64);
-
 /// A frame's arrays, checked.
 struct Arrays<'py> {
     data: PyReadonlyArray1<'py, f64>,
@@ -473,26 +471,12 @@ fn by_rows(py: Python<'_>, matrix: Matrix<f64>) -> Bound<'_, PyArray2<f64>> {
     out
 }
 
-fn spots_of(spots: &Any<'_>) -> PyResult<Vec<Spot>> {
+pub(crate) fn spots_of(spots: &Any<'_>) -> PyResult<Vec<Spot>> {
     let spots = array::<f64, Ix2>("spots", spots)?;
     same("columns of spots", PARAMETERS, spots.shape()[1])?;
     let spots = spots.as_array();
     let row = |spot: ndarray::ArrayView1<'_, f64>| std::array::from_fn(|i| spot[i]);
     Ok(spots.outer_iter().map(row).collect())
-}
-
-/// Of spots (m, 4), covariances (m, 3, 3) and what contents take up of a volume.
-fn expected_of((spots, spreads, content): &ExpectedArrays<'_>) -> PyResult<Vec<Expected>> {
-    let spots = spots_of(spots)?;
-    let spreads = array::<f64, Ix3>("covariances", spreads)?;
-    let entries = spots.len() * CONTENT * CONTENT;
-    same("entries of covariances", entries, spreads.len())?;
-    let spreads = spreads.as_array();
-    let one = |(number, &middle): (usize, &Spot)| {
-        let spread = std::array::from_fn(|i| std::array::from_fn(|j| spreads[(number, i, j)]));
-        Expected::of(middle, &spread, *content).ok_or_else(|| invalid("covariances: not positive"))
-    };
-    spots.iter().enumerate().map(one).collect()
 }
 
 fn grids_of(grids: &Any<'_>) -> PyResult<Vec<Grid>> {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
@@ -21,6 +22,12 @@ def test_density_of_what_is_expected() -> None:
     ):
         density = multivariate_normal(middle[:3], covariance).logpdf(middle[:3])
         assert volume == pytest.approx(-density)
+
+
+def test_nothing_is_expected_of_what_is_no_number() -> None:
+    covariance = np.eye(8)
+    covariance[5, 5] = np.nan
+    assert not len(Expectation.of(TWO, covariance, (5e-3, 5e-3, 0.1)).spots)
 
 
 def test_a_touch_where_it_is_expected_is_likelier_than_a_newcomer() -> None:

@@ -78,7 +78,7 @@ def _followed(
     """The rival in a further frame, and the logarithm of the odds that this gives."""
     pace, before = selection.pace, rival.detected.fit
     problem = replace(selection.problem, expected=going_on(rival.detected))
-    known = tuple(range(len(before.spots)))
+    known = tuple(range(len(problem.expected.spots)))
     fit = problem.refined(before.spots, before.deficit, pace.warm, known)
     fit = problem.corrected(fit, pace.closing, pace.near, pace.tolerance)
     return fit, problem.evidence(fit) - selection.problem.evidence(found)
