@@ -162,17 +162,21 @@ Frame = tuple[
     NDArray[np.float64],
     tuple[float, float, float, float],
     tuple[float, float],
+    tuple[NDArray[np.float64], NDArray[np.float64], float],
 ]
 """Whitened data (c,), the square of their rest, directions (q, c) that are left, an offset (rank,),
-deviations of direction, shape, way and growth, and the least and largest depth."""
+deviations of direction, shape, way and growth, the least and largest depth, and of the touches that
+are expected spots (m, 4), covariances (m, 3, 3) of all columns but the content, and the logarithm
+of the volume of a content's prior: see tomoskin.touch.fit.expectation."""
 
 Fitted = tuple[
     list[NDArray[np.float64]],
     list[NDArray[np.float64]],
     tuple[float, float, float, bool],
+    list[int | None],
 ]
 """Spots (k, 4), each (k, c), slopes (4k, c), unknown (q, c), normal (4k, 4k); predicted (c,),
-residual (c,), gradient (4k,); misfit, log_size, cost, settled: see
+residual (c,), gradient (4k,); misfit, log_size, cost, settled; known (k): see
 tomoskin.touch.fit.refine.Fit."""
 
 @final
@@ -298,9 +302,15 @@ class SpotTable:
         """Change, derivatives and directions (k, 7, rank) of spots (k, 4)."""
 
     def settled(
-        self, seen: SeenTable, frame: Frame, spots: NDArray[np.float64], most: int
+        self,
+        seen: SeenTable,
+        frame: Frame,
+        spots: NDArray[np.float64],
+        known: Sequence[int | None],
+        most: int,
     ) -> Fitted:
-        """Fit spots (k, 4) to a frame by at most so many steps."""
+        """Fit spots (k, 4) to a frame by at most so many steps; ``known``: which of the expected
+        touches each is, or None."""
 
     def searched(
         self,

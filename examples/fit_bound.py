@@ -2,8 +2,8 @@
 
 A flat probe of 12 mm presses with 3 N at 91 places of `textile-disc-8` and `textile-disc-16`, six
 frames each. The sheet is the twin's, on a mesh of its own and with the profile of a rigid probe;
-the board has ten bits. Each frame is fitted alone. The bound is that of Cramér and Rao for the twin
-itself, where position, force and radius are unknown.
+the board has ten bits. Each frame is fitted alone, on the sheet that the reference shows. The bound
+is that of Cramér and Rao for the twin itself, where position, force and radius are unknown.
 
 Shown: for either skin the bound, the root mean square error of the fit, and the fit in parts of the
 bound.
@@ -25,8 +25,9 @@ from bodies import options_of
 from lab import report
 from tomoskin.calibration import Differences, FrameView
 from tomoskin.core import FloatArray
-from tomoskin.pipeline import prepare
+from tomoskin.pipeline import Prepared, prepare
 from tomoskin.pipeline.finding import finding
+from tomoskin.pipeline.tune import tuned_sheet
 from tomoskin.signal import Reference
 from tomoskin.skin import Skin
 from tomoskin.touch.fit import Whitener, row_covariance
@@ -72,6 +73,11 @@ class Sheet:
         """Of idle frames."""
         return Reference.of(self.frames(None, IDLE))
 
+    @cached_property
+    def fitted(self) -> Prepared:
+        """With the sheet that the reference shows, as programs fit."""
+        return tuned_sheet(self.prepared, self.reference)
+
     def view(self, volts: FloatArray) -> FrameView:
         """What a frame shows; all voltages in proportion say nothing, as they do live."""
         mean, dv = self.reference.mean, volts - self.reference.mean
@@ -90,7 +96,7 @@ class Sheet:
         """m, root mean square over frames; infinite where a touch is missed."""
         missed = []
         for volts in self.frames(Press(x, y, FORCE, RADIUS), FRAMES):
-            finder = finding(self.prepared, self.reference)
+            finder = finding(self.fitted, self.reference)
             found = finder.push(self.view(volts))
             missed.append(min((np.hypot(d.x - x, d.y - y) for d in found), default=np.inf))
         return float(np.sqrt(np.mean(np.square(missed))))

@@ -1,5 +1,7 @@
 //! The most likely spots near a start: Levenberg–Marquardt, with unknown directions integrated out.
 
+use std::f64::consts::TAU;
+
 use crate::dense::Matrix;
 use crate::small::product;
 use crate::spot_algebra::{Metric, solved};
@@ -9,6 +11,9 @@ use crate::spot_table::{PARAMETERS, ROWS, SLOPES, Spot, Table};
 const SETTLED: f64 = 0.05;
 const LEAST_DAMPING: f64 = 1e-6;
 const MOST_DAMPING: f64 = 1e3;
+
+/// Last column of a spot.
+pub const CONTENT: usize = PARAMETERS - 1;
 
 /// Cells that are compared at a time.
 const ABREAST: usize = 8;
@@ -74,6 +79,38 @@ impl Prior {
     }
 }
 
+/// A touch of the frame before where it may have gone, normally distributed.
+#[derive(Clone, Copy, Debug)]
+pub struct Expected {
+    /// The most likely; the content is not expected to be anything.
+    pub middle: Spot,
+    /// Inverse of the covariance of the other columns.
+    pub weight: [[f64; CONTENT]; CONTENT],
+    /// Logarithm of one over the density at its largest.
+    pub volume: f64,
+}
+
+impl Expected {
+    /// Around `middle` with that covariance of all columns but the content, whose prior takes up
+    /// `content` of the volume; `None` where the covariance is not positive.
+    pub fn of(middle: Spot, covariance: &[[f64; CONTENT]; CONTENT], content: f64) -> Option<Self> {
+        let c = covariance;
+        let minor = |i: usize, j: usize| {
+            let ([a, b], [p, q]) = ([(i + 1) % 3, (i + 2) % 3], [(j + 1) % 3, (j + 2) % 3]);
+            c[a][p] * c[b][q] - c[a][q] * c[b][p]
+        };
+        let size: f64 = (0..CONTENT).map(|j| c[0][j] * minor(0, j)).sum();
+        (size > 0.0).then(|| Self {
+            middle,
+            weight: std::array::from_fn(|i| std::array::from_fn(|j| minor(j, i) / size)),
+            volume: content + (CONTENT as f64 * TAU.ln() + size.ln()) / 2.0,
+        })
+    }
+}
+
+/// Which of the touches that are expected a spot is; `None`: a newcomer.
+pub type Known = Option<usize>;
+
 /// The table as whitened data see it.
 #[derive(Debug)]
 pub struct Seen {
@@ -125,6 +162,8 @@ pub struct Frame<'a> {
     pub deviations: [f64; 4],
     /// Least and largest depth.
     pub depths: [f64; 2],
+    /// Touches that go on from the frame before.
+    pub expected: &'a [Expected],
 }
 
 /// Spots that explain a frame; matrices by columns.
@@ -132,6 +171,8 @@ pub struct Frame<'a> {
 pub struct Fit {
     /// See [`Spot`].
     pub spots: Vec<Spot>,
+    /// (k).
+    pub known: Vec<Known>,
     /// (rows, k).
     pub each: Matrix<f64>,
     /// (rows).
@@ -175,7 +216,7 @@ struct Descent {
 
 impl Frame<'_> {
     /// The frame with these spots, as they are; `None` where they cannot be compared with it.
-    pub fn at(&self, spots: Vec<Spot>) -> Option<Fit> {
+    pub fn at(&self, spots: Vec<Spot>, known: &[Known]) -> Option<Fit> {
         let (rank, rows, k) = (self.table.layout.rank, self.seen.rows, spots.len());
         let parts = self.expanded(&spots, ROWS);
         let seen = self.seen.whitened(&parts);
@@ -189,12 +230,13 @@ impl Frame<'_> {
         let own = metric.products(&[&jacobian.values[..], &residual].concat());
         let n = k * PARAMETERS;
         let misfit = self.rest + own[(n, n)];
-        let cost = (misfit + self.prior_squares(&spots)) / 2.0;
+        let cost = (misfit + self.prior_squares(&spots, known)) / 2.0;
         debug_assert_eq!(residual.len(), rows);
         cost.is_finite().then(|| Fit {
-            normal: self.normal(&own, k),
+            normal: self.normal(&own, known),
             gradient: (0..n).map(|j| own[(n, j)]).collect(),
             spots,
+            known: known.to_vec(),
             each,
             predicted,
             residual,
@@ -210,8 +252,8 @@ impl Frame<'_> {
     ///
     /// What is unknown of the spots is taken as it is at the first ones, and anew where steps with
     /// that end.
-    pub fn settled(&self, spots: &[Spot], most: usize) -> Option<Fit> {
-        let mut best = self.at(self.held(spots))?;
+    pub fn settled(&self, spots: &[Spot], known: &[Known], most: usize) -> Option<Fit> {
+        let mut best = self.at(self.held(spots), known)?;
         let mut left = most;
         while left > 0 {
             let descent = self.descended(&best, left);
@@ -220,7 +262,7 @@ impl Frame<'_> {
                 break;
             }
             left -= descent.steps;
-            let Some(next) = self.at(descent.spots) else {
+            let Some(next) = self.at(descent.spots, known) else {
                 break;
             };
             best = next;
@@ -231,7 +273,7 @@ impl Frame<'_> {
 
     /// Whether a step by the fit's own metric would be too small to matter.
     fn is_settled(&self, fit: &Fit) -> bool {
-        let gradient = self.pulled(&fit.spots, fit.gradient.iter().copied());
+        let gradient = self.pulled(&fit.spots, &fit.known, fit.gradient.iter().copied());
         solved(&fit.normal, &gradient, LEAST_DAMPING)
             .is_some_and(|step| dot(&gradient, &step) < SETTLED)
     }
@@ -241,7 +283,7 @@ impl Frame<'_> {
         let mut best = Slope {
             spots: fit.spots.clone(),
             normal: fit.normal.clone(),
-            gradient: self.pulled(&fit.spots, fit.gradient.iter().copied()),
+            gradient: self.pulled(&fit.spots, &fit.known, fit.gradient.iter().copied()),
             cost: fit.cost,
         };
         let mut damping = LEAST_DAMPING;
@@ -255,7 +297,7 @@ impl Frame<'_> {
                     settled: true,
                 };
             };
-            let tried = self.slope(&fit.metric, self.moved(&best.spots, &step));
+            let tried = self.slope(fit, self.moved(&best.spots, &step));
             if tried.cost < best.cost {
                 best = tried;
                 damping = (damping / 10.0).max(LEAST_DAMPING);
@@ -276,19 +318,19 @@ impl Frame<'_> {
         }
     }
 
-    /// The cost of spots by the metric of others.
-    fn slope(&self, metric: &Metric, spots: Vec<Spot>) -> Slope {
-        let (k, n) = (spots.len(), spots.len() * PARAMETERS);
+    /// The cost of spots by the metric of a fit that they began from.
+    fn slope(&self, fit: &Fit, spots: Vec<Spot>) -> Slope {
+        let (known, n) = (&fit.known, spots.len() * PARAMETERS);
         let seen = self.seen.whitened(&self.expanded(&spots, SLOPES));
         let each = picked(&seen, SLOPES, 0, 1);
         let mut columns = picked(&seen, SLOPES, 1, PARAMETERS).values;
         columns.extend(self.residual(&self.predicted(&each)));
-        let own = metric.products(&columns);
+        let own = fit.metric.products(&columns);
         let misfit = self.rest + own[(n, n)];
         Slope {
-            normal: self.normal(&own, k),
-            gradient: self.pulled(&spots, (0..n).map(|j| own[(n, j)])),
-            cost: (misfit + self.prior_squares(&spots)) / 2.0,
+            normal: self.normal(&own, known),
+            gradient: self.pulled(&spots, known, (0..n).map(|j| own[(n, j)])),
+            cost: (misfit + self.prior_squares(&spots, known)) / 2.0,
             spots,
         }
     }
@@ -317,17 +359,51 @@ impl Frame<'_> {
     }
 
     /// The prior's part of the normal matrix added to that of the data.
-    fn normal(&self, own: &Matrix<f64>, k: usize) -> Matrix<f64> {
-        let n = k * PARAMETERS;
-        Matrix::from_fn(n, n, |i, j| {
-            let weight = self.prior.weight[j % PARAMETERS];
-            own[(i.max(j), i.min(j))] + if i == j { weight * weight } else { 0.0 }
-        })
+    fn normal(&self, own: &Matrix<f64>, known: &[Known]) -> Matrix<f64> {
+        let n = known.len() * PARAMETERS;
+        let mut normal = Matrix::from_fn(n, n, |i, j| own[(i.max(j), i.min(j))]);
+        for (spot, known) in known.iter().enumerate() {
+            let first = spot * PARAMETERS;
+            let (mut even, expected) = (0, known.map(|number| &self.expected[number]));
+            if let Some(expected) = expected {
+                even = CONTENT;
+                for (i, row) in expected.weight.iter().enumerate() {
+                    for (j, weight) in row.iter().enumerate() {
+                        normal[(first + i, first + j)] += weight;
+                    }
+                }
+            }
+            for column in even..PARAMETERS {
+                let weight = self.prior.weight[column];
+                normal[(first + column, first + column)] += weight * weight;
+            }
+        }
+        normal
     }
 
-    fn prior_squares(&self, spots: &[Spot]) -> f64 {
-        let away = spots.iter().flat_map(|spot| self.prior.away(spot));
-        away.map(|a| a * a).sum()
+    /// What is held to be likely of a spot draws it back by.
+    fn force(&self, spot: &Spot, known: Known) -> Spot {
+        let away = self.prior.away(spot);
+        let mut force: Spot = std::array::from_fn(|i| away[i] * self.prior.weight[i]);
+        if let Some(expected) = known.map(|number| &self.expected[number]) {
+            for (force, row) in force.iter_mut().zip(&expected.weight) {
+                let pairs = row.iter().zip(spot).zip(&expected.middle);
+                *force = pairs.map(|((w, here), there)| w * (here - there)).sum();
+            }
+        }
+        force
+    }
+
+    fn prior_squares(&self, spots: &[Spot], known: &[Known]) -> f64 {
+        let square = |(spot, known): (&Spot, &Known)| -> f64 {
+            let mut middle = self.prior.middle;
+            if let Some(number) = known {
+                middle[..CONTENT].copy_from_slice(&self.expected[*number].middle[..CONTENT]);
+            }
+            let away = spot.iter().zip(&middle).map(|(here, there)| here - there);
+            away.zip(self.force(spot, *known)).map(|(a, f)| a * f).sum()
+        };
+        spots.iter().zip(known).map(square).sum()
     }
 
     /// Spots where they may be.
@@ -350,11 +426,14 @@ impl Frame<'_> {
     }
 
     /// The gradient with the prior's part.
-    fn pulled(&self, spots: &[Spot], gradient: impl Iterator<Item = f64>) -> Vec<f64> {
-        let pull = spots.iter().flat_map(|spot| {
-            let away = self.prior.away(spot);
-            (0..PARAMETERS).map(move |column| away[column] * self.prior.weight[column])
-        });
+    fn pulled(
+        &self,
+        spots: &[Spot],
+        known: &[Known],
+        gradient: impl Iterator<Item = f64>,
+    ) -> Vec<f64> {
+        let each = spots.iter().zip(known);
+        let pull = each.flat_map(|(spot, known)| self.force(spot, *known));
         gradient.zip(pull).map(|(g, p)| g - p).collect()
     }
 

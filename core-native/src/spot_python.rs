@@ -10,7 +10,8 @@ use crate::arrays::{Any, array, contiguous, invalid, same};
 use crate::dense::Matrix;
 use crate::small::product;
 use crate::spot_algebra::{Beside, Metric};
-use crate::spot_fit::{Fit, Frame, Prior, Seen, Sheet};
+use crate::spot_expected_python::{ExpectedArrays, expected_of};
+use crate::spot_fit::{Expected, Fit, Frame, Known, Prior, Seen, Sheet};
 use crate::spot_match::{self, Limits, Measurements, Quality, Signatures};
 use crate::spot_search::{Found, Pace, Rules, Search};
 use crate::spot_table::{DIRECTIONS, Grid, Layout, PARAMETERS, ROWS, SLOPES, Spot, Table};
@@ -39,6 +40,7 @@ type Fitted<'py> = (
     [Bound<'py, PyArray2<f64>>; 5],
     [Bound<'py, PyArray1<f64>>; 3],
     (f64, f64, f64, bool),
+    Vec<Known>,
 );
 
 #[pymethods]
@@ -115,18 +117,28 @@ impl SpotTable {
         Ok(out)
     }
 
-    /// The minimum near `spots` (k, 4), after at most so many steps; none: at the spots.
+    /// The minimum near `spots` (k, 4), after at most so many steps; none: at the spots. `known`
+    /// (k) which of the expected touches each is, or None.
     fn settled<'py>(
         &self,
         seen: &SeenTable,
         frame: FrameArrays<'py>,
         spots: &Any<'py>,
+        known: Vec<Known>,
         most: usize,
     ) -> PyResult<Fitted<'py>> {
         let (py, spots) = (frame.0.py(), spots_of(spots)?);
         let arrays = Arrays::of(self, seen, &frame)?;
+        same("length of known", spots.len(), known.len())?;
+        if known
+            .iter()
+            .flatten()
+            .any(|&number| number >= arrays.expected.len())
+        {
+            return Err(invalid("known: numbers of expected touches, or None"));
+        }
         let frame = arrays.frame(self, seen, &frame)?;
-        let fit = py.detach(|| frame.settled(&spots, most));
+        let fit = py.detach(|| frame.settled(&spots, &known, most));
         let fit = fit.ok_or_else(|| invalid("spots: not comparable with the data"))?;
         Ok(fitted(py, fit))
     }
@@ -287,8 +299,16 @@ type Judged<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 type Others<'py> = [Bound<'py, PyArray1<f64>>; 2];
 
 /// Whitened data of a frame, the square of their rest, directions that are left, an offset,
-/// deviations and depths; see `Frame`.
-type FrameArrays<'py> = (Any<'py>, f64, Any<'py>, Any<'py>, [f64; 4], [f64; 2]);
+/// deviations and depths, and the expected touches; see `Frame`.
+type FrameArrays<'py> = (
+    Any<'py>,
+    f64,
+    Any<'py>,
+    Any<'py>,
+    [f64; 4],
+    [f64; 2],
+    ExpectedArrays<'py>,
+);
 
 /// A frame's arrays, checked.
 struct Arrays<'py> {
@@ -296,6 +316,7 @@ struct Arrays<'py> {
     left: PyReadonlyArray2<'py, f64>,
     offset: Vec<f64>,
     values: PyReadonlyArray3<'py, f32>,
+    expected: Vec<Expected>,
 }
 
 impl<'py> Arrays<'py> {
@@ -317,6 +338,7 @@ impl<'py> Arrays<'py> {
             left,
             offset: seen.seen.whitened(contiguous("offset", &offset)?).values,
             values,
+            expected: expected_of(&frame.6)?,
         })
     }
 
@@ -337,6 +359,7 @@ impl<'py> Arrays<'py> {
             offset: &self.offset,
             deviations: frame.4,
             depths: frame.5,
+            expected: &self.expected,
         })
     }
 }
@@ -353,6 +376,7 @@ fn fitted(py: Python<'_>, fit: Fit) -> Fitted<'_> {
         matrices.map(|matrix| by_rows(py, matrix)),
         vectors.map(|vector| PyArray1::from_vec(py, vector)),
         (fit.misfit, fit.metric.log_size, fit.cost, fit.settled),
+        fit.known,
     )
 }
 
@@ -447,7 +471,7 @@ fn by_rows(py: Python<'_>, matrix: Matrix<f64>) -> Bound<'_, PyArray2<f64>> {
     out
 }
 
-fn spots_of(spots: &Any<'_>) -> PyResult<Vec<Spot>> {
+pub(crate) fn spots_of(spots: &Any<'_>) -> PyResult<Vec<Spot>> {
     let spots = array::<f64, Ix2>("spots", spots)?;
     same("columns of spots", PARAMETERS, spots.shape()[1])?;
     let spots = spots.as_array();

@@ -5,7 +5,7 @@
 use std::f64::consts::TAU;
 
 use crate::spot_algebra::{Metric, eliminated};
-use crate::spot_fit::{Fit, Frame};
+use crate::spot_fit::{Fit, Frame, Known};
 use crate::spot_match::{Limits, Signatures, standing, standing_out};
 use crate::spot_table::{PARAMETERS, Spot};
 
@@ -58,6 +58,9 @@ pub struct Found {
     pub others: Option<[Vec<f64>; 2]>,
 }
 
+/// Spots, and who they are.
+type Start = (Vec<Spot>, Vec<Known>);
+
 /// A search in one frame.
 #[derive(Debug)]
 pub struct Search<'a> {
@@ -80,7 +83,11 @@ pub struct Search<'a> {
 impl Search<'_> {
     /// Touches of the frame, from those of the last one; `None` where nothing can be compared.
     pub fn found(&self, before: &[Spot]) -> Option<Found> {
-        let (kept, weakest) = self.pruned(self.started(before)?)?;
+        let expected = self.frames[0].expected.len();
+        let known: Vec<Known> = (0..before.len())
+            .map(|i| (i < expected).then_some(i))
+            .collect();
+        let (kept, weakest) = self.pruned(self.started(before, &known)?)?;
         let lost = match kept.fit.spots.len() {
             0 => 0,
             k => before.len() - k,
@@ -105,11 +112,11 @@ impl Search<'_> {
     }
 
     fn nothing(&self) -> Option<Found> {
-        self.refined(&[], true, 0)
+        self.refined(&[], &[], true, 0)
     }
 
-    fn refined(&self, spots: &[Spot], bare: bool, steps: usize) -> Option<Found> {
-        let fit = self.frames[usize::from(bare)].settled(spots, steps)?;
+    fn refined(&self, spots: &[Spot], known: &[Known], bare: bool, steps: usize) -> Option<Found> {
+        let fit = self.frames[usize::from(bare)].settled(spots, known, steps)?;
         Some(Found {
             fit,
             bare,
@@ -117,12 +124,16 @@ impl Search<'_> {
         })
     }
 
-    fn started(&self, before: &[Spot]) -> Option<Found> {
+    fn started(&self, before: &[Spot], known: &[Known]) -> Option<Found> {
         if before.is_empty() {
             return self.nothing();
         }
-        let spots = &before[..before.len().min(self.pace.most)];
-        self.refined(spots, false, self.pace.warm)
+        let most = before.len().min(self.pace.most);
+        self.refined(&before[..most], &known[..most], false, self.pace.warm)
+    }
+
+    fn without(&self, fit: &Fit, number: usize) -> Option<Found> {
+        self.started(&without(&fit.spots, number), &without(&fit.known, number))
     }
 
     /// Without the spots that have faded; and the weakest of the others.
@@ -132,7 +143,7 @@ impl Search<'_> {
             if ratio >= self.rules.held * self.rules.least {
                 return Some((found, (weakest, ratio)));
             }
-            found = self.started(&without(&found.fit.spots, weakest))?;
+            found = self.without(&found.fit, weakest)?;
         }
         Some((found, (0, f64::INFINITY)))
     }
@@ -150,7 +161,7 @@ impl Search<'_> {
         if ratio >= enough * self.rules.least {
             return Some(found);
         }
-        let fewer = self.started(&without(&found.fit.spots, weakest))?;
+        let fewer = self.without(&found.fit, weakest)?;
         let better = self.evidence(&fewer.fit) > self.evidence(&found.fit);
         Some(if better { fewer } else { found })
     }
@@ -183,7 +194,7 @@ impl Search<'_> {
             let fit = &found.fit;
             let mut fresh = self.candidates[best];
             fresh[3] = content;
-            let more = self.best(&starts(&fit.spots, fresh), found.bare)?;
+            let more = self.best(&starts(fit, fresh), found.bare)?;
             let worth = self.weakest(&more.fit)?.1 >= self.threshold(fit, 1.0);
             let gain = self.evidence(&more.fit) - self.evidence(fit);
             if !worth || gain <= self.rules.rare {
@@ -195,15 +206,16 @@ impl Search<'_> {
     }
 
     /// The most evident of those that come out best after a glance.
-    fn best(&self, starts: &[Vec<Spot>], bare: bool) -> Option<Found> {
-        let glance = |start: &Vec<Spot>| self.refined(start, bare, self.pace.glance);
+    fn best(&self, starts: &[Start], bare: bool) -> Option<Found> {
+        let glance = |(start, known): &Start| self.refined(start, known, bare, self.pace.glance);
         let mut fits: Vec<Found> = starts.iter().map(glance).collect::<Option<_>>()?;
         fits.sort_by(|one, other| one.fit.cost.total_cmp(&other.fit.cost));
         fits.truncate(self.pace.finalists);
         let mut best: Option<(f64, Found)> = None;
         for mut found in fits {
             if !found.fit.settled {
-                found = self.refined(&found.fit.spots, bare, self.pace.cold)?;
+                let Fit { spots, known, .. } = &found.fit;
+                found = self.refined(spots, known, bare, self.pace.cold)?;
             }
             let evidence = self.evidence(&found.fit);
             if best.as_ref().is_none_or(|(most, _)| evidence > *most) {
@@ -231,14 +243,18 @@ impl Search<'_> {
 
     /// Logarithm of the evidence, by Laplace's method.
     fn evidence(&self, fit: &Fit) -> f64 {
-        let (k, n) = (fit.spots.len(), fit.normal.height);
+        let n = fit.normal.height;
         let mut normal = fit.normal.clone();
         let Some(half_log_det) = eliminated(&mut normal, n) else {
             return f64::NEG_INFINITY;
         };
-        let orders: f64 = (1..=k).map(|i| (i as f64).ln()).sum();
+        let expected = self.frames[0].expected;
+        let old = fit.known.iter().flatten();
+        let old: f64 = old.map(|&number| expected[number].volume).sum();
+        let new = fit.known.iter().filter(|known| known.is_none()).count();
+        let orders: f64 = (1..=new).map(|i| (i as f64).ln()).sum();
         let volume = n as f64 * TAU.ln() / 2.0 - half_log_det;
-        let prior = orders - k as f64 * self.rules.volume;
+        let prior = orders - new as f64 * self.rules.volume - old;
         prior + volume - fit.cost - fit.metric.log_size
     }
 }
@@ -252,18 +268,18 @@ fn largest(values: &[f64]) -> Option<(usize, f64)> {
     values.iter().enumerate().fold(None, first)
 }
 
-fn without(spots: &[Spot], number: usize) -> Vec<Spot> {
-    let mut rest = spots.to_vec();
+fn without<T: Copy>(all: &[T], number: usize) -> Vec<T> {
+    let mut rest = all.to_vec();
     rest.remove(number);
     rest
 }
 
 /// The new spot beside the others; or instead of half of the nearest.
-fn starts(spots: &[Spot], fresh: Spot) -> Vec<Vec<Spot>> {
+fn starts(fit: &Fit, fresh: Spot) -> Vec<Start> {
     debug_assert_eq!(fresh.len(), PARAMETERS);
-    let mut beside = spots.to_vec();
-    beside.push(fresh);
-    let mut starts = vec![beside];
+    let Fit { spots, known, .. } = fit;
+    let beside = [&spots[..], &[fresh]].concat();
+    let mut starts = vec![(beside, [&known[..], &[None]].concat())];
     let away = |spot: &Spot| [fresh[0] - spot[0], fresh[1] - spot[1]];
     let far = |spot: &Spot| away(spot)[0].hypot(away(spot)[1]);
     let near = (0..spots.len()).min_by(|&i, &j| far(&spots[i]).total_cmp(&far(&spots[j])));
@@ -276,7 +292,7 @@ fn starts(spots: &[Spot], fresh: Spot) -> Vec<Vec<Spot>> {
             let [u, v, log_radius, content] = half;
             instead.push([u + side * x, v + side * y, log_radius - 0.3, content / 2.0]);
         }
-        starts.push(instead);
+        starts.push((instead, [without(known, near), vec![None; 2]].concat()));
     }
     starts
 }

@@ -10,6 +10,7 @@ import pytest
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.touch import EXHAUSTIVE, LIVE, Pace, SpotFinder
+from tomoskin.touch.fit.expectation import Known
 from tomoskin.touch.fit.refine import Answer, Deficit, Fit, Limits, Problem, Question, Solver
 from touch.fit.scene import covariance, noise
 from touch.fit.test_finder import NOTHING, data, model, place, press, skin, spread
@@ -56,6 +57,27 @@ def test_a_press_that_begins_during_a_scan_is_where_it_is() -> None:
     assert is_at(detection, -0.03, 0.04)
 
 
+def test_a_faint_press_that_goes_on_is_nearer_than_one_frame_tells() -> None:
+    live, alone = finder(scan_time=0.02), finder(EXHAUSTIVE)
+    missed: dict[SpotFinder, list[float]] = {live: [], alone: []}
+    for step, n in enumerate(noise(16, 25, 9)):
+        x = 0.001 * step - 0.05
+        for ours, away in missed.items():
+            (detection,) = ours.push(data(press(x, 0.0, depth=-0.12)) + n, NOTHING)
+            away.append(float(np.hypot(detection.x - x, detection.y)))
+    rms = {ours: float(np.sqrt(np.mean(np.square(away[5:])))) for ours, away in missed.items()}
+    assert rms[live] < 0.8 * rms[alone]
+    assert rms[alone] > 1e-3
+
+
+def test_a_press_elsewhere_after_a_press_is_where_it_is() -> None:
+    ours = finder()
+    for n in noise(16, 3, 10):
+        ours.push(data(STANDING) + n, NOTHING)
+    (detection,) = ours.push(data(press(-0.05, 0.02)) + noise(16, 1, 11)[0], NOTHING)
+    assert is_at(detection, -0.05, 0.02)
+
+
 def test_presses_that_begin_together_are_told_apart_at_once() -> None:
     ours = finder()
     three = np.concatenate([press(-0.05, 0.0), press(0.05, 0.02), press(0.0, -0.06)])
@@ -90,9 +112,16 @@ class Counting:
     def searched(self, question: Question, before: FloatArray) -> Answer | None:
         """None: the search goes step by step, which comes to the same."""
 
-    def settled(self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
+    def settled(
+        self,
+        problem: Problem,
+        spots: FloatArray,
+        deficit: Deficit,
+        most: int,
+        known: Known = (),
+    ) -> Fit:
         self.steps += 1 + most
-        return self._solver.settled(problem, spots, deficit, most)
+        return self._solver.settled(problem, spots, deficit, most, known)
 
 
 def test_a_frame_has_a_bounded_number_of_steps() -> None:

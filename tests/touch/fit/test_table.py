@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit import EXHAUSTIVE, LIVE
+from tomoskin.touch.fit.expectation import Expectation, Known
 from tomoskin.touch.fit.native import NativeSolver
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
 from tomoskin.touch.fit.selection import ForwardSelection
@@ -17,6 +19,15 @@ from touch.fit.scene import noise, whitener
 from touch.fit.test_finder import data, model, press
 
 TWO = np.concatenate([press(-0.04, 0.03, 0.018, -0.4), press(0.05, -0.02, 0.024, -0.3)])
+SPREAD = np.array([4e-3, 2e-3, 0.2, 3e-5])
+"""Deviations of a spot's columns."""
+
+
+def expected(spots: FloatArray) -> Expectation:
+    """Of touches whose columns are correlated."""
+    k = len(spots)
+    one = SPREAD[:, None] * SPREAD * np.where(np.eye(4, dtype=bool), 1.0, 0.3)
+    return Expectation.of(spots, np.kron(np.eye(k), one), (5e-3, 5e-3, 0.1))
 
 
 def drawn(count: int, within: float) -> list[FloatArray]:
@@ -101,18 +112,22 @@ def close(first: Any, second: Any, to: float = 1e-6) -> None:
     )
 
 
+@pytest.mark.parametrize("known", [(), (None, 0)], ids=["newcomers", "one goes on"])
 @pytest.mark.parametrize("reach", [0.0, 0.01])
 @pytest.mark.parametrize("spots", [TWO[:0], TWO[:1], TWO], ids=len)
-def test_native_and_numpy_agree(spots: FloatArray, reach: float) -> None:
+def test_native_and_numpy_agree(spots: FloatArray, reach: float, known: Known) -> None:
     pair = solvers()
     start = spots + np.array([4e-3, -3e-3, 0.1, 2e-5])
     rank = len(pair[0].table.basis)
     deficit = Deficit(start, 1e-6 * np.random.default_rng(1).normal(size=rank))
-    frames = [problem(solver, TWO, reach) for solver in pair]
+    frames = [replace(problem(solver, TWO, reach), expected=expected(TWO[1:])) for solver in pair]
     one, other = (
-        solver.settled(frame, start, deficit, 6) for solver, frame in zip(pair, frames, strict=True)
+        solver.settled(frame, start, deficit, 6, known[: len(start)])
+        for solver, frame in zip(pair, frames, strict=True)
     )
     assert one.settled == other.settled
+    assert one.known == other.known
+    assert len(one.known) == len(start)
     for name in ("spots", "each", "predicted", "residual", "slopes", "unknown", "normal"):
         close(getattr(one, name), getattr(other, name))
     for name in ("misfit", "log_size", "cost", "degrees"):
@@ -133,21 +148,27 @@ def test_native_and_numpy_agree(spots: FloatArray, reach: float) -> None:
             close(first, second)
 
 
-def test_one_call_finds_what_the_search_step_by_step_does() -> None:
+@pytest.mark.parametrize("goes_on", [False, True])
+def test_one_call_finds_what_the_search_step_by_step_does(goes_on: bool) -> None:
     native, _ = solvers()
     kept = {"most": 5, "least": 5.0, "pace": LIVE, "deficit": Deficit.none(len(native.table.basis))}
-    counts = set()
+    counts, known = set(), set[int | None]()
     three = np.concatenate([TWO, press(0.0, -0.06)])
     for spots, before in ((TWO[:0], TWO[:0]), (TWO, TWO[:1]), (three, TWO), (TWO[:1], TWO)):
         frame = problem(native, spots, 0.01)
+        if goes_on:
+            frame = replace(frame, expected=expected(before))
         search = ForwardSelection(frame, model().candidates.matched(frame.seen), **kept)
         answer = native.searched(search.question, before)
         assert answer is not None
         other = search.found(before)
         close(answer.fit.spots, other.spots)
         assert answer.fit.cost == pytest.approx(other.cost, rel=1e-9)
+        assert answer.fit.known == other.known
+        known.update(other.known)
         counts.add(len(other.spots))
     assert counts == {0, 1, 2, 3}
+    assert known == ({None, 0} if goes_on else {None})
 
 
 def test_what_changes_do_not_show_along_is_noise() -> None:

@@ -17,7 +17,8 @@ def test_a_release_does_not_throw_the_touch_across_the_skin(rate: float) -> None
     """What is left is the sheet's own and then noise: 57 mm away at 14 deviations, once."""
     run = Run(rate)([[detection(0.0, snr=40.0)]] * 20)
     before = run.touches[-1][0].detection
-    run([[detection(x, snr=snr)] for x, snr in ((0.004, 24), (0.012, 12), (0.02, 8), (0.03, 3.4))])
+    fading = ((0.004, 24), (0.012, 12), (0.02, 8), (0.03, 3.4))
+    run([[detection(x, snr=snr, peak=-snr / 40)] for x, snr in fading])
     shown = [touches[0].detection for touches in run.touches]
     deviations = [d.sd_x for d in shown]
     assert all(abs(d.x) < min(0.01, 3 * d.sd_x) for d in shown)
@@ -53,8 +54,17 @@ def test_a_faint_detection_far_off_is_noise() -> None:
 
 def test_a_press_that_stays_lighter_is_followed_again() -> None:
     """After about a second, in which a sheet recovers."""
-    run = Run()([[detection(0.0, snr=50.0)]] * 20 + [[detection(0.01, snr=25.0)]] * 60)
+    lighter = detection(0.01, snr=25.0, peak=-0.5)
+    run = Run()([[detection(0.0, snr=50.0)]] * 20 + [[lighter]] * 60)
+    assert run.touches[20][0].detection.x < 0.005
     assert run.touches[-1][0].detection.x == pytest.approx(0.01, abs=0.0015)
+
+
+def test_a_touch_that_stands_out_less_beside_others_is_where_its_detection_is() -> None:
+    """Others take up a part of what it does to the voltages, and it presses as before."""
+    alone, beside = detection(0.0, snr=50.0), detection(0.01, snr=15.0)
+    run = Run()([[alone]] * 20 + [[beside, detection(0.08)]] * 3)
+    assert [touches[0].detection.x for touches in run.touches[20:]] == [0.01] * 3
 
 
 def test_what_is_off_without_noise_is_told() -> None:

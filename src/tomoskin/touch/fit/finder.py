@@ -19,11 +19,13 @@ from tomoskin.touch.fit.candidates import Candidates, Matched, footprints_of
 from tomoskin.touch.fit.cell_discs import CellDiscs
 from tomoskin.touch.fit.certificate import Certificate, Reduced
 from tomoskin.touch.fit.excess import Gauge
+from tomoskin.touch.fit.expectation import Expectation
 from tomoskin.touch.fit.native import NativeSolver
 from tomoskin.touch.fit.noise import ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
+from tomoskin.touch.fit.rival import Rival, challenged
 from tomoskin.touch.fit.search import SpotDetections, joined, search
 from tomoskin.touch.fit.selection import ForwardSelection
 from tomoskin.touch.fit.sheet import fields_of, fitting_sheet
@@ -44,6 +46,9 @@ _GROWS = 0.5
 
 _REST = 0.5
 """A touch that stood still in the frame before moves, and grows, by this part of that at least."""
+
+_SWELLS = 0.08
+"""Standard deviation of the logarithm of a touch's radius from frame to frame."""
 
 _MASKS = 8
 """Nuisance subspaces whose whitening is kept."""
@@ -228,8 +233,10 @@ class SpotFinder:
         self._newest_left = self._residual.changes, None, np.zeros((0, 0))
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
-        self._before, self._way = np.zeros((0, N_PARAMETERS)), np.zeros((0, 2))
+        self._before = np.zeros((0, N_PARAMETERS))
         self._deficit = Deficit.none(len(model.solver.table.basis))
+        self._expected = Expectation.none()
+        self._rival: Rival | None = None
         pattern = model.response.state.model.pattern
         self.watch = FrameWatch(pattern, skin.touch.sign, skin.touch.snr)
         self._scale = model.scale * gain
@@ -273,8 +280,9 @@ class SpotFinder:
         if times > 1.0:  # it may be no touch in as much noise
             detected, matched = self._searched(data, nuisance, times)
         self.watch.end(solver, detected.fit, matched, times)
-        self._unrest, self._way = self._motion(detected.fit.spots)
+        self._unrest = self._motion(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
+        self._expected = self._going_on(detected)
         if self._fading:
             self._residual = self._residual.after(self._before, self._model.changes, self._fading)
         detections = self._detections(joined(detected))
@@ -300,13 +308,17 @@ class SpotFinder:
             data=whitened,
             rest=rest,
             left=self._left(seen),
+            expected=self._expected,
         )
         sign = self.watch.sign(problem, matched)
         if sign != problem.sign:
             problem = replace(problem, sign=sign)
         least, pace = self._settings.snr, self._pace
         selection = ForwardSelection(problem, matched, least, self._most, pace, self._deficit)
-        detected = search(selection, self._expected)
+        detected = search(selection, self._before)
+        rival, self._rival = self._rival, None
+        if self._reach and sign != "both":
+            detected, self._rival = challenged(selection, detected, rival, self._going_on)
         if self.watch.puzzled(problem, detected.fit):
             both = self._anew(selection, len(detected.fit.spots) + 1)
             if self.watch.turns(both, detected.fit) and problem.favours(both.fit, detected.fit):
@@ -318,7 +330,7 @@ class SpotFinder:
         most = min(most, self._most)
         pace = replace(self._pace, tries=most)
         none = Deficit.none(len(self._deficit.change))
-        problem = replace(selection.problem, sign="both")
+        problem = replace(selection.problem, sign="both", expected=Expectation.none())
         return search(
             ForwardSelection(problem, selection.matched, selection.least, most, pace, none),
             np.zeros((0, N_PARAMETERS)),
@@ -333,23 +345,21 @@ class SpotFinder:
             self._newest_left = self._residual.changes, seen, left
         return left
 
-    @property
-    def _expected(self) -> FloatArray:
-        """(k, 4) the touches of the last frame where they go on as they went."""
-        spots = self._before.copy()
-        spots[:, :2] += self._way
-        return spots
+    def _going_on(self, detected: SpotDetections) -> Expectation:
+        """What is expected of the touches of this frame in the next one."""
+        if not self._reach or not len(detected.fit.spots):
+            return Expectation.none()
+        wander = self._reach, self._reach, _SWELLS
+        return Expectation.of(detected.fit.spots, detected.covariance, wander)
 
-    def _motion(self, spots: FloatArray) -> tuple[float, FloatArray]:
-        """How much of what touches may do they have done since the frame before, and their way
-        (k, 2) m; 1 and none where there are more of them, or fewer, or frames say nothing of each
-        other."""
+    def _motion(self, spots: FloatArray) -> float:
+        """How much of what touches may do they have done since the frame before; 1 where there are
+        more of them, or fewer, or frames say nothing of each other."""
         if len(spots) != len(self._before) or not len(spots) or not self._reach:
-            return 1.0, np.zeros((len(spots), 2))
+            return 1.0
         way = spots[:, :2] - self._before[:, :2]
         moved = max([math.sqrt(x * x + y * y) for x, y in way.tolist()])
-        unrest = min(1.0, math.hypot(_REST, moved / self._reach))
-        return unrest, way if moved <= self._reach else np.zeros_like(way)
+        return min(1.0, math.hypot(_REST, moved / self._reach))
 
     def _whitened(self, nuisance: FloatArray) -> Seen:
         key = nuisance.tobytes() + self.watch.excess.key

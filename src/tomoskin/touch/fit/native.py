@@ -7,11 +7,20 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.touch.fit.expectation import Known, newcomers
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Answer, Deficit, Fit, Limits, Problem, Question
 from tomoskin.touch.fit.solver import DIRECTED, RESHAPED, RIDGE, SheetDomain
 from tomoskin.touch.fit.spot import FILLING
 from tomoskin.touch.fit.table import ResponseTable
+
+Fitted = tuple[
+    tuple[FloatArray, ...],
+    tuple[FloatArray, ...],
+    tuple[float, float, float, bool],
+    list[int | None],
+]
+"""Matrices, vectors and numbers of a fit, and who its spots are."""
 
 
 class NativeSolver:
@@ -42,10 +51,18 @@ class NativeSolver:
         """See :class:`Solver`."""
         return self._core.SeenTable(direct, timed, matrix, self.table.basis, squares)
 
-    def settled(self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
+    def settled(
+        self,
+        problem: Problem,
+        spots: FloatArray,
+        deficit: Deficit,
+        most: int,
+        known: Known = (),
+    ) -> Fit:
         """See :class:`Solver`."""
         kept, frame = problem.seen.kept, self._frame(problem, deficit)
-        return _fit(problem, deficit, *self._spots.settled(kept, frame, spots, most))
+        known = known or newcomers(len(spots))
+        return _fit(problem, deficit, self._spots.settled(kept, frame, spots, known, most))
 
     def searched(self, question: Question, before: FloatArray) -> Answer | None:
         """See :class:`Solver`."""
@@ -70,12 +87,14 @@ class NativeSolver:
         )
         rank = len(self.table.basis)
         deficit = Deficit.none(rank) if bare else question.deficit
-        return Answer(_fit(problem, deficit, *found), others and tuple(others))
+        return Answer(_fit(problem, deficit, found), others and tuple(others))
 
     def _frame(self, problem: Problem, deficit: Deficit) -> tuple[Any, ...]:
         deviations = (DIRECTED, RESHAPED, problem.reach, problem.grows)
         depths = self._prior.depths(problem.sign)
-        return problem.data, problem.rest, problem.left, deficit.change, deviations, depths
+        data, expected = (problem.data, problem.rest, problem.left), problem.expected
+        going_on = expected.spots, expected.covariances, self._prior.log_content
+        return *data, deficit.change, deviations, depths, going_on
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
         """See :class:`Solver`."""
@@ -101,13 +120,8 @@ class NativeSolver:
         return ratio, content
 
 
-def _fit(
-    problem: Problem,
-    deficit: Deficit,
-    matrices: tuple[FloatArray, ...],
-    vectors: tuple[FloatArray, ...],
-    numbers: tuple[float, float, float, bool],
-) -> Fit:
+def _fit(problem: Problem, deficit: Deficit, fitted: Fitted) -> Fit:
+    matrices, vectors, numbers, known = fitted
     found, each, slopes, unknown, normal = matrices
     predicted, residual, gradient = vectors
     misfit, log_size, cost, settled = numbers
@@ -126,4 +140,5 @@ def _fit(
         cost=cost,
         degrees=max(len(problem.seen.full) - len(gradient), 1),
         settled=settled,
+        known=tuple(known),
     )

@@ -10,6 +10,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.mesh import Mesh
+from tomoskin.touch.fit.expectation import Expectation, Known
 from tomoskin.touch.fit.spot import CONTENT, FILLING, LOG_RADIUS
 
 _RADIUS = 0.11
@@ -71,11 +72,17 @@ class SpotPrior:
         wide = 1 / math.sqrt(self.area)
         return np.array([wide, wide, 1 / self.spread, 1 / self.content])
 
-    def log_density(self, spots: FloatArray) -> float:
-        """Logarithm of the prior density of spots (k, 4), in no order."""
-        k = len(spots)
-        away = float((self.away(spots) ** 2).sum())
-        return math.lgamma(k + 1) - k * self.log_volume - away / 2
+    def log_most(self, known: Known, expected: Expectation) -> float:
+        """Logarithm of the density of spots at their most likely; newcomers are in no order."""
+        old = [number for number in known if number is not None]
+        new = len(known) - len(old)
+        going_on = len(old) * self.log_content + float(expected.log_volumes[old].sum())
+        return math.lgamma(new + 1) - new * self.log_volume - going_on
+
+    @property
+    def log_content(self) -> float:
+        """What the content has of :attr:`log_volume`."""
+        return math.log(self.content) + math.log(2 * math.pi) / 2
 
     @property
     def log_volume(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, Protocol
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray, finished
 from tomoskin.touch.fit.certificate import Reduced
+from tomoskin.touch.fit.expectation import Expectation, Known
 from tomoskin.touch.fit.noise import Whitener
 from tomoskin.touch.fit.pace import Pace
 from tomoskin.touch.fit.prior import SpotPrior
@@ -104,6 +105,8 @@ class Fit:
         Degrees of freedom of the residual.
     settled
         Whether the steps towards it came to an end.
+    known
+        Who each spot is; nobody at all: all are newcomers.
     """
 
     spots: FloatArray
@@ -120,6 +123,7 @@ class Fit:
     cost: float
     degrees: int
     settled: bool = True
+    known: Known = ()
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -128,7 +132,7 @@ class Fit:
         even = np.linalg.inv(self.normal * scale[:, None] * scale)
         return np.asarray(even * scale[:, None] * scale)
 
-    def log_evidence(self, prior: SpotPrior) -> float:
+    def log_evidence(self, prior: SpotPrior, expected: Expectation) -> float:
         """Logarithm of ∫ likelihood · prior by Laplace's method (MacKay 2003, eq. 28.5).
 
         Up to what all fits of the same data have in common.
@@ -136,8 +140,7 @@ class Fit:
         n = len(self.normal)
         sign, log_det = np.linalg.slogdet(self.normal) if n else (1.0, 0.0)
         volume = (n * math.log(2 * math.pi) - log_det) / 2 if sign > 0 else -np.inf
-        likelihood = -self.misfit / 2 - self.log_size
-        return likelihood + prior.log_density(self.spots) + volume
+        return volume - self.cost - self.log_size + prior.log_most(self.known, expected)
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,8 +253,16 @@ class Solver(Protocol):
         """See :meth:`ResponseTable.expanded`."""
         ...
 
-    def settled(self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
-        """The minimum of the cost near ``spots`` (k, 4), after at most so many steps.
+    def settled(
+        self,
+        problem: Problem,
+        spots: FloatArray,
+        deficit: Deficit,
+        most: int,
+        known: Known = (),
+    ) -> Fit:
+        """The minimum of the cost near ``spots`` (k, 4), after at most so many steps; nobody
+        ``known``: all are newcomers.
 
         What is unknown of the spots is taken as it is at the first ones, and anew where steps
         with that end.
@@ -368,6 +379,7 @@ class Problem:
     ``sign`` is "decrease", "increase" or "both". Standard deviations of what a touch does within a
     scan: its way along each axis, ``reach`` m, and what it ``grows`` by, in parts of it.
     ``left`` (q, c) are directions of residual responses, each as long as its deviation.
+    ``expected`` are the touches of the frame before where they may have gone.
     """
 
     response: Response
@@ -380,6 +392,7 @@ class Problem:
     data: FloatArray
     rest: float
     left: FloatArray
+    expected: Expectation = field(default_factory=Expectation.none)
 
     @property
     def square(self) -> float:
@@ -396,9 +409,9 @@ class Problem:
         none = np.zeros((0, N_PARAMETERS))
         return self.solver.settled(self, none, Deficit.none(len(self.solver.table.basis)), 0)
 
-    def refined(self, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
+    def refined(self, spots: FloatArray, deficit: Deficit, most: int, known: Known = ()) -> Fit:
         """See :meth:`Solver.settled`."""
-        return self.solver.settled(self, spots, deficit, most)
+        return self.solver.settled(self, spots, deficit, most, known)
 
     def corrected(self, fit: Fit, rounds: int, near: float, tolerance: float) -> Fit:
         """The fit with what the table lacks at its spots, so many rounds at most, and not where
@@ -418,7 +431,7 @@ class Problem:
             far = np.linalg.norm(self.seen.direct @ (deficit.change - fit.deficit.change))
             if far < allowed:
                 return replace(fit, deficit=deficit)
-            fit = self.solver.settled(self, fit.spots, deficit, _AGAIN)
+            fit = self.solver.settled(self, fit.spots, deficit, _AGAIN, fit.known)
             if fit.deficit.holds_for(fit.spots, near):
                 break
         return fit
@@ -440,7 +453,7 @@ class Problem:
 
     def evidence(self, fit: Fit) -> float:
         """See :meth:`Fit.log_evidence`."""
-        return fit.log_evidence(self.prior)
+        return fit.log_evidence(self.prior, self.expected)
 
     def favours(self, one: Fit, other: Fit) -> bool:
         """Whether the frame speaks for one explanation against another, by odds of 200."""

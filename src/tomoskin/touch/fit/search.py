@@ -48,7 +48,7 @@ def search(selection: ForwardSelection, before: FloatArray) -> SpotDetections:
     fit = selection.found(before) if answer is None else answer.fit
     if answer and answer.others:
         selection.remember(fit, answer.others)
-    return _judged(selection, _confirmed(selection, fit, before))
+    return judged(selection, _confirmed(selection, fit, before))
 
 
 def _confirmed(selection: ForwardSelection, fit: Fit, before: FloatArray) -> Fit:
@@ -58,14 +58,15 @@ def _confirmed(selection: ForwardSelection, fit: Fit, before: FloatArray) -> Fit
     exact = problem.corrected(fit, pace.closing, pace.near, pace.tolerance)
     if not pace.closing or len(fit.spots) < 2 or len(fit.spots) <= len(before):
         return exact
-    fewer = selection.refined(before)
+    fewer = selection.again(before)
     other = problem.corrected(fewer, pace.closing, pace.near, pace.tolerance)
     worth = selection.ratios(exact).min() >= selection.threshold(other, 1.0)
     gain = problem.evidence(exact) - problem.evidence(other)
     return exact if worth and gain > pace.rare else other
 
 
-def _judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
+def judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
+    """How sure each touch of a fit is."""
     if not len(fit.spots):
         none = np.zeros(0)
         return SpotDetections(fit, none, np.zeros((0, 0)), none.astype(bool))

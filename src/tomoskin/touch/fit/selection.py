@@ -9,6 +9,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.touch.fit.candidates import Matched, limits_of
+from tomoskin.touch.fit.expectation import Known, less
 from tomoskin.touch.fit.joint_starts import JointStarts
 from tomoskin.touch.fit.pace import Pace
 from tomoskin.touch.fit.refine import Deficit, Fit, Problem, Question, Rules
@@ -23,6 +24,10 @@ _MISSHAPEN = 0.02
 _SURE = 2.0
 """Times the ratio at which a touch begins: half the square of that is more than what a simpler
 explanation of the frame is worth."""
+
+
+Start = tuple[FloatArray, Known]
+"""Spots (k, 4), and who they are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +72,7 @@ class ForwardSelection:
 
     def found(self, before: FloatArray) -> Fit:
         """The fit of the touches, before the exact model is asked for the last time."""
-        kept = self._pruned(self.refined(before))
+        kept = self._pruned(self.again(before))
         tries = self.pace.tries - (len(before) - len(kept.spots) if len(kept.spots) else 0)
         fit, tried = self._more(kept, tries)
         if tries > tried == 0:
@@ -84,12 +89,17 @@ class ForwardSelection:
             return in_vain
         return len(fit.spots) != len(before) or not fit.settled
 
-    def refined(self, before: FloatArray) -> Fit:
+    def again(self, before: FloatArray) -> Fit:
+        """The fit of no touches but those ``before`` (k, 4)."""
+        known = range(len(before)) if len(self.problem.expected.spots) else ()
+        return self._refined(before, tuple(known))
+
+    def _refined(self, before: FloatArray, known: Known) -> Fit:
         """The fit that begins with the touches ``before`` (k, 4)."""
         if not len(before):
             return self.problem.nothing()
         problem, spots = self.problem, before[: self.most]
-        fit = problem.refined(spots, self.deficit, self.pace.warm)
+        fit = problem.refined(spots, self.deficit, self.pace.warm, known[: self.most])
         return problem.corrected(fit, self.pace.rounds, self.pace.near, self.pace.tolerance)
 
     def _pruned(self, fit: Fit) -> Fit:
@@ -99,7 +109,7 @@ class ForwardSelection:
             weakest = int(ratio.argmin())
             if ratio[weakest] >= HELD * self.least:
                 return fit
-            fit = self.refined(np.delete(fit.spots, weakest, axis=0))
+            fit = self._without(fit, weakest)
         return fit
 
     def _fewer(self, fit: Fit) -> Fit:
@@ -110,9 +120,10 @@ class ForwardSelection:
         weakest = int(ratio.argmin())
         if ratio[weakest] >= (1.0 if fit.settled else _SURE) * self.least:
             return fit
-        return max(
-            fit, self.refined(np.delete(fit.spots, weakest, axis=0)), key=self.problem.evidence
-        )
+        return max(fit, self._without(fit, weakest), key=self.problem.evidence)
+
+    def _without(self, fit: Fit, number: int) -> Fit:
+        return self._refined(np.delete(fit.spots, number, axis=0), less(fit.known, number))
 
     def _more(self, fit: Fit, tries: int) -> tuple[Fit, int]:
         """With further spots, while they are worth it; and how many of ``tries`` were tried."""
@@ -132,8 +143,22 @@ class ForwardSelection:
 
     def threshold(self, fit: Fit, part: float) -> float:
         """Deviations for that ``part`` of a touch; a wrong profile adds to the noise."""
-        misshapen = _MISSHAPEN * float(np.linalg.norm(fit.predicted))
-        return part * self.least * float(np.hypot(1.0, misshapen / self.least))
+        return part * self.least * float(np.hypot(1.0, self.misshapen(fit) / self.least))
+
+    @staticmethod
+    def misshapen(fit: Fit) -> float:
+        """Deviations that a wrong profile of the spots of a fit may leave."""
+        return _MISSHAPEN * float(np.linalg.norm(fit.predicted))
+
+    def proposed(self, fit: Fit) -> Fit | None:
+        """One spot more than a ``fit`` has, whatever it is worth; None where nothing stands out."""
+        if not 0 < len(fit.spots) < self.most:
+            return None
+        ratio, content = self.standing_out(fit)
+        best = int(ratio.argmax())
+        if ratio[best] < self.threshold(fit, self.pace.look):
+            return None
+        return self._best(_starts(fit, self.matched.spot(best, content)), fit.deficit, [])
 
     def standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
         """Likelihood ratios (n,) and contents (n,) of the candidates beside ``fit``."""
@@ -158,15 +183,15 @@ class ForwardSelection:
         problem = self.problem
         return JointStarts.of(self.matched, problem.data, problem.prior, problem.sign)
 
-    def _best(self, starts: list[FloatArray], deficit: Deficit, joint: list[FloatArray]) -> Fit:
+    def _best(self, starts: list[Start], deficit: Deficit, joint: list[FloatArray]) -> Fit:
         """The most evident of those that come out best after a glance."""
         problem, pace = self.problem, self.pace
         none = Deficit.none(len(deficit.change))
-        fits = [problem.refined(start, deficit, pace.glance) for start in starts]
+        fits = [problem.refined(start, deficit, pace.glance, known) for start, known in starts]
         fits += [problem.refined(start, none, pace.glance) for start in joint]
         fits.sort(key=lambda fit: fit.cost)
         settled = [
-            fit if fit.settled else problem.refined(fit.spots, fit.deficit, pace.cold)
+            fit if fit.settled else problem.refined(fit.spots, fit.deficit, pace.cold, fit.known)
             for fit in fits[: pace.finalists]
         ]
         exact = [problem.corrected(fit, pace.rounds, pace.near, pace.tolerance) for fit in settled]
@@ -177,9 +202,9 @@ class ForwardSelection:
         return np.asarray(np.sqrt(self.problem.solver.standing(self.problem.left, fit)))
 
 
-def _starts(fit: Fit, fresh: FloatArray) -> list[FloatArray]:
+def _starts(fit: Fit, fresh: FloatArray) -> list[Start]:
     """The new spot beside the others; or instead of half of the nearest."""
-    starts = [np.concatenate([fit.spots, fresh[None]])]
+    starts = [(np.concatenate([fit.spots, fresh[None]]), (*fit.known, None))]
     if len(fit.spots):
         near = int(np.linalg.norm(fit.spots[:, :2] - fresh[:2], axis=1).argmin())
         away = fresh[:2] - fit.spots[near, :2]
@@ -188,5 +213,6 @@ def _starts(fit: Fit, fresh: FloatArray) -> list[FloatArray]:
         halves[:, :2] += np.outer([-reach, reach], away)
         halves[:, CONTENT] /= 2
         halves[:, LOG_RADIUS] -= 0.3
-        starts.append(np.concatenate([np.delete(fit.spots, near, axis=0), halves]))
+        instead = np.concatenate([np.delete(fit.spots, near, axis=0), halves])
+        starts.append((instead, (*less(fit.known, near), None, None)))
     return starts

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray
 from tomoskin.mesh import Mesh
+from tomoskin.touch.fit.expectation import Expectation, Known, newcomers
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Deficit, Fit, Limits, Problem, Question
 from tomoskin.touch.fit.spot import CONTENT, N_PARAMETERS, X, Y
@@ -67,38 +68,41 @@ class NumpySolver:
         """See :class:`Solver`."""
         return self.table.expanded(spots)
 
-    def settled(self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int) -> Fit:
+    def settled(
+        self,
+        problem: Problem,
+        spots: FloatArray,
+        deficit: Deficit,
+        most: int,
+        known: Known = (),
+    ) -> Fit:
         """See :class:`Solver`.
 
         Levenberg (1944) and Marquardt (1963): damping relative to the diagonal.
         """
-        best = self._at(problem, self._held(spots, problem.sign), deficit)
+        pull = Pull.of(self.prior, problem.expected, known or newcomers(len(spots)))
+        best = self._at(problem, self._held(spots, problem.sign), deficit, pull)
         while most > 0:
-            descent = self._descended(problem, best, most)
+            descent = self._descended(problem, best, most, pull)
             best = replace(best, settled=descent.settled)
             if np.array_equal(descent.spots, best.spots):
                 break
             most -= descent.steps
-            best = self._at(problem, descent.spots, deficit)
-            best = replace(best, settled=self._gain(best) < _SETTLED)
+            best = self._at(problem, descent.spots, deficit, pull)
+            best = replace(best, settled=_gain(best, pull) < _SETTLED)
         return best
 
-    def _gain(self, fit: Fit) -> float:
-        """Squared Newton decrement of a fit."""
-        gradient = self._pulled(fit.spots, fit.gradient)
-        return float(gradient @ _solved(fit.normal, gradient, _LEAST_DAMPING))
-
-    def _descended(self, problem: Problem, fit: Fit, most: int) -> FitDescent:
+    def _descended(self, problem: Problem, fit: Fit, most: int, pull: Pull) -> FitDescent:
         """Steps from a fit down to where its metric sees nothing to gain."""
         metric = NuisanceMetric.of(fit.unknown)
-        gradient = self._pulled(fit.spots, fit.gradient)
+        gradient = pull.pulled(fit.spots, fit.gradient)
         best, damping = Slope(fit.spots, fit.normal, gradient, fit.cost), _LEAST_DAMPING
         for steps in range(most):
             step = _solved(best.normal, best.gradient, damping)
             if best.gradient @ step < _SETTLED:
                 return FitDescent(best.spots, steps, settled=True)
             moved = self._held(best.spots + step.reshape(-1, N_PARAMETERS), problem.sign)
-            tried = self._slope(problem, metric, moved, fit.deficit)
+            tried = self._slope(problem, metric, moved, fit.deficit, pull)
             if tried.cost < best.cost:
                 best, damping = tried, max(damping / 10, _LEAST_DAMPING)
             elif damping > _MOST_DAMPING:
@@ -107,7 +111,7 @@ class NumpySolver:
                 damping = max(damping * 30, 1e-2)
         return FitDescent(best.spots, most, settled=False)
 
-    def _at(self, problem: Problem, spots: FloatArray, deficit: Deficit) -> Fit:
+    def _at(self, problem: Problem, spots: FloatArray, deficit: Deficit, pull: Pull) -> Fit:
         """The frame with these spots, as they are."""
         parts, direct = self.table.expanded(spots), problem.seen.direct
         own = parts[:, 1 : 1 + N_PARAMETERS]
@@ -133,17 +137,23 @@ class NumpySolver:
             residual=residual,
             slopes=slopes,
             unknown=unknown,
-            normal=self._normal(square, len(spots)),
+            normal=pull.normal(square),
             gradient=square[:-1, -1],
             misfit=misfit,
             log_size=metric.log_size,
-            cost=(misfit + self._prior_squares(spots)) / 2,
+            cost=(misfit + pull.square(spots)) / 2,
             degrees=max(len(problem.seen.full) - len(slopes), 1),
             settled=False,
+            known=pull.known,
         )
 
     def _slope(
-        self, problem: Problem, metric: NuisanceMetric, spots: FloatArray, deficit: Deficit
+        self,
+        problem: Problem,
+        metric: NuisanceMetric,
+        spots: FloatArray,
+        deficit: Deficit,
+        pull: Pull,
     ) -> Slope:
         """The cost of spots by the metric of others."""
         direct = problem.seen.direct
@@ -152,19 +162,9 @@ class NumpySolver:
         slopes = seen[:, 1:].reshape(-1, len(residual))
         square = metric.products(np.vstack([slopes, residual]))
         misfit = problem.rest + float(square[-1, -1])
-        gradient = self._pulled(spots, square[:-1, -1])
-        cost = (misfit + self._prior_squares(spots)) / 2
-        return Slope(spots, self._normal(square, len(spots)), gradient, cost)
-
-    def _normal(self, square: FloatArray, k: int) -> FloatArray:
-        return np.asarray(square[:-1, :-1] + np.diag(np.tile(self.prior.weights, k) ** 2))
-
-    def _pulled(self, spots: FloatArray, gradient: FloatArray) -> FloatArray:
-        """A gradient with the prior's part."""
-        return np.asarray(gradient - (self.prior.away(spots) * self.prior.weights).ravel())
-
-    def _prior_squares(self, spots: FloatArray) -> float:
-        return float((self.prior.away(spots) ** 2).sum())
+        gradient = pull.pulled(spots, square[:-1, -1])
+        cost = (misfit + pull.square(spots)) / 2
+        return Slope(spots, pull.normal(square), gradient, cost)
 
     def _held(self, spots: FloatArray, sign: str) -> FloatArray:
         return self.prior.held(self.sheet.held(spots), sign)
@@ -215,6 +215,60 @@ class NumpySolver:
         content[chosen] = onto[chosen] / size
         ratio[chosen] = np.abs(onto[chosen]) / np.sqrt(size)
         return ratio, content
+
+
+def _gain(fit: Fit, pull: Pull) -> float:
+    """Squared Newton decrement of a fit."""
+    gradient = pull.pulled(fit.spots, fit.gradient)
+    return float(gradient @ _solved(fit.normal, gradient, _LEAST_DAMPING))
+
+
+@dataclass(frozen=True, eq=False)
+class Pull:
+    """What is held to be likely of each of k spots: the normal distribution that is expected of
+    those that are ``known``, the prior of the others.
+
+    ``middles`` (k, 4); ``weights`` (k, 4, 4) inverse of the covariance, 0 for what is even over the
+    sheet, which ``bends`` (k, 4, 4) has as wide as the sheet.
+    """
+
+    known: Known
+    middles: FloatArray
+    weights: FloatArray
+    bends: FloatArray
+
+    @classmethod
+    def of(cls, prior: SpotPrior, expected: Expectation, known: Known) -> Pull:
+        """Of so many spots as there are ``known``."""
+        k = len(known)
+        middles, squares = np.tile(prior.middle, (k, 1)), prior.weights**2
+        bends = np.tile(np.diag(squares), (k, 1, 1))
+        weights = np.tile(np.diag(squares * [0, 0, 1, 1]), (k, 1, 1))
+        for own, number in enumerate(known):
+            if number is not None:
+                middles[own, :CONTENT] = expected.spots[number, :CONTENT]
+                weights[own, :CONTENT, :CONTENT] = expected.weights[number]
+                bends[own] = weights[own]
+        return cls(known, middles, weights, bends)
+
+    def normal(self, square: FloatArray) -> FloatArray:
+        """(4k, 4k) of data and prior together; ``square`` (4k + 1, 4k + 1) of the data."""
+        normal = square[:-1, :-1].copy()
+        for k, bend in enumerate(self.bends):
+            here = slice(N_PARAMETERS * k, N_PARAMETERS * (k + 1))
+            normal[here, here] += bend
+        return normal
+
+    def pulled(self, spots: FloatArray, gradient: FloatArray) -> FloatArray:
+        """A gradient (4k,) with the prior's part."""
+        return np.asarray(gradient - self._forces(spots).ravel())
+
+    def square(self, spots: FloatArray) -> float:
+        """Of the deviations of all spots."""
+        return float(((spots - self.middles) * self._forces(spots)).sum())
+
+    def _forces(self, spots: FloatArray) -> FloatArray:
+        return np.asarray(np.einsum("kij,kj->ki", self.weights, spots - self.middles))
 
 
 def _within_scan(problem: Problem, spots: FloatArray, slopes: FloatArray) -> list[FloatArray]:

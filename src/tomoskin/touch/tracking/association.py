@@ -90,7 +90,6 @@ def _costs(touch: ExpectedTouch, seen: Sequence[SeenDetection]) -> list[float]:
     state = touch.state
     if touch.several:
         state = state._replace(xx=state.xx + _PARTED**2, yy=state.yy + _PARTED**2)
-    mean, variance = touch.strength.mean, touch.strength.variance + NOISE**2 + ELSEWHERE**2
     there = math.log1p(math.exp(-touch.odds))
     costs = []
     for position, sign, content in seen:
@@ -98,7 +97,7 @@ def _costs(touch: ExpectedTouch, seen: Sequence[SeenDetection]) -> list[float]:
         if far > GATE or sign != touch.sign:
             costs.append(_LIMIT)
             continue
-        apart = min(0.5 * ((content - mean) ** 2 / variance), _STRENGTH)
+        apart = min(0.5 * _unlike(touch.strength, content), _STRENGTH)
         cost = 0.5 * far + 0.5 * math.log(area / 1e-8) + apart + there
         costs.append(cost if cost <= _APART else _LIMIT)
     return costs
@@ -111,19 +110,28 @@ def _jumps(
     detection that is not ``taken``."""
     touch = expected[own]
     others = [
-        _between(touch, other)
+        (_between(touch, other), touch.strength.plus(other.strength))
         for number, other in enumerate(expected)
         if number != own and other.sign == touch.sign
     ]
     costs = []
-    for number, (position, sign, _) in enumerate(seen):
+    for number, (position, sign, content) in enumerate(seen):
         nearest = math.inf
         if number not in taken and sign == touch.sign:
-            nearest = min((distance(state, position)[0] for state in others), default=math.inf)
+            away = (
+                distance(state, position)[0] + _unlike(both, min(content, both.mean))
+                for state, both in others
+            )
+            nearest = min(away, default=math.inf)
         # the stronger one goes on
         cost = _JUMP + 0.5 * nearest - touch.strength.mean / 8
         costs.append(cost if nearest <= GATE else _LIMIT)
     return costs
+
+
+def _unlike(strength: TouchStrength, content: float) -> float:
+    """Squared deviations of a content from that of a touch."""
+    return (content - strength.mean) ** 2 / (strength.variance + NOISE**2 + ELSEWHERE**2)
 
 
 def _between(one: ExpectedTouch, other: ExpectedTouch) -> TrackState:

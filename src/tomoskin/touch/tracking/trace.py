@@ -86,7 +86,7 @@ class Trace:
         """Leave the first footprint."""
         self.strong = self.since
         self.strength = self.fresh = TouchStrength.of(self.detection)
-        self.held = Position.of(self.detection, size_of(self.detection), self.since)
+        self.held = Position.of(self.detection, content_of(self.detection), self.since)
         self._step()
 
     @property
@@ -118,7 +118,7 @@ class Trace:
         ones say nothing of it."""
         self.detection = detection
         held = Position.of if still else self.held.after
-        self.held = held(detection, size_of(detection), time)
+        self.held = held(detection, content_of(detection), time)
         self.strength = self.strength.after(detection, seconds)
         if time - self.parted < _FRESH:
             self.fresh = self.fresh.after(detection, seconds)
@@ -131,7 +131,7 @@ class Trace:
         """It stands for other fingers from now on: what it was says nothing of them."""
         self.parted = time
         self.strength = self.fresh = TouchStrength.of(self.detection)
-        self.held = Position.of(self.detection, size_of(self.detection), time)
+        self.held = Position.of(self.detection, content_of(self.detection), time)
 
     def become(self, other: Trace) -> None:
         """Go on from where ``other`` is."""
@@ -162,6 +162,11 @@ def size_of(detection: Detection) -> float:
     """By how many deviations it stands out, or its peak where the noise is unknown: a fit knows
     the depth of a faint touch badly, but well what it does to the voltages."""
     return detection.snr if 0 < detection.snr < math.inf else abs(detection.peak)
+
+
+def content_of(detection: Detection) -> float:
+    """Its peak times its area: what it changes, whatever stands beside it."""
+    return abs(detection.peak) * detection.area
 
 
 def sign_of(detection: Detection) -> float:
