@@ -79,7 +79,7 @@ def _six_points(folder: Path) -> Iterator[Report]:
         "six flags at once, from one batch to the other: part of the frames with all six right",
         (
             *("batches", "untouched frames"),
-            *("as learnt", "no labels", "ten, most telling", "ten at random"),
+            *("as learnt", "no labels", "ten, evenly spread", "ten at random"),
             *("within the new batch", "said probability", "called unknown", "learnt in s"),
         ),
         tuple(rows),
@@ -157,7 +157,9 @@ def _transfer(old: Batch, new: Batch) -> tuple[object, ...]:
     fitted = known.in_session(dv)
     taken = time.process_time() - start
     answers = fitted.predict(dv)
-    telling = _with_labels(known, new, fitted.most_telling(dv, TEN))
+    spread = _with_labels(
+        known, new, np.arange(len(dv) // (2 * TEN), len(dv), len(dv) // TEN)[:TEN]
+    )
     drawn = [
         _with_labels(known, new, np.random.default_rng(seed).permutation(len(dv))[:TEN])
         for seed in range(DRAWS)
@@ -165,7 +167,7 @@ def _transfer(old: Batch, new: Batch) -> tuple[object, ...]:
     return (
         round(_right(known, new), 3),
         round(_right(fitted, new), 3),
-        round(telling, 3),
+        round(spread, 3),
         round(float(np.mean(drawn)), 3),
         round(Classifier.fit(dv, flags).right, 3),
         round(float(answers.probability.mean()), 3),
@@ -260,7 +262,7 @@ def _real(data: Path) -> Report:
     for name, skin, dv, xy in _skins(data):
         ring = ring_of(skin)
         near = {
-            ChannelMapping.as_drawn(len(ring)).turned(ring, k, mirrored=False).places
+            ChannelMapping.as_drawn(len(ring)).turned(ring, k, mirrored=False).electrodes
             for k in (-1, 0, 1)
         }
         for count in REAL_COUNTS:

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.labelled import RADIUS, Floats, held, presses
+from calibration.labelled import RADIUS, ROWS, Floats, held, presses
 from tomoskin import Locator, Pattern
 from tomoskin.calibration import TOUCH, SessionAlignment
+from tomoskin.calibration.locator.matching import CHANCE, distance, matched
 from tomoskin.core import DataError
 
 
@@ -59,9 +60,9 @@ def test_labels_that_are_given_are_kept(locator: Locator) -> None:
     some = np.full(xy.shape, np.nan)
     some[:10] = xy[:10]
     alignment = SessionAlignment.of(locator, dv, some)
-    np.testing.assert_allclose(alignment.presses.xy[:10], xy[:10])
-    assert not alignment.presses.spreads[:10].any()
-    assert (np.trace(alignment.presses.spreads[10:], axis1=1, axis2=2) > 0).all()
+    np.testing.assert_allclose(alignment.presses.xy[-120:-110], xy[:10])
+    assert not alignment.presses.spreads[-120:-110].any()
+    assert (np.trace(alignment.presses.spreads[-110:], axis1=1, axis2=2) > 0).all()
     assert alignment.holds
     assert alignment.missed < 0.2 * RADIUS
 
@@ -101,6 +102,45 @@ def test_touches_on_a_part_of_the_skin_are_not_spread_over_all_of_it(locator: Lo
     assert "touch the whole skin" in alignment.findings[-1]
     assert not alignment.holds
     assert locator.in_session(dv[part]) is locator
+
+
+def test_where_touches_are_in_the_same_session_is_no_change(locator: Locator) -> None:
+    """Half of the skin, or mostly its middle: channels are compared where the touches are."""
+    dv, xy = presses(400, 6)
+    for some in (xy[:, 0] > 0, np.linalg.norm(xy, axis=1) < 0.6 * RADIUS):
+        alignment = SessionAlignment.of(locator, dv[some])
+        assert alignment.apart < CHANCE
+        assert alignment.findings == ("the session agrees with the calibration",)
+
+
+def test_channels_that_answer_otherwise_are_matched_though_frames_fit() -> None:
+    """Each of twelve channels has another law: noise is large enough to hide it from the misfit."""
+    law = np.random.default_rng(12).uniform(0.5, 1.6, ROWS)
+
+    def session(n: int, seed: int) -> tuple[Floats, Floats]:
+        dv, xy = presses(n, seed, noise=0.3)
+        return dv * law, xy
+
+    loose = Locator.fit(*presses(200, 0, noise=0.3))
+    alignment = SessionAlignment.of(loose, session(300, 5)[0])
+    assert alignment.strangeness < 1.5
+    assert alignment.apart > CHANCE
+    assert alignment.needed
+    assert alignment.holds
+    assert len(alignment.presses) == 200
+    asked, xy = session(300, 8)
+    aligned = loose.aligned(alignment)
+    assert error(aligned.predict(asked)[0], xy) < error(loose.predict(asked)[0], xy)
+
+
+def test_a_monotone_law_of_each_channel_is_undone() -> None:
+    before = np.random.default_rng(3).normal(size=(400, 3))
+    now = np.column_stack([3 * before[:, 0], before[:, 1] ** 3, np.exp(before[:, 2])])
+    even = np.full(400, 1 / 400)
+    np.testing.assert_allclose(matched(before, now, even), now, rtol=0.2, atol=0.05)
+    assert distance(before, now, even) > CHANCE > distance(before, before[::2], even)
+    lost = np.where([True, False, False], np.nan, now)
+    np.testing.assert_array_equal(matched(before, lost, even)[:, 0], before[:, 0])
 
 
 def test_a_file_keeps_estimated_labels(tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ def test_ranges_of_frames_teach_states(tomoskin: Run, tmp_path: Path) -> None:
     code, out, err = tomoskin("states", asked, "--calibration", c, "--out", table, "--ask", 2)
     assert (code, err) == (0, "")
     assert re.search(r"frames    0 to +\d+  idle  \d+ % or more\nframes +\d+ to +\d+  ", out)
-    assert "labels would help most at frames" in out
+    assert "label frames 15, 45" in out
     with table.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     expected = [("idle", "bend", "touch")[k // 20] for k in range(60)]

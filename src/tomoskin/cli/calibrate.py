@@ -91,8 +91,13 @@ def touch(
     frames = np.arange(len(dv)) if unlabelled else labelled_frames(xy)
     calibration = learn(dv[frames], xy[frames])
     calibration.write(out, overwrite=force)
-    learnt = np.array_equal(calibration.model.presses.dv[-1], dv[frames[-1]], equal_nan=True)
-    facts = _findings(calibration, frames.tolist() if learnt else [])
+    known = calibration.model.presses.dv  # of an alignment, all frames, labelled ones or none
+    added = (
+        some.tolist()
+        for some in (frames, labelled_frames(xy))
+        if len(some) and np.array_equal(known[-len(some) :], dv[some], equal_nan=True)
+    )
+    facts = _findings(calibration, next(added, []))
     if facts["is_guess"]:
         remark(
             f"{recording}: the data hardly depend on the position. Presses left out have a mean "
@@ -138,7 +143,7 @@ def _onto(path: Path, name: str | None, recording: Path, *, aligns: bool) -> tup
 
     def learn(dv: FloatArray, xy: FloatArray) -> Calibration[Locator]:
         with Bar("learning") as bar:
-            return old.with_model(old.model.updated(dv, xy).settled_anew(bar))
+            return old.with_model(old.model.updated(dv, xy, progress=bar))
 
     def align(dv: FloatArray, xy: FloatArray) -> Calibration[Locator]:
         return old.with_model(_aligned(old.model, dv, xy))

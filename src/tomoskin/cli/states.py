@@ -37,7 +37,7 @@ def states(
     reference: ReferenceOption = None,
     ask: Annotated[
         int,
-        typer.Option(min=0, metavar="N", help="Name the N frames whose labels would help most."),
+        typer.Option(min=0, metavar="N", help="Name N frames to label, spread over the recording."),
     ] = 0,
     json: JsonFlag = False,
 ) -> None:
@@ -57,7 +57,7 @@ def states(
     dv = changes(data, reference, loaded.pattern)
     with Bar("telling states"):
         answers = classifier.predict(dv)
-        asked = classifier.most_telling(dv, min(ask, len(dv))).tolist()
+    asked = _spread(min(ask, len(dv)), len(dv))
     names = classifier.examples.codes.names
     if out is not None:
         _write(out, data, answers, names, overwrite=force)
@@ -65,6 +65,11 @@ def states(
         emit({"names": names, "frames": _documents(data, answers), "ask": asked})
     else:
         _say(answers, asked)
+
+
+def _spread(count: int, n: int) -> list[int]:
+    """``count`` of n frames, evenly: those that are least sure would show one state too often."""
+    return [(2 * k + 1) * n // (2 * count) for k in range(count)]
 
 
 def _documents(data: Recording, answers: Answers) -> list[dict[str, Any]]:
@@ -111,4 +116,4 @@ def _say(answers: Answers, asked: list[int]) -> None:
         typer.echo(f"… and {len(rows) - runs[_SHOWN][0][0]} more frames: --out writes all")
     typer.echo(f"{int(answers.rejected.sum())} of {len(rows)} frames show an unknown state")
     if asked:
-        typer.echo(f"labels would help most at frames {', '.join(map(str, asked))}")
+        typer.echo(f"label frames {', '.join(map(str, asked))}")

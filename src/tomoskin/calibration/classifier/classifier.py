@@ -14,7 +14,6 @@ from tomoskin.calibration.classifier.examples import Codes, Examples
 from tomoskin.calibration.classifier.mixture import (
     Mixture,
     Subspace,
-    entropy,
     posterior,
     session_mean,
 )
@@ -211,12 +210,6 @@ class Classifier:
         if not more.labelled.any() and len(more) < _ENOUGH:
             raise DataError(f"expected at least {_ENOUGH} frames of the session, got {len(more)}")
         return self.learn(self.examples.and_then(more), (self.pattern_id, self.skin_id))
-
-    def most_telling(self, dv: ArrayLike, count: int) -> IntArray:
-        """(count,) frames of (n, n_meas) whose label would tell most: they are the most open."""
-        data = frames(dv, self.examples.dv.shape[1])
-        weights = posterior(_compared(self.subspace, self.mixture, data)[0], self.sharpness)
-        return np.argsort(-entropy(weights), kind="stable")[:count]
 
     def check(self, pattern_id: str = "", skin_id: str = "") -> None:
         """Refuse data of another pattern or skin. Raises DataError."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, eigh
 
 from tomoskin.calibration.classifier.examples import Examples
@@ -230,8 +229,3 @@ def shrunk(left: FloatArray) -> FloatArray:
     noise = (((left**2).sum(axis=1) ** 2).sum() / n - (raw**2).sum()) / n
     part = float(np.clip(noise / away, 0.01, 1.0)) if away > 0 else 1.0
     return np.asarray((1 - part) * raw + part * size * np.eye(d))
-
-
-def entropy(weights: NDArray[np.float64]) -> FloatArray:
-    """(n,) nat, how open it is which combination a frame shows."""
-    return np.asarray(-(weights * np.log(np.maximum(weights, 1e-300))).sum(axis=1))

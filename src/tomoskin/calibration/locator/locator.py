@@ -40,13 +40,6 @@ _STEPS = 4
 _COARSE = 600
 """Places in the grid of few presses: what they know is less than that."""
 
-_GROWN = 1.25
-"""Growth up to which settings are kept when presses are added."""
-
-_CHANGED = 2.5
-"""How many times as far as usual new presses are missed on a skin that has changed (medians)."""
-
-
 _MISSING = 2.0
 """Power of the part of the rows that a frame has, by which its covariance is divided: filled in,
 the others say little. Chosen on the twin's textile disc without one of 8 electrodes, seeds 1 to 3.
@@ -87,8 +80,6 @@ class Locator:
         Part of the presses that lie in their own 90 % ellipse when they are left out.
     remarks
         Labels that the other presses contradict.
-    settled
-        Presses that the settings were learnt from; see :meth:`updated`.
     """
 
     presses: Presses
@@ -102,7 +93,6 @@ class Locator:
     power: Strength
     held: float
     remarks: tuple[Remark, ...]
-    settled: int
 
     @classmethod
     def fit(
@@ -164,18 +154,16 @@ class Locator:
         region: Region,
         origin: tuple[Pattern | None, str],
         progress: Progress,
-        like: Locator | None = None,
     ) -> Self:
         positions = region.scaled(presses.xy)
-        features = like.features if like else Features.of(presses.dv)
+        features = Features.of(presses.dv)
         data = features(presses.dv)
         progress(0, _STEPS)
-        before = like.estimates if like else None
         rotations = Rotations.of(origin[0]) if origin[0] else Rotations.none(presses.dv.shape[1])
         grid = region.lattice(_COARSE) if len(presses) < FEW else region.grid
-        estimates = Estimates.of(data, positions, grid, rotations.of_rows(features.rows), before)
+        estimates = Estimates.of(data, positions, grid, rotations.of_rows(features.rows))
         progress(1, _STEPS)
-        stacking = Stacking.of(data, estimates.left_out, positions, like.stacking if like else None)
+        stacking = Stacking.of(data, estimates.left_out, positions)
         progress(2, _STEPS)
         disagreement = disagreement_of(stacking.left_out_by_expert, stacking.left_out)
         calibrated = CalibratedCovariance.of(
@@ -192,7 +180,6 @@ class Locator:
         progress(3, _STEPS)
         power = Strength.of(presses, stacking.left_out)
         progress(_STEPS, _STEPS)
-        settled = like.settled if like else len(presses)
         return cls(
             presses,
             region,
@@ -204,7 +191,6 @@ class Locator:
             power,
             held,
             remarks,
-            settled,
         )
 
     def predict(self, dv: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -268,29 +254,17 @@ class Locator:
         guess = self.region.scaled(self.predict(data)[0])
         return self.power(data, guess)
 
-    def updated(self, dv: ArrayLike, xy: ArrayLike, strength: ArrayLike | None = None) -> Self:
-        """Locator with more presses, soon: scales, covariances and hyper-parameters are kept.
-
-        Maps, processes, weights and doubt are those of all presses. The settings are learnt anew
-        once there are a quarter more presses than they were learnt from, and where the new ones
-        are missed far: then the skin has changed. See :meth:`settled_anew`.
-        """
-        more = Presses.of_more(dv, xy, strength)
-        presses = self.presses.and_then(more)
+    def updated(
+        self,
+        dv: ArrayLike,
+        xy: ArrayLike,
+        strength: ArrayLike | None = None,
+        progress: Progress = silent,
+    ) -> Self:
+        """Locator that has learnt from more presses beside its own."""
+        presses = self.presses.and_then(Presses.of_more(dv, xy, strength))
         region = self.region if self.skin_id else Region.around(presses.xy)
-        presses.within(region)
-        missed = np.linalg.norm(self.predict(more.dv)[0] - more.xy, axis=1)
-        changed = np.median(missed) > _CHANGED * np.median(self.errors)
-        keep = len(presses) <= _GROWN * self.settled and not changed
-        like = self if keep else None
-        with threadpool_limits(1):
-            return self._learnt(presses, region, (self.pattern, self.skin_id), silent, like)
-
-    def settled_anew(self, progress: Progress = silent) -> Self:
-        """Locator with the same presses, every setting learnt from all of them."""
-        if self.settled == len(self.presses):
-            return self
-        return self.learn(self.presses, self.region, self.pattern, self.skin_id, progress)
+        return self.learn(presses.within(region), region, self.pattern, self.skin_id, progress)
 
     @property
     def pattern_id(self) -> str:

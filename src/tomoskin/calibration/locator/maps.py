@@ -149,12 +149,8 @@ class ResponseMaps:
         positions: FloatArray,
         features: FloatArray,
         directions: FloatArray,
-        coregion: Coregion | None = None,
     ) -> Self:
-        """Maps for ``features`` (n, k) of presses at ``positions`` (n, 2).
-
-        How the rows answer together is learnt, unless ``coregion`` knows it.
-        """
+        """Maps for ``features`` (n, k) of presses at ``positions`` (n, 2)."""
         mean = features.mean(axis=0)
         centred = (features - mean) @ directions
         basis = Basis.of(likeness, positions)
@@ -166,7 +162,7 @@ class ResponseMaps:
         n_rest = len(positions) - len(weights)
         rest = centred.T @ centred - rows.T @ rows if n_rest else np.zeros(2 * (centred.shape[1],))
         data = Projected(weights, rows, rest, n_rest)
-        return cls(mean, directions, basis, data, axes, coregion or Coregion.of(data))
+        return cls(mean, directions, basis, data, axes, Coregion.of(data))
 
     @property
     def evidence(self) -> float:

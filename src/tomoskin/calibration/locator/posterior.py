@@ -149,24 +149,14 @@ class Estimates:
         positions: FloatArray,
         grid: FloatArray,
         rotations: Rotations,
-        like: Estimates | None = None,
     ) -> Self:
-        """Learn the maps; length scales by evidence, powers by left-out presses.
-
-        Estimates that are ``like`` others have the length scale and coregionalisation of their
-        maps. Their usual misfit too: a coregionalisation has seen the presses that are left out.
-        """
-        known = like.likelihood.maps if like else None
-        directions = known.directions if known else principal(features)
-        coregion = known.coregion if known else None
-        if known:
-            maps = ResponseMaps.of(known.basis.likeness, positions, features, directions, coregion)
-        else:
-            maps = _likeliest(positions, features, directions)
+        """Learn the maps; length scales by evidence, powers by left-out presses."""
+        directions = principal(features)
+        maps = _likeliest(positions, features, directions)
         together = maps.basis.likeness
 
         def joint(some: FloatArray, theirs: FloatArray) -> GridLikelihood:
-            learnt = ResponseMaps.of(together, some, theirs, directions, coregion)
+            learnt = ResponseMaps.of(together, some, theirs, directions)
             return GridLikelihood.of(learnt, grid)
 
         folds = _folds(positions)
@@ -185,7 +175,7 @@ class Estimates:
         powers = powers_of(parts, grid, positions)
         left_out = moments(pooled(parts, powers), grid)
         per_channel = ChannelLikelihood.of(alone, grid) if alone and powers[1] else None
-        usual = like.usual if like else float(np.median(misfit.min(axis=1)))
+        usual = float(np.median(misfit.min(axis=1)))
         return cls(grid, GridLikelihood.of(maps, grid), per_channel, powers, usual, *left_out)
 
     def __call__(self, features: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -136,25 +136,14 @@ class Process:
         n = len(targets)
         chosen = np.unique(np.linspace(0, n - 1, min(n, _LEARNT_ON)).astype(int))
         few = {name: square[np.ix_(chosen, chosen)] for name, square in squares.items()}
-        return cls.given(tuple(terms), _learn(tuple(terms), few, targets[chosen]), squares, targets)
-
-    @classmethod
-    def given(
-        cls,
-        terms: tuple[tuple[str, ...], ...],
-        logs: FloatArray,
-        squares: Distances,
-        targets: FloatArray,
-    ) -> Self:
-        """The same with hyper-parameters that are known."""
-        n = len(targets)
+        logs = _learn(terms, few, targets[chosen])
         kernel = _kernel(terms, logs, squares)
         kernel[np.diag_indices(n)] += _noise(logs)
         factor = cho_factor(kernel, lower=True, overwrite_a=True, check_finite=False)
         weights = cho_solve(factor, targets, check_finite=False)
         inverse, _ = dpotri(factor[0], lower=1, overwrite_c=0)
         left_out = targets - weights / np.diag(inverse)[:, None]
-        return cls(terms, logs, weights, left_out)
+        return cls(tuple(terms), logs, weights, left_out)
 
     def __call__(self, squares: Distances) -> FloatArray:
         """(m, 2) answers for frames at squared distances (m, n) from the presses."""

@@ -123,20 +123,11 @@ class Expert:
         terms: tuple[tuple[str, ...], ...],
         squares: Distances,
         xy: FloatArray,
-        like: Expert | None,
     ) -> Self:
-        """Learn ``xy`` (n, 2).
-
-        An expert that is ``like`` another has its hyper-parameters.
-        """
+        """Learn ``xy`` (n, 2)."""
         centre = xy.mean(axis=0)
         scale = float((xy - centre).std()) or 1.0
-        targets = (xy - centre) / scale
-        if like is None:
-            process = Process.of(terms, squares, targets)
-        else:
-            process = Process.given(terms, like.process.logs, squares, targets)
-        return cls(process, centre, scale)
+        return cls(Process.of(terms, squares, (xy - centre) / scale), centre, scale)
 
     @property
     def left_out(self) -> FloatArray:
@@ -172,23 +163,15 @@ class Stacking:
         features: FloatArray,
         estimates: FloatArray,
         xy: FloatArray,
-        like: Stacking | None = None,
     ) -> Self:
-        """Learn from ``features`` (n, k), held-out ``estimates`` (n, 2) and places ``xy``.
-
-        A stack that is ``like`` another has its hyper-parameters; weights are always learnt.
-        """
+        """Learn from ``features`` (n, k), held-out ``estimates`` (n, 2) and places ``xy``."""
         between = squared_distances(features, features)
-        unit = like.unit if like else _usual(between)
+        unit = _usual(between)
         squares = {
             "features": between / unit,
             "estimate": squared_distances(estimates, estimates) / _NEAR**2,
         }
-        given = like.experts if like else (None, None)
-        experts = (
-            Expert.of(_PLAIN, squares, xy, given[0]),
-            Expert.of(_BOTH, squares, xy, given[1]),
-        )
+        experts = (Expert.of(_PLAIN, squares, xy), Expert.of(_BOTH, squares, xy))
         by_expert = np.stack([estimates, *(expert.left_out for expert in experts)])
         weights = _weights(by_expert, xy)
         return cls(features, estimates, unit, experts, weights, by_expert)
