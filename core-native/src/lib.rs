@@ -31,6 +31,7 @@ pub mod scalar;
 pub mod small;
 pub mod solve;
 pub mod spot_algebra;
+#[cfg(feature = "python")]
 mod spot_expected_python;
 pub mod spot_fit;
 pub mod spot_match;

@@ -17,6 +17,7 @@ from tomoskin.wire import (
     GetInfo,
     Hello,
     Info,
+    Ping,
     Reset,
     Result,
     SetScan,
@@ -74,7 +75,11 @@ class Board:
         for payload in self._deframer.feed(data):
             command = decode_payload(payload, 0.0)
             self.commands.append(command)
+            if isinstance(command, Ping):
+                continue  # a late test is no board that has stopped: it is not set up again
             self.raw(self._answer(command))
+            if isinstance(command, Start):  # frames come after the answer
+                self.scanning.set()
 
     def read(self, timeout):
         self._check()
@@ -139,9 +144,8 @@ class Board:
             )
         if isinstance(command, SetScan):
             self._configuration = command.configuration
-        if isinstance(command, Start):
+        if isinstance(command, Start) and not self.scanning.is_set():  # no repeated one
             self._sequence = count()
-            self.scanning.set()
         if isinstance(command, Stop):
             self.scanning.clear()
         return encode(Ack(command.request, type_byte(type(command)), Result.OK, 0))
