@@ -62,6 +62,8 @@ class SteppedSkin:
     ) -> None:
         skin = prepared.skin
         self._prepared, self._with_touches = prepared, with_touches
+        if with_touches:
+            prepared.warm_up()
         self._seed = (settings or TwinSettings()).seed
         self._board = make_electronics(skin, settings or TwinSettings.preset(skin.twin.preset))
         self._table = table_of(prepared.scan, ScanSettings.of(skin))
