@@ -17,11 +17,16 @@ def send(port, payload):
 def payloads(port):
     """Whatever arrives whole."""
     while True:
-        block, data = port.read_until(b"\0")[:-1], b""
+        got = port.read_until(b"\0")
+        if not got:
+            sys.exit("nothing has come for 5 s: check the board's power and cable")
+        block, data = got[:-1], b""
         while block:
             code, run, block = block[0], block[1 : block[0]], block[block[0] :]
             data += run + (b"\0" if block and code < 255 else b"")
         if len(data) > 2 and crc_hqx(data, 0xFFFF) == 0:
+            if data[0] == 0x04:  # FAULT: no frame comes until it is set up again
+                sys.exit(f"the board has switched its current off: fault {data[9]}")
             yield data[:-2]
 
 
