@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tomoskin.calibration.locator.process import squared_distances
+from tomoskin.calibration.locator.process import nearness
 from tomoskin.core import FloatArray, IntArray
 
 _NEAR = 0.2
@@ -25,10 +25,7 @@ def prevalence(presses: FloatArray, touches: FloatArray) -> FloatArray:
 
     ``touches`` (m, 2), both in radii of the region. The sum is one.
     """
-    often, before = (
-        np.exp(-0.5 * squared_distances(presses, some) / _NEAR**2).mean(axis=1)
-        for some in (touches, presses)
-    )
+    often, before = (nearness(presses, some, _NEAR).mean(axis=1) for some in (touches, presses))
     weight = often / before
     return np.asarray(weight / weight.sum())
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from tomoskin.calibration.locator.process import squared_distances
+from tomoskin.calibration.locator.process import nearness
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.touch import Region
 
@@ -284,7 +284,7 @@ class Strength:
 def mean_about(positions: FloatArray, presses: FloatArray, values: FloatArray) -> FloatArray:
     """(m, …) mean of the ``values`` (n, …) of ``presses`` (n, 2) about ``positions`` (m, 2), in
     radii of the region."""
-    near = np.exp(-0.5 * squared_distances(positions, presses) / _NEAR**2) + _LEAST
+    near = nearness(positions, presses, _NEAR) + _LEAST
     return np.asarray(np.tensordot(near / near.sum(axis=1, keepdims=True), values, 1))
 
 
@@ -302,7 +302,7 @@ def equally_hard(presses: Presses, places: FloatArray) -> bool:
     size = _size(presses.dv)
     if presses.strength is not None:
         return bool(np.log(np.maximum(presses.strength, _LEAST)).std() < _ALIKE)
-    near = np.exp(-0.5 * squared_distances(places, places) / _NEAR**2)
+    near = nearness(places, places, _NEAR)
     np.fill_diagonal(near, 0.0)
     beyond = size - near @ size / np.maximum(near.sum(axis=1), _LEAST)
     return bool(beyond[near.sum(axis=1) > _LEAST].std() < _ALIKE)

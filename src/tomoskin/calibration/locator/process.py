@@ -41,6 +41,11 @@ def squared_distances(
     return np.asarray(np.maximum(square - 2 * (a @ b.T), 0.0))
 
 
+def nearness(a: FloatArray, b: FloatArray, length: float) -> FloatArray:
+    """(n, m) exp(−d²/2 ``length``²) of the distances d between rows of ``a`` and ``b``."""
+    return np.asarray(np.exp(-0.5 * squared_distances(a, b) / length**2))
+
+
 @dataclass(frozen=True)
 class Likeness:
     """Prior covariance of a response at two places; ``length`` in the unit of the places."""
@@ -49,8 +54,7 @@ class Likeness:
 
     def __call__(self, a: FloatArray, b: FloatArray) -> FloatArray:
         """(n, m) for the places ``a`` (n, 2) and ``b`` (m, 2)."""
-        near = np.exp(-0.5 * squared_distances(a, b) / self.length**2)
-        return np.asarray(near + _CONSTANT)
+        return nearness(a, b, self.length) + _CONSTANT
 
     @property
     def variance(self) -> float:

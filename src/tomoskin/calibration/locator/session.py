@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from tomoskin.calibration.locator.matching import CHANCE, distance, matched, prevalence
 from tomoskin.calibration.locator.posterior import BoolArray
 from tomoskin.calibration.locator.presses import Presses, frames
-from tomoskin.calibration.locator.process import squared_distances
+from tomoskin.calibration.locator.process import nearness, squared_distances
 from tomoskin.calibration.locator.topographic import (
     TopographicMap,
     covariances,
@@ -360,8 +360,8 @@ def _correction(positions: FloatArray, known: BoolArray, labels: FloatArray) -> 
     A smooth mapping of the sheet onto itself fits the frames about as well.
     """
     at = positions[known]
-    among = np.exp(-0.5 * squared_distances(at, at) / _SMOOTH**2) + _UNSURE * np.eye(len(at))
-    near = np.exp(-0.5 * squared_distances(positions, at) / _SMOOTH**2)
+    among = nearness(at, at, _SMOOTH) + _UNSURE * np.eye(len(at))
+    near = nearness(positions, at, _SMOOTH)
     return np.asarray(near @ np.linalg.solve(among, labels - at))
 
 

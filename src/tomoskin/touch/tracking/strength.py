@@ -52,7 +52,12 @@ class TouchStrength:
         return TouchStrength(mean, variance)
 
 
+def content_of(detection: Detection) -> float:
+    """Its peak times its area: what it changes, whatever stands beside it."""
+    return abs(detection.peak) * detection.area
+
+
 def log_content(detection: Detection) -> float:
     """Logarithm of the size of the peak times the area; 0 where it has none."""
-    content = abs(detection.peak) * detection.area
+    content = content_of(detection)
     return math.log(content) if content > 0 else 0.0

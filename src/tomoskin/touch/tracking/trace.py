@@ -9,7 +9,7 @@ from tomoskin.core import Detection
 from tomoskin.touch.tracking.merging import Alone, MergedFinger
 from tomoskin.touch.tracking.motion import TrackState, region_radius
 from tomoskin.touch.tracking.position import Position
-from tomoskin.touch.tracking.strength import TouchStrength
+from tomoskin.touch.tracking.strength import TouchStrength, content_of
 
 _STEP = 0.012
 """A touch that slides leaves a footprint every so many metres."""
@@ -162,11 +162,6 @@ def size_of(detection: Detection) -> float:
     """By how many deviations it stands out, or its peak where the noise is unknown: a fit knows
     the depth of a faint touch badly, but well what it does to the voltages."""
     return detection.snr if 0 < detection.snr < math.inf else abs(detection.peak)
-
-
-def content_of(detection: Detection) -> float:
-    """Its peak times its area: what it changes, whatever stands beside it."""
-    return abs(detection.peak) * detection.area
 
 
 def sign_of(detection: Detection) -> float:
