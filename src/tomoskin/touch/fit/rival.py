@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from tomoskin.touch.fit.expectation import Expectation, newcomers
 from tomoskin.touch.fit.refine import Fit
 from tomoskin.touch.fit.search import SpotDetections, judged
-from tomoskin.touch.fit.selection import HELD, ForwardSelection
+from tomoskin.touch.fit.selection import HELD, ForwardSelection, misshapen
 
 _BORN = -4.0
 """Logarithm of the odds that one frame must give a rival, beginning apart."""
@@ -60,7 +60,7 @@ def challenged(
     if odds < _DROPPED:
         return found, None
     fit = replace(fit, known=newcomers(len(fit.spots)))  # of what was found
-    stays = math.hypot(HELD * selection.least, selection.misshapen(found.fit))
+    stays = math.hypot(HELD * selection.least, misshapen(found.fit))
     detected = judged(selection, fit)
     if odds > 0 and selection.ratios(fit).min() >= stays:
         return detected, None

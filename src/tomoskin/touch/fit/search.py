@@ -47,7 +47,7 @@ def search(selection: ForwardSelection, before: FloatArray) -> SpotDetections:
     answer = selection.problem.solver.searched(selection.question, before)
     fit = selection.found(before) if answer is None else answer.fit
     if answer and answer.others:
-        selection.remember(fit, answer.others)
+        selection.beside.remember(fit, answer.others)
     return judged(selection, _confirmed(selection, fit, before))
 
 
@@ -77,7 +77,7 @@ def judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
 
 def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:
     """Where a candidate within a radius of a spot stands out nearly enough."""
-    ratio, _ = selection.standing_out(fit)
+    ratio, _ = selection.beside.ratios(fit)
     doubtful = selection.matched.spots[ratio > selection.threshold(fit, _DOUBTFUL), :2]
     if not len(doubtful):
         return np.zeros(len(fit.spots), dtype=bool)

@@ -31,6 +31,43 @@ Start = tuple[FloatArray, Known]
 
 
 @dataclass(frozen=True, eq=False)
+class Beside:
+    """What stands out of a frame beside a fit. The last look is kept, since it takes long.
+
+    Attributes
+    ----------
+    problem
+        The frame.
+    matched
+        Candidates for its noise.
+    """
+
+    problem: Problem
+    matched: Matched
+
+    def remember(self, fit: Fit, ratios: tuple[FloatArray, FloatArray]) -> None:
+        """Keep what :meth:`ratios` would compute of ``fit``."""
+        self._looked_at.append((fit.residual, ratios))
+
+    def ratios(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
+        """Likelihood ratios (n,) and contents (n,) of the candidates."""
+        if not self._looked_at or self._looked_at[-1][0] is not fit.residual:
+            self.remember(fit, self.matched.ratios(self.problem.solver, fit, self.problem.sign))
+        return self._looked_at[-1][1]
+
+    def best(self, fit: Fit, least: float) -> FloatArray | None:
+        """(4,) the candidate that stands out most; None where that is less than ``least``."""
+        ratio, content = self.ratios(fit)
+        best = int(ratio.argmax())
+        return None if ratio[best] < least else self.matched.spot(best, content)
+
+    @cached_property
+    def _looked_at(self) -> list[tuple[FloatArray, tuple[FloatArray, FloatArray]]]:
+        """What candidates are to the residuals that have been looked at, the newest last."""
+        return []
+
+
+@dataclass(frozen=True, eq=False)
 class ForwardSelection:
     """Forward selection of the touches of one frame, with steps back where one is in the way.
 
@@ -66,9 +103,10 @@ class ForwardSelection:
         limits = limits_of(self.problem.sign)
         return Question(self.problem, candidates, limits, rules, self.pace, self.most, self.deficit)
 
-    def remember(self, fit: Fit, ratios: tuple[FloatArray, FloatArray]) -> None:
-        """Keep what :meth:`standing_out` would compute of ``fit``."""
-        self._looked_at.append((fit.residual, ratios))
+    @cached_property
+    def beside(self) -> Beside:
+        """What stands out beside what has been found."""
+        return Beside(self.problem, self.matched)
 
     def found(self, before: FloatArray) -> Fit:
         """The fit of the touches, before the exact model is asked for the last time."""
@@ -77,17 +115,10 @@ class ForwardSelection:
         fit, tried = self._more(kept, tries)
         if tries > tried == 0:
             fit = self._fewer(fit)
-        if len(before) and self._is_astray(fit, before, in_vain=tried > 0 and fit is kept):
+        if len(before) and _is_astray(self.pace, fit, before, in_vain=tried > 0 and fit is kept):
             fresh, _ = self._more(self.problem.nothing(), self.pace.tries)
             fit = max(fresh, fit, key=self.problem.evidence)
         return fit
-
-    def _is_astray(self, fit: Fit, before: FloatArray, *, in_vain: bool) -> bool:
-        """Whether what was there may keep the frame from being understood: another touch stands
-        out and does not fit ``in_vain``, or, at leisure, anything has changed."""
-        if not self.pace.restart:
-            return in_vain
-        return len(fit.spots) != len(before) or not fit.settled
 
     def again(self, before: FloatArray) -> Fit:
         """The fit of no touches but those ``before`` (k, 4)."""
@@ -128,12 +159,13 @@ class ForwardSelection:
     def _more(self, fit: Fit, tries: int) -> tuple[Fit, int]:
         """With further spots, while they are worth it; and how many of ``tries`` were tried."""
         for tried in range(min(tries, self.most - len(fit.spots))):
-            ratio, content = self.standing_out(fit)
-            best = int(ratio.argmax())
-            if ratio[best] < self.threshold(fit, self.pace.look if len(fit.spots) else HELD):
+            look = self.pace.look if len(fit.spots) else HELD
+            fresh = self.beside.best(fit, self.threshold(fit, look))
+            if fresh is None:
                 return fit, tried
-            fresh = _starts(fit, self.matched.spot(best, content))
-            more = self._best(fresh, fit.deficit, self._joint_starts(len(fit.spots) + 1))
+            more = self._best(
+                _starts(fit, fresh), fit.deficit, self._joint_starts(len(fit.spots) + 1)
+            )
             worth = self.ratios(more).min() >= self.threshold(fit, 1.0)
             gain = self.problem.evidence(more) - self.problem.evidence(fit)
             if not worth or gain <= self.pace.rare:
@@ -143,34 +175,14 @@ class ForwardSelection:
 
     def threshold(self, fit: Fit, part: float) -> float:
         """Deviations for that ``part`` of a touch; a wrong profile adds to the noise."""
-        return part * self.least * float(np.hypot(1.0, self.misshapen(fit) / self.least))
-
-    @staticmethod
-    def misshapen(fit: Fit) -> float:
-        """Deviations that a wrong profile of the spots of a fit may leave."""
-        return _MISSHAPEN * float(np.linalg.norm(fit.predicted))
+        return part * self.least * float(np.hypot(1.0, misshapen(fit) / self.least))
 
     def proposed(self, fit: Fit) -> Fit | None:
         """One spot more than a ``fit`` has, whatever it is worth; None where nothing stands out."""
         if not 0 < len(fit.spots) < self.most:
             return None
-        ratio, content = self.standing_out(fit)
-        best = int(ratio.argmax())
-        if ratio[best] < self.threshold(fit, self.pace.look):
-            return None
-        return self._best(_starts(fit, self.matched.spot(best, content)), fit.deficit, [])
-
-    def standing_out(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
-        """Likelihood ratios (n,) and contents (n,) of the candidates beside ``fit``."""
-        if not self._looked_at or self._looked_at[-1][0] is not fit.residual:
-            ratios = self.matched.ratios(self.problem.solver, fit, self.problem.sign)
-            self.remember(fit, ratios)
-        return self._looked_at[-1][1]
-
-    @cached_property
-    def _looked_at(self) -> list[tuple[FloatArray, tuple[FloatArray, FloatArray]]]:
-        """What candidates are to the residuals that have been looked at, the newest last."""
-        return []
+        fresh = self.beside.best(fit, self.threshold(fit, self.pace.look))
+        return None if fresh is None else self._best(_starts(fit, fresh), fit.deficit, [])
 
     def _joint_starts(self, count: int) -> list[FloatArray]:
         """Sets of so many spots whatever has been found."""
@@ -200,6 +212,19 @@ class ForwardSelection:
     def ratios(self, fit: Fit) -> FloatArray:
         """(k,) deviations of the noise and of residual responses by which each stands out."""
         return np.asarray(np.sqrt(self.problem.solver.standing(self.problem.left, fit)))
+
+
+def misshapen(fit: Fit) -> float:
+    """Deviations that a wrong profile of the spots of a fit may leave."""
+    return _MISSHAPEN * float(np.linalg.norm(fit.predicted))
+
+
+def _is_astray(pace: Pace, fit: Fit, before: FloatArray, *, in_vain: bool) -> bool:
+    """Whether what was there may keep the frame from being understood: another touch stands out
+    and does not fit ``in_vain``, or, at leisure, anything has changed."""
+    if not pace.restart:
+        return in_vain
+    return len(fit.spots) != len(before) or not fit.settled
 
 
 def _starts(fit: Fit, fresh: FloatArray) -> list[Start]:
