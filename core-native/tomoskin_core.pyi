@@ -212,17 +212,18 @@ class Terminals:
             When a pivot is not positive, or a terminal's has lost nine digits.
         """
 
-def conduct(
-    causes: Sequence[NDArray[np.float64]],
+def conducted(
+    cells: Sequence[NDArray[np.float64]],
+    series: Sequence[Sequence[tuple[float, float]]],
     numbers: tuple[float, ...],
-    creep: Sequence[float],
-    breakdown: Sequence[float],
-) -> NDArray[np.float64]:
-    """Conductivity of cells (1, n) S, or xx, xy, yx, yy (4, n) where directions differ.
+) -> list[NDArray[np.float64]]:
+    """Lagging, late and broken parts of a load after a step, wear, and conductivity S: (1, n), or
+    xx, xy, yx, yy (4, n) where directions differ.
 
-    ``causes``: prompt, late and broken parts of the load, wear, conductivity without
-    load. ``numbers``: gauge, the same across, compression, wear, heat, largest compression and
-    logarithm.
+    ``cells``: the load (4, n), the one before, lagging, late and broken parts, wear (or nothing),
+    conductivity without load. ``series``: parts and half widths of plays; parts of creep, and of
+    breakdown, with what the step leaves of each. ``numbers``: thickness, gauge, the same across,
+    compression, wear, heat, largest compression and logarithm.
     """
 
 def converted(
@@ -242,7 +243,7 @@ def dented(
     y: NDArray[np.float64],
     dents: Sequence[tuple[object, ...]],
 ) -> NDArray[np.float64]:
-    """Depth, and strain xx, yy, xy (4, m) of dents together at points x, y (m,).
+    """Strain xx, yy, xy, and depth (4, m) of dents together at points x, y (m,).
 
     A dent: its table (n·n, 4), its (n, step, reach), and (x, y, cosine, sine) of its probe.
     """
@@ -257,18 +258,6 @@ def lines(
 
     ``contact`` (n,) Ω: what each contact has more. ``numbers``: current, resistance and compliance
     of its source, resistance of a switch, parts of the common mode and of a neighbour.
-    """
-
-def remember(
-    load: NDArray[np.float64],
-    past: Sequence[NDArray[np.float64]],
-    play: Sequence[tuple[float, float]],
-    kept: Sequence[Sequence[float]],
-) -> list[NDArray[np.float64]]:
-    """Lagging, prompt, late and broken parts of a ``load`` (4, n) after a step, and wear.
-
-    ``past``: the load before, lagging, late and broken parts, wear (or nothing).
-    ``play``: parts and half widths; ``kept``: of late parts, and of breakdowns.
     """
 
 @final

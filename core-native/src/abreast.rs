@@ -147,20 +147,14 @@ pub(crate) fn exp<S: Simd>(x: Reals<S>) -> Reals<S> {
     x.made(scale) * (x.all(1.0) + (r * r).times_plus(series, r))
 }
 
-/// Rows of `n` numbers each, of which blocks are taken.
+/// Rows of `n` numbers each, of which blocks are taken: whole ones, or the part at the end.
 #[derive(Clone, Copy)]
-pub(crate) struct Abreast<S: Simd> {
+pub(crate) struct Abreast<S: Simd, const WHOLE: bool> {
     pub simd: S,
     pub n: usize,
 }
 
-impl<S: Simd> Abreast<S> {
-    /// Where the blocks begin.
-    #[inline(always)]
-    pub fn begins(self) -> impl Iterator<Item = usize> + use<S> {
-        (0..self.n).step_by(S::F64_LANES)
-    }
-
+impl<S: Simd, const WHOLE: bool> Abreast<S, WHOLE> {
     /// One number, for all cells of a block.
     #[inline(always)]
     pub fn all(self, value: f64) -> Reals<S> {
@@ -170,11 +164,11 @@ impl<S: Simd> Abreast<S> {
     /// A block of a row, from `at` on; zero beyond its end.
     #[inline(always)]
     pub fn read(self, values: &[f64], row: usize, at: usize) -> Reals<S> {
-        let row = &values[row * self.n + at..(row + 1) * self.n];
-        match S::as_simd_f64s(row).0.first() {
-            Some(&block) => self.made(block),
-            None => self.made(self.simd.partial_load_f64s(row)),
+        let block = &values[row * self.n + at..];
+        if WHOLE {
+            return self.made(S::as_simd_f64s(&block[..S::F64_LANES]).0[0]);
         }
+        self.made(self.simd.partial_load_f64s(&block[..self.n - at]))
     }
 
     /// A block of four rows from `first` on.
@@ -191,10 +185,12 @@ impl<S: Simd> Abreast<S> {
     /// Writes a block of a row.
     #[inline(always)]
     pub fn write(self, values: &mut [f64], row: usize, at: usize, block: Reals<S>) {
-        let row = &mut values[row * self.n + at..(row + 1) * self.n];
-        match S::as_mut_simd_f64s(row).0.first_mut() {
-            Some(target) => *target = block.values,
-            None => self.simd.partial_store_f64s(row, block.values),
+        let target = &mut values[row * self.n + at..];
+        if WHOLE {
+            S::as_mut_simd_f64s(&mut target[..S::F64_LANES]).0[0] = block.values;
+        } else {
+            let target = &mut target[..self.n - at];
+            self.simd.partial_store_f64s(target, block.values);
         }
     }
 

@@ -4,8 +4,10 @@ use pulp::{Simd, WithSimd};
 
 use crate::instructions::narrow;
 
-/// Depth, and strain xx, yy, xy.
+/// Strain xx, yy, xy, and depth.
 pub const PARTS: usize = 4;
+/// Points that are left out at once where none is near.
+const BLOCK: usize = 8;
 
 /// The dent of a probe, on a square grid around it, and where that is.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +33,8 @@ pub struct Dent<'a> {
 pub fn add(dents: &[Dent<'_>], x: &[f64], y: &[f64], felt: &mut [f64]) {
     assert!(y.len() == x.len() && felt.len() == PARTS * x.len());
     felt.fill(0.0);
-    let (mut far, mut near) = (vec![0.0; x.len()], vec![0; x.len() + 1]);
+    let room = x.len().next_multiple_of(BLOCK);
+    let (mut far, mut near) = (vec![f64::INFINITY; room], vec![0; x.len() + 1]);
     for dent in dents {
         assert!(dent.table.len() == PARTS * dent.nodes * dent.nodes && dent.nodes > 1);
         narrow(Reading {
@@ -49,7 +52,7 @@ struct Reading<'a> {
     dent: &'a Dent<'a>,
     x: &'a [f64],
     y: &'a [f64],
-    /// Room for squares of distances.
+    /// Room for squares of distances, whole blocks of them.
     far: &'a mut [f64],
     /// Room for the numbers of points that are near, and one more.
     near: &'a mut [u32],
@@ -74,7 +77,7 @@ impl WithSimd for Reading<'_> {
         let (middle, scale) = ((nodes / 2) as f64, 1.0 / step);
         let last = nodes as i32 - 2;
         let n = self.x.len();
-        let (depth, strain) = self.felt.split_at_mut(n);
+        let (strain, depth) = self.felt.split_at_mut(3 * n);
         let (xx, strain) = strain.split_at_mut(n);
         let (yy, xy) = strain.split_at_mut(n);
         for &at in &self.near[..count] {
@@ -89,10 +92,10 @@ impl WithSimd for Reading<'_> {
             if s != 0.0 {
                 read = turned(read, c, s);
             }
-            depth[at] += read[0];
-            xx[at] += read[1];
-            yy[at] += read[2];
-            xy[at] += read[3];
+            xx[at] += read[0];
+            yy[at] += read[1];
+            xy[at] += read[2];
+            depth[at] += read[3];
         }
     }
 }
@@ -106,10 +109,18 @@ impl Reading<'_> {
             let (x, y) = (x - place[0], y - place[1]);
             *far = x * x + y * y;
         }
-        let mut count = 0;
-        for (at, &far) in (0..).zip(&*self.far) {
-            self.near[count] = at; // written over unless it counts
-            count += usize::from(far < reach * reach);
+        let (limit, mut count) = (reach * reach, 0);
+        let (blocks, _) = self.far.as_chunks::<BLOCK>();
+        for (block, first) in blocks.iter().zip((0..).step_by(BLOCK)) {
+            // points beside each other follow each other, so that most blocks have none
+            let beyond = block.iter().map(|&far| far >= limit);
+            if beyond.fold(true, |all, one| all & one) {
+                continue;
+            }
+            for (at, &far) in (first..).zip(block) {
+                self.near[count] = at; // written over unless it counts
+                count += usize::from(far < limit);
+            }
         }
         count
     }
@@ -138,11 +149,11 @@ fn between<S: Simd>(simd: S, corners: &[f64], row: usize, part: [f64; 2]) -> [f6
 
 /// The parts in axes that are turned back by an angle of this cosine and sine.
 #[inline(always)]
-fn turned([depth, xx, yy, xy]: [f64; PARTS], c: f64, s: f64) -> [f64; PARTS] {
+fn turned([xx, yy, xy, depth]: [f64; PARTS], c: f64, s: f64) -> [f64; PARTS] {
     [
-        depth,
         c * c * xx + s * s * yy - 2.0 * c * s * xy,
         s * s * xx + c * c * yy + 2.0 * c * s * xy,
         c * s * (xx - yy) + (c * c - s * s) * xy,
+        depth,
     ]
 }

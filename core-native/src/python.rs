@@ -16,7 +16,7 @@ use crate::product::Rows;
 use crate::scalar::{Scalar, c64};
 use crate::spot_match_python::{standing, standing_out};
 use crate::spot_python::{SeenTable, SpotTable};
-use crate::twin_python::{Terminals, conduct, converted, dented, lines, remember};
+use crate::twin_python::{Terminals, conducted, converted, dented, lines};
 use crate::{factor, jacobian, product, solve, symbolic, threads};
 
 #[pyclass(frozen, module = "tomoskin_core")]
@@ -258,7 +258,7 @@ fn keep_freed_memory() {
 
 /// Number of what `tomoskin_core.pyi` says: raised with each change of it, so that tomoskin does
 /// not call an engine that was built for other arguments.
-const INTERFACE: u32 = 4;
+const INTERFACE: u32 = 5;
 
 #[pymodule]
 fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -277,9 +277,8 @@ fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(jacobian_rows, module)?)?;
     module.add_function(wrap_pyfunction!(converted, module)?)?;
     module.add_function(wrap_pyfunction!(dented, module)?)?;
-    module.add_function(wrap_pyfunction!(conduct, module)?)?;
+    module.add_function(wrap_pyfunction!(conducted, module)?)?;
     module.add_function(wrap_pyfunction!(lines, module)?)?;
-    module.add_function(wrap_pyfunction!(remember, module)?)?;
     module.add_function(wrap_pyfunction!(standing, module)?)?;
     module.add_function(wrap_pyfunction!(standing_out, module)?)?;
     module.add_function(wrap_pyfunction!(transposed_product, module)?)

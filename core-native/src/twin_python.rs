@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{Any, array, contiguous, invalid, same, unsigned};
 use crate::circuit::{Circuit, Converter};
-use crate::conduction::{self, Cause, GROUPS, LOADS, Material, Memory, Past, Present};
+use crate::conduction::{self, GROUPS, LOADS, Material, Past, Present};
 use crate::dent::{self, Dent, PARTS};
 use crate::python::pairs;
 use crate::symbolic::Symbolic;
@@ -75,7 +75,7 @@ impl Terminals {
 /// A table (n·n, 4), its n, step and reach, and place, cosine and sine of the turn of its probe.
 type Placed<'py> = (Any<'py>, (usize, f64, f64), [f64; 4]);
 
-/// Depth, and strain xx, yy, xy (4, m) of all dents together at points x, y (m,).
+/// Strain xx, yy, xy, and depth (4, m) of all dents together at points x, y (m,).
 #[pyfunction]
 pub(crate) fn dented<'py>(
     x: &Any<'py>,
@@ -111,86 +111,27 @@ pub(crate) fn dented<'py>(
     Ok(felt)
 }
 
-/// Lagging, prompt, late and broken parts after a step under `load` (4, n), and wear.
+/// Lagging, late and broken parts after a step, wear, and conductivity.
 type Step<'py> = [Bound<'py, PyArrayDyn<f64>>; 5];
 
-/// What cells remember after a step: `past` are the load before, lagging, late and broken parts, and
-/// wear; `play`: parts and half widths; `kept`: of late parts, and of breakdowns.
-#[pyfunction]
-pub(crate) fn remember<'py>(
-    load: &Any<'py>,
-    past: [Any<'py>; 5],
-    play: Vec<(f64, f64)>,
-    kept: [Vec<f64>; 2],
-) -> PyResult<Step<'py>> {
-    let py = load.py();
-    let load = array::<f64, Ix2>("load", load)?;
-    same("rows of load", LOADS, load.shape()[0])?;
-    let n = load.shape()[1];
-    let load = contiguous("load", &load)?;
-    let [late, broken] = &kept;
-    let worn = if past[4].is_empty()? { 0 } else { n };
-    let shapes: [&[usize]; 5] = [
-        &[LOADS, n],
-        &[play.len(), LOADS, n],
-        &[late.len(), LOADS, n],
-        &[broken.len(), GROUPS, n],
-        &[worn],
-    ];
-    let sizes = shapes.map(|shape| shape.iter().product());
-    let names = ["load before", "lagging", "late", "broken", "worn"];
-    let flat = flat(names, &past, sizes)?;
-    let [before, lagging, reached, shaken, wear] = [0, 1, 2, 3, 4].map(|k| flat[k].as_slice());
-    // SAFETY: `advance` writes all of them.
-    let made = |part: usize| unsafe { PyArrayDyn::<f64>::new(py, IxDyn(shapes[part]), false) };
-    let out = [1, 0, 2, 3, 4].map(made);
-    {
-        let [mut a, mut b, mut c, mut d, mut e] = out.each_ref().map(|part| part.readwrite());
-        let memory = Memory {
-            play: &play,
-            late,
-            broken,
-        };
-        let past = Past {
-            load: before?,
-            lagging: lagging?,
-            late: reached?,
-            broken: shaken?,
-            worn: wear?,
-        };
-        let present = Present {
-            lagging: a.as_slice_mut()?,
-            prompt: b.as_slice_mut()?,
-            late: c.as_slice_mut()?,
-            broken: d.as_slice_mut()?,
-            worn: e.as_slice_mut()?,
-        };
-        conduction::advance(memory, load, past, present);
-    }
-    Ok(out)
-}
-
-/// Conductivity of cells, (1, n), or xx, xy, yx, yy (4, n) where directions differ.
+/// A step of cells under a load: what they remember then, and how they conduct, (1, n), or
+/// xx, xy, yx, yy (4, n) where directions differ.
 ///
-/// `causes`: prompt, late and broken parts, wear, conductivity without load;
-/// `numbers`: gauge, across, compression, wear, heat, most compression, most logarithm.
+/// `cells`: the load, the one before, lagging, late and broken parts, wear (or nothing),
+/// conductivity without load; `series`: parts and half widths of plays, parts of creep and of
+/// breakdown with what they keep; `numbers`: thickness, gauge, across, compression, wear, heat, most
+/// compression, most logarithm.
 #[pyfunction]
-pub(crate) fn conduct<'py>(
-    causes: [Any<'py>; 5],
-    numbers: [f64; 7],
-    creep: Vec<f64>,
-    breakdown: Vec<f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let py = causes[0].py();
-    let n = array::<f64, Ix1>("unloaded", &causes[4])?.len();
-    let sizes = [LOADS, creep.len() * LOADS, breakdown.len() * GROUPS, 1, 1].map(|k| k * n);
-    let flat = flat(
-        ["prompt", "late", "broken", "worn", "unloaded"],
-        &causes,
-        sizes,
-    )?;
-    let [prompt, late, broken, worn, unloaded] = [0, 1, 2, 3, 4].map(|k| flat[k].as_slice());
+pub(crate) fn conducted<'py>(
+    cells: [Any<'py>; 7],
+    series: [Vec<(f64, f64)>; 3],
+    numbers: [f64; 8],
+) -> PyResult<Step<'py>> {
+    let py = cells[0].py();
+    let n = array::<f64, Ix1>("unloaded", &cells[6])?.len();
+    let [play, creep, breakdown] = &series;
     let [
+        thickness,
         gauge,
         gauge_across,
         compression,
@@ -199,30 +140,63 @@ pub(crate) fn conduct<'py>(
         most_compression,
         most_log,
     ] = numbers;
-    let rows = if gauge_across == 0.0 { 1 } else { 4 };
-    // SAFETY: `conductivity` writes all of it.
-    let out = unsafe { PyArray2::<f64>::new(py, [rows, n], false) };
+    let worn = if cells[5].is_empty()? { 0 } else { n };
+    let rows = if gauge_across == 0.0 { 1 } else { LOADS };
+    let shapes: [&[usize]; 5] = [
+        &[play.len(), LOADS, n],
+        &[creep.len(), LOADS, n],
+        &[breakdown.len(), GROUPS, n],
+        &[worn],
+        &[rows, n],
+    ];
+    let [lagging, late, broken, ..] = shapes.map(|shape| shape.iter().product());
+    let names = [
+        "load",
+        "load before",
+        "lagging",
+        "late",
+        "broken",
+        "worn",
+        "unloaded",
+    ];
+    let sizes = [LOADS * n, LOADS * n, lagging, late, broken, worn, n];
+    let flat = flat(names, &cells, sizes)?;
+    let [load, last, lagging, late, broken, worn, unloaded] =
+        [0, 1, 2, 3, 4, 5, 6].map(|k| flat[k].as_slice());
+    let past = Past {
+        load: load?,
+        last: last?,
+        lagging: lagging?,
+        late: late?,
+        broken: broken?,
+        worn: worn?,
+        unloaded: unloaded?,
+    };
+    // SAFETY: `advance` writes all of them.
+    let out = shapes.map(|shape| unsafe { PyArrayDyn::<f64>::new(py, IxDyn(shape), false) });
     {
-        let mut writable = out.readwrite();
+        let [mut a, mut b, mut c, mut d, mut e] = out.each_ref().map(|part| part.readwrite());
         let material = Material {
+            play,
+            creep,
+            breakdown,
+            thickness,
             gauge,
             gauge_across,
             compression,
             wear,
             heat,
-            creep: &creep,
-            breakdown: &breakdown,
             most_compression,
             most_log,
         };
-        let cause = Cause {
-            prompt: prompt?,
-            late: late?,
-            broken: broken?,
-            worn: worn?,
-            unloaded: unloaded?,
+        let present = Present {
+            lagging: a.as_slice_mut()?,
+            late: b.as_slice_mut()?,
+            broken: c.as_slice_mut()?,
+            worn: d.as_slice_mut()?,
+            conductivity: e.as_slice_mut()?,
         };
-        conduction::conductivity(material, cause, writable.as_slice_mut()?);
+        conduction::advance(material, past, present);
     }
     Ok(out)
 }

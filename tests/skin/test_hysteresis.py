@@ -14,6 +14,7 @@ from tomoskin.skin import (
     MemoryState,
     Metric,
     advanced,
+    followed,
     load_of,
     response,
     responses,
@@ -112,7 +113,7 @@ def test_a_play_of_several_components_knows_no_direction():
     for angle in (0.0, 0.7, 2.0):
         turned = np.array([[3 * math.cos(angle)], [3 * math.sin(angle)]])
         state = advanced(MemoryState.fresh(memory, 1, both), memory, turned, 0.0, both)
-        assert state.prompt == pytest.approx(2 / 3 * turned)
+        assert followed(state, memory) == pytest.approx(2 / 3 * turned)
     assert SCALAR.sizes(np.array([[-2.0]])) == [[2.0]]
 
 

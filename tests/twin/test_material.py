@@ -18,7 +18,7 @@ UNLOADED = np.array([1.25, 1.25])
 
 
 def loaded(strain, depth=0.0):
-    return Load(np.array([strain, (0.0, 0.0, 0.0)]), np.array([depth, 0.0]))
+    return Load(np.array([(*strain, depth), (0.0, 0.0, 0.0, 0.0)]).T)
 
 
 REST = Load.none(2)

@@ -58,8 +58,9 @@ def frames(
         sheet.set_presses(scene(random, reach))
         sheet.set_pose((Stretched(0.02, 0.1),) if number == 3 and settings.bend.height else ())
         counts = board.sample(table, 0.2 * number**2)
-        load = np.vstack([sheet.load.strain.T, sheet.load.depth])
-        found.append((load, sheet.conductivity(), sheet.resistance(), counts.astype(float)))
+        found.append(
+            (sheet.load.felt, sheet.conductivity(), sheet.resistance(), counts.astype(float))
+        )
     return found
 
 

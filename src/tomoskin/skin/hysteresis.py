@@ -153,8 +153,6 @@ class MemoryState:
         (d, n) as it was last.
     lagging
         (n_play, d, n) where each play stands.
-    prompt
-        (d, n) the part of the load that is answered without delay: itself, with its plays.
     late
         (n_creep, d, n) what each late part has reached.
     broken
@@ -163,7 +161,6 @@ class MemoryState:
 
     load: FloatArray
     lagging: FloatArray
-    prompt: FloatArray
     late: FloatArray
     broken: FloatArray
 
@@ -174,7 +171,6 @@ class MemoryState:
         return cls(
             load=np.zeros((d, n)),
             lagging=np.zeros((len(memory.play), d, n)),
-            prompt=np.zeros((d, n)),
             late=np.zeros((len(memory.creep), d, n)),
             broken=np.zeros((len(memory.breakdown), len(metric.weights), n)),
         )
@@ -190,7 +186,7 @@ class MemoryState:
 
     @property
     def _parts(self) -> tuple[FloatArray, ...]:
-        return self.load, self.lagging, self.prompt, self.late, self.broken
+        return self.load, self.lagging, self.late, self.broken
 
 
 def check_step(dt: float) -> None:
@@ -216,23 +212,24 @@ def advanced(
         When dt is negative or not finite.
     """
     check_step(dt)
-    lagging, prompt, late, broken = state.lagging, load, state.late, state.broken
+    lagging, late, broken = state.lagging, state.late, state.broken
     if memory.play:
         lagging = metric.dragged(lagging, load, memory.half_widths)
-        prompt = _mixed(load, lagging, memory.play)
     if memory.creep:
+        prompt = _mixed(load, lagging, memory.play)
         late = late - prompt
         late *= memory.kept(dt)[0].reshape(-1, 1, 1)
         late += prompt
     if memory.breakdown:
         moved = metric.sizes(load - state.load)
         broken = (broken + moved) * memory.kept(dt)[1].reshape(-1, 1, 1)
-    return MemoryState(load, lagging, prompt, late, broken)
+    return MemoryState(load, lagging, late, broken)
 
 
 def followed(state: MemoryState, memory: MaterialMemory) -> FloatArray:
     """(d, n) part of the response that follows the load, with its plays and creep."""
-    return _mixed(state.prompt, state.late, memory.creep)
+    prompt = _mixed(state.load, state.lagging, memory.play)
+    return _mixed(prompt, state.late, memory.creep)
 
 
 def broken_down(state: MemoryState, memory: MaterialMemory) -> FloatArray:

@@ -92,10 +92,11 @@ class Lines:
         (n_drives, n) V between channel and sink line, as the amplifier reads it.
     stuck
         (n_drives, n) True where an input floats or a channel is broken: it stands at the rail.
+        None: nowhere.
     """
 
     read: FloatArray
-    stuck: NDArray[np.bool_]
+    stuck: NDArray[np.bool_] | None = None
 
 
 def line_potentials(
@@ -126,8 +127,7 @@ def line_potentials(
             _part(settings.rejection),
             settings.crosstalk,
         )
-        read = core.lines(resistance, drives, contact, numbers)
-        return Lines(read, np.zeros(read.shape, dtype=bool))
+        return Lines(core.lines(resistance, drives, contact, numbers))
     resistance = shorted(resistance, faults.shorts)
     source, sink = drives.T
     n, rows = len(resistance), np.arange(len(drives))

@@ -37,19 +37,26 @@ class Load:
 
     Attributes
     ----------
-    strain
-        (n, 3) xx, yy, xy in the plane of the sheet.
-    depth
-        (n,) m.
+    felt
+        (4, n) strain xx, yy, xy in the plane of the sheet, and depth in m.
     """
 
-    strain: FloatArray
-    depth: FloatArray
+    felt: FloatArray
 
     @classmethod
     def none(cls, n: int) -> Self:
         """Nothing presses."""
-        return cls(np.zeros((n, 3)), np.zeros(n))
+        return cls(np.zeros((4, n)))
+
+    @property
+    def strain(self) -> FloatArray:
+        """(n, 3) xx, yy, xy in the plane of the sheet."""
+        return self.felt[:3].T
+
+    @property
+    def depth(self) -> FloatArray:
+        """(n,) m."""
+        return self.felt[3]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +72,7 @@ class Dent:
     travel
         Of the probe, on a body that does not lock, m.
     table
-        (13, n·n): depth; strain xx, yy, xy by bulging; by the slope; by a drag of as many
+        (13, n·n): strain xx, yy, xy by bulging; depth; strain by the slope; by a drag of as many
         newtons as ``force`` along x; and along y.
     """
 
@@ -91,8 +98,8 @@ def solved_dent(shape: Shape, settings: ContactSettings, force: float, blur: flo
     depth, pressed = np.pad(np.stack([dented.depth, dented.pressure]), _ROUND)
     still = np.zeros_like(pressed)
     fields = np.concatenate([
-        depth[None],
         bulge_strain(depth, settings, wide),
+        depth[None],
         slope_strain(depth, settings, wide),
         drag_strain(np.stack([pressed, still]), settings, wide),
         drag_strain(np.stack([still, pressed]), settings, wide),
@@ -116,8 +123,7 @@ def indent(
     x, y = np.ascontiguousarray(points.T)
     placed = [_placed(probe, settings, blur) for probe in probes if probe.force > 0]
     core = choose_engine().core
-    felt = _felt(placed, x, y) if core is None else core.dented(x, y, placed)
-    return Load(strain=felt[1:].T, depth=felt[0])
+    return Load(_felt(placed, x, y) if core is None else core.dented(x, y, placed))
 
 
 def turned(strain: FloatArray, angle: float) -> FloatArray:
@@ -136,7 +142,7 @@ def _turn(angle: float) -> FloatArray:
 
 
 class _Blend(NamedTuple):
-    """Depth and strain (n·n, 4) of a probe as it presses now, and its grid: n, step, reach."""
+    """Strain and depth (n·n, 4) of a probe as it presses now, and its grid: n, step, reach."""
 
     table: FloatArray
     grid: tuple[int, float, float]
@@ -162,7 +168,7 @@ def _placed(probe: Contact, settings: ContactSettings, blur: float) -> _Placed:
 
 
 def _felt(placed: Sequence[_Placed], x: FloatArray, y: FloatArray) -> FloatArray:
-    """(4, n) depth and strain of all dents together at points (n,)."""
+    """(4, n) strain and depth of all dents together at points (n,)."""
     total = np.zeros((4, len(x)))
     for table, (n, step, reach), (px, py, c, s) in placed:
         ax, ay = x - px, y - py
@@ -170,7 +176,7 @@ def _felt(placed: Sequence[_Placed], x: FloatArray, y: FloatArray) -> FloatArray
         ax, ay = ax[near] / step, ay[near] / step
         values = _read(table, n, c * ax + s * ay, c * ay - s * ax)
         if s:
-            values[1:] = _turn(math.atan2(s, c)) @ values[1:]
+            values[:3] = _turn(math.atan2(s, c)) @ values[:3]
         for row, felt in zip(total, values, strict=True):
             row[near] += felt
     return total
@@ -194,10 +200,10 @@ def _blended(
         scale, table = force / solved_at, dent.table
         share = settings.locked(dent.travel * scale)
         mixed = weight * scale * share * table[:4]
-        mixed[1:] += weight * (scale * share) ** 2 * table[4:7]
+        mixed[:3] += weight * (scale * share) ** 2 * table[4:7]
         if drag != (0.0, 0.0):
-            mixed[1:] += weight / solved_at * drag[0] * table[7:10]
-            mixed[1:] += weight / solved_at * drag[1] * table[10:]
+            mixed[:3] += weight / solved_at * drag[0] * table[7:10]
+            mixed[:3] += weight / solved_at * drag[1] * table[10:]
         total, grid = total + mixed, dent.grid
     table = np.ascontiguousarray(total.T)  # a point's values side by side, to be read at once
     table.flags.writeable = False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -74,6 +75,29 @@ def convert(
     return np.asarray(noisy.sum(axis=0).astype(np.uint16))
 
 
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """What each sample of a table has of its channel.
+
+    Attributes
+    ----------
+    place
+        (n_samples,) which of the drives' channels it reads, drive after drive.
+    gain, offset
+        (n_samples,) of the channel; V.
+    sine, cosine
+        (oversampling, n_samples) V of the hum at each conversion, if its phase is 0 at the scan's
+        start, and a quarter of a turn later.
+    """
+
+    table: SampleTable
+    place: IntArray
+    gain: FloatArray
+    offset: FloatArray
+    sine: FloatArray
+    cosine: FloatArray
+
+
 class TwinElectronics:
     """Current source, switches, amplifiers and converter on a twin's sheet."""
 
@@ -104,7 +128,8 @@ class TwinElectronics:
         self._bending: Bending | None = None
         self._before = np.zeros(n)
         self._lines_of: tuple[object, ...] = ()
-        self._lines = Lines(np.zeros((0, n)), np.zeros((0, n), dtype=bool))
+        self._lines = Lines(np.zeros((0, n)))
+        self._samples: _Samples | None = None
 
     @property
     def faults(self) -> Faults:
@@ -164,10 +189,9 @@ class TwinElectronics:
             self._set(*move)
             self._let_go_by(time + float(middles[number]))
             lines.append(self._under(table.drives[number : number + 1], self.sheet.resistance()))
-        return Lines(
-            read=np.concatenate([line.read for line in lines]),
-            stuck=np.concatenate([line.stuck for line in lines]),
-        )
+        read = np.concatenate([line.read for line in lines])
+        stuck = [line.stuck for line in lines if line.stuck is not None]
+        return Lines(read, np.concatenate(stuck) if stuck else None)
 
     def _moves(self, times: FloatArray) -> list[tuple[tuple[Contact, ...], Pose]]:
         """What presses, and how the sheet is bent, at each of the ``times``."""
@@ -190,28 +214,43 @@ class TwinElectronics:
 
     def _volts(self, table: SampleTable, time: float, lines: Lines) -> tuple[FloatArray, Courses]:
         """(n_samples,) V at the amplifiers' inputs, and what is added to them."""
-        settings, channel, gain = self.settings, table.channel, self._gain
-        place = _places(table, len(gain))
-        volts, each = lines.read.take(place), gain.take(channel)
+        settings, samples = self.settings, self._of(table)
+        place, n = samples.place, len(samples.place)
+        volts = lines.read.take(place)
         moving = []
         if settings.time_constant > 0:
             carried, remaining = _settling(table, settings.time_constant)
             start = carried @ np.concatenate([self._before[None], lines.read])
             self._before = start[-1]
-            moving.append((each * (start.take(place) - volts), remaining))
+            moving.append((samples.gain * (start.take(place) - volts), remaining))
         if settings.hum > 0:
-            sine, cosine = _turning(table, settings.hum_frequency)
-            turn = 2 * np.pi * settings.hum_frequency * time + self._phase
-            hum = gain * self._hum
-            moving.append(((hum * np.sin(turn)).take(channel), cosine))
-            moving.append(((hum * np.cos(turn)).take(channel), sine))
+            turn = 2 * math.pi * settings.hum_frequency * time
+            moving.append((np.full(n, math.cos(turn)), samples.sine))
+            moving.append((np.full(n, math.sin(turn)), samples.cosine))
         if not self._electrodes.silent:
             volts += self._electrodes.read(table, time)
-        volts += self._offset.take(channel)
-        volts *= each
-        if lines.stuck.any():
+        volts += samples.offset
+        volts *= samples.gain
+        if lines.stuck is not None:
             volts[lines.stuck.take(place)] = np.inf
         return volts, moving
+
+    def _of(self, table: SampleTable) -> _Samples:
+        """What the samples have of their channels, which stay as they are."""
+        if self._samples is None or self._samples.table is not table:
+            channel, gain = table.channel, self._gain
+            since = table.time + _within(table)
+            turn = 2 * np.pi * self.settings.hum_frequency * since + self._phase.take(channel)
+            hum = (gain * self._hum).take(channel)
+            self._samples = _Samples(
+                table=table,
+                place=table.drive * len(gain) + channel,
+                gain=gain.take(channel),
+                offset=self._offset.take(channel),
+                sine=hum * np.sin(turn),
+                cosine=hum * np.cos(turn),
+            )
+        return self._samples
 
     def _potentials(self, table: SampleTable) -> Lines:
         """What the channels stand at under each drive; worked out anew when something changed."""
@@ -246,23 +285,10 @@ class TwinElectronics:
 
 
 @lru_cache(maxsize=16)
-def _places(table: SampleTable, channels: int) -> IntArray:
-    """(n_samples,) which of the drives' channels each sample reads, drive after drive."""
-    return np.asarray(table.drive * channels + table.channel)
-
-
-@lru_cache(maxsize=16)
 def _settling(table: SampleTable, time_constant: float) -> tuple[FloatArray, FloatArray]:
     """What :func:`settling` gives, and (oversampling, n_samples) how much of it is left to go."""
     remaining = np.exp(-(table.since + _within(table)) / time_constant)
     return settling(table.length, time_constant), remaining
-
-
-@lru_cache(maxsize=16)
-def _turning(table: SampleTable, frequency: float) -> tuple[FloatArray, FloatArray]:
-    """(oversampling, n_samples) sine and cosine at each conversion, from the scan's start."""
-    turn = 2 * np.pi * frequency * (table.time + _within(table))
-    return np.sin(turn), np.cos(turn)
 
 
 def _within(table: SampleTable) -> FloatArray:

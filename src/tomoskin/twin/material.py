@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -122,12 +121,15 @@ class MaterialSettings:
 _memory = lru_cache(maxsize=64)(MaterialMemory)
 """The same for the same series: it is asked for several times a frame, and checks its numbers."""
 
-LOAD = Metric(((0.5, 0.5, 1.0), (1.0,)))
-"""Strain xx, yy, xy, whatever its direction, and compression: two loads, each with its own plays.
 
-A strain's size is √((xx² + yy²)/2 + xy²), the mean strain where both directions are strained
-alike.
-"""
+@lru_cache(maxsize=64)
+def metric_of(thickness: float) -> Metric:
+    """Strain, whatever its direction, and compression: two loads, each with its own plays.
+
+    A strain's size is √((xx² + yy²)/2 + xy²), the mean strain where both directions are strained
+    alike. That of a depth is the compression of a layer of this ``thickness``, m.
+    """
+    return Metric(((0.5, 0.5, 1.0), (thickness**-2,)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +139,7 @@ class MaterialState:
     Attributes
     ----------
     memory
-        Of strain xx, yy, xy and compression, by :data:`LOAD`.
+        Of strain xx, yy, xy and depth, by :func:`metric_of`.
     worn
         (n,) mean strain, summed over all loading.
     warmer
@@ -151,7 +153,45 @@ class MaterialState:
     @classmethod
     def fresh(cls, settings: MaterialSettings, n: int) -> MaterialState:
         """A sheet of ``n`` cells that nothing has touched."""
-        return cls(memory=MemoryState.fresh(settings.memory, n, LOAD), worn=np.zeros(n))
+        metric = metric_of(settings.thickness)
+        return cls(memory=MemoryState.fresh(settings.memory, n, metric), worn=np.zeros(n))
+
+
+def stepped(
+    state: MaterialState,
+    settings: MaterialSettings,
+    load: Load,
+    dt: float,
+    chance: float,
+    *,
+    unloaded: FloatArray,
+) -> tuple[MaterialState, FloatArray]:
+    """What :func:`advance` gives, and the :func:`conductivity` then; natively in one pass."""
+    if (core := choose_engine().core) is None:
+        after = advance(state, settings, load, dt, chance)
+        return after, conductivity(after, settings, unloaded)
+    check_step(dt)
+    past, memory = state.memory, settings.memory
+    worn = state.worn if settings.wear else state.worn[:0]
+    warmer = _warmed(state.warmer, settings, dt, chance)
+    play, creep, breakdown = _series(memory, dt)
+    *parts, fresh, rows = core.conducted(
+        (load.felt, past.load, past.lagging, past.late, past.broken, worn, unloaded),
+        (play, creep, breakdown),
+        (
+            settings.thickness,
+            settings.gauge,
+            settings.gauge_across,
+            settings.compression,
+            settings.wear,
+            1 + settings.temperature_coefficient * warmer,
+            _MOST_COMPRESSION,
+            _MOST_LOG,
+        ),
+    )
+    after = MemoryState(load.felt, *parts)
+    sigma = rows[0] if settings.scalar else rows.reshape(2, 2, -1).transpose(2, 0, 1)
+    return MaterialState(after, fresh if settings.wear else state.worn, warmer), sigma
 
 
 def advance(
@@ -171,18 +211,11 @@ def advance(
     ModelError
         When dt is negative or not finite.
     """
-    felt = np.empty((4, len(load.depth)))
-    felt[:3] = load.strain.T
-    np.divide(load.depth, settings.thickness, out=felt[3])
-    core, memory = choose_engine().core, settings.memory
-    warmer = _warmed(state.warmer, settings, dt, chance)
-    if core is not None and (memory.play or memory.creep or memory.breakdown or settings.wear):
-        check_step(dt)
-        return MaterialState(*_remembered(core, state, settings, felt, dt), warmer)
+    metric = metric_of(settings.thickness)
     return MaterialState(
-        memory=advanced(state.memory, memory, felt, dt, LOAD),
-        worn=_worn(state, felt, settings),
-        warmer=warmer,
+        memory=advanced(state.memory, settings.memory, load.felt, dt, metric),
+        worn=_worn(state, load.felt, settings),
+        warmer=_warmed(state.warmer, settings, dt, chance),
     )
 
 
@@ -200,11 +233,9 @@ def conductivity(
     unloaded
         (n_cells,) S.
     """
-    if (core := choose_engine().core) is not None:
-        return _conducted(core, state, settings, unloaded)
     memory = settings.memory
-    xx, yy, xy, squeezed = followed(state.memory, memory)
-    squeezed = np.clip(squeezed, -_MOST_COMPRESSION, _MOST_COMPRESSION)
+    xx, yy, xy, depth = followed(state.memory, memory)
+    squeezed = np.clip(depth / settings.thickness, -_MOST_COMPRESSION, _MOST_COMPRESSION)
     rise = xx + yy
     if memory.breakdown:
         rise += 2 * broken_down(state.memory, memory)[0]
@@ -220,40 +251,16 @@ def conductivity(
     return _directed(level, rise, half, cross)
 
 
-def _remembered(
-    core: Any, state: MaterialState, settings: MaterialSettings, felt: FloatArray, dt: float
-) -> tuple[MemoryState, FloatArray]:
-    """What :func:`advanced` gives, and the wear, by the native engine ``core``."""
-    past, memory = state.memory, settings.memory
-    kept = [
-        [math.exp(-dt / time) for time in times]
-        for times in (memory.creep_times, memory.breakdown_times)
-    ]
-    parts = past.load, past.lagging, past.late, past.broken
-    worn = state.worn if settings.wear else state.worn[:0]
-    play = list(zip(memory.play, memory.play_widths, strict=True))
-    *parts, fresh = core.remember(felt, [*parts, worn], play, kept)
-    return MemoryState(felt, *parts), fresh if settings.wear else state.worn
-
-
-def _conducted(
-    core: Any, state: MaterialState, settings: MaterialSettings, unloaded: FloatArray
-) -> FloatArray:
-    """What :func:`conductivity` gives, by the native engine ``core``."""
-    memory = state.memory
-    causes = memory.prompt, memory.late, memory.broken, state.worn, unloaded
-    numbers = (
-        settings.gauge,
-        settings.gauge_across,
-        settings.compression,
-        settings.wear,
-        1 + settings.temperature_coefficient * state.warmer,
-        _MOST_COMPRESSION,
-        _MOST_LOG,
+def _series(memory: MaterialMemory, dt: float) -> tuple[list[tuple[float, float]], ...]:
+    """Parts of plays with their half widths; of creep and breakdown with what ``dt`` s leave."""
+    return (
+        list(zip(memory.play, memory.play_widths, strict=True)),
+        [(p, math.exp(-dt / t)) for p, t in zip(memory.creep, memory.creep_times, strict=True)],
+        [
+            (p, math.exp(-dt / t))
+            for p, t in zip(memory.breakdown, memory.breakdown_times, strict=True)
+        ],
     )
-    parts = settings.creep, settings.breakdown
-    rows: FloatArray = core.conduct(causes, numbers, *parts)
-    return rows[0] if settings.scalar else rows.reshape(2, 2, -1).transpose(2, 0, 1)
 
 
 def _worn(state: MaterialState, felt: FloatArray, settings: MaterialSettings) -> FloatArray:

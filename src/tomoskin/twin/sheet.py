@@ -119,8 +119,10 @@ class TwinSkin:
                 self._dented = presses, indent(presses, *self._ground)
             self._load = dented = self._dented[1]
             if pose:
-                given = dented.depth + depth_of(pose, self._points)
-                self._load = Load(strain=dented.strain + self._strain(pose), depth=given)
+                felt = dented.felt.copy()
+                felt[:3] += self._strain(pose).T
+                felt[3] += depth_of(pose, self._points)
+                self._load = Load(felt)
             self._loaded = (presses, pose)
         return self._load
 
@@ -172,8 +174,8 @@ class TwinSkin:
             return
         self._stood = now
         chance = self._random.standard_normal() if self.material.temperature_sd > 0 else 0.0
-        self._state = material.advance(self._state, self.material, self.load, dt, chance)
-        self._conductivity = material.conductivity(self._state, self.material, self._unloaded)
+        step = self._state, self.material, self.load, dt, chance
+        self._state, self._conductivity = material.stepped(*step, unloaded=self._unloaded)
 
     def renew(self, chance: np.random.SeedSequence | None = None) -> None:
         """Forget all presses, bends and their past: a sheet that nothing has touched.
