@@ -214,16 +214,18 @@ class Terminals:
 
 def conducted(
     cells: Sequence[NDArray[np.float64]],
+    memory: Sequence[NDArray[np.float64]],
     series: Sequence[Sequence[tuple[float, float]]],
     numbers: tuple[float, ...],
-) -> list[NDArray[np.float64]]:
-    """Lagging, late and broken parts of a load after a step, wear, and conductivity S: (1, n), or
-    xx, xy, yx, yy (4, n) where directions differ.
+) -> NDArray[np.float64]:
+    """Conductivity S of cells (1, n), or xx, xy, yx, yy (4, n) where directions differ, after a
+    step under a load.
 
-    ``cells``: the load (4, n), the one before, lagging, late and broken parts, wear (or nothing),
-    conductivity without load. ``series``: parts and half widths of plays; parts of creep, and of
-    breakdown, with what the step leaves of each. ``numbers``: thickness, gauge, the same across,
-    compression, wear, heat, largest compression and logarithm.
+    ``cells``: the load (4, n), the one before, conductivity without load. ``memory``: lagging, late
+    and broken parts, and wear (or nothing), which are written over. ``series``: parts and half
+    widths of plays; parts of creep, and of breakdown, with what the step leaves of each.
+    ``numbers``: thickness, gauge, the same across, compression, wear, heat, largest compression
+    and logarithm.
     """
 
 def converted(

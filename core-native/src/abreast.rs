@@ -1,6 +1,6 @@
 //! Numbers of many cells, as many abreast as a register holds.
 
-use std::ops::{Add, Div, Mul, Sub};
+use std::ops::{Add, Deref, Div, Mul, Sub};
 use std::slice::from_raw_parts_mut;
 
 use pulp::Simd;
@@ -28,11 +28,19 @@ impl<S: Simd> Reals<S> {
         self.made(f64::plus_product(self.simd, values, factor, added.values))
     }
 
-    /// The polynomial of these numbers, its highest factor first.
+    /// The polynomial of these numbers, its highest factor first, with an even number of factors.
+    ///
+    /// Even and odd powers apart, so that fewer steps wait for each other.
     #[inline(always)]
-    pub fn series(self, factors: &[f64]) -> Self {
-        let sum = |sum: Self, &factor| sum.times_plus(self, self.all(factor));
-        factors.iter().fold(self.all(0.0), sum)
+    pub fn series<const N: usize>(self, factors: &[f64; N]) -> Self {
+        const { assert!(N.is_multiple_of(2)) }
+        let square = self * self;
+        let next = |sum: Self, factor: f64| sum.times_plus(square, self.all(factor));
+        let (mut odd, mut even) = (self.all(0.0), self.all(0.0));
+        for [one, other] in factors.as_chunks::<2>().0 {
+            (odd, even) = (next(odd, *one), next(even, *other));
+        }
+        odd.times_plus(self, even)
     }
 
     /// Whether all are below.
@@ -147,51 +155,95 @@ pub(crate) fn exp<S: Simd>(x: Reals<S>) -> Reals<S> {
     x.made(scale) * (x.all(1.0) + (r * r).times_plus(series, r))
 }
 
-/// Rows of `n` numbers each, of which blocks are taken: whole ones, or the part at the end.
-#[derive(Clone, Copy)]
-pub(crate) struct Abreast<S: Simd, const WHOLE: bool> {
-    pub simd: S,
-    pub n: usize,
+/// Rows of as many numbers each.
+pub(crate) struct Rows<V> {
+    values: V,
+    count: usize,
+    n: usize,
 }
 
-impl<S: Simd, const WHOLE: bool> Abreast<S, WHOLE> {
-    /// One number, for all cells of a block.
+impl<V: Deref<Target = [f64]>> Rows<V> {
+    /// So many rows of `n` numbers.
+    ///
+    /// # Panics
+    /// When there are fewer values.
+    #[inline(always)]
+    pub fn new(values: V, count: usize, n: usize) -> Self {
+        assert!(count.checked_mul(n).is_some_and(|all| all <= values.len()));
+        Self { values, count, n }
+    }
+
+    /// Whether there are none.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+}
+
+/// A block of each row, from `at` on: a whole one, or the part at the end.
+#[derive(Clone, Copy)]
+pub(crate) struct Block<S: Simd, const WHOLE: bool> {
+    pub simd: S,
+    pub at: usize,
+}
+
+impl<S: Simd, const WHOLE: bool> Block<S, WHOLE> {
+    /// One number, for all cells.
     #[inline(always)]
     pub fn all(self, value: f64) -> Reals<S> {
         self.made(self.simd.splat_f64s(value))
     }
 
-    /// A block of a row, from `at` on; zero beyond its end.
+    /// The block of a row; zero beyond its end.
     #[inline(always)]
-    pub fn read(self, values: &[f64], row: usize, at: usize) -> Reals<S> {
-        let block = &values[row * self.n + at..];
+    pub fn read<V: Deref<Target = [f64]>>(self, rows: &Rows<V>, row: usize) -> Reals<S> {
+        let begin = self.begin(rows, row);
         if WHOLE {
-            return self.made(S::as_simd_f64s(&block[..S::F64_LANES]).0[0]);
+            // SAFETY: `begin` has seen that so many numbers follow.
+            let block = unsafe {
+                rows.values
+                    .as_ptr()
+                    .add(begin)
+                    .cast::<S::f64s>()
+                    .read_unaligned()
+            };
+            return self.made(block);
         }
-        self.made(self.simd.partial_load_f64s(&block[..self.n - at]))
+        let rest = &rows.values[begin..][..rows.n - self.at];
+        self.made(self.simd.partial_load_f64s(rest))
     }
 
-    /// A block of four rows from `first` on.
+    /// The block of four rows from `first` on.
     #[inline(always)]
-    pub fn four(self, values: &[f64], first: usize, at: usize) -> [Reals<S>; 4] {
-        [
-            self.read(values, first, at),
-            self.read(values, first + 1, at),
-            self.read(values, first + 2, at),
-            self.read(values, first + 3, at),
-        ]
+    pub fn four<V: Deref<Target = [f64]>>(self, rows: &Rows<V>, first: usize) -> [Reals<S>; 4] {
+        [0, 1, 2, 3].map(|row| self.read(rows, first + row))
     }
 
-    /// Writes a block of a row.
+    /// Writes the block of a row.
     #[inline(always)]
-    pub fn write(self, values: &mut [f64], row: usize, at: usize, block: Reals<S>) {
-        let target = &mut values[row * self.n + at..];
+    pub fn write(self, rows: &mut Rows<&mut [f64]>, row: usize, block: Reals<S>) {
+        let begin = self.begin(rows, row);
         if WHOLE {
-            S::as_mut_simd_f64s(&mut target[..S::F64_LANES]).0[0] = block.values;
-        } else {
-            let target = &mut target[..self.n - at];
-            self.simd.partial_store_f64s(target, block.values);
+            let target = rows.values.as_mut_ptr();
+            // SAFETY: `begin` has seen that so many numbers follow.
+            unsafe {
+                target
+                    .add(begin)
+                    .cast::<S::f64s>()
+                    .write_unaligned(block.values)
+            };
+            return;
         }
+        let rest = &mut rows.values[begin..][..rows.n - self.at];
+        self.simd.partial_store_f64s(rest, block.values);
+    }
+
+    /// Where the block begins among the values of all rows, as far as it is there.
+    #[inline(always)]
+    fn begin<V>(self, rows: &Rows<V>, row: usize) -> usize {
+        assert!(row < rows.count && self.at < rows.n);
+        assert!(!WHOLE || rows.n - self.at >= S::F64_LANES);
+        row * rows.n + self.at
     }
 
     #[inline(always)]

@@ -1,11 +1,11 @@
 //! How a sheet under load conducts: what its cells remember of the load, and what follows from it.
 //!
 //! A load has two groups of components, each with its own plays: strain xx, yy, xy, and depth. Cells
-//! are taken abreast, as many as a register holds, and in one pass: memory is what most time goes to.
+//! are taken abreast, as many as a register holds, and all that is asked of them in one pass.
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::abreast::{Abreast, Reals, exp};
+use crate::abreast::{Block, Reals, Rows, exp};
 use crate::instructions::run;
 
 /// Components of a load.
@@ -40,53 +40,67 @@ pub struct Material<'a> {
     pub most_log: f64,
 }
 
-/// What cells feel, and remember: of each part, component after component, in each all cells.
+/// What cells feel: component after component, in each all cells.
 #[derive(Clone, Copy, Debug)]
-pub struct Past<'a> {
-    /// The load now.
-    pub load: &'a [f64],
-    /// The load as it was last.
+pub struct Load<'a> {
+    /// Now.
+    pub now: &'a [f64],
+    /// As it was last.
     pub last: &'a [f64],
-    /// Where each play stood.
-    pub lagging: &'a [f64],
-    /// What each late part had reached.
-    pub late: &'a [f64],
-    /// Motion of which each breakdown had not recovered, of each group.
-    pub broken: &'a [f64],
-    /// Mean strain, summed over all loading; empty where it is of no use.
-    pub worn: &'a [f64],
-    /// Conductivity of each cell without load.
-    pub unloaded: &'a [f64],
 }
 
-/// What cells remember after a step, as [`Past`]; and how they conduct.
+/// What cells remember: of each part, component after component, in each all cells.
 #[derive(Debug)]
-pub struct Present<'a> {
-    /// See [`Past`].
+pub struct Memory<'a> {
+    /// Where each play stands.
     pub lagging: &'a mut [f64],
-    /// See [`Past`].
+    /// What each late part has reached.
     pub late: &'a mut [f64],
-    /// See [`Past`].
+    /// Motion of which each breakdown has not recovered, of each group.
     pub broken: &'a mut [f64],
-    /// See [`Past`].
+    /// Mean strain, summed over all loading; empty where it is of no use.
     pub worn: &'a mut [f64],
-    /// Conductivity of each cell; where directions differ, xx, xy, yx, yy after each other.
-    pub conductivity: &'a mut [f64],
 }
 
-/// Goes on by one step.
+/// Goes on by one step, and writes the conductivity of all cells, of which `unloaded` is that
+/// without load; where directions differ, xx, xy, yx, yy after each other.
+///
+/// What is remembered is written where it lies.
 ///
 /// # Panics
 /// When an array is too short.
-pub fn advance(material: Material<'_>, past: Past<'_>, present: Present<'_>) {
-    run(
-        Arch::new(),
-        Step {
-            material,
-            past,
-            present,
-        },
-    );
+pub fn advance(
+    material: Material<'_>,
+    load: Load<'_>,
+    memory: Memory<'_>,
+    unloaded: &[f64],
+    conductivity: &mut [f64],
+) {
+    let n = unloaded.len();
+    let rows = if material.gauge_across == 0.0 {
+        1
+    } else {
+        LOADS
+    };
+    let worn = usize::from(!memory.worn.is_empty());
+    let left = |parts: &[(f64, f64)]| 1.0 - parts.iter().map(|&(part, _)| part).sum::<f64>();
+    let cells = Cells {
+        material,
+        own: left(material.play),
+        prompt: left(material.creep),
+        per_depth: 1.0 / material.thickness,
+        cold: 1.0 / material.heat.max(LEAST),
+        n,
+        load: Rows::new(load.now, LOADS, n),
+        last: Rows::new(load.last, LOADS, n),
+        lagging: Rows::new(memory.lagging, LOADS * material.play.len(), n),
+        late: Rows::new(memory.late, LOADS * material.creep.len(), n),
+        broken: Rows::new(memory.broken, GROUPS * material.breakdown.len(), n),
+        worn: Rows::new(memory.worn, worn, n),
+        unloaded: Rows::new(unloaded, 1, n),
+        conductivity: Rows::new(conductivity, rows, n),
+    };
+    run(Arch::new(), cells);
 }
 
 /// Least factor of compression or heat.
@@ -116,52 +130,63 @@ const SINH: [f64; 8] = [
     1.0,
 ];
 
-struct Step<'a> {
+struct Cells<'a> {
     material: Material<'a>,
-    past: Past<'a>,
-    present: Present<'a>,
+    /// What plays leave of a load, and creep of what follows.
+    own: f64,
+    prompt: f64,
+    /// Compression per depth.
+    per_depth: f64,
+    /// By heat.
+    cold: f64,
+    n: usize,
+    load: Rows<&'a [f64]>,
+    last: Rows<&'a [f64]>,
+    lagging: Rows<&'a mut [f64]>,
+    late: Rows<&'a mut [f64]>,
+    broken: Rows<&'a mut [f64]>,
+    worn: Rows<&'a mut [f64]>,
+    unloaded: Rows<&'a [f64]>,
+    conductivity: Rows<&'a mut [f64]>,
 }
 
-impl WithSimd for Step<'_> {
+impl WithSimd for Cells<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let n = self.past.unloaded.len();
-        let whole = n - n % S::F64_LANES;
+        let whole = self.n - self.n % S::F64_LANES;
         for at in (0..whole).step_by(S::F64_LANES) {
-            self.block(Abreast::<S, true> { simd, n }, at);
+            self.go_on(Block::<S, true> { simd, at });
         }
-        if whole < n {
-            self.block(Abreast::<S, false> { simd, n }, whole);
+        if whole < self.n {
+            self.go_on(Block::<S, false> { simd, at: whole });
         }
     }
 }
 
-impl Step<'_> {
-    /// The cells of one block.
+impl Cells<'_> {
+    /// Goes on by one step in the cells of a block.
     #[inline(always)]
-    fn block<S: Simd, const WHOLE: bool>(&mut self, rows: Abreast<S, WHOLE>, at: usize) {
+    fn go_on<S: Simd, const WHOLE: bool>(&mut self, block: Block<S, WHOLE>) {
         let material = self.material;
-        let load = rows.four(self.past.load, 0, at);
-        let [xx, yy, xy, depth] = self.followed(rows, load, at);
-        let rise = self.risen(rows, load, xx + yy, at);
-        let squeezed = depth * rows.all(1.0 / material.thickness);
-        let squeezed = squeezed.bounded(rows.all(material.most_compression));
-        let factor = rows.all(1.0) + rows.all(material.compression) * squeezed;
-        let unloaded = rows.read(self.past.unloaded, 0, at);
-        let cold = rows.all(1.0 / material.heat.max(LEAST));
-        let level = unloaded * factor.max(rows.all(LEAST)) * cold;
-        let out = &mut *self.present.conductivity;
+        let load = block.four(&self.load, 0);
+        let [xx, yy, xy, depth] = self.followed(block, load);
+        let rise = self.risen(block, load, xx + yy);
+        let squeezed = depth * block.all(self.per_depth);
+        let squeezed = squeezed.bounded(block.all(material.most_compression));
+        let factor = block.all(1.0) + block.all(material.compression) * squeezed;
+        let cold = block.all(self.cold);
+        let level = block.read(&self.unloaded, 0) * factor.max(block.all(LEAST)) * cold;
         if material.gauge_across == 0.0 {
-            rows.write(out, 0, at, level * exp(rise));
+            block.write(&mut self.conductivity, 0, level * exp(rise));
             return;
         }
-        let across = rows.all(material.gauge_across);
-        let (half, cross) = (across * (xx - yy) * rows.all(0.5), across * xy);
+        let across = block.all(material.gauge_across);
+        let (half, cross) = (across * (xx - yy) * block.all(0.5), across * xy);
         let tensor = directed(level, [rise, half, cross], material.most_log);
         for (row, part) in [0, 1, 1, 2].into_iter().enumerate() {
-            rows.write(out, row, at, tensor[part]);
+            block.write(&mut self.conductivity, row, tensor[part]);
         }
     }
 
@@ -169,29 +194,27 @@ impl Step<'_> {
     #[inline(always)]
     fn followed<S: Simd, const WHOLE: bool>(
         &mut self,
-        rows: Abreast<S, WHOLE>,
+        block: Block<S, WHOLE>,
         load: [Reals<S>; LOADS],
-        at: usize,
     ) -> [Reals<S>; LOADS] {
-        let (Material { play, creep, .. }, past) = (self.material, self.past);
-        let mut prompt = scaled(rest(rows, play), load);
+        let Material { play, creep, .. } = self.material;
+        let mut prompt = scaled(block.all(self.own), load);
         for (number, &(part, width)) in play.iter().enumerate() {
-            let lagging = rows.four(past.lagging, number * LOADS, at);
-            let lagging = dragged(lagging, load, width, 1.0 / self.material.thickness);
+            let lagging = block.four(&self.lagging, number * LOADS);
+            let lagging = dragged(lagging, load, width, self.per_depth);
             for d in 0..LOADS {
-                let row = number * LOADS + d;
-                rows.write(self.present.lagging, row, at, lagging[d]);
-                prompt[d] = prompt[d] + rows.all(part) * lagging[d];
+                block.write(&mut self.lagging, number * LOADS + d, lagging[d]);
+                prompt[d] = prompt[d] + block.all(part) * lagging[d];
             }
         }
-        let mut total = scaled(rest(rows, creep), prompt);
+        let mut total = scaled(block.all(self.prompt), prompt);
         for (number, &(part, kept)) in creep.iter().enumerate() {
             for d in 0..LOADS {
                 let row = number * LOADS + d;
-                let late = rows.read(past.late, row, at);
-                let late = (late - prompt[d]) * rows.all(kept) + prompt[d];
-                rows.write(self.present.late, row, at, late);
-                total[d] = total[d] + rows.all(part) * late;
+                let late = block.read(&self.late, row);
+                let late = (late - prompt[d]) * block.all(kept) + prompt[d];
+                block.write(&mut self.late, row, late);
+                total[d] = total[d] + block.all(part) * late;
             }
         }
         total
@@ -202,44 +225,37 @@ impl Step<'_> {
     #[inline(always)]
     fn risen<S: Simd, const WHOLE: bool>(
         &mut self,
-        rows: Abreast<S, WHOLE>,
+        block: Block<S, WHOLE>,
         load: [Reals<S>; LOADS],
         strain: Reals<S>,
-        at: usize,
     ) -> Reals<S> {
-        let (material, past) = (self.material, self.past);
+        let material = self.material;
         let mut rise = strain;
         if !material.breakdown.is_empty() {
-            let moved = apart(load, rows.four(past.last, 0, at));
-            let moved = sizes(moved, 1.0 / material.thickness);
+            let moved = apart(load, block.four(&self.last, 0));
+            let moved = sizes(moved, self.per_depth);
             for (number, &(part, kept)) in material.breakdown.iter().enumerate() {
                 for (group, &moved) in moved.iter().enumerate() {
                     let row = number * GROUPS + group;
-                    let broken = rows.read(past.broken, row, at);
-                    let broken = (broken + moved) * rows.all(kept);
-                    rows.write(self.present.broken, row, at, broken);
+                    let broken = block.read(&self.broken, row);
+                    let broken = (broken + moved) * block.all(kept);
+                    block.write(&mut self.broken, row, broken);
                     if group == 0 {
-                        rise = rise + rows.all(2.0 * part) * broken;
+                        rise = rise + block.all(2.0 * part) * broken;
                     }
                 }
             }
         }
-        rise = rise * rows.all(-material.gauge / 2.0);
-        if !past.worn.is_empty() {
-            let [xx, yy] = [0, 1].map(|row| load[row] - rows.read(past.last, row, at));
-            let more = ((xx + yy) * rows.all(0.5)).max(rows.all(0.0));
-            let worn = rows.read(past.worn, 0, at) + more;
-            rows.write(self.present.worn, 0, at, worn);
-            rise = rise - rows.all(material.wear) * worn;
+        rise = rise * block.all(-material.gauge / 2.0);
+        if !self.worn.is_empty() {
+            let [xx, yy] = [0, 1].map(|row| load[row] - block.read(&self.last, row));
+            let more = ((xx + yy) * block.all(0.5)).max(block.all(0.0));
+            let worn = block.read(&self.worn, 0) + more;
+            block.write(&mut self.worn, 0, worn);
+            rise = rise - block.all(material.wear) * worn;
         }
-        rise.bounded(rows.all(material.most_log))
+        rise.bounded(block.all(material.most_log))
     }
-}
-
-/// What these parts leave of a whole.
-#[inline(always)]
-fn rest<S: Simd, const WHOLE: bool>(rows: Abreast<S, WHOLE>, parts: &[(f64, f64)]) -> Reals<S> {
-    rows.all(1.0 - parts.iter().map(|&(part, _)| part).sum::<f64>())
 }
 
 #[inline(always)]

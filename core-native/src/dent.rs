@@ -6,8 +6,6 @@ use crate::instructions::narrow;
 
 /// Strain xx, yy, xy, and depth.
 pub const PARTS: usize = 4;
-/// Points that are left out at once where none is near.
-const BLOCK: usize = 8;
 
 /// The dent of a probe, on a square grid around it, and where that is.
 #[derive(Clone, Copy, Debug)]
@@ -33,8 +31,7 @@ pub struct Dent<'a> {
 pub fn add(dents: &[Dent<'_>], x: &[f64], y: &[f64], felt: &mut [f64]) {
     assert!(y.len() == x.len() && felt.len() == PARTS * x.len());
     felt.fill(0.0);
-    let room = x.len().next_multiple_of(BLOCK);
-    let (mut far, mut near) = (vec![f64::INFINITY; room], vec![0; x.len() + 1]);
+    let (mut far, mut near) = (vec![0.0; x.len()], vec![0; x.len() + 1]);
     for dent in dents {
         assert!(dent.table.len() == PARTS * dent.nodes * dent.nodes && dent.nodes > 1);
         narrow(Reading {
@@ -52,7 +49,7 @@ struct Reading<'a> {
     dent: &'a Dent<'a>,
     x: &'a [f64],
     y: &'a [f64],
-    /// Room for squares of distances, whole blocks of them.
+    /// Room for squares of distances.
     far: &'a mut [f64],
     /// Room for the numbers of points that are near, and one more.
     near: &'a mut [u32],
@@ -109,18 +106,10 @@ impl Reading<'_> {
             let (x, y) = (x - place[0], y - place[1]);
             *far = x * x + y * y;
         }
-        let (limit, mut count) = (reach * reach, 0);
-        let (blocks, _) = self.far.as_chunks::<BLOCK>();
-        for (block, first) in blocks.iter().zip((0..).step_by(BLOCK)) {
-            // points beside each other follow each other, so that most blocks have none
-            let beyond = block.iter().map(|&far| far >= limit);
-            if beyond.fold(true, |all, one| all & one) {
-                continue;
-            }
-            for (at, &far) in (first..).zip(block) {
-                self.near[count] = at; // written over unless it counts
-                count += usize::from(far < limit);
-            }
+        let mut count = 0;
+        for (at, &far) in (0..).zip(&*self.far) {
+            self.near[count] = at; // written over unless it counts
+            count += usize::from(far < reach * reach);
         }
         count
     }

@@ -11,13 +11,10 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::factor::eliminated;
 use crate::instructions::narrow;
-use crate::panels::inverse;
 use crate::symbolic::Symbolic;
 
 /// A pivot that is this part of the diagonal has lost so many digits.
 const LEAST: f64 = 1e-9;
-/// So many edges are added before the next one of a node.
-const APART: usize = 16;
 
 /// Cells between terminals, of any conductivity.
 #[derive(Debug)]
@@ -85,10 +82,8 @@ impl Cells {
         (0..nodes).flat_map(move |i| (i + 1..nodes).map(move |j| [i, j]))
     }
 
-    /// Which edge each pair is, and the edges: `place` has the place of each value of the matrix in
-    /// the lower triangle, or more than there are.
-    ///
-    /// Edges of one node are far from each other, so that no sum waits for the one before.
+    /// Which edge each pair is, and the edges, in the order of their values: `place` has that of
+    /// each value of the matrix in the lower triangle, or more than there are.
     fn edges(&self, place: &[u32]) -> (Vec<u32>, Vec<[u32; 3]>) {
         let k = self.nodes;
         let found = self.ends().flat_map(|[i, j]| {
@@ -101,14 +96,8 @@ impl Cells {
         let mut edges = found.clone();
         edges.sort_unstable();
         edges.dedup_by_key(|edge| edge[0]);
-        let order = apart(edges.len());
-        let place = inverse(&order);
-        let number = |edge: &[u32; 3]| edges.partition_point(|other| other[0] < edge[0]);
-        let numbers = found.iter().map(|edge| place[number(edge)]).collect();
-        (
-            numbers,
-            order.iter().map(|&at| edges[at as usize]).collect(),
-        )
+        let number = |edge: &[u32; 3]| edges.partition_point(|other| other[0] < edge[0]) as u32;
+        (found.iter().map(number).collect(), edges)
     }
 }
 
@@ -266,13 +255,6 @@ fn centre(values: &mut [f64], size: usize) {
     }
 }
 
-/// So many numbers, those that follow each other far apart.
-fn apart(count: usize) -> Vec<u32> {
-    let step = count.div_ceil(APART).max(1);
-    let all = (0..step).flat_map(|first| (first..count).step_by(step));
-    all.map(|number| number as u32).collect()
-}
-
 struct Assembly<'a> {
     network: &'a Terminals,
     conductivity: &'a [f64],
@@ -287,20 +269,19 @@ impl WithSimd for Assembly<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         let cells = &self.network.cells;
         let (n, pairs) = (cells.count, cells.pairs());
-        let mut sums = vec![0.0; self.network.edges.len()];
-        let mut conducted = vec![0.0; n];
-        for (pair, edge) in self.network.edge.chunks_exact(n.max(1)).enumerate() {
-            conducted.fill(0.0);
-            for (number, component) in cells.components().enumerate() {
-                let forms = &cells.forms[(number * pairs + pair) * n..][..n];
-                let sigma = &self.conductivity[component * n..][..n];
-                for ((value, form), sigma) in conducted.iter_mut().zip(forms).zip(sigma) {
+        let mut conducted = vec![0.0; pairs * n];
+        let each = cells.forms.chunks_exact(pairs * n);
+        for (forms, component) in each.zip(cells.components()) {
+            let sigma = &self.conductivity[component * n..][..n];
+            for (pair, forms) in conducted.chunks_exact_mut(n).zip(forms.chunks_exact(n)) {
+                for ((value, form), sigma) in pair.iter_mut().zip(forms).zip(sigma) {
                     *value += form * sigma;
                 }
             }
-            for (&edge, value) in edge.iter().zip(&conducted) {
-                sums[edge as usize] += value;
-            }
+        }
+        let mut sums = vec![0.0; self.network.edges.len()];
+        for (&edge, value) in self.network.edge.iter().zip(&conducted) {
+            sums[edge as usize] += value;
         }
         for (&[at, first, second], sum) in self.network.edges.iter().zip(&sums) {
             self.values[at as usize] += sum;

@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{Any, array, contiguous, invalid, same, unsigned};
 use crate::circuit::{Circuit, Converter};
-use crate::conduction::{self, GROUPS, LOADS, Material, Past, Present};
+use crate::conduction::{self, GROUPS, LOADS, Load, Material, Memory};
 use crate::dent::{self, Dent, PARTS};
 use crate::python::pairs;
 use crate::symbolic::Symbolic;
@@ -111,25 +111,39 @@ pub(crate) fn dented<'py>(
     Ok(felt)
 }
 
-/// Lagging, late and broken parts after a step, wear, and conductivity.
-type Step<'py> = [Bound<'py, PyArrayDyn<f64>>; 5];
-
-/// A step of cells under a load: what they remember then, and how they conduct, (1, n), or
-/// xx, xy, yx, yy (4, n) where directions differ.
+/// Conductivity of cells (1, n), or xx, xy, yx, yy (4, n) where directions differ, after a step under
+/// a load.
 ///
-/// `cells`: the load, the one before, lagging, late and broken parts, wear (or nothing),
-/// conductivity without load; `series`: parts and half widths of plays, parts of creep and of
-/// breakdown with what they keep; `numbers`: thickness, gauge, across, compression, wear, heat, most
-/// compression, most logarithm.
+/// `cells`: the load, the one before, conductivity without load; `memory`: lagging, late and broken
+/// parts, and wear (or nothing), which are written over; `series`: parts and half widths of plays,
+/// parts of creep and of breakdown with what they keep; `numbers`: thickness, gauge, across,
+/// compression, wear, heat, most compression, most logarithm.
 #[pyfunction]
 pub(crate) fn conducted<'py>(
-    cells: [Any<'py>; 7],
+    cells: [Any<'py>; 3],
+    memory: [Bound<'py, PyArrayDyn<f64>>; 4],
     series: [Vec<(f64, f64)>; 3],
     numbers: [f64; 8],
-) -> PyResult<Step<'py>> {
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let py = cells[0].py();
-    let n = array::<f64, Ix1>("unloaded", &cells[6])?.len();
+    let n = array::<f64, Ix1>("unloaded", &cells[2])?.len();
+    let names = ["load", "load before", "unloaded"];
+    let cells = flat(names, &cells, [LOADS * n, LOADS * n, n])?;
     let [play, creep, breakdown] = &series;
+    let worn = if memory[3].is_empty() { 0 } else { n };
+    let sizes = [
+        play.len() * LOADS * n,
+        creep.len() * LOADS * n,
+        breakdown.len() * GROUPS * n,
+        worn,
+    ];
+    for ((name, part), size) in ["lagging", "late", "broken", "worn"]
+        .iter()
+        .zip(&memory)
+        .zip(sizes)
+    {
+        same(name, size, part.len())?;
+    }
     let [
         thickness,
         gauge,
@@ -140,63 +154,38 @@ pub(crate) fn conducted<'py>(
         most_compression,
         most_log,
     ] = numbers;
-    let worn = if cells[5].is_empty()? { 0 } else { n };
-    let rows = if gauge_across == 0.0 { 1 } else { LOADS };
-    let shapes: [&[usize]; 5] = [
-        &[play.len(), LOADS, n],
-        &[creep.len(), LOADS, n],
-        &[breakdown.len(), GROUPS, n],
-        &[worn],
-        &[rows, n],
-    ];
-    let [lagging, late, broken, ..] = shapes.map(|shape| shape.iter().product());
-    let names = [
-        "load",
-        "load before",
-        "lagging",
-        "late",
-        "broken",
-        "worn",
-        "unloaded",
-    ];
-    let sizes = [LOADS * n, LOADS * n, lagging, late, broken, worn, n];
-    let flat = flat(names, &cells, sizes)?;
-    let [load, last, lagging, late, broken, worn, unloaded] =
-        [0, 1, 2, 3, 4, 5, 6].map(|k| flat[k].as_slice());
-    let past = Past {
-        load: load?,
-        last: last?,
-        lagging: lagging?,
-        late: late?,
-        broken: broken?,
-        worn: worn?,
-        unloaded: unloaded?,
+    let material = Material {
+        play,
+        creep,
+        breakdown,
+        thickness,
+        gauge,
+        gauge_across,
+        compression,
+        wear,
+        heat,
+        most_compression,
+        most_log,
     };
-    // SAFETY: `advance` writes all of them.
-    let out = shapes.map(|shape| unsafe { PyArrayDyn::<f64>::new(py, IxDyn(shape), false) });
+    let load = Load {
+        now: cells[0].as_slice()?,
+        last: cells[1].as_slice()?,
+    };
+    let rows = if gauge_across == 0.0 { 1 } else { LOADS };
+    // SAFETY: `advance` writes all of it.
+    let out = unsafe { PyArray2::<f64>::new(py, [rows, n], false) };
+    let [a, b, c, d] = memory.each_ref().map(|part| part.try_readwrite());
+    let (mut a, mut b, mut c, mut d) = (a?, b?, c?, d?);
     {
-        let [mut a, mut b, mut c, mut d, mut e] = out.each_ref().map(|part| part.readwrite());
-        let material = Material {
-            play,
-            creep,
-            breakdown,
-            thickness,
-            gauge,
-            gauge_across,
-            compression,
-            wear,
-            heat,
-            most_compression,
-            most_log,
-        };
-        let present = Present {
+        let memory = Memory {
             lagging: a.as_slice_mut()?,
             late: b.as_slice_mut()?,
             broken: c.as_slice_mut()?,
             worn: d.as_slice_mut()?,
-            conductivity: e.as_slice_mut()?,
         };
-        conduction::advance(material, past, present);
+        let mut out = out.readwrite();
+        let out = out.as_slice_mut()?;
+        conduction::advance(material, load, memory, cells[2].as_slice()?, out);
     }
     Ok(out)
 }

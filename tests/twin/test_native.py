@@ -18,6 +18,8 @@ from tomoskin.twin import (
     Circle,
     Contact,
     Finger,
+    Load,
+    MaterialState,
     Probe,
     Square,
     Stretched,
@@ -26,6 +28,7 @@ from tomoskin.twin import (
     make_electronics,
     table_of,
 )
+from tomoskin.twin.material import stepped
 
 SEEDS = (101, 102, 103)
 BRITTLE = {"breakdown": (1.4, 0.3), "breakdown_times": (0.2, 3.0), "wear": 3e-4}
@@ -79,6 +82,28 @@ def test_native_code_and_numpy_make_the_same_frames(
             assert one == pytest.approx(other, rel=1e-9, abs=1e-12 * np.abs(other).max())
         # a conversion on the edge between two codes may fall on either side
         assert np.mean(native[3] != plain[3]) < 1e-3
+
+
+@pytest.mark.parametrize("n", [1, 7, 8, 17])
+@pytest.mark.parametrize("preset", ["ideal", "textile", "brittle"])
+def test_sheets_of_any_number_of_cells_remember_the_same(
+    monkeypatch: pytest.MonkeyPatch, preset: str, n: int
+) -> None:
+    pytest.importorskip("tomoskin_core", reason=NO_ENGINE)
+    settings = TwinSettings.preset("ideal" if preset == "ideal" else "textile").material
+    if preset == "brittle":
+        settings = replace(settings, **BRITTLE)
+    random, unloaded = np.random.default_rng(n), np.linspace(1.0, 2.0, n)
+    loads = [Load(random.normal(0.0, 0.02, (4, n)) * [[1], [1], [1], [0.1]]) for _ in range(5)]
+    native, plain = (MaterialState.fresh(settings, n) for _ in range(2))
+    for load in loads:
+        monkeypatch.setenv(engine_choice.VARIABLE, "native")
+        native, found = stepped(native, settings, load, 0.3, 0.5, unloaded=unloaded)
+        monkeypatch.setenv(engine_choice.VARIABLE, "scipy")
+        plain, expected = stepped(plain, settings, load, 0.3, 0.5, unloaded=unloaded)
+        assert found == pytest.approx(expected, rel=1e-12, abs=1e-14)
+    assert native.memory.late == pytest.approx(plain.memory.late, rel=1e-12, abs=1e-16)
+    assert native.worn == pytest.approx(plain.worn, rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -56,7 +56,7 @@ class Load:
     @property
     def depth(self) -> FloatArray:
         """(n,) m."""
-        return self.felt[3]
+        return np.asarray(self.felt[3])
 
 
 @dataclass(frozen=True, eq=False)

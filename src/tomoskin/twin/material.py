@@ -166,7 +166,10 @@ def stepped(
     *,
     unloaded: FloatArray,
 ) -> tuple[MaterialState, FloatArray]:
-    """What :func:`advance` gives, and the :func:`conductivity` then; natively in one pass."""
+    """What :func:`advance` gives, and the :func:`conductivity` then.
+
+    Natively in one pass, and in the memory of ``state``, which is of no use afterwards.
+    """
     if (core := choose_engine().core) is None:
         after = advance(state, settings, load, dt, chance)
         return after, conductivity(after, settings, unloaded)
@@ -175,8 +178,10 @@ def stepped(
     worn = state.worn if settings.wear else state.worn[:0]
     warmer = _warmed(state.warmer, settings, dt, chance)
     play, creep, breakdown = _series(memory, dt)
-    *parts, fresh, rows = core.conducted(
-        (load.felt, past.load, past.lagging, past.late, past.broken, worn, unloaded),
+    parts = past.lagging, past.late, past.broken
+    rows = core.conducted(
+        (load.felt, past.load, unloaded),
+        (*parts, worn),
         (play, creep, breakdown),
         (
             settings.thickness,
@@ -189,9 +194,8 @@ def stepped(
             _MOST_LOG,
         ),
     )
-    after = MemoryState(load.felt, *parts)
     sigma = rows[0] if settings.scalar else rows.reshape(2, 2, -1).transpose(2, 0, 1)
-    return MaterialState(after, fresh if settings.wear else state.worn, warmer), sigma
+    return MaterialState(MemoryState(load.felt, *parts), state.worn, warmer), sigma
 
 
 def advance(

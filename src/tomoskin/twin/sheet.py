@@ -106,11 +106,6 @@ class TwinSkin:
         return self._pose
 
     @property
-    def state(self) -> MaterialState:
-        """What the sheet remembers."""
-        return self._state
-
-    @property
     def load(self) -> Load:
         """What the cells feel under the present presses, in the present pose."""
         presses, pose = self._presses, self._pose
