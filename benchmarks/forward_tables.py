@@ -51,7 +51,7 @@ def forward_table(measured: Sequence[Measured]) -> Report:
         (
             f"medians of {clock()[1]}; × is how many times longer the other takes",
             "faer: factor and solve of the same matrix by that library as it comes, ready arrays, "
-            "its analysis (minimum degree) made beforehand, one thread; its fields agree to 1e-9",
+            "its analysis (minimum degree) made before, one thread; its fields agree to 1e-9",
             "own: the same by our engine",
             "script: COO assembly, splu as it comes; its voltages agree to 1e-9",
             f"{forward_peer.name()}: point electrodes; larger meshes are left out",
