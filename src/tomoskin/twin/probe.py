@@ -126,7 +126,7 @@ def check_on_skin(contacts: Sequence[Contact], outline: Outline) -> None:
     if not contacts:
         return
     inside = outline.contains(np.array([(c.x, c.y) for c in contacts]))
-    if not inside.all():
+    if not all(inside.tolist()):
         number = int(np.argmin(inside))
         x, y = contacts[number].x * 1e3, contacts[number].y * 1e3
         raise GeometryError(
