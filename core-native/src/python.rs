@@ -16,6 +16,7 @@ use crate::product::Rows;
 use crate::scalar::{Scalar, c64};
 use crate::spot_match_python::{standing, standing_out};
 use crate::spot_python::{SeenTable, SpotTable};
+use crate::spot_reduced_python::Reduced;
 use crate::twin_python::{Terminals, conduct, converted, dented, lines, remember};
 use crate::{factor, jacobian, product, solve, symbolic, threads};
 
@@ -258,7 +259,7 @@ fn keep_freed_memory() {
 
 /// Number of what `tomoskin_core.pyi` says: raised with each change of it, so that tomoskin does
 /// not call an engine that was built for other arguments.
-const INTERFACE: u32 = 4;
+const INTERFACE: u32 = 5;
 
 #[pymodule]
 fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -269,6 +270,7 @@ fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Symbolic>()?;
     module.add_class::<Factor>()?;
     module.add_class::<Patches>()?;
+    module.add_class::<Reduced>()?;
     module.add_class::<SpotTable>()?;
     module.add_class::<Terminals>()?;
     module.add_class::<SeenTable>()?;

@@ -20,7 +20,7 @@ from tomoskin.forward.engine import (
 )
 from tomoskin.pattern import Pattern
 
-INTERFACE = 4
+INTERFACE = 5
 """The interface of tomoskin_core that is called here and in ``touch``; raised with its own."""
 
 

@@ -42,7 +42,7 @@ class Expectation:
         """Of ``spots`` (m, 4) of that ``covariance`` (4m, 4m), with deviations (3,) of what they
         ``wander`` until the next frame; nothing where the covariance is no number."""
         k, n = len(spots), N_PARAMETERS
-        own = covariance.reshape(k, n, k, n)[range(k), :CONTENT, range(k), :CONTENT]
+        own = np.einsum("iaib->iab", covariance.reshape(k, n, k, n))[:, :CONTENT, :CONTENT]
         if not np.isfinite(own).all():
             return cls.none()
         return cls(spots, own + np.diag(np.square(wander)))

@@ -7,6 +7,7 @@ from collections import OrderedDict
 from collections.abc import Generator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import is_
 from typing import Self
 
 import numpy as np
@@ -24,13 +25,13 @@ from tomoskin.touch.fit.native import NativeSolver
 from tomoskin.touch.fit.noise import ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
+from tomoskin.touch.fit.refine import Deficit, Fit, Problem, Solver, WhitenedTable
 from tomoskin.touch.fit.rival import Rival, challenged
 from tomoskin.touch.fit.search import SpotDetections, joined, search
 from tomoskin.touch.fit.selection import ForwardSelection
 from tomoskin.touch.fit.sheet import fields_of, fitting_sheet
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
-from tomoskin.touch.fit.spot import N_PARAMETERS, Footprints, Response, depth_of
+from tomoskin.touch.fit.spot import FILLING, N_PARAMETERS, Footprints, Response
 from tomoskin.touch.fit.table import ResponseTable
 from tomoskin.touch.fit.tabulate import Tabulation, kept_tabulation
 from tomoskin.touch.fit.watch import FrameWatch
@@ -182,8 +183,7 @@ class SpotModel:
         made.__dict__["reduced"] = yield from Reduced.making(response, certificate, self.prior)
         yield
         _ = made.solver
-        yield
-        _ = table.typical
+        table.__dict__["typical"] = yield from table.typifying()
         return made
 
 
@@ -233,7 +233,7 @@ class SpotFinder:
         self._newest_left = self._residual.changes, None, np.zeros((0, 0))
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
-        self._before = np.zeros((0, N_PARAMETERS))
+        self._before = self._ahead = np.zeros((0, N_PARAMETERS))
         self._deficit = Deficit.none(len(model.solver.table.basis))
         self._expected = Expectation.none()
         self._rival: Rival | None = None
@@ -243,6 +243,7 @@ class SpotFinder:
         self._noise = noise / self._scale[:, None] / self._scale
         self._nuisance = np.zeros((len(noise), 0))
         self._matched: OrderedDict[bytes, Seen] = OrderedDict()
+        self._newest_seen: tuple[tuple[object, ...], Seen] | None = None
 
     def renewing(self, noise: FloatArray, gain: float = 1.0) -> Generator[None, None, None]:
         """Go on with other noise, or another gain, at the end of some pieces of work."""
@@ -272,15 +273,16 @@ class SpotFinder:
         touch: a unit vector for each excluded row. There must be more rows than that.
         """
         self._nuisance = nuisance
-        data, nuisance = dv / self._scale, nuisance / self._scale[:, None]
-        self.watch.begin(data, self._whitened(nuisance)[2])
-        detected, matched = self._searched(data, nuisance)
+        data = dv / self._scale
+        self.watch.begin(data, self._seen()[2])
+        detected, matched = self._searched(data)
         solver = self._model.solver
         times = self.watch.unexplained(solver, detected.fit, matched)
         if times > 1.0:  # it may be no touch in as much noise
-            detected, matched = self._searched(data, nuisance, times)
+            detected, matched = self._searched(data, times)
         self.watch.end(solver, detected.fit, matched, times)
         self._unrest = self._motion(detected.fit.spots)
+        self._ahead = self._gone_on(detected.fit)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
         self._expected = self._going_on(detected)
         if self._fading:
@@ -289,11 +291,9 @@ class SpotFinder:
         detections.sort(key=lambda detection: -abs(detection.peak))
         return detections
 
-    def _searched(
-        self, data: FloatArray, nuisance: FloatArray, times: float = 1.0
-    ) -> tuple[SpotDetections, Matched]:
+    def _searched(self, data: FloatArray, times: float = 1.0) -> tuple[SpotDetections, Matched]:
         """Touches of ``data`` (n_meas,) in so many times the noise that is known."""
-        seen, matched, _ = self._whitened(nuisance)
+        seen, matched, _ = self._seen()
         if times != 1.0:
             seen, matched = seen.louder(times), matched.louder(times)
         whitened, rest = seen.whitened(data)
@@ -315,7 +315,7 @@ class SpotFinder:
             problem = replace(problem, sign=sign)
         least, pace = self._settings.snr, self._pace
         selection = ForwardSelection(problem, matched, least, self._most, pace, self._deficit)
-        detected = search(selection, self._before)
+        detected = search(selection, self._ahead)
         rival, self._rival = self._rival, None
         if self._reach and sign != "both":
             detected, self._rival = challenged(selection, detected, rival, self._going_on)
@@ -352,6 +352,16 @@ class SpotFinder:
         wander = self._reach, self._reach, _SWELLS
         return Expectation.of(detected.fit.spots, detected.covariance, wander)
 
+    def _gone_on(self, fit: Fit) -> FloatArray:
+        """Spots of a fit where they are in the next frame, if each goes on as it did in this one:
+        the search begins there."""
+        known = [number for number in fit.known if number is not None]
+        if not self._reach or len(known) < len(fit.known) or not known:
+            return fit.spots
+        ahead = fit.spots.copy()
+        ahead[:, :2] += fit.spots[:, :2] - self._before[known, :2]
+        return ahead
+
     def _motion(self, spots: FloatArray) -> float:
         """How much of what touches may do they have done since the frame before; 1 where there are
         more of them, or fewer, or frames say nothing of each other."""
@@ -361,7 +371,15 @@ class SpotFinder:
         moved = max([math.sqrt(x * x + y * y) for x, y in way.tolist()])
         return min(1.0, math.hypot(_REST, moved / self._reach))
 
-    def _whitened(self, nuisance: FloatArray) -> Seen:
+    def _seen(self) -> Seen:
+        """How the newest frame is seen: as the one before, where nothing has changed."""
+        now, newest = (self._nuisance, self._noise, self.watch.excess), self._newest_seen
+        if newest is None or not all(map(is_, now, newest[0])):
+            newest = self._newest_seen = now, self._kept()
+        return newest[1]
+
+    def _kept(self) -> Seen:
+        nuisance = self._nuisance / self._scale[:, None]
         key = nuisance.tobytes() + self.watch.excess.key
         if key not in self._matched:
             self._matched[key] = finished(self._making(self._noise, nuisance))
@@ -387,21 +405,22 @@ class SpotFinder:
 
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots
-        depth = self._unit * np.expm1(depth_of(spots)) if len(spots) else np.zeros(0)
-        shown = np.flatnonzero(~self.watch.wrong(spots)).tolist()
-        return [self._detection(detected, k, float(depth[k])) for k in shown]
+        wrong = self.watch.wrong(spots).tolist()
+        shown = [(k, spot) for k, spot in enumerate(spots.tolist()) if not wrong[k]]
+        return [self._detection(detected, k, spot) for k, spot in shown]
 
-    def _detection(self, detected: SpotDetections, k: int, peak: float) -> Detection:
-        x, y, log_radius, _ = detected.fit.spots[k].tolist()
+    def _detection(self, detected: SpotDetections, k: int, spot: list[float]) -> Detection:
+        x, y, log_radius, content = spot
         (xx, xy), (_, yy) = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2].tolist()
+        radius = math.exp(log_radius)
         return Detection(
             x=x,
             y=y,
             sd_x=math.sqrt(xx),
             sd_y=math.sqrt(yy),
-            area=math.pi * math.exp(2 * log_radius),
-            peak=peak,
-            cells=self._cells.within(x, y, math.exp(2 * log_radius)),
+            area=math.pi * radius**2,
+            peak=self._unit * math.expm1(content / (FILLING * radius**2)),
+            cells=self._cells.within(x, y, radius),
             cov_xy=xy,
             snr=float(detected.ratio[k]),
             close=bool(detected.close[k]),
