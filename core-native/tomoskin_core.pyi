@@ -321,7 +321,7 @@ class SpotTable:
         limits: tuple[float, float, float, float, float],
         pace: tuple[int, int, int, int, int, int, bool],
         rules: tuple[float, float, float, float, float, float, float],
-    ) -> tuple[Fitted, bool, list[NDArray[np.float64]] | None]:
+    ) -> tuple[Fitted, bool, list[NDArray[np.float64]] | None, Fitted | None]:
         """Find the touches of a frame; the last one's were ``spots`` (k, 4).
 
         Parameters
@@ -343,6 +343,8 @@ class SpotTable:
             Whether that is without the frame's offset.
         others
             Likelihood ratios (n,) and contents (n,) of the candidates beside it, or None.
+        turned_down
+            One spot more, that was not worth it, or None.
         """
 
 @final

@@ -13,7 +13,7 @@ use crate::spot_algebra::{Beside, Metric};
 use crate::spot_expected_python::{ExpectedArrays, expected_of};
 use crate::spot_fit::{Expected, Fit, Frame, Known, Prior, Seen, Sheet};
 use crate::spot_match::{self, Limits, Measurements, Quality, Signatures};
-use crate::spot_search::{Found, Pace, Rules, Search};
+use crate::spot_search::{Pace, Rules, Search};
 use crate::spot_table::{DIRECTIONS, Grid, Layout, PARAMETERS, ROWS, Spot, Table};
 
 /// A table of spots, whose values stay Python's, and where they may be.
@@ -145,8 +145,7 @@ impl SpotTable {
         Ok(fitted(py, fit))
     }
 
-    /// Touches of a frame that before held `spots` (k, 4), and whether they are fitted without
-    /// the frame's offset.
+    /// Touches of a frame that before held `spots` (k, 4).
     ///
     /// `candidates`: spots (n, 4), signatures (n, narrow), squares (n); `limits`: see
     /// `standing_out`; `pace` and `rules` in the order of their fields.
@@ -160,7 +159,7 @@ impl SpotTable {
         limits: [f64; 5],
         pace: (usize, usize, usize, usize, usize, usize, bool),
         rules: [f64; 7],
-    ) -> PyResult<(Fitted<'py>, bool, Option<Others<'py>>)> {
+    ) -> PyResult<Searched<'py>> {
         let (py, spots) = (frame.0.py(), spots_of(spots)?);
         let arrays = Arrays::of(self, seen, &frame)?;
         let frame = arrays.frame(self, seen, &frame)?;
@@ -208,9 +207,10 @@ impl SpotTable {
         };
         let found = py.detach(|| search.found(&spots));
         let found = found.ok_or_else(|| invalid("spots: not comparable with the data"))?;
-        let Found { fit, bare, others } = found;
+        let others = found.others;
         let others = others.map(|both| both.map(|values| PyArray1::from_vec(py, values)));
-        Ok((fitted(py, fit), bare, others))
+        let turned_down = found.turned_down.map(|fit| fitted(py, fit));
+        Ok((fitted(py, found.fit), found.bare, others, turned_down))
     }
 }
 
@@ -225,6 +225,9 @@ impl SpotTable {
 
 /// Squares of what spots change, and a covariance.
 type Judged<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
+
+/// A fit, whether it is without the frame's offset, candidates beside it, and one spot more.
+type Searched<'py> = (Fitted<'py>, bool, Option<Others<'py>>, Option<Fitted<'py>>);
 
 /// Likelihood ratios and contents of candidates.
 type Others<'py> = [Bound<'py, PyArray1<f64>>; 2];

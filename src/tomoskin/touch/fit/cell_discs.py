@@ -40,16 +40,15 @@ class CellDiscs:
         return cls(order, (x + 1j * y)[order])
 
     def within(self, x: float, y: float, radius: float) -> IntArray:
-        """(m,) in order, those whose middles are no farther than ``radius`` m from ``x``, ``y`` m,
-        or the nearest one."""
+        """(m,) those whose middles are no farther than ``radius`` m from ``x``, ``y`` m, or the
+        nearest one."""
         along, reach = self._along, radius * _MARGIN
         near = slice(bisect_left(along, x - reach), bisect_left(along, x + reach))
-        found = self.cells[near][np.abs(self.middles[near] - complex(x, y)) <= radius]
-        if len(found):
-            found.sort()
-            return found
+        found = np.abs(self.middles[near] - complex(x, y)) <= radius
+        if found.any():
+            return np.asarray(self.cells[near].compress(found))
         away = np.abs(self.middles - complex(x, y))
-        return np.sort(self.cells[away == away.min()])
+        return np.asarray(self.cells[away == away.min()])
 
     @cached_property
     def _along(self) -> list[float]:

@@ -169,9 +169,19 @@ class Gauge:
         seen[0], seen[1:] = one[0] - other[0], one + other
         # one by one: a product with so few columns takes three times as long
         along = np.array([self.shows @ column for column in seen], np.float64)
-        differs, gains, changes = _means(along * along, self.starts, self.count)
+        squares, (some, starts, count) = np.zeros(len(self.count)), self._parts
+        if not len(some):
+            return squares
+        differs, gains, changes = np.add.reduceat(along * along, starts, axis=1) / count
         allowed = _MOVES**2 * changes + _GAINS**2 * gains
-        return np.asarray(differs - (allowed + allowed.mean()) / 2)
+        squares[some] = differs - (allowed + allowed.sum() / len(squares)) / 2
+        return squares
+
+    @cached_property
+    def _parts(self) -> tuple[IntArray, IntArray, IntArray]:
+        """Channels with parts, the first of each, and how many it has."""
+        some = np.flatnonzero(self.count)
+        return some, self.starts[some], self.count[some]
 
     @cached_property
     def loudest(self) -> float:
@@ -180,10 +190,10 @@ class Gauge:
 
 
 def _means(values: FloatArray, starts: IntArray, count: IntArray) -> FloatArray:
-    """(…, n_channels) means of ``values`` (…, n) over each channel's; 0 where it has none."""
-    out, some = np.zeros((*values.shape[:-1], len(count))), np.flatnonzero(count)
+    """(n_channels,) means of ``values`` (n,) over each channel's; 0 where it has none."""
+    out, some = np.zeros(len(count)), np.flatnonzero(count)
     if len(some):
-        out[..., some] = np.add.reduceat(values, starts[some], axis=-1) / count[some]
+        out[some] = np.add.reduceat(values, starts[some]) / count[some]
     return out
 
 

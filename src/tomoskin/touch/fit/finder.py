@@ -22,7 +22,7 @@ from tomoskin.touch.fit.certificate import Certificate, Reduced
 from tomoskin.touch.fit.excess import Gauge
 from tomoskin.touch.fit.expectation import Expectation
 from tomoskin.touch.fit.native import NativeSolver
-from tomoskin.touch.fit.noise import ResidualResponse, Whitener
+from tomoskin.touch.fit.noise import ResidualDirections, ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Deficit, Fit, Problem, Solver, WhitenedTable
@@ -228,9 +228,8 @@ class SpotFinder:
         self._cells = CellDiscs.of(mesh)
         self._pace, self._reach, self._unrest = pace, pace.speed * scan_time, 1.0
         self._fading = math.ceil(pace.fading / scan_time) if scan_time else 0
-        self._residual = ResidualResponse.none(len(model.scale))
-        self._newest_left: tuple[FloatArray, WhitenedTable | None, FloatArray]
-        self._newest_left = self._residual.changes, None, np.zeros((0, 0))
+        self._residual = ResidualResponse.none()
+        self._left = ResidualDirections.none(np.zeros((0, len(model.scale))))
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
         self._before = self._ahead = np.zeros((0, N_PARAMETERS))
@@ -297,6 +296,10 @@ class SpotFinder:
         if times != 1.0:
             seen, matched = seen.louder(times), matched.louder(times)
         whitened, rest = seen.whitened(data)
+        left = (
+            self._left if self._left.matrix is seen.matrix else ResidualDirections.none(seen.matrix)
+        )
+        self._left = left.of(self._residual.changes)
         problem = Problem(
             response=self._model.response,
             reduced=self._model.reduced,
@@ -307,7 +310,7 @@ class SpotFinder:
             grows=self._unrest * _GROWS,
             data=whitened,
             rest=rest,
-            left=self._left(seen),
+            left=self._left.rows,
             expected=self._expected,
         )
         sign = self.watch.sign(problem, matched)
@@ -335,15 +338,6 @@ class SpotFinder:
             ForwardSelection(problem, selection.matched, selection.least, most, pace, none),
             np.zeros((0, N_PARAMETERS)),
         )
-
-    def _left(self, seen: WhitenedTable) -> FloatArray:
-        """(q, c) whitened directions of residual responses; those of the last frame where nothing
-        has changed."""
-        responses, noise, left = self._newest_left
-        if responses is not self._residual.changes or noise is not seen:
-            left = self._residual.directions.T @ seen.matrix.T
-            self._newest_left = self._residual.changes, seen, left
-        return left
 
     def _going_on(self, detected: SpotDetections) -> Expectation:
         """What is expected of the touches of this frame in the next one."""

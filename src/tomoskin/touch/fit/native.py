@@ -70,7 +70,7 @@ class NativeSolver:
         if pace.rounds or pace.joint:
             return None
         limits, rules = question.limits, question.rules
-        found, bare, others = self._spots.searched(
+        found, bare, others, more = self._spots.searched(
             problem.seen.kept,
             self._frame(problem, question.deficit),
             before,
@@ -87,7 +87,8 @@ class NativeSolver:
         )
         rank = len(self.table.basis)
         deficit = Deficit.none(rank) if bare else question.deficit
-        return Answer(_fit(problem, deficit, found), others and tuple(others))
+        more = more and _fit(problem, deficit, more)
+        return Answer(_fit(problem, deficit, found), others and tuple(others), more)
 
     def _frame(self, problem: Problem, deficit: Deficit) -> tuple[Any, ...]:
         deviations = (DIRECTED, RESHAPED, problem.reach, problem.grows)

@@ -306,11 +306,12 @@ class Solver(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """A fit, and the likelihood ratios (n,) and contents (n,) of candidates beside it, where these
-    have been looked at."""
+    """A fit; the likelihood ratios (n,) and contents (n,) of candidates beside it, where these have
+    been looked at; and one spot more where that was tried last, and not worth it."""
 
     fit: Fit
     others: tuple[FloatArray, FloatArray] | None
+    turned_down: Fit | None
 
 
 @dataclass(frozen=True, slots=True)

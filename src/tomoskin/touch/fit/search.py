@@ -48,6 +48,8 @@ def search(selection: ForwardSelection, before: FloatArray) -> SpotDetections:
     fit = selection.found(before) if answer is None else answer.fit
     if answer and answer.others:
         selection.beside.remember(fit, answer.others)
+    if answer and answer.turned_down:
+        selection.turn_down(fit, answer.turned_down)
     return judged(selection, _confirmed(selection, fit, before))
 
 
