@@ -25,7 +25,7 @@ from tomoskin.touch.fit.native import NativeSolver
 from tomoskin.touch.fit.noise import ResidualDirections, ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.refine import Deficit, Fit, Problem, Solver, WhitenedTable
+from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
 from tomoskin.touch.fit.rival import Rival, challenged
 from tomoskin.touch.fit.search import SpotDetections, joined, search
 from tomoskin.touch.fit.selection import ForwardSelection
@@ -232,7 +232,7 @@ class SpotFinder:
         self._left = ResidualDirections.none(np.zeros((0, len(model.scale))))
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
-        self._before = self._ahead = np.zeros((0, N_PARAMETERS))
+        self._before = np.zeros((0, N_PARAMETERS))
         self._deficit = Deficit.none(len(model.solver.table.basis))
         self._expected = Expectation.none()
         self._rival: Rival | None = None
@@ -281,7 +281,6 @@ class SpotFinder:
             detected, matched = self._searched(data, times)
         self.watch.end(solver, detected.fit, matched, times)
         self._unrest = self._motion(detected.fit.spots)
-        self._ahead = self._gone_on(detected.fit)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
         self._expected = self._going_on(detected)
         if self._fading:
@@ -318,7 +317,7 @@ class SpotFinder:
             problem = replace(problem, sign=sign)
         least, pace = self._settings.snr, self._pace
         selection = ForwardSelection(problem, matched, least, self._most, pace, self._deficit)
-        detected = search(selection, self._ahead)
+        detected = search(selection, self._before)
         rival, self._rival = self._rival, None
         if self._reach and sign != "both":
             detected, self._rival = challenged(selection, detected, rival, self._going_on)
@@ -345,16 +344,6 @@ class SpotFinder:
             return Expectation.none()
         wander = self._reach, self._reach, _SWELLS
         return Expectation.of(detected.fit.spots, detected.covariance, wander)
-
-    def _gone_on(self, fit: Fit) -> FloatArray:
-        """Spots of a fit where they are in the next frame, if each goes on as it did in this one:
-        the search begins there."""
-        known = [number for number in fit.known if number is not None]
-        if not self._reach or len(known) < len(fit.known) or not known:
-            return fit.spots
-        ahead = fit.spots.copy()
-        ahead[:, :2] += fit.spots[:, :2] - self._before[known, :2]
-        return ahead
 
     def _motion(self, spots: FloatArray) -> float:
         """How much of what touches may do they have done since the frame before; 1 where there are

@@ -28,7 +28,7 @@ ABREAST = 8
 NEAR = 4
 """Radii that a spot is between."""
 
-_TYPICAL, _PIECES = 2000, 8
+_TYPICAL, _PIECES = 2000, 4
 """Points of a table that tell what is typical; pieces of work in which they are read."""
 
 N_DIRECTIONS = 2
