@@ -312,7 +312,7 @@ class SpotTable:
         limits: tuple[float, float, float, float, float],
         pace: tuple[int, int, int, int, int, int, bool],
         rules: tuple[float, float, float, float, float, float, float],
-    ) -> tuple[Fitted, bool, list[NDArray[np.float64]] | None]:
+    ) -> tuple[Fitted, bool, list[NDArray[np.float64]] | None, Fitted | None]:
         """Find the touches of a frame; the last one's were ``spots`` (k, 4).
 
         Parameters
@@ -334,20 +334,8 @@ class SpotTable:
             Whether that is without the frame's offset.
         others
             Likelihood ratios (n,) and contents (n,) of the candidates beside it, or None.
-        """
-
-    def judged(
-        self,
-        seen: SeenTable,
-        fit: tuple[NDArray[np.float64], ...],
-        offset: NDArray[np.float64],
-        quality: tuple[float, float, float],
-        ridge: float,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Squares (k,) of what spots change beside each other, and their covariance (4k, 4k).
-
-        ``fit``: spots, each, slopes, unknown and normal; ``offset`` (rank,) what the table lacks of
-        them; ``quality``: misfit, degrees of freedom, uneven.
+        turned_down
+            One spot more, that was not worth it, or None.
         """
 
 @final
@@ -363,6 +351,61 @@ class SeenTable:
         squares: NDArray[np.float64],
     ) -> SeenTable:
         """Of (narrow, rank), (c, rank), (c, n_meas), (rank, n_meas) and (n_meas,)."""
+
+    def judged(
+        self,
+        fit: tuple[NDArray[np.float64], ...],
+        change: NDArray[np.float64],
+        quality: tuple[float, float, float],
+        ridge: float,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Squares (k,) of what spots change beside each other, and their covariance (4k, 4k).
+
+        ``fit``: each, slopes, unknown and normal; ``change`` (rank,) what all spots change;
+        ``quality``: misfit, degrees of freedom, uneven.
+        """
+
+@final
+class Reduced:
+    """What stands for the exact model: see tomoskin.touch.fit.certificate."""
+
+    def __new__(
+        cls,
+        profile: tuple[float, float, float, float, float, float],
+        interaction: tuple[
+            NDArray[np.float64], float, NDArray[np.float32], NDArray[np.float32]
+        ],
+        certificate: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+        numbers: tuple[float, float, float],
+        neighbours: int,
+    ) -> Reduced:
+        """Take what it is made of.
+
+        Parameters
+        ----------
+        profile
+            Of a spot: reach, filling, scales, and of the bell narrow, height and part.
+        interaction
+            Centres (p, 2) of patches, spread, fields (p, 2, n_electrodes), between (2p, 2p).
+        certificate
+            like (n, 2) and parts (n,) of some spots, and points (m, 2) of the rim.
+        numbers
+            margin, moved, and the radius of a median spot.
+        neighbours
+            Spots that tell of one between them.
+
+        Raises
+        ------
+        ValueError
+            When these do not fit together.
+        """
+
+    def lacking(
+        self, spots: NDArray[np.float64], sizes: NDArray[np.float64]
+    ) -> tuple[float, NDArray[np.float64]]:
+        """What the table lacks of spots (k, 4) alone at the most, in the measure of the ``sizes``
+        (k,) of what each changes; and the change (n_electrodes, n_electrodes) of the transfer
+        resistance by all of them beyond that by each."""
 
 def standing(
     left: NDArray[np.float64],

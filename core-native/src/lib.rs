@@ -39,6 +39,9 @@ pub mod spot_match;
 mod spot_match_python;
 #[cfg(feature = "python")]
 mod spot_python;
+pub mod spot_reduced;
+#[cfg(feature = "python")]
+mod spot_reduced_python;
 pub mod spot_search;
 pub mod spot_table;
 pub mod symbolic;

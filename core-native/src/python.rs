@@ -16,6 +16,7 @@ use crate::product::Rows;
 use crate::scalar::{Scalar, c64};
 use crate::spot_match_python::{standing, standing_out};
 use crate::spot_python::{SeenTable, SpotTable};
+use crate::spot_reduced_python::Reduced;
 use crate::twin_python::{Terminals, conducted, converted, dented, lines};
 use crate::{factor, jacobian, product, solve, symbolic, threads};
 
@@ -269,6 +270,7 @@ fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Symbolic>()?;
     module.add_class::<Factor>()?;
     module.add_class::<Patches>()?;
+    module.add_class::<Reduced>()?;
     module.add_class::<SpotTable>()?;
     module.add_class::<Terminals>()?;
     module.add_class::<SeenTable>()?;

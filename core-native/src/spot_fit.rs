@@ -15,34 +15,38 @@ const MOST_DAMPING: f64 = 1e3;
 /// Last column of a spot.
 pub const CONTENT: usize = PARAMETERS - 1;
 
-/// Cells that are compared at a time.
-const ABREAST: usize = 8;
-
 /// Where a spot may be.
 #[derive(Debug)]
 pub struct Sheet {
-    /// Of its cells, m.
-    pub centroids: Vec<[f64; 2]>,
-    /// How far each reaches from there, m.
-    pub margin: Vec<f64>,
+    /// Of its cells, m, and how far each reaches from there, m: in order of the first.
+    cells: Vec<[f64; 3]>,
 }
 
 impl Sheet {
+    /// Of cells, one at least: both coordinates of the centroid, m, and how far it reaches, m.
+    pub fn of(mut cells: Vec<[f64; 3]>) -> Self {
+        cells.sort_by(|one, other| one[0].total_cmp(&other[0]));
+        Self { cells }
+    }
+
     /// Brings a spot that is off the sheet back to its nearest cell.
     fn hold(&self, spot: &mut Spot) {
-        let square = |[x, y]: &[f64; 2]| (x - spot[0]).powi(2) + (y - spot[1]).powi(2);
-        let mut least = [f64::INFINITY; ABREAST];
-        for cells in self.centroids.chunks(ABREAST) {
-            for (least, cell) in least.iter_mut().zip(cells) {
-                let square = square(cell);
-                *least = if square < *least { square } else { *least };
+        let (mut nearest, mut least) = (self.cells[0], f64::INFINITY);
+        let mut look = |cell: &[f64; 3]| {
+            let [along, across] = [cell[0] - spot[0], cell[1] - spot[1]];
+            let square = along * along + across * across;
+            if square < least {
+                (least, nearest) = (square, *cell);
             }
-        }
-        let least = least.into_iter().fold(f64::INFINITY, f64::min);
-        let nearest = self.centroids.iter().position(|cell| square(cell) == least);
-        let nearest = nearest.unwrap_or(0);
-        if least.sqrt() > self.margin[nearest] {
-            spot[..2].copy_from_slice(&self.centroids[nearest]);
+            along * along < least
+        };
+        // both ways, as far as a nearer one may be
+        let ahead = self.cells.partition_point(|cell| cell[0] < spot[0]);
+        let _ = self.cells[ahead..].iter().all(&mut look);
+        let _ = self.cells[..ahead].iter().rev().all(&mut look);
+        let [x, y, margin] = nearest;
+        if least.sqrt() > margin {
+            [spot[0], spot[1]] = [x, y];
         }
     }
 }
@@ -173,6 +177,8 @@ pub struct Fit {
     pub spots: Vec<Spot>,
     /// (k).
     pub known: Vec<Known>,
+    /// (rank) what all change by the table.
+    pub change: Vec<f64>,
     /// (rows, k).
     pub each: Matrix<f64>,
     /// (rows).
@@ -233,6 +239,7 @@ impl Frame<'_> {
         let cost = (misfit + self.prior_squares(&spots, known)) / 2.0;
         debug_assert_eq!(residual.len(), rows);
         cost.is_finite().then(|| Fit {
+            change: summed(&parts, rank),
             normal: self.normal(&own, known),
             gradient: (0..n).map(|j| own[(n, j)]).collect(),
             spots,
@@ -465,6 +472,17 @@ impl Frame<'_> {
             height: rows,
         }
     }
+}
+
+/// (rank) the changes of expansions (k, ROWS, rank) together.
+fn summed(parts: &[f64], rank: usize) -> Vec<f64> {
+    let mut sum = vec![0.0; rank];
+    for part in parts.chunks_exact((ROWS * rank).max(1)) {
+        sum.iter_mut()
+            .zip(part)
+            .for_each(|(sum, value)| *sum += value);
+    }
+    sum
 }
 
 fn dot(one: &[f64], other: &[f64]) -> f64 {

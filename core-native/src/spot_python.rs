@@ -13,8 +13,8 @@ use crate::spot_algebra::{Beside, Metric};
 use crate::spot_expected_python::{ExpectedArrays, expected_of};
 use crate::spot_fit::{Expected, Fit, Frame, Known, Prior, Seen, Sheet};
 use crate::spot_match::{self, Limits, Measurements, Quality, Signatures};
-use crate::spot_search::{Found, Pace, Rules, Search};
-use crate::spot_table::{DIRECTIONS, Grid, Layout, PARAMETERS, ROWS, SLOPES, Spot, Table};
+use crate::spot_search::{Pace, Rules, Search};
+use crate::spot_table::{DIRECTIONS, Grid, Layout, PARAMETERS, ROWS, Spot, Table};
 
 /// A table of spots, whose values stay Python's, and where they may be.
 #[pyclass(frozen, module = "tomoskin_core")]
@@ -38,7 +38,7 @@ pub(crate) struct SeenTable {
 /// Spots, and what they do: arrays by rows, as Python has them.
 type Fitted<'py> = (
     [Bound<'py, PyArray2<f64>>; 5],
-    [Bound<'py, PyArray1<f64>>; 3],
+    [Bound<'py, PyArray1<f64>>; 4],
     (f64, f64, f64, bool),
     Vec<Known>,
 );
@@ -87,10 +87,12 @@ impl SpotTable {
         Ok(Self {
             layout: layout.checked(count).map_err(invalid)?,
             values: (*values).clone().unbind(),
-            sheet: Sheet {
-                centroids: sheet.outer_iter().map(|cell| [cell[0], cell[1]]).collect(),
-                margin: sheet.outer_iter().map(|cell| cell[2]).collect(),
-            },
+            sheet: Sheet::of(
+                sheet
+                    .outer_iter()
+                    .map(|row| [row[0], row[1], row[2]])
+                    .collect(),
+            ),
             prior: Prior {
                 middle: row(0),
                 weight: row(1),
@@ -143,8 +145,7 @@ impl SpotTable {
         Ok(fitted(py, fit))
     }
 
-    /// Touches of a frame that before held `spots` (k, 4), and whether they are fitted without
-    /// the frame's offset.
+    /// Touches of a frame that before held `spots` (k, 4).
     ///
     /// `candidates`: spots (n, 4), signatures (n, narrow), squares (n); `limits`: see
     /// `standing_out`; `pace` and `rules` in the order of their fields.
@@ -158,7 +159,7 @@ impl SpotTable {
         limits: [f64; 5],
         pace: (usize, usize, usize, usize, usize, usize, bool),
         rules: [f64; 7],
-    ) -> PyResult<(Fitted<'py>, bool, Option<Others<'py>>)> {
+    ) -> PyResult<Searched<'py>> {
         let (py, spots) = (frame.0.py(), spots_of(spots)?);
         let arrays = Arrays::of(self, seen, &frame)?;
         let frame = arrays.frame(self, seen, &frame)?;
@@ -206,68 +207,10 @@ impl SpotTable {
         };
         let found = py.detach(|| search.found(&spots));
         let found = found.ok_or_else(|| invalid("spots: not comparable with the data"))?;
-        let Found { fit, bare, others } = found;
+        let others = found.others;
         let others = others.map(|both| both.map(|values| PyArray1::from_vec(py, values)));
-        Ok((fitted(py, fit), bare, others))
-    }
-
-    /// Squares of what each spot of a fit changes beside the others, and the covariance (4k, 4k).
-    ///
-    /// `fit`: spots, each, slopes, unknown and normal; `offset` (rank) what the table lacks of
-    /// them; `quality` in the order of its fields.
-    fn judged<'py>(
-        &self,
-        seen: &SeenTable,
-        fit: [Any<'py>; 5],
-        offset: &Any<'py>,
-        quality: [f64; 3],
-        ridge: f64,
-    ) -> PyResult<Judged<'py>> {
-        let py = offset.py();
-        let [spots, each, slopes, unknown, normal] = fit;
-        let spots = spots_of(&spots)?;
-        let [each, slopes, unknown] =
-            directions([("each", &each), ("slopes", &slopes), ("unknown", &unknown)])?;
-        let normal = array::<f64, Ix2>("normal", &normal)?;
-        let offset = array::<f64, Ix1>("offset", offset)?;
-        let n = PARAMETERS * spots.len();
-        same("length of each", seen.seen.rows, each.shape()[1])?;
-        same("rows of each", spots.len(), each.shape()[0])?;
-        same("rows of slopes", n, slopes.shape()[0])?;
-        same("rows of normal", n, normal.shape()[0])?;
-        same("columns of normal", n, normal.shape()[1])?;
-        same("length of offset", self.layout.rank, offset.len())?;
-        let values = self.values.bind(py).try_readonly()?;
-        let table = self.table(&values)?;
-        let (each, slopes) = (contiguous("each", &each)?, contiguous("slopes", &slopes)?);
-        let unknown = contiguous("unknown", &unknown)?;
-        let offset = contiguous("offset", &offset)?;
-        let normal = Matrix {
-            values: contiguous("normal", &normal)?.to_vec(),
-            height: n,
-        };
-        let [misfit, degrees, uneven] = quality;
-        let quality = Quality {
-            misfit,
-            degrees,
-            uneven,
-        };
-        let out = py.detach(|| {
-            let alone = Metric::of(Matrix::zeros(seen.seen.rows, 0))?;
-            let squares = spot_match::standing(&alone, [slopes, each], ridge)?;
-            let onto = Beside::of(unknown, &[], seen.seen.rows, ridge)?;
-            let onto = onto.projected(slopes, seen.seen.rows);
-            let change = change(table, seen, &spots, offset);
-            let measurements = Measurements {
-                matrix: &seen.matrix,
-                squares: &seen.squares,
-                change: &change,
-            };
-            let covariance = spot_match::covariance(&normal, &onto, measurements, quality)?;
-            Some((squares, covariance))
-        });
-        let (squares, covariance) = out.ok_or_else(|| invalid("normal: not positive"))?;
-        Ok((PyArray1::from_vec(py, squares), by_rows(py, covariance)))
+        let turned_down = found.turned_down.map(|fit| fitted(py, fit));
+        Ok((fitted(py, found.fit), found.bare, others, turned_down))
     }
 }
 
@@ -280,20 +223,11 @@ impl SpotTable {
     }
 }
 
-/// (n_meas) what spots change, with what the table lacks of them.
-fn change(table: Table<'_>, seen: &SeenTable, spots: &[Spot], offset: &[f64]) -> Vec<f64> {
-    let rank = table.layout.rank;
-    let (mut sum, mut part) = (offset.to_vec(), vec![0.0; SLOPES * rank]);
-    for spot in spots {
-        table.expand(spot, SLOPES, &mut part);
-        let both = sum.iter_mut().zip(&part[..rank]);
-        both.for_each(|(sum, value)| *sum += value);
-    }
-    product(&seen.basis, seen.squares.len(), &sum).values
-}
-
 /// Squares of what spots change, and a covariance.
 type Judged<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
+
+/// A fit, whether it is without the frame's offset, candidates beside it, and one spot more.
+type Searched<'py> = (Fitted<'py>, bool, Option<Others<'py>>, Option<Fitted<'py>>);
 
 /// Likelihood ratios and contents of candidates.
 type Others<'py> = [Bound<'py, PyArray1<f64>>; 2];
@@ -371,7 +305,7 @@ fn fitted(py: Python<'_>, fit: Fit) -> Fitted<'_> {
     };
     let unknown = fit.metric.unknown;
     let matrices = [spots, fit.each, fit.jacobian, unknown, fit.normal];
-    let vectors = [fit.predicted, fit.residual, fit.gradient];
+    let vectors = [fit.change, fit.predicted, fit.residual, fit.gradient];
     (
         matrices.map(|matrix| by_rows(py, matrix)),
         vectors.map(|vector| PyArray1::from_vec(py, vector)),
@@ -441,6 +375,61 @@ impl SeenTable {
             squares: squares.as_array().to_vec(),
         })
     }
+
+    /// Squares of what each spot of a fit changes beside the others, and the covariance (4k, 4k).
+    ///
+    /// `fit`: each, slopes, unknown and normal; `change` (rank) what all spots change; `quality` in
+    /// the order of its fields.
+    fn judged<'py>(
+        &self,
+        fit: [Any<'py>; 4],
+        change: &Any<'py>,
+        quality: [f64; 3],
+        ridge: f64,
+    ) -> PyResult<Judged<'py>> {
+        let py = change.py();
+        let [each, slopes, unknown, normal] = fit;
+        let [each, slopes, unknown] =
+            directions([("each", &each), ("slopes", &slopes), ("unknown", &unknown)])?;
+        let normal = array::<f64, Ix2>("normal", &normal)?;
+        let change = array::<f64, Ix1>("change", change)?;
+        let n = PARAMETERS * each.shape()[0];
+        same("length of each", self.seen.rows, each.shape()[1])?;
+        same("rows of slopes", n, slopes.shape()[0])?;
+        same("rows of normal", n, normal.shape()[0])?;
+        same("columns of normal", n, normal.shape()[1])?;
+        let n_meas = self.squares.len();
+        same("length of change", self.basis.len(), change.len() * n_meas)?;
+        let (each, slopes) = (contiguous("each", &each)?, contiguous("slopes", &slopes)?);
+        let unknown = contiguous("unknown", &unknown)?;
+        let change = contiguous("change", &change)?;
+        let normal = Matrix {
+            values: contiguous("normal", &normal)?.to_vec(),
+            height: n,
+        };
+        let [misfit, degrees, uneven] = quality;
+        let quality = Quality {
+            misfit,
+            degrees,
+            uneven,
+        };
+        let out = py.detach(|| {
+            let alone = Metric::of(Matrix::zeros(self.seen.rows, 0))?;
+            let squares = spot_match::standing(&alone, [slopes, each], ridge)?;
+            let onto = Beside::of(unknown, &[], self.seen.rows, ridge)?;
+            let onto = onto.projected(slopes, self.seen.rows);
+            let change = product(&self.basis, n_meas, change).values;
+            let measurements = Measurements {
+                matrix: &self.matrix,
+                squares: &self.squares,
+                change: &change,
+            };
+            let covariance = spot_match::covariance(&normal, &onto, measurements, quality)?;
+            Some((squares, covariance))
+        });
+        let (squares, covariance) = out.ok_or_else(|| invalid("normal: not positive"))?;
+        Ok((PyArray1::from_vec(py, squares), by_rows(py, covariance)))
+    }
 }
 
 /// Arrays of as many columns, which are there.
@@ -462,7 +451,7 @@ pub(crate) fn directions<'py, const N: usize>(
 }
 
 /// A matrix by columns as the rows of an array.
-fn by_rows(py: Python<'_>, matrix: Matrix<f64>) -> Bound<'_, PyArray2<f64>> {
+pub(crate) fn by_rows(py: Python<'_>, matrix: Matrix<f64>) -> Bound<'_, PyArray2<f64>> {
     let shape = [matrix.width(), matrix.height];
     let out = PyArray2::<f64>::zeros(py, shape, false);
     if let Ok(values) = out.readwrite().as_slice_mut() {

@@ -56,6 +56,8 @@ pub struct Found {
     pub bare: bool,
     /// Likelihood ratios and contents of candidates beside it, where these have been looked at.
     pub others: Option<[Vec<f64>; 2]>,
+    /// One spot more, that was not worth it.
+    pub turned_down: Option<Fit>,
 }
 
 /// Spots, and who they are.
@@ -121,6 +123,7 @@ impl Search<'_> {
             fit,
             bare,
             others: None,
+            turned_down: None,
         })
     }
 
@@ -198,6 +201,7 @@ impl Search<'_> {
             let worth = self.weakest(&more.fit)?.1 >= self.threshold(fit, 1.0);
             let gain = self.evidence(&more.fit) - self.evidence(fit);
             if !worth || gain <= self.rules.rare {
+                found.turned_down = Some(more.fit);
                 return Some((found, tried + 1, changed));
             }
             (found, changed) = (more, true);

@@ -280,7 +280,7 @@ impl Mix<'_> {
         let mut out = [[0.0; N]; MIXED];
         for line in self.lines {
             let (mut sum, mut slope) = ([0.0; N], [0.0; N]);
-            let [weights, slopes] = line.across;
+            let [weights, slopes] = &line.across;
             for point in 0..NEAR {
                 let values = &self.values[line.first + point * self.width + first..][..N];
                 for n in 0..N {

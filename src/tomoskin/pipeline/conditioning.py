@@ -141,6 +141,7 @@ class Followed:
         self._noise_for: tuple[object, float] = (None, np.nan)
         self._blocks, self._due = baseline.idle.blocks, 1
         self._values, self._excluded = baseline.mean, np.zeros(len(baseline.mean), bool)
+        self._levels = _Levels.of(self._values, self._excluded)
         self.renew(prepared)
 
     @classmethod
@@ -233,7 +234,9 @@ class Followed:
             values = np.where(health.lost, mean, values)
         if subspace.nuisance.count > MOST_NUISANCE * len(values):
             return Conditioned(None, n_excluded, health)
-        times = _gain_of(values, mean, self._excluded)
+        if self._levels.mean is not mean or self._levels.excluded is not self._excluded:
+            self._levels = _Levels.of(mean, self._excluded)
+        times = self._levels.gain(values)
         self._has_gain = times is not None
         if times is not None and self._prepared.skin.signal.common_modes != "projected":
             return Conditioned(None, n_excluded, health, f"{_gain_text(times)}; no image is shown")
@@ -347,18 +350,34 @@ def _scale(prepared: Prepared, reference: FloatArray) -> FloatArray:
     return np.abs(reference)
 
 
-def _gain_of(values: FloatArray, mean: FloatArray, excluded: NDArray[np.bool_]) -> float | None:
-    """By which factor all voltages have changed, where it is one and far from 1; else None."""
-    counts = ~excluded & (np.abs(mean) > _COUNTS * np.sqrt(np.mean(mean**2)))
-    if not counts.any():
-        return None
-    ratio = values[counts] / mean[counts]
-    usual = (ratio > 1 / _GAIN) & (ratio < _GAIN)
-    if 2 * np.count_nonzero(usual) > len(ratio):  # so the median is too
-        return None
-    times = float(np.median(ratio))
-    alike = float(np.median(np.abs(ratio - times))) < _ALIKE * abs(times)
-    return times if alike and not 1 / _GAIN < times < _GAIN else None
+@dataclass(frozen=True, slots=True, eq=False)
+class _Levels:
+    """What tells of another gain: a ``mean`` (n_meas,) V, and what of it is ``excluded``.
+
+    ``counts`` are the numbers (n,) of the rows that do, and ``usual`` (n,) V what they read.
+    """
+
+    mean: FloatArray
+    excluded: NDArray[np.bool_]
+    counts: IntArray
+    usual: FloatArray
+
+    @classmethod
+    def of(cls, mean: FloatArray, excluded: NDArray[np.bool_]) -> Self:
+        least = _COUNTS * np.sqrt(np.mean(mean**2))
+        counts = np.flatnonzero(~excluded & (np.abs(mean) > least))
+        return cls(mean, excluded, counts, mean[counts])
+
+    def gain(self, values: FloatArray) -> float | None:
+        """By which factor all ``values`` (n_meas,) V have changed, where it is one and far from 1;
+        else None."""
+        ratio = values[self.counts] / self.usual
+        usual = (ratio > 1 / _GAIN) & (ratio < _GAIN)
+        if 2 * np.count_nonzero(usual) > len(ratio) or not len(ratio):  # so the median is too
+            return None
+        times = float(np.median(ratio))
+        alike = float(np.median(np.abs(ratio - times))) < _ALIKE * abs(times)
+        return times if alike and not 1 / _GAIN < times < _GAIN else None
 
 
 def _gain_text(times: float) -> str:

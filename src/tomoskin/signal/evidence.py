@@ -163,10 +163,11 @@ class Reciprocity:
         read at different times of a scan, so beyond its noise it may stand in the error.
         ``changed`` (n_meas,) V, since the reference: channels differ in gain, and show that.
         """
-        motion = np.maximum(np.abs(moved[self.first]), np.abs(moved[self.second]))
+        sizes = np.abs([moved, changed])
+        motion, change = np.maximum(sizes.take(self.first, axis=1), sizes.take(self.second, axis=1))
         allowed = np.maximum(motion - 4.0 * deviation, 0.0)
-        gain = _GAIN * np.maximum(np.abs(changed[self.first]), np.abs(changed[self.second]))
-        return np.asarray(np.minimum(error**2 / (deviation**2 + allowed**2 + gain**2), _MOST))
+        noise = deviation**2 + allowed**2 + (_GAIN * change) ** 2
+        return np.asarray(np.minimum(error**2 / noise, _MOST))
 
     def excess(self, squared: FloatArray) -> FloatArray:
         """(n_electrodes,) variance that each electrode adds, in units of the noise.

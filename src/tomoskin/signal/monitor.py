@@ -92,7 +92,7 @@ class Monitor:
         self._pattern = pattern
         order = np.arange(n) if rank is None else rank
         self._sign, limit = sign_limit(pattern, reference.mean, noise, order)
-        self._limit = np.where(usable, limit, np.inf)
+        self._least = np.where(usable, -limit, -np.inf)
         self._start, self._silent = reference.mean, self._unusable
         self._reciprocity = Reciprocity.of(pattern)
         self._deviation = self._reciprocity.deviation(noise)
@@ -132,7 +132,7 @@ class Monitor:
         ``own`` (n_electrodes,) V that does not turn with the current, where the drive alternates.
         """
         off = railed | self._unusable
-        bad = off | (self._sign * values < -self._limit)
+        bad = off | (self._sign * values < self._least)
         dead = self._groups.dead(values, off)
         loud = self._loud(values, off)
         stuck = self._stuck(samples)
@@ -264,11 +264,10 @@ class Monitor:
             return {}
         share = unchanged(samples, last, self._members)
         alone = share[:-1] > 1.0 - 1e-9
-        self._still = np.where(alone, self._still + 1, 0.0)
-        if not alone.any() or share[-1] > 0.5:
-            if share[-1] > 0.5:
-                self._still[:] = 0.0
+        if share[-1] > 0.5 or not alone.any():
+            self._still[:] = 0.0
             return {}
+        self._still = np.where(alone, self._still + 1, 0.0)
         count = 1.0 / np.maximum(self._members[:-1].max(axis=1), 1e-9)
         chance = np.log(max(share[-1], 0.05)) * count * self._still
         return {

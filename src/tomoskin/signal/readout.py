@@ -148,8 +148,8 @@ class Readout:
             if sums is None
             else np.any([self._at_rail(part, 2) for part in directions(samples, sums)], axis=0)
         )
-        volts = (counts[..., plus] - counts[..., minus]) * self.volts_per_count
-        return np.asarray(volts), np.asarray(at_rail[..., plus] | at_rail[..., minus])
+        volts = (counts.take(plus, -1) - counts.take(minus, -1)) * self.volts_per_count
+        return np.asarray(volts), np.asarray(at_rail.take(plus, -1) | at_rail.take(minus, -1))
 
     def _at_rail(self, counts: FloatArray, parts: int) -> NDArray[np.bool_]:
         return np.asarray((parts * counts <= self.low) | (parts * counts >= self.high))

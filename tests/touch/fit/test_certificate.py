@@ -62,12 +62,25 @@ def test_no_more_is_wrong_than_is_certified() -> None:
     errors = np.linalg.norm(by_table(spots)[:, 0] - exact, axis=1)
     said = np.array(
         [
-            ours.reduced.error(spot[None], size[None])
+            ours.reduced.lacking(spot[None], size[None])[0]
             for spot, size in zip(spots, sizes, strict=True)
         ]
     )
     assert np.mean(errors <= said) >= 0.9
     assert np.median(said) < 6 * np.median(errors), "and not for want of saying much"
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def test_the_native_engine_says_what_numpy_does(count: int) -> None:
+    ours, random = model(), np.random.default_rng(5)
+    reduced = ours.reduced
+    for _ in range(5):
+        spots = drawn_spots(random, ours.response, ours.prior, "decrease", count)
+        sizes = random.uniform(1.0, 50.0, count)
+        alone, change = reduced.lacking(spots, sizes)
+        assert alone == pytest.approx(reduced.certificate.error(reduced.rim.like(spots), sizes))
+        other = reduced.interaction.change(spots)
+        np.testing.assert_allclose(change, other, atol=1e-5 * np.abs(other).max())
 
 
 def test_a_live_frame_asks_the_exact_model_where_more_may_be_wrong(

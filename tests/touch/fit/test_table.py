@@ -171,6 +171,26 @@ def test_one_call_finds_what_the_search_step_by_step_does(goes_on: bool) -> None
     assert known == ({None, 0} if goes_on else {None})
 
 
+def test_one_spot_more_that_was_not_worth_it_is_proposed_as_it_was_fitted() -> None:
+    native, _ = solvers()
+    none, pace = Deficit.none(len(native.table.basis)), replace(LIVE, rare=500.0)
+    frame = problem(native, np.concatenate([TWO, press(0.0, -0.06, 0.018, -0.1)]), 0.01)
+    search = ForwardSelection(frame, model().candidates.matched(frame.seen), 5.0, 5, pace, none)
+    answer = native.searched(search.question, TWO)
+    assert answer is not None
+    assert answer.turned_down is not None
+    assert len(answer.fit.spots) == 2
+    anew = search.proposed(answer.fit)
+    assert anew is not None
+    close(answer.turned_down.spots, anew.spots)
+    search.turn_down(answer.fit, answer.turned_down)
+    assert search.proposed(answer.fit) is answer.turned_down
+    stepwise = search.found(TWO)
+    proposed = search.proposed(stepwise)
+    assert proposed is not None
+    close(proposed.spots, anew.spots)
+
+
 def test_what_changes_do_not_show_along_is_noise() -> None:
     seen = WhitenedTable.of(model().solver, whitener(), model().response.times)
     volts = data(TWO)

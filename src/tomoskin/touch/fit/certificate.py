@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,7 +16,14 @@ from scipy.spatial import cKDTree
 from tomoskin.core import Arrays, FloatArray, IntArray, finished, reach
 from tomoskin.touch.fit.interaction import Interaction
 from tomoskin.touch.fit.prior import SpotPrior
-from tomoskin.touch.fit.spot import CONTENT, FILLING, LOG_RADIUS, N_PARAMETERS, Response
+from tomoskin.touch.fit.spot import (
+    CONTENT,
+    FILLING,
+    LOG_RADIUS,
+    N_PARAMETERS,
+    PROFILE,
+    Response,
+)
 from tomoskin.touch.fit.table import ResponseTable
 
 _SPOTS, _PAIRS = 240, 60
@@ -104,14 +111,13 @@ class Certificate:
     ) -> Generator[None, None, Certificate]:
         """That of the ``table`` of ``response``, another sheet on the same mesh, a piece between
         two yields."""
-        exact = []
-        for some in np.array_split(self.spots[:_MOVED, None], _MOVED // 3):
+        wrong: list[float] = []
+        for some in np.array_split(self.spots[:_MOVED], _MOVED // 3):
             yield
-            exact.append(response.changes(list(some)))
-        yield
-        alone = np.concatenate(exact)
-        wrong = alone - table.expanded(self.spots[:_MOVED])[:, 0] @ table.basis
-        beside = _norms(wrong) ** 2 / _norms(alone) ** 2 - self.parts[:_MOVED] ** 2
+            alone = response.changes(list(some[:, None]))
+            lacks = alone - table.expanded(some)[:, 0] @ table.basis
+            wrong += (_norms(lacks) / _norms(alone)).tolist()
+        beside = np.square(wrong) - self.parts[:_MOVED] ** 2
         return replace(self, moved=float(np.sqrt(max(beside.mean(), 0.0))))
 
     def error(self, like: FloatArray, sizes: FloatArray) -> float:
@@ -187,9 +193,27 @@ class Reduced:
         yield
         return cls(interaction, certificate, Rim.of(response, prior))
 
-    def error(self, spots: FloatArray, sizes: FloatArray) -> float:
-        """See :meth:`Certificate.error`, of spots (k, 4)."""
-        return self.certificate.error(self.rim.like(spots), sizes)
+    def lacking(self, spots: FloatArray, sizes: FloatArray) -> tuple[float, FloatArray]:
+        """What the table lacks of spots (k, 4) alone, see :meth:`Certificate.error`; and (n_meas,)
+        V that they do to each other, see :meth:`Interaction.change`."""
+        if self._native is None:
+            alone = self.certificate.error(self.rim.like(spots), sizes)
+            return alone, self.interaction.change(spots)
+        alone, transfer = self._native.lacking(spots, sizes)
+        return alone, self.interaction.state.model.voltages(transfer)
+
+    @cached_property
+    def _native(self) -> Any:
+        """The same in the native engine; None where that does not run."""
+        own, certificate, rim = self.interaction, self.certificate, self.rim
+        core = own.state.model.engine.core
+        return core and core.Reduced(
+            PROFILE,
+            (own.centres, own.spread, own.fields, own.between),
+            (certificate.like, certificate.parts, rim.tree.data),
+            (certificate.margin, certificate.moved, rim.radius),
+            _NEIGHBOURS,
+        )
 
 
 def drawn_spots(

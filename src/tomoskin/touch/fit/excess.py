@@ -162,22 +162,38 @@ class Gauge:
         ``moved`` (n_meas,) V since the frame before: of that a part may stand between two rows,
         since one is read after the other; and of all data as much as channels differ in gain.
         """
-        first, second, sign = self.pairs.first, self.pairs.second, self.pairs.sign
-        one, other = dv[first], sign * dv[second]
-        seen = np.stack([one - other, moved[first] + sign * moved[second], one + other], axis=1)
-        along = (self.shows @ seen.astype(np.float32)).astype(np.float64)
-        differs, changes, gains = _means(along * along, self.starts, self.count).T
+        pairs, rows = self.pairs, np.array([dv, moved])
+        one = rows.take(pairs.first, axis=1)
+        other = rows.take(pairs.second, axis=1) * pairs.sign
+        seen = np.empty((3, len(pairs.sign)), np.float32)
+        seen[0], seen[1:] = one[0] - other[0], one + other
+        # one by one: a product with so few columns takes three times as long
+        along = np.array([self.shows @ column for column in seen], np.float64)
+        squares, (some, starts, count) = np.zeros(len(self.count)), self._parts
+        if not len(some):
+            return squares
+        differs, gains, changes = np.add.reduceat(along * along, starts, axis=1) / count
         allowed = _MOVES**2 * changes + _GAINS**2 * gains
-        return np.asarray(differs - (allowed + allowed.mean()) / 2)
+        squares[some] = differs - (allowed + allowed.sum() / len(squares)) / 2
+        return squares
+
+    @cached_property
+    def _parts(self) -> tuple[IntArray, IntArray, IntArray]:
+        """Channels with parts, the first of each, and how many it has."""
+        some = np.flatnonzero(self.count)
+        return some, self.starts[some], self.count[some]
+
+    @cached_property
+    def loudest(self) -> float:
+        """The median channel's mean square up to which all channels may be as they should."""
+        return 1 + (_common(self.limit, self) - 1) / 2
 
 
 def _means(values: FloatArray, starts: IntArray, count: IntArray) -> FloatArray:
-    """(n_channels, …) means of ``values`` (n, …) over each channel's; 0 where it has none."""
-    out = np.zeros((len(count), *values.shape[1:]))
-    some = count > 0
-    if some.any():
-        sums = np.add.reduceat(values, starts[some])
-        out[some] = (sums.T / count[some]).T
+    """(n_channels,) means of ``values`` (n,) over each channel's; 0 where it has none."""
+    out, some = np.zeros(len(count)), np.flatnonzero(count)
+    if len(some):
+        out[some] = np.add.reduceat(values, starts[some]) / count[some]
     return out
 
 
@@ -219,7 +235,7 @@ class Excess:
         none = np.zeros(len(channels.names))
         return cls(1.0, none, 0, none)
 
-    @property
+    @cached_property
     def any(self) -> bool:
         """Whether there is some."""
         return self.level > 1.0 or bool(self.variance.any())
@@ -256,7 +272,7 @@ class Excess:
     def after(self, squares: FloatArray, gauge: Gauge) -> Excess:
         """With what a frame shows, (n_channels,) mean squares."""
         common = _common(squares, gauge)
-        if common <= 1 + (_common(gauge.limit, gauge) - 1) / 2:
+        if common <= gauge.loudest:
             common = 1.0
         louder = squares > gauge.limit * common
         if common == 1.0 and not louder.any():

@@ -7,6 +7,7 @@ from collections import OrderedDict
 from collections.abc import Generator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import is_
 from typing import Self
 
 import numpy as np
@@ -21,7 +22,7 @@ from tomoskin.touch.fit.certificate import Certificate, Reduced
 from tomoskin.touch.fit.excess import Gauge
 from tomoskin.touch.fit.expectation import Expectation
 from tomoskin.touch.fit.native import NativeSolver
-from tomoskin.touch.fit.noise import ResidualResponse, Whitener
+from tomoskin.touch.fit.noise import ResidualDirections, ResidualResponse, Whitener
 from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
@@ -30,7 +31,7 @@ from tomoskin.touch.fit.search import SpotDetections, joined, search
 from tomoskin.touch.fit.selection import ForwardSelection
 from tomoskin.touch.fit.sheet import fields_of, fitting_sheet
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
-from tomoskin.touch.fit.spot import N_PARAMETERS, Footprints, Response, depth_of
+from tomoskin.touch.fit.spot import FILLING, N_PARAMETERS, Footprints, Response
 from tomoskin.touch.fit.table import ResponseTable
 from tomoskin.touch.fit.tabulate import Tabulation, kept_tabulation
 from tomoskin.touch.fit.watch import FrameWatch
@@ -182,8 +183,7 @@ class SpotModel:
         made.__dict__["reduced"] = yield from Reduced.making(response, certificate, self.prior)
         yield
         _ = made.solver
-        yield
-        _ = table.typical
+        table.__dict__["typical"] = yield from table.typifying()
         return made
 
 
@@ -228,9 +228,8 @@ class SpotFinder:
         self._cells = CellDiscs.of(mesh)
         self._pace, self._reach, self._unrest = pace, pace.speed * scan_time, 1.0
         self._fading = math.ceil(pace.fading / scan_time) if scan_time else 0
-        self._residual = ResidualResponse.none(len(model.scale))
-        self._newest_left: tuple[FloatArray, WhitenedTable | None, FloatArray]
-        self._newest_left = self._residual.changes, None, np.zeros((0, 0))
+        self._residual = ResidualResponse.none()
+        self._left = ResidualDirections.none(np.zeros((0, len(model.scale))))
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
         self._before = np.zeros((0, N_PARAMETERS))
@@ -243,6 +242,7 @@ class SpotFinder:
         self._noise = noise / self._scale[:, None] / self._scale
         self._nuisance = np.zeros((len(noise), 0))
         self._matched: OrderedDict[bytes, Seen] = OrderedDict()
+        self._newest_seen: tuple[tuple[object, ...], Seen] | None = None
 
     def renewing(self, noise: FloatArray, gain: float = 1.0) -> Generator[None, None, None]:
         """Go on with other noise, or another gain, at the end of some pieces of work."""
@@ -272,13 +272,13 @@ class SpotFinder:
         touch: a unit vector for each excluded row. There must be more rows than that.
         """
         self._nuisance = nuisance
-        data, nuisance = dv / self._scale, nuisance / self._scale[:, None]
-        self.watch.begin(data, self._whitened(nuisance)[2])
-        detected, matched = self._searched(data, nuisance)
+        data = dv / self._scale
+        self.watch.begin(data, self._seen()[2])
+        detected, matched = self._searched(data)
         solver = self._model.solver
         times = self.watch.unexplained(solver, detected.fit, matched)
         if times > 1.0:  # it may be no touch in as much noise
-            detected, matched = self._searched(data, nuisance, times)
+            detected, matched = self._searched(data, times)
         self.watch.end(solver, detected.fit, matched, times)
         self._unrest = self._motion(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
@@ -289,14 +289,16 @@ class SpotFinder:
         detections.sort(key=lambda detection: -abs(detection.peak))
         return detections
 
-    def _searched(
-        self, data: FloatArray, nuisance: FloatArray, times: float = 1.0
-    ) -> tuple[SpotDetections, Matched]:
+    def _searched(self, data: FloatArray, times: float = 1.0) -> tuple[SpotDetections, Matched]:
         """Touches of ``data`` (n_meas,) in so many times the noise that is known."""
-        seen, matched, _ = self._whitened(nuisance)
+        seen, matched, _ = self._seen()
         if times != 1.0:
             seen, matched = seen.louder(times), matched.louder(times)
         whitened, rest = seen.whitened(data)
+        left = (
+            self._left if self._left.matrix is seen.matrix else ResidualDirections.none(seen.matrix)
+        )
+        self._left = left.of(self._residual.changes)
         problem = Problem(
             response=self._model.response,
             reduced=self._model.reduced,
@@ -307,7 +309,7 @@ class SpotFinder:
             grows=self._unrest * _GROWS,
             data=whitened,
             rest=rest,
-            left=self._left(seen),
+            left=self._left.rows,
             expected=self._expected,
         )
         sign = self.watch.sign(problem, matched)
@@ -336,15 +338,6 @@ class SpotFinder:
             np.zeros((0, N_PARAMETERS)),
         )
 
-    def _left(self, seen: WhitenedTable) -> FloatArray:
-        """(q, c) whitened directions of residual responses; those of the last frame where nothing
-        has changed."""
-        responses, noise, left = self._newest_left
-        if responses is not self._residual.changes or noise is not seen:
-            left = self._residual.directions.T @ seen.matrix.T
-            self._newest_left = self._residual.changes, seen, left
-        return left
-
     def _going_on(self, detected: SpotDetections) -> Expectation:
         """What is expected of the touches of this frame in the next one."""
         if not self._reach or not len(detected.fit.spots):
@@ -361,7 +354,15 @@ class SpotFinder:
         moved = max([math.sqrt(x * x + y * y) for x, y in way.tolist()])
         return min(1.0, math.hypot(_REST, moved / self._reach))
 
-    def _whitened(self, nuisance: FloatArray) -> Seen:
+    def _seen(self) -> Seen:
+        """How the newest frame is seen: as the one before, where nothing has changed."""
+        now, newest = (self._nuisance, self._noise, self.watch.excess), self._newest_seen
+        if newest is None or not all(map(is_, now, newest[0])):
+            newest = self._newest_seen = now, self._kept()
+        return newest[1]
+
+    def _kept(self) -> Seen:
+        nuisance = self._nuisance / self._scale[:, None]
         key = nuisance.tobytes() + self.watch.excess.key
         if key not in self._matched:
             self._matched[key] = finished(self._making(self._noise, nuisance))
@@ -387,21 +388,22 @@ class SpotFinder:
 
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots
-        depth = self._unit * np.expm1(depth_of(spots)) if len(spots) else np.zeros(0)
-        shown = np.flatnonzero(~self.watch.wrong(spots)).tolist()
-        return [self._detection(detected, k, float(depth[k])) for k in shown]
+        wrong = self.watch.wrong(spots).tolist()
+        shown = [(k, spot) for k, spot in enumerate(spots.tolist()) if not wrong[k]]
+        return [self._detection(detected, k, spot) for k, spot in shown]
 
-    def _detection(self, detected: SpotDetections, k: int, peak: float) -> Detection:
-        x, y, log_radius, _ = detected.fit.spots[k].tolist()
+    def _detection(self, detected: SpotDetections, k: int, spot: list[float]) -> Detection:
+        x, y, log_radius, content = spot
         (xx, xy), (_, yy) = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2].tolist()
+        radius = math.exp(log_radius)
         return Detection(
             x=x,
             y=y,
             sd_x=math.sqrt(xx),
             sd_y=math.sqrt(yy),
-            area=math.pi * math.exp(2 * log_radius),
-            peak=peak,
-            cells=self._cells.within(x, y, math.exp(2 * log_radius)),
+            area=math.pi * radius**2,
+            peak=self._unit * math.expm1(content / (FILLING * radius**2)),
+            cells=self._cells.within(x, y, radius),
             cov_xy=xy,
             snr=float(detected.ratio[k]),
             close=bool(detected.close[k]),

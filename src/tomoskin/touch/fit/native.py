@@ -70,7 +70,7 @@ class NativeSolver:
         if pace.rounds or pace.joint:
             return None
         limits, rules = question.limits, question.rules
-        found, bare, others = self._spots.searched(
+        found, bare, others, more = self._spots.searched(
             problem.seen.kept,
             self._frame(problem, question.deficit),
             before,
@@ -87,7 +87,8 @@ class NativeSolver:
         )
         rank = len(self.table.basis)
         deficit = Deficit.none(rank) if bare else question.deficit
-        return Answer(_fit(problem, deficit, found), others and tuple(others))
+        more = more and _fit(problem, deficit, more)
+        return Answer(_fit(problem, deficit, found), others and tuple(others), more)
 
     def _frame(self, problem: Problem, deficit: Deficit) -> tuple[Any, ...]:
         deviations = (DIRECTED, RESHAPED, problem.reach, problem.grows)
@@ -98,11 +99,10 @@ class NativeSolver:
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
         """See :class:`Solver`."""
-        parts = fit.spots, fit.each, fit.slopes, fit.unknown, fit.normal
+        parts = fit.each, fit.slopes, fit.unknown, fit.normal
         quality = fit.misfit, float(fit.degrees), uneven
-        squares, covariance = self._spots.judged(
-            problem.seen.kept, parts, fit.deficit.change, quality, RIDGE
-        )
+        change = fit.change + fit.deficit.change
+        squares, covariance = problem.seen.kept.judged(parts, change, quality, RIDGE)
         return squares, covariance
 
     def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
@@ -123,11 +123,12 @@ class NativeSolver:
 def _fit(problem: Problem, deficit: Deficit, fitted: Fitted) -> Fit:
     matrices, vectors, numbers, known = fitted
     found, each, slopes, unknown, normal = matrices
-    predicted, residual, gradient = vectors
+    change, predicted, residual, gradient = vectors
     misfit, log_size, cost, settled = numbers
     return Fit(
         spots=found,
         deficit=deficit,
+        change=change,
         each=each,
         predicted=predicted,
         residual=residual,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Self
 
 import numpy as np
@@ -158,24 +159,19 @@ class ResidualResponse:
     spots
         (k, 4), the newest last.
     changes
-        (k, n_meas) V, what each did to the rows.
+        (n_meas,) V of each, what it did to the rows.
     quiet
         Frames since there was a touch.
     """
 
     spots: FloatArray
-    changes: FloatArray
+    changes: tuple[FloatArray, ...]
     quiet: int = 0
 
     @classmethod
-    def none(cls, n_meas: int) -> Self:
+    def none(cls) -> Self:
         """Where nothing has touched."""
-        return cls(np.zeros((0, N_PARAMETERS)), np.zeros((0, n_meas)))
-
-    @property
-    def directions(self) -> FloatArray:
-        """(n_meas, k) V, each as long as its deviation."""
-        return _LEFT * self.changes.T
+        return cls(np.zeros((0, N_PARAMETERS)), ())
 
     def after(
         self, spots: FloatArray, changes: Callable[[FloatArray], FloatArray], frames: int
@@ -184,7 +180,7 @@ class ResidualResponse:
         last of them. ``changes`` gives (k, n_meas) V of spots (k, 4), each alone."""
         if not len(spots):
             if len(self.spots) and self.quiet >= frames:
-                return self.none(self.changes.shape[1])
+                return self.none()
             return replace(self, quiet=self.quiet + 1)
         kept = self.spots.tolist()
         news = [not _is_held(spot, kept) for spot in spots.tolist()]
@@ -194,8 +190,43 @@ class ResidualResponse:
         stays = [not any(_is_near(foot, spot) for spot in fresh.tolist()) for foot in kept]
         return type(self)(
             np.concatenate([self.spots[stays], fresh])[-_MOST:],
-            np.concatenate([self.changes[stays], changes(fresh)])[-_MOST:],
+            (*compress(self.changes, stays), *changes(fresh))[-_MOST:],
         )
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualDirections:
+    """Residual responses as whitened data see them, each as long as its deviation.
+
+    Attributes
+    ----------
+    matrix
+        (c, n_meas) 1/V, from data to whitened data.
+    changes
+        (n_meas,) V of each, see :class:`ResidualResponse`.
+    rows
+        (k, c).
+    """
+
+    matrix: FloatArray
+    changes: tuple[FloatArray, ...]
+    rows: FloatArray
+
+    @classmethod
+    def none(cls, matrix: FloatArray) -> Self:
+        """Where nothing has touched."""
+        return cls(matrix, (), np.zeros((0, len(matrix))))
+
+    def of(self, changes: tuple[FloatArray, ...]) -> Self:
+        """Those of other ``changes``: a product for each that is new."""
+        if changes is self.changes:
+            return self
+        known = {id(change): row for change, row in zip(self.changes, self.rows, strict=True)}
+        rows = [
+            known[id(change)] if id(change) in known else _LEFT * (self.matrix @ change)
+            for change in changes
+        ]
+        return type(self)(self.matrix, changes, np.array(rows).reshape(-1, len(self.matrix)))
 
 
 def _is_near(foot: list[float], spot: list[float]) -> bool:

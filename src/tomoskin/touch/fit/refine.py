@@ -83,6 +83,8 @@ class Fit:
         (k, 4), see :mod:`tomoskin.touch.fit.spot`.
     deficit
         What the table lacks of these spots.
+    change
+        (rank,) V that all of them change by the table, in its basis.
     each, predicted
         (k, c) what each spot does to the whitened data, and (c,) what all do together.
     residual
@@ -111,6 +113,7 @@ class Fit:
 
     spots: FloatArray
     deficit: Deficit
+    change: FloatArray
     each: FloatArray
     predicted: FloatArray
     residual: FloatArray
@@ -303,11 +306,12 @@ class Solver(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """A fit, and the likelihood ratios (n,) and contents (n,) of candidates beside it, where these
-    have been looked at."""
+    """A fit; the likelihood ratios (n,) and contents (n,) of candidates beside it, where these have
+    been looked at; and one spot more where that was tried last, and not worth it."""
 
     fit: Fit
     others: tuple[FloatArray, FloatArray] | None
+    turned_down: Fit | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -427,7 +431,7 @@ class Problem:
             return fit
         allowed = max(_EXACT, tolerance * math.sqrt(len(self.seen.full)))
         for _ in range(rounds):
-            deficit = self._lacking(fit, allowed if tolerance else 0.0)
+            deficit = (self._reduced(fit, allowed) if tolerance else None) or self._exact(fit)
             far = np.linalg.norm(self.seen.direct @ (deficit.change - fit.deficit.change))
             if far < allowed:
                 return replace(fit, deficit=deficit)
@@ -436,20 +440,20 @@ class Problem:
                 break
         return fit
 
-    def _lacking(self, fit: Fit, allowed: float) -> Deficit:
-        """What the table lacks of the spots of a fit; so many deviations may be wrong of it."""
-        spots, basis = fit.spots, self.solver.table.basis
-        sizes = np.linalg.norm(fit.each, axis=1)
-        alone = self.reduced.error(spots, sizes) if allowed else 0.0
-        if alone < allowed:
-            change = np.zeros(len(basis))
-            if len(spots) > 1:
-                change = basis @ self.reduced.interaction.change(spots)
-            together = float(np.linalg.norm(self.seen.direct @ change))
-            if math.hypot(alone, self.reduced.certificate.pair * together) < allowed:
-                return Deficit(spots, change)
-        exact = basis @ self.response.changes([spots])[0]
-        return Deficit(spots, exact - self.solver.expanded(spots)[:, 0].sum(axis=0))
+    def _reduced(self, fit: Fit, allowed: float) -> Deficit | None:
+        """What the table lacks of the spots of a fit, by what stands for the exact model; None
+        where more may be wrong of it than so many deviations."""
+        sizes = np.sqrt(np.einsum("kc,kc->k", fit.each, fit.each))
+        alone, volts = self.reduced.lacking(fit.spots, sizes)
+        change = self.solver.table.basis @ volts
+        together = self.seen.direct @ change
+        pairs = self.reduced.certificate.pair * math.sqrt(together @ together)
+        return Deficit(fit.spots, change) if math.hypot(alone, pairs) < allowed else None
+
+    def _exact(self, fit: Fit) -> Deficit:
+        """The same by the exact model."""
+        exact = self.solver.table.basis @ self.response.changes([fit.spots])[0]
+        return Deficit(fit.spots, exact - fit.change)
 
     def evidence(self, fit: Fit) -> float:
         """See :meth:`Fit.log_evidence`."""

@@ -48,6 +48,8 @@ def search(selection: ForwardSelection, before: FloatArray) -> SpotDetections:
     fit = selection.found(before) if answer is None else answer.fit
     if answer and answer.others:
         selection.beside.remember(fit, answer.others)
+    if answer and answer.turned_down:
+        selection.turn_down(fit, answer.turned_down)
     return judged(selection, _confirmed(selection, fit, before))
 
 
@@ -87,13 +89,15 @@ def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:
 
 def joined(detected: SpotDetections) -> SpotDetections:
     """The same with each two touches as one whose positions are not distinct (2 deviations)."""
-    spots, k = detected.fit.spots, len(detected.fit.spots)
-    variance = np.diag(detected.covariance).reshape(k, N_PARAMETERS)[:, :2].sum(axis=1)
-    for i in range(k):
-        for j in range(i + 1, k):
-            away = spots[i, :2] - spots[j, :2]
-            if away @ away > 8 * (variance[i] + variance[j]):  # no direction has more than all
+    places = detected.fit.spots[:, :2].tolist()
+    variance = detected.covariance.diagonal().tolist()
+    for i in range(len(places)):
+        for j in range(i + 1, len(places)):
+            x, y = (one - other for one, other in zip(places[i], places[j], strict=True))
+            both = sum(variance[4 * k] + variance[4 * k + 1] for k in (i, j))
+            if x * x + y * y > 8 * both:  # no direction has more than all
                 continue
+            away = np.array([x, y])
             pick = [4 * i, 4 * i + 1, 4 * j, 4 * j + 1]
             block = detected.covariance[np.ix_(pick, pick)]
             turn = np.concatenate([away, -away])

@@ -169,6 +169,7 @@ class ForwardSelection:
             worth = self.ratios(more).min() >= self.threshold(fit, 1.0)
             gain = self.problem.evidence(more) - self.problem.evidence(fit)
             if not worth or gain <= self.pace.rare:
+                self.turn_down(fit, more)
                 return fit, tried + 1
             fit = more
         return fit, tries
@@ -181,8 +182,19 @@ class ForwardSelection:
         """One spot more than a ``fit`` has, whatever it is worth; None where nothing stands out."""
         if not 0 < len(fit.spots) < self.most:
             return None
+        if self._turned_down and self._turned_down[-1][0] is fit:
+            return self._turned_down[-1][1]
         fresh = self.beside.best(fit, self.threshold(fit, self.pace.look))
         return None if fresh is None else self._best(_starts(fit, fresh), fit.deficit, [])
+
+    def turn_down(self, fit: Fit, more: Fit) -> None:
+        """Keep what :meth:`proposed` would find beside ``fit``: ``more`` was not worth it."""
+        self._turned_down.append((fit, more))
+
+    @cached_property
+    def _turned_down(self) -> list[tuple[Fit, Fit]]:
+        """Fits, and one spot more beside each, the newest last."""
+        return []
 
     def _joint_starts(self, count: int) -> list[FloatArray]:
         """Sets of so many spots whatever has been found."""

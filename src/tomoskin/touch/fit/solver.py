@@ -132,6 +132,7 @@ class NumpySolver:
         return Fit(
             spots=spots,
             deficit=deficit,
+            change=parts[:, 0].sum(axis=0),
             each=each,
             predicted=predicted,
             residual=residual,
@@ -171,8 +172,8 @@ class NumpySolver:
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
         """See :class:`Solver`."""
-        seen, table = problem.seen, self.table
-        change = (table.expanded(fit.spots)[:, 0].sum(axis=0) + fit.deficit.change) @ table.basis
+        seen = problem.seen
+        change = (fit.change + fit.deficit.change) @ self.table.basis
         onto = _Beside.of(fit.unknown, fit.slopes[:0]).projected(fit.slopes)
         answers = onto @ seen.matrix * change
         moved = fit.covariance @ answers

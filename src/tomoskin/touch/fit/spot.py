@@ -96,6 +96,9 @@ _BELL_HEIGHT = _bell_height()
 REACH, FILLING = _moments(profile)
 """Of a spot: where it ends, in radii, and ∫ profile over the plane, in squared radii."""
 
+PROFILE = REACH, FILLING, _SCALES, _NARROW, _BELL_HEIGHT, _BELL
+"""All numbers of it, for the native engine."""
+
 
 def spots_of(
     places: FloatArray, radius: FloatArray | float, depth: FloatArray | float

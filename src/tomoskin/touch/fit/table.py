@@ -8,6 +8,7 @@ other is left to the exact model.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -15,7 +16,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray, IntArray, finished
 from tomoskin.touch.fit.spot import FILLING, LOG_RADIUS, X, Y, depth_of
 
 PADDING = 2
@@ -27,8 +28,8 @@ ABREAST = 8
 NEAR = 4
 """Radii that a spot is between."""
 
-_TYPICAL = 2000
-"""Points of a table that tell what is typical."""
+_TYPICAL, _PIECES = 2000, 4
+"""Points of a table that tell what is typical; pieces of work in which they are read."""
 
 N_DIRECTIONS = 2
 """Of each spot: of a stretched sheet's direction, and of its shape; see :class:`Part`."""
@@ -172,10 +173,20 @@ class ResponseTable:
     @cached_property
     def typical(self) -> FloatArray:
         """(rank, rank) V whose rows' squares are the mean ones of spots of all depths."""
-        n, some = len(self.nodes), self.values[:: max(1, len(self.values) // _TYPICAL)]
-        strong = (some[:, :n] * self.nodes[:, None]).reshape(-1, len(self.basis))
-        square, vectors = np.linalg.eigh(strong.T @ strong / len(strong))
-        return np.asarray(vectors * np.sqrt(np.maximum(square, 0.0)))
+        return finished(self.typifying())
+
+    def typifying(self) -> Generator[None, None, FloatArray]:
+        """:attr:`typical`, a piece of work between two yields."""
+        n, rank = len(self.nodes), len(self.basis)
+        some = self.values[:: max(1, len(self.values) // _TYPICAL)]
+        square = np.zeros((rank, rank))
+        for part in np.array_split(some, _PIECES):
+            yield
+            strong = (part[:, :n] * self.nodes[:, None]).reshape(-1, rank)
+            square += strong.T @ strong
+        yield
+        mean, vectors = np.linalg.eigh(square / (n * len(some)))
+        return np.asarray(vectors * np.sqrt(np.maximum(mean, 0.0)))
 
     @cached_property
     def _all(self) -> tuple[FloatArray, FloatArray, IntArray, IntArray]:

@@ -154,9 +154,11 @@ class FrameWatch:
         self._before, self._times = fit.spots, times
         self._in_vain, self._astray = self._in_vain + 1 if self._astray else 0, False
         self._age = self._age + 1 if len(fit.spots) else 0
-        wrong = fit.spots[self.wrong(fit.spots)]
-        self._lifted = wrong[np.abs(wrong[:, CONTENT]).argmax(), :2] if len(wrong) else None
-        self._raised = self._raised + 1 if len(wrong) else 0
+        wrong, self._lifted = self.wrong(fit.spots), None
+        if wrong.any():
+            spots = fit.spots[wrong]
+            self._lifted = spots[np.abs(spots[:, CONTENT]).argmax(), :2]
+        self._raised = 0 if self._lifted is None else self._raised + 1
         self.like_touch = bool(len(fit.spots))
         beyond = fit.misfit - fit.degrees
         if beyond > 0 and not self.like_touch:
