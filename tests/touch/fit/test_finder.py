@@ -139,13 +139,6 @@ def test_two_at_one_place_are_one_or_said_to_be_close() -> None:
         assert np.hypot(found[0].x, found[0].y) < 0.015
 
 
-@pytest.mark.parametrize(("radius", "several"), [(0.020, False), (0.045, True)])
-def test_what_is_wider_than_a_finger_may_be_several(radius: float, several: bool) -> None:
-    for n in noise(16, 4, 9):
-        (detection,) = finder().push(data(press(0.01, 0.0, radius)) + n, NOTHING)
-        assert detection.close == several
-
-
 def test_only_the_sign_that_counts() -> None:
     rise = data(press(0.03, 0.0, depth=0.3))
     assert finder().push(rise, NOTHING) == []

@@ -15,10 +15,6 @@ from tomoskin.touch.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
 _DOUBTFUL = 0.8
 """Part of the ratio at which a touch begins; above it, another touch beside one is possible."""
 
-_WIDE, _BY_DEVIATIONS = 1.5, 0.5
-"""Times the median radius beyond which a spot is wider than a finger, and by how many deviations:
-then it may be several."""
-
 _UNEVEN = 0.08
 """Part by which each row answers a touch otherwise than the model's, at the least: a sheet is
 uneven, contacts and gains differ. A standard deviation, chosen on the twin's seeds 1 to 3."""
@@ -37,7 +33,7 @@ class SpotDetections:
     covariance
         (4k, 4k), noise and a wrong profile together.
     close
-        (k,) bool: another touch so near cannot be ruled out, or it is wider than a finger.
+        (k,) bool: another touch so near cannot be ruled out.
     """
 
     fit: Fit
@@ -76,8 +72,7 @@ def judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
         return SpotDetections(fit, none, np.zeros((0, 0)), none.astype(bool))
     problem = selection.problem
     squares, covariance = problem.solver.judged(problem, fit, _UNEVEN)
-    close = _close(selection, fit) | _wide(selection, fit, covariance)
-    return SpotDetections(fit, np.sqrt(squares), covariance, close)
+    return SpotDetections(fit, np.sqrt(squares), covariance, _close(selection, fit))
 
 
 def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:
@@ -88,13 +83,6 @@ def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:
         return np.zeros(len(fit.spots), dtype=bool)
     apart = np.linalg.norm(fit.spots[:, None, :2] - doubtful, axis=2).min(axis=1)
     return np.asarray(apart < 2 * np.exp(fit.spots[:, LOG_RADIUS]))
-
-
-def _wide(selection: ForwardSelection, fit: Fit, covariance: FloatArray) -> NDArray[np.bool_]:
-    """Where a spot is wider than a finger: of two that it stands for, neither stands out."""
-    deviation = np.sqrt(np.diag(covariance)[LOG_RADIUS::N_PARAMETERS])
-    least = np.log(_WIDE * selection.problem.prior.radius)
-    return np.asarray(fit.spots[:, LOG_RADIUS] > least + _BY_DEVIATIONS * deviation)
 
 
 def joined(detected: SpotDetections) -> SpotDetections:
