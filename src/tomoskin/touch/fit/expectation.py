@@ -53,14 +53,14 @@ class Expectation:
         return np.asarray(np.linalg.inv(self.covariances))
 
     def away(self, spots: FloatArray, known: Known) -> float:
-        """Squared deviations from where it is expected of that of ``spots`` (k, 4) which is
-        farthest from it; of newcomers without bound, and 0 where there are none."""
+        """The largest squared deviation, along one column, of ``spots`` (k, 4) from where they are
+        expected; of newcomers without bound, and 0 where there are none."""
         numbers = [number for number in known if number is not None]
         if len(numbers) < len(spots):
             return math.inf
         off = spots[:, :CONTENT] - self.spots[numbers, :CONTENT]
-        squares = np.einsum("ki,kij,kj->k", off, self.weights[numbers], off)
-        return float(squares.max(initial=0.0))
+        variances = self.covariances.diagonal(axis1=1, axis2=2)[numbers]
+        return float((off * off / variances).max(initial=0.0))
 
     @cached_property
     def log_volumes(self) -> FloatArray:
