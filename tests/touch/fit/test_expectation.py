@@ -30,6 +30,14 @@ def test_nothing_is_expected_of_what_is_no_number() -> None:
     assert not len(Expectation.of(TWO, covariance, (5e-3, 5e-3, 0.1)).spots)
 
 
+def test_how_far_touches_are_from_where_they_are_expected() -> None:
+    ours, off = expected(TWO), np.array([0.003, -0.002, 0.1, 1e-4])
+    assert ours.away(TWO, (0, 1)) == ours.away(TWO[:0], ()) == 0.0
+    far = float((off[:3] ** 2 / np.diag(ours.covariances[1])).max())
+    assert ours.away(TWO[::-1] + np.array([off, 0 * off]), (1, 0)) == pytest.approx(far)
+    assert ours.away(TWO, (0, None)) == ours.away(TWO, ()) == math.inf
+
+
 def test_a_touch_where_it_is_expected_is_likelier_than_a_newcomer() -> None:
     frame = replace(problem(model().solver, TWO, 0.01), expected=expected(TWO))
     none = Deficit.none(len(model().solver.table.basis))

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.touch import LIVE
+from tomoskin.touch.fit.expectation import Expectation
+from tomoskin.touch.fit.refine import Deficit
+from tomoskin.touch.fit.rival import challenged
+from tomoskin.touch.fit.search import judged
+from tomoskin.touch.fit.selection import ForwardSelection
 from touch.fit.scene import noise
-from touch.fit.test_finder import NOTHING, data, press
+from touch.fit.test_finder import NOTHING, data, model, press
 from touch.fit.test_pace import finder
+from touch.fit.test_table import expected, problem
 
 STRONG = press(0.03, 0.0, depth=-0.5)
 
@@ -31,3 +40,19 @@ def test_a_touch_that_no_frame_alone_shows_is_found_after_some() -> None:
 def test_noise_beside_a_touch_is_no_rival_for_long() -> None:
     nothing = press(-0.02, 0.0)[:0]
     assert counts(nothing, 4, frames=200) == [1] * 200
+
+
+def test_a_touch_that_left_its_place_in_vain_goes_back_and_another_has_begun() -> None:
+    faint = np.concatenate([press(-0.04, 0.02, 0.018, -0.06), press(0.0, -0.02, 0.018, -0.06)])
+    freely = problem(model().solver, faint, 0.01)
+    frame = replace(freely, expected=expected(faint[:1]))
+    deficit = Deficit.none(len(model().solver.table.basis))
+    matched = model().candidates.matched(frame.seen)
+    selection = ForwardSelection(frame, matched, 5.0, 5, LIVE, deficit)
+    between = freely.refined(faint.mean(axis=0)[None], deficit, 12).spots
+    moved = judged(selection, frame.refined(between, deficit, 0, (0,)))
+    assert selection.proposed(moved.fit) is None
+    both, _ = challenged(selection, moved, None, lambda _: Expectation.none())
+    away = np.linalg.norm(both.fit.spots[:, None, :2] - faint[:, :2], axis=2).min(axis=0)
+    assert len(both.fit.spots) == 2
+    assert away.max() < 0.015

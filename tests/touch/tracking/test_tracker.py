@@ -40,6 +40,20 @@ def test_beside_another_no_touch_begins_in_its_first_frame() -> None:
     assert run([[detection(-0.05), detection(0.05, snr=30.0)]] * 2).shown[-1] == [1, 2]
 
 
+def test_what_was_beside_a_touch_and_is_gone_does_not_hold_it_back() -> None:
+    run = Run(10)([[detection(-0.05)], [detection(0.05, snr=15.0)]])
+    assert run.shown == [[1], [1, 2]]
+
+
+@pytest.mark.parametrize("rate", [10, 40])
+def test_a_touch_is_reported_where_it_is_or_after_a_moment(rate: float) -> None:
+    vague = {"sd_x": 0.010, "sd_y": 0.010}
+    run = Run(rate)([[detection(0, **vague)], [detection(0.01)]])
+    assert run.shown == [[], [1]]
+    shown = Run(rate)([[detection(0, **vague)]] * 20).shown
+    assert 0.1 * rate < shown.index([1]) < 0.15 * rate + 2
+
+
 def test_a_touch_tells_since_when_by_the_host() -> None:
     run = Run(10)([[]] * 3 + [[detection(0, **FAINT)]] * 3)
     assert run.touches[-1][0].since == pytest.approx(100.3)

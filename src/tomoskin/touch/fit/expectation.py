@@ -53,6 +53,16 @@ class Expectation:
         """(m, 3, 3) inverse of the covariances."""
         return np.asarray(np.linalg.inv(self.covariances))
 
+    def away(self, spots: FloatArray, known: Known) -> float:
+        """The largest squared deviation, along one column, of ``spots`` (k, 4) from where they are
+        expected; of newcomers without bound, and 0 where there are none."""
+        numbers = [number for number in known if number is not None]
+        if len(numbers) < len(spots):
+            return math.inf
+        off = spots[:, :CONTENT] - self.spots[numbers, :CONTENT]
+        variances = self.covariances.diagonal(axis1=1, axis2=2)[numbers]
+        return float((off * off / variances).max(initial=0.0))
+
     @cached_property
     def log_volumes(self) -> FloatArray:
         """(m,) logarithm of one over the density at the most likely."""

@@ -21,6 +21,10 @@ _BORN = -4.0
 _DROPPED = -12.0
 """Logarithm of the odds below which it is given up."""
 
+_ASTRAY = 9.0
+"""Squared deviations from where it is expected, beyond which a touch may have left its place to
+explain another one that has begun."""
+
 GoingOn = Callable[[SpotDetections], Expectation]
 """What is expected of the touches of one frame in the next."""
 
@@ -85,9 +89,21 @@ def _followed(
 
 
 def _proposed(selection: ForwardSelection, found: Fit) -> tuple[Fit | None, float]:
-    """One spot more than was found, where something stands out, and what it is worth."""
-    proposed = selection.proposed(found)
-    if proposed is None:
-        return None, -math.inf
-    problem = selection.problem
-    return proposed, problem.evidence(proposed) - problem.evidence(found)
+    """The best that has one spot more than was found, and what it is worth."""
+    best, most = None, -math.inf
+    for fit in (selection.proposed(found), _beside_expected(selection, found)):
+        evidence = -math.inf if fit is None else selection.problem.evidence(fit)
+        if evidence > most:
+            best, most = fit, evidence
+    return best, most - selection.problem.evidence(found) if best else most
+
+
+def _beside_expected(selection: ForwardSelection, found: Fit) -> Fit | None:
+    """One spot beside those that are expected, where these may have left their places in vain."""
+    expected = selection.problem.expected
+    if len(found.spots) != len(expected.spots) or expected.away(found.spots, found.known) < _ASTRAY:
+        return None
+    known = tuple(range(len(expected.spots)))
+    return selection.proposed(
+        selection.problem.refined(expected.spots, selection.deficit, 0, known)
+    )

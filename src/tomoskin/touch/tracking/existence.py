@@ -40,11 +40,15 @@ _CLUTTER = 3.0
 _LIFE = 2.0
 """Seconds that a touch lasts, as an expectation before it has ended."""
 
-_MISSES = 0.2
+_MISSES = 0.15
 """Probability that a finder loses a touch, however strong, for a frame."""
 
 _COHERENCE = 0.02
 """Seconds within which frames tell the same."""
+
+_REACH, _SOUGHT = 0.025, 0.15
+"""Metres within which a touch must be where it is reported, as surely as it is there at all; and
+seconds after which it is reported wherever it may be."""
 
 
 def first(detection: Detection, threshold: float, strongest: float) -> float:
@@ -73,6 +77,13 @@ def missed(odds: float, snr: float, least: float, seconds: float) -> float:
     faint = 0.0 if math.isnan(snr) else 0.5 * math.erfc((snr - least) / (1 + 0.2 * snr) / 2**0.5)
     lost = math.log(max(_MISSES, faint))
     return math.log(there) - math.log1p(-there) + _share(seconds) * lost
+
+
+def placed(detection: Detection, seconds: float) -> bool:
+    """Whether it is known where a touch is, or it has been seen for so many ``seconds`` that it is
+    reported all the same: its first frames may have seen it come down."""
+    variance = detection.sd_x**2 + detection.sd_y**2
+    return not BEGUN * variance > _REACH**2 or seconds > _SOUGHT
 
 
 def _standing_out(snr: float, threshold: float, strongest: float) -> float:

@@ -113,7 +113,7 @@ class Tracker:
     def _begin(self, index: int, frame: FrameOfTouches, beside: dict[int, Alone]) -> None:
         self._keys += 1
         detection = frame.detections[index]
-        others = any(trace.reported for trace in self._traces)
+        others = any(trace.reported and trace.missing is None for trace in self._traces)
         odds = existence.first(detection, self.settings.snr, frame.strongest if others else 0.0)
         state = begin(frame.seen[index].position, self.settings)
         clock = self._clock
@@ -142,7 +142,8 @@ class Tracker:
         if trace.missing is not None or trace.detection.snr < self.settings.snr:
             self._traces.remove(trace)
             return
-        if trace.odds < existence.BEGUN:
+        seconds = self._clock.now - trace.since
+        if trace.odds < existence.BEGUN or not existence.placed(trace.detection, seconds):
             return
         if self._residuals.explain(trace.detection, self._clock.now, self._traces):
             self._traces.remove(trace)
