@@ -161,9 +161,11 @@ class Lab:
         self.by_image = finding(self._image, self.reference)
 
     def found(self, finder: Finder, change: Floats) -> Sequence[Detection]:
-        """Touches of a frame of this ``change`` (n_meas,) V after one in which nothing touches."""
+        """What begins a touch in a frame of this ``change`` (n_meas,) V, after one in which nothing
+        touches."""
         finder.push(self._view(0 * change))
-        return finder.push(self._view(change))
+        least = self.skin.touch.snr
+        return [d for d in finder.push(self._view(change)) if not d.weak and d.snr >= least]
 
     def change(self, fingers: Sequence[Finger]) -> Floats:
         """(n_meas,) V by which one frame differs from the reference."""

@@ -12,6 +12,8 @@ from tomoskin.core import Detection, FloatArray
 from tomoskin.forward import ForwardModel
 from tomoskin.skin import Skin
 from tomoskin.touch.fit import SpotFinder, SpotModel, position_bound, spots_of
+from tomoskin.touch.fit.search import vague
+from tomoskin.touch.fit.watch import FrameWatch
 from touch.fit.scene import covariance, noise, whitener
 
 NOTHING = np.zeros((208, 0))
@@ -123,6 +125,27 @@ def test_as_many_as_there_are(places: list[tuple[float, float]]) -> None:
     assert len(found) == len(places)
     apart = np.linalg.norm(spots[:, None, :2] - [place(r) for r in found], axis=2)
     assert apart.min(axis=1).max() < 0.006
+
+
+def test_presses_that_look_like_a_rise_between_them_are_presses(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    two = np.concatenate([press(-0.04, 0.0), press(0.05, 0.01)])
+    dv = data(two) + noise(16, 1, 6)[0]
+    expected = [place(detection) for detection in finder().push(dv, NOTHING)]
+    monkeypatch.setattr(FrameWatch, "sign", lambda *_: "both")
+    found = [place(detection) for detection in finder().push(dv, NOTHING)]
+    assert len(found) == 2
+    assert np.array(found) == pytest.approx(np.array(expected), abs=1e-6)
+
+
+def test_a_touch_is_vague_where_some_axis_of_its_ellipse_is_long() -> None:
+    two = data(np.concatenate([press(-0.04, 0.0), press(0.05, 0.01, depth=-0.1)]))
+    detected, _ = finder()._searched(two, NOTHING)
+    axes = [np.sqrt(np.linalg.norm(detected.covariance[i : i + 2, i : i + 2], 2)) for i in (0, 4)]
+    assert vague(detected, 0.9 * min(axes)).all()
+    assert vague(detected, float(np.mean(axes))).sum() == 1
+    assert not vague(detected, 1.1 * max(axes)).any()
 
 
 def test_one_strong_press_is_one() -> None:

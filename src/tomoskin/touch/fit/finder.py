@@ -27,7 +27,7 @@ from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
 from tomoskin.touch.fit.rival import Rival, challenged
-from tomoskin.touch.fit.search import SpotDetections, joined, search
+from tomoskin.touch.fit.search import SpotDetections, joined, search, vague
 from tomoskin.touch.fit.selection import ForwardSelection
 from tomoskin.touch.fit.sheet import fields_of, fitting_sheet
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
@@ -318,6 +318,11 @@ class SpotFinder:
         least, pace = self._settings.snr, self._pace
         selection = ForwardSelection(problem, matched, least, self._most, pace, self._deficit)
         detected = search(selection, self._before)
+        if pace.joint and sign != self._settings.sign:  # presses may look like a rise between them
+            own = replace(selection, problem=replace(problem, sign=self._settings.sign))
+            pressed = search(own, self._before)
+            if not problem.favours(detected.fit, pressed.fit):
+                detected = pressed
         rival, self._rival = self._rival, None
         if self._reach and sign != "both":
             detected, self._rival = challenged(selection, detected, rival, self._going_on)
@@ -389,10 +394,15 @@ class SpotFinder:
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots
         wrong = self.watch.wrong(spots).tolist()
+        weak = [False] * len(spots)
+        if self._pace.restart and len(spots):  # frames that follow each other tell more and more
+            weak = vague(detected, self._model.prior.radius).tolist()
         shown = [(k, spot) for k, spot in enumerate(spots.tolist()) if not wrong[k]]
-        return [self._detection(detected, k, spot) for k, spot in shown]
+        return [self._detection(detected, k, spot, weak[k]) for k, spot in shown]
 
-    def _detection(self, detected: SpotDetections, k: int, spot: list[float]) -> Detection:
+    def _detection(
+        self, detected: SpotDetections, k: int, spot: list[float], weak: bool
+    ) -> Detection:
         x, y, log_radius, content = spot
         (xx, xy), (_, yy) = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2].tolist()
         radius = math.exp(log_radius)
@@ -407,6 +417,7 @@ class SpotFinder:
             cov_xy=xy,
             snr=float(detected.ratio[k]),
             close=bool(detected.close[k]),
+            weak=weak,
         )
 
 

@@ -25,6 +25,24 @@ _SURE = 2.0
 """Times the ratio at which a touch begins: half the square of that is more than what a simpler
 explanation of the frame is worth."""
 
+_TRUE = 0.25
+"""Part of that ratio which a wrong profile may leave where evidence decides on further spots."""
+
+_FAINT = 0.7
+"""Part of that ratio by which each spot stands out then: a faint one may explain much."""
+
+_ONE_SIGN = float(np.log(2))
+"""Evidence of a spot that is not counted: the prior has contents of both signs."""
+
+_DETOUR = 1.5
+"""Evidence that a spot may cost beside which one more is tried: the two may be worth it."""
+
+_WIDE = 1.2
+"""Deviations of the prior by which a spot is so wide that it may be two."""
+
+_LEFT = 1.0
+"""Deviations of noise alone by which so much is left that a spot may be missing."""
+
 
 Start = tuple[FloatArray, Known]
 """Spots (k, 4), and who they are."""
@@ -158,21 +176,41 @@ class ForwardSelection:
 
     def _more(self, fit: Fit, tries: int) -> tuple[Fit, int]:
         """With further spots, while they are worth it; and how many of ``tries`` were tried."""
+        best = fit
         for tried in range(min(tries, self.most - len(fit.spots))):
-            look = self.pace.look if len(fit.spots) else HELD
-            fresh = self.beside.best(fit, self.threshold(fit, look))
-            if fresh is None:
-                return fit, tried
-            more = self._best(
-                _starts(fit, fresh), fit.deficit, self._joint_starts(len(fit.spots) + 1)
-            )
-            worth = self.ratios(more).min() >= self.threshold(fit, 1.0)
-            gain = self.problem.evidence(more) - self.problem.evidence(fit)
-            if not worth or gain <= self.pace.rare:
-                self.turn_down(fit, more)
-                return fit, tried + 1
+            starts, joint = self._openings(fit)
+            if not starts and not joint:
+                return best, tried
+            more, open_ = self._best(starts, fit.deficit, joint), self._is_open(fit)
+            worth = self.ratios(more).min() >= self.threshold(fit, _FAINT if open_ else 1.0)
+            gain = self.problem.evidence(more) - self.problem.evidence(best)
+            if worth and gain > (-_ONE_SIGN if open_ else self.pace.rare):
+                best = more
+            elif not open_ or gain < -_DETOUR:
+                self.turn_down(best, more)
+                return best, tried + 1
             fit = more
-        return fit, tries
+        return best, tries
+
+    def _openings(self, fit: Fit) -> tuple[list[Start], list[FloatArray]]:
+        """Where a fit with one spot more may begin: from this one, and whatever it has."""
+        look = self.pace.look if len(fit.spots) else HELD
+        fresh = self.beside.best(fit, self.threshold(fit, look))
+        if fresh is None and not (self._is_open(fit) and self._is_doubtful(fit)):
+            return [], []
+        starts = [] if fresh is None else _starts(fit, fresh)
+        return starts, self._joint_starts(len(fit.spots) + 1)
+
+    def _is_open(self, fit: Fit) -> bool:
+        """Whether the evidence decides on further spots: where sets are tried, and a wrong profile
+        leaves little of those that are there."""
+        return bool(self.pace.joint and len(fit.spots)) and misshapen(fit) < _TRUE * self.least
+
+    def _is_doubtful(self, fit: Fit) -> bool:
+        """Whether several spots may stand where a fit has one, though nothing stands out beside."""
+        widest = self.problem.prior.away(fit.spots)[:, LOG_RADIUS].max()
+        left = (fit.misfit - fit.degrees) / np.sqrt(2 * fit.degrees)
+        return bool(widest > _WIDE or left > _LEFT)
 
     def threshold(self, fit: Fit, part: float) -> float:
         """Deviations for that ``part`` of a touch; a wrong profile adds to the noise."""
