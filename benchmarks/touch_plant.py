@@ -161,11 +161,9 @@ class Lab:
         self.by_image = finding(self._image, self.reference)
 
     def found(self, finder: Finder, change: Floats) -> Sequence[Detection]:
-        """What begins a touch in a frame of this ``change`` (n_meas,) V, after one in which nothing
-        touches."""
+        """Touches of a frame of this ``change`` (n_meas,) V after one in which nothing touches."""
         finder.push(self._view(0 * change))
-        least = self.skin.touch.snr
-        return [d for d in finder.push(self._view(change)) if not d.weak and d.snr >= least]
+        return finder.push(self._view(change))
 
     def change(self, fingers: Sequence[Finger]) -> Floats:
         """(n_meas,) V by which one frame differs from the reference."""

@@ -12,7 +12,6 @@ from tomoskin.core import Detection, FloatArray
 from tomoskin.forward import ForwardModel
 from tomoskin.skin import Skin
 from tomoskin.touch.fit import SpotFinder, SpotModel, position_bound, spots_of
-from tomoskin.touch.fit.search import vague
 from tomoskin.touch.fit.watch import FrameWatch
 from touch.fit.scene import covariance, noise, whitener
 
@@ -137,15 +136,6 @@ def test_presses_that_look_like_a_rise_between_them_are_presses(
     found = [place(detection) for detection in finder().push(dv, NOTHING)]
     assert len(found) == 2
     assert np.array(found) == pytest.approx(np.array(expected), abs=1e-6)
-
-
-def test_a_touch_is_vague_where_some_axis_of_its_ellipse_is_long() -> None:
-    two = data(np.concatenate([press(-0.04, 0.0), press(0.05, 0.01, depth=-0.1)]))
-    detected, _ = finder()._searched(two, NOTHING)
-    axes = [np.sqrt(np.linalg.norm(detected.covariance[i : i + 2, i : i + 2], 2)) for i in (0, 4)]
-    assert vague(detected, 0.9 * min(axes)).all()
-    assert vague(detected, float(np.mean(axes))).sum() == 1
-    assert not vague(detected, 1.1 * max(axes)).any()
 
 
 def test_one_strong_press_is_one() -> None:

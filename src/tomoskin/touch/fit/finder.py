@@ -27,7 +27,7 @@ from tomoskin.touch.fit.pace import EXHAUSTIVE, Pace
 from tomoskin.touch.fit.prior import SpotPrior
 from tomoskin.touch.fit.refine import Deficit, Problem, Solver, WhitenedTable
 from tomoskin.touch.fit.rival import Rival, challenged
-from tomoskin.touch.fit.search import SpotDetections, joined, search, vague
+from tomoskin.touch.fit.search import SpotDetections, joined, search
 from tomoskin.touch.fit.selection import ForwardSelection
 from tomoskin.touch.fit.sheet import fields_of, fitting_sheet
 from tomoskin.touch.fit.solver import NumpySolver, SheetDomain
@@ -394,15 +394,10 @@ class SpotFinder:
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots
         wrong = self.watch.wrong(spots).tolist()
-        weak = [False] * len(spots)
-        if self._pace.restart and len(spots):  # frames that follow each other tell more and more
-            weak = vague(detected, self._model.prior.radius).tolist()
         shown = [(k, spot) for k, spot in enumerate(spots.tolist()) if not wrong[k]]
-        return [self._detection(detected, k, spot, weak[k]) for k, spot in shown]
+        return [self._detection(detected, k, spot) for k, spot in shown]
 
-    def _detection(
-        self, detected: SpotDetections, k: int, spot: list[float], weak: bool
-    ) -> Detection:
+    def _detection(self, detected: SpotDetections, k: int, spot: list[float]) -> Detection:
         x, y, log_radius, content = spot
         (xx, xy), (_, yy) = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2].tolist()
         radius = math.exp(log_radius)
@@ -417,7 +412,6 @@ class SpotFinder:
             cov_xy=xy,
             snr=float(detected.ratio[k]),
             close=bool(detected.close[k]),
-            weak=weak,
         )
 
 

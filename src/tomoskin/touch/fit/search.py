@@ -87,13 +87,6 @@ def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:
     return np.asarray(apart < 2 * np.exp(fit.spots[:, LOG_RADIUS]))
 
 
-def vague(detected: SpotDetections, within: float) -> NDArray[np.bool_]:
-    """(k,) of which touches the position is not known to ``within`` m along every axis."""
-    k = len(detected.fit.spots)
-    own = detected.covariance.reshape(k, N_PARAMETERS, k, N_PARAMETERS)[range(k), :2, range(k), :2]
-    return np.asarray(np.linalg.norm(own, 2, axis=(1, 2)) > within**2)
-
-
 def joined(detected: SpotDetections) -> SpotDetections:
     """The same with each two touches as one whose positions are not distinct (2 deviations)."""
     places = detected.fit.spots[:, :2].tolist()

@@ -204,7 +204,7 @@ class ForwardSelection:
     def _is_open(self, fit: Fit) -> bool:
         """Whether the evidence decides on further spots: where sets are tried, and a wrong profile
         leaves little of those that are there."""
-        return bool(self.pace.joint and len(fit.spots)) and misshapen(fit) < _TRUE * self.least
+        return bool(self.pace.joint) and len(fit.spots) > 1 and misshapen(fit) < _TRUE * self.least
 
     def _is_doubtful(self, fit: Fit) -> bool:
         """Whether several spots may stand where a fit has one, though nothing stands out beside."""
