@@ -372,9 +372,7 @@ class Reduced:
     def __new__(
         cls,
         profile: tuple[float, float, float, float, float, float],
-        interaction: tuple[
-            NDArray[np.float64], float, NDArray[np.float32], NDArray[np.float32]
-        ],
+        interaction: tuple[NDArray[np.float64], float, NDArray[np.float32], NDArray[np.float32]],
         certificate: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
         numbers: tuple[float, float, float],
         neighbours: int,
