@@ -11,9 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from tomoskin.touch.fit.expectation import Expectation, newcomers
+from tomoskin.touch.fit.openings import HELD, misshapen
 from tomoskin.touch.fit.refine import Fit
 from tomoskin.touch.fit.search import SpotDetections, judged
-from tomoskin.touch.fit.selection import HELD, ForwardSelection, misshapen
+from tomoskin.touch.fit.selection import ForwardSelection
 
 _BORN = -4.0
 """Logarithm of the odds that one frame must give a rival, beginning apart."""

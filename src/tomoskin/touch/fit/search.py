@@ -47,7 +47,7 @@ def search(selection: ForwardSelection, before: FloatArray) -> SpotDetections:
     answer = selection.problem.solver.searched(selection.question, before)
     fit = selection.found(before) if answer is None else answer.fit
     if answer and answer.others:
-        selection.beside.remember(fit, answer.others)
+        selection.openings.beside.remember(fit, answer.others)
     if answer and answer.turned_down:
         selection.turn_down(fit, answer.turned_down)
     return judged(selection, _confirmed(selection, fit, before))
@@ -62,7 +62,7 @@ def _confirmed(selection: ForwardSelection, fit: Fit, before: FloatArray) -> Fit
         return exact
     fewer = selection.again(before)
     other = problem.corrected(fewer, pace.closing, pace.near, pace.tolerance)
-    worth = selection.ratios(exact).min() >= selection.threshold(other, 1.0)
+    worth = selection.ratios(exact).min() >= selection.openings.threshold(other, 1.0)
     gain = problem.evidence(exact) - problem.evidence(other)
     return exact if worth and gain > pace.rare else other
 
@@ -79,8 +79,8 @@ def judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
 
 def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:
     """Where a candidate within a radius of a spot stands out nearly enough."""
-    ratio, _ = selection.beside.ratios(fit)
-    doubtful = selection.matched.spots[ratio > selection.threshold(fit, _DOUBTFUL), :2]
+    ratio, _ = selection.openings.beside.ratios(fit)
+    doubtful = selection.matched.spots[ratio > selection.openings.threshold(fit, _DOUBTFUL), :2]
     if not len(doubtful):
         return np.zeros(len(fit.spots), dtype=bool)
     apart = np.linalg.norm(fit.spots[:, None, :2] - doubtful, axis=2).min(axis=1)
