@@ -175,8 +175,8 @@ Fitted = tuple[
     tuple[float, float, float, bool],
     list[int | None],
 ]
-"""Spots (k, 4), each (k, c), slopes (4k, c), unknown (q, c), normal (4k, 4k); predicted (c,),
-residual (c,), gradient (4k,); misfit, log_size, cost, settled; known (k): see
+"""Spots (k, 4), each (k, c), slopes (4k, c), unknown (q, c), normal (4k, 4k); change (rank,),
+predicted (c,), residual (c,), gradient (4k,); misfit, log_size, cost, settled; known (k): see
 tomoskin.touch.fit.refine.Fit."""
 
 @final

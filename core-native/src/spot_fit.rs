@@ -478,9 +478,8 @@ impl Frame<'_> {
 fn summed(parts: &[f64], rank: usize) -> Vec<f64> {
     let mut sum = vec![0.0; rank];
     for part in parts.chunks_exact((ROWS * rank).max(1)) {
-        sum.iter_mut()
-            .zip(part)
-            .for_each(|(sum, value)| *sum += value);
+        let both = sum.iter_mut().zip(part);
+        both.for_each(|(sum, value)| *sum += value);
     }
     sum
 }

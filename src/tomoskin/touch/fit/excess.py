@@ -86,6 +86,39 @@ class Channels:
 
 
 @dataclass(frozen=True, eq=False)
+class PartsOfChannels:
+    """Which parts are of which channel: those of one after those of the other.
+
+    Attributes
+    ----------
+    n_channels
+        Of all.
+    some
+        Channels that have parts.
+    starts, count
+        Of each of these its first part, and how many it has.
+    """
+
+    n_channels: int
+    some: IntArray
+    starts: IntArray
+    count: IntArray
+
+    @classmethod
+    def of(cls, count: IntArray) -> Self:
+        """Where each channel has so many, (n_channels,)."""
+        some = np.flatnonzero(count)
+        return cls(len(count), some, (np.cumsum(count) - count)[some], count[some])
+
+    def means(self, values: FloatArray) -> FloatArray:
+        """(…, n_channels) means of ``values`` (…, n) over each channel's; 0 where it has none."""
+        out = np.zeros((*values.shape[:-1], self.n_channels))
+        if len(self.some):
+            out[..., self.some] = np.add.reduceat(values, self.starts, axis=-1) / self.count
+        return out
+
+
+@dataclass(frozen=True, eq=False)
 class Gauge:
     """Channels as they show in what no touch can do, for one covariance of the noise.
 
@@ -100,8 +133,8 @@ class Gauge:
         (n_seen, n_pairs) 1/V: how the parts that can be seen, one channel's after the other, show
         in the pairs' differences where these are white; as one deviation of noise does. In single
         precision: it is read through in each frame.
-    starts, count
-        (n_channels,) its first part among these, and how many it has.
+    parts
+        Whose these are.
     variance
         (n_channels,) V² of noise in a part that shows as much as all other noise in its direction.
     limit
@@ -113,8 +146,7 @@ class Gauge:
 
     pairs: Reciprocity
     shows: NDArray[np.float32]
-    starts: IntArray
-    count: IntArray
+    parts: PartsOfChannels
     variance: FloatArray
     limit: FloatArray
     judged: IntArray
@@ -142,16 +174,15 @@ class Gauge:
         order = order[shows[order]]
         yield
         count = np.bincount(channels.channel[order], minlength=len(channels.names))
-        starts = np.cumsum(count) - count
-        own = [directions[order[a : a + n]] for a, n in zip(starts, count, strict=True)]
+        ends, parts = np.cumsum(count), PartsOfChannels.of(count)
+        own = [directions[order[b - n : b]] for b, n in zip(ends, count, strict=True)]
         spread = np.array([np.linalg.norm(d @ d.T) / max(len(d), 1) for d in own])
         limit = np.where(count >= _FEWEST, 1 + _LIMIT * np.sqrt(2) * spread, np.inf)
         return cls(
             pairs=channels.pairs,
             shows=(directions[order] @ whiten.matrix).astype(np.float32),
-            starts=starts,
-            count=count,
-            variance=_means(1 / squares[order], starts, count),
+            parts=parts,
+            variance=parts.means(1 / squares[order]),
             limit=limit,
             judged=np.flatnonzero(np.isfinite(limit)),
         )
@@ -169,32 +200,14 @@ class Gauge:
         seen[0], seen[1:] = one[0] - other[0], one + other
         # one by one: a product with so few columns takes three times as long
         along = np.array([self.shows @ column for column in seen], np.float64)
-        squares, (some, starts, count) = np.zeros(len(self.count)), self._parts
-        if not len(some):
-            return squares
-        differs, gains, changes = np.add.reduceat(along * along, starts, axis=1) / count
+        differs, gains, changes = self.parts.means(along * along)
         allowed = _MOVES**2 * changes + _GAINS**2 * gains
-        squares[some] = differs - (allowed + allowed.sum() / len(squares)) / 2
-        return squares
-
-    @cached_property
-    def _parts(self) -> tuple[IntArray, IntArray, IntArray]:
-        """Channels with parts, the first of each, and how many it has."""
-        some = np.flatnonzero(self.count)
-        return some, self.starts[some], self.count[some]
+        return np.asarray(differs - (allowed + allowed.mean()) / 2)
 
     @cached_property
     def loudest(self) -> float:
         """The median channel's mean square up to which all channels may be as they should."""
         return 1 + (_common(self.limit, self) - 1) / 2
-
-
-def _means(values: FloatArray, starts: IntArray, count: IntArray) -> FloatArray:
-    """(n_channels,) means of ``values`` (n,) over each channel's; 0 where it has none."""
-    out, some = np.zeros(len(count)), np.flatnonzero(count)
-    if len(some):
-        out[some] = np.add.reduceat(values, starts[some]) / count[some]
-    return out
 
 
 def _white(covariance: FloatArray, nuisance: FloatArray) -> Whitener:

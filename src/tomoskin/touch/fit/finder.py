@@ -229,7 +229,7 @@ class SpotFinder:
         self._pace, self._reach, self._unrest = pace, pace.speed * scan_time, 1.0
         self._fading = math.ceil(pace.fading / scan_time) if scan_time else 0
         self._residual = ResidualResponse.none()
-        self._left = ResidualDirections.none(np.zeros((0, len(model.scale))))
+        self._left = ResidualDirections.none()
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
         self._before = np.zeros((0, N_PARAMETERS))
@@ -295,10 +295,7 @@ class SpotFinder:
         if times != 1.0:
             seen, matched = seen.louder(times), matched.louder(times)
         whitened, rest = seen.whitened(data)
-        left = (
-            self._left if self._left.matrix is seen.matrix else ResidualDirections.none(seen.matrix)
-        )
-        self._left = left.of(self._residual.changes)
+        self._left = self._left.of(seen.matrix, self._residual.changes)
         problem = Problem(
             response=self._model.response,
             reduced=self._model.reduced,

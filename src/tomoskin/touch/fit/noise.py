@@ -213,20 +213,22 @@ class ResidualDirections:
     rows: FloatArray
 
     @classmethod
-    def none(cls, matrix: FloatArray) -> Self:
+    def none(cls) -> Self:
         """Where nothing has touched."""
-        return cls(matrix, (), np.zeros((0, len(matrix))))
+        return cls(np.zeros((0, 0)), (), np.zeros((0, 0)))
 
-    def of(self, changes: tuple[FloatArray, ...]) -> Self:
-        """Those of other ``changes``: a product for each that is new."""
-        if changes is self.changes:
+    def of(self, matrix: FloatArray, changes: tuple[FloatArray, ...]) -> Self:
+        """Those of other ``changes``: a product for each that is new, and for all where the
+        ``matrix`` is."""
+        if matrix is self.matrix and changes is self.changes:
             return self
-        known = {id(change): row for change, row in zip(self.changes, self.rows, strict=True)}
+        before = zip(self.changes, self.rows, strict=True) if matrix is self.matrix else ()
+        known = {id(change): row for change, row in before}
         rows = [
-            known[id(change)] if id(change) in known else _LEFT * (self.matrix @ change)
+            known[id(change)] if id(change) in known else _LEFT * (matrix @ change)
             for change in changes
         ]
-        return type(self)(self.matrix, changes, np.array(rows).reshape(-1, len(self.matrix)))
+        return type(self)(matrix, changes, np.array(rows).reshape(-1, len(matrix)))
 
 
 def _is_near(foot: list[float], spot: list[float]) -> bool:

@@ -132,7 +132,7 @@ class ForwardSelection:
             if worth and gain > (-_ONE_SIGN if open_ else self.pace.rare):
                 best = more
             elif not open_ or gain < -_DETOUR:
-                self.turn_down(best, more)
+                self.turn_down(fit, more)
                 return best, tried + 1
             fit = more
         return best, tries
