@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import queue
 from dataclasses import replace
 
@@ -10,7 +9,7 @@ import pytest
 
 from recording.runs import TOUCH
 from sink.conftest import EVENT, PATIENCE, moment_at, robot_program
-from tomoskin import source
+from tomoskin import sink, source
 from tomoskin.sink import ContactListener, Naming
 from tomoskin.twin import Press
 
@@ -40,26 +39,26 @@ def test_the_first_lines_of_the_documentation_react_to_a_touch(monkeypatch):
     program = robot_program("tomoskin")
     assert len([line for line in program.splitlines() if line.strip()]) <= MOST_LINES
     open_source, opened = source.open_source, []
-    heard = queue.SimpleQueue()
+    heard, standing = queue.SimpleQueue(), queue.SimpleQueue()
 
     def keep(*arguments):
         opened.append(open_source(*arguments))
         return opened[-1]
 
+    def listener(react):
+        return ContactListener(lambda contacts: (standing.put(contacts.valid), react(contacts)))
+
     def press(_):
-        """Until it is said; a first one may fall into the reference."""
-        for _ in range(PATIENCE):
-            (twin,) = opened
-            twin.set_presses(())
-            with contextlib.suppress(queue.Empty):
-                heard.get(timeout=2.0)
-            twin.set_presses((Press(0.03, 0.02, force=5.0, radius=0.015),))
-            with contextlib.suppress(queue.Empty):
-                return said.append(heard.get(timeout=2.0))
-        return None
+        """Once the reference stands: a press before would be a part of it."""
+        while not standing.get(timeout=PATIENCE):
+            pass
+        (twin,) = opened
+        twin.set_presses((Press(0.03, 0.02, force=5.0, radius=0.015),))
+        said.append(heard.get(timeout=PATIENCE))
 
     said = []
     monkeypatch.setattr(source, "open_source", keep)
+    monkeypatch.setattr(sink, "ContactListener", listener)
     names = {"print": lambda *words: heard.put(words), "input": press}
     exec(compile(program, "robot.md", "exec"), names)
     ((_, position, normal),) = said
